@@ -14,7 +14,7 @@
 #include "calib/registration/change_of_reference.h"
 #include "calib/registration/frame_structure.h"
 #include "calib/registration/radial_causes.h"
-#include "calib/registration/reading_gates.h"
+#include "calib/registration/reading_checks.h"
 #include "calib/registration/scale_causes.h"
 #include "calib/registration/scale_tracking.h"
 #include "calib/sharpness/sharpest_reading.h"
@@ -79,12 +79,13 @@ class Calibrator {
     result_.reason = reason;
     return false;
   }
-  // Returns whether a gate let enough frames pass.
+  // Returns whether a quality check let enough frames pass.
   bool Passed(const std::optional<std::string>& refusal) { return !refusal || Refuse(*refusal); }
 
   void Measure() {
     const bool needs_scale = options_.fit_blur || !sweep_.offset_mm;
-    if (MeasureAndGate() && MeasureSharpness() && (needs_scale ? FindDepths() : BelieveDepths())) {
+    if (MeasureAndCheck() && MeasureSharpness() &&
+        (needs_scale ? FindDepths() : UseGivenOffset())) {
       result_.source = RunSourceRecipe(sweep_.camera, result_.frames, used());
       FitPeak();
       if (options_.fit_blur) {
@@ -94,10 +95,11 @@ class Calibrator {
       }
     }
     FindSharpest();
-    NamePlainCause();
+    ReportRootCause();
   }
 
-  // Runs also for a sweep that is refused, on the frames that passed the gates of the light.
+  // Runs also for a sweep that is refused, on the frames that passed the quality checks of the
+  // light.
   void FindSharpest() {
     const SharpestReading found = FindSharpestReading(result_.frames, used());
     if (found.done || !result_.sharpest.done) result_.sharpest = found;
@@ -116,7 +118,7 @@ class Calibrator {
   }
 
   // The reason of a refusal is often only the consequence of a simpler cause.
-  void NamePlainCause() {
+  void ReportRootCause() {
     const std::string exposure =
         ExposureAdvice(result_.frames, [this] { return store_.Stored(0).depth() == CV_16U; });
     if (result_.outcome != Outcome::kRefused) {
@@ -155,18 +157,18 @@ class Calibrator {
 
   cv::Mat Grey(std::size_t frame) { return store_.Grey(frame); }
 
-  // Applies the absolute gates to every frame, then the blank gate against the median of the frames
-  // that passed them.
-  bool MeasureAndGate() {
+  // Applies the absolute checks to every frame, then the blank quality check against the median of
+  // the frames that passed them.
+  bool MeasureAndCheck() {
     ParallelFor(static_cast<int>(sweep_.frames.size()), options_.threads, [&](int i) {
       const auto index = static_cast<std::size_t>(i);
       result_.frames[index].statistics =
           MeasureFrame(RegionOf(store_.Stored(index), sweep_, index), store_.Grey(index));
       Tick();
     });
-    GateOptions gates = options_.gates;
-    gates.edge_target |= sweep_.target == model::SweepTarget::kKnifeEdge;
-    return Passed(selection_.KeepMeasurable(gates));
+    QualityCheckOptions checks = options_.checks;
+    checks.edge_target |= sweep_.target == model::SweepTarget::kKnifeEdge;
+    return Passed(selection_.KeepMeasurable(checks));
   }
 
   bool MeasureSharpness() {
@@ -207,9 +209,9 @@ class Calibrator {
     std::vector<ScaleSample> samples = TrackScale(
         sweep_, [this](std::size_t frame) { return Grey(frame); }, used(), reference_, known_mm,
         options_.threads, [this] { Tick(); });
-    result_.scale = FitScaleLaw(samples, static_cast<int>(reference_), sweep_.reading_sigma_mm,
-                                sweep_.direction, RegionCornerRadiusPx(sweep_));
-    ReckonWithFalloff(kUsualRatio, result_.scale.reference_depth_mm, &result_.scale);
+    result_.scale = FitScaleModel(samples, static_cast<int>(reference_), sweep_.reading_sigma_mm,
+                                  sweep_.direction, RegionCornerRadiusPx(sweep_));
+    CorrectForFalloff(kDefaultRatio, result_.scale.reference_depth_mm, &result_.scale);
     const bool is_lone_edge = IsLoneEdge(sweep_, used().size(), samples.size(), result_.scale);
     if (is_lone_edge) ForgetScales(sweep_, &samples, &result_.scale);
     for (const ScaleSample& sample : samples) {
@@ -243,12 +245,12 @@ class Calibrator {
     } else {
       return Refuse(ReasonOfUnknownOffset(result_.scale));
     }
-    if (ShowsDistortion(result_) || FindBend(scales_, result_.scale, sweep_))
+    if (ShowsDistortion(result_) || FindScaleNonlinearity(scales_, result_.scale, sweep_))
       LookForStructure(scales_);
     if (const auto refusal = CheckDistortion(&result_)) return Refuse(*refusal);
-    slip_ = FindSlip(scales_, result_.scale);
-    if (slip_) WarnOfSlip(*slip_, &result_);
-    bend_ = CheckBend(sweep_, scales_, &result_);
+    slip_ = FindReadingStep(scales_, result_.scale);
+    if (slip_) WarnOfReadingStep(*slip_, &result_);
+    bend_ = CheckScaleNonlinearity(sweep_, scales_, &result_);
     return PlacedWithinReach();
   }
 
@@ -280,7 +282,7 @@ class Calibrator {
   }
 
   // Takes the given bench zero and the readings as they are.
-  bool BelieveDepths() {
+  bool UseGivenOffset() {
     TakeGivenOffset();
     return PlacedWithinReach();
   }
@@ -305,7 +307,7 @@ class Calibrator {
   // The image scale's zero is the centre of perspective. Its distance from the aperture depends on
   // the blur and on how the light spreads over the pupil, which is unknown for a real lens: the
   // paper's law gives the value, and the other laws give an interval around it.
-  void ReckonWithFalloff(double blur_ratio, double focus_depth_mm, ScaleLaw* law) const {
+  void CorrectForFalloff(double blur_ratio, double focus_depth_mm, ScaleModel* law) const {
     const model::Camera& camera = sweep_.camera;
     law->offset_of_pupil_laws_mm.setConstant(law->offset_mm.value);
     if (!law->done || !(focus_depth_mm > camera.lens.front_focal_length_mm)) return;
@@ -363,8 +365,8 @@ class Calibrator {
     task.reference = reference_;
     task.scales = scales_;
     task.scale_centre_mm = result_.scale.centre_mm;
-    task.law =
-        result_.scale.kind == ScaleKind::kConstant ? BlurLaw::kTelecentric : BlurLaw::kPerspective;
+    task.law = result_.scale.kind == ScaleKind::kConstant ? BlurModel::kTelecentric
+                                                          : BlurModel::kPerspective;
     task.scale_follows_readings = result_.scale.done;
     task.offset_mm = {result_.bench_offset_mm->value, result_.bench_offset_mm->sigma};
     task.reading_sigma_mm = sweep_.reading_sigma_mm;
@@ -382,7 +384,8 @@ class Calibrator {
     BlurFitResult fit;
     const Calibration before = result_;
     SolveFocus(sweep_, &evidence, &fit, &result_);
-    if (ReplaceRejectedReference(before) || MovesZero(before)) return MeasureAndSolve();
+    if (ReplaceRejectedReference(before) || RefineOffsetWithFittedBlur(before))
+      return MeasureAndSolve();
     if (!result_.frames[reference_].rejection.empty()) return;
     if (sweep_.target_period_mm) CheckMagnification(sweep_, reference_, Grey(reference_), &result_);
     if (result_.outcome == Outcome::kRefused) return;
@@ -410,13 +413,13 @@ class Calibrator {
     }
     if (slip_) {
       WidenByTrials("jump of the readings", "find what slipped, or take the sweep again",
-                    WithoutSlip(sweep_, setup, *slip_, scales_, reference_, result_), fit,
+                    WithoutReadingStep(sweep_, setup, *slip_, scales_, reference_, result_), fit,
                     &result_);
     }
     if (bend_ && !sweep_.offset_mm) {
       const double half_mm = 0.5 * std::abs(bend_->zero_spread_mm);
       const double zero_mm = setup.offset_mm.value;
-      WidenByTrials("bend of the image scale", BendRemedy(result_.structure),
+      WidenByTrials("nonlinearity of the image scale", NonlinearityRemedy(result_.structure),
                     WithOffsets(setup, {zero_mm - half_mm, zero_mm + half_mm}), fit, &result_);
     }
   }
@@ -444,11 +447,11 @@ class Calibrator {
 
   // The bench zero of the image scale was found with a usual blur ratio. It is found once more if
   // the fitted ratio moves it by more than a part of its error.
-  bool MovesZero(const Calibration& before) {
+  bool RefineOffsetWithFittedBlur(const Calibration& before) {
     if (sweep_.offset_mm || zero_is_settled_ || !result_.blur_ratio) return false;
     zero_is_settled_ = true;
     Calibration again = before;
-    ReckonWithFalloff(result_.blur_ratio->value, result_.focus_depth_mm->value, &again.scale);
+    CorrectForFalloff(result_.blur_ratio->value, result_.focus_depth_mm->value, &again.scale);
     const Result& zero_mm = again.scale.offset_mm;
     if (!(std::abs(zero_mm.value - before.scale.offset_mm.value) > kZeroMoves * zero_mm.sigma))
       return false;
@@ -470,12 +473,12 @@ class Calibrator {
   const CalibrationOptions& options_;
   FrameStore store_;
   Calibration result_;
-  FrameSelection selection_{&result_.frames};  // frames that passed the gates
+  FrameSelection selection_{&result_.frames};  // frames that passed the quality checks
   std::size_t reference_ = 0;                  // the sharpest of them, normalised
   std::vector<ScaleSample> scales_;            // registered frames
   ScaleCauses causes_;                         // possible causes of the scales
-  std::optional<Slip> slip_;
-  std::optional<Bend> bend_;
+  std::optional<ReadingStep> slip_;
+  std::optional<ScaleNonlinearity> bend_;
   bool zero_is_settled_ = false;
   // The zero from the image scale where it contradicts the given one.
   std::optional<model::Estimate> conflicting_offset_mm_;
@@ -489,15 +492,15 @@ class Calibrator {
 bool HasEnoughFrames(const FocusSweep& sweep, std::string* why) {
   std::set<double> distinct;
   for (const model::SweepFrame& frame : sweep.frames) distinct.insert(frame.reading_mm);
-  if (sweep.frames.size() < kFewestFrames) {
-    *why = fmt::format("a sweep needs at least {} frames, this one has {}", kFewestFrames,
+  if (sweep.frames.size() < kMinFrames) {
+    *why = fmt::format("a sweep needs at least {} frames, this one has {}", kMinFrames,
                        sweep.frames.size());
     return false;
   }
-  if (distinct.size() < kFewestFrames) {
+  if (distinct.size() < kMinFrames) {
     *why =
-        fmt::format("a sweep needs at least {} different readings, this one has {}{}",
-                    kFewestFrames, distinct.size(),
+        fmt::format("a sweep needs at least {} different readings, this one has {}{}", kMinFrames,
+                    distinct.size(),
                     distinct.size() == 1 ? fmt::format(" (all are {} mm)", *distinct.begin()) : "");
     return false;
   }
@@ -506,9 +509,9 @@ bool HasEnoughFrames(const FocusSweep& sweep, std::string* why) {
 
 bool CalibrationOptions::IsValid(std::string* why) const {
   if (threads < 0) return Fail(why, fmt::format("threads must be >= 0, found {}", threads));
-  if (!(gates.max_saturated_fraction >= 0)) {
-    return Fail(why, fmt::format("gates.max_saturated_fraction must be >= 0, found {}",
-                                 gates.max_saturated_fraction));
+  if (!(checks.max_saturated_fraction >= 0)) {
+    return Fail(why, fmt::format("checks.max_saturated_fraction must be >= 0, found {}",
+                                 checks.max_saturated_fraction));
   }
   return true;
 }

@@ -33,8 +33,8 @@ class Solution {
       : sweep_(sweep), evidence_(*evidence), fit_(*fit), result_(*calibration) {}
 
   void Run() {
-    if (evidence_.setup.meters.empty()) return Refuse(evidence_.message);
-    if (const auto reason = ThrowOutFrames(sweep_.direction, &evidence_, &result_))
+    if (evidence_.setup.estimators.empty()) return Refuse(evidence_.message);
+    if (const auto reason = RejectOutliers(sweep_.direction, &evidence_, &result_))
       return Refuse(*reason);
     CompareChoices(sweep_.camera.psf, &evidence_);
     const FloorChoice choice = ChooseFloor(sweep_.floor, evidence_, &result_.warnings);
@@ -108,9 +108,9 @@ class Solution {
     blur.chi2_per_dof = fit_.chi2_per_dof;
     blur.weak_direction = fit_.weak_direction;
     blur.weak_correlation = fit_.weak_correlation;
-    blur.meter = evidence_.edges < 0      ? "relative spectrum"
-                 : evidence_.spectrum < 0 ? "edges"
-                                          : "edges and relative spectrum";
+    blur.estimator = evidence_.edges < 0      ? "relative spectrum"
+                     : evidence_.spectrum < 0 ? "edges"
+                                              : "edges and relative spectrum";
     blur.family = sweep_.camera.psf;
     blur.tails = evidence_.taken_tails;
     if (evidence_.spectrum >= 0) blur.band = UsualBand(sweep_.camera.psf);
@@ -129,16 +129,16 @@ class Solution {
   }
 
   void FillFrames() {
-    for (std::size_t m = 0; m < evidence_.setup.meters.size(); ++m) {
-      const BlurSamples& meter = evidence_.setup.meters[m];
-      for (std::size_t i = 0; i < meter.frames.size(); ++i) {
-        const std::size_t f = meter.frames[i];
+    for (std::size_t m = 0; m < evidence_.setup.estimators.size(); ++m) {
+      const BlurSamples& estimator = evidence_.setup.estimators[m];
+      for (std::size_t i = 0; i < estimator.frames.size(); ++i) {
+        const std::size_t f = estimator.frames[i];
         FrameMeasurement& frame = Frame(f);
         const auto row = static_cast<Eigen::Index>(i);
         const double s2 = std::pow(evidence_.setup.frames[f].scale, 2);
         const double variance =
-            std::max(0.0, (meter.variances_px2[row] - fit_.softness_px2[m]) * s2);
-        const double error = std::sqrt(std::max(0.0, meter.covariance(row, row))) * s2;
+            std::max(0.0, (estimator.variances_px2[row] - fit_.softness_px2[m]) * s2);
+        const double error = std::sqrt(std::max(0.0, estimator.covariance(row, row))) * s2;
         frame.blur_sigma_px = std::sqrt(variance);
         // Near 0 the derivative of the root grows without bound; the root of the variance's error
         // limits it.
@@ -331,7 +331,7 @@ class Solution {
     result_.covariance = full(rows, rows);
   }
 
-  // Reports the frames that passed every gate and still do not constrain the blur.
+  // Reports the frames that passed every quality check and still do not constrain the blur.
   void NameUnused() {
     for (std::size_t f = 0; f < evidence_.frames.size(); ++f) {
       FrameMeasurement& frame = Frame(f);

@@ -9,9 +9,9 @@ namespace thicklens::calib {
 
 // Derives the results from the blur of the frames. It rejects frames that do not follow the others
 // (they are named in their `rejection`), chooses the floor's constraint, fits, estimates the
-// systematic interval from the unknown quantities, and decides the outcome. It reads gates, depths
-// and sharpness from `calibration` and fills in the rest. On return `evidence` holds the used
-// frames and the assumed floor, and `fit` holds the fit.
+// systematic interval from the unknown quantities, and decides the outcome. It reads quality
+// checks, depths and sharpness from `calibration` and fills in the rest. On return `evidence` holds
+// the used frames and the assumed floor, and `fit` holds the fit.
 void SolveFocus(const FocusSweep& sweep, BlurEvidence* evidence, BlurFitResult* fit,
                 Calibration* calibration);
 

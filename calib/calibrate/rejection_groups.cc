@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 
-#include "thicklens/calib/frame_gates.h"
+#include "thicklens/calib/frame_checks.h"
 
 namespace thicklens::calib {
 namespace {
@@ -20,7 +20,7 @@ std::vector<RejectionGroup> RejectionGroups(const std::vector<FrameMeasurement>&
   for (int i = 0; i < static_cast<int>(frames.size()); ++i) {
     const std::string& reason = frames[static_cast<std::size_t>(i)].rejection;
     if (reason.empty()) continue;
-    const std::string kind = RejectionKind(reason);
+    const std::string kind = FailedCheck(reason);
     auto group = std::find_if(groups.begin(), groups.end(),
                               [&](const RejectionGroup& g) { return g.kind == kind; });
     if (group == groups.end()) group = groups.insert(groups.end(), {kind, 0, {}});

@@ -10,10 +10,10 @@
 namespace thicklens::calib {
 namespace {
 
-constexpr int kFewestPixels = 100;
-constexpr int kMostPixels = 16000;
+constexpr int kMinPixels = 100;
+constexpr int kMaxPixels = 16000;
 // Minimum angle between two edges that count as crossing.
-constexpr double kLeastAngleRad = 0.9;
+constexpr double kMinAngleRad = 0.9;
 
 enum Parameter {
   kX,
@@ -116,9 +116,9 @@ class CornerFit : StepSearch<CornerModel> {
     parameters_[kX] = parameters_[kY] = parameters_[kTurn] = 0;
     const double half_px = std::min(feature_.half_width_px, 60.0);
     strip_ = {feature_.centre_px, feature_.angle_rad, half_px, half_px, arm_px};
-    pixels_ = GatherPixels(grey_, strip_, kMostPixels);
+    pixels_ = GatherPixels(grey_, strip_, kMaxPixels);
     if (without_core) DropCore();
-    return pixels_.size() >= kFewestPixels && pixels_.coverage > 0.9 && StartLevels();
+    return pixels_.size() >= kMinPixels && pixels_.coverage > 0.9 && StartLevels();
   }
 
   void DropCore() {
@@ -176,7 +176,7 @@ class CornerFit : StepSearch<CornerModel> {
     const double width_px = feature_.half_width_px;
     const double between_rad = CV_PI / 2 + parameters_[kSecondTurn] - parameters_[kTurn];
     return parameters_.allFinite() && std::hypot(parameters_[kX], parameters_[kY]) < width_px &&
-           between_rad > kLeastAngleRad && between_rad < CV_PI - kLeastAngleRad &&
+           between_rad > kMinAngleRad && between_rad < CV_PI - kMinAngleRad &&
            std::min(parameters_[kVariance], parameters_[kSecondVariance]) > -1 &&
            LargerSigma() < width_px;
   }

@@ -9,7 +9,7 @@
 namespace thicklens::calib {
 namespace {
 
-constexpr int kFewestEdges = 12;
+constexpr int kMinEdges = 12;
 
 }  // namespace
 
@@ -21,7 +21,7 @@ std::optional<SourceEdgeBlur> MeasureSourceEdgeBlur(const cv::Mat& grey) {
     const double ratio = sharp.magnitude.at<float>(edge) / reblurred.magnitude.at<float>(edge);
     if (ratio > 1 && std::isfinite(ratio)) sigmas.push_back(1 / std::sqrt(ratio * ratio - 1));
   }
-  if (sigmas.size() < kFewestEdges) return std::nullopt;
+  if (sigmas.size() < kMinEdges) return std::nullopt;
   return SourceEdgeBlur{Median(sigmas), static_cast<int>(sigmas.size())};
 }
 

@@ -11,7 +11,7 @@ namespace thicklens::calib {
 namespace {
 
 constexpr int kSmallestSide = 24;
-constexpr int kMostScales = 4;
+constexpr int kMaxScales = 4;
 constexpr double kSmoothingSigma = 1;
 
 // Noise of a gradient component, measured at quiet places. The magnitude of a gradient that
@@ -135,7 +135,7 @@ std::vector<FrameScale> FrameScales(const cv::Mat& grey) {
   std::vector<FrameScale> scales;
   cv::Mat reduced = grey;
   double factor = 1;
-  while (static_cast<int>(scales.size()) < kMostScales &&
+  while (static_cast<int>(scales.size()) < kMaxScales &&
          std::min(reduced.cols, reduced.rows) >= kSmallestSide) {
     FrameScale scale;
     scale.factor = factor;

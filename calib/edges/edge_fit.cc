@@ -9,9 +9,9 @@
 namespace thicklens::calib {
 namespace {
 
-constexpr int kFewestPixels = 60;
+constexpr int kMinPixels = 60;
 constexpr int kSeedPixels = 1500;
-constexpr int kMostPixels = 16000;
+constexpr int kMaxPixels = 16000;
 // A sag beyond this part of the edge's length is a curve, not an edge that distortion has bent.
 constexpr double kLargestSag = 0.02;
 
@@ -113,7 +113,7 @@ class EdgeFit : StepSearch<EdgeModel> {
     if (!EndsAreInside() || !Seed()) return std::nullopt;
     // The second round, in the right width, moves the blur by less than its error. The third round
     // uses all pixels.
-    for (const int most : {2 * kSeedPixels, kMostPixels}) {
+    for (const int most : {2 * kSeedPixels, kMaxPixels}) {
       const double sigma_px = SigmaOf(parameters_[kVariance]);
       if (!(feature_.half_width_px >= LeastHalfWidthPx(sigma_px))) return std::nullopt;
       if (!Gather(std::min(feature_.half_width_px, StripHalfWidthPx(sigma_px)), most)) {
@@ -150,7 +150,7 @@ class EdgeFit : StepSearch<EdgeModel> {
     // its levels may come from a texture.
     strip_.is_long = 4 * feature_.half_length_px >= std::min(grey_.cols, grey_.rows);
     pixels_ = GatherPixels(grey_, strip_, most);
-    return pixels_.size() >= kFewestPixels && pixels_.coverage > 0.5 && StartLevels();
+    return pixels_.size() >= kMinPixels && pixels_.coverage > 0.5 && StartLevels();
   }
 
   // Computes the means of the two sides. Returns whether they are finite and differ.

@@ -14,8 +14,8 @@ namespace {
 
 constexpr int kHalfWidth = 32;  // half width of the patch, px of the scale
 constexpr int kColumns = 2 * kHalfWidth + 1;
-constexpr int kMostRows = 64;
-constexpr int kFewestRows = 7;
+constexpr int kMaxRows = 64;
+constexpr int kMinRows = 7;
 constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 // Maximum departure of a plateau from a step, relative to the contrast.
 constexpr double kTolerance = 0.06;
@@ -30,7 +30,7 @@ class Patch {
   Patch(const FrameScale& scale, const StraightRegion& line)
       : noise_(scale.gradient_noise), line_(line) {
     const int wanted = static_cast<int>(2 * line.half_length) + 1;
-    rows_ = std::min(wanted, kMostRows);
+    rows_ = std::min(wanted, kMaxRows);
     spacing_ = 2 * line.half_length / std::max(rows_ - 1, 1);
     values_.resize(static_cast<std::size_t>(rows_ * kColumns));
     const Eigen::Vector2d normal(std::cos(line.normal_rad), std::sin(line.normal_rad));
@@ -226,12 +226,12 @@ float SampleAt(const cv::Mat& grey, const Eigen::Vector2d& at) {
 std::optional<FeatureCandidate> UndisturbedStep(const FrameScale& scale,
                                                 const StraightRegion& region) {
   Patch rough(scale, region);
-  if (rough.rows() < kFewestRows || !rough.Describe()) return std::nullopt;
+  if (rough.rows() < kMinRows || !rough.Describe()) return std::nullopt;
   const StraightRegion line = rough.Aligned();
   Patch patch(scale, line);
   if (!patch.Describe()) return std::nullopt;
   patch.KeepUndisturbed();
-  if (patch.kept().Count() < kFewestRows || !patch.Describe()) return std::nullopt;
+  if (patch.kept().Count() < kMinRows || !patch.Describe()) return std::nullopt;
   if (patch.plateau() < patch.reach() + 1) return std::nullopt;
 
   // A structure beyond an end disturbs the rows as far as the blur reaches. The rows that it

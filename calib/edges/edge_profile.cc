@@ -18,10 +18,10 @@ namespace {
 constexpr double kNarrowestBoxPx = 1e-4;
 // Phi(-6) = 1e-9.
 constexpr double kGaussianReach = 6;
-constexpr double kLeastVariancePx2 = 0.02;
+constexpr double kMinVariancePx2 = 0.02;
 // Minimum width of the Gaussian behind a disc. A narrower one would only lengthen the series: the
 // pixel's box is ten times as wide.
-constexpr double kLeastFloorPx = 0.1;
+constexpr double kMinFloorPx = 0.1;
 
 // The normal distribution Phi(x/sigma), its first antiderivative x Phi + sigma phi, px, and its
 // second one [(x^2 + sigma^2) Phi + x sigma phi]/2, px^2, all 0 at -infinity. The formulas are
@@ -41,8 +41,8 @@ Antiderivatives Gaussian(double x, double sigma) {
 
 EdgeProfile::EdgeProfile(model::Psf psf, double variance_px2, double floor_px, double normal_rad) {
   // A fit may try any value; NaN is treated as the minimum.
-  const double shown_px2 = variance_px2 > kLeastVariancePx2 ? variance_px2 : kLeastVariancePx2;
-  const double gaussian_px2 = std::pow(std::max(floor_px, kLeastFloorPx), 2);
+  const double shown_px2 = variance_px2 > kMinVariancePx2 ? variance_px2 : kMinVariancePx2;
+  const double gaussian_px2 = std::pow(std::max(floor_px, kMinFloorPx), 2);
   if (psf == model::Psf::kDisc && shown_px2 > gaussian_px2) {
     TabulateDisc(gaussian_px2, shown_px2, normal_rad);
   } else {

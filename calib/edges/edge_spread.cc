@@ -13,8 +13,8 @@ namespace {
 
 // Maximum number of candidates in one scale. A frame full of texture has hundreds of false
 // candidates.
-constexpr int kMostCandidates = 96;
-constexpr int kMostMeasured = 32;
+constexpr int kMaxCandidates = 96;
+constexpr int kMaxMeasured = 32;
 
 // Whether a and b show the same line, side by side, or the same corner.
 bool IsSame(const EdgeFeature& a, const EdgeFeature& b) {
@@ -110,7 +110,7 @@ std::vector<EdgeFeature> FindEdges(const cv::Mat& grey, int most) {
   std::vector<FeatureCandidate> candidates;
   for (const FrameScale& scale : FrameScales(grey)) {
     for (const auto& found :
-         {EdgeCandidates(scale, kMostCandidates), CornerCandidates(scale, kMostCandidates)}) {
+         {EdgeCandidates(scale, kMaxCandidates), CornerCandidates(scale, kMaxCandidates)}) {
       candidates.insert(candidates.end(), found.begin(), found.end());
     }
   }
@@ -142,7 +142,7 @@ std::optional<FrameEdgeSpread> MeasureEdgeSpread(const cv::Mat& grey, model::Psf
                                                  double floor_px) {
   std::vector<BlurSigma> x, y;
   FrameEdgeSpread frame;
-  for (const EdgeFeature& feature : FindEdges(grey, kMostMeasured)) {
+  for (const EdgeFeature& feature : FindEdges(grey, kMaxMeasured)) {
     const auto fit = FitEdgeSpread(grey, feature, psf, floor_px, false);
     if (!fit) continue;
     if (fit->across_x) x.push_back(*fit->across_x);

@@ -34,8 +34,8 @@ struct Sums {
   }
 };
 
-// A camera clips at some grey value, which need not be its full scale. The values then pile up at
-// the largest one and lose their noise, independently of the fit.
+// A camera clips at some grey value, which need not be its full scale. The values then are clipped
+// at the largest one and lose their noise, independently of the fit.
 bool IsClipped(const FeaturePixels& pixels, const std::vector<double>& bright) {
   const double largest = *std::max_element(pixels.grey.begin(), pixels.grey.end());
   Sums dark_steps, bright_steps;

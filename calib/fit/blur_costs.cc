@@ -7,7 +7,7 @@ namespace thicklens::calib {
 namespace {
 
 bool IsSamePoint(const BlurParameters& a, const BlurParameters& b) {
-  return a.global == b.global && a.softness_px2 == b.softness_px2 && a.scale_law == b.scale_law;
+  return a.global == b.global && a.softness_px2 == b.softness_px2 && a.scale_model == b.scale_model;
 }
 
 }  // namespace
@@ -24,7 +24,7 @@ BlurCost::BlurCost(const BlurResiduals& residuals, BlurParameters start)
 std::vector<double*> BlurCost::Blocks(const BlurResiduals& residuals, BlurParameters* parameters) {
   std::vector<double*> blocks = {parameters->global.data()};
   for (double& softness : parameters->softness_px2) blocks.push_back(&softness);
-  if (residuals.has_scales()) blocks.push_back(parameters->scale_law.data());
+  if (residuals.has_scales()) blocks.push_back(parameters->scale_model.data());
   return blocks;
 }
 
@@ -34,7 +34,7 @@ BlurParameters BlurCost::At(double const* const* blocks) const {
   for (std::size_t m = 0; m < point.softness_px2.size(); ++m)
     point.softness_px2[m] = *blocks[1 + m];
   if (residuals_.has_scales())
-    point.scale_law = Eigen::Map<const Eigen::Vector3d>(blocks[1 + point.softness_px2.size()]);
+    point.scale_model = Eigen::Map<const Eigen::Vector3d>(blocks[1 + point.softness_px2.size()]);
   return point;
 }
 

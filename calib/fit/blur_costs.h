@@ -8,12 +8,12 @@
 #include <vector>
 
 #include "calib/fit/blur_residuals.h"
-#include "calib/fit/error_elimination.h"
+#include "calib/fit/variable_projection.h"
 
 namespace thicklens::calib {
 
 // The cost that Ceres minimises: all residuals of a fit of the blur, with the readings' errors
-// eliminated. Its blocks are global, c of each meter, and the scale's law if there are scales;
+// eliminated. Its blocks are global, c of each estimator, and the scale's law if there are scales;
 // Blocks puts them in this order.
 class BlurCost : public ceres::CostFunction {
  public:

@@ -14,7 +14,7 @@ namespace {
 constexpr std::array<const char*, kBlurParameters> kNames = {"focus_depth_mm", "blur_ratio",
                                                              "blur_floor_px", "bench_offset_mm"};
 // Singular values below this part of the largest: the data do not determine that combination.
-constexpr double kLeastSingular = 1e-7;
+constexpr double kMinSingular = 1e-7;
 
 // Returns the chi^2 per degree of freedom that chance exceeds once in a hundred (Wilson and
 // Hilferty 1931) [L9].
@@ -72,7 +72,7 @@ std::optional<Eigen::MatrixXd> FillCovariance(const BlurJacobian& jacobian,
   const Eigen::MatrixXd scaled = jacobian.values * norms.cwiseInverse().asDiagonal();
   const Eigen::JacobiSVD<Eigen::MatrixXd> svd(scaled, Eigen::ComputeThinV);
   const Eigen::VectorXd& singular = svd.singularValues();
-  if (!(singular.tail<1>()[0] > kLeastSingular * singular[0])) {
+  if (!(singular.tail<1>()[0] > kMinSingular * singular[0])) {
     NameWeak(jacobian.free, svd.matrixV().rightCols<1>(), &result->weak_direction);
     result->message = "the data do not tell apart: " + result->weak_direction;
     return std::nullopt;

@@ -9,13 +9,13 @@ namespace thicklens::calib {
 namespace {
 
 // Number of a frame's features in which a straight edge is sought.
-constexpr int kMostFeatures = 8;
+constexpr int kMaxFeatures = 8;
 // Part of an edge's profile that is shown on each side.
 constexpr double kShownSigmas = 4, kShownBeyondPx = 1.5;
 
 BlurExample TransferExample(model::Psf stated, const FittedRegion& other,
                             const BlurEvidence& evidence, std::size_t i) {
-  const MeterRegion& region = evidence.region;
+  const EstimatorRegion& region = evidence.region;
   const RelativeBlur& blur = evidence.blur;
   const auto reference = static_cast<Eigen::Index>(region.reference);
   const double scale = region.samples[i].scale;
@@ -83,7 +83,7 @@ void AddTransferExamples(model::Psf stated, const FittedRegion& other, BlurEvide
 
 std::optional<EdgeComparison> EdgeExample(const cv::Mat& grey, std::size_t frame, model::Psf stated,
                                           double floor_px) {
-  for (const EdgeFeature& feature : FindEdges(grey, kMostFeatures)) {
+  for (const EdgeFeature& feature : FindEdges(grey, kMaxFeatures)) {
     if (feature.kind != EdgeFeature::Kind::kEdge) continue;
     const auto fit = FitEdgeSpread(grey, feature, stated, floor_px, true);
     if (!fit || fit->distance_px.empty()) continue;

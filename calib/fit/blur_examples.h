@@ -10,7 +10,7 @@ namespace thicklens::calib {
 
 // Curves of single frames with both fitted shapes of the blur, for plots.
 
-// Adds the transfer of the nearest, the sharpest and the farthest frame of the spectral meter.
+// Adds the transfer of the nearest, the sharpest and the farthest frame of the spectral estimator.
 // `other` is the fit with the shape that is not stated. Its curve is omitted where this fit is not
 // done or lacks the frame.
 void AddTransferExamples(model::Psf stated, const FittedRegion& other, BlurEvidence* evidence);

@@ -26,8 +26,8 @@ double HuberWeight(double standardised) {
 
 class Fit {
  public:
-  // There is one `information` for each meter.
-  Fit(const BlurFitSetup& setup, const std::vector<MeterInformation>& information)
+  // There is one `information` for each estimator.
+  Fit(const BlurFitSetup& setup, const std::vector<WhitenedCovariance>& information)
       : setup_(setup),
         information_(information),
         sign_(model::DirectionSign(setup.direction)),
@@ -35,9 +35,9 @@ class Fit {
     const auto n = static_cast<Eigen::Index>(setup.frames.size());
     parameters_.errors_mm = Eigen::VectorXd::Zero(n);
     weights_.readings = weights_.scales = Eigen::VectorXd::Ones(n);
-    for (const BlurSamples& meter : setup.meters)
-      weights_.meters.push_back(
-          Eigen::VectorXd::Ones(static_cast<Eigen::Index>(meter.frames.size())));
+    for (const BlurSamples& estimator : setup.estimators)
+      weights_.estimators.push_back(
+          Eigen::VectorXd::Ones(static_cast<Eigen::Index>(estimator.frames.size())));
   }
 
   // Without frames, only the parameters and their covariance are computed.
@@ -74,8 +74,8 @@ class Fit {
 
   bool Start(const BlurFitResult* start) {
     parameters_.softness_px2.clear();
-    for (const BlurSamples& meter : setup_.meters)
-      parameters_.softness_px2.push_back(meter.held_softness_px2.value_or(0));
+    for (const BlurSamples& estimator : setup_.estimators)
+      parameters_.softness_px2.push_back(estimator.held_softness_px2.value_or(0));
     parameters_.global[kBenchOffset] = setup_.offset_mm.value;
     parameters_.global[kFloorVariance] =
         setup_.floor_variance_px2 ? setup_.floor_variance_px2->value : 0.25;
@@ -83,46 +83,46 @@ class Fit {
       parameters_.global.head<3>() = start->values.head<3>();
       if (setup_.floor_variance_px2)
         parameters_.global[kFloorVariance] = setup_.floor_variance_px2->value;
-      for (std::size_t m = 0; m < setup_.meters.size(); ++m) {
-        if (!setup_.meters[m].held_softness_px2 && m < start->softness_px2.size())
+      for (std::size_t m = 0; m < setup_.estimators.size(); ++m) {
+        if (!setup_.estimators[m].held_softness_px2 && m < start->softness_px2.size())
           parameters_.softness_px2[m] = start->softness_px2[m];
       }
       return true;
     }
     const auto largest = std::max_element(
-        setup_.meters.begin(), setup_.meters.end(),
+        setup_.estimators.begin(), setup_.estimators.end(),
         [](const auto& a, const auto& b) { return a.frames.size() < b.frames.size(); });
-    if (largest == setup_.meters.end() || largest->frames.size() < 4) {
+    if (largest == setup_.estimators.end() || largest->frames.size() < 4) {
       return Fail(fmt::format("blur was measured on {} frames, at least 4 are needed",
-                              largest == setup_.meters.end() ? 0 : largest->frames.size()));
+                              largest == setup_.estimators.end() ? 0 : largest->frames.size()));
     }
     return StartFromParabola(*largest);
   }
 
-  bool StartFromParabola(const BlurSamples& meter) {
-    const auto n = static_cast<Eigen::Index>(meter.frames.size());
+  bool StartFromParabola(const BlurSamples& estimator) {
+    const auto n = static_cast<Eigen::Index>(estimator.frames.size());
     Eigen::VectorXd depths(n);
     double reference_mm = 0;
     for (Eigen::Index i = 0; i < n; ++i) {
-      const std::size_t f = meter.frames[static_cast<std::size_t>(i)];
+      const std::size_t f = estimator.frames[static_cast<std::size_t>(i)];
       depths[i] = Depth(f);
       reference_mm += depths[i] * setup_.frames[f].scale / static_cast<double>(n);
     }
     const Parabola parabola =
-        FitParabola(depths, meter.variances_px2, meter.covariance.diagonal().cwiseSqrt(),
+        FitParabola(depths, estimator.variances_px2, estimator.covariance.diagonal().cwiseSqrt(),
                     setup_.reading_sigma_mm);
     const auto found =
         FromParabola(parabola, setup_, reference_mm, parameters_.global[kFloorVariance]);
     if (!found) return Fail("the blur has no minimum in depth above the lens floor");
     parameters_.global[kFocusDepth] = found->focus_depth_mm;
     parameters_.global[kBlurRatio] = found->blur_ratio;
-    for (std::size_t m = 0; m < setup_.meters.size(); ++m) {
-      if (setup_.meters[m].held_softness_px2) continue;
+    for (std::size_t m = 0; m < setup_.estimators.size(); ++m) {
+      if (setup_.estimators[m].held_softness_px2) continue;
       std::vector<double> rests;
-      for (std::size_t i = 0; i < setup_.meters[m].frames.size(); ++i) {
-        const std::size_t f = setup_.meters[m].frames[i];
+      for (std::size_t i = 0; i < setup_.estimators[m].frames.size(); ++i) {
+        const std::size_t f = setup_.estimators[m].frames[i];
         rests.push_back(
-            setup_.meters[m].variances_px2[static_cast<Eigen::Index>(i)] -
+            setup_.estimators[m].variances_px2[static_cast<Eigen::Index>(i)] -
             PredictBlur(setup_, parameters_.global, Depth(f), setup_.frames[f].scale).value);
       }
       parameters_.softness_px2[m] = Median(rests);
@@ -134,8 +134,8 @@ class Fit {
     double* global = parameters_.global.data();
     problem->AddResidualBlock(new BlurCost(residuals, parameters_), nullptr,
                               BlurCost::Blocks(residuals, &parameters_));
-    for (std::size_t m = 0; m < setup_.meters.size(); ++m) {
-      if (setup_.meters[m].held_softness_px2)
+    for (std::size_t m = 0; m < setup_.estimators.size(); ++m) {
+      if (setup_.estimators[m].held_softness_px2)
         problem->SetParameterBlockConstant(&parameters_.softness_px2[m]);
     }
     std::vector<int> held = {kBenchOffset};
@@ -167,12 +167,12 @@ class Fit {
     return true;
   }
 
-  Eigen::VectorXd MeterResiduals(std::size_t m) const {
-    const BlurSamples& meter = setup_.meters[m];
-    Eigen::VectorXd rest(static_cast<Eigen::Index>(meter.frames.size()));
+  Eigen::VectorXd EstimatorResiduals(std::size_t m) const {
+    const BlurSamples& estimator = setup_.estimators[m];
+    Eigen::VectorXd rest(static_cast<Eigen::Index>(estimator.frames.size()));
     for (Eigen::Index i = 0; i < rest.size(); ++i) {
-      const std::size_t f = meter.frames[static_cast<std::size_t>(i)];
-      rest[i] = meter.variances_px2[i] - parameters_.softness_px2[m] -
+      const std::size_t f = estimator.frames[static_cast<std::size_t>(i)];
+      rest[i] = estimator.variances_px2[i] - parameters_.softness_px2[m] -
                 PredictBlur(setup_, parameters_.global, Depth(f), setup_.frames[f].scale).value;
     }
     return rest;
@@ -185,15 +185,16 @@ class Fit {
       change = std::max(change, std::abs(*weight - value));
       *weight = value;
     };
-    for (std::size_t m = 0; m < setup_.meters.size(); ++m) {
-      const Eigen::ArrayXd off = (MeterResiduals(m).array() /
-                                  (setup_.meters[m].covariance.diagonal().array() + 1e-12).sqrt())
-                                     .abs();
+    for (std::size_t m = 0; m < setup_.estimators.size(); ++m) {
+      const Eigen::ArrayXd off =
+          (EstimatorResiduals(m).array() /
+           (setup_.estimators[m].covariance.diagonal().array() + 1e-12).sqrt())
+              .abs();
       // Where a lens follows the law only roughly, single frames are not at fault.
       const double scatter =
           std::max(1.0, 1.4826 * Median(std::vector<double>(off.begin(), off.end())));
       for (Eigen::Index i = 0; i < off.size(); ++i)
-        set(&weights_.meters[m][i], HuberWeight(off[i] / scatter));
+        set(&weights_.estimators[m][i], HuberWeight(off[i] / scatter));
     }
     if (!ReadingsAreExact()) {
       for (Eigen::Index f = 0; f < weights_.readings.size(); ++f)
@@ -214,11 +215,11 @@ class Fit {
     jacobian.free = {kFocusDepth, kBlurRatio};
     if (!FloorIsHeld()) jacobian.free.push_back(kFloorVariance);
     std::vector<Eigen::Index> columns(jacobian.free.begin(), jacobian.free.end());
-    for (std::size_t m = 0; m < setup_.meters.size(); ++m) {
-      if (!setup_.meters[m].held_softness_px2)
+    for (std::size_t m = 0; m < setup_.estimators.size(); ++m) {
+      if (!setup_.estimators[m].held_softness_px2)
         columns.push_back(kBlurParameters + static_cast<Eigen::Index>(m));
     }
-    for (Eigen::Index c = kBlurParameters + static_cast<Eigen::Index>(setup_.meters.size());
+    for (Eigen::Index c = kBlurParameters + static_cast<Eigen::Index>(setup_.estimators.size());
          c < residuals.columns(); ++c)
       columns.push_back(c);
     if (FloorIsUncertain()) {
@@ -233,7 +234,7 @@ class Fit {
     jacobian.values = reduced.jacobian(Eigen::all, columns);
     jacobian.residuals = reduced.values;
     jacobian.eliminated = ReadingsAreExact() ? 0 : parameters_.errors_mm.size();
-    for (const Eigen::VectorXd& weights : weights_.meters)
+    for (const Eigen::VectorXd& weights : weights_.estimators)
       jacobian.lost_weight += (1 - weights.array()).sum();
     jacobian.lost_weight +=
         (1 - weights_.readings.array()).sum() + (1 - weights_.scales.array()).sum();
@@ -252,17 +253,17 @@ class Fit {
     return true;
   }
 
-  // Computes the residuals with the readings as written, relative to the errors of meter and
+  // Computes the residuals with the readings as written, relative to the errors of estimator and
   // reading together.
   void FillFrames() {
     const auto n = static_cast<Eigen::Index>(setup_.frames.size());
     result_.reading_errors_mm = parameters_.errors_mm;
     result_.residuals = Eigen::VectorXd::Zero(n);
     result_.weights = weights_.readings.cwiseMin(weights_.scales);
-    for (std::size_t m = 0; m < setup_.meters.size(); ++m) {
-      const BlurSamples& meter = setup_.meters[m];
-      for (std::size_t i = 0; i < meter.frames.size(); ++i) {
-        const std::size_t f = meter.frames[i];
+    for (std::size_t m = 0; m < setup_.estimators.size(); ++m) {
+      const BlurSamples& estimator = setup_.estimators[m];
+      for (std::size_t i = 0; i < estimator.frames.size(); ++i) {
+        const std::size_t f = estimator.frames[i];
         const auto row = static_cast<Eigen::Index>(f);
         const double as_written_mm =
             parameters_.global[kBenchOffset] + sign_ * setup_.frames[f].reading_mm;
@@ -270,18 +271,18 @@ class Fit {
             PredictBlur(setup_, parameters_.global, as_written_mm, setup_.frames[f].scale);
         const auto k = static_cast<Eigen::Index>(i);
         const double sigma =
-            std::hypot(std::sqrt(meter.covariance(k, k)), p.by_depth * setup_.reading_sigma_mm);
-        const double rest = meter.variances_px2[k] - parameters_.softness_px2[m] - p.value;
+            std::hypot(std::sqrt(estimator.covariance(k, k)), p.by_depth * setup_.reading_sigma_mm);
+        const double rest = estimator.variances_px2[k] - parameters_.softness_px2[m] - p.value;
         const double standardised = rest / std::max(sigma, 1e-9);
         if (std::abs(standardised) > std::abs(result_.residuals[row]))
           result_.residuals[row] = standardised;
-        result_.weights[row] = std::min(result_.weights[row], weights_.meters[m][k]);
+        result_.weights[row] = std::min(result_.weights[row], weights_.estimators[m][k]);
       }
     }
   }
 
   const BlurFitSetup& setup_;
-  const std::vector<MeterInformation>& information_;
+  const std::vector<WhitenedCovariance>& information_;
   double sign_ = 1;
   std::vector<std::size_t> scale_frames_;
   BlurParameters parameters_;
@@ -297,8 +298,9 @@ BlurFitResult FitBlur(const BlurFitSetup& setup, const BlurFitResult* start) {
     none.message = "no frame is left to fit";
     return none;
   }
-  std::vector<MeterInformation> information;  // one inversion for all rounds of all fits
-  for (const BlurSamples& meter : setup.meters) information.emplace_back(meter.covariance);
+  std::vector<WhitenedCovariance> information;  // one inversion for all rounds of all fits
+  for (const BlurSamples& estimator : setup.estimators)
+    information.emplace_back(estimator.covariance);
   BlurFitResult result = Fit(setup, information).Run(start, true);
   const double offset_sigma_mm = setup.offset_mm.sigma;
   if (!result.done || !(offset_sigma_mm > 0)) return result;

@@ -12,14 +12,14 @@
 namespace thicklens::calib {
 
 // Dependence of the blur on depth.
-enum class BlurLaw {
+enum class BlurModel {
   kPerspective,  // sigma^2 = S0 + A (1/z - 1/zf)^2, [S25], [S26] [D71]
   // sigma^2 = S0 + A ((z - zf)/zf^2)^2: a telecentric pupil, whose image scale does not change. The
   // slope at focus is equal to that of kPerspective, so that kappa has the same meaning.
   kTelecentric,
 };
 
-// The measurements of one meter: blur variance on the target, px^2 of the reference frame,
+// The measurements of one estimator: blur variance on the target, px^2 of the reference frame,
 //   V_i = sigma_i^2/scale_i^2 + c,
 // without the pixel box. c is a nuisance of the target: its own softness (print) or, for relative
 // measurements, the blur of the reference.
@@ -43,7 +43,7 @@ struct FitFrame {
 struct BlurFitSetup {
   model::ThickLens lens;
   double pixel_pitch_mm = 0;
-  BlurLaw law = BlurLaw::kPerspective;
+  BlurModel law = BlurModel::kPerspective;
   // The bench zero comes from elsewhere: it is held, and its error is propagated to the results. As
   // a free parameter it would absorb the deviations of a real lens from the blur law.
   model::Estimate offset_mm;
@@ -51,7 +51,7 @@ struct BlurFitSetup {
   double reading_sigma_mm = 0;
   bool reading_sigma_is_known = true;  // false: errors are estimated from the scatter about the fit
   std::vector<FitFrame> frames;
-  std::vector<BlurSamples> meters;
+  std::vector<BlurSamples> estimators;
   // S0, px^2: free, or given with its sigma (0: fixed).
   std::optional<model::Estimate> floor_variance_px2;
 };
@@ -65,11 +65,11 @@ struct BlurFitResult {
   // (zf mm, kappa, S0 px^2, offset mm) and their covariance. A held parameter has a row of 0.
   Eigen::Vector4d values{0, 0, 0, 0};
   Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
-  std::vector<double> softness_px2;  // c of each meter
+  std::vector<double> softness_px2;  // c of each estimator
   double chi2_per_dof = 0;
   double error_factor = 1;  // factor by which the errors were widened because of chi^2
   // For each frame: the written reading minus the fitted one, and its standard deviation; the
-  // residual of the blur in its own standard deviations (the largest of the meters); and the
+  // residual of the blur in its own standard deviations (the largest of the estimators); and the
   // weight.
   Eigen::VectorXd reading_errors_mm, reading_error_sigmas_mm, residuals, weights;
   std::string weak_direction;  // the least certain combination of parameters, and their correlation
@@ -89,8 +89,8 @@ double FittedDefocusVariance(const BlurFitSetup& setup, const BlurFitResult& fit
 // always where the readings' error is unknown. `start` replaces the search for a start.
 BlurFitResult FitBlur(const BlurFitSetup& setup, const BlurFitResult* start = nullptr);
 
-// A robust parabola V(z) through the samples of a meter, which any target follows whatever c is
-// (least trimmed squares over seeded triplets).
+// A robust parabola V(z) through the samples of an estimator, which any target follows whatever c
+// is (least trimmed squares over seeded triplets).
 struct Parabola {
   bool done = false;
   Eigen::Vector3d coefficients{0, 0, 0};  // coefficients of 1, x, x^2

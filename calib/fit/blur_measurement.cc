@@ -15,9 +15,9 @@
 namespace thicklens::calib {
 namespace {
 
-constexpr std::size_t kFewestFrames = 5;
-constexpr int kFewestModesOfFrame = 16;
-constexpr double kUsualFloor = 0.25;  // S0 at the start, px^2
+constexpr std::size_t kMinFrames = 5;
+constexpr int kMinModesOfFrame = 16;
+constexpr double kDefaultFloor = 0.25;  // S0 at the start, px^2
 constexpr double kWholeField = 0.98;
 constexpr std::size_t kFramesForBound = 9;
 constexpr double kModesOfAll = 30000;  // per ring, times frames
@@ -28,7 +28,7 @@ constexpr double kExpectedWell = 0.3;
 double FloorToStartWith(const model::FloorKnowledge& floor) {
   if (floor.given_px) return floor.given_px->value * floor.given_px->value;
   if (floor.from_px) return 0.5 * (*floor.from_px * *floor.from_px + *floor.to_px * *floor.to_px);
-  return kUsualFloor;
+  return kDefaultFloor;
 }
 
 class Measurement {
@@ -54,7 +54,7 @@ class Measurement {
     MeasureSpectra();
     MeasureEdges();
     evidence_.region = std::move(region_);
-    if (evidence_.setup.meters.empty() && evidence_.message.empty())
+    if (evidence_.setup.estimators.empty() && evidence_.message.empty())
       evidence_.message = "neither edges nor texture could be measured";
     return std::move(evidence_);
   }
@@ -78,7 +78,7 @@ class Measurement {
   FitFrame PlaceOf(std::size_t frame) const {
     FitFrame place;
     place.reading_mm = task_.sweep.frames[frame].reading_mm;
-    place.scale = task_.law == BlurLaw::kPerspective
+    place.scale = task_.law == BlurModel::kPerspective
                       ? FromCentreMm(task_.reference) / FromCentreMm(frame)
                       : 1.0;
     if (const ScaleSample* sample = Registered(frame)) {
@@ -123,8 +123,8 @@ class Measurement {
       evidence_.other_psf = EdgeSamples(chosen, evidence_.better_psf);
       if (evidence_.other_psf) evidence_.other_psf->held_softness_px2 = samples->held_softness_px2;
     }
-    evidence_.edges = static_cast<int>(evidence_.setup.meters.size());
-    evidence_.setup.meters.push_back(std::move(*samples));
+    evidence_.edges = static_cast<int>(evidence_.setup.estimators.size());
+    evidence_.setup.estimators.push_back(std::move(*samples));
   }
 
   // Measures the edges of the chosen frames of the task, with one shape of the blur.
@@ -147,7 +147,7 @@ class Measurement {
       errors.push_back(std::max(2 * both.sigma_px * both.error_px, both.error_px * both.error_px) /
                        s2);
     }
-    if (samples.frames.size() < kFewestFrames) return std::nullopt;
+    if (samples.frames.size() < kMinFrames) return std::nullopt;
     const auto n = static_cast<Eigen::Index>(variances.size());
     samples.variances_px2 = Eigen::Map<Eigen::VectorXd>(variances.data(), n);
     samples.covariance =
@@ -183,19 +183,19 @@ class Measurement {
 
   // ---- relative spectra ----
   void MeasureSpectra() {
-    double ratio = kUsualRatio;
+    double ratio = kDefaultRatio;
     for (int pass = 0; pass < kPasses; ++pass) {
       SetUp(ratio);
-      std::optional<MeterRegion> region =
+      std::optional<EstimatorRegion> region =
           PlanRegion(evidence_.spectral, kWholeField, Eigen::Vector2d::Zero());
       if (!region) {
         NoteNoSpectrum("too few frames see enough of the same target");
         return;
       }
-      std::vector<MeterRegion> regions = {std::move(*region)};
+      std::vector<EstimatorRegion> regions = {std::move(*region)};
       MeasureRegions(evidence_.spectral, &regions);
       region_ = std::move(regions.front());
-      if (region_.frames.size() < kFewestFrames || region_.modes.size() < 12) {
+      if (region_.frames.size() < kMinFrames || region_.modes.size() < 12) {
         NoteNoSpectrum("the target shows too little texture above the noise");
         return;
       }
@@ -218,26 +218,26 @@ class Measurement {
   void NoteNoSpectrum(const std::string& why) { evidence_.message = why; }
 
   void SetUp(double ratio) {
-    SpectralMeterSetup& meter = evidence_.spectral;
-    meter = {};
+    SpectralEstimatorSetup& estimator = evidence_.spectral;
+    estimator = {};
     const model::Sensor& sensor = task_.sweep.camera.sensor;
     const model::RegionOfInterest& roi = task_.sweep.roi;
-    meter.origin_px = sensor.principal_point_px - Eigen::Vector2d(roi.x, roi.y);
-    meter.size_px = roi.width > 0 ? Eigen::Vector2d(roi.width, roi.height)
-                                  : Eigen::Vector2d(sensor.width_px, sensor.height_px);
-    meter.psf = task_.sweep.camera.psf;
-    meter.threads = task_.threads;
+    estimator.origin_px = sensor.principal_point_px - Eigen::Vector2d(roi.x, roi.y);
+    estimator.size_px = roi.width > 0 ? Eigen::Vector2d(roi.width, roi.height)
+                                      : Eigen::Vector2d(sensor.width_px, sensor.height_px);
+    estimator.psf = task_.sweep.camera.psf;
+    estimator.threads = task_.threads;
     // The time of the fit grows with the square of the frames: with many, each needs fewer modes.
-    meter.modes_per_ring = std::clamp(
+    estimator.modes_per_ring = std::clamp(
         static_cast<int>(kModesOfAll / static_cast<double>(task_.frames.size())), 24, 200);
-    meter.tick = task_.tick;
-    meter.read_grey = [&store = task_.store](std::size_t frame) { return store.Grey(frame); };
+    estimator.tick = task_.tick;
+    estimator.read_grey = [&store = task_.store](std::size_t frame) { return store.Grey(frame); };
     evidence_.fit_index.clear();
     for (std::size_t i = 0; i < task_.frames.size(); ++i) {
       const std::size_t frame = task_.frames[i];
       const ScaleSample* sample = Registered(frame);
       if (sample == nullptr) continue;
-      MeterFrame entry;
+      EstimatorFrame entry;
       entry.frame = frame;
       entry.place.scale = sample->scale;
       entry.place.shift_px = sample->registration.shift_px;
@@ -247,8 +247,8 @@ class Measurement {
            ratio * ratio * DefocusVariance(evidence_.setup, focus_mm_, DepthMm(frame))) /
           (sample->scale * sample->scale);
       entry.pixel_noise = std::max(task_.pixel_noise, 1e-5);
-      if (frame == task_.reference) meter.reference = meter.frames.size();
-      meter.frames.push_back(entry);
+      if (frame == task_.reference) estimator.reference = estimator.frames.size();
+      estimator.frames.push_back(entry);
       evidence_.fit_index.push_back(i);
     }
   }
@@ -257,7 +257,7 @@ class Measurement {
   // chosen that they must be chosen again, with the measured blur.
   bool ExpectationWasFarOff(const RelativeBlur& blur, double* ratio) {
     BlurFitSetup setup = evidence_.setup;
-    setup.meters = {FitSamples(evidence_, blur, region_)};
+    setup.estimators = {FitSamples(evidence_, blur, region_)};
     setup.floor_variance_px2 = model::Estimate{evidence_.assumed_floor_px2, 0};
     const BlurFitResult fit = FitBlur(setup);
     if (!fit.done) return false;
@@ -278,8 +278,8 @@ class Measurement {
   }
 
   void Keep(const RelativeBlur& blur) {
-    evidence_.spectrum = static_cast<int>(evidence_.setup.meters.size());
-    evidence_.setup.meters.push_back(FitSamples(evidence_, blur, region_));
+    evidence_.spectrum = static_cast<int>(evidence_.setup.estimators.size());
+    evidence_.setup.estimators.push_back(FitSamples(evidence_, blur, region_));
     evidence_.frame_noise_ratios.assign(evidence_.setup.frames.size(), 0);
     for (std::size_t i = 0; i < region_.frames.size(); ++i)
       evidence_.frame_noise_ratios[evidence_.fit_index[region_.frames[i]]] =
@@ -290,12 +290,12 @@ class Measurement {
   const BlurTask& task_;
   BlurEvidence evidence_;
   double focus_mm_ = 0;
-  MeterRegion region_;
+  EstimatorRegion region_;
 };
 
 }  // namespace
 
-BlurSamples AsSamples(const RelativeBlur& blur, const MeterRegion& region) {
+BlurSamples AsSamples(const RelativeBlur& blur, const EstimatorRegion& region) {
   BlurSamples samples;
   samples.frames = region.frames;
   samples.variances_px2 = blur.variances_px2;
@@ -304,24 +304,24 @@ BlurSamples AsSamples(const RelativeBlur& blur, const MeterRegion& region) {
 }
 
 BlurSamples FitSamples(const BlurEvidence& evidence, const RelativeBlur& blur,
-                       const MeterRegion& region) {
+                       const EstimatorRegion& region) {
   BlurSamples samples = AsSamples(blur, region);
   for (std::size_t& f : samples.frames) f = evidence.fit_index[f];
   return samples;
 }
 
-FittedRegion FitRegion(MeterRegion region, const RelativeBlurOptions& options) {
+FittedRegion FitRegion(EstimatorRegion region, const RelativeBlurOptions& options) {
   while (true) {
     RelativeBlur blur = FitRelativeBlur(region.samples, region.reference, region.window,
                                         region.modes, region.leakage, options);
     if (!blur.done) return {std::move(region), std::move(blur)};
     std::set<std::size_t> empty;
     for (std::size_t i = 0; i < region.frames.size(); ++i) {
-      if (i != region.reference && blur.modes_used[i] < kFewestModesOfFrame)
+      if (i != region.reference && blur.modes_used[i] < kMinModesOfFrame)
         empty.insert(region.frames[i]);
     }
     if (empty.empty()) return {std::move(region), std::move(blur)};
-    if (region.frames.size() - empty.size() < kFewestFrames) {
+    if (region.frames.size() - empty.size() < kMinFrames) {
       blur.done = false;
       blur.message = fmt::format("the texture of {} frames is lost in blur or noise; {} are left",
                                  empty.size(), region.frames.size() - empty.size());

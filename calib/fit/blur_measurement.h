@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "calib/fit/blur_fit.h"
-#include "calib/spectrum/spectral_meter.h"
+#include "calib/spectrum/spectral_estimator.h"
 #include "calib/spectrum/spectral_options.h"
 #include "calib/sweep/frame_store.h"
 #include "thicklens/calib/calibration.h"
@@ -16,7 +16,7 @@
 
 namespace thicklens::calib {
 
-inline constexpr double kUsualRatio = 0.45;  // kappa at the start of a fit
+inline constexpr double kDefaultRatio = 0.45;  // kappa at the start of a fit
 
 // The input for the measurement of a sweep's blur.
 struct BlurTask {
@@ -25,11 +25,11 @@ struct BlurTask {
 
   const FocusSweep& sweep;
   FrameStore& store;
-  std::vector<std::size_t> frames;      // indices into the sweep; they passed the gates
+  std::vector<std::size_t> frames;      // indices into the sweep; they passed the quality checks
   std::size_t reference = 0;            // index into the sweep
   std::vector<ScaleSample> scales;      // registered frames
   bool scale_follows_readings = false;  // then they may constrain readings' errors
-  BlurLaw law = BlurLaw::kPerspective;
+  BlurModel law = BlurModel::kPerspective;
   model::Estimate offset_mm;
   double scale_centre_mm = 0;  // depth of the centre of perspective
   double reading_sigma_mm = 0;
@@ -40,28 +40,28 @@ struct BlurTask {
   std::function<void()> tick;  // called once per frame and pass
 };
 
-// The measurements of the meters.
+// The measurements of the estimators.
 struct BlurEvidence {
-  BlurFitSetup setup;               // has frames and meters; the floor is left open
+  BlurFitSetup setup;               // has frames and estimators; the floor is left open
   std::vector<std::size_t> frames;  // indices into the sweep, for each of setup.frames
-  int edges = -1, spectrum = -1;    // indices into setup.meters; -1: absent
+  int edges = -1, spectrum = -1;    // indices into setup.estimators; -1: absent
   // Edges of a target that is not stated to be an edge, where its texture is fitted. They give an
   // upper limit of the lens floor.
   std::optional<BlurSamples> unstated_edges;
-  // The spectral meter with other choices, for the systematic errors: see CompareChoices.
+  // The spectral estimator with other choices, for the systematic errors: see CompareChoices.
   std::optional<BlurSamples> other_psf, narrow_band;
   model::Psf better_psf = model::Psf::kGaussian;
   std::optional<double> gaussian_misfit, disc_misfit;
   double shape_dof = 0;  // degrees of freedom of each misfit; 0: they are means over few edges
   std::vector<BlurExample> examples;
   std::vector<double> frame_noise_ratios;  // spectral scatter over the pixel noise, of setup.frames
-  std::string message;                     // reason why there is no meter
-  // The spectral meter's own set-up with its results, for parts of the field and channels. It reads
-  // the frames from the task's store.
-  SpectralMeterSetup spectral;
+  std::string message;                     // reason why there is no estimator
+  // The spectral estimator's own set-up with its results, for parts of the field and channels. It
+  // reads the frames from the task's store.
+  SpectralEstimatorSetup spectral;
   std::vector<std::size_t> fit_index;  // for each of spectral.frames its index in setup.frames
   double assumed_floor_px2 = 0;        // S0 in a disc's transfer function
-  MeterRegion region;                  // the whole field, as measured
+  EstimatorRegion region;              // the whole field, as measured
   RelativeBlur blur;                   // the whole field, as fitted
   double taken_tails = 0;              // tails of the blur that the family includes (TakeTails)
 };
@@ -70,20 +70,21 @@ struct BlurEvidence {
 // spectra of all registered frames. The other choices are left open.
 BlurEvidence MeasureBlur(const BlurTask& task);
 
-// Returns one region's relative blur as samples of a fit. Their frames are indices of the meter.
-BlurSamples AsSamples(const RelativeBlur& blur, const MeterRegion& region);
+// Returns one region's relative blur as samples of a fit. Their frames are indices of the
+// estimator.
+BlurSamples AsSamples(const RelativeBlur& blur, const EstimatorRegion& region);
 
 // Returns the same samples with their frames as indices into evidence.setup.frames.
 BlurSamples FitSamples(const BlurEvidence& evidence, const RelativeBlur& blur,
-                       const MeterRegion& region);
+                       const EstimatorRegion& region);
 
 // The fit of a region's frames. Frames with almost no mode left in the band give no information
 // about such a blur, and are removed from the region.
 struct FittedRegion {
-  MeterRegion region;
+  EstimatorRegion region;
   RelativeBlur blur;
 };
-FittedRegion FitRegion(MeterRegion region, const RelativeBlurOptions& options);
+FittedRegion FitRegion(EstimatorRegion region, const RelativeBlurOptions& options);
 
 }  // namespace thicklens::calib
 

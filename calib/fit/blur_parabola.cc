@@ -14,7 +14,7 @@ namespace {
 constexpr int kTriplets = 400;
 constexpr double kTrimmed = 0.7;  // part of the samples by which a candidate is judged
 // A parabola passes three samples exactly and a fourth by chance.
-constexpr std::ptrdiff_t kFewestJudged = 5;
+constexpr std::ptrdiff_t kMinJudged = 5;
 constexpr double kFarOff = 6;          // standard deviations
 constexpr double kModelError = 0.002;  // part of the range of V: no lens follows the law better
 
@@ -95,7 +95,7 @@ class Search {
     const auto part =
         static_cast<std::ptrdiff_t>(std::ceil(kTrimmed * static_cast<double>(sorted.size())));
     const auto kept =
-        std::min(std::max(kFewestJudged, part), static_cast<std::ptrdiff_t>(sorted.size()));
+        std::min(std::max(kMinJudged, part), static_cast<std::ptrdiff_t>(sorted.size()));
     std::nth_element(sorted.begin(), sorted.begin() + kept - 1, sorted.end());
     double sum = 0;
     for (auto s = sorted.begin(); s != sorted.begin() + kept; ++s) sum += *s;
@@ -167,7 +167,7 @@ std::optional<FocusAndRatio> FromParabola(const Parabola& parabola, const BlurFi
   const double a2 = parabola.coefficients[2] / (parabola.unit_mm * parabola.unit_mm);
   FocusAndRatio found;
   double root = 0;  // sqrt(A)/zf
-  if (setup.law == BlurLaw::kPerspective) {
+  if (setup.law == BlurModel::kPerspective) {
     const double a = a2 * reference_depth_mm * reference_depth_mm;
     if (!(a > floor_variance_px2)) return std::nullopt;
     found.focus_depth_mm = parabola.vertex_mm * a / (a - floor_variance_px2);

@@ -16,7 +16,7 @@ Radius RadiusPx(const BlurFitSetup& setup, double zf, double z) {
   const double a = setup.lens.aperture_radius_mm / setup.pixel_pitch_mm;
   const double beyond = zf - f1;
   const double k = f1 * zf / beyond;
-  if (setup.law == BlurLaw::kPerspective) {
+  if (setup.law == BlurModel::kPerspective) {
     return {a * k * (1 / z - 1 / zf), a * f1 * (1 - f1 / z) / (beyond * beyond), -a * k / (z * z),
             2 * a * k / (z * z * z)};
   }

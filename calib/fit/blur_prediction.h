@@ -7,7 +7,8 @@
 
 namespace thicklens::calib {
 
-// V of a frame by the blur law, px^2 of the target and without the meter's c, with its derivatives.
+// V of a frame by the blur law, px^2 of the target and without the estimator's c, with its
+// derivatives.
 struct BlurPrediction {
   double value = 0;
   Eigen::Vector4d by_global{0, 0, 0, 0};  // derivatives in the order of BlurParameter

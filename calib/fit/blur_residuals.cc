@@ -11,14 +11,14 @@ namespace thicklens::calib {
 namespace {
 
 // A law of three terms needs more than three frames to constrain their errors.
-constexpr std::size_t kFewestScales = 6;
+constexpr std::size_t kMinScales = 6;
 
 Eigen::Index Size(std::size_t size) { return static_cast<Eigen::Index>(size); }
 
 }  // namespace
 
 BlurResiduals::BlurResiduals(const BlurFitSetup& setup,
-                             const std::vector<MeterInformation>& information,
+                             const std::vector<WhitenedCovariance>& information,
                              const BlurWeights& weights)
     : setup_(setup),
       information_(information),
@@ -30,8 +30,8 @@ BlurResiduals::BlurResiduals(const BlurFitSetup& setup,
       [](const FitFrame& a, const FitFrame& b) { return a.reading_mm < b.reading_mm; });
   middle_mm_ = 0.5 * (low->reading_mm + high->reading_mm);
   half_range_mm_ = std::max(0.5 * (high->reading_mm - low->reading_mm), 1e-9);
-  for (std::size_t m = 0; m < setup.meters.size(); ++m) {
-    factors_.push_back(information[m].Factors(weights.meters[m]));
+  for (std::size_t m = 0; m < setup.estimators.size(); ++m) {
+    factors_.push_back(information[m].Factors(weights.estimators[m]));
     rows_ += factors_.back().size();
   }
   if (setup.reading_sigma_mm > 0) readings_ = weights.readings.cwiseSqrt() / setup.reading_sigma_mm;
@@ -44,12 +44,12 @@ std::vector<std::size_t> BlurResiduals::ScaleFrames(const BlurFitSetup& setup) {
   for (std::size_t f = 0; f < setup.frames.size(); ++f) {
     if (setup.frames[f].scale_sigma) frames.push_back(f);
   }
-  if (frames.size() < kFewestScales) frames.clear();
+  if (frames.size() < kMinScales) frames.clear();
   return frames;
 }
 
 Eigen::Index BlurResiduals::columns() const {
-  return kBlurParameters + Size(setup_.meters.size()) + (scale_frames_.empty() ? 0 : 3);
+  return kBlurParameters + Size(setup_.estimators.size()) + (scale_frames_.empty() ? 0 : 3);
 }
 
 double BlurResiduals::ScaleFactor(std::size_t i) const {
@@ -59,29 +59,29 @@ double BlurResiduals::ScaleFactor(std::size_t i) const {
 
 double BlurResiduals::ScaleRest(const BlurParameters& parameters, std::size_t frame) const {
   const double x = PlaceOnBench(parameters, frame);
-  const Eigen::Vector3d& law = parameters.scale_law;
+  const Eigen::Vector3d& law = parameters.scale_model;
   return setup_.frames[frame].scale * (law[0] + x * (law[1] + x * law[2])) - 1;
 }
 
 std::optional<BlurResiduals::Terms> BlurResiduals::At(const BlurParameters& parameters) const {
   Terms terms;
-  for (std::size_t m = 0; m < setup_.meters.size(); ++m) {
-    const BlurSamples& meter = setup_.meters[m];
-    Rows& rows = terms.meters.emplace_back(meter.frames.size());
+  for (std::size_t m = 0; m < setup_.estimators.size(); ++m) {
+    const BlurSamples& estimator = setup_.estimators[m];
+    Rows& rows = terms.estimators.emplace_back(estimator.frames.size());
     for (std::size_t i = 0; i < rows.size(); ++i) {
-      const std::size_t f = meter.frames[i];
+      const std::size_t f = estimator.frames[i];
       const double depth_mm = DepthMm(parameters, f);
       if (!(depth_mm > 0)) return std::nullopt;
       const BlurPrediction p =
           PredictBlur(setup_, parameters.global, depth_mm, setup_.frames[f].scale);
       const double factor = factors_[m][Size(i)];
       rows[i].value =
-          factor * (p.value + parameters.softness_px2[m] - meter.variances_px2[Size(i)]);
+          factor * (p.value + parameters.softness_px2[m] - estimator.variances_px2[Size(i)]);
       rows[i].by_error = -factor * sign_ * p.by_depth;
       rows[i].by_error_twice = factor * p.by_depth_twice;
     }
   }
-  const Eigen::Vector3d& law = parameters.scale_law;
+  const Eigen::Vector3d& law = parameters.scale_model;
   for (std::size_t i = 0; i < scale_frames_.size(); ++i) {
     const std::size_t f = scale_frames_[i];
     const double x = PlaceOnBench(parameters, f), factor = ScaleFactor(i);
@@ -97,10 +97,10 @@ std::optional<BlurResiduals::Terms> BlurResiduals::At(const BlurParameters& para
 Eigen::VectorXd BlurResiduals::Values(const Terms& terms) const {
   Eigen::VectorXd values(rows_);
   Eigen::Index row = 0;
-  for (std::size_t m = 0; m < terms.meters.size(); ++m) {
-    Eigen::VectorXd raw(Size(terms.meters[m].size()));
+  for (std::size_t m = 0; m < terms.estimators.size(); ++m) {
+    Eigen::VectorXd raw(Size(terms.estimators[m].size()));
     for (Eigen::Index i = 0; i < raw.size(); ++i)
-      raw[i] = terms.meters[m][static_cast<std::size_t>(i)].value;
+      raw[i] = terms.estimators[m][static_cast<std::size_t>(i)].value;
     values.segment(row, raw.size()) = information_[m].Whitened(raw);
     row += raw.size();
   }
@@ -112,12 +112,12 @@ Eigen::VectorXd BlurResiduals::Values(const Terms& terms) const {
 Eigen::MatrixXd BlurResiduals::Jacobian(const BlurParameters& parameters) const {
   Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(rows_, columns());
   Eigen::Index row = 0;
-  for (std::size_t m = 0; m < setup_.meters.size(); ++m) {
-    const BlurSamples& meter = setup_.meters[m];
-    const Eigen::Index n = Size(meter.frames.size());
+  for (std::size_t m = 0; m < setup_.estimators.size(); ++m) {
+    const BlurSamples& estimator = setup_.estimators[m];
+    const Eigen::Index n = Size(estimator.frames.size());
     Eigen::MatrixXd raw(n, kBlurParameters + 1);
     for (Eigen::Index i = 0; i < n; ++i) {
-      const std::size_t f = meter.frames[static_cast<std::size_t>(i)];
+      const std::size_t f = estimator.frames[static_cast<std::size_t>(i)];
       raw.row(i) << PredictBlur(setup_, parameters.global, DepthMm(parameters, f),
                                 setup_.frames[f].scale)
                         .by_global.transpose(),
@@ -139,11 +139,11 @@ Eigen::MatrixXd BlurResiduals::Jacobian(const BlurParameters& parameters) const 
 Eigen::MatrixXd BlurResiduals::TimesErrors(const Terms& terms, const Eigen::MatrixXd& x) const {
   Eigen::MatrixXd product(rows_, x.cols());
   Eigen::Index row = 0;
-  for (std::size_t m = 0; m < terms.meters.size(); ++m) {
-    const Rows& rows = terms.meters[m];
+  for (std::size_t m = 0; m < terms.estimators.size(); ++m) {
+    const Rows& rows = terms.estimators[m];
     Eigen::MatrixXd raw(Size(rows.size()), x.cols());
     for (std::size_t i = 0; i < rows.size(); ++i)
-      raw.row(Size(i)) = rows[i].by_error * x.row(Size(setup_.meters[m].frames[i]));
+      raw.row(Size(i)) = rows[i].by_error * x.row(Size(setup_.estimators[m].frames[i]));
     product.middleRows(row, raw.rows()) = information_[m].Whitened(raw);
     row += raw.rows();
   }
@@ -157,12 +157,12 @@ Eigen::MatrixXd BlurResiduals::TransposeTimesErrors(const Terms& terms,
                                                     const Eigen::MatrixXd& y) const {
   Eigen::MatrixXd product = readings_.asDiagonal() * y.bottomRows(readings_.size());
   Eigen::Index row = 0;
-  for (std::size_t m = 0; m < terms.meters.size(); ++m) {
-    const Rows& rows = terms.meters[m];
+  for (std::size_t m = 0; m < terms.estimators.size(); ++m) {
+    const Rows& rows = terms.estimators[m];
     const Eigen::MatrixXd raw =
         information_[m].TransposeWhitened(y.middleRows(row, Size(rows.size())));
     for (std::size_t i = 0; i < rows.size(); ++i)
-      product.row(Size(setup_.meters[m].frames[i])) += rows[i].by_error * raw.row(Size(i));
+      product.row(Size(setup_.estimators[m].frames[i])) += rows[i].by_error * raw.row(Size(i));
     row += raw.rows();
   }
   for (std::size_t i = 0; i < scale_frames_.size(); ++i)
@@ -179,9 +179,9 @@ Eigen::VectorXd BlurResiduals::OwnInformation(const Terms& terms) const {
 
 Eigen::MatrixXd BlurResiduals::ErrorNormal(const Terms& terms) const {
   Eigen::MatrixXd normal = OwnInformation(terms).asDiagonal();
-  for (std::size_t m = 0; m < terms.meters.size(); ++m) {
-    const Rows& rows = terms.meters[m];
-    const std::vector<std::size_t>& frames = setup_.meters[m].frames;
+  for (std::size_t m = 0; m < terms.estimators.size(); ++m) {
+    const Rows& rows = terms.estimators[m];
+    const std::vector<std::size_t>& frames = setup_.estimators[m].frames;
     const Eigen::MatrixXd& information = information_[m].matrix();
     for (std::size_t j = 0; j < rows.size(); ++j) {
       for (std::size_t i = 0; i < rows.size(); ++i) {
@@ -197,12 +197,12 @@ Eigen::VectorXd BlurResiduals::ErrorCurvature(const Terms& terms,
                                               const Eigen::VectorXd& values) const {
   Eigen::VectorXd curvature = Eigen::VectorXd::Zero(readings_.size());
   Eigen::Index row = 0;
-  for (std::size_t m = 0; m < terms.meters.size(); ++m) {
-    const Rows& rows = terms.meters[m];
+  for (std::size_t m = 0; m < terms.estimators.size(); ++m) {
+    const Rows& rows = terms.estimators[m];
     const Eigen::VectorXd pull =
         information_[m].TransposeWhitened(values.segment(row, Size(rows.size())));
     for (std::size_t i = 0; i < rows.size(); ++i)
-      curvature[Size(setup_.meters[m].frames[i])] += rows[i].by_error_twice * pull[Size(i)];
+      curvature[Size(setup_.estimators[m].frames[i])] += rows[i].by_error_twice * pull[Size(i)];
     row += pull.size();
   }
   for (std::size_t i = 0; i < scale_frames_.size(); ++i)

@@ -6,34 +6,34 @@
 #include <vector>
 
 #include "calib/fit/blur_fit.h"
-#include "calib/fit/meter_information.h"
+#include "calib/fit/whitened_covariance.h"
 
 namespace thicklens::calib {
 
 // All fitted quantities. The errors e of the readings mean: the bench was at reading - e.
 struct BlurParameters {
-  Eigen::Vector4d global{0, 0, 0, 0};  // in the order of BlurParameter
-  std::vector<double> softness_px2;    // c of each meter
-  Eigen::Vector3d scale_law{1, 0, 0};  // 1/scale = l0 + l1 x + l2 x^2, x the reading in [-1, 1]
+  Eigen::Vector4d global{0, 0, 0, 0};    // in the order of BlurParameter
+  std::vector<double> softness_px2;      // c of each estimator
+  Eigen::Vector3d scale_model{1, 0, 0};  // 1/scale = l0 + l1 x + l2 x^2, x the reading in [-1, 1]
   Eigen::VectorXd errors_mm;
 };
 
 // Weights, 0 to 1, of the squared residuals.
 struct BlurWeights {
-  std::vector<Eigen::VectorXd> meters;  // one for each sample
-  Eigen::VectorXd readings, scales;     // one for each frame
+  std::vector<Eigen::VectorXd> estimators;  // one for each sample
+  Eigen::VectorXd readings, scales;         // one for each frame
 };
 
 // The residuals that FitBlur minimises [D74], each in its standard deviations, stacked:
-//   meter:   B f (V_model + c - V), B its covariance's inverse root, f the weights' factors;
+//   estimator:   B f (V_model + c - V), B its covariance's inverse root, f the weights' factors;
 //   scale:   sqrt(w) (scale (l0 + l1 x + l2 x^2) - 1)/sigma, x from the corrected reading;
 //   reading: sqrt(w) e/sigma; none, and e = 0, where the readings are exact.
-// Their Jacobian by the errors is never stored as a matrix: its part of the meters is B with scaled
-// columns, and the parts below are diagonal.
+// Their Jacobian by the errors is never stored as a matrix: its part of the estimators is B with
+// scaled columns, and the parts below are diagonal.
 class BlurResiduals {
  public:
-  // `setup` and `information` (one for each meter) must outlive this object.
-  BlurResiduals(const BlurFitSetup& setup, const std::vector<MeterInformation>& information,
+  // `setup` and `information` (one for each estimator) must outlive this object.
+  BlurResiduals(const BlurFitSetup& setup, const std::vector<WhitenedCovariance>& information,
                 const BlurWeights& weights);
 
   // Returns the frames whose scale constrains their reading's error.
@@ -41,8 +41,8 @@ class BlurResiduals {
   bool has_scales() const { return !scale_frames_.empty(); }
   bool readings_are_exact() const { return readings_.size() == 0; }
   Eigen::Index rows() const { return rows_; }
-  // Number of parameters without the errors: global, a softness for each meter, and the scale's law
-  // if there are scales.
+  // Number of parameters without the errors: global, a softness for each estimator, and the scale's
+  // law if there are scales.
   Eigen::Index columns() const;
 
   // A sample's or a scale's residual before B, with its derivatives by its reading's error.
@@ -51,7 +51,7 @@ class BlurResiduals {
   };
   using Rows = std::vector<Row>;
   struct Terms {
-    std::vector<Rows> meters;  // one for each sample
+    std::vector<Rows> estimators;  // one for each sample
     Rows scales;
     Eigen::VectorXd readings;
   };
@@ -67,27 +67,27 @@ class BlurResiduals {
   Eigen::MatrixXd TimesErrors(const Terms& terms, const Eigen::MatrixXd& x) const;
   Eigen::MatrixXd TransposeTimesErrors(const Terms& terms, const Eigen::MatrixXd& y) const;
   Eigen::MatrixXd ErrorNormal(const Terms& terms) const;
-  // Diagonal of J^T J without the meters' part: the prior information on each error.
+  // Diagonal of J^T J without the estimators' part: the prior information on each error.
   Eigen::VectorXd OwnInformation(const Terms& terms) const;
   // Diagonal of the second derivative of half the squared residuals by the errors, minus that of
   // J^T J.
   Eigen::VectorXd ErrorCurvature(const Terms& terms, const Eigen::VectorXd& values) const;
 
  private:
-  double BelievedReading(const BlurParameters& parameters, std::size_t frame) const {
+  double EstimatedReading(const BlurParameters& parameters, std::size_t frame) const {
     return setup_.frames[frame].reading_mm - parameters.errors_mm[static_cast<Eigen::Index>(frame)];
   }
   double PlaceOnBench(const BlurParameters& parameters, std::size_t frame) const {
-    return (BelievedReading(parameters, frame) - middle_mm_) / half_range_mm_;
+    return (EstimatedReading(parameters, frame) - middle_mm_) / half_range_mm_;
   }
   double DepthMm(const BlurParameters& parameters, std::size_t frame) const {
-    return parameters.global[kBenchOffset] + sign_ * BelievedReading(parameters, frame);
+    return parameters.global[kBenchOffset] + sign_ * EstimatedReading(parameters, frame);
   }
   double ScaleFactor(std::size_t i) const;
 
   const BlurFitSetup& setup_;
-  const std::vector<MeterInformation>& information_;
-  std::vector<Eigen::VectorXd> factors_;  // f for each meter's samples
+  const std::vector<WhitenedCovariance>& information_;
+  std::vector<Eigen::VectorXd> factors_;  // f for each estimator's samples
   std::vector<std::size_t> scale_frames_;
   Eigen::VectorXd scale_weights_;  // one for each frame
   Eigen::VectorXd readings_;       // sqrt(w)/sigma

@@ -12,8 +12,8 @@ constexpr double kDoubtless = 4;  // standard deviations of tails that are beyon
 
 // Returns the tails of the known laws minus those that the family has already; nothing where such a
 // blur is impossible.
-std::optional<Eigen::Vector2d> LawsLeft(model::Psf psf, const BlurFitResult& fit,
-                                        const BlurEvidence& evidence) {
+std::optional<Eigen::Vector2d> ModelsLeft(model::Psf psf, const BlurFitResult& fit,
+                                          const BlurEvidence& evidence) {
   const double kappa = fit.values[kBlurRatio], zf_mm = fit.values[kFocusDepth];
   const model::ThickLens& lens = evidence.setup.lens;
   if (evidence.spectrum < 0 || evidence.blur.variance_by_tails.size() == 0 || !(kappa > 0) ||
@@ -28,7 +28,7 @@ std::optional<Eigen::Vector2d> LawsLeft(model::Psf psf, const BlurFitResult& fit
 }  // namespace
 
 bool TakeTails(model::Psf psf, const BlurFitResult& fit, BlurEvidence* evidence) {
-  const auto laws = LawsLeft(psf, fit, *evidence);
+  const auto laws = ModelsLeft(psf, fit, *evidence);
   RelativeBlur& blur = evidence->blur;
   if (!laws || !(blur.tails.value > kDoubtless * blur.tails.sigma)) return false;
   const double taken = std::min(blur.tails.value, laws->y());
@@ -38,14 +38,14 @@ bool TakeTails(model::Psf psf, const BlurFitResult& fit, BlurEvidence* evidence)
   blur.variances_px2 += taken * blur.variance_by_tails;
   blur.covariance += blur.tails.sigma * blur.tails.sigma * blur.variance_by_tails *
                      blur.variance_by_tails.transpose();
-  evidence->setup.meters[static_cast<std::size_t>(evidence->spectrum)] =
+  evidence->setup.estimators[static_cast<std::size_t>(evidence->spectrum)] =
       FitSamples(*evidence, blur, evidence->region);
   return true;
 }
 
 std::optional<Eigen::Vector2d> TailsLeft(model::Psf psf, const BlurFitResult& fit,
                                          const BlurEvidence& evidence) {
-  const auto laws = LawsLeft(psf, fit, evidence);
+  const auto laws = ModelsLeft(psf, fit, evidence);
   if (!laws) return std::nullopt;
   const model::Estimate& tails = evidence.blur.tails;
   Eigen::Vector2d range(std::min(0.0, std::max(tails.value - kReach * tails.sigma, laws->x())),

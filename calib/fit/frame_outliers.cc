@@ -10,7 +10,7 @@
 namespace thicklens::calib {
 namespace {
 
-constexpr std::size_t kFewestFrames = 5;
+constexpr std::size_t kMinFrames = 5;
 // A frame whose spectrum scatters more than the others' by this factor, in power, does not show
 // what the others show.
 constexpr double kScatterOfDamage = 30;
@@ -29,15 +29,15 @@ class Outliers {
   Outliers(model::BenchDirection direction, BlurEvidence* evidence, Calibration* calibration)
       : sign_(model::DirectionSign(direction)), evidence_(*evidence), result_(*calibration) {}
 
-  std::optional<std::string> ThrowOut() {
+  std::optional<std::string> RejectOutlier() {
     RejectScattered();
-    for (BlurSamples& meter : evidence_.setup.meters) RejectOffParabola(meter);
-    for (BlurSamples& meter : evidence_.setup.meters) DropRejected(&meter);
+    for (BlurSamples& estimator : evidence_.setup.estimators) RejectOffParabola(estimator);
+    for (BlurSamples& estimator : evidence_.setup.estimators) DropRejected(&estimator);
     std::size_t most = 0;
-    for (const BlurSamples& meter : evidence_.setup.meters)
-      most = std::max(most, meter.frames.size());
-    if (most >= kFewestFrames) return std::nullopt;
-    return fmt::format("the blur of {} frames follows one law, {} are needed", most, kFewestFrames);
+    for (const BlurSamples& estimator : evidence_.setup.estimators)
+      most = std::max(most, estimator.frames.size());
+    if (most >= kMinFrames) return std::nullopt;
+    return fmt::format("the blur of {} frames follows one law, {} are needed", most, kMinFrames);
   }
 
  private:
@@ -65,24 +65,24 @@ class Outliers {
 
   // On the target any blur follows a parabola in depth, whatever floor and texture. A frame that is
   // far off the parabola has a wrong reading or is damaged.
-  void RejectOffParabola(const BlurSamples& meter) {
-    const auto n = static_cast<Eigen::Index>(meter.frames.size());
+  void RejectOffParabola(const BlurSamples& estimator) {
+    const auto n = static_cast<Eigen::Index>(estimator.frames.size());
     Eigen::VectorXd depths(n);
     for (Eigen::Index i = 0; i < n; ++i)
-      depths[i] = Frame(meter.frames[static_cast<std::size_t>(i)]).depth_mm;
+      depths[i] = Frame(estimator.frames[static_cast<std::size_t>(i)]).depth_mm;
     const Parabola parabola =
-        FitParabola(depths, meter.variances_px2, meter.covariance.diagonal().cwiseSqrt(),
+        FitParabola(depths, estimator.variances_px2, estimator.covariance.diagonal().cwiseSqrt(),
                     evidence_.setup.reading_sigma_mm);
     if (!parabola.done) return;
     const double range_mm = depths.maxCoeff() - depths.minCoeff();
     for (Eigen::Index i = 0; i < n; ++i) {
       const auto s = static_cast<std::size_t>(i);
-      FrameMeasurement& frame = Frame(meter.frames[s]);
+      FrameMeasurement& frame = Frame(estimator.frames[s]);
       if (parabola.follows[s] || !frame.rejection.empty()) continue;
       const double off = parabola.residuals_px2[i] / parabola.sigmas_px2[i];
       // The written reading minus that of the parabola.
       std::vector<double> errors_mm;
-      for (const double depth_mm : parabola.DepthsOf(meter.variances_px2[i], depths[i])) {
+      for (const double depth_mm : parabola.DepthsOf(estimator.variances_px2[i], depths[i])) {
         if (std::abs(depths[i] - depth_mm) < range_mm)
           errors_mm.push_back(sign_ * (depths[i] - depth_mm));
       }
@@ -93,18 +93,18 @@ class Outliers {
     }
   }
 
-  void DropRejected(BlurSamples* meter) {
+  void DropRejected(BlurSamples* estimator) {
     std::vector<Eigen::Index> kept;
-    BlurSamples rest = *meter;
+    BlurSamples rest = *estimator;
     rest.frames.clear();
-    for (std::size_t i = 0; i < meter->frames.size(); ++i) {
-      if (!Frame(meter->frames[i]).rejection.empty()) continue;
+    for (std::size_t i = 0; i < estimator->frames.size(); ++i) {
+      if (!Frame(estimator->frames[i]).rejection.empty()) continue;
       kept.push_back(static_cast<Eigen::Index>(i));
-      rest.frames.push_back(meter->frames[i]);
+      rest.frames.push_back(estimator->frames[i]);
     }
-    rest.variances_px2 = meter->variances_px2(kept);
-    rest.covariance = meter->covariance(kept, kept);
-    *meter = std::move(rest);
+    rest.variances_px2 = estimator->variances_px2(kept);
+    rest.covariance = estimator->covariance(kept, kept);
+    *estimator = std::move(rest);
   }
 
   double sign_;
@@ -114,9 +114,9 @@ class Outliers {
 
 }  // namespace
 
-std::optional<std::string> ThrowOutFrames(model::BenchDirection direction, BlurEvidence* evidence,
+std::optional<std::string> RejectOutliers(model::BenchDirection direction, BlurEvidence* evidence,
                                           Calibration* calibration) {
-  return Outliers(direction, evidence, calibration).ThrowOut();
+  return Outliers(direction, evidence, calibration).RejectOutlier();
 }
 
 }  // namespace thicklens::calib

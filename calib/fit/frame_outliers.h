@@ -8,12 +8,12 @@
 
 namespace thicklens::calib {
 
-// Removes from the meters' samples the frames that do not follow the others: their spectrum
+// Removes from the estimators' samples the frames that do not follow the others: their spectrum
 // scatters far more, or their blur is far from the law that any target follows. They are named in
 // `calibration->frames` by their `rejection`, with the reading's error (the written reading minus
 // that of the law, mm) where the law gives one. Returns the reason if too few frames are left for a
 // fit.
-std::optional<std::string> ThrowOutFrames(model::BenchDirection direction, BlurEvidence* evidence,
+std::optional<std::string> RejectOutliers(model::BenchDirection direction, BlurEvidence* evidence,
                                           Calibration* calibration);
 
 }  // namespace thicklens::calib

@@ -35,7 +35,7 @@ std::string CausesOfMisfit(const FocusSweep& sweep, const BlurEvidence& evidence
   if (calibration.structure.HasBands()) causes.emplace_back("bands of the light");
   if (calibration.structure.HasFixedStructure())
     causes.emplace_back("structure that stays on the sensor");
-  const ScaleLaw& scale = calibration.scale;
+  const ScaleModel& scale = calibration.scale;
   // The image scale shows the readings' errors without the blur.
   const bool readings_are_as_stated = scale.done && sweep.reading_sigma_mm > 0 &&
                                       scale.reading_rms_mm < kAsStated * sweep.reading_sigma_mm;

@@ -7,13 +7,13 @@
 namespace thicklens::calib {
 namespace {
 
-constexpr std::size_t kFewestSamples = 5;
+constexpr std::size_t kMinSamples = 5;
 // The error of an added variance: a relative part and px^2.
-constexpr double kRelativeError = 0.2, kLeastErrorPx2 = 0.2;
+constexpr double kRelativeError = 0.2, kMinErrorPx2 = 0.2;
 constexpr double kSignificant = 4;
 constexpr int kRounds = 8;
 constexpr double kCauchyWidth = 3;
-constexpr double kUsualRatio = 0.45;  // usual blur ratio of lenses
+constexpr double kDefaultRatio = 0.45;  // usual blur ratio of lenses
 // Standard deviations of the logarithm of the ratio. The light of a whole aperture gives 0.5, and
 // no lens gives more than 0.7.
 constexpr double kDeviationBelow = 0.3, kDeviationAbove = 0.25;
@@ -33,7 +33,7 @@ double BlurSlope::RatioOfMovingLens(const model::Camera& camera) const {
 
 double ChiSquareOfRatio(double blur_ratio) {
   if (!(blur_ratio > 0)) return kImpossible;
-  const double log_ratio = std::log(blur_ratio / kUsualRatio);
+  const double log_ratio = std::log(blur_ratio / kDefaultRatio);
   const double off = log_ratio / (log_ratio > 0 ? kDeviationAbove : kDeviationBelow);
   return std::min(off * off, kImpossible);
 }
@@ -49,7 +49,7 @@ std::optional<BlurSlope> FindBlurSlope(const std::vector<ScaleSample>& samples) 
     const double change = sample.scale - 1;
     rows.emplace_back(change, change * change, *added_px2);
   }
-  if (rows.size() < kFewestSamples) return std::nullopt;
+  if (rows.size() < kMinSamples) return std::nullopt;
   std::vector<double> weights(rows.size(), 1);
   Eigen::Vector2d terms(0, 0);
   double variance = 0;
@@ -57,7 +57,7 @@ std::optional<BlurSlope> FindBlurSlope(const std::vector<ScaleSample>& samples) 
     Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
     Eigen::Vector2d right = Eigen::Vector2d::Zero();
     for (std::size_t i = 0; i < rows.size(); ++i) {
-      const double sigma = kRelativeError * std::abs(rows[i].z()) + kLeastErrorPx2;
+      const double sigma = kRelativeError * std::abs(rows[i].z()) + kMinErrorPx2;
       const double weight = weights[i] / (sigma * sigma);
       normal += weight * rows[i].head<2>() * rows[i].head<2>().transpose();
       right += weight * rows[i].head<2>() * rows[i].z();
@@ -70,7 +70,7 @@ std::optional<BlurSlope> FindBlurSlope(const std::vector<ScaleSample>& samples) 
     terms = inverse * right;
     double sum = 0;
     for (std::size_t i = 0; i < rows.size(); ++i) {
-      const double sigma = kRelativeError * std::abs(rows[i].z()) + kLeastErrorPx2;
+      const double sigma = kRelativeError * std::abs(rows[i].z()) + kMinErrorPx2;
       const double off = (rows[i].z() - rows[i].head<2>().dot(terms)) / sigma;
       sum += weights[i] * off * off;
       weights[i] = 1 / (1 + off * off / (kCauchyWidth * kCauchyWidth));

@@ -42,8 +42,8 @@ PhasePeak PeakByPhase(const cv::Mat& reference, const cv::Mat& frame) {
   cv::Mat window, spectra[2];
   cv::createHanningWindow(window, reference.size(), CV_32F);
   for (int i = 0; i < 2; ++i) {
-    const cv::Mat& picture = i == 0 ? reference : frame;
-    cv::Mat windowed = (picture - cv::mean(picture)).mul(window);
+    const cv::Mat& image = i == 0 ? reference : frame;
+    cv::Mat windowed = (image - cv::mean(image)).mul(window);
     cv::dft(windowed, spectra[i], cv::DFT_COMPLEX_OUTPUT);
   }
   double amplitudes = 0;
@@ -83,17 +83,17 @@ PhasePeak PeakByPhase(const cv::Mat& reference, const cv::Mat& frame) {
 
 // Information about the scale, independent of shift and rotation, relative to half the sum of
 // |gradient|^2 |p|^2, and about the shift from the tensor of the gradients.
-PictureInformation InformationOfShrunk(const cv::Mat& picture) {
-  const Gradient gradient = CentralGradient(Smoothed(picture, 1));
+ImageInformation InformationOfShrunk(const cv::Mat& image) {
+  const Gradient gradient = CentralGradient(Smoothed(image, 1));
   Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();
   double most = 0;
-  for (int y = 1; y + 1 < picture.rows; ++y) {
+  for (int y = 1; y + 1 < image.rows; ++y) {
     ThrowIfCancelled();
-    const double py = y - 0.5 * (picture.rows - 1);
+    const double py = y - 0.5 * (image.rows - 1);
     const auto* row_x = gradient.x.ptr<float>(y);
     const auto* row_y = gradient.y.ptr<float>(y);
-    for (int x = 1; x + 1 < picture.cols; ++x) {
-      const double px = x - 0.5 * (picture.cols - 1);
+    for (int x = 1; x + 1 < image.cols; ++x) {
+      const double px = x - 0.5 * (image.cols - 1);
       const auto gx = static_cast<double>(row_x[x]), gy = static_cast<double>(row_y[x]);
       const Eigen::Vector4d design(gx * px + gy * py, gx, gy, gy * px - gx * py);
       normal += design * design.transpose();
@@ -175,11 +175,11 @@ cv::Rect2d SharedField(const FrameMap& map, cv::Size reference, cv::Size frame) 
   return {x0, y0, std::max(0.0, x1 - x0), std::max(0.0, y1 - y0)};
 }
 
-cv::Mat Shrunk(const cv::Mat& picture, int factor) {
-  if (factor <= 1) return picture;
-  const cv::Size size(picture.cols / factor, picture.rows / factor);
+cv::Mat Shrunk(const cv::Mat& image, int factor) {
+  if (factor <= 1) return image;
+  const cv::Size size(image.cols / factor, image.rows / factor);
   cv::Mat shrunk;
-  cv::resize(picture(cv::Rect(0, 0, size.width * factor, size.height * factor)), shrunk, size, 0, 0,
+  cv::resize(image(cv::Rect(0, 0, size.width * factor, size.height * factor)), shrunk, size, 0, 0,
              cv::INTER_AREA);
   return shrunk;
 }
@@ -241,9 +241,9 @@ cv::Mat InFrameGeometry(const cv::Mat& reference, const FrameMap& map, int frame
   return out;
 }
 
-PictureInformation InformationOf(const cv::Mat& picture) {
+ImageInformation InformationOf(const cv::Mat& image) {
   return InformationOfShrunk(
-      Shrunk(picture, FactorFor(std::max(picture.cols, picture.rows), kCoarseSizePx)));
+      Shrunk(image, FactorFor(std::max(image.cols, image.rows), kCoarseSizePx)));
 }
 
 std::optional<FrameMap> ShiftCoarsely(const cv::Mat& reference, const cv::Mat& frame, double scale,
@@ -268,7 +268,7 @@ std::optional<FrameMap> RegisterCoarsely(const cv::Mat& reference, const cv::Mat
                                          double expected_scale, cv::Point2d centre) {
   const std::optional<Start> start =
       StartFrom(reference, frame, expected_scale, centre, kCoarseSizePx, false);
-  if (!start || !(InformationOfShrunk(start->expected).scale > kLeastScaleInformation))
+  if (!start || !(InformationOfShrunk(start->expected).scale > kMinScaleInformation))
     return std::nullopt;
   const cv::Mat& small = start->small;
   const cv::Mat& expected = start->expected;

@@ -23,7 +23,7 @@ cv::Rect2d SharedField(const FrameMap& map, cv::Size reference, cv::Size frame);
 
 // Averages over blocks of `factor` x `factor` px. Pixel i of the result has the full-resolution
 // coordinate factor (i + 1/2) - 1/2.
-cv::Mat Shrunk(const cv::Mat& picture, int factor);
+cv::Mat Shrunk(const cv::Mat& image, int factor);
 
 // Resamples the reference in the geometry of the frame, for the pixels of `region` of the frame
 // shrunk by `frame_factor`. `reference` has full resolution. The interpolation is cubic
@@ -34,7 +34,7 @@ cv::Mat InFrameGeometry(const cv::Mat& reference, const FrameMap& map, int frame
 
 // Information about its own position that an image, shrunk as for RegisterCoarsely, contains. Each
 // value is 1 where the gradients are isotropic and evenly distributed.
-struct PictureInformation {
+struct ImageInformation {
   // Information about a change of scale in addition to a shift and a rotation. It is 0 where a
   // change of scale looks like these, or has no effect (a single edge or corner, a star of spokes).
   double scale = 0;
@@ -42,10 +42,10 @@ struct PictureInformation {
   // informative one; 0 for a single edge.
   double worst_shift = 0;
 };
-PictureInformation InformationOf(const cv::Mat& picture);
+ImageInformation InformationOf(const cv::Mat& image);
 
 // Minimum scale information for a registration that determines the scale.
-constexpr double kLeastScaleInformation = 0.05;
+constexpr double kMinScaleInformation = 0.05;
 
 // Finds the shift of a frame that shows the reference at `scale` about `centre`, by phase
 // correlation of shrunk images. If a periodic target allows several shifts, the smallest one is

@@ -37,12 +37,12 @@ struct PlaceInReference {
 };
 
 // Bilinear interpolation; returns false outside the image.
-bool SampleAt(const cv::Mat& picture, const Eigen::Vector2d& at, double* value) {
+bool SampleAt(const cv::Mat& image, const Eigen::Vector2d& at, double* value) {
   const int x = static_cast<int>(std::floor(at.x())), y = static_cast<int>(std::floor(at.y()));
-  if (x < 0 || y < 0 || x + 1 >= picture.cols || y + 1 >= picture.rows) return false;
+  if (x < 0 || y < 0 || x + 1 >= image.cols || y + 1 >= image.rows) return false;
   const double u = at.x() - x, v = at.y() - y;
   const auto pixel = [&](int row, int column) {
-    return static_cast<double>(picture.at<float>(row, column));
+    return static_cast<double>(image.at<float>(row, column));
   };
   *value = (1 - v) * ((1 - u) * pixel(y, x) + u * pixel(y, x + 1)) +
            v * ((1 - u) * pixel(y + 1, x) + u * pixel(y + 1, x + 1));
@@ -99,14 +99,14 @@ class Structure {
 
   // ---- vignetting ----
   void FindVignetting() {
-    constexpr std::size_t kMostFrames = 8;
-    constexpr double kLeastChange = 0.004;  // change of scale
+    constexpr std::size_t kMaxFrames = 8;
+    constexpr double kMinChange = 0.004;  // change of scale
     const ScaleSample* reference = nullptr;
     std::vector<const ScaleSample*> others;
     for (const auto& [frame, sample] : registered_) {
       if (sample->scale == 1 && reference == nullptr) {
         reference = sample;
-      } else if (std::abs(std::log(sample->scale)) > kLeastChange) {
+      } else if (std::abs(std::log(sample->scale)) > kMinChange) {
         others.push_back(sample);
       }
     }
@@ -114,7 +114,7 @@ class Structure {
     std::stable_sort(others.begin(), others.end(), [](const ScaleSample* a, const ScaleSample* b) {
       return std::abs(std::log(a->scale)) > std::abs(std::log(b->scale));
     });
-    others.resize(std::min(others.size(), kMostFrames));
+    others.resize(std::min(others.size(), kMaxFrames));
     const cv::Mat reference_grey = Read(reference->frame);
     const int factor = std::max(1, std::min(reference_grey.cols, reference_grey.rows) / 48);
     const cv::Mat reference_small = Small(reference_grey, factor);
@@ -187,9 +187,9 @@ class Structure {
 
   // ---- bands ----
   // Means over rows (or columns), from which a parabola is subtracted.
-  static std::vector<double> Profile(const cv::Mat& picture, bool of_rows) {
+  static std::vector<double> Profile(const cv::Mat& image, bool of_rows) {
     cv::Mat means;
-    cv::reduce(picture, means, of_rows ? 1 : 0, cv::REDUCE_AVG, CV_64F);
+    cv::reduce(image, means, of_rows ? 1 : 0, cv::REDUCE_AVG, CV_64F);
     const auto n = static_cast<Eigen::Index>(means.total());
     Eigen::MatrixXd design(n, 3);
     Eigen::VectorXd values(n);
@@ -209,13 +209,13 @@ class Structure {
   }
 
   // Variance of the row means over that of the column means; 1 for an image of independent parts.
-  static double RowsOverColumns(const cv::Mat& picture, double* row_deviation,
+  static double RowsOverColumns(const cv::Mat& image, double* row_deviation,
                                 double* column_deviation) {
-    const double rows = Variance(Profile(picture, true));
-    const double columns = Variance(Profile(picture, false));
+    const double rows = Variance(Profile(image, true));
+    const double columns = Variance(Profile(image, false));
     *row_deviation = std::sqrt(rows);
     *column_deviation = std::sqrt(columns);
-    return rows * picture.cols / std::max(columns * picture.rows, 1e-30);
+    return rows * image.cols / std::max(columns * image.rows, 1e-30);
   }
 
   // Ratio of the target's size in frame `a` to that in `b`; 1 where it is unknown.
@@ -227,8 +227,8 @@ class Structure {
 
   // The image is reduced, because no band is as fine as a pixel of a large sensor.
   static cv::Mat ForBands(const cv::Mat& grey) {
-    constexpr int kMostPx = 1024;
-    const int factor = 1 + std::max(grey.cols, grey.rows) / kMostPx;
+    constexpr int kMaxPx = 1024;
+    const int factor = 1 + std::max(grey.cols, grey.rows) / kMaxPx;
     if (factor == 1) return grey;
     cv::Mat small;
     cv::resize(grey, small, cv::Size(grey.cols / factor, grey.rows / factor), 0, 0, cv::INTER_AREA);
@@ -236,10 +236,10 @@ class Structure {
   }
 
   void FindBands() {
-    constexpr std::size_t kMostPairs = 12;
+    constexpr std::size_t kMaxPairs = 12;
     constexpr double kAnisotropy = 10;  // ratio of variances, above chance and usual targets
     const std::vector<std::size_t> order = ByReading();
-    const std::size_t pairs = std::min(kMostPairs, order.size() - 1);
+    const std::size_t pairs = std::min(kMaxPairs, order.size() - 1);
     std::vector<double> ratios, row_deviations, column_deviations;
     cv::Mat mean;
     for (std::size_t k = 0; k < pairs; ++k) {
@@ -269,7 +269,7 @@ class Structure {
     const double ratio = Median(ratios);
     if (ratio <= kAnisotropy && ratio >= 1 / kAnisotropy) {
       result_.bands = model::Estimate{
-          0, FrameStructureFinding::kLeastBands / FrameStructureFinding::kSignificant};
+          0, FrameStructureFinding::kMinBands / FrameStructureFinding::kSignificant};
       return;
     }
     result_.bands_are_columns = ratio < 1;
@@ -291,7 +291,7 @@ class Structure {
   }
 
   void FindFixedStructure() {
-    constexpr std::size_t kMostPairs = 3;
+    constexpr std::size_t kMaxPairs = 3;
     std::vector<const ScaleSample*> order;
     for (const auto& [frame, sample] : registered_) order.push_back(sample);
     if (order.size() < 6) return;
@@ -300,7 +300,7 @@ class Structure {
     });
     std::map<std::pair<int, int>, double> at;  // excess of the product, by the shift
     std::size_t pairs = 0;
-    for (std::size_t k = 0; k < kMostPairs; ++k) {
+    for (std::size_t k = 0; k < kMaxPairs; ++k) {
       const ScaleSample& small = *order[k];
       const ScaleSample& large = *order[order.size() - 1 - k];
       if (AddProducts(small, large, &at)) ++pairs;
@@ -328,7 +328,7 @@ class Structure {
                    std::map<std::pair<int, int>, double>* at) const {
     constexpr double kFarPx = 6;
     constexpr int kStepPx = 11, kBesidePx = 5, kReachPx = 2 * kStepPx + kBesidePx;
-    constexpr double kLeastPart = 0.2;  // part of the field
+    constexpr double kMinPart = 0.2;  // part of the field
     const cv::Mat a = Fine(Read(one.frame));
     const cv::Mat b = Fine(Read(other.frame));
     const Eigen::Vector2d centre(places_.centre.x, places_.centre.y);
@@ -343,7 +343,7 @@ class Structure {
         ++pixels;
       }
     }
-    if (!(pixels > kLeastPart * static_cast<double>(a.total()))) return false;
+    if (!(pixels > kMinPart * static_cast<double>(a.total()))) return false;
     const cv::Rect inner(kReachPx, kReachPx, a.cols - 2 * kReachPx, a.rows - 2 * kReachPx);
     const cv::Mat masked = a.mul(far)(inner);
     const auto product = [&](int dx, int dy) {
@@ -373,10 +373,10 @@ bool IsExcludedBy(const std::optional<model::Estimate>& found, double least) {
 }  // namespace
 
 bool VignettingIsExcluded(const FrameStructureFinding& structure) {
-  return IsExcludedBy(structure.vignetting, FrameStructureFinding::kLeastVignetting);
+  return IsExcludedBy(structure.vignetting, FrameStructureFinding::kMinVignetting);
 }
 bool FixedStructureIsExcluded(const FrameStructureFinding& structure) {
-  return IsExcludedBy(structure.fixed_structure, FrameStructureFinding::kLeastFixed);
+  return IsExcludedBy(structure.fixed_structure, FrameStructureFinding::kMinFixed);
 }
 
 bool BandsExplain(const FrameStructureFinding& structure, std::size_t missing, std::size_t frames) {

@@ -12,7 +12,7 @@ namespace thicklens::calib {
 namespace {
 
 // Relative change of the image height at the corner.
-constexpr double kWorthTelling = 0.005, kGross = 0.05;
+constexpr double kWorthReporting = 0.005, kGross = 0.05;
 constexpr double kSignificant = 4;
 // One standard deviation for photographic lenses. A distortion of 40 % is beyond any lens that
 // forms a plain image.
@@ -38,7 +38,7 @@ Diagnosis Compare(const model::Estimate& distortion, const FrameStructureFinding
 }
 
 // Names the structure that this sweep is too small or too short to show.
-std::string HiddenInWords(const FrameStructureFinding& structure) {
+std::string OcclusionText(const FrameStructureFinding& structure) {
   const bool vignetting = !VignettingIsExcluded(structure);
   const bool fixed = !FixedStructureIsExcluded(structure);
   if (!vignetting && !fixed) return "";
@@ -58,7 +58,7 @@ std::string CausesInWords(const Diagnosis& diagnosis, const FrameStructureFindin
             ? "the lens distorts (undistort the images), or the target is not flat"
             : "the target is not flat: no lens distorts so much");
   }
-  const std::string hidden = HiddenInWords(structure);
+  const std::string hidden = OcclusionText(structure);
   if (!diagnosis.Names(kLensDistorts)) {
     return "no lens distorts so much: the target is not flat (what is nearer moves more), or the "
            "frames do not show one and the same target; photograph a flat one" +
@@ -74,7 +74,7 @@ std::string CausesInWords(const Diagnosis& diagnosis, const FrameStructureFindin
 bool ShowsDistortion(const Calibration& calibration) {
   const auto& distortion = calibration.scale.distortion_at_corner;
   return distortion &&
-         std::abs(distortion->value) > std::max(kWorthTelling, kSignificant * distortion->sigma);
+         std::abs(distortion->value) > std::max(kWorthReporting, kSignificant * distortion->sigma);
 }
 
 std::optional<std::string> CheckDistortion(Calibration* calibration) {
@@ -95,13 +95,14 @@ std::optional<std::string> CheckDistortion(Calibration* calibration) {
   return std::nullopt;
 }
 
-std::string BendRemedy(const FrameStructureFinding& structure) {
+std::string NonlinearityRemedy(const FrameStructureFinding& structure) {
   return structure.HasVignetting() || structure.HasFixedStructure()
              ? "measure offset_mm, divide the frames by a photograph of an evenly lit white sheet"
              : "measure offset_mm, check the rail's scale, undistort the images";
 }
 
-std::string BendInWords(const Bend& bend, const Calibration& calibration) {
+std::string NonlinearityText(const ScaleNonlinearity& nonlinearity,
+                             const Calibration& calibration) {
   const std::string seen = StructureInWords(calibration.structure);
   const std::string causes =
       seen.empty()
@@ -112,7 +113,7 @@ std::string BendInWords(const Bend& bend, const Calibration& calibration) {
                 "the lens breathes; these look alike. A rail of known steps (a micrometer screw) "
                 "tells "
                 "the first of them from the others") +
-                HiddenInWords(calibration.structure)
+                OcclusionText(calibration.structure)
           : fmt::format(
                 "{}{}. That draws the image scale. If it is not the cause, the rail's scale is not "
                 "linear, the images are distorted, the target is not flat, or the lens breathes",
@@ -122,7 +123,7 @@ std::string BendInWords(const Bend& bend, const Calibration& calibration) {
       "{:.2f} mm off the straight line through its ends. {}. A bench zero from the image scale is "
       "then less certain than its error says: the farther half of the sweep alone puts it {:+.1f} "
       "mm from where the nearer half does",
-      bend.bow_mm.value, bend.bow_mm.sigma, causes, bend.zero_spread_mm);
+      nonlinearity.bow_mm.value, nonlinearity.bow_mm.sigma, causes, nonlinearity.zero_spread_mm);
 }
 
 }  // namespace thicklens::calib

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "calib/registration/scale_bend.h"
+#include "calib/registration/scale_nonlinearity.h"
 #include "thicklens/calib/calibration.h"
 
 namespace thicklens::calib {
@@ -25,9 +25,9 @@ std::optional<std::string> CheckDistortion(Calibration* calibration);
 
 // The warning about readings that bend against the image scale. It names the structure found in
 // `calibration.structure`.
-std::string BendInWords(const Bend& bend, const Calibration& calibration);
+std::string NonlinearityText(const ScaleNonlinearity& nonlinearity, const Calibration& calibration);
 // A remedy that makes the bend smaller, or its effect on the bench zero.
-std::string BendRemedy(const FrameStructureFinding& structure);
+std::string NonlinearityRemedy(const FrameStructureFinding& structure);
 
 }  // namespace thicklens::calib
 

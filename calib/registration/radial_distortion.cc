@@ -8,7 +8,7 @@
 namespace thicklens::calib {
 namespace {
 
-constexpr std::size_t kFewestSamples = 5;
+constexpr std::size_t kMinSamples = 5;
 constexpr int kBlocks = 8;  // blocks of the jackknife
 constexpr int kRounds = 20;
 constexpr double kDefined = 16;     // sum of squares of the responses over that of their errors
@@ -94,7 +94,7 @@ std::optional<model::Estimate> FitRadialDistortion(const std::vector<ScaleSample
     if (s.registration.cubic_sigma > 0 && response != 0)
       terms.push_back({response, s.registration.cubic, s.registration.cubic_sigma});
   }
-  if (terms.size() < kFewestSamples) return std::nullopt;
+  if (terms.size() < kMinSamples) return std::nullopt;
   // Where the scales differ by no more than their own errors, the response consists of these
   // errors.
   double squares = 0, errors = 0;

@@ -19,7 +19,7 @@ constexpr double kMaxDisagreement = 0.015;
 constexpr double kMaxScaleSigma = 3e-3;
 // Error of the method itself, measured on simulated images of known scale.
 constexpr double kScaleBias = 1e-5;
-constexpr int kLeastFieldPx = 60;          // minimum shared field for a registration
+constexpr int kMinFieldPx = 60;            // minimum shared field for a registration
 constexpr double kLargestBlurPart = 0.06;  // sigma of blur, relative to the field
 constexpr int kCoarserRounds = 3;
 constexpr double kClosePx = 0.5;    // shrunk pixels
@@ -92,7 +92,7 @@ std::optional<FreeRegistration> RegisterFreely(const cv::Mat& reference, const c
   FrameMap map = *coarse;
   const cv::Rect2d shared = SharedField(map, reference.size(), frame.size());
   const double field_px = std::min(shared.width, shared.height);
-  if (!(field_px >= kLeastFieldPx)) return std::nullopt;
+  if (!(field_px >= kMinFieldPx)) return std::nullopt;
   const double longer_px = std::max(shared.width, shared.height);
   // The first passes use half resolution. They bring the map close, and determine the difference of
   // the blurs.

@@ -23,7 +23,7 @@ constexpr double kScaleBias = 3e-5;  // error of registrations, from frame to fr
 constexpr double kZeroBias = 0.01;   // error of a bench zero from the scale, relative to the depth
 constexpr double kCauchyWidth = 3;
 constexpr int kRounds = 12;
-constexpr std::size_t kMostForMedians = 300;
+constexpr std::size_t kMaxForMedians = 300;
 constexpr double kNearDioptres = 0.15;  // relative difference from 1000/f
 
 struct Point {
@@ -57,7 +57,7 @@ Points PointsOf(const std::vector<ScaleSample>& samples, bool inverse) {
 // with that slope.
 Line MedianLine(const Points& points) {
   // The line is only a start; a long sweep therefore uses only a part of its pairs.
-  const std::size_t step = 1 + points.size() / kMostForMedians;
+  const std::size_t step = 1 + points.size() / kMaxForMedians;
   std::vector<double> slopes, intercepts;
   for (std::size_t i = 0; i < points.size(); i += step) {
     for (std::size_t j = 0; j < i; j += step) {
@@ -293,7 +293,7 @@ std::string LensMovesReason(const FocusSweep& sweep, const ScaleCauses& causes) 
       evidence, meaning);
 }
 
-std::string NotToldApart() {
+std::string NotDistinguished() {
   return "Scale and blur do not tell these apart: look at what moved (in a sweep with the focus "
          "ring "
          "or a focus motor the lens does, and the target has to be moved instead)";
@@ -305,7 +305,7 @@ ScaleCauses CompareScaleCauses(const std::vector<ScaleSample>& samples, const Fo
   return Comparison(samples, sweep).Run();
 }
 
-std::optional<std::string> ReasonOfScaleCauses(const FocusSweep& sweep, const ScaleLaw& law,
+std::optional<std::string> ReasonOfScaleCauses(const FocusSweep& sweep, const ScaleModel& law,
                                                const ScaleCauses& causes) {
   const Diagnosis& diagnosis = causes.diagnosis;
   const bool is_reversed = law.kind == ScaleKind::kReversed;
@@ -317,7 +317,7 @@ std::optional<std::string> ReasonOfScaleCauses(const FocusSweep& sweep, const Sc
     return fmt::format("either {}; or the target moves{} and the readings are not in mm. {}. {}",
                        LensMovesReason(sweep, causes),
                        is_reversed ? ", " + law.message : std::string(),
-                       UnitThatFits(sweep, causes), NotToldApart());
+                       UnitThatFits(sweep, causes), NotDistinguished());
   }
   if (!is_reversed) return std::nullopt;
   if (!is_explained) {
@@ -331,7 +331,7 @@ std::optional<std::string> ReasonOfScaleCauses(const FocusSweep& sweep, const Sc
   }
   if (diagnosis.Names(kLensMoves)) {
     return fmt::format("{}, or the lens or the sensor moves and not the target. {}", law.message,
-                       NotToldApart());
+                       NotDistinguished());
   }
   return law.message;
 }
@@ -350,7 +350,7 @@ std::string UnitThatFits(const FocusSweep& sweep, const ScaleCauses& causes) {
 }
 
 std::string UnitAdvice(const FocusSweep& sweep, const std::vector<FrameMeasurement>& frames,
-                       const ScaleLaw& law, const ScaleCauses& causes) {
+                       const ScaleModel& law, const ScaleCauses& causes) {
   if (!law.done) return "";
   std::vector<double> depths_mm;
   for (const FrameMeasurement& frame : frames) {

@@ -51,14 +51,14 @@ ScaleCauses CompareScaleCauses(const std::vector<ScaleSample>& samples, const Fo
 // The refusal where the causes forbid any result: the lens moves, or the readings run the other
 // way. If both explain the scales, the text names both and an observation that separates them.
 // Otherwise returns std::nullopt.
-std::optional<std::string> ReasonOfScaleCauses(const FocusSweep& sweep, const ScaleLaw& law,
+std::optional<std::string> ReasonOfScaleCauses(const FocusSweep& sweep, const ScaleModel& law,
                                                const ScaleCauses& causes);
 
 // A question about the unit of the readings. It is asked where the law places every frame so near
 // that no image would form, or one larger than the target, and the blur does not confirm it. The
 // text names the unit that fits, if there is one. Otherwise it is empty.
 std::string UnitAdvice(const FocusSweep& sweep, const std::vector<FrameMeasurement>& frames,
-                       const ScaleLaw& law, const ScaleCauses& causes);
+                       const ScaleModel& law, const ScaleCauses& causes);
 
 // "With readings in inches it is at about 300 mm and the blur ratio about 0.45". The text is empty
 // where no unit explains what millimetres do not.

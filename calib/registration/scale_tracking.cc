@@ -157,7 +157,7 @@ std::vector<ScaleSample> TrackScale(const FocusSweep& sweep,
                                     std::optional<double> known_offset_mm, int threads,
                                     const std::function<void()>& tick) {
   const cv::Mat reference_grey = read_grey(reference);
-  if (sweep.target != model::SweepTarget::kKnifeEdge && ShowsShiftAlone(reference_grey))
+  if (sweep.target != model::SweepTarget::kKnifeEdge && IsScaleInvariant(reference_grey))
     return TrackShifts(sweep, read_grey, frames, reference, known_offset_mm, threads, tick);
   const cv::Point2d centre = RegionCentre(sweep);
   const double reference_reading_mm = sweep.frames[reference].reading_mm;

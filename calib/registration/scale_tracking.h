@@ -20,9 +20,9 @@ namespace thicklens::calib {
 // that the frames show together is removed from the scales, and its uncertainty is added to their
 // errors.
 //
-// On a target that looks the same at every scale (ShowsShiftAlone; the edge meter handles a knife
-// edge) the scales are taken from the readings and only shifts are measured. If no offset is known
-// either, only the reference is returned. All samples of such a target have
+// On a target that looks the same at every scale (IsScaleInvariant; the edge estimator handles a
+// knife edge) the scales are taken from the readings and only shifts are measured. If no offset is
+// known either, only the reference is returned. All samples of such a target have
 // `scale_is_from_reading` set.
 std::vector<ScaleSample> TrackScale(const FocusSweep& sweep,
                                     const std::function<cv::Mat(std::size_t)>& read_grey,

@@ -10,10 +10,10 @@
 namespace thicklens::calib {
 namespace {
 
-constexpr double kLeastShiftInformation = 0.1;
+constexpr double kMinShiftInformation = 0.1;
 constexpr double kMinAgreement = 0.6;
 constexpr double kMaxShiftSigmaPx = 0.3;
-constexpr int kLeastFieldPx = 60;
+constexpr int kMinFieldPx = 60;
 constexpr double kLargestBlurPart = 0.06;  // sigma of blur, relative to the field
 constexpr int kCoarserRounds = 4;
 constexpr double kClosePx = 0.2;    // shrunk pixels
@@ -40,10 +40,10 @@ void Follow(const RigidDisplacement& step, Registration* registration) {
 
 }  // namespace
 
-bool ShowsShiftAlone(const cv::Mat& picture) {
-  const PictureInformation information = InformationOf(picture);
-  return !(information.scale > kLeastScaleInformation) &&
-         information.worst_shift > kLeastShiftInformation;
+bool IsScaleInvariant(const cv::Mat& image) {
+  const ImageInformation information = InformationOf(image);
+  return !(information.scale > kMinScaleInformation) &&
+         information.worst_shift > kMinShiftInformation;
 }
 
 std::optional<Registration> RegisterShift(const cv::Mat& reference, const cv::Mat& frame,
@@ -55,7 +55,7 @@ std::optional<Registration> RegisterShift(const cv::Mat& reference, const cv::Ma
   found.shift_px = coarse->linear * coarse->centre + coarse->offset - coarse->centre;
   const cv::Rect2d shared = SharedField(*coarse, reference.size(), frame.size());
   const double field_px = std::min(shared.width, shared.height);
-  if (!(field_px >= kLeastFieldPx)) return std::nullopt;
+  if (!(field_px >= kMinFieldPx)) return std::nullopt;
   // The first passes use half resolution. They bring the map close, and determine the difference of
   // the blurs.
   const int finest = TileFactor(std::max(shared.width, shared.height), 0);

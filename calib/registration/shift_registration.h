@@ -10,7 +10,7 @@ namespace thicklens::calib {
 
 // Whether the target looks the same at every scale, but determines the position along both axes (a
 // star of spokes, a single corner). The frame must be sharp.
-bool ShowsShiftAlone(const cv::Mat& picture);
+bool IsScaleInvariant(const cv::Mat& image);
 
 // Measures the shift and rotation of a frame of such a target at a known scale. Both images are
 // CV_32F and of one size. The method is phase correlation on shrunk images, then the phases of the

@@ -9,16 +9,16 @@
 namespace thicklens::calib {
 namespace {
 
-constexpr std::size_t kFewestTiles = 6;
+constexpr std::size_t kMinTiles = 6;
 constexpr int kRounds = 8;
 constexpr double kCut = 5;  // cut of Tukey's weights, in standard deviations
 // Minimum error of a shift, independent of its spectrum: interpolation and sampling of the blur.
-constexpr double kLeastShiftSigmaPx = 0.002;
+constexpr double kMinShiftSigmaPx = 0.002;
 // Factor for the variance, because tiles overlap and neighbours share a part of their errors. It
 // was measured on simulated sweeps.
 constexpr double kOverlap = 1.5;
 constexpr double kMedianOfChi2 = 1.386;  // two degrees of freedom
-constexpr double kLeastCondition = 1e-9;
+constexpr double kMinCondition = 1e-9;
 
 // The terms of a displacement at one place.
 template <int kParameters>
@@ -63,7 +63,7 @@ struct Solution {
 template <int kParameters>
 std::optional<Solution<kParameters>> FitRobustly(const std::vector<TileShift>& shifts,
                                                  const std::vector<Design<kParameters>>& designs) {
-  if (shifts.size() < kFewestTiles) return std::nullopt;
+  if (shifts.size() < kMinTiles) return std::nullopt;
   Solution<kParameters> solution;
   std::vector<double> robust(shifts.size(), 1);
   double scatter_px2 = 0.01;  // wide at first, so that no tile dominates by its formal error
@@ -81,7 +81,7 @@ std::optional<Solution<kParameters>> FitRobustly(const std::vector<TileShift>& s
     }
     const Eigen::SelfAdjointEigenSolver<decltype(normal)> eigen(normal);
     const auto values = eigen.eigenvalues();
-    if (!(values[0] > kLeastCondition * values[kParameters - 1])) return std::nullopt;
+    if (!(values[0] > kMinCondition * values[kParameters - 1])) return std::nullopt;
     solution.covariance = eigen.eigenvectors() * values.cwiseInverse().asDiagonal() *
                           eigen.eigenvectors().transpose();
     solution.value = solution.covariance * right;
@@ -102,11 +102,11 @@ std::optional<Solution<kParameters>> FitRobustly(const std::vector<TileShift>& s
     const double excess = Median(distances) / (kMedianOfChi2 * free);
     if (round + 2 < kRounds) {
       scatter_px2 = std::max(scatter_px2 * std::clamp(excess, 0.1, 10.0),
-                             kLeastShiftSigmaPx * kLeastShiftSigmaPx);
+                             kMinShiftSigmaPx * kMinShiftSigmaPx);
     }
   }
   for (const double weight : robust) solution.tiles += weight > 0.3 ? 1 : 0;
-  if (solution.tiles < static_cast<int>(std::max(kFewestTiles, shifts.size() / 2)) || !(dof > 1))
+  if (solution.tiles < static_cast<int>(std::max(kMinTiles, shifts.size() / 2)) || !(dof > 1))
     return std::nullopt;
   solution.covariance *= kOverlap * std::max(1.0, chi2 / dof);
   return solution;

@@ -14,12 +14,12 @@ namespace {
 // has.
 constexpr double kLowestCyclesPerTile = 2.2;
 constexpr double kHighestFrequency = 0.2;  // cycles per px
-constexpr double kLeastCoherence = 0.1;    // minimum coherence of a frequency that counts
+constexpr double kMinCoherence = 0.1;      // minimum coherence of a frequency that counts
 constexpr double kBlurCoherence = 0.2;  // minimum coherence of a frequency that determines the blur
 // Variance of a phase, rad^2, in addition to the part that follows from the coherence.
 constexpr double kPhaseVariance = 1e-3;
 constexpr float kLargestSine = 0.9F;  // sine of the remaining phase
-constexpr int kFewestFrequencies = 12;
+constexpr int kMinFrequencies = 12;
 // Maximum radii of the first rounds, in cycles per px. Their phases are small.
 constexpr float kFirstRounds[] = {0.06F, 0.12F, 0.24F};
 
@@ -154,7 +154,7 @@ void TilePhases::Step(std::size_t count, Tile* tile) const {
     ++used;
   }
   tile->shift.information.setZero();
-  if (used < kFewestFrequencies) return;
+  if (used < kMinFrequencies) return;
   Eigen::Matrix2d information;
   information << static_cast<double>(xx), static_cast<double>(xy), static_cast<double>(xy),
       static_cast<double>(yy);
@@ -186,13 +186,13 @@ void TilePhases::SumRings() {
 // For two spectra of coherence c^2, one of which is a filtered copy of the other with noise, a
 // phase has the variance (1/c^2 - 1)/2 times the mean power over the power of the bin (derived here
 // [D60]; small variances).
-void TilePhases::Weigh(Tile* tile) const {
+void TilePhases::WeightByErrors(Tile* tile) const {
   for (std::size_t i = 0; i < frequencies_.size(); ++i) {
     const Ring& ring = rings_[static_cast<std::size_t>(frequencies_[i].ring)];
     Bin& bin = tile->bins[i];
     const double coherence = ring.Coherence();
     bin.weight = 0;
-    if (!(coherence > kLeastCoherence)) continue;
+    if (!(coherence > kMinCoherence)) continue;
     const double mean = std::sqrt(ring.frame * ring.reference) / ring.count;
     const double own =
         std::sqrt(static_cast<double>(bin.frame) * static_cast<double>(bin.reference));
@@ -226,7 +226,7 @@ void TilePhases::Summarise() {
       wxz += weight * x * z;
       ++count;
     }
-    if (!(coherence > kLeastCoherence)) continue;
+    if (!(coherence > kMinCoherence)) continue;
     cross += ring.cross;
     frame += ring.frame;
     reference += ring.reference;
@@ -253,7 +253,7 @@ std::vector<TileShift> TilePhases::Solve() {
   for (int round = 0; round < 2; ++round) {
     SumRings();
     for (Tile& tile : tiles_) {
-      Weigh(&tile);
+      WeightByErrors(&tile);
       Step(frequencies_.size(), &tile);
     }
   }

@@ -68,7 +68,7 @@ class TilePhases {
 
   void Step(std::size_t count, Tile* tile) const;
   void SumRings();
-  void Weigh(Tile* tile) const;
+  void WeightByErrors(Tile* tile) const;
   void Summarise();
 
   int size_px_;

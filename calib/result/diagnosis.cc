@@ -36,10 +36,10 @@ void SortCauses(Diagnosis* diagnosis) {
   }
 }
 
-bool FrameStructureFinding::HasVignetting() const { return IsThere(vignetting, kLeastVignetting); }
-bool FrameStructureFinding::HasBands() const { return IsThere(bands, kLeastBands); }
+bool FrameStructureFinding::HasVignetting() const { return IsThere(vignetting, kMinVignetting); }
+bool FrameStructureFinding::HasBands() const { return IsThere(bands, kMinBands); }
 bool FrameStructureFinding::HasFixedStructure() const {
-  return IsThere(fixed_structure, kLeastFixed);
+  return IsThere(fixed_structure, kMinFixed);
 }
 
 }  // namespace thicklens::calib

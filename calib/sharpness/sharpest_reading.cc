@@ -11,7 +11,7 @@
 namespace thicklens::calib {
 namespace {
 
-constexpr std::size_t kFewestFrames = 5;
+constexpr std::size_t kMinFrames = 5;
 constexpr double kTop = 0.8, kWiderTop = 0.6;  // parts of the largest index
 
 struct Sharpness {
@@ -32,9 +32,9 @@ std::pair<std::size_t, std::size_t> Around(const std::vector<Sharpness>& samples
   while (first > 0 && samples[first - 1].index >= least) --first;
   while (last < samples.size() && samples[last].index >= least) ++last;
   // A coarse sweep has few frames that reach this: the nearest ones on both sides are taken.
-  while (last - first < kFewestFrames && last - first < samples.size()) {
+  while (last - first < kMinFrames && last - first < samples.size()) {
     if (first > 0) --first;
-    if (last < samples.size() && last - first < kFewestFrames) ++last;
+    if (last < samples.size() && last - first < kMinFrames) ++last;
   }
   return {first, last};
 }
@@ -96,13 +96,13 @@ SharpestReading FindSharpestReading(const std::vector<FrameMeasurement>& frames,
   SharpestReading result;
   const std::vector<Sharpness> samples = SamplesOf(
       frames, used, [](const FrameMeasurement& frame) { return frame.normalised_edge_slope; });
-  if (samples.size() < kFewestFrames) {
-    result.message = used.size() < kFewestFrames
+  if (samples.size() < kMinFrames) {
+    result.message = used.size() < kMinFrames
                          ? fmt::format("{} of {} frames passed the checks, {} are needed",
-                                       used.size(), frames.size(), kFewestFrames)
+                                       used.size(), frames.size(), kMinFrames)
                      : samples.empty() ? "no edges were measured in the frames"
                                        : fmt::format("{} of {} frames have edges, {} are needed",
-                                                     samples.size(), used.size(), kFewestFrames);
+                                                     samples.size(), used.size(), kMinFrames);
     return result;
   }
   const std::size_t top = TopOf(samples);
@@ -131,7 +131,7 @@ SharpestReading FindSharpestReading(const std::vector<FrameMeasurement>& frames,
         const FrameStatistics& s = frame.statistics;
         return s.mean_linear > 0 ? s.top_gradient / s.mean_linear : 0;
       });
-  if (gradients.size() >= kFewestFrames) {
+  if (gradients.size() >= kMinFrames) {
     const auto [from, to] = Around(gradients, TopOf(gradients), kTop);
     widen(FitPeak(gradients, from, to));
   }

@@ -7,7 +7,7 @@
 namespace thicklens::calib {
 namespace {
 
-constexpr std::size_t kFewestFrames = 5;
+constexpr std::size_t kMinFrames = 5;
 constexpr double kTopFraction = 0.8;
 
 }  // namespace
@@ -17,7 +17,7 @@ SharpnessPeak FitSharpnessPeak(std::vector<SharpnessSample> samples) {
   samples.erase(std::remove_if(samples.begin(), samples.end(),
                                [](const SharpnessSample& s) { return !(s.index > 0); }),
                 samples.end());
-  if (samples.size() < kFewestFrames) {
+  if (samples.size() < kMinFrames) {
     peak.message = "fewer than five frames have edges";
     return peak;
   }
@@ -32,9 +32,9 @@ SharpnessPeak FitSharpnessPeak(std::vector<SharpnessSample> samples) {
   while (first != samples.begin() && (first - 1)->index >= floor_index) --first;
   while (last != samples.end() && last->index >= floor_index) ++last;
   // A coarse sweep has few frames that reach this: the nearest ones on both sides are taken.
-  while (static_cast<std::size_t>(last - first) < kFewestFrames) {
+  while (static_cast<std::size_t>(last - first) < kMinFrames) {
     if (first != samples.begin()) --first;
-    if (last != samples.end() && static_cast<std::size_t>(last - first) < kFewestFrames) ++last;
+    if (last != samples.end() && static_cast<std::size_t>(last - first) < kMinFrames) ++last;
   }
 
   const auto n = static_cast<Eigen::Index>(last - first);

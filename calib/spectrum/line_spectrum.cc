@@ -11,7 +11,7 @@
 namespace thicklens::calib {
 namespace {
 
-constexpr double kFewestPeriods = 4;        // across the shorter side
+constexpr double kMinPeriods = 4;           // across the shorter side
 constexpr double kHighestFrequency = 0.44;  // cycles per px, along each axis
 
 }  // namespace
@@ -57,7 +57,7 @@ Frequency LineSpectrum::Of(int kx, int ky) const {
 }
 
 double LineSpectrum::LowestFrequency() const {
-  return kFewestPeriods / std::min(size_.width, size_.height);
+  return kMinPeriods / std::min(size_.width, size_.height);
 }
 
 bool LineSpectrum::Resolves(const Frequency& f) const {

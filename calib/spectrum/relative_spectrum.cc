@@ -15,7 +15,7 @@ namespace thicklens::calib {
 namespace {
 
 constexpr double kTwoPiSquared = 2 * kPi * kPi;
-constexpr int kMostSteps = 30;
+constexpr int kMaxSteps = 30;
 // Factor by which neighbouring modes widen the variances of independent ones. They share a sixth of
 // their noise and of the texture's amplitude (the transform of the squared Hann window), so that it
 // is (1 + 2/36)^2.
@@ -169,7 +169,7 @@ class Fit {
   bool Descend() {
     Evaluation now = Evaluate(state_);
     double damping = 1e-6;
-    for (int step = 0; step < kMostSteps; ++step) {
+    for (int step = 0; step < kMaxSteps; ++step) {
       ThrowIfCancelled();
       Eigen::VectorXd gradient;
       const Eigen::MatrixXd normal = AmplitudeNormal(now, &gradient);
@@ -185,7 +185,7 @@ class Fit {
           now = std::move(there);
           damping = std::max(1e-9, 0.1 * damping);
           better = true;
-          if (gained < 1e-7 * now.cost + 1e-9) step = kMostSteps;
+          if (gained < 1e-7 * now.cost + 1e-9) step = kMaxSteps;
         } else {
           damping = std::max(1e-4, 30 * damping);
         }

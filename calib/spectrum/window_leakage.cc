@@ -65,9 +65,9 @@ WindowLeakage::WindowLeakage(const cv::Mat& reference, const Eigen::Vector2d& or
         row[u] *= static_cast<float>(model::DefocusTransfer(psf, sigma, fx, fy));
       }
     }
-    cv::Mat picture;
-    cv::dft(blurred, picture, cv::DFT_INVERSE | cv::DFT_SCALE | cv::DFT_REAL_OUTPUT);
-    const cv::Mat inner = picture(cv::Rect(pad, pad, part.width, part.height));
+    cv::Mat image;
+    cv::dft(blurred, image, cv::DFT_INVERSE | cv::DFT_SCALE | cv::DFT_REAL_OUTPUT);
+    const cv::Mat inner = image(cv::Rect(pad, pad, part.width, part.height));
     const auto seen = MeasureSpectrum(inner, part_origin_px, {}, window, modes, count);
     Eigen::ArrayXcd& node = nodes_[static_cast<std::size_t>(index + 1)];
     node = Eigen::ArrayXcd::Zero(static_cast<Eigen::Index>(count));

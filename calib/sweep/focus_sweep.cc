@@ -27,7 +27,7 @@ DecodeTable MakeDecodeTable(const model::TransferCurve& transfer, std::size_t le
   return table;
 }
 
-// Returns the table from stored values to linear light. It is kept for the next frame, which is
+// Returns the table from encoded values to linear light. It is kept for the next frame, which is
 // usually from the same camera.
 std::shared_ptr<const DecodeTable> DecodeTableOf(const model::TransferCurve& transfer,
                                                  std::size_t levels) {
@@ -120,11 +120,11 @@ cv::Mat RegionOf(const cv::Mat& stored, const FocusSweep& sweep, std::size_t ind
   const model::Sensor& sensor = sweep.camera.sensor;
   const std::string& name = sweep.frames[index].image;
   if (stored.cols != sensor.width_px || stored.rows != sensor.height_px) {
-    throw Error(fmt::format("{}: the picture is {} x {} px, the camera's sensor {} x {} px", name,
+    throw Error(fmt::format("{}: the image is {} x {} px, the camera's sensor {} x {} px", name,
                             stored.cols, stored.rows, sensor.width_px, sensor.height_px));
   }
   if (stored.depth() != CV_8U && stored.depth() != CV_16U) {
-    throw Error(fmt::format("{}: pictures of 8 or 16 bits a channel are expected", name));
+    throw Error(fmt::format("{}: images of 8 or 16 bits a channel are expected", name));
   }
   if (stored.channels() != 1 && stored.channels() != 3 && stored.channels() != 4) {
     throw Error(
@@ -152,7 +152,7 @@ cv::Mat LinearChannel(const cv::Mat& stored, const FocusSweep& sweep, std::size_
   const cv::Mat region = RegionOf(stored, sweep, index);
   const int colours = region.channels() == 4 ? 3 : region.channels();
   if (channel < 0 || channel >= colours) {
-    throw Error(fmt::format("{}: channel {} is asked for; the picture has {}, counted from 0",
+    throw Error(fmt::format("{}: channel {} is asked for; the image has {}, counted from 0",
                             sweep.frames[index].image, channel, colours));
   }
   const bool bytes = region.depth() == CV_8U;

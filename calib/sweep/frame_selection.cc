@@ -16,7 +16,7 @@ namespace {
 
 // The target is not visible in a frame with fewer edges than this and a contrast below this part of
 // the median.
-constexpr int kFewestEdges = 12;
+constexpr int kMinEdges = 12;
 constexpr double kFaintContrast = 0.5;
 // A frame of this coarse texture is kept: the target is visible where the noise is averaged out.
 constexpr double kClearTexture = 3;
@@ -40,15 +40,15 @@ FrameSelection::FrameSelection(std::vector<FrameMeasurement>* frames) : frames_(
   std::iota(used_.begin(), used_.end(), std::size_t{0});
 }
 
-std::optional<std::string> FrameSelection::KeepMeasurable(const GateOptions& gates) {
+std::optional<std::string> FrameSelection::KeepMeasurable(const QualityCheckOptions& checks) {
   std::vector<double> contrasts;
   for (const FrameMeasurement& frame : frames_) {
-    if (!RejectionReason(frame.statistics, 0, gates))
+    if (!RejectionReason(frame.statistics, 0, checks))
       contrasts.push_back(frame.statistics.contrast);
   }
   const double median_contrast = Median(contrasts);
   return KeepOnly([&](const FrameMeasurement& frame) {
-    return RejectionReason(frame.statistics, median_contrast, gates);
+    return RejectionReason(frame.statistics, median_contrast, checks);
   });
 }
 
@@ -57,7 +57,7 @@ std::optional<std::string> FrameSelection::KeepThoseWithEdges() {
   for (const std::size_t i : used_) contrasts.push_back(frames_[i].statistics.contrast);
   const double median_contrast = Median(contrasts);
   return KeepOnly([&](const FrameMeasurement& frame) -> std::optional<std::string> {
-    if (frame.edge_count >= kFewestEdges ||
+    if (frame.edge_count >= kMinEdges ||
         frame.statistics.contrast >= kFaintContrast * median_contrast ||
         frame.statistics.coarse_texture >= kClearTexture)
       return std::nullopt;
@@ -98,7 +98,7 @@ std::optional<std::string> FrameSelection::KeepOnly(const Reason& reason) {
     }
   }
   used_ = kept;
-  if (distinct.size() >= kFewestFrames) return std::nullopt;
+  if (distinct.size() >= kMinFrames) return std::nullopt;
   return TooFewUsable(distinct.size());
 }
 
@@ -112,7 +112,7 @@ std::string FrameSelection::TooFewUsable(std::size_t distinct_readings) const {
   std::map<std::string, Kind> kinds;
   for (std::size_t i = 0; i < frames_.size(); ++i) {
     if (frames_[i].rejection.empty()) continue;
-    Kind& kind = kinds[RejectionKind(frames_[i].rejection)];
+    Kind& kind = kinds[FailedCheck(frames_[i].rejection)];
     if (kind.frames++ == 0) kind.first = i;
   }
   const std::string counts =
@@ -120,7 +120,7 @@ std::string FrameSelection::TooFewUsable(std::size_t distinct_readings) const {
                   distinct_readings == used_.size()
                       ? ""
                       : fmt::format(" at {} different readings", distinct_readings),
-                  kFewestFrames);
+                  kMinFrames);
   if (kinds.empty()) return counts;
   std::vector<std::pair<std::string, Kind>> sorted(kinds.begin(), kinds.end());
   std::stable_sort(sorted.begin(), sorted.end(),
@@ -141,11 +141,11 @@ std::string ExposureAdvice(const std::vector<FrameMeasurement>& frames,
   std::size_t over = 0, under = 0, clear = 0;
   std::vector<double> means;
   for (const FrameMeasurement& frame : frames) {
-    const std::string kind = RejectionKind(frame.rejection);
+    const std::string kind = FailedCheck(frame.rejection);
     if (kind == kKindSaturated) ++over;
     if (kind != kKindDark && kind != kKindBlack) continue;
     ++under;
-    means.push_back(frame.statistics.mean_stored);
+    means.push_back(frame.statistics.mean_encoded);
     const double noise_gradient = frame.statistics.noise_sigma / std::sqrt(8 * CV_PI);
     if (frame.statistics.top_gradient > kClearGradient * noise_gradient) ++clear;
   }
@@ -183,7 +183,7 @@ std::string RegionAdvice(const FocusSweep& sweep) {
   return fmt::format(
       "the {} is {} x {} px: an edge needs at least {} px on each side, a texture {}, and {} or "
       "more are better",
-      sweep.roi.width > 0 ? "region of interest (roi_px)" : "picture", size.width, size.height,
+      sweep.roi.width > 0 ? "region of interest (roi_px)" : "image", size.width, size.height,
       kSmallestRegionPx, kSmallestTextureRegionPx, kAmpleRegionPx);
 }
 

@@ -9,18 +9,18 @@
 
 #include "thicklens/calib/calibration.h"
 #include "thicklens/calib/focus_sweep.h"
-#include "thicklens/calib/frame_gates.h"
+#include "thicklens/calib/frame_checks.h"
 
 namespace thicklens::calib {
 
-inline constexpr std::size_t kFewestFrames = 5;
+inline constexpr std::size_t kMinFrames = 5;
 // Edge pixels of the sharpness index have gradients above this part of the sweep's steepest.
 inline constexpr double kEdgeThreshold = 0.25;
 
 // Returns the file's name as in the table of readings, without its directory on this machine.
 std::string FileName(const std::string& image);
 
-// The frames of a sweep that are in use; the gates reject others one after the other.
+// The frames of a sweep that are in use; the quality checks reject others one after the other.
 class FrameSelection {
  public:
   // All frames are in use at first. `frames` must outlive this object.
@@ -31,11 +31,11 @@ class FrameSelection {
   // Each Keep function sets the `rejection` of the used frames that it rejects. It returns the
   // reason for a refusal if too few are left.
 
-  // Applies the absolute gates on the levels, then the blank gate against the median of the frames
-  // that passed them.
-  std::optional<std::string> KeepMeasurable(const GateOptions& gates);
+  // Applies the absolute checks on the levels, then the blank quality check against the median of
+  // the frames that passed them.
+  std::optional<std::string> KeepMeasurable(const QualityCheckOptions& checks);
   // Rejects frames with hardly any edge, little contrast and no clear texture: they do not show the
-  // target any more, but shading alone passes the gates of contrast and gradient.
+  // target any more, but shading alone passes the quality checks of contrast and gradient.
   std::optional<std::string> KeepThoseWithEdges();
   // Rejects frames nearer than the front focal point. No image of the target forms there: such a
   // frame shows another object, or the lens rests on the target.

@@ -29,12 +29,12 @@ class Choices {
 
  private:
   BlurSamples& Samples() {
-    return evidence_.setup.meters[static_cast<std::size_t>(evidence_.spectrum)];
+    return evidence_.setup.estimators[static_cast<std::size_t>(evidence_.spectrum)];
   }
 
-  bool IsKept(std::size_t meter_frame) {
+  bool IsKept(std::size_t estimator_frame) {
     const std::vector<std::size_t>& kept = Samples().frames;
-    return std::find(kept.begin(), kept.end(), evidence_.fit_index[meter_frame]) != kept.end();
+    return std::find(kept.begin(), kept.end(), evidence_.fit_index[estimator_frame]) != kept.end();
   }
 
   FittedRegion Fit(model::Psf psf, double part) const {
@@ -43,12 +43,12 @@ class Choices {
 
   // Returns false where the reference itself was rejected, because everything refers to it.
   bool LeaveOutRejected() {
-    MeterRegion& region = evidence_.region;
+    EstimatorRegion& region = evidence_.region;
     if (!IsKept(region.frames[region.reference])) return false;
     if (std::all_of(region.frames.begin(), region.frames.end(),
                     [this](std::size_t f) { return IsKept(f); }))
       return true;
-    MeterRegion kept = PartOf(
+    EstimatorRegion kept = PartOf(
         region, [this](std::size_t f) { return IsKept(f); }, [](const Mode&) { return true; });
     std::swap(region, kept);
     FittedRegion fitted = Fit(stated_, 1);
@@ -87,15 +87,15 @@ class Choices {
   }
 
   FittedRegion FitOtherShape() {
-    MeterRegion& region = evidence_.region;
-    const SpectralMeterSetup& meter = evidence_.spectral;
+    EstimatorRegion& region = evidence_.region;
+    const SpectralEstimatorSetup& estimator = evidence_.spectral;
     double largest = 0;
     for (const std::size_t f : region.frames)
-      largest = std::max(largest, meter.frames[f].expected_variance_px2);
-    WindowLeakage leakage(meter.read_grey(meter.frames[meter.reference].frame), meter.origin_px,
-                          region.window, region.modes, region.samples[region.reference].spectrum,
-                          OtherPsf(stated_), kLeakageMargin * std::sqrt(largest) + 0.5,
-                          meter.threads);
+      largest = std::max(largest, estimator.frames[f].expected_variance_px2);
+    WindowLeakage leakage(estimator.read_grey(estimator.frames[estimator.reference].frame),
+                          estimator.origin_px, region.window, region.modes,
+                          region.samples[region.reference].spectrum, OtherPsf(stated_),
+                          kLeakageMargin * std::sqrt(largest) + 0.5, estimator.threads);
     std::swap(region.leakage, leakage);
     FittedRegion fit = Fit(OtherPsf(stated_), CommonPart(OtherPsf(stated_)));
     std::swap(region.leakage, leakage);

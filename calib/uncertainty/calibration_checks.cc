@@ -37,7 +37,7 @@ MagnificationCheck DistanceFromPeriod(const FocusSweep& sweep, const PeriodEstim
 OffsetCheck CheckGivenOffset(const FocusSweep& sweep, const std::string& unit_that_fits,
                              Calibration* calibration) {
   OffsetCheck check;
-  const ScaleLaw& law = calibration->scale;
+  const ScaleModel& law = calibration->scale;
   if (!law.done) {
     calibration->warnings.push_back("the given offset_mm could not be checked: " + law.message);
     return check;
@@ -64,20 +64,23 @@ OffsetCheck CheckGivenOffset(const FocusSweep& sweep, const std::string& unit_th
   return check;
 }
 
-std::optional<Bend> CheckBend(const FocusSweep& sweep, const std::vector<ScaleSample>& scales,
-                              Calibration* calibration) {
-  const std::optional<Bend> bend = FindBend(scales, calibration->scale, sweep);
-  if (!bend) return std::nullopt;
-  calibration->warnings.push_back(BendInWords(*bend, *calibration));
-  return bend;
+std::optional<ScaleNonlinearity> CheckScaleNonlinearity(const FocusSweep& sweep,
+                                                        const std::vector<ScaleSample>& scales,
+                                                        Calibration* calibration) {
+  const std::optional<ScaleNonlinearity> nonlinearity =
+      FindScaleNonlinearity(scales, calibration->scale, sweep);
+  if (!nonlinearity) return std::nullopt;
+  calibration->warnings.push_back(NonlinearityText(*nonlinearity, *calibration));
+  return nonlinearity;
 }
 
-void WarnOfSlip(const Slip& slip, Calibration* calibration) {
-  const FrameMeasurement& frame = calibration->frames[slip.frame];
+void WarnOfReadingStep(const ReadingStep& reading_step, Calibration* calibration) {
+  const FrameMeasurement& frame = calibration->frames[reading_step.frame];
   calibration->warnings.push_back(
       fmt::format("the readings jump by {:+.2f} +- {:.2f} mm against the image scale from {} "
                   "(reading {:.6g} mm) on: check the clamp and the table of readings there",
-                  slip.jump_mm.value, slip.jump_mm.sigma, FileName(frame.image), frame.reading_mm));
+                  reading_step.jump_mm.value, reading_step.jump_mm.sigma, FileName(frame.image),
+                  frame.reading_mm));
 }
 
 std::vector<BlurFitSetup> WithOffsets(const BlurFitSetup& setup,
@@ -87,23 +90,24 @@ std::vector<BlurFitSetup> WithOffsets(const BlurFitSetup& setup,
   return setups;
 }
 
-std::vector<BlurFitSetup> WithoutSlip(const FocusSweep& sweep, const BlurFitSetup& setup,
-                                      const Slip& slip, std::vector<ScaleSample> scales,
-                                      std::size_t reference, const Calibration& calibration) {
-  const double from_mm = calibration.frames[slip.frame].reading_mm;
+std::vector<BlurFitSetup> WithoutReadingStep(const FocusSweep& sweep, const BlurFitSetup& setup,
+                                             const ReadingStep& reading_step,
+                                             std::vector<ScaleSample> scales, std::size_t reference,
+                                             const Calibration& calibration) {
+  const double from_mm = calibration.frames[reading_step.frame].reading_mm;
   BlurFitSetup later = setup, earlier = setup;
   for (FitFrame& frame : later.frames) {
-    if (frame.reading_mm >= from_mm) frame.reading_mm -= slip.jump_mm.value;
+    if (frame.reading_mm >= from_mm) frame.reading_mm -= reading_step.jump_mm.value;
   }
   for (FitFrame& frame : earlier.frames) {
-    if (frame.reading_mm < from_mm) frame.reading_mm += slip.jump_mm.value;
+    if (frame.reading_mm < from_mm) frame.reading_mm += reading_step.jump_mm.value;
   }
   if (sweep.offset_mm) return {later, earlier};
   for (ScaleSample& sample : scales) {
-    if (sample.reading_mm >= from_mm) sample.reading_mm -= slip.jump_mm.value;
+    if (sample.reading_mm >= from_mm) sample.reading_mm -= reading_step.jump_mm.value;
   }
-  const ScaleLaw law = FitScaleLaw(scales, static_cast<int>(reference), setup.reading_sigma_mm,
-                                   sweep.direction, RegionCornerRadiusPx(sweep));
+  const ScaleModel law = FitScaleModel(scales, static_cast<int>(reference), setup.reading_sigma_mm,
+                                       sweep.direction, RegionCornerRadiusPx(sweep));
   if (!law.done) return {later, earlier};
   later.offset_mm.value = law.offset_mm.value + calibration.scale.centre_mm;
   return {later};

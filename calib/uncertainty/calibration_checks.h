@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "calib/fit/blur_fit.h"
-#include "calib/registration/reading_gates.h"
-#include "calib/registration/scale_bend.h"
+#include "calib/registration/reading_checks.h"
+#include "calib/registration/scale_nonlinearity.h"
 #include "thicklens/calib/calibration.h"
 #include "thicklens/calib/focus_sweep.h"
 
@@ -29,20 +29,22 @@ OffsetCheck CheckGivenOffset(const FocusSweep& sweep, const std::string& unit_th
                              Calibration* calibration);
 
 // Finds readings that follow a curve against the image scale.
-std::optional<Bend> CheckBend(const FocusSweep& sweep, const std::vector<ScaleSample>& scales,
-                              Calibration* calibration);
+std::optional<ScaleNonlinearity> CheckScaleNonlinearity(const FocusSweep& sweep,
+                                                        const std::vector<ScaleSample>& scales,
+                                                        Calibration* calibration);
 
-void WarnOfSlip(const Slip& slip, Calibration* calibration);
+void WarnOfReadingStep(const ReadingStep& reading_step, Calibration* calibration);
 
 // The setups of fits with the alternatives that the checks leave possible. WithOffsets uses other
-// bench zeros, such as that of one half of the sweep. WithoutSlip moves the readings before or
-// after a jump; where no zero was given, it uses the zero that the scales of the moved readings
+// bench zeros, such as that of one half of the sweep. WithoutReadingStep moves the readings before
+// or after a jump; where no zero was given, it uses the zero that the scales of the moved readings
 // give.
 std::vector<BlurFitSetup> WithOffsets(const BlurFitSetup& setup,
                                       const std::vector<double>& offsets_mm);
-std::vector<BlurFitSetup> WithoutSlip(const FocusSweep& sweep, const BlurFitSetup& setup,
-                                      const Slip& slip, std::vector<ScaleSample> scales,
-                                      std::size_t reference, const Calibration& calibration);
+std::vector<BlurFitSetup> WithoutReadingStep(const FocusSweep& sweep, const BlurFitSetup& setup,
+                                             const ReadingStep& reading_step,
+                                             std::vector<ScaleSample> scales, std::size_t reference,
+                                             const Calibration& calibration);
 
 // Compares d1 from the target's period, which must be stated, with d1 from the focus. `grey` is the
 // linear light of the frame `reference`.

@@ -21,14 +21,14 @@ namespace {
 constexpr double kWholeField = 0.98;
 constexpr double kSmallField = 240;  // px; three tiles per side below, five above
 constexpr int kModesPerRing = 48;
-constexpr std::size_t kFewestTiles = 5;
+constexpr std::size_t kMinTiles = 5;
 constexpr double kSpreadOverErrors = 4;  // ratio of squares; below it the tiles agree
 constexpr double kApart = 6;             // standard deviations between depths of a target
 constexpr double kRoughSurface = 4;  // chi^2 per dof of a smooth field above which depths differ
 constexpr double kColourDifference = 0.01;  // part of the mean; below it the channels are copies
 // At most this many frames of a longer sweep are mapped, evenly spread: the time to fit one part
 // grows with the square of its frames, and all parts' spectra are in memory at once.
-constexpr std::size_t kMostFrames = 128;
+constexpr std::size_t kMaxFrames = 128;
 
 class Field {
  public:
@@ -59,10 +59,10 @@ class Field {
   // Keeps the frames that are in the fit, and updates them with the fitted blur.
   void KeepUsedFrames() {
     const std::size_t reference = setup_.frames.empty() ? 0 : setup_.frames[setup_.reference].frame;
-    std::vector<MeterFrame> kept;
-    for (const MeterFrame& frame : setup_.frames) {
+    std::vector<EstimatorFrame> kept;
+    for (const EstimatorFrame& frame : setup_.frames) {
       if (!result_.frames[frame.frame].in_blur_fit) continue;
-      MeterFrame entry = frame;
+      EstimatorFrame entry = frame;
       const double depth_mm = DepthMm(frame.frame);
       entry.expected_variance_px2 =
           (fit_.values[kFloorVariance] + FittedDefocusVariance(evidence_.setup, fit_, depth_mm)) /
@@ -79,9 +79,9 @@ class Field {
   }
 
   void ThinOut() {
-    std::vector<MeterFrame> kept;
+    std::vector<EstimatorFrame> kept;
     std::size_t reference = 0;
-    for (const std::size_t f : EvenlySpread(setup_.frames.size(), setup_.reference, kMostFrames)) {
+    for (const std::size_t f : EvenlySpread(setup_.frames.size(), setup_.reference, kMaxFrames)) {
       if (f == setup_.reference) reference = kept.size();
       kept.push_back(setup_.frames[f]);
     }
@@ -89,16 +89,17 @@ class Field {
     setup_.reference = reference;
   }
 
-  double BelievedReading(std::size_t frame) const {
+  double EstimatedReading(std::size_t frame) const {
     return result_.frames[frame].reading_mm - result_.frames[frame].reading_error_mm;
   }
   double DepthMm(std::size_t frame) const {
     return evidence_.setup.offset_mm.value +
-           model::DirectionSign(sweep_.direction) * BelievedReading(frame);
+           model::DirectionSign(sweep_.direction) * EstimatedReading(frame);
   }
 
   // Returns zf of one region, with the corrected readings and the fitted floor.
-  std::optional<model::Estimate> FocusOf(const MeterRegion& region, std::string* message) const {
+  std::optional<model::Estimate> FocusOf(const EstimatorRegion& region,
+                                         std::string* message) const {
     if (region.frames.size() < 5 || region.modes.size() < 8) {
       *message = "too little texture, or too few frames see it";
       return std::nullopt;
@@ -115,9 +116,9 @@ class Field {
     setup.reading_sigma_mm = 0;
     setup.reading_sigma_is_known = false;  // errors from the scatter, not noise alone
     setup.floor_variance_px2 = model::Estimate{fit_.values[kFloorVariance], 0};
-    for (const MeterFrame& frame : setup_.frames)
-      setup.frames.push_back({BelievedReading(frame.frame), frame.place.scale, std::nullopt});
-    setup.meters = {AsSamples(fitted.blur, fitted.region)};
+    for (const EstimatorFrame& frame : setup_.frames)
+      setup.frames.push_back({EstimatedReading(frame.frame), frame.place.scale, std::nullopt});
+    setup.estimators = {AsSamples(fitted.blur, fitted.region)};
     const BlurFitResult fit = FitBlur(setup);
     *message = fit.message;
     if (!fit.done) return std::nullopt;
@@ -130,7 +131,7 @@ class Field {
     const int side = setup_.size_px.minCoeff() < kSmallField ? 3 : 5;
     const double part = 2.0 / (side + 1);  // neighbours overlap by half
     map.columns = map.rows = side;
-    std::vector<MeterRegion> regions;
+    std::vector<EstimatorRegion> regions;
     std::vector<std::size_t> tile_of;
     for (int row = 0; row < side; ++row) {
       for (int column = 0; column < side; ++column) {
@@ -166,10 +167,10 @@ class Field {
     for (std::size_t i = 0; i < map.tiles.size(); ++i) {
       if (map.tiles[i].done) fitted.push_back(i);
     }
-    map.done = fitted.size() >= kFewestTiles;
+    map.done = fitted.size() >= kMinTiles;
     map.message = map.done ? "done"
                            : fmt::format("{} parts of the field could be fitted, {} are needed",
-                                         fitted.size(), kFewestTiles);
+                                         fitted.size(), kMinTiles);
     if (map.done) DescribeSurface(fitted);
   }
 
@@ -337,7 +338,7 @@ class Field {
   void MeasureAstigmatism() {
     const TargetWindow& window = evidence_.region.window;
     const auto along = [&](int axis) {
-      MeterRegion part = PartOf(
+      EstimatorRegion part = PartOf(
           evidence_.region, [&](std::size_t f) { return NewIndex(f).has_value(); },
           [&](const Mode& mode) {
             const Eigen::Vector2d nu = ModeFrequency(mode, window).cwiseAbs();
@@ -380,7 +381,7 @@ class Field {
       };
       auto region = PlanRegion(setup_, kWholeField, Eigen::Vector2d::Zero());
       if (region) {
-        std::vector<MeterRegion> regions = {std::move(*region)};
+        std::vector<EstimatorRegion> regions = {std::move(*region)};
         MeasureRegions(setup_, &regions);
         if (const auto found = FocusOf(regions[0], &focus.message)) {
           focus.done = true;
@@ -396,7 +397,7 @@ class Field {
   const BlurFitResult& fit_;
   FrameStore& store_;
   Calibration& result_;
-  SpectralMeterSetup setup_;
+  SpectralEstimatorSetup setup_;
 };
 
 }  // namespace

@@ -23,15 +23,15 @@ constexpr double kLowestFrequency = 0.03, kHighestFrequency = 0.33;  // cycles p
 // The range where a soft image has noise alone; remaining detail of a sharp image makes the bound
 // larger.
 constexpr double kNoiseFrom = 0.40, kNoiseTo = 0.49;
-constexpr int kFewestModes = 8;  // per ring
+constexpr int kMinModes = 8;  // per ring
 
 // Returns sigma^2 of the target's edges in the plane of focus, of lens and ink together, if it has
 // edges.
 std::optional<double> EdgeSoftness(const BlurEvidence& evidence) {
   BlurFitSetup setup = evidence.setup;
   if (evidence.edges >= 0) {
-    setup.meters = {setup.meters[static_cast<std::size_t>(evidence.edges)]};
-    setup.meters[0].held_softness_px2 = 0;
+    setup.estimators = {setup.estimators[static_cast<std::size_t>(evidence.edges)]};
+    setup.estimators[0].held_softness_px2 = 0;
     setup.floor_variance_px2.reset();
     const BlurFitResult fit = FitBlur(setup);
     if (!fit.done || !(fit.values[kFloorVariance] > 0)) return std::nullopt;
@@ -86,11 +86,11 @@ struct Ring {
 };
 
 // Returns the mean noise power of a mode, with the pixel's box still in it.
-double NoisePower(const SpectralMeterSetup& meter, const MeterRegion& region) {
-  const MeterFrame& frame = meter.frames[meter.reference];
+double NoisePower(const SpectralEstimatorSetup& estimator, const EstimatorRegion& region) {
+  const EstimatorFrame& frame = estimator.frames[estimator.reference];
   const std::vector<Mode> modes = ModesBetween(region.window, kNoiseFrom, kNoiseTo);
-  const auto spectrum = MeasureSpectrum(meter.read_grey(frame.frame), meter.origin_px, frame.place,
-                                        region.window, modes, modes.size());
+  const auto spectrum = MeasureSpectrum(estimator.read_grey(frame.frame), estimator.origin_px,
+                                        frame.place, region.window, modes, modes.size());
   if (!spectrum || modes.empty()) return 0;
   double sum = 0;
   for (std::size_t k = 0; k < modes.size(); ++k) {
@@ -101,13 +101,14 @@ double NoisePower(const SpectralMeterSetup& meter, const MeterRegion& region) {
                   spectrum->noise_gain * frame.pixel_noise * frame.pixel_noise);
 }
 
-std::vector<Ring> MeasureRings(const SpectralMeterSetup& meter, const MeterRegion& region) {
-  const MeterFrame& frame = meter.frames[meter.reference];
+std::vector<Ring> MeasureRings(const SpectralEstimatorSetup& estimator,
+                               const EstimatorRegion& region) {
+  const EstimatorFrame& frame = estimator.frames[estimator.reference];
   const std::vector<Mode> modes = ModesBetween(region.window, kLowestFrequency, kHighestFrequency);
-  const auto spectrum = MeasureSpectrum(meter.read_grey(frame.frame), meter.origin_px, frame.place,
-                                        region.window, modes, modes.size());
+  const auto spectrum = MeasureSpectrum(estimator.read_grey(frame.frame), estimator.origin_px,
+                                        frame.place, region.window, modes, modes.size());
   if (!spectrum) return {};
-  const double noise = NoisePower(meter, region);
+  const double noise = NoisePower(estimator, region);
   std::vector<Ring> rings(kRings);
   std::vector<int> counts(kRings, 0);
   std::vector<double> raw(kRings, 0);
@@ -124,7 +125,7 @@ std::vector<Ring> MeasureRings(const SpectralMeterSetup& meter, const MeterRegio
   }
   std::vector<Ring> kept;
   for (std::size_t r = 0; r < rings.size(); ++r) {
-    if (counts[r] < kFewestModes) continue;
+    if (counts[r] < kMinModes) continue;
     Ring ring = rings[r];
     ring.nu = std::sqrt(ring.nu / counts[r]);
     ring.power /= counts[r];
@@ -140,7 +141,7 @@ std::vector<Ring> MeasureRings(const SpectralMeterSetup& meter, const MeterRegio
 FloorChoice ChooseFloor(const model::FloorKnowledge& known, const BlurEvidence& evidence,
                         std::vector<std::string>* warnings) {
   FloorChoice choice;
-  const std::vector<BlurSamples>& meters = evidence.setup.meters;
+  const std::vector<BlurSamples>& estimators = evidence.setup.estimators;
   if (known.given_px) {
     const double px = known.given_px->value;
     const double sigma_px = known.given_px->sigma;
@@ -150,8 +151,8 @@ FloorChoice ChooseFloor(const model::FloorKnowledge& known, const BlurEvidence& 
   } else if (known.from_px) {
     choice.interval_px2 =
         Eigen::Vector2d(*known.from_px * *known.from_px, *known.to_px * *known.to_px);
-  } else if (std::any_of(meters.begin(), meters.end(), [](const BlurSamples& meter) {
-               return meter.held_softness_px2.has_value();
+  } else if (std::any_of(estimators.begin(), estimators.end(), [](const BlurSamples& estimator) {
+               return estimator.held_softness_px2.has_value();
              })) {
     choice.is_measured = true;
   } else {
@@ -161,10 +162,10 @@ FloorChoice ChooseFloor(const model::FloorKnowledge& known, const BlurEvidence& 
   return choice;
 }
 
-std::optional<double> LargestBlurVariance(const SpectralMeterSetup& meter,
-                                          const MeterRegion& region) {
-  if (region.samples.empty() || !meter.read_grey) return std::nullopt;
-  const std::vector<Ring> rings = MeasureRings(meter, region);
+std::optional<double> LargestBlurVariance(const SpectralEstimatorSetup& estimator,
+                                          const EstimatorRegion& region) {
+  if (region.samples.empty() || !estimator.read_grey) return std::nullopt;
+  const std::vector<Ring> rings = MeasureRings(estimator, region);
   std::optional<double> least;
   for (std::size_t a = 0; a < rings.size(); ++a) {
     for (std::size_t b = a + 1; b < rings.size(); ++b) {

@@ -30,8 +30,8 @@ FloorChoice ChooseFloor(const model::FloorKnowledge& known, const BlurEvidence& 
 // where P is the mean power in rings without the noise, each at the end of its two-sigma interval
 // that makes the bound larger. Derived here [D81]: P(nu) = S(nu) exp(-4 pi^2 sigma^2 nu^2),
 // S(a) >= S(b). Returns nothing where no ring exceeds the noise.
-std::optional<double> LargestBlurVariance(const SpectralMeterSetup& meter,
-                                          const MeterRegion& region);
+std::optional<double> LargestBlurVariance(const SpectralEstimatorSetup& estimator,
+                                          const EstimatorRegion& region);
 
 }  // namespace thicklens::calib
 

@@ -9,7 +9,7 @@
 namespace thicklens::calib {
 namespace {
 
-constexpr std::size_t kFewestOnASide = 6;
+constexpr std::size_t kMinOnASide = 6;
 
 // Returns the samples on one side of focus, with the target's softness held at the value of the
 // whole sweep.
@@ -20,29 +20,30 @@ std::optional<BlurFitSetup> SideOf(const BlurEvidence& evidence, const BlurFitRe
   if (!setup.floor_variance_px2)
     setup.floor_variance_px2 = model::Estimate{fit.values[kFloorVariance], 0};
   *frames = 0;
-  for (std::size_t m = 0; m < setup.meters.size(); ++m) {
-    BlurSamples& meter = setup.meters[m];
+  for (std::size_t m = 0; m < setup.estimators.size(); ++m) {
+    BlurSamples& estimator = setup.estimators[m];
     std::vector<Eigen::Index> kept;
     std::vector<std::size_t> kept_frames;
-    for (std::size_t i = 0; i < meter.frames.size(); ++i) {
-      const double depth_mm = setup.offset_mm.value + model::DirectionSign(setup.direction) *
-                                                          setup.frames[meter.frames[i]].reading_mm;
+    for (std::size_t i = 0; i < estimator.frames.size(); ++i) {
+      const double depth_mm =
+          setup.offset_mm.value +
+          model::DirectionSign(setup.direction) * setup.frames[estimator.frames[i]].reading_mm;
       if ((depth_mm < fit.values[kFocusDepth]) != nearer) continue;
       kept.push_back(static_cast<Eigen::Index>(i));
-      kept_frames.push_back(meter.frames[i]);
+      kept_frames.push_back(estimator.frames[i]);
     }
     BlurSamples side;
     side.frames = kept_frames;
-    side.variances_px2 = meter.variances_px2(kept);
-    side.covariance = meter.covariance(kept, kept);
+    side.variances_px2 = estimator.variances_px2(kept);
+    side.covariance = estimator.covariance(kept, kept);
     side.held_softness_px2 = fit.softness_px2[m];
-    meter = std::move(side);
+    estimator = std::move(side);
     *frames = std::max(*frames, kept.size());
   }
-  setup.meters.erase(std::remove_if(setup.meters.begin(), setup.meters.end(),
-                                    [](const BlurSamples& m) { return m.frames.empty(); }),
-                     setup.meters.end());
-  if (*frames < kFewestOnASide) return std::nullopt;
+  setup.estimators.erase(std::remove_if(setup.estimators.begin(), setup.estimators.end(),
+                                        [](const BlurSamples& m) { return m.frames.empty(); }),
+                         setup.estimators.end());
+  if (*frames < kMinOnASide) return std::nullopt;
   return setup;
 }
 
@@ -52,7 +53,7 @@ SideFit FitSide(const BlurEvidence& evidence, const BlurFitResult& fit, bool nea
   const std::optional<BlurFitSetup> setup = SideOf(evidence, fit, nearer, &frames);
   side.frames_used = static_cast<int>(frames);
   if (!setup) {
-    side.message = fmt::format("{} frames on this side, {} are needed", frames, kFewestOnASide);
+    side.message = fmt::format("{} frames on this side, {} are needed", frames, kMinOnASide);
     return side;
   }
   const BlurFitResult alone = FitBlur(*setup, &fit);

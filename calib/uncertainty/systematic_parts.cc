@@ -12,14 +12,14 @@
 namespace thicklens::calib {
 namespace {
 
-constexpr std::size_t kFewestFrames = 5;
+constexpr std::size_t kMinFrames = 5;
 constexpr double kShapesDiffer = 1.1;  // ratio of chi^2 of the frames
 // Difference of chi^2 of the frames, 4 standard deviations, beyond which a family is ruled out.
 constexpr double kRuledOut = 16;
-constexpr double kLawFails = 2;       // chi^2 per degree of freedom of the blur law
+constexpr double kModelFails = 2;     // chi^2 per degree of freedom of the blur law
 constexpr double kSidesDisagree = 3;  // times their standard deviations
-// Accuracy of the meters themselves, relative to kappa: measured on simulated sweeps.
-constexpr double kMeterRatioError = 0.003;
+// Accuracy of the estimators themselves, relative to kappa: measured on simulated sweeps.
+constexpr double kEstimatorRatioError = 0.003;
 
 // An alternative choice: the fit with it, and the lens that it is for.
 struct Trial {
@@ -45,12 +45,12 @@ class Parts {
     AddBand();
     AddShape();
     AddTails();
-    AddMeter();
+    AddEstimator();
     AddTolerances();
     SystematicPart own;
-    own.name = "blur meter";
-    own.blur_ratio = kMeterRatioError * fit_.values[kBlurRatio] * Eigen::Vector2d(-1, 1);
-    own.remedy = "nothing: it is what the meter itself is good for";
+    own.name = "blur estimator";
+    own.blur_ratio = kEstimatorRatioError * fit_.values[kBlurRatio] * Eigen::Vector2d(-1, 1);
+    own.remedy = "nothing: it is what the estimator itself is good for";
     result_.systematic_parts.push_back(own);
     SetIntervals(floor);
     SortAndAdvise(&result_);
@@ -121,18 +121,18 @@ class Parts {
     result_.systematic_parts.push_back(part);
   }
 
-  // Fits with other samples in place of a meter's. Rejected frames remain excluded.
-  std::optional<Trial> With(const std::optional<BlurSamples>& samples, int meter) const {
-    if (!samples || meter < 0) return std::nullopt;
+  // Fits with other samples in place of an estimator's. Rejected frames remain excluded.
+  std::optional<Trial> With(const std::optional<BlurSamples>& samples, int estimator) const {
+    if (!samples || estimator < 0) return std::nullopt;
     BlurFitSetup setup = evidence_.setup;
-    BlurSamples& place = setup.meters[static_cast<std::size_t>(meter)];
+    BlurSamples& place = setup.estimators[static_cast<std::size_t>(estimator)];
     std::vector<Eigen::Index> kept;
     for (std::size_t i = 0; i < samples->frames.size(); ++i) {
       if (std::find(place.frames.begin(), place.frames.end(), samples->frames[i]) !=
           place.frames.end())
         kept.push_back(static_cast<Eigen::Index>(i));
     }
-    if (kept.size() < kFewestFrames) return std::nullopt;
+    if (kept.size() < kMinFrames) return std::nullopt;
     BlurSamples chosen;
     chosen.held_softness_px2 = place.held_softness_px2;
     chosen.variances_px2 = samples->variances_px2(kept);
@@ -163,7 +163,7 @@ class Parts {
       const double better = is_gaussian ? *evidence_.disc_misfit : *evidence_.gaussian_misfit;
       if (stated > kShapesDiffer * better) return true;
     }
-    return evidence_.better_psf != sweep_.camera.psf && fit_.chi2_per_dof > kLawFails &&
+    return evidence_.better_psf != sweep_.camera.psf && fit_.chi2_per_dof > kModelFails &&
            fit_.chi2_per_dof > 2 * other.fit.chi2_per_dof;
   }
 
@@ -233,16 +233,16 @@ class Parts {
     result_.systematic_parts.push_back(part);
   }
 
-  // Tries each meter alone, where there are two.
-  void AddMeter() {
-    if (evidence_.setup.meters.size() < 2) return;
+  // Tries each estimator alone, where there are two.
+  void AddEstimator() {
+    if (evidence_.setup.estimators.size() < 2) return;
     SystematicPart part;
     part.name = "edges against texture";
     part.remedy = "check that edge and texture lie in one plane";
-    for (std::size_t m = 0; m < evidence_.setup.meters.size(); ++m) {
+    for (std::size_t m = 0; m < evidence_.setup.estimators.size(); ++m) {
       BlurFitSetup setup = evidence_.setup;
-      setup.meters = {evidence_.setup.meters[m]};
-      // The floor that one meter determines also holds for the other.
+      setup.estimators = {evidence_.setup.estimators[m]};
+      // The floor that one estimator determines also holds for the other.
       if (!setup.floor_variance_px2)
         setup.floor_variance_px2 = model::Estimate{fit_.values[kFloorVariance], 0};
       Include(Try(setup), &part);

@@ -17,9 +17,9 @@ using FloorInterval = std::optional<Eigen::Vector2d>;
 // self-test.
 void FitSides(const BlurEvidence& evidence, const BlurFitResult& fit, Calibration* calibration);
 
-// Tries every alternative choice (floor, side, band, shape, meter, the camera's stated tolerances)
-// and records how far it moves each result. Fills in the systematic intervals, the table of parts
-// and the advice.
+// Tries every alternative choice (floor, side, band, shape, estimator, the camera's stated
+// tolerances) and records how far it moves each result. Fills in the systematic intervals, the
+// table of parts and the advice.
 void AddSystematicParts(const FocusSweep& sweep, const BlurEvidence& evidence,
                         const BlurFitResult& fit, const FloorInterval& floor,
                         Calibration* calibration);

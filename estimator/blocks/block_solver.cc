@@ -127,13 +127,13 @@ class MemoryForecast {
 
  private:
   double PixelsOf(int block_px) const {
-    const model::LinearPicture& picture = rays_.input().picture;
-    return static_cast<double>(std::min(block_px, picture.width_px)) *
-           std::min(block_px, picture.height_px);
+    const model::LinearImage& image = rays_.input().image;
+    return static_cast<double>(std::min(block_px, image.width_px)) *
+           std::min(block_px, image.height_px);
   }
   double AtOnce(int block_px) const {
-    const model::LinearPicture& picture = rays_.input().picture;
-    const auto blocks = CutInBlocks(picture.width_px, picture.height_px, block_px).size();
+    const model::LinearImage& image = rays_.input().image;
+    const auto blocks = CutInBlocks(image.width_px, image.height_px, block_px).size();
     return std::min<double>(threads_, static_cast<double>(blocks));
   }
 
@@ -142,10 +142,10 @@ class MemoryForecast {
   // these.
   std::vector<model::PixelRect> DemandingBlocks(int block_px) const {
     const EstimateInput& input = rays_.input();
-    const int width_px = std::min(block_px, input.picture.width_px);
-    const int height_px = std::min(block_px, input.picture.height_px);
-    const model::PixelRect middle{(input.picture.width_px - width_px) / 2,
-                                  (input.picture.height_px - height_px) / 2, width_px, height_px};
+    const int width_px = std::min(block_px, input.image.width_px);
+    const int height_px = std::min(block_px, input.image.height_px);
+    const model::PixelRect middle{(input.image.width_px - width_px) / 2,
+                                  (input.image.height_px - height_px) / 2, width_px, height_px};
     std::vector<model::PixelRect> chosen(4, middle);
     BlockSlopes most = SlopesIn(input.disparity, middle);
     const auto keep_larger = [](double value, double* largest, const model::PixelRect& rect,
@@ -155,7 +155,7 @@ class MemoryForecast {
       *of_largest = rect;
     };
     for (const model::PixelRect& rect :
-         CutInBlocks(input.picture.width_px, input.picture.height_px, block_px)) {
+         CutInBlocks(input.image.width_px, input.image.height_px, block_px)) {
       if (rect.width < width_px || rect.height < height_px) continue;
       const BlockSlopes slopes = SlopesIn(input.disparity, rect);
       keep_larger(slopes.largest_px, &most.largest_px, rect, &chosen[1]);
@@ -203,9 +203,9 @@ double BytesUpTo(double limit, int block_px, int first_px, MemoryForecast* forec
   }
 }
 
-int ChooseBlockPx(const BlockOptions& options, const model::LinearPicture& picture,
+int ChooseBlockPx(const BlockOptions& options, const model::LinearImage& image,
                   MemoryForecast forecast, double* bytes) {
-  const int whole_px = std::max(picture.width_px, picture.height_px);
+  const int whole_px = std::max(image.width_px, image.height_px);
   if (!options.memory_limit_mib) {
     const int block_px = std::min(options.block_px.value_or(kDefaultBlockPx), whole_px);
     *bytes = forecast.Bytes(block_px);
@@ -311,14 +311,14 @@ SolvedBlock SolveBlock(const BlockSystem& system, const BlockOptions& options,
 }
 
 // Description of a run, so that its blocks are not used for another run.
-BlockRun RunOf(const RayField& rays, const BlockOptions& options, const EstimateSummary& summary,
+BlockRun RunOf(const RayField& rays, const BlockOptions& options, const BlockSummary& summary,
                const std::string& driver, int blocks) {
-  const model::LinearPicture& picture = rays.input().picture;
+  const model::LinearImage& image = rays.input().image;
   const auto exact = [](double number) { return fmt::format("{:.17g}", number); };
   BlockRun run;
   run.blocks = blocks;
-  run.settings = {{"size_px", fmt::format("{}x{}", picture.width_px, picture.height_px)},
-                  {"channels", fmt::format("{}", picture.channels)},
+  run.settings = {{"size_px", fmt::format("{}x{}", image.width_px, image.height_px)},
+                  {"channels", fmt::format("{}", image.channels)},
                   {"views", fmt::format("{}x{}", rays.u_count(), rays.v_count())},
                   {"block_px", fmt::format("{}", summary.block_px)},
                   {"block_solver", BlockSolverName(options.solver)},
@@ -367,8 +367,8 @@ std::optional<SolvedBlock> FromStore(const BlockOptions& options, int number,
 }
 
 // Rays that land outside of the image belong to no block: only their prior is known.
-void KeepPriorBesideThePicture(const BlockGeometry& whole, const model::LightField& prior,
-                               std::vector<float>* values) {
+void KeepPriorBesideTheImage(const BlockGeometry& whole, const model::LightField& prior,
+                             std::vector<float>* values) {
   const int width = prior.s_count;
   const int height = prior.t_count;
   for (int l = 0; l < prior.v_count; ++l) {
@@ -400,7 +400,7 @@ void CheckOptions(const BlockOptions& options) {
 }  // namespace
 
 model::LightField EstimateByBlocks(const EstimateInput& input, const BlockOptions& given,
-                                   kernels::Backend* backend, EstimateSummary* summary) {
+                                   kernels::Backend* backend, BlockSummary* summary) {
   CheckOptions(given);
   CheckInput(input);
   const bool symmetric = given.stencil == Stencil::kWarp;
@@ -422,7 +422,7 @@ model::LightField EstimateByBlocks(const EstimateInput& input, const BlockOption
   // them and make sums depend on the number of threads.
   const OneBlasThread one_blas_thread;
 
-  *summary = EstimateSummary();
+  *summary = BlockSummary();
   summary->threads = threads;
   summary->device = on_device ? backend->name() : "cpu (" + backend->name() + " has no double)";
   if (!device_of_solver.empty()) summary->device += ", " + device_of_solver;
@@ -430,18 +430,17 @@ model::LightField EstimateByBlocks(const EstimateInput& input, const BlockOption
   summary->ridge = *options.ridge;
   double bytes = 0;
   summary->block_px =
-      ChooseBlockPx(options, input.picture,
+      ChooseBlockPx(options, input.image,
                     MemoryForecast(rays, options, *options.ridge, threads, merging.get()), &bytes);
   summary->predicted_memory_mib = bytes / kBytesPerMib;
   summary->setup_seconds = SecondsSince(start);
 
   const auto solve_start = Clock::now();
-  const auto rects =
-      CutInBlocks(input.picture.width_px, input.picture.height_px, summary->block_px);
+  const auto rects = CutInBlocks(input.image.width_px, input.image.height_px, summary->block_px);
   const int count = static_cast<int>(rects.size());
   summary->blocks.resize(rects.size());
-  merging->StartWhole(input.picture.width_px, input.picture.height_px, rays.u_count(),
-                      rays.v_count(), input.picture.channels);
+  merging->StartWhole(input.image.width_px, input.image.height_px, rays.u_count(), rays.v_count(),
+                      input.image.channels);
   const std::unique_ptr<Kernels<double>> pattern_of_workers = merging->Clone();
   const LinearSolverLimits limits{options.tolerance, options.max_iterations};
   Workers workers([&] {
@@ -455,7 +454,7 @@ model::LightField EstimateByBlocks(const EstimateInput& input, const BlockOption
   ParallelFor(count, threads, [&](int i) {
     const model::PixelRect& rect = rects[Index(i)];
     const BlockGeometry block = rays.Block(rect.x, rect.y, rect.width, rect.height);
-    std::optional<SolvedBlock> solved = FromStore(options, i, block, input.picture.channels);
+    std::optional<SolvedBlock> solved = FromStore(options, i, block, input.image.channels);
     const bool is_found = solved.has_value();
     if (!is_found) {
       Worker worker = workers.Take();
@@ -475,9 +474,9 @@ model::LightField EstimateByBlocks(const EstimateInput& input, const BlockOption
     if (options.progress) options.progress(done, count);
   });
   std::vector<float> values = merging->FinishWhole();
-  const BlockGeometry whole = rays.Block(0, 0, input.picture.width_px, input.picture.height_px);
+  const BlockGeometry whole = rays.Block(0, 0, input.image.width_px, input.image.height_px);
   model::LightField light_field = std::move(rays).TakePrior();
-  KeepPriorBesideThePicture(whole, light_field, &values);
+  KeepPriorBesideTheImage(whole, light_field, &values);
   light_field.values = std::move(values);
 
   const bool iterative = IsIterative(options.solver);

@@ -55,14 +55,14 @@ void AddMatrix(const CsrMatrix<double>& a, double scale, const CsrPattern& patte
 }
 
 // Returns the pixels of one channel, row by row.
-std::vector<double> PixelsOf(const model::LinearPicture& picture, const BlockGeometry& block,
+std::vector<double> PixelsOf(const model::LinearImage& image, const BlockGeometry& block,
                              int channel) {
   std::vector<double> pixels;
   pixels.reserve(Index(block.pixels()));
   for (int y = 0; y < block.height_px; ++y) {
     ThrowIfCancelled();
     for (int x = 0; x < block.width_px; ++x) {
-      pixels.push_back(picture.at(block.first_x + x, block.first_y + y, channel));
+      pixels.push_back(image.at(block.first_x + x, block.first_y + y, channel));
     }
   }
   return pixels;
@@ -93,24 +93,24 @@ BlockGeometry RayField::Block(int x, int y, int width_px, int height_px) const {
   return BlockOf(prior_, {x, y, width_px, height_px}, input_.weights);
 }
 
-RayField::Slopes RayField::SlopesOf(const BlockGeometry& block, bool cut_hidden) const {
+RayField::Slopes RayField::SlopesOf(const BlockGeometry& block, bool cut_occluded) const {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   Slopes slopes;
   slopes.u.assign(Index(block.rays()), kNone);
   slopes.v = slopes.u;
-  const int width = input_.picture.width_px;
+  const int width = input_.image.width_px;
   ForEachRay(block, [&](std::size_t ray, int k, int l, int s, int t) {
     const int view = l * block.u_count + k;
     const double disparity = disparity_[Index(view)][Index(t) * Index(width) + Index(s)];
     const double m_u = -disparity * input_.disparity.step.x();
     const double m_v = -disparity * input_.disparity.step.y();
     const auto linked = [&](int next, double next_s, double next_t) {
-      return !cut_hidden ||
+      return !cut_occluded ||
              ShowsSamePoint(input_.disparity, disparity_[Index(next)], next_s, next_t, disparity);
     };
     // Without a next view the slope still serves the six-term mask.
-    if (k + 1 == block.u_count ? !cut_hidden : linked(view + 1, s + m_u, t)) slopes.u[ray] = m_u;
-    if (l + 1 == block.v_count ? !cut_hidden : linked(view + block.u_count, s, t + m_v)) {
+    if (k + 1 == block.u_count ? !cut_occluded : linked(view + 1, s + m_u, t)) slopes.u[ray] = m_u;
+    if (l + 1 == block.v_count ? !cut_occluded : linked(view + block.u_count, s, t + m_v)) {
       slopes.v[ray] = m_v;
     }
   });
@@ -120,7 +120,7 @@ RayField::Slopes RayField::SlopesOf(const BlockGeometry& block, bool cut_hidden)
 std::vector<double> RayField::IrradianceOf(const BlockGeometry& block) const {
   if (irradiance_.empty()) return {};
   std::vector<double> irradiance(Index(block.rays()), 0.0);
-  const int width = input_.picture.width_px;
+  const int width = input_.image.width_px;
   ForEachRay(block, [&](std::size_t ray, int k, int l, int s, int t) {
     irradiance[ray] = irradiance_[Index(l * block.u_count + k)][Index(t) * Index(width) + Index(s)];
   });
@@ -135,19 +135,19 @@ std::vector<BlockRun::Data> RayField::Data() const {
   BlockRun::Data falloff{"fall-off", {}};
   for (const auto& view : irradiance_) falloff.bytes.push_back(BytesOf(view));
   // The landing positions depend on the step from view to view, which the prior knows.
-  return {{"picture", {BytesOf(input_.picture.values)}},
+  return {{"image", {BytesOf(input_.image.values)}},
           {"aperture",
            {BytesOf(weights.data(), static_cast<std::size_t>(weights.size())),
             BytesOf(prior_.landing_step_px.data(), 2)}},
           std::move(depth),
           std::move(falloff),
-          {"warped picture", {BytesOf(prior_.values)}}};
+          {"warped image", {BytesOf(prior_.values)}}};
 }
 
 BlockSystem MakeBlockSystem(const RayField& rays, const BlockGeometry& block,
                             const BlockOptions& options, double ridge,
                             kernels::Kernels<double>* kernels) {
-  const CsrMatrix<double> h = kernels::Compress(kernels->WeighRays(
+  const CsrMatrix<double> h = kernels::Compress(kernels->WeightRays(
       block, options.splat, kernels->FindRays(block, options.splat), rays.IrradianceOf(block)));
 
   const bool warp = options.stencil == Stencil::kWarp;
@@ -182,7 +182,7 @@ BlockSystem MakeBlockSystem(const RayField& rays, const BlockGeometry& block,
   const model::LightField& prior = rays.prior();
   for (int channel = 0; channel < prior.channels; ++channel) {
     std::vector<double> right =
-        kernels->MultiplyTransposed(h, PixelsOf(rays.input().picture, block, channel));
+        kernels->MultiplyTransposed(h, PixelsOf(rays.input().image, block, channel));
     std::vector<double> start(right.size(), 0.0);
     ForEachRay(block, [&](std::size_t ray, int k, int l, int s, int t) {
       start[ray] =

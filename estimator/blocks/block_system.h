@@ -28,13 +28,13 @@ class RayField {
 
   kernels::BlockGeometry Block(int x, int y, int width_px, int height_px) const;
 
-  // Slope m of each ray of the block, samples per view step, in u and in v. With `cut_hidden` the
+  // Slope m of each ray of the block, samples per view step, in u and in v. With `cut_occluded` the
   // slope is NaN where the next view does not show the scene point of the ray: rays of two points
   // are not linked.
   struct Slopes {
     std::vector<double> u, v;
   };
-  Slopes SlopesOf(const kernels::BlockGeometry& block, bool cut_hidden) const;
+  Slopes SlopesOf(const kernels::BlockGeometry& block, bool cut_occluded) const;
 
   // Relative irradiance of each ray of the block; empty without fall-off.
   std::vector<double> IrradianceOf(const kernels::BlockGeometry& block) const;

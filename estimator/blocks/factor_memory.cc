@@ -95,7 +95,7 @@ std::size_t FactorMemory::kept_bytes() const {
 
 std::optional<void*> FactorMemory::TakeKept(std::size_t bytes) {
   const auto fits = [&](const Piece& piece) {
-    return piece.bytes >= bytes && piece.bytes / kMostSpare <= bytes;
+    return piece.bytes >= bytes && piece.bytes / kMaxSpare <= bytes;
   };
   auto best = kept_.end();
   for (auto piece = kept_.begin(); piece != kept_.end(); ++piece) {

@@ -37,7 +37,7 @@ class FactorMemory {
 
   static constexpr std::size_t kSmallest = 64 * 1024;
   // A kept piece may serve a request for at least a quarter of its size.
-  static constexpr std::size_t kMostSpare = 4;
+  static constexpr std::size_t kMaxSpare = 4;
 
   std::size_t kept_bytes() const;
 

@@ -62,9 +62,9 @@ std::vector<double> IterativeSolver::SolveFrom(std::vector<double> start,
   // of the goal, and a pass after too little progress at a tenth of that.
   double share = 1;
   constexpr double kProgress = 0.9;
-  constexpr int kMostIdlePasses = 3;
+  constexpr int kMaxIdlePasses = 3;
   int idle_passes = 0;
-  while (left > goal && iterations_ < limits_.max_iterations && idle_passes < kMostIdlePasses) {
+  while (left > goal && iterations_ < limits_.max_iterations && idle_passes < kMaxIdlePasses) {
     const std::vector<double> update = method_->Run(
         residual, share * goal / left, limits_.max_iterations - iterations_, &iterations_);
     std::vector<double> next = x;

@@ -22,7 +22,7 @@ constexpr double kWindowSigmaPx = 2;
 // The difference of two pixels of one surface has 1.4 times the noise; 1 in 2500 such differences
 // exceeds this limit.
 constexpr double kSameSurface = 5;
-constexpr int kLeastNeighbours = 6;
+constexpr int kMinNeighbours = 6;
 
 // The Gaussian over the window, one axis.
 std::array<double, 2 * kReachPx + 1> WindowWeights() {
@@ -54,7 +54,7 @@ struct Middle {
   double variance = 1;  // in units of the variance of the noise
 };
 Middle MiddleOf(const PlaneSums& sums) {
-  if (sums.count <= kLeastNeighbours) return {};
+  if (sums.count <= kMinNeighbours) return {};
   const Eigen::LDLT<Eigen::Matrix3d> factor(sums.normal);
   const Eigen::Vector3d pivots = factor.vectorD();
   if (!(pivots.minCoeff() > 1e-6 * pivots.maxCoeff())) return {};

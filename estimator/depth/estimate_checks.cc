@@ -15,8 +15,8 @@ namespace {
 constexpr int kPatchPx = 32;
 constexpr double kFarAbove = 4;
 constexpr double kAbove = 1.5;
-constexpr double kLeastCounted = 0.1;  // share of all blocks
-constexpr float kMostHidden = 0.01F;
+constexpr double kMinCounted = 0.1;  // share of all blocks
+constexpr float kMaxOccluded = 0.01F;
 
 std::size_t Index(int width_px, int x, int y) {
   return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_px) +
@@ -42,14 +42,14 @@ struct Patch {
   int counted = 0;
 };
 
-Patch MeasurePatch(const std::vector<float>& residual, const std::vector<float>& hidden_share,
+Patch MeasurePatch(const std::vector<float>& residual, const std::vector<float>& occluded_fraction,
                    int width_px, const ResidualPatch& place) {
   Patch patch{place};
   double sum = 0;
   for (int y = place.y; y < place.y + place.height_px; ++y) {
     for (int x = place.x; x < place.x + place.width_px; ++x) {
       const std::size_t i = Index(width_px, x, y);
-      if (hidden_share[i] > kMostHidden) continue;
+      if (occluded_fraction[i] > kMaxOccluded) continue;
       sum += static_cast<double>(residual[i]) * static_cast<double>(residual[i]);
       ++patch.counted;
     }
@@ -64,21 +64,21 @@ std::size_t Blocks(int size_px) {
 
 // Returns the blocks of which the whole aperture sees enough.
 std::vector<ResidualPatch> MeasurePatches(const std::vector<float>& residual,
-                                          const std::vector<float>& hidden_share, int width_px,
+                                          const std::vector<float>& occluded_fraction, int width_px,
                                           int height_px) {
   const std::size_t pixels =
       static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px);
-  if (residual.size() != pixels || hidden_share.size() != pixels) {
+  if (residual.size() != pixels || occluded_fraction.size() != pixels) {
     throw Error(fmt::format(
-        "residual and hidden_share have {} and {} values: they must have {}, one a pixel",
-        residual.size(), hidden_share.size(), pixels));
+        "residual and occluded_fraction have {} and {} values: they must have {}, one a pixel",
+        residual.size(), occluded_fraction.size(), pixels));
   }
   std::vector<ResidualPatch> patches;
   for (int y = 0; y < height_px; y += kPatchPx) {
     ThrowIfCancelled();
     for (int x = 0; x < width_px; x += kPatchPx) {
       const Patch patch = MeasurePatch(
-          residual, hidden_share, width_px,
+          residual, occluded_fraction, width_px,
           {x, y, std::min(kPatchPx, width_px - x), std::min(kPatchPx, height_px - y), 0});
       if (4 * patch.counted < patch.place.width_px * patch.place.height_px) continue;
       patches.push_back(patch.place);
@@ -127,9 +127,10 @@ std::optional<double> DepthNoisePx(const DisparityMap& map) {
 }
 
 std::vector<ResidualPatch> ResidualPatches(const std::vector<float>& residual,
-                                           const std::vector<float>& hidden_share, int width_px,
-                                           int height_px, double noise_sigma) {
-  std::vector<ResidualPatch> patches = MeasurePatches(residual, hidden_share, width_px, height_px);
+                                           const std::vector<float>& occluded_fraction,
+                                           int width_px, int height_px, double noise_sigma) {
+  std::vector<ResidualPatch> patches =
+      MeasurePatches(residual, occluded_fraction, width_px, height_px);
   std::vector<double> all;
   all.reserve(patches.size());
   for (const ResidualPatch& patch : patches) all.push_back(patch.rms);
@@ -145,12 +146,12 @@ std::vector<ResidualPatch> ResidualPatches(const std::vector<float>& residual,
 }
 
 std::optional<double> UnexplainedShare(const std::vector<float>& residual,
-                                       const std::vector<float>& hidden_share, int width_px,
+                                       const std::vector<float>& occluded_fraction, int width_px,
                                        int height_px, double noise_sigma) {
   const std::vector<ResidualPatch> patches =
-      MeasurePatches(residual, hidden_share, width_px, height_px);
+      MeasurePatches(residual, occluded_fraction, width_px, height_px);
   const auto blocks = static_cast<double>(Blocks(width_px) * Blocks(height_px));
-  if (patches.empty() || static_cast<double>(patches.size()) < kLeastCounted * blocks) {
+  if (patches.empty() || static_cast<double>(patches.size()) < kMinCounted * blocks) {
     return std::nullopt;
   }
   const double usual = kAbove * noise_sigma;

@@ -9,8 +9,8 @@
 #include <limits>
 #include <vector>
 
+#include "estimator/depth/geodesic_voronoi_labels.h"
 #include "estimator/depth/hole_region.h"
-#include "estimator/depth/hole_territories.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/index.h"
 #include "thicklens/estimator/estimate_checks.h"
@@ -21,14 +21,14 @@ namespace {
 // Neighbours whose disparities differ by more than this belong to two surfaces: a multiple of the
 // noise of the map, limited to a minimum and a maximum in px per view step.
 constexpr double kJumpOfNoise = 6;
-constexpr double kLeastJumpPx = 0.2;
-constexpr double kMostJumpPx = 1;
+constexpr double kMinJumpPx = 0.2;
+constexpr double kMaxJumpPx = 1;
 // Sweeps of successive over-relaxation that a hole needs for each px of distance to a known pixel,
 // and the number available to all holes of a map together. Holes that are too large for this are
 // bent only near their rims.
 constexpr double kSweepsPerPx = 6;
 constexpr double kSweepsOfAll = 16;
-constexpr double kMostUpdates = 1e6;  // in addition
+constexpr double kMaxUpdates = 1e6;  // in addition
 
 // Solves for one hole: each pixel's disparity u is the mean over its neighbours of u + (p - q)
 // slope, where the slope is the mean of their planes' slopes. Pixels of different surfaces are not
@@ -107,8 +107,8 @@ class SurfaceRelaxation {
   std::vector<Links> links_;
 };
 
-model::LinearPicture RootsOf(const model::LinearPicture& picture) {
-  model::LinearPicture roots = picture;
+model::LinearImage RootsOf(const model::LinearImage& image) {
+  model::LinearImage roots = image;
   for (float& value : roots.values) value = value > 0 ? std::sqrt(value) : 0.0F;
   return roots;
 }
@@ -119,7 +119,7 @@ struct Range {
   double low = std::numeric_limits<double>::infinity();
   double high = -std::numeric_limits<double>::infinity();
 };
-Range BelievableRange(const DisparityMap& map, double at_infinity) {
+Range PlausibleRange(const DisparityMap& map, double at_infinity) {
   Range range;
   for (const float value : map.disparity) {
     if (std::isnan(value)) continue;
@@ -130,7 +130,7 @@ Range BelievableRange(const DisparityMap& map, double at_infinity) {
   return {std::max(range.low - beyond, std::min(at_infinity, range.low)), range.high + beyond};
 }
 
-void CheckSizes(const DisparityMap& map, const model::LinearPicture& picture) {
+void CheckSizes(const DisparityMap& map, const model::LinearImage& image) {
   const std::size_t pixels = Index(map.width_px) * Index(map.height_px);
   if (map.width_px < 1 || map.height_px < 1 || map.disparity.size() != pixels) {
     throw Error(
@@ -138,37 +138,37 @@ void CheckSizes(const DisparityMap& map, const model::LinearPicture& picture) {
                     "and not 0",
                     map.disparity.size(), map.width_px, map.height_px));
   }
-  if (picture.width_px != map.width_px || picture.height_px != map.height_px ||
-      picture.channels < 1 || picture.values.size() != pixels * Index(picture.channels)) {
+  if (image.width_px != map.width_px || image.height_px != map.height_px || image.channels < 1 ||
+      image.values.size() != pixels * Index(image.channels)) {
     throw Error(fmt::format(
-        "disparity map: it is {}x{} px, the picture {}x{} px in {} channel(s) with {} values: the "
+        "disparity map: it is {}x{} px, the image {}x{} px in {} channel(s) with {} values: the "
         "sizes must be equal",
-        map.width_px, map.height_px, picture.width_px, picture.height_px, picture.channels,
-        picture.values.size()));
+        map.width_px, map.height_px, image.width_px, image.height_px, image.channels,
+        image.values.size()));
   }
-  const auto bad = std::find_if_not(picture.values.begin(), picture.values.end(),
+  const auto bad = std::find_if_not(image.values.begin(), image.values.end(),
                                     [](float value) { return std::isfinite(value); });
-  if (bad != picture.values.end()) {
-    const auto pixel = (bad - picture.values.begin()) / picture.channels;
-    throw Error(fmt::format("picture: a value of pixel ({}, {}) is {}: it must be finite",
-                            pixel % picture.width_px, pixel / picture.width_px, *bad));
+  if (bad != image.values.end()) {
+    const auto pixel = (bad - image.values.begin()) / image.channels;
+    throw Error(fmt::format("image: a value of pixel ({}, {}) is {}: it must be finite",
+                            pixel % image.width_px, pixel / image.width_px, *bad));
   }
 }
 
 double JumpOf(const DisparityMap& map) {
   const double px_per_unit = map.step.cwiseAbs().maxCoeff();
   const double noise_px = DepthNoisePx(map).value_or(0);
-  return std::clamp(kJumpOfNoise * noise_px, kLeastJumpPx, kMostJumpPx) / px_per_unit;
+  return std::clamp(kJumpOfNoise * noise_px, kMinJumpPx, kMaxJumpPx) / px_per_unit;
 }
 
-void Fill(const DisparityMap& map, const model::LinearPicture& picture, std::size_t holes,
+void Fill(const DisparityMap& map, const model::LinearImage& image, std::size_t holes,
           double at_infinity, DisparityMap* full) {
   const double jump = JumpOf(map);
-  const Range range = BelievableRange(map, at_infinity);
-  const model::LinearPicture roots = RootsOf(picture);
-  const double most_sweeps = kSweepsOfAll + kMostUpdates / static_cast<double>(holes);
+  const Range range = PlausibleRange(map, at_infinity);
+  const model::LinearImage roots = RootsOf(image);
+  const double most_sweeps = kSweepsOfAll + kMaxUpdates / static_cast<double>(holes);
   HoleFinder finder(map, jump);
-  HoleTerritories territories(finder, roots, jump);
+  GeodesicVoronoiLabels territories(finder, roots, jump);
   HoleRegion region;
   std::vector<int> rim_of;
   std::vector<double> disparity;
@@ -193,9 +193,9 @@ void Fill(const DisparityMap& map, const model::LinearPicture& picture, std::siz
 
 }  // namespace
 
-DisparityMap FillHoles(const DisparityMap& map, const model::LinearPicture& picture,
+DisparityMap FillHoles(const DisparityMap& map, const model::LinearImage& image,
                        std::size_t* filled, double at_infinity) {
-  CheckSizes(map, picture);
+  CheckSizes(map, image);
   DisparityMap full = map;
   const auto holes = static_cast<std::size_t>(std::count_if(
       map.disparity.begin(), map.disparity.end(), [](float value) { return std::isnan(value); }));
@@ -206,7 +206,7 @@ DisparityMap FillHoles(const DisparityMap& map, const model::LinearPicture& pict
                     "fill them from",
                     holes));
   }
-  if (holes > 0) Fill(map, picture, holes, at_infinity, &full);
+  if (holes > 0) Fill(map, image, holes, at_infinity, &full);
   return full;
 }
 

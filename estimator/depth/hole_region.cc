@@ -11,8 +11,8 @@ namespace {
 
 constexpr std::int32_t kNoPlace = -1;
 // A surface is examined as far behind the rim as the hole is wide, within these limits.
-constexpr int kLeastDepthPx = 3;
-constexpr int kMostDepthPx = 48;
+constexpr int kMinDepthPx = 3;
+constexpr int kMaxDepthPx = 48;
 // If some group has so many rim pixels, isolated rim pixels are ignored.
 constexpr int kManyRimPixels = 3;
 
@@ -163,8 +163,7 @@ void HoleFinder::FitPlanes(HoleRegion* region) {
     return X(pixel) == 0 || X(pixel) == width_ - 1 || Y(pixel) == 0 || Y(pixel) == height_ - 1;
   });
   const bool rim_is_enough = !is_open && region->planes.size() == 1;
-  const int depth_px =
-      rim_is_enough ? 0 : std::clamp(region->widest_px, kLeastDepthPx, kMostDepthPx);
+  const int depth_px = rim_is_enough ? 0 : std::clamp(region->widest_px, kMinDepthPx, kMaxDepthPx);
   for (std::size_t group = 0; group < region->planes.size(); ++group) {
     CollectSurface(group, depth_px);
     region->planes[group] = FitSurfacePlane(samples_);

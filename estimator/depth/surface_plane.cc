@@ -9,8 +9,8 @@
 namespace thicklens::estimator {
 namespace {
 
-constexpr std::size_t kLeastSamples = 6;
-constexpr double kLeastSpreadPx = 0.3;  // standard deviation of the positions
+constexpr std::size_t kMinSamples = 6;
+constexpr double kMinSpreadPx = 0.3;  // standard deviation of the positions
 
 double SquaredResiduals(const std::vector<SurfaceSample>& samples, const SurfacePlane& plane) {
   double sum = 0;
@@ -32,7 +32,7 @@ SurfacePlane FitSurfacePlane(const std::vector<SurfaceSample>& samples) {
   }
   plane.middle_px /= count;
   plane.disparity /= count;
-  const double least_squares = count * kLeastSpreadPx * kLeastSpreadPx;
+  const double least_squares = count * kMinSpreadPx * kMinSpreadPx;
   Eigen::Matrix2d squares = Eigen::Matrix2d::Zero();
   Eigen::Vector2d products = Eigen::Vector2d::Zero();
   for (const SurfaceSample& sample : samples) {
@@ -44,7 +44,7 @@ SurfacePlane FitSurfacePlane(const std::vector<SurfaceSample>& samples) {
   principal.computeDirect(squares);
   std::array<double, 2> along{0, 0};
   double unknowns = 1;
-  for (int i = 0; i < 2 && samples.size() >= kLeastSamples; ++i) {
+  for (int i = 0; i < 2 && samples.size() >= kMinSamples; ++i) {
     if (!(principal.eigenvalues()[i] > least_squares)) continue;
     along[static_cast<std::size_t>(i)] =
         principal.eigenvectors().col(i).dot(products) / principal.eigenvalues()[i];

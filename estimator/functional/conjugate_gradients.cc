@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "thicklens/base/parallel.h"
-#include "thicklens/kernels/picture_filter.h"
+#include "thicklens/kernels/image_filter.h"
 
 namespace thicklens::estimator {
 namespace {

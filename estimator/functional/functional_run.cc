@@ -65,8 +65,8 @@ void StartRun(const std::string& solver, const EstimateInput& input,
 void RequireMemory(const FunctionalOptions& options, double bytes) {
   if (!options.memory_limit_mib || bytes <= *options.memory_limit_mib * kBytesPerMib) return;
   throw Error(fmt::format(
-      "memory limit {:.0f} MiB: all rays of the picture at once need {:.0f} MiB; the limit must be "
-      "at least that, or the views fewer, or the picture smaller",
+      "memory limit {:.0f} MiB: all rays of the image at once need {:.0f} MiB; the limit must be "
+      "at least that, or the views fewer, or the image smaller",
       *options.memory_limit_mib, std::ceil(bytes / kBytesPerMib)));
 }
 

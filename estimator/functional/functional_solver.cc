@@ -18,7 +18,7 @@
 #include "thicklens/base/residual_guard.h"
 #include "thicklens/base/run_cost.h"
 #include "thicklens/kernels/aperture_prior.h"
-#include "thicklens/kernels/picture_filter.h"
+#include "thicklens/kernels/image_filter.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -72,22 +72,22 @@ class FunctionalSystem {
     return outcome;
   }
 
-  static constexpr int kPictures = 3 + ConjugateGradients<Real>::kVectors;  // besides the planes
+  static constexpr int kImages = 3 + ConjugateGradients<Real>::kVectors;  // besides the planes
 
  private:
-  // Sets all planes to A^-1 H^T x, where x is `picture`.
-  void SpreadOverAperture(const std::vector<Real>& picture) {
-    rays_.ApplyTransposed(picture.data(), planes_.data());
+  // Sets all planes to A^-1 H^T x, where x is `image`.
+  void SpreadOverAperture(const std::vector<Real>& image) {
+    rays_.ApplyTransposed(image.data(), planes_.data());
     constexpr std::size_t kPacket = kernels::AperturePrior<Real>::kPacket;
     const std::size_t points = (size_ + kPacket - 1) / kPacket;
     prior_.ApplyInverse(points * kPacket, rays_.plane_stride(), threads_, planes_.data());
   }
 
-  // Sets the product to (Id + H A^-1 H^T) x, where x is `picture`.
-  void Multiply(const std::vector<Real>& picture, std::vector<Real>* product) {
-    SpreadOverAperture(picture);
+  // Sets the product to (Id + H A^-1 H^T) x, where x is `image`.
+  void Multiply(const std::vector<Real>& image, std::vector<Real>* product) {
+    SpreadOverAperture(image);
     rays_.Apply(planes_.data(), rays_.plane_stride(), product->data());
-    for (std::size_t i = 0; i < size_; ++i) (*product)[i] += picture[i];
+    for (std::size_t i = 0; i < size_; ++i) (*product)[i] += image[i];
   }
 
   // Sets the right-hand side I - H R0.
@@ -120,8 +120,8 @@ double FixedBytes(const EstimateInput& input, int threads) {
   const auto pixels = static_cast<double>(input.disparity.disparity.size());
   const auto views = static_cast<double>(input.weights.size());
   return pixels *
-         (sizeof(float) * views * input.picture.channels +
-          sizeof(Real) * (views + FunctionalSystem<Real>::kPictures + 1) + kPerViewMade * threads);
+         (sizeof(float) * views * input.image.channels +
+          sizeof(Real) * (views + FunctionalSystem<Real>::kImages + 1) + kPerViewMade * threads);
 }
 template <typename Real>
 double LeastRayBytes(const EstimateInput& input, int kinds) {
@@ -136,7 +136,7 @@ model::LightField SolveFunctional(const EstimateInput& input, const FunctionalOp
   const auto start = Clock::now();
   const int threads = summary->threads;
   const auto views = static_cast<int>(input.weights.size());
-  const int channels = input.picture.channels;
+  const int channels = input.image.channels;
   const Eigen::Vector2d landing_step_px =
       input.grid ? LandingStepPx(*input.camera, *input.grid) : Eigen::Vector2d::Zero();
   const bool same_rays = ShowsSameRays(input, landing_step_px);
@@ -161,10 +161,10 @@ model::LightField SolveFunctional(const EstimateInput& input, const FunctionalOp
   RequireMemory(options, bytes);
 
   const bool falloff = options.falloff && input.camera.has_value();
-  const model::LinearPicture radiance =
-      falloff ? WithoutFalloff(input.picture, *input.grid, input.camera_of_falloff(), input.weights,
+  const model::LinearImage radiance =
+      falloff ? WithoutFalloff(input.image, *input.grid, input.camera_of_falloff(), input.weights,
                                threads)
-              : input.picture;
+              : input.image;
   kernels::AperturePrior<Real> prior(static_cast<int>(input.weights.cols()),
                                      static_cast<int>(input.weights.rows()), options.gamma,
                                      summary->ridge);

@@ -18,40 +18,40 @@ constexpr std::size_t kBandSamples = kernels::kLongestRun;
 }  // namespace
 
 GridLinks::GridLinks(const DisparityMap& map, std::vector<std::vector<float>> disparity,
-                     const kernels::BlockGeometry& picture, int threads)
+                     const kernels::BlockGeometry& image, int threads)
     : map_(map),
       disparity_(std::move(disparity)),
-      picture_(picture),
+      image_(image),
       threads_(threads),
-      across_(Index(picture.views())),
-      down_(Index(picture.views())) {
-  ParallelFor(picture.views(), threads, [&](int view) {
+      across_(Index(image.views())),
+      down_(Index(image.views())) {
+  ParallelFor(image.views(), threads, [&](int view) {
     across_[Index(view)] = FindLinks(Axis::kU, view);
     down_[Index(view)] = FindLinks(Axis::kV, view);
   });
 }
 
 std::size_t GridLinks::BandCount() const {
-  return (Index(picture_.s_count) + kBandSamples - 1) / kBandSamples;
+  return (Index(image_.s_count) + kBandSamples - 1) / kBandSamples;
 }
 
 bool GridLinks::FindLink(Axis axis, int view, int s, int t, Run* run) const {
-  const int k = view % picture_.u_count, l = view / picture_.u_count;
+  const int k = view % image_.u_count, l = view / image_.u_count;
   const bool across = axis == Axis::kU;
-  if (across ? k + 1 == picture_.u_count : l + 1 == picture_.v_count) return false;
+  if (across ? k + 1 == image_.u_count : l + 1 == image_.v_count) return false;
   // The shifts of a view lead from its samples to the pixels that they land on.
-  const LandingRect here = LandingIn(picture_, k, l);
-  const LandingRect there = LandingIn(picture_, across ? k + 1 : k, across ? l : l + 1);
-  const int x = s + picture_.s_shift[Index(k)], y = t + picture_.t_shift[Index(l)];
+  const LandingRect here = LandingIn(image_, k, l);
+  const LandingRect there = LandingIn(image_, across ? k + 1 : k, across ? l : l + 1);
+  const int x = s + image_.s_shift[Index(k)], y = t + image_.t_shift[Index(l)];
   if (x < here.x_begin || x >= here.x_end || y < here.y_begin || y >= here.y_end) return false;
-  const int first = across ? there.x_begin - picture_.s_shift[Index(k + 1)]
-                           : there.y_begin - picture_.t_shift[Index(l + 1)];
-  const int end = across ? there.x_end - picture_.s_shift[Index(k + 1)]
-                         : there.y_end - picture_.t_shift[Index(l + 1)];
+  const int first = across ? there.x_begin - image_.s_shift[Index(k + 1)]
+                           : there.y_begin - image_.t_shift[Index(l + 1)];
+  const int end = across ? there.x_end - image_.s_shift[Index(k + 1)]
+                         : there.y_end - image_.t_shift[Index(l + 1)];
 
-  const double d = disparity_[Index(view)][Index(t) * Index(picture_.s_count) + Index(s)];
+  const double d = disparity_[Index(view)][Index(t) * Index(image_.s_count) + Index(s)];
   const double m = -d * (across ? map_.step.x() : map_.step.y());
-  const int next = view + (across ? 1 : picture_.u_count);
+  const int next = view + (across ? 1 : image_.u_count);
   if (!ShowsSamePoint(map_, disparity_[Index(next)], across ? s + m : s, across ? t : t + m, d)) {
     return false;
   }
@@ -68,8 +68,8 @@ bool GridLinks::FindLink(Axis axis, int view, int s, int t, Run* run) const {
 
 GridLinks::ViewLinks GridLinks::FindLinks(Axis axis, int view) const {
   ViewLinks links;
-  for (int t = 0; t < picture_.t_count; ++t) {
-    for (int s = 0; s < picture_.s_count; ++s) {
+  for (int t = 0; t < image_.t_count; ++t) {
+    for (int s = 0; s < image_.s_count; ++s) {
       if (Index(s) % kBandSamples == 0) links.start.push_back(links.runs.size());
       Run run;
       if (!FindLink(axis, view, s, t, &run)) continue;
@@ -94,11 +94,11 @@ void GridLinks::AddBand(Axis axis, int view, int t, std::size_t band, Real gamma
                         Real* y) const {
   const bool across = axis == Axis::kU;
   const ViewLinks& links = (across ? across_ : down_)[Index(view)];
-  const std::size_t width = Index(picture_.s_count), view_size = width * Index(picture_.t_count);
+  const std::size_t width = Index(image_.s_count), view_size = width * Index(image_.t_count);
   const std::size_t row = Index(t) * width;
   const Real* here = x + Index(view) * view_size;
   Real* sum_here = y + Index(view) * view_size;
-  const std::size_t to_next = (across ? 1 : Index(picture_.u_count)) * view_size;
+  const std::size_t to_next = (across ? 1 : Index(image_.u_count)) * view_size;
   const std::size_t to_far = across ? 1 : width;
   const std::size_t first = Index(t) * BandCount() + band;
   for (std::size_t n = links.start[first]; n < links.start[first + 1]; ++n) {
@@ -124,29 +124,29 @@ void GridLinks::AddBand(Axis axis, int view, int t, std::size_t band, Real gamma
 
 template <typename Real>
 void GridLinks::Apply(double gamma, double mu, const Real* x, Real* y) const {
-  const std::size_t width = Index(picture_.s_count), view_size = width * Index(picture_.t_count);
+  const std::size_t width = Index(image_.s_count), view_size = width * Index(image_.t_count);
   const auto gamma_here = static_cast<Real>(gamma), mu_here = static_cast<Real>(mu);
   // Differences across link a row of a view to the same row of the next view; differences down link
   // a column.
-  ParallelFor(picture_.v_count * picture_.t_count, threads_, [&](int i) {
-    const int l = i / picture_.t_count, t = i % picture_.t_count;
-    for (int k = 0; k < picture_.u_count; ++k) {
-      const std::size_t from = Index(l * picture_.u_count + k) * view_size + Index(t) * width;
+  ParallelFor(image_.v_count * image_.t_count, threads_, [&](int i) {
+    const int l = i / image_.t_count, t = i % image_.t_count;
+    for (int k = 0; k < image_.u_count; ++k) {
+      const std::size_t from = Index(l * image_.u_count + k) * view_size + Index(t) * width;
       for (std::size_t s = from; s < from + width; ++s) y[s] = mu_here * x[s];
     }
-    for (int k = 0; k + 1 < picture_.u_count; ++k) {
+    for (int k = 0; k + 1 < image_.u_count; ++k) {
       for (std::size_t band = 0; band < BandCount(); ++band) {
-        AddBand(Axis::kU, l * picture_.u_count + k, t, band, gamma_here, x, y);
+        AddBand(Axis::kU, l * image_.u_count + k, t, band, gamma_here, x, y);
       }
     }
   });
   const auto bands = static_cast<int>(BandCount());
-  ParallelFor(picture_.u_count * bands, threads_, [&](int i) {
+  ParallelFor(image_.u_count * bands, threads_, [&](int i) {
     const int k = i / bands;
     const std::size_t band = Index(i % bands);
-    for (int l = 0; l + 1 < picture_.v_count; ++l) {
-      for (int t = 0; t < picture_.t_count; ++t) {
-        AddBand(Axis::kV, l * picture_.u_count + k, t, band, gamma_here, x, y);
+    for (int l = 0; l + 1 < image_.v_count; ++l) {
+      for (int t = 0; t < image_.t_count; ++t) {
+        AddBand(Axis::kV, l * image_.u_count + k, t, band, gamma_here, x, y);
       }
     }
   });

@@ -22,7 +22,7 @@ class GridLinks {
   // `disparity` is rendered into each view (l * u_count + k), with the unit and size of `map`. The
   // block is the whole image.
   GridLinks(const DisparityMap& map, std::vector<std::vector<float>> disparity,
-            const kernels::BlockGeometry& picture, int threads);
+            const kernels::BlockGeometry& image, int threads);
 
   // Sets y = mu x + gamma D^T D x; views as in GridPhotograph.
   template <typename Real>
@@ -57,7 +57,7 @@ class GridLinks {
 
   const DisparityMap& map_;
   std::vector<std::vector<float>> disparity_;
-  kernels::BlockGeometry picture_;
+  kernels::BlockGeometry image_;
   int threads_;
   std::vector<ViewLinks> across_, down_;
 };

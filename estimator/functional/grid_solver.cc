@@ -21,7 +21,7 @@
 #include "thicklens/base/parallel.h"
 #include "thicklens/base/residual_guard.h"
 #include "thicklens/base/run_cost.h"
-#include "thicklens/kernels/picture_filter.h"
+#include "thicklens/kernels/image_filter.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -38,16 +38,16 @@ template <typename Real>
 class GridSystem {
  public:
   GridSystem(const GridPhotograph<Real>* photograph, const GridLinks* links,
-             const kernels::BlockGeometry* picture, double gamma, double mu, int threads)
+             const kernels::BlockGeometry* image, double gamma, double mu, int threads)
       : photograph_(*photograph),
         links_(*links),
-        picture_(*picture),
+        image_(*image),
         gamma_(gamma),
         mu_(mu),
         threads_(threads),
-        answer_(static_cast<std::size_t>(picture->views()) *
-                static_cast<std::size_t>(picture->s_count) *
-                static_cast<std::size_t>(picture->t_count)),
+        answer_(static_cast<std::size_t>(image->views()) *
+                static_cast<std::size_t>(image->s_count) *
+                static_cast<std::size_t>(image->t_count)),
         pixels_(photograph->pixels()),
         solver_(answer_.size(), threads) {}
 
@@ -80,8 +80,8 @@ class GridSystem {
  private:
   template <typename Work>
   void ForViews(const Work& work) const {
-    const std::size_t view_size = answer_.size() / static_cast<std::size_t>(picture_.views());
-    ParallelFor(picture_.views(), threads_, [&](int view) {
+    const std::size_t view_size = answer_.size() / static_cast<std::size_t>(image_.views());
+    ParallelFor(image_.views(), threads_, [&](int view) {
       work(static_cast<std::size_t>(view) * view_size,
            static_cast<std::size_t>(view + 1) * view_size);
     });
@@ -112,13 +112,13 @@ class GridSystem {
   // Sets the rays that land outside of the image to 0.
   void ClearBeside(std::vector<Real>* rays) const {
     std::size_t ray = 0;
-    for (int l = 0; l < picture_.v_count; ++l) {
-      for (int k = 0; k < picture_.u_count; ++k) {
-        const LandingRect inside = LandingIn(picture_, k, l);
-        const int s_shift = picture_.s_shift[static_cast<std::size_t>(k)];
-        const int t_shift = picture_.t_shift[static_cast<std::size_t>(l)];
-        for (int t = 0; t < picture_.t_count; ++t) {
-          for (int s = 0; s < picture_.s_count; ++s, ++ray) {
+    for (int l = 0; l < image_.v_count; ++l) {
+      for (int k = 0; k < image_.u_count; ++k) {
+        const LandingRect inside = LandingIn(image_, k, l);
+        const int s_shift = image_.s_shift[static_cast<std::size_t>(k)];
+        const int t_shift = image_.t_shift[static_cast<std::size_t>(l)];
+        for (int t = 0; t < image_.t_count; ++t) {
+          for (int s = 0; s < image_.s_count; ++s, ++ray) {
             const int x = s + s_shift, y = t + t_shift;
             if (x < inside.x_begin || x >= inside.x_end || y < inside.y_begin ||
                 y >= inside.y_end) {
@@ -132,7 +132,7 @@ class GridSystem {
 
   const GridPhotograph<Real>& photograph_;
   const GridLinks& links_;
-  const kernels::BlockGeometry& picture_;
+  const kernels::BlockGeometry& image_;
   const double gamma_, mu_;
   const int threads_;
   std::vector<Real> answer_;
@@ -144,13 +144,13 @@ class GridSystem {
 // a view.
 template <typename Real>
 double FixedBytes(const EstimateInput& input, int threads) {
-  constexpr double kPictures = 3;
+  constexpr double kImages = 3;
   constexpr double kPerViewMade = 40;
   const auto pixels = static_cast<double>(input.disparity.disparity.size());
   const auto views = static_cast<double>(input.weights.size());
   return pixels *
-         (sizeof(float) * (views + 2) * input.picture.channels +
-          sizeof(Real) * (views * GridSystem<Real>::kVectors + kPictures) + kPerViewMade * threads);
+         (sizeof(float) * (views + 2) * input.image.channels +
+          sizeof(Real) * (views * GridSystem<Real>::kVectors + kImages) + kPerViewMade * threads);
 }
 // Bytes of H and D that are known beforehand: the disparities, and the irradiance if there is one.
 double LeastGridBytes(const EstimateInput& input, bool falloff) {
@@ -174,7 +174,7 @@ template <typename Real>
 model::LightField SolveOnGrid(const EstimateInput& input, const FunctionalOptions& options,
                               FunctionalSummary* summary) {
   const auto start = Clock::now();
-  const int threads = summary->threads, channels = input.picture.channels;
+  const int threads = summary->threads, channels = input.image.channels;
   const bool falloff = options.falloff && input.camera.has_value();
   const double fixed_bytes = ResidentBytes() + FixedBytes<Real>(input, threads);
   RequireMemory(options, fixed_bytes + LeastGridBytes(input, falloff));
@@ -184,16 +184,16 @@ model::LightField SolveOnGrid(const EstimateInput& input, const FunctionalOption
   std::vector<std::vector<float>> disparity;
   model::LightField light_field = WarpToAllViews(input, falloff, threads, &disparity);
   progress.Count();
-  const kernels::BlockGeometry picture =
-      BlockOf(light_field, {0, 0, input.picture.width_px, input.picture.height_px}, input.weights);
-  const GridLinks links(input.disparity, std::move(disparity), picture, threads);
+  const kernels::BlockGeometry image =
+      BlockOf(light_field, {0, 0, input.image.width_px, input.image.height_px}, input.weights);
+  const GridLinks links(input.disparity, std::move(disparity), image, threads);
   const GridPhotograph<Real> photograph(
-      picture, falloff ? IrradianceOfViews(input, threads) : std::vector<std::vector<float>>(),
+      image, falloff ? IrradianceOfViews(input, threads) : std::vector<std::vector<float>>(),
       threads);
   const double bytes = fixed_bytes + links.bytes() + photograph.bytes();
   summary->predicted_memory_mib = bytes / kBytesPerMib;
   RequireMemory(options, bytes);
-  GridSystem<Real> system(&photograph, &links, &picture, options.gamma, summary->ridge, threads);
+  GridSystem<Real> system(&photograph, &links, &image, options.gamma, summary->ridge, threads);
   progress.Count();
   summary->setup_seconds = SecondsSince(start);
 
@@ -202,7 +202,7 @@ model::LightField SolveOnGrid(const EstimateInput& input, const FunctionalOption
   for (int channel = 0; channel < channels; ++channel) {
     for (std::size_t i = 0; i < channel_values.size(); ++i) {
       channel_values[i] =
-          input.picture
+          input.image
               .values[i * static_cast<std::size_t>(channels) + static_cast<std::size_t>(channel)];
     }
     const int solved = 2 + (channel + 1) * iterations;

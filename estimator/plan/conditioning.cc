@@ -27,12 +27,12 @@ namespace {
 using Eigen::Index;
 
 void RequireFew(double unknowns) {
-  constexpr double kMost = 4000;
-  if (unknowns <= kMost) return;
+  constexpr double kMax = 4000;
+  if (unknowns <= kMax) return;
   throw Error(fmt::format(
-      "conditioning: {:.0f} unknowns: a dense system may have {:.0f} at most; a smaller picture or "
+      "conditioning: {:.0f} unknowns: a dense system may have {:.0f} at most; a smaller image or "
       "fewer views are needed",
-      unknowns, kMost));
+      unknowns, kMax));
 }
 
 // Solves a system in that precision and returns the relative error of the solution.
@@ -103,8 +103,8 @@ Conditioning ConditioningOfBlock(const EstimateInput& input, const BlockOptions&
   const RayField rays(input, options.falloff, 1);
   const auto kernels = kernels::NewReference<double>();
   const BlockSystem system =
-      MakeBlockSystem(rays, rays.Block(0, 0, input.picture.width_px, input.picture.height_px),
-                      options, options.ridge.value_or(1e-2 / views), kernels.get());
+      MakeBlockSystem(rays, rays.Block(0, 0, input.image.width_px, input.image.height_px), options,
+                      options.ridge.value_or(1e-2 / views), kernels.get());
   return ConditioningOf(Dense(system.matrix), options.stencil == Stencil::kWarp);
 }
 

@@ -60,7 +60,7 @@ Offer Choose(const EstimateProfile& profile, const QualityTarget& target,
     const Offer fastest = *std::min_element(offers.begin(), offers.end(), IsFaster);
     Refuse(target_text, profile,
            fmt::format(
-               "the fastest plan is {}; fewer --views or a smaller picture (--crop) take less time",
+               "the fastest plan is {}; fewer --views or a smaller image (--crop) take less time",
                OfferText(fastest)));
   }
   const Offer best = *std::min_element(soon.begin(), soon.end(), IsBetter);

@@ -61,7 +61,7 @@ TimeModel::Terms TermsOf(const Workload& load) {
   return terms;
 }
 
-// A part of the time of some pictures, and the whole that its errors count against.
+// A part of the time of some images, and the whole that its errors count against.
 struct PartOfTime {
   std::vector<Workload> loads;
   std::vector<double> part, whole;
@@ -117,7 +117,7 @@ void CheckTimes(const TimesOfPlans& plans) {
   for (const std::vector<TimedWorkload>& plan : plans) {
     if (plan.size() < 2 || plan.size() != plans.front().size()) {
       throw Error(
-          fmt::format("models of the run time need the same pictures for each plan, at least two; "
+          fmt::format("models of the run time need the same images for each plan, at least two; "
                       "there are {} and "
                       "{}",
                       plans.front().size(), plan.size()));
@@ -152,7 +152,7 @@ Workload WorkloadOf(const EstimateInput& input, double file_seconds) {
       (map.step.x() * map.step.x() * spread_x + map.step.y() * map.step.y() * spread_y) / 2;
   Workload load;
   load.megapixels = 1e-6 * pixels;
-  load.channels = input.picture.channels;
+  load.channels = input.image.channels;
   load.views = static_cast<int>(input.weights.size());
   load.blur_sigma_px = std::sqrt(square_sum / pixels * per_disparity);
   load.file_seconds = file_seconds;

@@ -16,16 +16,16 @@ namespace {
 
 // Rows of the photograph that one thread sums together. Each view's rows are read in succession,
 // which is fastest for memory, while the photograph's rows stay in the processor's second cache.
-constexpr int kMostBandRows = 128, kFewestBandRows = 8;
-constexpr std::size_t kMostBandBytes = 320 * 1024;
+constexpr int kMaxBandRows = 128, kMinBandRows = 8;
+constexpr std::size_t kMaxBandBytes = 320 * 1024;
 // Rows of rays that one thread adds to together.
-constexpr int kMostRayRows = 256;
+constexpr int kMaxRayRows = 256;
 // Starting a thread for less takes longer than it saves.
-constexpr std::size_t kLeastBytesOfThread = 3 * 1024 * 1024;
+constexpr std::size_t kMinBytesOfThread = 3 * 1024 * 1024;
 
 int BandRows(std::size_t bytes_of_row) {
-  const std::size_t rows = kMostBandBytes / std::max<std::size_t>(bytes_of_row, 1);
-  return static_cast<int>(std::clamp<std::size_t>(rows, kFewestBandRows, kMostBandRows));
+  const std::size_t rows = kMaxBandBytes / std::max<std::size_t>(bytes_of_row, 1);
+  return static_cast<int>(std::clamp<std::size_t>(rows, kMinBandRows, kMaxBandRows));
 }
 
 struct Rows {
@@ -43,7 +43,7 @@ void ForBalancedBands(const Rows& rows, int threads, const Work& work) {
   const auto begin = [&](int band) {
     return static_cast<int>(static_cast<std::int64_t>(rows.count) * band / bands);
   };
-  const std::size_t useful = 1 + rows.bytes / kLeastBytesOfThread;
+  const std::size_t useful = 1 + rows.bytes / kMinBytesOfThread;
   ParallelFor(bands, static_cast<int>(std::min(Index(resolved), useful)),
               [&](int band) { work(begin(band), begin(band + 1)); });
 }
@@ -110,50 +110,50 @@ std::vector<double> SharesOf(const Run& run, int count) {
 
 }  // namespace
 
-LandingRect LandingIn(const kernels::BlockGeometry& picture, int k, int l) {
-  const int s_shift = picture.s_shift[Index(k)], t_shift = picture.t_shift[Index(l)];
-  return {std::max(0, s_shift), std::min(picture.width_px, picture.s_count + s_shift),
-          std::max(0, t_shift), std::min(picture.height_px, picture.t_count + t_shift)};
+LandingRect LandingIn(const kernels::BlockGeometry& image, int k, int l) {
+  const int s_shift = image.s_shift[Index(k)], t_shift = image.t_shift[Index(l)];
+  return {std::max(0, s_shift), std::min(image.width_px, image.s_count + s_shift),
+          std::max(0, t_shift), std::min(image.height_px, image.t_count + t_shift)};
 }
 
 template <typename Real>
-GridPhotograph<Real>::GridPhotograph(const kernels::BlockGeometry& picture,
+GridPhotograph<Real>::GridPhotograph(const kernels::BlockGeometry& image,
                                      std::vector<std::vector<float>> irradiance, int threads)
-    : picture_(picture), irradiance_(std::move(irradiance)), threads_(threads) {
+    : image_(image), irradiance_(std::move(irradiance)), threads_(threads) {
   SetTaps();
 }
 
 template <typename Real>
 void GridPhotograph<Real>::SetTaps() {
   const std::vector<Run> columns =
-      RunsOf(picture_.width_px, picture_.s_count, picture_.s_shift, picture_.s_fraction);
-  taps_.resize(Index(picture_.v_count));
+      RunsOf(image_.width_px, image_.s_count, image_.s_shift, image_.s_fraction);
+  taps_.resize(Index(image_.v_count));
   std::vector<std::vector<double>> shares_of_columns;
   for (const Run& column : columns) {
     column_ends_.push_back(column.end);
-    shares_of_columns.push_back(SharesOf(column, picture_.u_count));
-    for (int l = 0; l < picture_.v_count; ++l) {
+    shares_of_columns.push_back(SharesOf(column, image_.u_count));
+    for (int l = 0; l < image_.v_count; ++l) {
       std::vector<kernels::PixelTap<Real>>& taps = taps_[Index(l)].emplace_back();
       for (const Reach& reach : column.reaches) {
-        const int k = reach.of_views, view = l * picture_.u_count + k;
-        const auto weight = static_cast<Real>(picture_.view_weight[Index(view)] * reach.tap.share);
+        const int k = reach.of_views, view = l * image_.u_count + k;
+        const auto weight = static_cast<Real>(image_.view_weight[Index(view)] * reach.tap.share);
         if (!(weight > 0)) continue;
         taps.push_back({weight, Index(k) * view_size(),
-                        static_cast<std::ptrdiff_t>(reach.tap.offset - picture_.s_shift[Index(k)]),
+                        static_cast<std::ptrdiff_t>(reach.tap.offset - image_.s_shift[Index(k)]),
                         irradiance_.empty() ? nullptr : irradiance_[Index(view)].data()});
       }
     }
   }
   for (const Run& row :
-       RunsOf(picture_.height_px, picture_.t_count, picture_.t_shift, picture_.t_fraction)) {
+       RunsOf(image_.height_px, image_.t_count, image_.t_shift, image_.t_fraction)) {
     run_of_row_.resize(Index(row.end), inverse_sums_.size());
     std::vector<Real>& of_columns = inverse_sums_.emplace_back();
-    const std::vector<double> shares_of_row = SharesOf(row, picture_.v_count);
+    const std::vector<double> shares_of_row = SharesOf(row, image_.v_count);
     for (const std::vector<double>& shares : shares_of_columns) {
       double sum = 0;
-      for (int view = 0; view < picture_.views(); ++view) {
-        sum += picture_.view_weight[Index(view)] * shares_of_row[Index(view / picture_.u_count)] *
-               shares[Index(view % picture_.u_count)];
+      for (int view = 0; view < image_.views(); ++view) {
+        sum += image_.view_weight[Index(view)] * shares_of_row[Index(view / image_.u_count)] *
+               shares[Index(view % image_.u_count)];
       }
       // The sum is rounded to Real like the weights that Apply uses: a sum that is 0 there has no
       // inverse.
@@ -176,9 +176,9 @@ void GridPhotograph<Real>::Normalise(int y, const Real* from, Real* to) const {
 template <typename Real>
 void GridPhotograph<Real>::AddViews(int l, int first, int last, const Real* rays,
                                     Real* photograph) const {
-  const LandingRect inside = LandingIn(picture_, 0, l);
-  const Real* const of_views = rays + Index(l) * Index(picture_.u_count) * view_size();
-  const std::array<RayTap, 2> taps = TapsOf(picture_.t_fraction[Index(l)]);
+  const LandingRect inside = LandingIn(image_, 0, l);
+  const Real* const of_views = rays + Index(l) * Index(image_.u_count) * view_size();
+  const std::array<RayTap, 2> taps = TapsOf(image_.t_fraction[Index(l)]);
   const int begin = std::max(inside.y_begin, first - 1);  // first pixel that rays land nearest to
   const int end = std::min(inside.y_end, last + 1);
   for (int ray_y = begin; ray_y < end; ++ray_y) {
@@ -186,12 +186,10 @@ void GridPhotograph<Real>::AddViews(int l, int first, int last, const Real* rays
     for (std::size_t i = 0; i < taps.size(); ++i) {
       const int y = ray_y - taps[i].offset;
       if (!(taps[i].share > 0) || y < first || y >= last) continue;
-      rows[i] = {photograph + Index(y) * Index(picture_.width_px),
-                 static_cast<Real>(taps[i].share)};
+      rows[i] = {photograph + Index(y) * Index(image_.width_px), static_cast<Real>(taps[i].share)};
     }
     if (rows[0].pixels == nullptr && rows[1].pixels == nullptr) continue;
-    const std::size_t row_start =
-        Index(ray_y - picture_.t_shift[Index(l)]) * Index(picture_.s_count);
+    const std::size_t row_start = Index(ray_y - image_.t_shift[Index(l)]) * Index(image_.s_count);
     int x = 0;
     for (std::size_t run = 0; run < column_ends_.size(); ++run) {
       kernels::AddTaps(taps_[Index(l)][run], of_views, row_start, Index(x),
@@ -203,11 +201,11 @@ void GridPhotograph<Real>::AddViews(int l, int first, int last, const Real* rays
 
 template <typename Real>
 void GridPhotograph<Real>::Apply(const Real* rays, Real* photograph) const {
-  const std::size_t width = Index(picture_.width_px);
-  const Rows of_picture{picture_.height_px, BandRows(width * sizeof(Real)), bytes_of_rays()};
-  ForBalancedBands(of_picture, threads_, [&](int first, int last) {
+  const std::size_t width = Index(image_.width_px);
+  const Rows of_image{image_.height_px, BandRows(width * sizeof(Real)), bytes_of_rays()};
+  ForBalancedBands(of_image, threads_, [&](int first, int last) {
     std::fill(photograph + Index(first) * width, photograph + Index(last) * width, Real{0});
-    for (int l = 0; l < picture_.v_count; ++l) AddViews(l, first, last, rays, photograph);
+    for (int l = 0; l < image_.v_count; ++l) AddViews(l, first, last, rays, photograph);
     for (int y = first; y < last; ++y) {
       Real* row = photograph + Index(y) * width;
       Normalise(y, row, row);
@@ -218,16 +216,16 @@ void GridPhotograph<Real>::Apply(const Real* rays, Real* photograph) const {
 template <typename Real>
 void GridPhotograph<Real>::AddToView(int view, int first, int last, const Real* framed,
                                      Real* rays) const {
-  const int k = view % picture_.u_count, l = view / picture_.u_count;
-  const int s_shift = picture_.s_shift[Index(k)], t_shift = picture_.t_shift[Index(l)];
-  const LandingRect inside = LandingIn(picture_, k, l);
+  const int k = view % image_.u_count, l = view / image_.u_count;
+  const int s_shift = image_.s_shift[Index(k)], t_shift = image_.t_shift[Index(l)];
+  const LandingRect inside = LandingIn(image_, k, l);
   const int begin = std::max(first, inside.y_begin - t_shift);
   const int end = std::min(last, inside.y_end - t_shift);
   if (begin >= end || inside.x_begin >= inside.x_end) return;
   std::vector<kernels::RayPixel<Real>> pixels;  // pixels of the first ray in a row
-  for (const RayTap& in_y : TapsOf(picture_.t_fraction[Index(l)])) {
-    for (const RayTap& in_x : TapsOf(picture_.s_fraction[Index(k)])) {
-      const double weight = picture_.view_weight[Index(view)] * in_y.share * in_x.share;
+  for (const RayTap& in_y : TapsOf(image_.t_fraction[Index(l)])) {
+    for (const RayTap& in_x : TapsOf(image_.s_fraction[Index(k)])) {
+      const double weight = image_.view_weight[Index(view)] * in_y.share * in_x.share;
       if (!(weight > 0)) continue;
       const std::size_t row = Index(begin + t_shift - in_y.offset + 1);
       pixels.push_back({static_cast<Real>(weight),
@@ -236,7 +234,7 @@ void GridPhotograph<Real>::AddToView(int view, int first, int last, const Real* 
   }
   if (pixels.empty()) return;
   for (int t = begin; t < end; ++t) {
-    const std::size_t sample = Index(t) * Index(picture_.s_count) + Index(inside.x_begin - s_shift);
+    const std::size_t sample = Index(t) * Index(image_.s_count) + Index(inside.x_begin - s_shift);
     kernels::AddPixels(
         pixels, irradiance_.empty() ? nullptr : irradiance_[Index(view)].data() + sample,
         Index(inside.x_end - inside.x_begin), rays + Index(view) * view_size() + sample);
@@ -247,17 +245,17 @@ void GridPhotograph<Real>::AddToView(int view, int first, int last, const Real* 
 template <typename Real>
 void GridPhotograph<Real>::AddTransposed(const Real* photograph, Real* rays) const {
   // The frame is black, so that rays at the border need no loop of their own.
-  std::vector<Real> framed(framed_width() * Index(picture_.height_px + 2));
-  const Rows of_picture{picture_.height_px, kMostBandRows, framed.size() * sizeof(Real)};
-  ForBalancedBands(of_picture, threads_, [&](int first, int last) {
+  std::vector<Real> framed(framed_width() * Index(image_.height_px + 2));
+  const Rows of_image{image_.height_px, kMaxBandRows, framed.size() * sizeof(Real)};
+  ForBalancedBands(of_image, threads_, [&](int first, int last) {
     for (int y = first; y < last; ++y) {
-      Normalise(y, photograph + Index(y) * Index(picture_.width_px),
+      Normalise(y, photograph + Index(y) * Index(image_.width_px),
                 framed.data() + Index(y + 1) * framed_width() + 1);
     }
   });
   // No two bands share a ray.
-  const int t_count = picture_.t_count;
-  const Rows of_views{picture_.views() * t_count, kMostRayRows, bytes_of_rays()};
+  const int t_count = image_.t_count;
+  const Rows of_views{image_.views() * t_count, kMaxRayRows, bytes_of_rays()};
   ForBalancedBands(of_views, threads_, [&](int first, int last) {
     for (int view = first / t_count; view * t_count < last; ++view) {
       AddToView(view, std::max(0, first - view * t_count), std::min(t_count, last - view * t_count),
@@ -269,7 +267,7 @@ void GridPhotograph<Real>::AddTransposed(const Real* photograph, Real* rays) con
 template <typename Real>
 double GridPhotograph<Real>::bytes() const {
   // The framed copy for the transpose.
-  double sum = static_cast<double>(framed_width() * Index(picture_.height_px + 2) * sizeof(Real));
+  double sum = static_cast<double>(framed_width() * Index(image_.height_px + 2) * sizeof(Real));
   for (const auto& view : irradiance_) {
     sum += static_cast<double>(view.capacity() * sizeof(float));
   }

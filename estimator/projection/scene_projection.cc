@@ -6,15 +6,15 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimator/projection/plain_pixels.h"
-#include "estimator/projection/seen_share.h"
+#include "estimator/projection/separable_mask.h"
+#include "estimator/projection/visible_fraction.h"
 #include "thicklens/base/error.h"
 
 namespace thicklens::estimator {
 namespace {
 
 // A sum of this many products costs no more than rows for all pixels would.
-constexpr int kMostTerms = 4;
+constexpr int kMaxTerms = 4;
 
 // Weights as a sum of products of a column and a row, by singular values: exact to rounding.
 struct Product {
@@ -32,26 +32,27 @@ std::vector<Product> ProductsOf(const Eigen::ArrayXXd& weights) {
   return products;
 }
 
-std::vector<float> HiddenShare(const ViewFan& fan, std::size_t pixels) {
+std::vector<float> OccludedFraction(const AngularBundle& bundle, std::size_t pixels) {
   std::vector<double> share(pixels, 0.0);
-  for (const FanView& view : fan.views) {
-    for (const CompactView::Hidden& hidden : view.sees.hidden)
-      share[static_cast<std::size_t>(hidden.index)] += view.weight;
-    for (const CompactView::Mixed& mixed : view.sees.mixed) {
-      const auto i = static_cast<std::size_t>(mixed.index);
-      const double hidden_before = std::isnan(view.sees.disparity[i]) ? 1 : 0;
-      const double other_hidden = mixed.other.index == mixed.index ? 0 : 1;
-      share[i] += view.weight * static_cast<double>(mixed.share) * (other_hidden - hidden_before);
+  for (const BundleView& view : bundle.views) {
+    for (const CompactView::Occluded& occluded : view.sees.occluded)
+      share[static_cast<std::size_t>(occluded.index)] += view.weight;
+    for (const CompactView::Boundary& boundary : view.sees.boundary) {
+      const auto i = static_cast<std::size_t>(boundary.index);
+      const double occluded_before = std::isnan(view.sees.disparity[i]) ? 1 : 0;
+      const double other_occluded = boundary.other.index == boundary.index ? 0 : 1;
+      share[i] +=
+          view.weight * static_cast<double>(boundary.share) * (other_occluded - occluded_before);
     }
   }
   return {share.begin(), share.end()};
 }
 
 // The centre view is the map itself.
-void DropCentre(ViewFan* fan) {
-  const auto is_centre = [](const FanView& view) { return view.a == 0 && view.b == 0; };
-  fan->views.erase(std::remove_if(fan->views.begin(), fan->views.end(), is_centre),
-                   fan->views.end());
+void DropCentre(AngularBundle* bundle) {
+  const auto is_centre = [](const BundleView& view) { return view.a == 0 && view.b == 0; };
+  bundle->views.erase(std::remove_if(bundle->views.begin(), bundle->views.end(), is_centre),
+                      bundle->views.end());
 }
 
 }  // namespace
@@ -60,8 +61,8 @@ template <typename Real>
 void SceneProjection<Real>::Apply(const Real* x, int channels, Real* y) const {
   const auto stride = static_cast<std::ptrdiff_t>(pixels());
   const std::size_t size = pixels() * static_cast<std::size_t>(channels);
-  const kernels::PictureIn<Real> in{x, stride, channels};
-  const kernels::PictureOut<Real> out{y, stride, channels};
+  const kernels::ImageIn<Real> in{x, stride, channels};
+  const kernels::ImageOut<Real> out{y, stride, channels};
   between_.resize(size);
   if (terms.size() > 1) other_.resize(size);
   for (std::size_t t = 0; t < terms.size(); ++t) {
@@ -78,7 +79,7 @@ template <typename Real>
 void SceneProjection<Real>::ApplyTransposed(const Real* y, int channels, Real* x) const {
   const auto stride = static_cast<std::ptrdiff_t>(pixels());
   const std::size_t size = pixels() * static_cast<std::size_t>(channels);
-  const kernels::PictureOut<Real> out{x, stride, channels};
+  const kernels::ImageOut<Real> out{x, stride, channels};
   if (terms.empty()) {
     std::fill(x, x + size, Real(0));
   } else {
@@ -138,7 +139,7 @@ double SceneProjection<Real>::bytes(int first_row, int last_row) const {
       (last_run - first_run) * (kernels::kPixelsOfRun * sizeof(Real) + sizeof(std::int32_t)) +
       (last - first) * (sizeof(std::int64_t) + sizeof(std::int32_t));
   for (const Term& term : terms) {
-    for (const kernels::PixelFilter<Real>* filter : {&term.across, &term.down}) {
+    for (const kernels::VaryingFilter<Real>* filter : {&term.across, &term.down}) {
       const auto start = [&](int row) {
         return filter->start[static_cast<std::size_t>(row) *
                              static_cast<std::size_t>(filter->blocks_in_row())];
@@ -153,48 +154,49 @@ template <typename Real>
 SceneProjection<Real> MakeSceneProjection(const DisparityMap& disparity,
                                           const Eigen::ArrayXXd& weights,
                                           const ProjectionOptions& options) {
-  ViewFan fan = RenderFan(disparity, weights, options.threads, options.progress);
+  AngularBundle bundle = RenderBundle(disparity, weights, options.threads, options.progress);
   const auto u_count = static_cast<int>(weights.cols()), v_count = static_cast<int>(weights.rows());
   const std::vector<Product> products = ProductsOf(weights);
-  const bool has_products = products.size() <= kMostTerms;
-  PlainPixels plain;
-  if (has_products || options.seen_share) {
-    plain = FindPlainPixels(disparity, u_count, v_count, options.tolerance_px);
+  const bool has_products = products.size() <= kMaxTerms;
+  SeparableMask plain;
+  if (has_products || options.visible_fraction) {
+    plain = FindSeparablePixels(disparity, u_count, v_count, options.tolerance_px);
   }
   SceneProjection<Real> projection;
   projection.width_px = disparity.width_px;
   projection.height_px = disparity.height_px;
   projection.threads = options.threads;
-  projection.fan_bytes = BytesOf(fan);
-  projection.hidden_share = HiddenShare(fan, projection.pixels());
-  if (options.seen_share)
-    projection.seen_share = SeenShare(fan, disparity, plain.is_seen, options.threads);
+  projection.bundle_bytes = BytesOf(bundle);
+  projection.occluded_fraction = OccludedFraction(bundle, projection.pixels());
+  if (options.visible_fraction)
+    projection.visible_fraction =
+        VisibleFraction(bundle, disparity, plain.is_visible, options.threads);
 
   std::vector<unsigned char> is_product(projection.pixels(), 0);
   if (has_products) {
-    FanAxes axes = AxesOf(fan, disparity, u_count, v_count, options.threads);
+    BundleAxes axes = AxesOf(bundle, disparity, u_count, v_count, options.threads);
     is_product =
-        IsProduct(fan, axes, disparity, options.tolerance_px, plain.is_product, options.threads);
-    for (const FanView& view : fan.views) {
-      for (const CompactView::Mixed& mixed : view.sees.mixed) {
-        is_product[static_cast<std::size_t>(mixed.index)] = 0;
+        IsProduct(bundle, axes, disparity, options.tolerance_px, plain.is_product, options.threads);
+    for (const BundleView& view : bundle.views) {
+      for (const CompactView::Boundary& boundary : view.sees.boundary) {
+        is_product[static_cast<std::size_t>(boundary.index)] = 0;
       }
     }
     for (const Product& product : products) {
       projection.terms.emplace_back();
       auto& term = projection.terms.back();
       term.across = FilterOf<Real>(axes.across, kernels::Axis::kAcross, disparity, product.across,
-                                   options.between, options.threads);
+                                   options.interpolation, options.threads);
       // The axes of the last term are not read again; freeing them makes room for the other filter.
       if (&product == &products.back()) axes.across = {};
       term.down = FilterOf<Real>(axes.down, kernels::Axis::kDown, disparity, product.down,
-                                 options.between, options.threads);
+                                 options.interpolation, options.threads);
     }
   }
-  projection.rows = RunsOf<Real>(fan, disparity, is_product, options.threads, options.freed);
-  if (options.fan) {
-    DropCentre(&fan);
-    projection.fan = std::move(fan);
+  projection.rows = RunsOf<Real>(bundle, disparity, is_product, options.threads, options.freed);
+  if (options.bundle) {
+    DropCentre(&bundle);
+    projection.bundle = std::move(bundle);
   }
   return projection;
 }

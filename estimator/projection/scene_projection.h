@@ -7,9 +7,9 @@
 #include <utility>
 #include <vector>
 
-#include "estimator/projection/view_fan.h"
+#include "estimator/projection/angular_bundle.h"
 #include "thicklens/estimator/view_geometry.h"
-#include "thicklens/kernels/picture_filter.h"
+#include "thicklens/kernels/image_filter.h"
 
 namespace thicklens::estimator {
 
@@ -20,34 +20,34 @@ namespace thicklens::estimator {
 //   (H r)(x) = sum_k w_k r(x + s_k(x)) [D100],
 //
 // where s_k is the displacement from the view's sample to its source (ViewDisparity). A source is
-// read by those of its bilinear taps that are on its surface, and a mixed sample by the taps of
+// read by those of its bilinear taps that are on its surface, and a boundary sample by the taps of
 // both surfaces. Rows sum to 1.
 //
-// A pixel whose fan meets only one surface is computed by filters down and across the image. They
-// treat the fan as a product of its axes (weights that are no product are a sum of products, by
-// singular values) and may read bicubic, as views are shown. A pixel where the product would
-// misplace a ray by more than a tolerance has a row of its own. There taps cost more, and their
-// refinement would be lost in the effect of the edge beside the pixel. Derived here. Images are
-// `channels` planes of width * height numbers.
+// A pixel whose bundle meets only one surface is computed by filters down and across the image.
+// They treat the bundle as a product of its axes (weights that are no product are a sum of
+// products, by singular values) and may read bicubic, as views are shown. A pixel where the product
+// would misplace a ray by more than a tolerance has a row of its own. There taps cost more, and
+// their refinement would be lost in the effect of the edge beside the pixel. Derived here. Images
+// are `channels` planes of width * height numbers.
 template <typename Real>
 class SceneProjection {
  public:
   // One product of weights: (x -> sum_n across_n) then (sum_m down_m).
   struct Term {
-    kernels::PixelFilter<Real> across, down;
+    kernels::VaryingFilter<Real> across, down;
   };
 
   int width_px = 0, height_px = 0;
   int threads = 1;
   std::vector<Term> terms;  // empty: every pixel has a row
-  kernels::PixelRuns<Real> rows;
+  kernels::PixelBlockedCsr<Real> rows;
   // Share of the aperture, 0 to 1, that sees each pixel through samples hidden from the centre
-  // view; a mixed sample counts by its hidden share.
-  std::vector<float> hidden_share;
+  // view; a boundary sample counts by its hidden share.
+  std::vector<float> occluded_fraction;
   // Share of the aperture that sees each point of the centre view; only if requested.
-  std::vector<float> seen_share;
-  ViewFan fan;           // only if requested; without the centre
-  double fan_bytes = 0;  // memory of the whole fan while H was made
+  std::vector<float> visible_fraction;
+  AngularBundle bundle;     // only if requested; without the centre
+  double bundle_bytes = 0;  // memory of the whole bundle while H was made
 
   // Both functions set their results.
   void Apply(const Real* x, int channels, Real* y) const;
@@ -70,10 +70,11 @@ class SceneProjection {
 
 struct ProjectionOptions {
   double tolerance_px =
-      0.2;  // largest error of a ray's position where the fan is treated as a product
-  Between between = Between::kCubic;  // interpolation of the products; rows are linear
-  bool seen_share = false;            // true: compute seen_share
-  bool fan = false;                   // true: keep the fan
+      0.2;  // largest error of a ray's position where the bundle is treated as a product
+  Interpolation interpolation =
+      Interpolation::kCubic;      // interpolation of the products; rows are linear
+  bool visible_fraction = false;  // true: compute visible_fraction
+  bool bundle = false;            // true: keep the bundle
   int threads = 1;
   std::function<void()> progress;  // called repeatedly, from any thread; may throw to stop
   std::function<void()> freed;     // called, from any thread, when much memory was freed

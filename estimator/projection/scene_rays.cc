@@ -54,8 +54,8 @@ ViewRays<Real>::ViewRays(const DisparityMap& map, const std::vector<float>& lowe
       const float d = view.disparity[i];
       const std::int32_t step_x = Floor(shift_x_ * d), step_y = Floor(shift_y_ * d);
       const int cell_x = x + step_x, cell_y = y + step_y;
-      bool plain = view.seen[i] == Seen::kSeen && cell_x >= 0 && cell_x + 1 < map.width_px &&
-                   cell_y >= 0 && cell_y + 1 < map.height_px;
+      bool plain = view.visibility[i] == Visibility::kVisible && cell_x >= 0 &&
+                   cell_x + 1 < map.width_px && cell_y >= 0 && cell_y + 1 < map.height_px;
       if (plain) {
         const std::size_t cell = Index(cell_y) * Index(map.width_px) + Index(cell_x);
         plain = highest[cell] - d <= room && d - lowest[cell] <= room;
@@ -75,7 +75,7 @@ ViewRays<Real>::ViewRays(const DisparityMap& map, const std::vector<float>& lowe
   }
   run_start_.push_back(runs_.size());
   odd_start_.push_back(odd_.size());
-  AddMixed(map, tolerance, view);
+  AddBoundaryRays(map, tolerance, view);
   runs_.shrink_to_fit();
   odd_.shrink_to_fit();
 }
@@ -83,7 +83,7 @@ ViewRays<Real>::ViewRays(const DisparityMap& map, const std::vector<float>& lowe
 template <typename Real>
 typename ViewRays<Real>::OddRay ViewRays<Real>::OddRayOf(
     const DisparityMap& map, double tolerance, std::size_t sample,
-    const kernels::HiddenSample& source) const {
+    const kernels::OccludedSample& source) const {
   const std::size_t x = sample % Index(map.width_px), y = sample / Index(map.width_px);
   const SurfaceTaps taps =
       TapsAt(map, tolerance, static_cast<double>(x) + static_cast<double>(source.source_x),
@@ -99,17 +99,18 @@ typename ViewRays<Real>::OddRay ViewRays<Real>::OddRayOf(
 }
 
 template <typename Real>
-void ViewRays<Real>::AddMixed(const DisparityMap& map, double tolerance,
-                              const ViewDisparity& view) {
-  mixed_.reserve(view.mixed.size());
-  mixed_start_.assign(Index(map.height_px) + 1, view.mixed.size());
+void ViewRays<Real>::AddBoundaryRays(const DisparityMap& map, double tolerance,
+                                     const ViewDisparity& view) {
+  boundary_.reserve(view.boundary.size());
+  mixed_start_.assign(Index(map.height_px) + 1, view.boundary.size());
   std::size_t row = 0;
-  for (const kernels::MixedSample& mixed : view.mixed) {
-    const std::size_t sample = Index(mixed.index);
-    while (row <= sample / Index(map.width_px)) mixed_start_[row++] = mixed_.size();
-    MixedRay ray{OddRayOf(map, tolerance, sample, mixed.other), 1 - static_cast<Real>(mixed.share)};
-    for (Real& weight : ray.other.weight) weight *= static_cast<Real>(mixed.share);
-    mixed_.push_back(ray);
+  for (const kernels::BoundarySample& boundary : view.boundary) {
+    const std::size_t sample = Index(boundary.index);
+    while (row <= sample / Index(map.width_px)) mixed_start_[row++] = boundary_.size();
+    BoundaryRay ray{OddRayOf(map, tolerance, sample, boundary.other),
+                    1 - static_cast<Real>(boundary.share)};
+    for (Real& weight : ray.other.weight) weight *= static_cast<Real>(boundary.share);
+    boundary_.push_back(ray);
   }
 }
 
@@ -124,34 +125,33 @@ kernels::RayRow<Real> ViewRays<Real>::RowOf(int row) const {
 }
 
 template <typename Real>
-void ViewRays<Real>::Warp(int row, const Real* picture, Real* warped) const {
-  kernels::WarpRow(RowOf(row), picture + Index(row) * Index(width_px_), warped);
+void ViewRays<Real>::Warp(int row, const Real* image, Real* warped) const {
+  kernels::WarpRow(RowOf(row), image + Index(row) * Index(width_px_), warped);
   for (std::size_t n = odd_start_[Index(row)]; n < odd_start_[Index(row) + 1]; ++n) {
     const OddRay& ray = odd_[n];
     Real sum = 0;
-    for (std::size_t t = 0; t < 4; ++t) sum += ray.weight[t] * picture[ray.pixel[t]];
+    for (std::size_t t = 0; t < 4; ++t) sum += ray.weight[t] * image[ray.pixel[t]];
     warped[ray.x] = sum;
   }
   for (std::size_t n = mixed_start_[Index(row)]; n < mixed_start_[Index(row) + 1]; ++n) {
-    const OddRay& other = mixed_[n].other;
-    Real sum = mixed_[n].rest * warped[other.x];
-    for (std::size_t t = 0; t < 4; ++t) sum += other.weight[t] * picture[other.pixel[t]];
+    const OddRay& other = boundary_[n].other;
+    Real sum = boundary_[n].rest * warped[other.x];
+    for (std::size_t t = 0; t < 4; ++t) sum += other.weight[t] * image[other.pixel[t]];
     warped[other.x] = sum;
   }
 }
 
 template <typename Real>
-void ViewRays<Real>::Spread(int row, Real* values, Real* picture) const {
+void ViewRays<Real>::Spread(int row, Real* values, Real* image) const {
   for (std::size_t n = mixed_start_[Index(row)]; n < mixed_start_[Index(row) + 1]; ++n) {
-    const OddRay& other = mixed_[n].other;
-    for (std::size_t t = 0; t < 4; ++t)
-      picture[other.pixel[t]] += other.weight[t] * values[other.x];
-    values[other.x] *= mixed_[n].rest;
+    const OddRay& other = boundary_[n].other;
+    for (std::size_t t = 0; t < 4; ++t) image[other.pixel[t]] += other.weight[t] * values[other.x];
+    values[other.x] *= boundary_[n].rest;
   }
-  kernels::SpreadRow(RowOf(row), values, picture + Index(row) * Index(width_px_));
+  kernels::SpreadRow(RowOf(row), values, image + Index(row) * Index(width_px_));
   for (std::size_t n = odd_start_[Index(row)]; n < odd_start_[Index(row) + 1]; ++n) {
     const OddRay& ray = odd_[n];
-    for (std::size_t t = 0; t < 4; ++t) picture[ray.pixel[t]] += ray.weight[t] * values[ray.x];
+    for (std::size_t t = 0; t < 4; ++t) image[ray.pixel[t]] += ray.weight[t] * values[ray.x];
   }
 }
 
@@ -159,7 +159,7 @@ template <typename Real>
 double ViewRays<Real>::bytes() const {
   return static_cast<double>(
       disparity_.capacity() * sizeof(Real) + runs_.capacity() * sizeof(kernels::RayRun) +
-      odd_.capacity() * sizeof(OddRay) + mixed_.capacity() * sizeof(MixedRay) +
+      odd_.capacity() * sizeof(OddRay) + boundary_.capacity() * sizeof(BoundaryRay) +
       3 * run_start_.capacity() * sizeof(std::size_t));
 }
 

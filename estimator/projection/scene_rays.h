@@ -26,10 +26,10 @@ class ViewRays {
   // Count of extra numbers that a row of values, and an image, needs after its last one.
   static constexpr std::size_t kMargin = 2 * kernels::kRaysTogether;
 
-  // Computes warped(x) = sum_taps t(x, p) picture(p) of one row, by the taps of SurfaceTaps.
-  void Warp(int row, const Real* picture, Real* warped) const;
+  // Computes warped(x) = sum_taps t(x, p) image(p) of one row, by the taps of SurfaceTaps.
+  void Warp(int row, const Real* image, Real* warped) const;
   // Adds the transpose to the image. `values` is overwritten.
-  void Spread(int row, Real* values, Real* picture) const;
+  void Spread(int row, Real* values, Real* image) const;
 
   double bytes() const;
 
@@ -41,13 +41,13 @@ class ViewRays {
     std::array<Real, 4> weight{};
   };
   // A ray that keeps the share `rest` and also reads another place.
-  struct MixedRay {
+  struct BoundaryRay {
     OddRay other;
     Real rest = 0;
   };
   OddRay OddRayOf(const DisparityMap& map, double tolerance, std::size_t sample,
-                  const kernels::HiddenSample& source) const;
-  void AddMixed(const DisparityMap& map, double tolerance, const ViewDisparity& view);
+                  const kernels::OccludedSample& source) const;
+  void AddBoundaryRays(const DisparityMap& map, double tolerance, const ViewDisparity& view);
   kernels::RayRow<Real> RowOf(int row) const;
 
   int width_px_ = 0;
@@ -55,7 +55,7 @@ class ViewRays {
   std::vector<Real> disparity_;
   std::vector<kernels::RayRun> runs_;
   std::vector<OddRay> odd_;
-  std::vector<MixedRay> mixed_;
+  std::vector<BoundaryRay> boundary_;
   std::vector<std::size_t> run_start_, odd_start_, mixed_start_;  // start of each row, and the end
 };
 

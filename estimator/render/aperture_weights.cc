@@ -115,7 +115,7 @@ std::optional<model::ApertureShape> ShapeOfWeights(const model::LightField& ligh
 
 // Uses the rays with u = v = 0: with ST in the plane of focus, they are the middle of the rays that
 // land at a pixel.
-double LargestWander(const model::LightField& light_field) {
+double MaxPupilShift(const model::LightField& light_field) {
   const model::LightFieldGrid& grid = *light_field.grid;
   const Eigen::Vector2d reach_mm =
       model::ApertureStepsMm(grid, *light_field.camera)
@@ -135,8 +135,8 @@ double LargestWander(const model::LightField& light_field) {
   return largest;
 }
 
-std::vector<float> PassedRays(const model::LightField& light_field, const Vignetting& vignetting,
-                              int k, int l) {
+std::vector<float> ApertureTransmissionMap(const model::LightField& light_field,
+                                           const Vignetting& vignetting, int k, int l) {
   const model::LightFieldGrid& grid = *light_field.grid;
   const Eigen::Vector2d step_mm = model::ApertureStepsMm(grid, *light_field.camera);
   std::vector<float> passed;

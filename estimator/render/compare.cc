@@ -63,7 +63,7 @@ void RequireComparable(const model::LightField& reference, const model::LightFie
 }
 
 void RequireFitting(const model::LightField& reference, const DibrInput& dibr) {
-  const model::LinearPicture& photograph = dibr.photograph;
+  const model::LinearImage& photograph = dibr.photograph;
   if (photograph.width_px != reference.s_count || photograph.height_px != reference.t_count ||
       photograph.channels != reference.channels) {
     throw Error(fmt::format(
@@ -86,28 +86,28 @@ struct DibrViews {
       : renderer(input.disparity), warper(input.photograph, input.disparity) {}
 
   DisparityRenderer renderer;
-  PictureWarper warper;
+  ImageWarper warper;
 };
 
 ViewScores CompareView(const model::LightField& reference, const model::LightField& other, int k,
                        int l, int border_px, const std::optional<DibrViews>& dibr) {
-  const model::StoredValues truth =
-      model::StoredValuesOf(model::ViewPicture(reference, k, l), reference.transfer);
+  const model::EncodedValues truth =
+      model::EncodedValuesOf(model::ViewImage(reference, k, l), reference.transfer);
   ViewScores view;
   view.u = k;
   view.v = l;
-  view.scores = ComparePictures(
-      truth, model::StoredValuesOf(model::ViewPicture(other, k, l), reference.transfer), border_px);
+  view.scores = CompareImages(
+      truth, model::EncodedValuesOf(model::ViewImage(other, k, l), reference.transfer), border_px);
   if (!dibr) return view;
   const ViewDisparity seen = dibr->renderer.Render(reference.u_offset(k), reference.v_offset(l));
-  view.dibr = ComparePictures(
-      truth, model::StoredValuesOf(dibr->warper.Warp(seen), reference.transfer), border_px);
+  view.dibr = CompareImages(
+      truth, model::EncodedValuesOf(dibr->warper.Warp(seen), reference.transfer), border_px);
   return view;
 }
 
-using Scores = std::vector<PictureScores>;
+using Scores = std::vector<ImageScores>;
 
-bool HasFinitePsnr(const PictureScores& scores) { return !std::isinf(scores.psnr_db); }
+bool HasFinitePsnr(const ImageScores& scores) { return !std::isinf(scores.psnr_db); }
 
 // Selects the views that a mean of PSNRs is over: the views that differ from the reference, so that
 // one perfect view does not hide the others. For two means that are shown together, these are the
@@ -121,14 +121,14 @@ std::vector<bool> ViewsOfPsnrMean(const Scores& scores, const Scores& beside) {
   return std::find(both.begin(), both.end(), true) == both.end() ? own : both;
 }
 
-PictureScores MeanOf(const Scores& scores, const Scores& beside) {
-  PictureScores mean;
+ImageScores MeanOf(const Scores& scores, const Scores& beside) {
+  ImageScores mean;
   const std::vector<bool> in_psnr = ViewsOfPsnrMean(scores, beside);
   int psnrs = 0;
   int standins = 0;
   double standin_sum = 0;
   for (std::size_t i = 0; i < scores.size(); ++i) {
-    const PictureScores& one = scores[i];
+    const ImageScores& one = scores[i];
     mean.ssim += one.ssim;
     mean.delta_e94_mean += one.delta_e94_mean;
     if (in_psnr[i]) {
@@ -159,7 +159,7 @@ double DistanceSquared(const model::LightField& light_field, const ViewScores& v
 struct Groups {
   Scores all, centre, corner;
 };
-using ScoresOfView = std::function<const PictureScores&(const ViewScores&)>;
+using ScoresOfView = std::function<const ImageScores&(const ViewScores&)>;
 Groups GroupsOf(const model::LightField& light_field, const std::vector<ViewScores>& views,
                 const ScoresOfView& scores_of) {
   double nearest = std::numeric_limits<double>::infinity();
@@ -210,11 +210,11 @@ LightFieldScores CompareLightFields(const model::LightField& reference,
   });
   const Groups own =
       GroupsOf(reference, result.views,
-               [](const ViewScores& view) -> const PictureScores& { return view.scores; });
+               [](const ViewScores& view) -> const ImageScores& { return view.scores; });
   Groups warped;
   if (dibr) {
     warped = GroupsOf(reference, result.views,
-                      [](const ViewScores& view) -> const PictureScores& { return *view.dibr; });
+                      [](const ViewScores& view) -> const ImageScores& { return *view.dibr; });
     result.dibr_mean = MeanOf(warped.all, own.all);
     result.dibr_centre = MeanOf(warped.centre, own.centre);
     result.dibr_corner = MeanOf(warped.corner, own.corner);

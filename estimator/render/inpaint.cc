@@ -36,12 +36,12 @@ struct ViewHoles {
 ViewHoles HolesOf(const DisparityMap& map, const DisparityRenderer& renderer, int view, double a,
                   double b) {
   ViewDisparity rendered = renderer.Render(a, b);
-  ViewHoles holes{view, a, b, std::vector<char>(rendered.seen.size(), 0), 0, {}};
+  ViewHoles holes{view, a, b, std::vector<char>(rendered.visibility.size(), 0), 0, {}};
   for (int y = 0; y < map.height_px; ++y) {
     ThrowIfCancelled();
     for (int x = 0; x < map.width_px; ++x) {
       const std::size_t i = Index(y) * Index(map.width_px) + Index(x);
-      if (rendered.seen[i] != Seen::kHidden) continue;
+      if (rendered.visibility[i] != Visibility::kOccluded) continue;
       // Position in the centre view of the background that is seen here.
       const double centre_x = x + a * map.step.x() * rendered.disparity[i];
       const double centre_y = y + b * map.step.y() * rendered.disparity[i];
@@ -168,8 +168,8 @@ bool InpaintOptions::IsValid(std::string* why) const {
   return true;
 }
 
-void InpaintHiddenRays(const DisparityMap& map, const InpaintOptions& options,
-                       model::LightField* light_field, InpaintSummary* summary) {
+void InpaintOccludedRays(const DisparityMap& map, const InpaintOptions& options,
+                         model::LightField* light_field, InpaintSummary* summary) {
   std::string why;
   if (!options.IsValid(&why)) throw Error("inpainting: " + why);
   CheckLightField(*light_field);
@@ -216,7 +216,8 @@ void InpaintHiddenRays(const DisparityMap& map, const InpaintOptions& options,
   }
   summary->seconds = SecondsSince(start);
   summary->message = fmt::format(
-      "{} rays of hidden background: {} filled in {} views by Telea's method, {} carried to others",
+      "{} rays of occluded background: {} filled in {} views by Telea's method, {} carried to "
+      "others",
       summary->holes, summary->filled, summary->views_visited, summary->carried);
 }
 

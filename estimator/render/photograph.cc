@@ -47,19 +47,20 @@ std::vector<std::vector<float>> PassedByViews(const model::LightField& light_fie
                                               const Eigen::ArrayXXd& seen, int threads) {
   std::vector<std::vector<float>> passed(Index(light_field.u_count * light_field.v_count));
   ForEachView(light_field, threads, [&](int view, int k, int l) {
-    if (seen(l, k) > 0) passed[Index(view)] = PassedRays(light_field, vignetting, k, l);
+    if (seen(l, k) > 0)
+      passed[Index(view)] = ApertureTransmissionMap(light_field, vignetting, k, l);
   });
   return passed;
 }
 
 // Forms the image of one channel from its views as they lie in the light field.
-using PictureFormer = std::function<std::vector<float>(const float* rays)>;
+using ImageFormer = std::function<std::vector<float>(const float* rays)>;
 
 // Uses `kernels` or, if it is null, vector instructions of the processor; both give the numbers of
-// Kernels::FormPicture. If there are `shares`, they multiply the rays.
-PictureFormer NewFormer(const kernels::BlockGeometry& whole, kernels::Splat splat,
-                        std::vector<std::vector<float>> shares, kernels::Kernels<float>* kernels,
-                        int threads) {
+// Kernels::FormImage. If there are `shares`, they multiply the rays.
+ImageFormer NewFormer(const kernels::BlockGeometry& whole, kernels::Splat splat,
+                      std::vector<std::vector<float>> shares, kernels::Kernels<float>* kernels,
+                      int threads) {
   if (kernels == nullptr) {
     kernels::BlockGeometry geometry = whole;
     if (splat == kernels::Splat::kNearest) {  // each ray counts fully, as if it landed on its pixel
@@ -85,7 +86,7 @@ PictureFormer NewFormer(const kernels::BlockGeometry& whole, kernels::Splat spla
             for (std::size_t i = 0; i < share.size(); ++i) values[i] *= share[i];
           });
         }
-        return kernels->FormPicture(whole, splat, weighed);
+        return kernels->FormImage(whole, splat, weighed);
       };
 }
 
@@ -93,7 +94,7 @@ PictureFormer NewFormer(const kernels::BlockGeometry& whole, kernels::Splat spla
 // rays and the aperture passes none.
 std::vector<float> BundleOf(const model::LightField& light_field,
                             const std::vector<std::vector<float>>& passed,
-                            const PictureFormer& form) {
+                            const ImageFormer& form) {
   std::vector<float> rays;
   rays.reserve(passed.size() * light_field.view_size());
   for (const std::vector<float>& view : passed) {
@@ -135,10 +136,9 @@ void MultiplyInto(const std::vector<std::vector<float>>& shares,
 
 }  // namespace
 
-model::LinearPicture Photograph(const model::LightField& light_field,
-                                const Eigen::ArrayXXd& weights, const model::Camera* falloff,
-                                const Vignetting* vignetting, kernels::Kernels<float>* kernels,
-                                int threads) {
+model::LinearImage Photograph(const model::LightField& light_field, const Eigen::ArrayXXd& weights,
+                              const model::Camera* falloff, const Vignetting* vignetting,
+                              kernels::Kernels<float>* kernels, int threads) {
   CheckLightField(light_field);
   const Eigen::ArrayXXd present = PresentWeights(light_field, weights);
   const bool is_vignetted = vignetting != nullptr && IsOffAperture(light_field);
@@ -164,9 +164,8 @@ model::LinearPicture Photograph(const model::LightField& light_field,
     MultiplyInto(passed, &share_of_rays);
   }
 
-  const PictureFormer form = NewFormer(whole, splat, std::move(share_of_rays), kernels, threads);
-  model::LinearPicture photograph{
-      light_field.s_count, light_field.t_count, light_field.channels, {}};
+  const ImageFormer form = NewFormer(whole, splat, std::move(share_of_rays), kernels, threads);
+  model::LinearImage photograph{light_field.s_count, light_field.t_count, light_field.channels, {}};
   for (int channel = 0; channel < light_field.channels; ++channel) {
     std::vector<float> pixels =
         form(light_field.values.data() + light_field.ViewStart(channel, 0, 0));

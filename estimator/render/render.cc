@@ -78,7 +78,7 @@ void AddRow(const float* view, int s_count, int t_count, const ShiftedView& shif
 
 // Computes row y of the mean of the shifted views, for all channels.
 void RefocusRow(const model::LightField& light_field, const std::vector<ShiftedView>& views, int y,
-                model::LinearPicture* picture) {
+                model::LinearImage* image) {
   const int width = light_field.s_count;
   std::vector<double> weights(Index(width), 0.0);
   for (const ShiftedView& view : views) {
@@ -95,18 +95,18 @@ void RefocusRow(const model::LightField& light_field, const std::vector<ShiftedV
     }
     for (int x = 0; x < width; ++x) {
       if (weights[Index(x)] == 0) continue;  // no view reaches here: black
-      picture->values[(Index(y) * Index(width) + Index(x)) * Index(light_field.channels) +
-                      Index(channel)] = static_cast<float>(sums[Index(x)] / weights[Index(x)]);
+      image->values[(Index(y) * Index(width) + Index(x)) * Index(light_field.channels) +
+                    Index(channel)] = static_cast<float>(sums[Index(x)] / weights[Index(x)]);
     }
   }
 }
 
 // Copies the channel values of one sample of a view to a pixel.
 void CopySample(const model::LightField& light_field, int k, int l, int s, int t, int x, int y,
-                model::LinearPicture* picture) {
+                model::LinearImage* image) {
   for (int channel = 0; channel < light_field.channels; ++channel) {
-    picture->values[(Index(y) * Index(picture->width_px) + Index(x)) * Index(picture->channels) +
-                    Index(channel)] =
+    image->values[(Index(y) * Index(image->width_px) + Index(x)) * Index(image->channels) +
+                  Index(channel)] =
         light_field.values[light_field.ViewStart(channel, k, l) +
                            Index(t) * Index(light_field.s_count) + Index(s)];
   }
@@ -119,8 +119,8 @@ void CheckRepeat(int repeat_px) {
 
 }  // namespace
 
-model::LinearPicture Refocus(const model::LightField& light_field, double disparity_u_px,
-                             double disparity_v_px, const Eigen::ArrayXXd& weights, int threads) {
+model::LinearImage Refocus(const model::LightField& light_field, double disparity_u_px,
+                           double disparity_v_px, const Eigen::ArrayXXd& weights, int threads) {
   CheckLightField(light_field);
   if (!std::isfinite(disparity_u_px) || !std::isfinite(disparity_v_px)) {
     throw Error(fmt::format("disparity is ({}, {}) px per view step: both must be finite",
@@ -136,11 +136,11 @@ model::LinearPicture Refocus(const model::LightField& light_field, double dispar
                        ShiftedAxis(light_field.v_offset(l) * disparity_v_px, light_field.t_count)});
     }
   }
-  model::LinearPicture picture =
-      BlackPicture(light_field.s_count, light_field.t_count, light_field.channels);
+  model::LinearImage image =
+      BlackImage(light_field.s_count, light_field.t_count, light_field.channels);
   ParallelFor(light_field.t_count, threads,
-              [&](int y) { RefocusRow(light_field, views, y, &picture); });
-  return picture;
+              [&](int y) { RefocusRow(light_field, views, y, &image); });
+  return image;
 }
 
 // d = -m. SlopeOnGrid returns m in u; for a grid with exchanged axes it returns m in v.
@@ -157,14 +157,14 @@ Eigen::Vector2d DisparityAtDepthPx(const model::LightField& light_field, double 
           -model::SlopeOnGrid(exchanged, depth_mm)};
 }
 
-model::LinearPicture Mosaic(const model::LightField& light_field, int gap_px) {
+model::LinearImage Mosaic(const model::LightField& light_field, int gap_px) {
   CheckLightField(light_field);
   if (gap_px < 0) throw Error(fmt::format("gap_px is {}: it must be >= 0", gap_px));
   const int step_x = light_field.s_count + gap_px;
   const int step_y = light_field.t_count + gap_px;
-  model::LinearPicture mosaic =
-      BlackPicture(light_field.u_count * step_x - gap_px, light_field.v_count * step_y - gap_px,
-                   light_field.channels);
+  model::LinearImage mosaic =
+      BlackImage(light_field.u_count * step_x - gap_px, light_field.v_count * step_y - gap_px,
+                 light_field.channels);
   for (int l = 0; l < light_field.v_count; ++l) {
     for (int k = 0; k < light_field.u_count; ++k) {
       for (int t = 0; t < light_field.t_count; ++t) {
@@ -177,37 +177,36 @@ model::LinearPicture Mosaic(const model::LightField& light_field, int gap_px) {
   return mosaic;
 }
 
-model::LinearPicture EpipolarRow(const model::LightField& light_field, int t, int l,
-                                 int repeat_px) {
+model::LinearImage EpipolarRow(const model::LightField& light_field, int t, int l, int repeat_px) {
   CheckLightField(light_field);
   CheckIndex("row t", t, light_field.t_count);
   CheckIndex("view row l", l, light_field.v_count);
   CheckRepeat(repeat_px);
-  model::LinearPicture picture =
-      BlackPicture(light_field.s_count, light_field.u_count * repeat_px, light_field.channels);
-  for (int y = 0; y < picture.height_px; ++y) {
+  model::LinearImage image =
+      BlackImage(light_field.s_count, light_field.u_count * repeat_px, light_field.channels);
+  for (int y = 0; y < image.height_px; ++y) {
     ThrowIfCancelled();
     for (int s = 0; s < light_field.s_count; ++s) {
-      CopySample(light_field, y / repeat_px, l, s, t, s, y, &picture);
+      CopySample(light_field, y / repeat_px, l, s, t, s, y, &image);
     }
   }
-  return picture;
+  return image;
 }
 
-model::LinearPicture EpipolarColumn(const model::LightField& light_field, int s, int k,
-                                    int repeat_px) {
+model::LinearImage EpipolarColumn(const model::LightField& light_field, int s, int k,
+                                  int repeat_px) {
   CheckLightField(light_field);
   CheckIndex("column s", s, light_field.s_count);
   CheckIndex("view column k", k, light_field.u_count);
   CheckRepeat(repeat_px);
-  model::LinearPicture picture =
-      BlackPicture(light_field.v_count * repeat_px, light_field.t_count, light_field.channels);
+  model::LinearImage image =
+      BlackImage(light_field.v_count * repeat_px, light_field.t_count, light_field.channels);
   for (int t = 0; t < light_field.t_count; ++t) {
-    for (int x = 0; x < picture.width_px; ++x) {
-      CopySample(light_field, k, x / repeat_px, s, t, x, t, &picture);
+    for (int x = 0; x < image.width_px; ++x) {
+      CopySample(light_field, k, x / repeat_px, s, t, x, t, &image);
     }
   }
-  return picture;
+  return image;
 }
 
 }  // namespace thicklens::estimator

@@ -37,7 +37,7 @@ Eigen::ArrayXXd PresentWeights(const model::LightField& light_field,
   return present;
 }
 
-model::LinearPicture BlackPicture(int width_px, int height_px, int channels) {
+model::LinearImage BlackImage(int width_px, int height_px, int channels) {
   return {
       width_px, height_px, channels,
       std::vector<float>(static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px) *

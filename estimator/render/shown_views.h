@@ -13,7 +13,7 @@ void CheckLightField(const model::LightField& light_field);  // throws Error
 Eigen::ArrayXXd PresentWeights(const model::LightField& light_field,
                                const Eigen::ArrayXXd& weights);
 
-model::LinearPicture BlackPicture(int width_px, int height_px, int channels);
+model::LinearImage BlackImage(int width_px, int height_px, int channels);
 
 }  // namespace thicklens::estimator
 

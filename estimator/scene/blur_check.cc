@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <utility>
 
-#include "estimator/scene/blur_picture.h"
+#include "estimator/scene/blur_image.h"
 #include "estimator/scene/blur_trials.h"
 #include "estimator/scene/scene_radiance.h"
 #include "estimator/views/input_checks.h"
@@ -21,22 +21,22 @@ namespace thicklens::estimator {
 namespace {
 
 // Minimum share of unexplained blocks; fewer are more probably a fault of the depth.
-constexpr double kLeastShare = 0.04;
-constexpr int kLeastBlocks = 4;
+constexpr double kMinShare = 0.04;
+constexpr int kMinBlocks = 4;
 // Maximum share of the unexplained misfit that a proposed blur may leave, and the maximum for the
 // other of the two proposals.
-constexpr double kMostLeft = 0.25;
-double MostLeftBeside(double left) { return std::max(kMostLeft, 2 * left); }
+constexpr double kMaxLeft = 0.25;
+double MostLeftBeside(double left) { return std::max(kMaxLeft, 2 * left); }
 // Maximum share left by a blur that does about as well as one that leaves `left`.
 double AboutAsMuch(double left) { return 1.1 * left + 0.03; }
 constexpr double kAboutTheScore = 1.3;
 
-constexpr int kMostNarrower = 8;  // steps of 2^(-1/4): to a quarter
+constexpr int kMaxNarrower = 8;  // steps of 2^(-1/4): to a quarter
 // A step of the offset changes the standard deviation of the blur by this; the maximum number of
 // steps is that on either side.
 constexpr double kOffsetSigmaPx = 0.3;
-constexpr int kMostOffsets = 4;
-constexpr int kMostTrials = 1 + kMostNarrower + 2 * kMostOffsets;
+constexpr int kMaxOffsets = 4;
+constexpr int kMaxTrials = 1 + kMaxNarrower + 2 * kMaxOffsets;
 
 // Returns the standard deviation of the positions of the views, in view steps, on the wider axis.
 double SpreadOf(const Eigen::ArrayXXd& weights) {
@@ -65,7 +65,7 @@ void TryOn(int most, bool must_be_there, const Next& next, BlurTrials* trials, B
     const double score = check->trials.back().score;
     // Where all is explained, only the score distinguishes the trials.
     const bool better = left < best || (left == best && score < best_score);
-    const bool waits = must_be_there && !(std::min(best, left) < kMostLeft);
+    const bool waits = must_be_there && !(std::min(best, left) < kMaxLeft);
     worse = better || waits ? 0 : worse + 1;
     best = std::min(best, left);
     best_score = std::min(best_score, score);
@@ -99,28 +99,28 @@ void KeepProposals(BlurCheck* check) {
   };
   const double least = std::min(left(check->narrower_blur), left(check->other_focus));
   for (std::optional<BlurTrial>* best : {&check->narrower_blur, &check->other_focus}) {
-    if (!(least < kMostLeft) || !(left(*best) < MostLeftBeside(least))) best->reset();
+    if (!(least < kMaxLeft) || !(left(*best) < MostLeftBeside(least))) best->reset();
   }
 }
 
 // `spread`: of the views, in view steps.
 void Search(double spread, BlurTrials* trials, BlurCheck* check, IterationProgress* progress) {
   TryOn(
-      kMostNarrower, true, [](int i) { return std::pair(std::exp2(-0.25 * i), 0.0); }, trials,
-      check, progress);
+      kMaxNarrower, true, [](int i) { return std::pair(std::exp2(-0.25 * i), 0.0); }, trials, check,
+      progress);
   check->narrower_blur = BestOf(check->trials, 1);
   check->narrower_blur_at_end =
-      check->narrower_blur && check->narrower_blur->blur_scale <= std::exp2(-0.25 * kMostNarrower);
+      check->narrower_blur && check->narrower_blur->blur_scale <= std::exp2(-0.25 * kMaxNarrower);
   for (const double step_px : {-kOffsetSigmaPx / spread, kOffsetSigmaPx / spread}) {
     const std::size_t first = check->trials.size();
     TryOn(
-        kMostOffsets, false, [step_px](int i) { return std::pair(1.0, i * step_px); }, trials,
-        check, progress);
+        kMaxOffsets, false, [step_px](int i) { return std::pair(1.0, i * step_px); }, trials, check,
+        progress);
     const std::optional<BlurTrial> focus = BestOf(check->trials, first);
     if (focus && (!check->other_focus || focus->unexplained < check->other_focus->unexplained)) {
       check->other_focus = focus;
       check->other_focus_at_end =
-          std::abs(focus->focus_offset_px) >= (kMostOffsets - 0.5) * std::abs(step_px);
+          std::abs(focus->focus_offset_px) >= (kMaxOffsets - 0.5) * std::abs(step_px);
     }
   }
   KeepProposals(check);
@@ -175,12 +175,12 @@ BlurCheck CheckBlur(const EstimateInput& input, const BlurCheckOptions& options)
     return check;
   }
   const int threads = ResolveThreads(options.threads);
-  IterationProgress progress(options.progress, kMostTrials);
-  progress.Tell();
-  BlurPicture looked = BlurPictureOf(input, options.falloff, threads);
+  IterationProgress progress(options.progress, kMaxTrials);
+  progress.Report();
+  BlurImage looked = BlurImageOf(input, options.falloff, threads);
   check.halvings = looked.halvings;
-  const std::optional<double> noise = StoredNoiseSigma(looked.picture, input.transfer);
-  check.noise_sigma = std::max(noise.value_or(kUsualNoise), kLeastNoise);
+  const std::optional<double> noise = EncodedNoiseSigma(looked.image, input.transfer);
+  check.noise_sigma = std::max(noise.value_or(kDefaultNoise), kMinNoise);
   if (!noise) {
     check.message = "no part of the photograph tells its noise: the blur cannot be checked";
     check.seconds = SecondsSince(start);
@@ -188,13 +188,13 @@ BlurCheck CheckBlur(const EstimateInput& input, const BlurCheckOptions& options)
   }
   ProjectionOptions projection;
   projection.threads = threads;
-  projection.progress = [&progress] { progress.Tell(); };
+  projection.progress = [&progress] { progress.Report(); };
   projection.freed = [&options] { ReturnFreedMemory(options.memory_limit_mib); };
   auto given = std::make_optional(
       ProjectionWithin(input.weights, options.memory_limit_mib, projection, &looked));
-  check.width_px = looked.picture.width_px;
-  check.height_px = looked.picture.height_px;
-  BlurTrials trials({std::move(looked.picture), std::move(looked.disparity), input.weights,
+  check.width_px = looked.image.width_px;
+  check.height_px = looked.image.height_px;
+  BlurTrials trials({std::move(looked.image), std::move(looked.disparity), input.weights,
                      input.transfer, check.noise_sigma},
                     *given, projection);
   given.reset();
@@ -202,11 +202,11 @@ BlurCheck CheckBlur(const EstimateInput& input, const BlurCheckOptions& options)
   check.blocks = trials.blocks();
   check.unexplained_blocks = trials.unexplained_blocks();
   check.trials.push_back(trials.given());
-  if (check.unexplained_blocks >= std::max<double>(kLeastBlocks, kLeastShare * check.blocks)) {
+  if (check.unexplained_blocks >= std::max<double>(kMinBlocks, kMinShare * check.blocks)) {
     Search(spread, &trials, &check, &progress);
   }
   ToPhotographPx(&check);
-  progress.SkipTo(kMostTrials);
+  progress.SkipTo(kMaxTrials);
   check.iterations = trials.iterations();
   check.message = MessageOf(check);
   check.seconds = SecondsSince(start);

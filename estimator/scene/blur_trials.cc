@@ -4,11 +4,11 @@
 #include <cmath>
 #include <utility>
 
+#include "estimator/scene/encoding_slope.h"
 #include "estimator/scene/scene_data.h"
 #include "estimator/scene/scene_priors.h"
 #include "estimator/scene/scene_strength.h"
 #include "estimator/scene/scene_system.h"
-#include "estimator/scene/stored_slope.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -16,12 +16,12 @@ namespace {
 constexpr int kBlockPx = 32;
 // A block counts if it has at least this share of its pixels and its trace is not too large: with a
 // larger trace the prior replaces so much of the data that the score depends on the trace alone.
-constexpr double kLeastPixels = kBlockPx * kBlockPx / 4;
-constexpr double kMostTrace = 0.5;
+constexpr double kMinPixels = kBlockPx * kBlockPx / 4;
+constexpr double kMaxTrace = 0.5;
 // Maximum misfit of a block that noise explains, in variances. For the right blur it is less than
 // 1, and the mean square of 768 or more numbers is uncertain by 5 %.
-constexpr double kMostOfNoise = 1.2;
-constexpr float kMostHidden = 0.01F;
+constexpr double kMaxOfNoise = 1.2;
+constexpr float kMaxOccluded = 0.01F;
 constexpr double kSlopeSmoothingPx = 2;
 // Tolerance of the iterations: the misfit that it leaves is far below the noise.
 constexpr double kTolerance = 3e-4;
@@ -31,12 +31,12 @@ int BlocksAlong(int size_px) { return (size_px + kBlockPx - 1) / kBlockPx; }
 
 template <typename Block>
 bool Counts(const Block& block) {
-  return block.pixels >= kLeastPixels && block.trace <= kMostTrace;
+  return block.pixels >= kMinPixels && block.trace <= kMaxTrace;
 }
 
 template <typename Block>
 bool IsUnexplained(const Block& block) {
-  return block.misfit > kMostOfNoise;
+  return block.misfit > kMaxOfNoise;
 }
 
 }  // namespace
@@ -45,12 +45,13 @@ BlurTrials::BlurTrials(Photograph photograph, const SceneProjection<float>& give
                        ProjectionOptions options)
     : photograph_(std::move(photograph)), options_(std::move(options)) {
   for (const double slope :
-       StoredSlopes(photograph_.picture, photograph_.transfer, kSlopeSmoothingPx)) {
+       EncodingSlopes(photograph_.image, photograph_.transfer, kSlopeSmoothingPx)) {
     slope_squared_.push_back(static_cast<float>(slope * slope));
   }
-  weight_ = DataWeights(slope_squared_, given.hidden_share, true);
-  for (const float hidden : given.hidden_share) is_seen_.push_back(hidden <= kMostHidden ? 1 : 0);
-  radiance_ = Planar<float>(photograph_.picture);
+  weight_ = DataWeights(slope_squared_, given.occluded_fraction, true);
+  for (const float occluded : given.occluded_fraction)
+    is_visible_.push_back(occluded <= kMaxOccluded ? 1 : 0);
+  radiance_ = Planar<float>(photograph_.image);
   given_ = Solve(given, photograph_.disparity);
   for (const Block& block : given_) {
     if (!Counts(block)) continue;
@@ -60,17 +61,17 @@ BlurTrials::BlurTrials(Photograph photograph, const SceneProjection<float>& give
 }
 
 std::size_t BlurTrials::BlockOf(std::size_t pixel) const {
-  const auto width = static_cast<std::size_t>(photograph_.picture.width_px);
+  const auto width = static_cast<std::size_t>(photograph_.image.width_px);
   return pixel / width / kBlockPx *
-             static_cast<std::size_t>(BlocksAlong(photograph_.picture.width_px)) +
+             static_cast<std::size_t>(BlocksAlong(photograph_.image.width_px)) +
          pixel % width / kBlockPx;
 }
 
 std::vector<BlurTrials::Block> BlurTrials::Solve(const SceneProjection<float>& projection,
                                                  const DisparityMap& disparity) {
-  DataTerm<float> data = DataTermOf(projection, photograph_.picture, options_.threads);
+  DataTerm<float> data = DataTermOf(projection, photograph_.image, options_.threads);
   data.weight = weight_;
-  data.squared_row = SquaredRows<float>(disparity, photograph_.weights);
+  data.row_norm2 = SquaredRows<float>(disparity, photograph_.weights);
   if (strength_ == 0) {
     strength_ =
         StrengthForNoise(Prior::kTotalVariation, photograph_.noise_sigma, data, slope_squared_);
@@ -88,7 +89,7 @@ std::vector<BlurTrials::Block> BlurTrials::Solve(const SceneProjection<float>& p
                             static_cast<std::size_t>(BlocksAlong(data.height_px)));
   const double variance = photograph_.noise_sigma * photograph_.noise_sigma * data.channels;
   for (std::size_t i = 0; i < data.pixels(); ++i) {
-    if (is_seen_[i] == 0) continue;
+    if (is_visible_[i] == 0) continue;
     double squares = 0;
     for (std::size_t at = i; at < shown.size(); at += data.pixels()) {
       const double difference = static_cast<double>(shown[at] - data.photograph[at]);
@@ -111,7 +112,7 @@ BlurTrial BlurTrials::given() const {
   double pixels = 0;
   for (const Block& block : given_) pixels += Counts(block) ? block.pixels : 0;
   BlurTrial trial;
-  trial.compared_share = pixels / static_cast<double>(is_seen_.size());
+  trial.compared_share = pixels / static_cast<double>(is_visible_.size());
   return trial;
 }
 
@@ -139,11 +140,11 @@ BlurTrial BlurTrials::Try(double blur_scale, double focus_offset_px) {
     score += before.pixels * is;
     if (counts) compared += before.pixels;
     if (IsUnexplained(before)) {
-      given_above += before.pixels * (was - kMostOfNoise);
-      above += before.pixels * std::max(0.0, is - kMostOfNoise);
+      given_above += before.pixels * (was - kMaxOfNoise);
+      above += before.pixels * std::max(0.0, is - kMaxOfNoise);
     }
   }
-  trial.compared_share = compared / static_cast<double>(is_seen_.size());
+  trial.compared_share = compared / static_cast<double>(is_visible_.size());
   if (given_score > 0) trial.score = score / given_score;
   if (given_above > 0) trial.unexplained = above / given_above;
   return trial;

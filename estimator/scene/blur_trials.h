@@ -16,11 +16,11 @@ namespace thicklens::estimator {
 class BlurTrials {
  public:
   struct Photograph {
-    model::LinearPicture picture;  // without fall-off
-    DisparityMap disparity;        // disparity of its pixels, 0 in the plane of focus
+    model::LinearImage image;  // without fall-off
+    DisparityMap disparity;    // disparity of its pixels, 0 in the plane of focus
     Eigen::ArrayXXd weights;
     model::TransferCurve transfer;
-    double noise_sigma = 0;  // of stored values
+    double noise_sigma = 0;  // of encoded values
   };
   // Solves with the given blur, whose H is `given`. `options` apply to the other blurs; their
   // `progress` is called repeatedly, from any thread, and may throw to stop.
@@ -48,7 +48,7 @@ class BlurTrials {
   const Photograph photograph_;
   const ProjectionOptions options_;
   std::vector<float> slope_squared_, weight_, radiance_;
-  std::vector<unsigned char> is_seen_;
+  std::vector<unsigned char> is_visible_;
   double strength_ = 0;
   int iterations_ = 0;
   std::vector<Block> given_;

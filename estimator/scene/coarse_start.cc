@@ -15,18 +15,18 @@ int Half(int count) { return (count + 1) / 2; }
 
 }  // namespace
 
-model::LinearPicture HalfSize(const model::LinearPicture& picture) {
-  const int channels = picture.channels;
-  model::LinearPicture half{Half(picture.width_px), Half(picture.height_px), channels, {}};
+model::LinearImage HalfSize(const model::LinearImage& image) {
+  const int channels = image.channels;
+  model::LinearImage half{Half(image.width_px), Half(image.height_px), channels, {}};
   half.values.reserve(Index(half.width_px) * Index(half.height_px) * Index(channels));
   for (int y = 0; y < half.height_px; ++y) {
     ThrowIfCancelled();
-    const int y1 = std::min(2 * y + 1, picture.height_px - 1);
+    const int y1 = std::min(2 * y + 1, image.height_px - 1);
     for (int x = 0; x < half.width_px; ++x) {
-      const int x1 = std::min(2 * x + 1, picture.width_px - 1);
+      const int x1 = std::min(2 * x + 1, image.width_px - 1);
       for (int c = 0; c < channels; ++c) {
-        half.values.push_back((picture.at(2 * x, 2 * y, c) + picture.at(x1, 2 * y, c) +
-                               picture.at(2 * x, y1, c) + picture.at(x1, y1, c)) /
+        half.values.push_back((image.at(2 * x, 2 * y, c) + image.at(x1, 2 * y, c) +
+                               image.at(2 * x, y1, c) + image.at(x1, y1, c)) /
                               4);
       }
     }
@@ -45,11 +45,10 @@ DisparityMap HalfSize(const DisparityMap& map) {
   return half;
 }
 
-model::LinearPicture WithDetail(const model::LinearPicture& picture,
-                                const model::LinearPicture& blurred,
-                                const model::LinearPicture& sharp) {
-  model::LinearPicture result = picture;
-  const std::size_t channels = Index(picture.channels);
+model::LinearImage WithDetail(const model::LinearImage& image, const model::LinearImage& blurred,
+                              const model::LinearImage& sharp) {
+  model::LinearImage result = image;
+  const std::size_t channels = Index(image.channels);
   std::vector<float> plane(Index(blurred.width_px) * Index(blurred.height_px));
   const cv::Mat detail(blurred.height_px, blurred.width_px, CV_32F, plane.data());
   cv::Mat at_full_size;
@@ -60,10 +59,10 @@ model::LinearPicture WithDetail(const model::LinearPicture& picture,
     cv::resize(detail, at_full_size, {2 * blurred.width_px, 2 * blurred.height_px}, 0, 0,
                cv::INTER_CUBIC);
     float* to = result.values.data() + c;
-    for (int y = 0; y < picture.height_px; ++y) {
+    for (int y = 0; y < image.height_px; ++y) {
       ThrowIfCancelled();
       const float* const row = at_full_size.ptr<float>(y);
-      for (int x = 0; x < picture.width_px; ++x, to += channels) *to += row[x];
+      for (int x = 0; x < image.width_px; ++x, to += channels) *to += row[x];
     }
   }
   return result;

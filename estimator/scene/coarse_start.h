@@ -10,16 +10,15 @@ namespace thicklens::estimator {
 // that it shows is the start of the iteration at full size.
 
 // Averages each four pixels; a last row or column without a partner is used twice.
-model::LinearPicture HalfSize(const model::LinearPicture& picture);
+model::LinearImage HalfSize(const model::LinearImage& image);
 // Halves a map like the image. The disparity is that of the first of the four pixels, so that it
 // stays on one surface; the step is halved.
 DisparityMap HalfSize(const DisparityMap& map);
 
-// Returns `picture` plus the difference of `sharp` and `blurred`, both of half its size,
+// Returns `image` plus the difference of `sharp` and `blurred`, both of half its size,
 // interpolated cubically.
-model::LinearPicture WithDetail(const model::LinearPicture& picture,
-                                const model::LinearPicture& blurred,
-                                const model::LinearPicture& sharp);
+model::LinearImage WithDetail(const model::LinearImage& image, const model::LinearImage& blurred,
+                              const model::LinearImage& sharp);
 
 }  // namespace thicklens::estimator
 

@@ -5,10 +5,10 @@
 #include <cstddef>
 #include <numeric>
 
-#include "estimator/projection/plain_pixels.h"
+#include "estimator/projection/angular_bundle.h"
 #include "estimator/projection/scene_projection.h"
-#include "estimator/projection/seen_share.h"
-#include "estimator/projection/view_fan.h"
+#include "estimator/projection/separable_mask.h"
+#include "estimator/projection/visible_fraction.h"
 #include "estimator/scene/scene_data.h"
 #include "estimator/views/input_checks.h"
 #include "estimator/views/ray_landing.h"
@@ -19,39 +19,40 @@
 namespace thicklens::estimator {
 namespace {
 
-constexpr Confidence kLeastUnresolved = 1, kLeastResolved = 129;
+constexpr Confidence kMinUnresolved = 1, kMinResolved = 129;
 constexpr int kShares = 126;  // steps from the minimum to the maximum of either kind
 
 }  // namespace
 
-Confidence ConfidenceOfPoint(double seen_share, double blur_sigma_px) {
-  const int least = blur_sigma_px > kUnresolvedBlurSigmaPx ? kLeastUnresolved : kLeastResolved;
-  return static_cast<Confidence>(least + std::lround(std::clamp(seen_share, 0.0, 1.0) * kShares));
+Confidence ConfidenceOfPoint(double visible_fraction, double blur_sigma_px) {
+  const int least = blur_sigma_px > kUnresolvedBlurSigmaPx ? kMinUnresolved : kMinResolved;
+  return static_cast<Confidence>(least +
+                                 std::lround(std::clamp(visible_fraction, 0.0, 1.0) * kShares));
 }
 
-double SeenShareOf(Confidence confidence) {
+double VisibleFractionOf(Confidence confidence) {
   if (confidence == kFilledIn) return 0;
-  const int least = IsResolved(confidence) ? kLeastResolved : kLeastUnresolved;
+  const int least = IsResolved(confidence) ? kMinResolved : kMinUnresolved;
   return (confidence - least) / static_cast<double>(kShares);
 }
 
-bool IsResolved(Confidence confidence) { return confidence >= kLeastResolved; }
+bool IsResolved(Confidence confidence) { return confidence >= kMinResolved; }
 
 ConfidenceShares SharesOf(const std::array<std::size_t, 256>& counts) {
-  constexpr double kSeenWhole = 0.99;
+  constexpr double kWhollyVisible = 0.99;
   ConfidenceShares shares;
   const double all =
       static_cast<double>(std::accumulate(counts.begin(), counts.end(), std::size_t{0}));
   for (std::size_t value = 0; value < counts.size(); ++value) {
     if (counts[value] == 0) continue;
     const auto confidence = static_cast<Confidence>(value);
-    double* share = &shares.partly_seen;
+    double* share = &shares.partly_visible;
     if (confidence == kFilledIn) {
       share = &shares.filled_in;
     } else if (!IsResolved(confidence)) {
       share = &shares.blurred;
-    } else if (SeenShareOf(confidence) > kSeenWhole) {
-      share = &shares.seen;
+    } else if (VisibleFractionOf(confidence) > kWhollyVisible) {
+      share = &shares.visible;
     }
     *share += static_cast<double>(counts[value]) / all;
   }
@@ -65,16 +66,16 @@ std::vector<Confidence> PointConfidence(const EstimateInput& input, int threads)
     disparity = PhotographDisparity(disparity, LandingStepPx(*input.camera, *input.grid));
   }
   threads = ResolveThreads(threads);
-  const ViewFan fan = RenderFan(disparity, input.weights, threads, nullptr);
-  const PlainPixels plain =
-      FindPlainPixels(disparity, static_cast<int>(input.weights.cols()),
-                      static_cast<int>(input.weights.rows()), ProjectionOptions().tolerance_px);
-  const std::vector<float> seen = SeenShare(fan, disparity, plain.is_seen, threads);
+  const AngularBundle bundle = RenderBundle(disparity, input.weights, threads, nullptr);
+  const SeparableMask plain =
+      FindSeparablePixels(disparity, static_cast<int>(input.weights.cols()),
+                          static_cast<int>(input.weights.rows()), ProjectionOptions().tolerance_px);
+  const std::vector<float> visible = VisibleFraction(bundle, disparity, plain.is_visible, threads);
   const std::vector<float> blur_sigma_px = BlurSigmaPx(disparity, input.weights);
-  std::vector<Confidence> confidence(seen.size());
-  for (std::size_t i = 0; i < seen.size(); ++i) {
+  std::vector<Confidence> confidence(visible.size());
+  for (std::size_t i = 0; i < visible.size(); ++i) {
     confidence[i] =
-        ConfidenceOfPoint(static_cast<double>(seen[i]), static_cast<double>(blur_sigma_px[i]));
+        ConfidenceOfPoint(static_cast<double>(visible[i]), static_cast<double>(blur_sigma_px[i]));
   }
   return confidence;
 }
@@ -101,8 +102,8 @@ std::vector<Confidence> RayConfidence(const std::vector<Confidence>& of_points,
                                 nearest(x, shift_x * view.disparity[i], view.width_px)];
     }
   }
-  for (const CompactView::Hidden& hidden : view.hidden) {
-    confidence[static_cast<std::size_t>(hidden.index)] = kFilledIn;
+  for (const CompactView::Occluded& occluded : view.occluded) {
+    confidence[static_cast<std::size_t>(occluded.index)] = kFilledIn;
   }
   return confidence;
 }

@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <utility>
 
-#include "estimator/scene/scene_relief.h"
+#include "estimator/scene/guided_shading.h"
 #include "estimator/views/ray_landing.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/residual_guard.h"
@@ -17,7 +17,7 @@ namespace thicklens::estimator {
 namespace {
 
 // Lower bands would consist mainly of margin.
-constexpr int kLeastRows = 16;
+constexpr int kMinRows = 16;
 // For a large photograph, sampled bands with so many pixels in all represent the whole. A band has
 // at least so many rows and not more rows of margin than that.
 constexpr int kSampleRows = 16;
@@ -33,7 +33,7 @@ class JoinedSummary {
     relative_residual_ = LargerResidual(relative_residual_, of_band.relative_residual);
     rows_ += rows;
     row_share_ += rows * of_band.row_share;
-    hidden_share_ += rows * of_band.hidden_share;
+    occluded_fraction_ += rows * of_band.occluded_fraction;
     squares_ += rows * of_band.residual_rms * of_band.residual_rms;
     strength_ = of_band.strength;
   }
@@ -51,7 +51,7 @@ class JoinedSummary {
     summary->converged = converged_;
     summary->relative_residual = relative_residual_;
     summary->row_share = row_share_ / rows_;
-    summary->hidden_share = hidden_share_ / rows_;
+    summary->occluded_fraction = occluded_fraction_ / rows_;
     summary->residual_rms = std::sqrt(squares_ / rows_);
   }
 
@@ -59,18 +59,17 @@ class JoinedSummary {
   int iterations_ = 0, reweightings_ = 0, rows_ = 0;
   bool converged_ = true;
   double strength_ = 0, relative_residual_ = 0;
-  double row_share_ = 0, hidden_share_ = 0, squares_ = 0;
+  double row_share_ = 0, occluded_fraction_ = 0, squares_ = 0;
 };
 
 // Appends the rows of a band's result to those of the bands above.
-void AddRows(const model::LinearPicture& solved, const SceneBand& band,
-             model::LinearPicture* picture) {
+void AddRows(const model::LinearImage& solved, const SceneBand& band, model::LinearImage* image) {
   const auto in_row =
       static_cast<std::ptrdiff_t>(solved.width_px) * static_cast<std::ptrdiff_t>(solved.channels);
-  picture->values.insert(picture->values.end(),
-                         solved.values.begin() + (band.first - band.from) * in_row,
-                         solved.values.begin() + (band.last - band.from) * in_row);
-  picture->height_px += band.last - band.first;
+  image->values.insert(image->values.end(),
+                       solved.values.begin() + (band.first - band.from) * in_row,
+                       solved.values.begin() + (band.last - band.from) * in_row);
+  image->height_px += band.last - band.first;
 }
 
 }  // namespace
@@ -89,7 +88,7 @@ SceneBandRun<Real>::SceneBandRun(const EstimateInput& input, const SceneOptions&
       summary_(summary) {}
 
 template <typename Real>
-SolvedScene SceneBandRun<Real>::Solve(const model::LinearPicture& photograph, bool wants_confidence,
+SolvedScene SceneBandRun<Real>::Solve(const model::LinearImage& photograph, bool wants_confidence,
                                       SceneMaps* maps) {
   const auto start = Clock::now();
   const int height_px = photograph.height_px;
@@ -97,7 +96,7 @@ SolvedScene SceneBandRun<Real>::Solve(const model::LinearPicture& photograph, bo
     mean_slope_ = MeanSlope(photograph, input_.transfer,
                             BandsOf(height_px, options_.least_bands, BandMarginPx(reach_px_)));
   }
-  if (options_.prior == Prior::kPatches) relief_slope_ = ReliefSlope(input_.disparity);
+  if (options_.prior == Prior::kPatches) guide_slope_ = ShadingGuideSlope(input_.disparity);
   int count = std::min(options_.least_bands, height_px);
   if (options_.memory_limit_mib) {
     per_pixel_ = memory_.LargestPerPixel();
@@ -116,7 +115,7 @@ SolvedScene SceneBandRun<Real>::Solve(const model::LinearPicture& photograph, bo
 
 template <typename Real>
 double SceneBandRun<Real>::MostBytes(int count, const ProjectionBytes& per_pixel) const {
-  const int height_px = input_.picture.height_px;
+  const int height_px = input_.image.height_px;
   const int rows =
       count == 1
           ? height_px
@@ -127,8 +126,8 @@ double SceneBandRun<Real>::MostBytes(int count, const ProjectionBytes& per_pixel
 template <typename Real>
 int SceneBandRun<Real>::BandsFor(const ProjectionBytes& per_pixel) const {
   const double limit = *options_.memory_limit_mib * kBytesPerMib;
-  const int least = std::min(options_.least_bands, input_.picture.height_px);
-  const int most = std::max(least, input_.picture.height_px / kLeastRows);
+  const int least = std::min(options_.least_bands, input_.image.height_px);
+  const int most = std::max(least, input_.image.height_px / kMinRows);
   double needed = MostBytes(least, per_pixel);
   for (int count = least; count <= most; ++count) {
     const double bytes = MostBytes(count, per_pixel);
@@ -137,7 +136,7 @@ int SceneBandRun<Real>::BandsFor(const ProjectionBytes& per_pixel) const {
   }
   throw Error(fmt::format(
       "memory limit {:.0f} MiB: in any number of bands {:.0f} MiB are needed; the limit must be at "
-      "least that, or the views or threads fewer, or the picture smaller",
+      "least that, or the views or threads fewer, or the image smaller",
       *options_.memory_limit_mib, std::ceil(needed / kBytesPerMib)));
 }
 
@@ -148,13 +147,13 @@ typename SceneRadiance<Real>::Run SceneBandRun<Real>::RunFor(const SceneOptions&
   run.threads = summary_->threads;
   run.noise_sigma = summary_->noise_sigma;
   run.mean_slope = mean_slope_;
-  run.relief_slope = relief_slope_;
+  run.guide_slope = guide_slope_;
   run.progress = progress_;
   return run;
 }
 
 template <typename Real>
-double SceneBandRun<Real>::Prepare(const model::LinearPicture& photograph, const SceneBand& band,
+double SceneBandRun<Real>::Prepare(const model::LinearImage& photograph, const SceneBand& band,
                                    Start start, Radiance* radiance) {
   const bool whole = band.rows() == photograph.height_px;
   if (!whole) band_disparity_ = CutRows(input_.disparity, band.from, band.to);
@@ -163,9 +162,9 @@ double SceneBandRun<Real>::Prepare(const model::LinearPicture& photograph, const
                                           LandingStepPx(*input_.camera, *input_.grid));
   }
   const DisparityMap& disparity = whole && !input_.grid ? input_.disparity : band_disparity_;
-  const std::optional<model::LinearPicture> cut =
+  const std::optional<model::LinearImage> cut =
       whole ? std::nullopt : std::optional(CutRows(photograph, band.from, band.to));
-  const model::LinearPicture& rows = cut ? *cut : photograph;
+  const model::LinearImage& rows = cut ? *cut : photograph;
   double seconds = 0;
   if (start == Start::kFound) {
     seconds = radiance->FindStart(rows, disparity);
@@ -177,7 +176,7 @@ double SceneBandRun<Real>::Prepare(const model::LinearPicture& photograph, const
 
 template <typename Real>
 const typename SceneBandRun<Real>::Sample& SceneBandRun<Real>::TakenSample(
-    const model::LinearPicture& photograph) {
+    const model::LinearImage& photograph) {
   if (sample_) return *sample_;
   sample_.emplace();
   const double pixels = static_cast<double>(photograph.width_px) * photograph.height_px;
@@ -194,24 +193,24 @@ const typename SceneBandRun<Real>::Sample& SceneBandRun<Real>::TakenSample(
     sample_->signal.count += signal.count;
     const ProjectionBytes of_band = radiance.result_projection_bytes();
     bytes.held += of_band.held;
-    bytes.fan += of_band.fan;
+    bytes.bundle += of_band.bundle;
     sampled += static_cast<double>(photograph.width_px) * (band.last - band.first);
   }
-  sample_->per_pixel = {bytes.held / sampled, bytes.fan / sampled};
+  sample_->per_pixel = {bytes.held / sampled, bytes.bundle / sampled};
   return *sample_;
 }
 
 // Returns one strength for all bands, so that they fit together. Cross-validation uses the band in
 // the middle.
 template <typename Real>
-double SceneBandRun<Real>::StrengthFor(const model::LinearPicture& photograph,
+double SceneBandRun<Real>::StrengthFor(const model::LinearImage& photograph,
                                        const std::vector<SceneBand>& bands) {
   switch (options_.strength_rule) {
     case StrengthRule::kGiven:
       break;
     case StrengthRule::kAuto:
       return StrengthForNoise(
-          options_.prior, std::max(summary_->noise_sigma, kLeastNoise),
+          options_.prior, std::max(summary_->noise_sigma, kMinNoise),
           NeedsSignal(options_.prior) ? TakenSample(photograph).signal : SignalSum());
     case StrengthRule::kGcv:
       Radiance radiance(RunFor(options_));
@@ -231,9 +230,9 @@ bool SceneBandRun<Real>::IsWithinLimit(double bytes) const {
 
 template <typename Real>
 double SceneBandRun<Real>::PredictedMib(double bytes, int rows, const ProjectionBytes& projection,
-                                        double kept_fan_bytes) const {
+                                        double kept_bundle_bytes) const {
   const double with_freed =
-      memory_.MostBytes(rows, projection, kept_fan_bytes, SceneMemory::Freed::kStays);
+      memory_.MostBytes(rows, projection, kept_bundle_bytes, SceneMemory::Freed::kStays);
   const double staying = std::min(with_freed, StayingBytes(options_.memory_limit_mib));
   return std::max(bytes, staying) / kBytesPerMib;
 }
@@ -245,14 +244,14 @@ bool SceneBandRun<Real>::Fits(const SceneBand& band, const Radiance& radiance) {
   summary_->predicted_memory_mib =
       std::max(summary_->predicted_memory_mib, PredictedMib(bytes, band.rows(), projection, 0));
   if (IsWithinLimit(bytes)) return true;
-  const double pixels = static_cast<double>(input_.picture.width_px) * band.rows();
+  const double pixels = static_cast<double>(input_.image.width_px) * band.rows();
   per_pixel_ = {std::max(per_pixel_.held, projection.held / pixels),
-                std::max(per_pixel_.fan, projection.fan / pixels)};
+                std::max(per_pixel_.bundle, projection.bundle / pixels)};
   return false;
 }
 
 template <typename Real>
-bool SceneBandRun<Real>::MayKeepFan(int bands) const {
+bool SceneBandRun<Real>::MayKeepBundle(int bands) const {
   if (bands > 1) return false;
   if (!input_.grid) return true;
   return LandingStepPx(*input_.camera, *input_.grid).isZero(0);
@@ -260,7 +259,7 @@ bool SceneBandRun<Real>::MayKeepFan(int bands) const {
 
 template <typename Real>
 std::optional<SolvedScene> SceneBandRun<Real>::SolveIn(int count,
-                                                       const model::LinearPicture& photograph,
+                                                       const model::LinearImage& photograph,
                                                        bool wants_confidence, SceneMaps* maps) {
   auto lap = Clock::now();
   const auto take_lap = [&lap] { return SecondsSince(std::exchange(lap, Clock::now())); };
@@ -284,25 +283,25 @@ std::optional<SolvedScene> SceneBandRun<Real>::SolveIn(int count,
     ReturnFreedMemory(options_.memory_limit_mib);  // memory of the band above
     typename Radiance::Run run = RunFor(options);
     run.confidence = wants_confidence;
-    run.fan = MayKeepFan(count);
+    run.bundle = MayKeepBundle(count);
     run.last_iteration = static_cast<int>(iterations_ * (i + 1) / bands.size());
     Radiance radiance(run);
     const double coarse_seconds = Prepare(photograph, band, Start::kFound, &radiance);
     summary_->solve_seconds += coarse_seconds;
     summary_->setup_seconds += take_lap() - coarse_seconds;
     if (!Fits(band, radiance)) return std::nullopt;
-    if (run.fan) {
-      ViewFan fan = radiance.TakeFan();
+    if (run.bundle) {
+      AngularBundle bundle = radiance.TakeBundle();
       const double bytes =
-          memory_.MostBytes(band.rows(), radiance.projection_bytes(), BytesOf(fan));
+          memory_.MostBytes(band.rows(), radiance.projection_bytes(), BytesOf(bundle));
       if (IsWithinLimit(bytes)) {
         summary_->predicted_memory_mib =
-            PredictedMib(bytes, band.rows(), radiance.projection_bytes(), BytesOf(fan));
-        whole.fan = std::move(fan);
+            PredictedMib(bytes, band.rows(), radiance.projection_bytes(), BytesOf(bundle));
+        whole.bundle = std::move(bundle);
       }
     }
     SceneSummary of_band;
-    model::LinearPicture solved = radiance.Solve(&of_band);
+    model::LinearImage solved = radiance.Solve(&of_band);
     progress_->SkipTo(run.last_iteration);
     joined.Add(of_band, band.last - band.first);
     if (maps != nullptr) radiance.AddMaps(maps);

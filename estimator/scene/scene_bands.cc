@@ -9,7 +9,7 @@ namespace {
 
 constexpr int kSlopeMarginPx = 8;
 // Margin for the smoothing of the slopes and for the prior, whatever the blur.
-constexpr int kLeastMarginPx = 16;
+constexpr int kMinMarginPx = 16;
 constexpr int kReaches = 4;
 
 SceneBand WithMargin(int first, int last, int height_px, int margin_px) {
@@ -59,12 +59,12 @@ int ReachPx(const DisparityMap& disparity, double landing_step_px, int v_count) 
 
 int SampleMarginPx(int reach_px) { return kSlopeMarginPx + 2 * reach_px; }
 
-int BandMarginPx(int reach_px) { return kLeastMarginPx + kReaches * reach_px; }
+int BandMarginPx(int reach_px) { return kMinMarginPx + kReaches * reach_px; }
 
-model::LinearPicture CutRows(const model::LinearPicture& picture, int from, int to) {
+model::LinearImage CutRows(const model::LinearImage& image, int from, int to) {
   const std::size_t in_row =
-      static_cast<std::size_t>(picture.width_px) * static_cast<std::size_t>(picture.channels);
-  return {picture.width_px, to - from, picture.channels, RowsOf(picture.values, in_row, from, to)};
+      static_cast<std::size_t>(image.width_px) * static_cast<std::size_t>(image.channels);
+  return {image.width_px, to - from, image.channels, RowsOf(image.values, in_row, from, to)};
 }
 
 DisparityMap CutRows(const DisparityMap& map, int from, int to) {

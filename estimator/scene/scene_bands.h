@@ -34,7 +34,7 @@ int BandMarginPx(int reach_px);
 // Returns the margin that H and the slopes alone need.
 int SampleMarginPx(int reach_px);
 
-model::LinearPicture CutRows(const model::LinearPicture& picture, int from, int to);
+model::LinearImage CutRows(const model::LinearImage& image, int from, int to);
 DisparityMap CutRows(const DisparityMap& map, int from, int to);
 
 }  // namespace thicklens::estimator

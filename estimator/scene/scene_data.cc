@@ -4,13 +4,13 @@
 #include <cmath>
 #include <cstddef>
 
-#include "estimator/scene/stored_slope.h"
+#include "estimator/scene/encoding_slope.h"
 #include "thicklens/base/index.h"
 
 namespace thicklens::estimator {
 namespace {
 
-constexpr double kHiddenWeight = 20;
+constexpr double kOccludedWeight = 20;
 
 // Returns the sum of the squares of the weights that the rays of one axis put on the pixels of a
 // line, linear between pixels, for neighbours `step_px` apart.
@@ -45,7 +45,7 @@ double SpreadOf(const Eigen::ArrayXd& weights) {
 
 template <typename Real>
 DataTerm<Real> DataTermOf(const SceneProjection<Real>& projection,
-                          const model::LinearPicture& photograph, int threads) {
+                          const model::LinearImage& photograph, int threads) {
   DataTerm<Real> data;
   data.width_px = photograph.width_px;
   data.height_px = photograph.height_px;
@@ -66,26 +66,26 @@ DataTerm<Real> DataTermOf(const SceneProjection<Real>& projection,
 }
 
 template <typename Real>
-std::vector<Real> Planar(const model::LinearPicture& picture) {
-  const std::size_t channels = Index(picture.channels);
-  const std::size_t pixels = picture.values.size() / channels;
-  std::vector<Real> planes(picture.values.size());
+std::vector<Real> Planar(const model::LinearImage& image) {
+  const std::size_t channels = Index(image.channels);
+  const std::size_t pixels = image.values.size() / channels;
+  std::vector<Real> planes(image.values.size());
   for (std::size_t i = 0; i < planes.size(); ++i) {
-    planes[i % channels * pixels + i / channels] = static_cast<Real>(picture.values[i]);
+    planes[i % channels * pixels + i / channels] = static_cast<Real>(image.values[i]);
   }
   return planes;
 }
 
 template <typename Real>
-model::LinearPicture Interleaved(const std::vector<Real>& planes, int width_px, int height_px,
-                                 int channels) {
-  model::LinearPicture picture{width_px, height_px, channels, std::vector<float>(planes.size())};
+model::LinearImage Interleaved(const std::vector<Real>& planes, int width_px, int height_px,
+                               int channels) {
+  model::LinearImage image{width_px, height_px, channels, std::vector<float>(planes.size())};
   const std::size_t pixels = planes.size() / Index(channels);
   for (std::size_t i = 0; i < planes.size(); ++i) {
-    picture.values[i] =
+    image.values[i] =
         static_cast<float>(planes[i % Index(channels) * pixels + i / Index(channels)]);
   }
-  return picture;
+  return image;
 }
 
 template <typename Real>
@@ -116,12 +116,13 @@ std::vector<Real> SquaredRows(const DisparityMap& disparity, const Eigen::ArrayX
 
 template <typename Real>
 std::vector<Real> DataWeights(const std::vector<Real>& slope_squared,
-                              const std::vector<float>& hidden_share, bool hidden_weights) {
+                              const std::vector<float>& occluded_fraction,
+                              bool disocclusion_weights) {
   std::vector<Real> weights = slope_squared;
-  if (!hidden_weights) return weights;
+  if (!disocclusion_weights) return weights;
   for (std::size_t i = 0; i < weights.size(); ++i) {
-    const double hidden = kHiddenWeight * static_cast<double>(hidden_share[i]);
-    weights[i] = static_cast<Real>(static_cast<double>(weights[i]) / (1 + hidden * hidden));
+    const double occluded = kOccludedWeight * static_cast<double>(occluded_fraction[i]);
+    weights[i] = static_cast<Real>(static_cast<double>(weights[i]) / (1 + occluded * occluded));
   }
   return weights;
 }
@@ -140,12 +141,13 @@ std::vector<float> BlurSigmaPx(const DisparityMap& disparity, const Eigen::Array
 }
 
 template <typename Real>
-StoredResidual StoredResidualOf(const DataTerm<Real>& data, const std::vector<Real>& radiance,
-                                const model::TransferCurve& transfer, int first_row, int last_row) {
-  const StoredValueTable table(transfer);
+EncodedResidual EncodedResidualOf(const DataTerm<Real>& data, const std::vector<Real>& radiance,
+                                  const model::TransferCurve& transfer, int first_row,
+                                  int last_row) {
+  const EncodedValueTable table(transfer);
   std::vector<Real> shown(radiance.size());
   data.projection.apply(radiance.data(), data.channels, shown.data());
-  StoredResidual residual;
+  EncodedResidual residual;
   residual.mean.assign(data.pixels(), 0.0F);
   const Sums sums = SumOverBands(data.height_px, data.threads, [&](int y0, int y1) {
     double sum = 0;
@@ -167,16 +169,16 @@ StoredResidual StoredResidualOf(const DataTerm<Real>& data, const std::vector<Re
   return residual;
 }
 
-#define THICKLENS_SCENE_DATA(Real)                                                              \
-  template DataTerm<Real> DataTermOf(const SceneProjection<Real>&, const model::LinearPicture&, \
-                                     int);                                                      \
-  template std::vector<Real> Planar(const model::LinearPicture&);                               \
-  template model::LinearPicture Interleaved(const std::vector<Real>&, int, int, int);           \
-  template std::vector<Real> SquaredRows(const DisparityMap&, const Eigen::ArrayXXd&);          \
-  template std::vector<Real> DataWeights(const std::vector<Real>&, const std::vector<float>&,   \
-                                         bool);                                                 \
-  template StoredResidual StoredResidualOf(const DataTerm<Real>&, const std::vector<Real>&,     \
-                                           const model::TransferCurve&, int, int);
+#define THICKLENS_SCENE_DATA(Real)                                                            \
+  template DataTerm<Real> DataTermOf(const SceneProjection<Real>&, const model::LinearImage&, \
+                                     int);                                                    \
+  template std::vector<Real> Planar(const model::LinearImage&);                               \
+  template model::LinearImage Interleaved(const std::vector<Real>&, int, int, int);           \
+  template std::vector<Real> SquaredRows(const DisparityMap&, const Eigen::ArrayXXd&);        \
+  template std::vector<Real> DataWeights(const std::vector<Real>&, const std::vector<float>&, \
+                                         bool);                                               \
+  template EncodedResidual EncodedResidualOf(const DataTerm<Real>&, const std::vector<Real>&, \
+                                             const model::TransferCurve&, int, int);
 THICKLENS_SCENE_DATA(float)
 THICKLENS_SCENE_DATA(double)
 #undef THICKLENS_SCENE_DATA

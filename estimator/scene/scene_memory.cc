@@ -4,28 +4,28 @@
 #include <cmath>
 #include <cstdint>
 
-#include "estimator/projection/view_fan.h"
-#include "estimator/scene/scene_relief.h"
+#include "estimator/projection/angular_bundle.h"
+#include "estimator/scene/guided_shading.h"
 #include "thicklens/base/parallel.h"
 #include "thicklens/base/run_cost.h"
 #include "thicklens/estimator/view_geometry.h"
-#include "thicklens/kernels/picture_filter.h"
+#include "thicklens/kernels/image_filter.h"
 
 namespace thicklens::estimator {
 namespace {
 
 constexpr double kFloat = sizeof(float);
 
-// Memory per pixel of a view in the making: its disparity and confidence, and its hidden samples if
-// they are a third.
+// Memory per pixel of a view in the making: its disparity and confidence, and its occluded samples
+// if they are a third.
 constexpr double kRenderedBytes = kFloat + 1 + 8;
 // Code that is loaded when it runs first, stacks, and all objects smaller than the image.
 constexpr double kSmallBytes = 8 << 20;
 
-// Memory of a sample of a view of the fan: its disparity, and its entry where it is hidden or
+// Memory of a sample of a view of the bundle: its disparity, and its entry where it is hidden or
 // mixed.
-constexpr double kSeenBytes = kFloat, kHiddenBytes = sizeof(CompactView::Hidden),
-                 kMixedBytes = sizeof(CompactView::Mixed);
+constexpr double kVisibleBytes = kFloat, kOccludedBytes = sizeof(CompactView::Occluded),
+                 kBoundarySampleBytes = sizeof(CompactView::Boundary);
 
 // Shares that are kept while systems are solved: the hidden share of the rays, and the share that
 // sees each point.
@@ -33,7 +33,7 @@ constexpr double kSharesBytes = 2 * kFloat;
 
 // Memory of a system. Images: the data, H^T W I, the radiance, and the vectors of CG and H. Planes:
 // weights, slopes, diagonals, the prior. Patches need more planes.
-constexpr double kSolvePictures = 12, kSolvePlanes = 7, kMorePlanes = 6;
+constexpr double kSolveImages = 12, kSolvePlanes = 7, kMorePlanes = 6;
 
 // Memory shared by all views in the making: the surfaces of the disparity.
 constexpr double kRendererBytes = 3;
@@ -43,19 +43,19 @@ constexpr double kRendererBytes = 3;
 SceneMemory::SceneMemory(const EstimateInput& input, const SceneOptions& options,
                          const Keeps& keeps, int reach_px)
     : before_(ResidentBytes() + kSmallBytes),
-      width_px_(input.picture.width_px),
-      height_px_(input.picture.height_px),
-      channels_(input.picture.channels),
+      width_px_(input.image.width_px),
+      height_px_(input.image.height_px),
+      channels_(input.image.channels),
       u_count_(static_cast<int>(input.weights.cols())),
       v_count_(static_cast<int>(input.weights.rows())),
-      seen_views_(static_cast<int>((input.weights > 0).count())),
+      visible_views_(static_cast<int>((input.weights > 0).count())),
       threads_(ResolveThreads(options.threads)),
       reach_px_(reach_px),
       real_(options.double_precision ? sizeof(double) : sizeof(float)),
       patches_(options.prior == Prior::kPatches),
       keeps_(keeps) {}
 
-double SceneMemory::MostBytes(int rows, const ProjectionBytes& projection, double kept_fan_bytes,
+double SceneMemory::MostBytes(int rows, const ProjectionBytes& projection, double kept_bundle_bytes,
                               Freed freed) const {
   const double all = static_cast<double>(width_px_) * height_px_;
   double kept = all;  // the confidence of its points
@@ -71,8 +71,8 @@ double SceneMemory::MostBytes(int rows, const ProjectionBytes& projection, doubl
   return before_ + kept +
          std::max(band + projection.held +
                       std::max(SetupBytes(pixels, projection, freed),
-                               kept_fan_bytes + SolveBytes(pixels)),
-                  kept_fan_bytes + ViewsBytes());
+                               kept_bundle_bytes + SolveBytes(pixels)),
+                  kept_bundle_bytes + ViewsBytes());
 }
 
 double SceneMemory::RowBytes() const {
@@ -80,7 +80,7 @@ double SceneMemory::RowBytes() const {
   // the image are stored in runs.
   constexpr double kRun = kernels::kPixelsOfRun;
   const double around = 2.0 * reach_px_ + 1;
-  const double runs = std::min(2.0 * seen_views_, around * std::ceil(around / kRun));
+  const double runs = std::min(2.0 * visible_views_, around * std::ceil(around / kRun));
   return runs * (kRun * real_ + sizeof(std::int32_t));
 }
 
@@ -88,20 +88,22 @@ ProjectionBytes SceneMemory::LargestPerPixel() const {
   constexpr double kIndexBytes = sizeof(std::int64_t) + sizeof(std::int32_t);
   const double products = std::min(u_count_, v_count_);
   return {RowBytes() + kIndexBytes + products * 2 * real_ * (2.0 * reach_px_ + 3),
-          seen_views_ * (kSeenBytes + kHiddenBytes + kMixedBytes)};
+          visible_views_ * (kVisibleBytes + kOccludedBytes + kBoundarySampleBytes)};
 }
 
 ProjectionBytes SceneMemory::OfRows(int rows, const ProjectionBytes& per_pixel) const {
   const int at_borders = rows < height_px_ ? std::min(2 * reach_px_, rows) : 0;
-  constexpr double kHiddenShare = 1.0 / 3;  // of views: half of them look away, and not all as far
+  constexpr double kOccludedFraction =
+      1.0 / 3;  // of views: half of them look away, and not all as far
   const double width = width_px_;
   return {width * (rows * per_pixel.held + at_borders * RowBytes()),
-          width * (rows * per_pixel.fan + kHiddenShare * at_borders * seen_views_ * kHiddenBytes)};
+          width * (rows * per_pixel.bundle +
+                   kOccludedFraction * at_borders * visible_views_ * kOccludedBytes)};
 }
 
-// Memory in addition to H: the fan of all views; either its axes, or each thread's place where rows
-// are gathered and the parts of H that are not joined yet; the sums of each thread; and the shares
-// of the aperture that see each point.
+// Memory in addition to H: the bundle of all views; either its axes, or each thread's place where
+// rows are gathered and the parts of H that are not joined yet; the sums of each thread; and the
+// shares of the aperture that see each point.
 double SceneMemory::SetupBytes(double pixels, const ProjectionBytes& projection,
                                Freed freed) const {
   constexpr double kShareBytes = sizeof(double) + kFloat;
@@ -109,30 +111,30 @@ double SceneMemory::SetupBytes(double pixels, const ProjectionBytes& projection,
   const double rows = std::max(1.0, pixels / width_px_);
   const double parts =
       freed == Freed::kStays ? 1 : std::min(1.0, 1.0 / kPartsOfAThread + threads_ / rows);
-  return projection.fan + parts * projection.held +
+  return projection.bundle + parts * projection.held +
          pixels * (kShareBytes + kFloat + kRendererBytes + std::max(axes, threads_ * real_));
 }
 
 // Memory in addition to H while systems are solved. A device needs the same again, and its
 // programs.
 double SceneMemory::SolveBytes(double pixels) const {
-  if (patches_) return std::max(PatchesBytes(pixels), ReliefBytes(pixels));
-  return PlaneBytes(pixels, kSolvePictures * channels_ + kSolvePlanes);
+  if (patches_) return std::max(PatchesBytes(pixels), ShadingGuideBytes(pixels));
+  return PlaneBytes(pixels, kSolveImages * channels_ + kSolvePlanes);
 }
 
 // The last system needs in addition the target, here and in the system, the shading of the relief,
 // and the photograph without it. It also needs the strengths, weights in double, and the part of
 // the data that belongs to that photograph.
 double SceneMemory::PatchesBytes(double pixels) const {
-  return PlaneBytes(pixels, (kSolvePictures + 4) * channels_ + kSolvePlanes + kMorePlanes);
+  return PlaneBytes(pixels, (kSolveImages + 4) * channels_ + kSolvePlanes + kMorePlanes);
 }
 
 // The system of the relief's normals has them in place of colours, and as they are. It also has
 // photograph and radiance, the smooth pixels, and the prior and weights, which exist twice here.
 // Afterwards, without the system, the shading is fitted.
-double SceneMemory::ReliefBytes(double pixels) const {
+double SceneMemory::ShadingGuideBytes(double pixels) const {
   const double system = PlaneBytes(
-      pixels, (kSolvePictures + 1) * kNormals + 2 * channels_ + kSolvePlanes + kMorePlanes);
+      pixels, (kSolveImages + 1) * kNormals + 2 * channels_ + kSolvePlanes + kMorePlanes);
   const double fit =
       pixels * (real_ * (4 * channels_ + 2 * kNormals + kSolvePlanes) + kSharesBytes) +
       ShadingBytes(width_px_, static_cast<int>(pixels / width_px_), channels_, threads_, real_);
@@ -156,7 +158,7 @@ double SceneMemory::ViewsBytes() const {
   double bytes = all * (view + all_views + at_once * (view + kRenderedBytes));
   bytes += at_once * keeps_.sink_bytes;
   // A device holds the image, its disparity and ranges, and for each view in the making the values,
-  // the disparity and the hidden samples if they are a third.
+  // the disparity and the occluded samples if they are a third.
   if (keeps_.device) bytes += all * (view + 3 * kFloat + at_once * (view + 3 * kFloat));
   if (keeps_.light_field) {
     const double ray = view + (keeps_.maps ? 1 : 0);

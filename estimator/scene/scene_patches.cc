@@ -7,15 +7,15 @@
 #include <optional>
 #include <utility>
 
-#include "estimator/scene/scene_relief.h"
-#include "estimator/scene/stored_slope.h"
+#include "estimator/scene/encoding_slope.h"
+#include "estimator/scene/guided_shading.h"
 #include "thicklens/kernels/patch_filter.h"
 
 namespace thicklens::estimator {
 namespace {
 
 // These values were chosen on rendered and simulated scenes with noise of 0.3 to 3 grey levels.
-constexpr double kLeastVariation = 0.5;
+constexpr double kMinVariation = 0.5;
 constexpr double kExplained = 0.7;  // sigma_p/sigma of a photograph that H explains
 constexpr int kAroundPx = 4;
 // Values for a noise of one grey level; both grow with the noise.
@@ -24,11 +24,11 @@ constexpr double kPull = 0.15;
 constexpr double kThresholdPower = 0.6;
 constexpr double kPullPower = 2 * (1 - kThresholdPower);  // as (noise/threshold)^2
 
-// s G, the shading in stored values; 0 where there is no shading.
+// s G, the shading in encoded values; 0 where there is no shading.
 template <typename Real>
-class StoredShading {
+class EncodedShading {
  public:
-  StoredShading(const std::vector<Real>& shading, const std::vector<Real>& slope_squared)
+  EncodedShading(const std::vector<Real>& shading, const std::vector<Real>& slope_squared)
       : shading_(shading), slope_squared_(slope_squared) {}
   Real operator()(std::size_t i) const {
     return shading_.empty() ? Real{0}
@@ -43,7 +43,7 @@ class StoredShading {
 // Returns v of a radiance.
 template <typename Real>
 std::vector<Real> Filtered(const PatchPrior& prior, const DataTerm<Real>& data,
-                           const std::vector<Real>& radiance, const StoredShading<Real>& shading) {
+                           const std::vector<Real>& radiance, const EncodedShading<Real>& shading) {
   const double threshold = kThreshold / 255 * std::pow(255 * prior.noise_sigma, kThresholdPower);
   std::vector<Real> values(radiance.size());
   const auto convert = [&](const auto& one) {
@@ -55,7 +55,7 @@ std::vector<Real> Filtered(const PatchPrior& prior, const DataTerm<Real>& data,
       }
     });
   };
-  const StoredValueTable table(prior.transfer);
+  const EncodedValueTable table(prior.transfer);
   convert([&](std::size_t i) {
     return static_cast<Real>(table.Encode(static_cast<float>(radiance[i]))) - shading(i);
   });
@@ -87,8 +87,8 @@ std::vector<Real> LocalVariation(const DataTerm<Real>& data, const std::vector<R
   std::vector<Real> shares;
   shares.reserve(squares.size());
   for (const double square : squares) {
-    const double share = kLeastVariation * std::pow(std::max(square, 0.0) / explained, 0.75);
-    shares.push_back(static_cast<Real>(std::clamp(share, kLeastVariation, 1.0)));
+    const double share = kMinVariation * std::pow(std::max(square, 0.0) / explained, 0.75);
+    shares.push_back(static_cast<Real>(std::clamp(share, kMinVariation, 1.0)));
   }
   return shares;
 }
@@ -121,11 +121,11 @@ class PatchRun {
   // of u. Returns an empty vector and leaves r unchanged if that part is not found within the limit
   // of iterations.
   std::vector<Real> TakeShading(std::vector<Real>* radiance) {
-    const Relief<Real> relief = ReliefOf<Real>(*prior_.disparity, prior_.relief_slope);
-    std::vector<Real> estimated = relief.normals;
+    const ShadingGuide<Real> guide = ShadingGuideOf<Real>(*prior_.disparity, prior_.guide_slope);
+    std::vector<Real> estimated = guide.normals;
     if (!Estimate(*radiance, &estimated)) return {};
-    ReliefShading<Real> shading =
-        FitShading(relief, estimated, *radiance, data_.width_px, data_.height_px, data_.threads);
+    GuidedShading<Real> shading =
+        FitShading(guide, estimated, *radiance, data_.width_px, data_.height_px, data_.threads);
     AddTo(shading.already, -1, radiance);
     return std::move(shading.sharp);
   }
@@ -137,11 +137,12 @@ class PatchRun {
     near_filtered.target = *radiance;
     AddTo(shading, 1, &near_filtered.target);
     near_filtered.target =
-        Filtered(prior_, data, near_filtered.target, StoredShading(shading, slope_squared_));
+        Filtered(prior_, data, near_filtered.target, EncodedShading(shading, slope_squared_));
     AddTo(shading, -1, &near_filtered.target);
-    near_filtered.pull = slope_squared_;
+    near_filtered.tikhonov_weight = slope_squared_;
     const double share = kPull * std::pow(255 * prior_.noise_sigma, kPullPower);
-    for (Real& pull : near_filtered.pull) pull *= static_cast<Real>(share);
+    for (Real& tikhonov_weight : near_filtered.tikhonov_weight)
+      tikhonov_weight *= static_cast<Real>(share);
     system->SetPrior(near_filtered);
     *radiance = std::move(near_filtered.target);
     Count(system->Solve(CgOfWhatIsLeft(), radiance).iterations);
@@ -165,7 +166,7 @@ class PatchRun {
     of_planes.photograph.resize(planes->size());
     data_.projection.apply(planes->data(), of_planes.channels, of_planes.photograph.data());
     SceneSystem<Real> system(of_planes, backend_);
-    system.SetPrior(TouchingPrior(data_, slope_squared_, prior_.strength, radiance));
+    system.SetPrior(ReweightedPrior(data_, slope_squared_, prior_.strength, radiance));
     const CgOutcome outcome =
         system.Solve({limits_.tolerance, limits_.max_iterations, limits_.on_iteration}, planes);
     whole_.iterations += outcome.iterations;
@@ -201,7 +202,7 @@ RadianceOutcome SolveWithPatches(const PatchPrior& prior, const DataTerm<Real>& 
   run.SolveVariation(data, slope_squared, system.get(), radiance);
   std::vector<Real> shading;
   std::optional<DataTerm<Real>> without_shading;
-  if (prior.relief_slope >= kLeastReliefSlope) {
+  if (prior.guide_slope >= kMinShadingGuideSlope) {
     system.reset();  // a device holds one at a time
     shading = run.TakeShading(radiance);
     if (!shading.empty()) {

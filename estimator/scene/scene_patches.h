@@ -12,10 +12,10 @@ namespace thicklens::estimator {
 
 struct PatchPrior {
   double strength = 0;     // lambda of its total variation
-  double noise_sigma = 0;  // of the photograph's stored values
+  double noise_sigma = 0;  // of the photograph's encoded values
   model::TransferCurve transfer;
   const DisparityMap* disparity = nullptr;  // of the data's pixels
-  double relief_slope = 0;  // c of ReliefOf; below kLeastReliefSlope the relief is ignored
+  double guide_slope = 0;  // c of ShadingGuideOf; below kMinShadingGuideSlope the relief is ignored
 };
 
 // Solves, from `radiance` on, for the radiance of Prior::kPatches [D107]:
@@ -28,8 +28,8 @@ struct PatchPrior {
 //   3. u is solved for with total variation of strength f lambda, where
 //      f = (sigma_p/(0.7 sigma))^1.5/2, but between 1/2 and 1, and sigma_p is the rms of
 //      s (H r - I) within 4 px of p. Where H explains the photograph, less variation is needed,
-//      because the patches do the rest; where it does not, at hidden points, all is needed.
-//   4. v has the stored values s G + FilterPatches of (those of r less s G), with the threshold
+//      because the patches do the rest; where it does not, at occluded points, all is needed.
+//   4. v has the encoded values s G + FilterPatches of (those of r less s G), with the threshold
 //      8.1/255 (255 sigma)^0.6. r then minimises sum_x W |H r - I|^2 + rho sum s^2 |r - v|^2,
 //      rho = 0.15 (255 sigma)^0.8: half-quadratic splitting (Zoran and Weiss 2011) [L14] cut short.
 //

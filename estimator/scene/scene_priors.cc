@@ -11,12 +11,12 @@ namespace {
 
 // Sets the sum over the channels of the squared forward differences at each pixel of a row.
 template <typename Real>
-void SquaredDifferences(const DataTerm<Real>& data, const std::vector<Real>& picture, int y,
+void SquaredDifferences(const DataTerm<Real>& data, const std::vector<Real>& image, int y,
                         std::vector<Real>* squares) {
   const int width = data.width_px;
   std::fill(squares->begin(), squares->end(), Real(0));
   for (int channel = 0; channel < data.channels; ++channel) {
-    const Real* r = picture.data() + Index(channel) * data.pixels() + Index(y) * Index(width);
+    const Real* r = image.data() + Index(channel) * data.pixels() + Index(y) * Index(width);
     Real* out = squares->data();
     for (int i = 0; i + 1 < width; ++i) {
       const Real across = r[i + 1] - r[i];
@@ -81,7 +81,7 @@ double SumSquaredBlurLoss(const DataTerm<Real>& data, const std::vector<Real>& s
 constexpr double kRidgeShare = 0.2;
 constexpr double kGradientShare = 0.125;
 // Minimum signal relative to the noise: a smaller signal cannot be distinguished from noise.
-constexpr double kLeastSignal = 0.25;
+constexpr double kMinSignal = 0.25;
 
 }  // namespace
 
@@ -106,9 +106,9 @@ double StrengthForNoise(Prior prior, double sigma, const SignalSum& signal) {
   const double noise = sigma * sigma;
   const double mean = signal.squares / signal.count;
   if (prior == Prior::kRidge) {
-    return kRidgeShare * noise / std::max(mean - noise, kLeastSignal * noise);
+    return kRidgeShare * noise / std::max(mean - noise, kMinSignal * noise);
   }
-  return kGradientShare * noise / std::max(mean - 2 * noise, kLeastSignal * noise);
+  return kGradientShare * noise / std::max(mean - 2 * noise, kMinSignal * noise);
 }
 
 template <typename Real>
@@ -121,33 +121,33 @@ template <typename Real>
 QuadraticPrior<Real> RidgePrior(const std::vector<Real>& slope_squared, double mu) {
   QuadraticPrior<Real> prior;
   prior.target_is_photograph = true;
-  prior.pull = slope_squared;
-  for (Real& value : prior.pull) value *= static_cast<Real>(mu);
+  prior.tikhonov_weight = slope_squared;
+  for (Real& value : prior.tikhonov_weight) value *= static_cast<Real>(mu);
   return prior;
 }
 
 template <typename Real>
 QuadraticPrior<Real> GradientPrior(const std::vector<Real>& slope_squared, double eta) {
   QuadraticPrior<Real> prior;
-  prior.pull.assign(slope_squared.size(), static_cast<Real>(kLeastPull));
-  prior.smoothness = slope_squared;
-  for (Real& value : prior.smoothness) value *= static_cast<Real>(eta);
+  prior.tikhonov_weight.assign(slope_squared.size(), static_cast<Real>(kMinTikhonovWeight));
+  prior.gradient_weight = slope_squared;
+  for (Real& value : prior.gradient_weight) value *= static_cast<Real>(eta);
   return prior;
 }
 
 template <typename Real>
 kernels::TotalVariation<Real> VariationPrior(const std::vector<Real>& slope_squared,
                                              double lambda) {
-  return {&slope_squared, lambda, kVariationEps, kLeastPull};
+  return {&slope_squared, lambda, kVariationEps, kMinTikhonovWeight};
 }
 
 template <typename Real>
-QuadraticPrior<Real> TouchingPrior(const DataTerm<Real>& data,
-                                   const std::vector<Real>& slope_squared, double lambda,
-                                   const std::vector<Real>& radiance) {
+QuadraticPrior<Real> ReweightedPrior(const DataTerm<Real>& data,
+                                     const std::vector<Real>& slope_squared, double lambda,
+                                     const std::vector<Real>& radiance) {
   QuadraticPrior<Real> prior;
-  prior.pull.assign(data.pixels(), static_cast<Real>(kLeastPull));
-  prior.smoothness.resize(data.pixels());
+  prior.tikhonov_weight.assign(data.pixels(), static_cast<Real>(kMinTikhonovWeight));
+  prior.gradient_weight.resize(data.pixels());
   ForFixedBands(data.height_px, data.threads, [&](int y0, int y1) {
     std::vector<Real> squares(Index(data.width_px));
     for (int y = y0; y < y1; ++y) {
@@ -155,7 +155,7 @@ QuadraticPrior<Real> TouchingPrior(const DataTerm<Real>& data,
       for (std::size_t x = 0; x < squares.size(); ++x) {
         const std::size_t i = Index(y) * Index(data.width_px) + x;
         const auto slope = static_cast<double>(slope_squared[i]);
-        prior.smoothness[i] = static_cast<Real>(
+        prior.gradient_weight[i] = static_cast<Real>(
             lambda / 2 * slope /
             std::sqrt(slope * static_cast<double>(squares[x]) + kVariationEps * kVariationEps));
       }
@@ -191,12 +191,12 @@ RadianceOutcome SolveRadiance(Prior prior, double strength, const DataTerm<Real>
     int calls = 0;
     const auto renew = [&] {
       if (calls++ < kStartIterations) return false;
-      system->TouchVariation();
+      system->ReweightVariation();
       ++outcome.reweightings;
       return true;
     };
     outcome.iterations = system->SolveRenewed(cg, renew, radiance).iterations;
-    system->TouchVariation();
+    system->ReweightVariation();
   } else {
     system->SetPrior(prior == Prior::kRidge ? RidgePrior(slope_squared, strength)
                                             : GradientPrior(slope_squared, strength));
@@ -213,8 +213,8 @@ RadianceOutcome SolveRadiance(Prior prior, double strength, const DataTerm<Real>
                                    const std::vector<Real>&);                                    \
   template QuadraticPrior<Real> RidgePrior(const std::vector<Real>&, double);                    \
   template QuadraticPrior<Real> GradientPrior(const std::vector<Real>&, double);                 \
-  template QuadraticPrior<Real> TouchingPrior(const DataTerm<Real>&, const std::vector<Real>&,   \
-                                              double, const std::vector<Real>&);                 \
+  template QuadraticPrior<Real> ReweightedPrior(const DataTerm<Real>&, const std::vector<Real>&, \
+                                                double, const std::vector<Real>&);               \
   template kernels::TotalVariation<Real> VariationPrior(const std::vector<Real>&, double);       \
   template RadianceOutcome SolveRadiance(Prior, double, const DataTerm<Real>&,                   \
                                          const std::vector<Real>&, const RadianceLimits&,        \

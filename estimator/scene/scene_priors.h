@@ -9,14 +9,14 @@
 
 namespace thicklens::estimator {
 
-// The smallest pull toward 0; it leaves no direction undetermined where the data contain no
+// The smallest Tikhonov weight; it leaves no direction undetermined where the data contain no
 // information.
-constexpr double kLeastPull = 1e-6;
-// Parameter of total variation, in stored values: differences below it count as squares.
+constexpr double kMinTikhonovWeight = 1e-6;
+// Parameter of total variation, in encoded values: differences below it count as squares.
 constexpr double kVariationEps = 0.004;
 
 // Returns the strength of a prior for a photograph with noise of standard deviation `sigma` in
-// stored values. The ratio of a quadratic prior to the data term is that of the variance of the
+// encoded values. The ratio of a quadratic prior to the data term is that of the variance of the
 // noise to the variance of the quantity in the prior (derived here, [D104], from the most probable
 // r of normal noise and a normal prior):
 //
@@ -46,15 +46,15 @@ template <typename Real>
 QuadraticPrior<Real> RidgePrior(const std::vector<Real>& slope_squared, double mu);
 template <typename Real>
 QuadraticPrior<Real> GradientPrior(const std::vector<Real>& slope_squared, double eta);
-// [D103] Returns lambda sum (g + eps^2)^(1/2) + kLeastPull |r|^2, g = sum s^2 |dr|^2. The slopes
-// are kept by reference.
+// [D103] Returns lambda sum (g + eps^2)^(1/2) + kMinTikhonovWeight |r|^2, g = sum s^2 |dr|^2. The
+// slopes are kept by reference.
 template <typename Real>
 kernels::TotalVariation<Real> VariationPrior(const std::vector<Real>& slope_squared, double lambda);
 // Returns the quadratic that touches VariationPrior at a radiance of all channels of the data.
 template <typename Real>
-QuadraticPrior<Real> TouchingPrior(const DataTerm<Real>& data,
-                                   const std::vector<Real>& slope_squared, double lambda,
-                                   const std::vector<Real>& radiance);
+QuadraticPrior<Real> ReweightedPrior(const DataTerm<Real>& data,
+                                     const std::vector<Real>& slope_squared, double lambda,
+                                     const std::vector<Real>& radiance);
 
 struct RadianceLimits {
   double tolerance = 1e-4;

@@ -8,16 +8,16 @@
 #include <utility>
 
 #include "estimator/scene/coarse_start.h"
+#include "estimator/scene/encoding_slope.h"
 #include "estimator/scene/scene_patches.h"
 #include "estimator/scene/scene_strength.h"
-#include "estimator/scene/stored_slope.h"
 #include "thicklens/base/run_cost.h"
 
 namespace thicklens::estimator {
 namespace {
 
 // An image starts from the estimate at half its size unless it is smaller than this.
-constexpr int kLeastCoarsePx = 128;
+constexpr int kMinCoarsePx = 128;
 // Tolerance of that estimate relative to that at full size: work that is left to the full size
 // costs four times as much there.
 constexpr double kCoarseTolerance = 0.3;
@@ -47,13 +47,13 @@ constexpr double kSlopeSmoothingPx = 2;
 
 }  // namespace
 
-double MeanSlope(const model::LinearPicture& photograph, const model::TransferCurve& transfer,
+double MeanSlope(const model::LinearImage& photograph, const model::TransferCurve& transfer,
                  const std::vector<SceneBand>& bands) {
   double sum = 0, count = 0;
   for (const SceneBand& band : bands) {
     const std::vector<double> slopes =
-        StoredSlopes(bands.size() == 1 ? photograph : CutRows(photograph, band.from, band.to),
-                     transfer, kSlopeSmoothingPx);
+        EncodingSlopes(bands.size() == 1 ? photograph : CutRows(photograph, band.from, band.to),
+                       transfer, kSlopeSmoothingPx);
     const auto row = [&](int y) {
       return slopes.begin() + static_cast<std::ptrdiff_t>(y - band.from) * photograph.width_px;
     };
@@ -64,11 +64,11 @@ double MeanSlope(const model::LinearPicture& photograph, const model::TransferCu
 }
 
 template <typename Real>
-double SceneRadiance<Real>::FindStart(const model::LinearPicture& photograph,
+double SceneRadiance<Real>::FindStart(const model::LinearImage& photograph,
                                       const DisparityMap& disparity) {
-  if (std::min(photograph.width_px, photograph.height_px) < 2 * kLeastCoarsePx) return 0;
+  if (std::min(photograph.width_px, photograph.height_px) < 2 * kMinCoarsePx) return 0;
   EstimateInput half;
-  half.picture = HalfSize(photograph);
+  half.image = HalfSize(photograph);
   half.disparity = HalfSize(disparity);
   half.weights = run_.input.weights;
   half.transfer = run_.input.transfer;
@@ -78,42 +78,43 @@ double SceneRadiance<Real>::FindStart(const model::LinearPicture& photograph,
   options.prior = SolvedFirst(options.prior);
   options.strength = CoarseStrength(options.prior, options.strength);
   if (options.strength_rule == StrengthRule::kGcv) options.strength_rule = StrengthRule::kAuto;
-  const std::function<void(int, int)> tell = [this](int, int) { run_.progress->Tell(); };
-  IterationProgress progress(tell, 1);
+  const std::function<void(int, int)> report = [this](int, int) { run_.progress->Report(); };
+  IterationProgress progress(report, 1);
   Run run{half, options};
   run.backend = run_.backend;
   run.threads = run_.threads;
-  run.noise_sigma = StoredNoiseSigma(half.picture, half.transfer).value_or(kUsualNoise / 2);
+  run.noise_sigma = EncodedNoiseSigma(half.image, half.transfer).value_or(kDefaultNoise / 2);
   run.mean_slope = run_.mean_slope;
   run.progress = &progress;
   SceneRadiance coarse(run);
-  const int height_px = half.picture.height_px;
-  coarse.Prepare(half.picture, half.disparity, {0, height_px, 0, height_px});
+  const int height_px = half.image.height_px;
+  coarse.Prepare(half.image, half.disparity, {0, height_px, 0, height_px});
   const auto prepared = Clock::now();
   SceneSummary unused;
-  start_ = WithDetail(photograph, half.picture, coarse.Solve(&unused));
+  start_ = WithDetail(photograph, half.image, coarse.Solve(&unused));
   return SecondsSince(prepared);
 }
 
 template <typename Real>
-void SceneRadiance<Real>::Prepare(const model::LinearPicture& photograph,
+void SceneRadiance<Real>::Prepare(const model::LinearImage& photograph,
                                   const DisparityMap& disparity, const SceneBand& band) {
   band_ = band;
   disparity_ = &disparity;
   ProjectionOptions projection;
   projection.threads = run_.threads;
-  projection.between = run_.options.cubic ? Between::kCubic : Between::kLinear;
-  projection.seen_share = run_.confidence;
-  projection.fan = run_.fan;
-  projection.progress = [this] { run_.progress->Tell(); };
+  projection.interpolation = run_.options.cubic ? Interpolation::kCubic : Interpolation::kLinear;
+  projection.visible_fraction = run_.confidence;
+  projection.bundle = run_.bundle;
+  projection.progress = [this] { run_.progress->Report(); };
   projection.freed = [this] { ReturnFreedMemory(run_.options.memory_limit_mib); };
   projection_ = MakeSceneProjection<Real>(disparity, run_.input.weights, projection);
   ReturnFreedMemory(run_.options.memory_limit_mib);
 
   data_ = DataTermOf(projection_, photograph, run_.threads);
   slope_squared_ = SlopeSquared(photograph);
-  data_.weight = DataWeights(slope_squared_, projection_.hidden_share, run_.options.hidden_weights);
-  data_.squared_row = SquaredRows<Real>(disparity, run_.input.weights);
+  data_.weight =
+      DataWeights(slope_squared_, projection_.occluded_fraction, run_.options.disocclusion_weights);
+  data_.row_norm2 = SquaredRows<Real>(disparity, run_.input.weights);
 }
 
 template <typename Real>
@@ -121,7 +122,7 @@ ProjectionBytes SceneRadiance<Real>::BytesOfRows(int first, int last) const {
   constexpr double kOnDevice = 2;  // at most: filters as they are and transposed
   const bool on_device = run_.backend != nullptr && run_.backend->is_opencl();
   return {projection_.bytes(first, last) * (on_device ? 1 + kOnDevice : 1),
-          projection_.fan_bytes * (last - first) / projection_.height_px};
+          projection_.bundle_bytes * (last - first) / projection_.height_px};
 }
 
 template <typename Real>
@@ -130,7 +131,7 @@ SignalSum SceneRadiance<Real>::Signal() const {
 }
 
 template <typename Real>
-model::LinearPicture SceneRadiance<Real>::Solve(SceneSummary* summary) {
+model::LinearImage SceneRadiance<Real>::Solve(SceneSummary* summary) {
   const SceneOptions& options = run_.options;
   auto system = std::make_unique<SceneSystem<Real>>(data_, run_.backend);
   std::vector<Real> radiance = start_.values.empty() ? data_.photograph : Planar<Real>(start_);
@@ -140,7 +141,7 @@ model::LinearPicture SceneRadiance<Real>::Solve(SceneSummary* summary) {
   limits.max_iterations = options.max_iterations;
   limits.on_iteration = [this] { run_.progress->CountUpTo(run_.last_iteration); };
   summary->strength = options.strength;
-  const double sigma = std::max(run_.noise_sigma, kLeastNoise);
+  const double sigma = std::max(run_.noise_sigma, kMinNoise);
   if (options.strength_rule != StrengthRule::kGiven) {
     summary->strength = StrengthForNoise(options.prior, sigma, data_, slope_squared_);
   }
@@ -154,7 +155,7 @@ model::LinearPicture SceneRadiance<Real>::Solve(SceneSummary* summary) {
   const RadianceOutcome outcome =
       options.prior == Prior::kPatches
           ? SolveWithPatches(
-                {summary->strength, sigma, run_.input.transfer, disparity_, run_.relief_slope},
+                {summary->strength, sigma, run_.input.transfer, disparity_, run_.guide_slope},
                 data_, slope_squared_, limits, std::move(system), run_.backend, &radiance)
           : SolveRadiance(options.prior, summary->strength, data_, slope_squared_, limits,
                           system.get(), &radiance);
@@ -163,7 +164,7 @@ model::LinearPicture SceneRadiance<Real>::Solve(SceneSummary* summary) {
   summary->converged = outcome.converged;
   summary->relative_residual = outcome.relative_residual;
   system.reset();  // frees its memory
-  residual_ = StoredResidualOf(data_, radiance, run_.input.transfer, first_row(), last_row());
+  residual_ = EncodedResidualOf(data_, radiance, run_.input.transfer, first_row(), last_row());
   summary->residual_rms = residual_.rms;
   FillShares(summary);
   return Interleaved(radiance, data_.width_px, data_.height_px, data_.channels);
@@ -172,7 +173,7 @@ model::LinearPicture SceneRadiance<Real>::Solve(SceneSummary* summary) {
 template <typename Real>
 void SceneRadiance<Real>::AddMaps(SceneMaps* maps) const {
   AddRows(residual_.mean, &maps->residual);
-  AddRows(projection_.hidden_share, &maps->hidden_share);
+  AddRows(projection_.occluded_fraction, &maps->occluded_fraction);
   AddRows(BlurSigmaPx(*disparity_, run_.input.weights), &maps->blur_sigma_px);
 }
 
@@ -180,7 +181,7 @@ template <typename Real>
 void SceneRadiance<Real>::AddConfidence(std::vector<Confidence>* of_points) const {
   const std::vector<float> sigma_px = BlurSigmaPx(*disparity_, run_.input.weights);
   for (std::size_t i = PixelOfRow(first_row()); i < PixelOfRow(last_row()); ++i) {
-    of_points->push_back(ConfidenceOfPoint(static_cast<double>(projection_.seen_share[i]),
+    of_points->push_back(ConfidenceOfPoint(static_cast<double>(projection_.visible_fraction[i]),
                                            static_cast<double>(sigma_px[i])));
   }
 }
@@ -199,13 +200,13 @@ void SceneRadiance<Real>::AddRows(const std::vector<float>& plane, std::vector<f
 // Returns s^2. Without slope weights it is that of the whole image, so that strengths keep their
 // unit.
 template <typename Real>
-std::vector<Real> SceneRadiance<Real>::SlopeSquared(const model::LinearPicture& photograph) const {
+std::vector<Real> SceneRadiance<Real>::SlopeSquared(const model::LinearImage& photograph) const {
   if (!run_.options.slope_weights) {
     return std::vector<Real>(disparity_->disparity.size(),
                              static_cast<Real>(run_.mean_slope * run_.mean_slope));
   }
   const std::vector<double> slopes =
-      StoredSlopes(photograph, run_.input.transfer, kSlopeSmoothingPx);
+      EncodingSlopes(photograph, run_.input.transfer, kSlopeSmoothingPx);
   std::vector<Real> squares;
   squares.reserve(slopes.size());
   for (const double slope : slopes) squares.push_back(static_cast<Real>(slope * slope));
@@ -216,10 +217,10 @@ template <typename Real>
 void SceneRadiance<Real>::FillShares(SceneSummary* summary) const {
   const std::size_t first = PixelOfRow(first_row()), last = PixelOfRow(last_row());
   const auto count = static_cast<double>(last - first);
-  const auto hidden = [&](std::size_t i) {
-    return projection_.hidden_share.begin() + static_cast<std::ptrdiff_t>(i);
+  const auto occluded = [&](std::size_t i) {
+    return projection_.occluded_fraction.begin() + static_cast<std::ptrdiff_t>(i);
   };
-  summary->hidden_share = std::accumulate(hidden(first), hidden(last), 0.0) / count;
+  summary->occluded_fraction = std::accumulate(occluded(first), occluded(last), 0.0) / count;
   summary->row_share =
       static_cast<double>(projection_.pixels_with_row(first_row(), last_row())) / count;
 }

@@ -16,14 +16,14 @@
 
 namespace thicklens::estimator {
 
-// Noise that is assumed where it cannot be measured in the photograph, in stored values.
-constexpr double kUsualNoise = 1.0 / 255;
+// Noise that is assumed where it cannot be measured in the photograph, in encoded values.
+constexpr double kDefaultNoise = 1.0 / 255;
 // Minimum noise, used for a noiseless photograph: no model of its rays is better than the rounding
 // of 8 bits.
-constexpr double kLeastNoise = 0.29 / 255;
+constexpr double kMinNoise = 0.29 / 255;
 
 // Returns the mean slope of the transfer curve at the smoothed intensity.
-double MeanSlope(const model::LinearPicture& photograph, const model::TransferCurve& transfer,
+double MeanSlope(const model::LinearImage& photograph, const model::TransferCurve& transfer,
                  const std::vector<SceneBand>& bands);
 
 // The radiance of one band of a photograph, in one precision.
@@ -36,23 +36,23 @@ class SceneRadiance {
     const SceneOptions& options;
     kernels::Backend* backend = nullptr;
     int threads = 1;
-    double noise_sigma = 0;   // of stored values
-    double relief_slope = 0;  // of the whole depth; for patches
-    double mean_slope = 0;    // over the whole photograph; for options without slope weights
-    int last_iteration = 0;   // value of the progress after this band
+    double noise_sigma = 0;  // of encoded values
+    double guide_slope = 0;  // of the whole depth; for patches
+    double mean_slope = 0;   // over the whole photograph; for options without slope weights
+    int last_iteration = 0;  // value of the progress after this band
     IterationProgress* progress = nullptr;
     bool confidence = false;  // true: AddConfidence is used
-    bool fan = false;         // true: the fan is kept
+    bool bundle = false;      // true: the bundle is kept
   };
   explicit SceneRadiance(const Run& run) : run_(run) {}
 
   // Finds the start of the iteration: the estimate at half the size, unless the image is small. It
   // must be called before Prepare, so that H of both sizes is never held at once; if it is not
   // called, the photograph is the start. Returns the seconds that it took without those for H.
-  double FindStart(const model::LinearPicture& photograph, const DisparityMap& disparity);
+  double FindStart(const model::LinearImage& photograph, const DisparityMap& disparity);
   // Makes H, I and the weights from the rows of the band: the photograph without fall-off, and the
   // disparity of its pixels, which must outlive this object.
-  void Prepare(const model::LinearPicture& photograph, const DisparityMap& disparity,
+  void Prepare(const model::LinearImage& photograph, const DisparityMap& disparity,
                const SceneBand& band);
   // Memory of H for all rows that are solved for, and approximately for the band's result alone.
   ProjectionBytes projection_bytes() const { return BytesOfRows(0, projection_.height_px); }
@@ -60,10 +60,10 @@ class SceneRadiance {
   SignalSum Signal() const;
 
   // Returns the views of the photograph's rays, if they were kept, and removes them here.
-  ViewFan TakeFan() { return std::exchange(projection_.fan, {}); }
+  AngularBundle TakeBundle() { return std::exchange(projection_.bundle, {}); }
 
   // Sets the members of the summary that describe the solution and the band's result.
-  model::LinearPicture Solve(SceneSummary* summary);
+  model::LinearImage Solve(SceneSummary* summary);
   // Appends the rows of the band's result to those of the bands above.
   void AddMaps(SceneMaps* maps) const;
   void AddConfidence(std::vector<Confidence>* of_points) const;  // only if requested
@@ -75,7 +75,7 @@ class SceneRadiance {
   ProjectionBytes BytesOfRows(int first, int last) const;
   std::size_t PixelOfRow(int row) const;
   void AddRows(const std::vector<float>& plane, std::vector<float>* to) const;
-  std::vector<Real> SlopeSquared(const model::LinearPicture& photograph) const;
+  std::vector<Real> SlopeSquared(const model::LinearImage& photograph) const;
   void FillShares(SceneSummary* summary) const;
 
   const Run run_;
@@ -84,8 +84,8 @@ class SceneRadiance {
   SceneProjection<Real> projection_;
   DataTerm<Real> data_;
   std::vector<Real> slope_squared_;
-  StoredResidual residual_;
-  model::LinearPicture start_;
+  EncodedResidual residual_;
+  model::LinearImage start_;
 };
 
 }  // namespace thicklens::estimator

@@ -76,18 +76,17 @@ model::LightField EstimateIn(const EstimateInput& input, const SceneOptions& opt
   const int iterations = std::min(options.max_iterations, UsualIterations(options.prior));
   IterationProgress progress(options.progress, iterations + static_cast<int>(input.weights.size()));
 
-  const std::optional<double> noise = StoredNoiseSigma(input.picture, input.transfer);
-  summary->noise_sigma = noise.value_or(kUsualNoise);
+  const std::optional<double> noise = EncodedNoiseSigma(input.image, input.transfer);
+  summary->noise_sigma = noise.value_or(kDefaultNoise);
   SceneBandRun<Real> run(input, options, backend, memory, reach_px, iterations, &progress, summary);
-  std::optional<model::LinearPicture> without_falloff;
+  std::optional<model::LinearImage> without_falloff;
   if (falloff) {
-    without_falloff = WithoutFalloff(input.picture, *input.grid, input.camera_of_falloff(),
+    without_falloff = WithoutFalloff(input.image, *input.grid, input.camera_of_falloff(),
                                      input.weights, summary->threads);
   }
   summary->setup_seconds = SecondsSince(start);
   const bool wants_confidence = sink != nullptr ? sink->wants_confidence : maps != nullptr;
-  SolvedScene solved =
-      run.Solve(falloff ? *without_falloff : input.picture, wants_confidence, maps);
+  SolvedScene solved = run.Solve(falloff ? *without_falloff : input.image, wants_confidence, maps);
   without_falloff.reset();
   ReturnFreedMemory(options.memory_limit_mib);
 
@@ -97,7 +96,7 @@ model::LightField EstimateIn(const EstimateInput& input, const SceneOptions& opt
     light_field.values.assign(light_field.ViewStart(light_field.channels, 0, 0), 0.0F);
     if (maps != nullptr) maps->confidence.resize(input.disparity.disparity.size() * views);
     ShowInAllViews(input, solved, summary->threads, backend, &progress,
-                   {[&](int k, int l, const model::LinearPicture& view,
+                   {[&](int k, int l, const model::LinearImage& view,
                         const std::vector<Confidence>& confidence) {
                       model::SetView(&light_field, k, l, view);
                       if (maps != nullptr) {

@@ -35,7 +35,7 @@ Sums SumOverBands(int height_px, int threads, const std::function<Sums(int, int)
 template <typename Real>
 SceneSystem<Real>::SceneSystem(const DataTerm<Real>& data, kernels::Backend* backend)
     : data_(data),
-      steps_(backend != nullptr ? backend->NewSteps(data) : kernels::NewNativeSteps(data)) {}
+      steps_(backend != nullptr ? backend->NewSteps(data) : kernels::NewCpuRadianceSteps(data)) {}
 
 template <typename Real>
 void SceneSystem<Real>::SetPrior(const QuadraticPrior<Real>& prior) {
@@ -48,8 +48,8 @@ void SceneSystem<Real>::SetVariation(const kernels::TotalVariation<Real>& variat
 }
 
 template <typename Real>
-void SceneSystem<Real>::TouchVariation() {
-  steps_->TouchVariation();
+void SceneSystem<Real>::ReweightVariation() {
+  steps_->ReweightVariation();
 }
 
 template <typename Real>
@@ -63,15 +63,15 @@ CgOutcome SceneSystem<Real>::Iterate(const CgLimits& limits, const Renew& renew)
     outcome.converged = may_converge && sums.squared <= target;
     if (outcome.converged || outcome.iterations == limits.max_iterations) break;
     const double beta =
-        before > 0 ? std::max(0.0, (sums.preconditioned - sums.with_former) / before) : 0;
+        before > 0 ? std::max(0.0, (sums.preconditioned - sums.with_previous) / before) : 0;
     before = sums.preconditioned;
-    const double steepness = steps_->Turn(beta);
-    const double curvature = steps_->Curvature();
+    const double steepness = steps_->UpdateDirection(beta);
+    const double curvature = steps_->ApplyNormalOperator();
     if (!(curvature > 0)) {  // rounding has removed the direction: this system is solved
       if (may_converge) break;
       continue;
     }
-    steps_->Advance(steepness / curvature);
+    steps_->UpdateSolution(steepness / curvature);
     ++outcome.iterations;
     if (limits.on_iteration) limits.on_iteration();
   }

@@ -12,7 +12,7 @@
 namespace thicklens::estimator {
 
 using kernels::DataTerm;
-using kernels::PictureMap;
+using kernels::ImageMap;
 using kernels::QuadraticPrior;
 
 struct CgLimits {
@@ -26,8 +26,8 @@ struct CgOutcome {
 };
 
 // [D106] (H^T W H + P) r = b, where P is the matrix of the prior: the normal equations of data term
-// and prior, with b = H^T W I + pull target. They are solved by conjugate gradients with the
-// diagonal as preconditioner, vectors in Real, sums in double, all channels together (one
+// and prior, with b = H^T W I + tikhonov_weight target. They are solved by conjugate gradients with
+// the diagonal as preconditioner, vectors in Real, sums in double, all channels together (one
 // polynomial of A for all). The steps are computed on the backend. The result does not depend on
 // the number of threads.
 template <typename Real>
@@ -37,11 +37,11 @@ class SceneSystem {
   explicit SceneSystem(const DataTerm<Real>& data, kernels::Backend* backend = nullptr);
 
   void SetPrior(const QuadraticPrior<Real>& prior);
-  // Sets the prior that is not quadratic, which TouchVariation needs.
+  // Sets the prior that is not quadratic, which ReweightVariation needs.
   void SetVariation(const kernels::TotalVariation<Real>& variation);
   // Replaces the prior by the quadratic that touches the variation from above, at the radiance of
   // the last iteration.
-  void TouchVariation();
+  void ReweightVariation();
 
   // Solves the system, starting from x.
   CgOutcome Solve(const CgLimits& limits, std::vector<Real>* x);

@@ -35,32 +35,31 @@ class Spare {
 };
 
 kernels::ViewSources SourcesOf(const CompactView& view) {
-  return {&view.disparity, view.shift.x(), view.shift.y(), &view.hidden, &view.mixed};
+  return {&view.disparity, view.shift.x(), view.shift.y(), &view.occluded, &view.boundary};
 }
 
 // Makes views of one image, on a device or on the processor; for use by many threads.
 class ViewMaker {
  public:
-  ViewMaker(const model::LinearPicture& picture, const DisparityMap& map, kernels::Backend* backend)
-      : picture_(picture) {
+  ViewMaker(const model::LinearImage& image, const DisparityMap& map, kernels::Backend* backend)
+      : image_(image) {
     if (backend == nullptr || !backend->is_opencl()) {
-      native_.emplace(picture, map);
+      cpu_.emplace(image, map);
       return;
     }
-    on_device_ =
-        backend->NewWarp({picture.width_px, picture.height_px, picture.channels, &picture.values,
-                          &map.disparity, static_cast<float>(SurfaceTolerance(map))});
+    on_device_ = backend->NewWarp({image.width_px, image.height_px, image.channels, &image.values,
+                                   &map.disparity, static_cast<float>(SurfaceTolerance(map))});
   }
 
-  void Make(const CompactView& view, model::LinearPicture* made) {
-    if (native_) return native_->Warp(view, made);
-    *made = {picture_.width_px, picture_.height_px, picture_.channels, std::move(made->values)};
+  void Make(const CompactView& view, model::LinearImage* made) {
+    if (cpu_) return cpu_->Warp(view, made);
+    *made = {image_.width_px, image_.height_px, image_.channels, std::move(made->values)};
     on_device_->Warp(SourcesOf(view), &made->values);
   }
 
  private:
-  const model::LinearPicture& picture_;
-  std::optional<PictureWarper> native_;
+  const model::LinearImage& image_;
+  std::optional<ImageWarper> cpu_;
   std::unique_ptr<kernels::ViewWarp> on_device_;
 };
 
@@ -73,14 +72,14 @@ void ShowInAllViews(const EstimateInput& input, const SolvedScene& solved, int t
   const auto v_count = static_cast<int>(input.weights.rows());
   const DisparityRenderer renderer(input.disparity);
   ViewMaker maker(solved.radiance, input.disparity, backend);
-  Spare<model::LinearPicture> spare;
+  Spare<model::LinearImage> spare;
   ParallelFor(u_count * v_count, threads, [&](int view) {
     const int k = view % u_count, l = view / u_count;
     const double a = k - (u_count - 1) / 2.0, b = l - (v_count - 1) / 2.0;
-    const CompactView* seen = ViewAt(solved.fan, a, b);
+    const CompactView* seen = ViewAt(solved.bundle, a, b);
     const CompactView rendered = seen != nullptr ? CompactView() : renderer.RenderCompact(a, b);
     if (seen == nullptr) seen = &rendered;
-    model::LinearPicture made = spare.Take();
+    model::LinearImage made = spare.Take();
     maker.Make(*seen, &made);
     sink.take(
         k, l, made,

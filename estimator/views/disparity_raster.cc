@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
+#include "estimator/views/boundary_samples.h"
 #include "estimator/views/disparity_buffer.h"
 #include "estimator/views/hole_filler.h"
-#include "estimator/views/mixed_samples.h"
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/index.h"
@@ -128,23 +128,23 @@ void FindSources(const DisparityMap& map, const SupportedPixels& supported, Disp
                  CompactView* view) {
   HoleFiller filler(map, supported, buffer, view->shift);
   const std::vector<HoleFiller::Sample>& holes = filler.holes();
-  view->hidden.reserve(holes.size());
+  view->occluded.reserve(holes.size());
   if (holes.size() == map.disparity.size()) {  // the view looks past the image: use the centre view
     for (std::size_t i = 0; i < holes.size(); ++i) {
-      view->hidden.push_back({static_cast<std::int32_t>(i), 0, 0, map.disparity[i]});
+      view->occluded.push_back({static_cast<std::int32_t>(i), 0, 0, map.disparity[i]});
     }
   } else {
     for (const HoleFiller::Sample& hole : holes) {
       ThrowIfCancelled();
       const HoleFiller::Source from = filler.Background(hole.x, hole.y);
-      view->hidden.push_back({static_cast<std::int32_t>(buffer.Index(hole.x, hole.y)),
-                              static_cast<float>(from.way_x), static_cast<float>(from.way_y),
-                              from.disparity});
+      view->occluded.push_back({static_cast<std::int32_t>(buffer.Index(hole.x, hole.y)),
+                                static_cast<float>(from.way_x), static_cast<float>(from.way_y),
+                                from.disparity});
     }
   }
   view->disparity = std::move(buffer).TakeDisparity();
-  for (const CompactView::Hidden& hidden : view->hidden) {
-    view->disparity[Index(hidden.index)] = std::numeric_limits<float>::quiet_NaN();
+  for (const CompactView::Occluded& occluded : view->occluded) {
+    view->disparity[Index(occluded.index)] = std::numeric_limits<float>::quiet_NaN();
   }
 }
 
@@ -191,7 +191,7 @@ CompactView DisparityRenderer::RenderCompact(double a, double b) const {
   PaintSurfaces(map_, is_surface_, view.shift, &buffer);
   PaintAlone(map_, alone_, view.shift, &buffer);
   FindSources(map_, *supported_, std::move(buffer), &view);
-  view.mixed = FindMixedSamples(map_, alone_, view);
+  view.boundary = FindBoundarySamples(map_, alone_, view);
   return view;
 }
 
@@ -201,29 +201,29 @@ ViewDisparity DisparityRenderer::Render(double a, double b) const {
   return view;
 }
 
-const CompactView::Hidden& CompactView::HiddenAt(std::size_t i) const {
-  return *std::lower_bound(hidden.begin(), hidden.end(), i,
-                           [](const Hidden& h, std::size_t at) { return Index(h.index) < at; });
+const CompactView::Occluded& CompactView::OccludedAt(std::size_t i) const {
+  return *std::lower_bound(occluded.begin(), occluded.end(), i,
+                           [](const Occluded& h, std::size_t at) { return Index(h.index) < at; });
 }
 
 void Expand(const CompactView& compact, ViewDisparity* view) {
   view->width_px = compact.width_px;
   view->height_px = compact.height_px;
   view->disparity = compact.disparity;
-  view->mixed = compact.mixed;
-  view->seen.assign(view->disparity.size(), Seen::kSeen);
+  view->boundary = compact.boundary;
+  view->visibility.assign(view->disparity.size(), Visibility::kVisible);
   view->source_x.resize(view->disparity.size());
   view->source_y.resize(view->disparity.size());
   for (std::size_t i = 0; i < view->disparity.size(); ++i) {
     view->source_x[i] = static_cast<float>(compact.shift.x() * view->disparity[i]);
     view->source_y[i] = static_cast<float>(compact.shift.y() * view->disparity[i]);
   }
-  for (const CompactView::Hidden& hidden : compact.hidden) {
-    const std::size_t i = Index(hidden.index);
-    view->disparity[i] = hidden.disparity;
-    view->seen[i] = Seen::kHidden;
-    view->source_x[i] = hidden.source_x;
-    view->source_y[i] = hidden.source_y;
+  for (const CompactView::Occluded& occluded : compact.occluded) {
+    const std::size_t i = Index(occluded.index);
+    view->disparity[i] = occluded.disparity;
+    view->visibility[i] = Visibility::kOccluded;
+    view->source_x[i] = occluded.source_x;
+    view->source_y[i] = occluded.source_y;
   }
 }
 

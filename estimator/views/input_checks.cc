@@ -25,40 +25,39 @@ double LargestDisparityPx(const DisparityMap& map) {
   return largest * map.step.cwiseAbs().maxCoeff();
 }
 
-void CheckPicture(const model::LinearPicture& picture) {
-  if (picture.channels < 1) {
-    Fail(fmt::format("the picture has {} channels: it must have at least 1", picture.channels));
+void CheckImage(const model::LinearImage& image) {
+  if (image.channels < 1) {
+    Fail(fmt::format("the image has {} channels: it must have at least 1", image.channels));
   }
-  if (picture.width_px < 1 || picture.height_px < 1 ||
-      picture.values.size() !=
-          Index(picture.width_px) * Index(picture.height_px) * Index(picture.channels)) {
-    Fail(fmt::format("the picture is {}x{} px with {} values", picture.width_px, picture.height_px,
-                     picture.values.size()));
+  if (image.width_px < 1 || image.height_px < 1 ||
+      image.values.size() !=
+          Index(image.width_px) * Index(image.height_px) * Index(image.channels)) {
+    Fail(fmt::format("the image is {}x{} px with {} values", image.width_px, image.height_px,
+                     image.values.size()));
   }
-  for (std::size_t i = 0; i < picture.values.size(); ++i) {
-    if (std::isfinite(picture.values[i])) continue;
-    const std::size_t pixel = i / Index(picture.channels);
-    Fail(fmt::format("the picture has values that are not finite: {} at ({}, {})",
-                     picture.values[i], pixel % Index(picture.width_px),
-                     pixel / Index(picture.width_px)));
+  for (std::size_t i = 0; i < image.values.size(); ++i) {
+    if (std::isfinite(image.values[i])) continue;
+    const std::size_t pixel = i / Index(image.channels);
+    Fail(fmt::format("the image has values that are not finite: {} at ({}, {})", image.values[i],
+                     pixel % Index(image.width_px), pixel / Index(image.width_px)));
   }
 }
 
-void CheckDisparity(const DisparityMap& map, const model::LinearPicture& picture) {
-  if (map.width_px != picture.width_px || map.height_px != picture.height_px) {
-    Fail(fmt::format("the depth is {}x{} px, the picture {}x{} px: the sizes must be equal",
-                     map.width_px, map.height_px, picture.width_px, picture.height_px));
+void CheckDisparity(const DisparityMap& map, const model::LinearImage& image) {
+  if (map.width_px != image.width_px || map.height_px != image.height_px) {
+    Fail(fmt::format("the depth is {}x{} px, the image {}x{} px: the sizes must be equal",
+                     map.width_px, map.height_px, image.width_px, image.height_px));
   }
   if (!std::all_of(map.disparity.begin(), map.disparity.end(),
                    [](float value) { return std::isfinite(value); })) {
     Fail("the disparity has holes: they must be filled");
   }
   const double widest_px = LargestDisparityPx(map);
-  const int size_px = std::max(picture.width_px, picture.height_px);
+  const int size_px = std::max(image.width_px, image.height_px);
   if (!(widest_px <= size_px)) {
     Fail(
         fmt::format("the largest disparity is {:.4g} px per view step: it must be at most the "
-                    "picture's size, {} px; is its scale right?",
+                    "image's size, {} px; is its scale right?",
                     widest_px, size_px));
   }
 }
@@ -84,9 +83,9 @@ void CheckWeights(const Eigen::ArrayXXd& weights) {
 }  // namespace
 
 void CheckInput(const EstimateInput& input) {
-  const model::LinearPicture& picture = input.picture;
-  CheckPicture(picture);
-  CheckDisparity(input.disparity, picture);
+  const model::LinearImage& image = input.image;
+  CheckImage(image);
+  CheckDisparity(input.disparity, image);
   CheckWeights(input.weights);
   if (input.grid.has_value() != input.camera.has_value()) {
     Fail("a camera and a grid come together");
@@ -98,24 +97,24 @@ void CheckInput(const EstimateInput& input) {
         input.grid->planes.uv_depth_mm));
   }
   if (input.grid &&
-      (input.grid->s_count != picture.width_px || input.grid->t_count != picture.height_px ||
+      (input.grid->s_count != image.width_px || input.grid->t_count != image.height_px ||
        input.grid->u_count != input.weights.cols() ||
        input.grid->v_count != input.weights.rows())) {
     Fail(fmt::format(
-        "the grid has {}x{} samples and {}x{} views, the picture {}x{} px and the "
+        "the grid has {}x{} samples and {}x{} views, the image {}x{} px and the "
         "weights {}x{}: they must be equal",
         input.grid->s_count, input.grid->t_count, input.grid->u_count, input.grid->v_count,
-        picture.width_px, picture.height_px, input.weights.cols(), input.weights.rows()));
+        image.width_px, image.height_px, input.weights.cols(), input.weights.rows()));
   }
 }
 
 model::LightField DescriptionOf(const EstimateInput& input) {
   model::LightField description;
-  description.s_count = input.picture.width_px;
-  description.t_count = input.picture.height_px;
+  description.s_count = input.image.width_px;
+  description.t_count = input.image.height_px;
   description.u_count = static_cast<int>(input.weights.cols());
   description.v_count = static_cast<int>(input.weights.rows());
-  description.channels = input.picture.channels;
+  description.channels = input.image.channels;
   description.weights = input.weights;
   description.transfer = input.transfer;
   description.grid = input.grid;

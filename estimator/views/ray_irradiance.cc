@@ -141,9 +141,9 @@ std::vector<float> RelativeFalloff(const model::LightFieldGrid& grid, const mode
   return falloff;
 }
 
-std::vector<float> FalloffOfPicture(const model::LightFieldGrid& grid, const model::Camera& camera,
-                                    const Eigen::ArrayXXd& weights, int width_px, int height_px,
-                                    int threads) {
+std::vector<float> FalloffOfImage(const model::LightFieldGrid& grid, const model::Camera& camera,
+                                  const Eigen::ArrayXXd& weights, int width_px, int height_px,
+                                  int threads) {
   CheckViewWeights(grid, weights);
   const Eigen::ArrayXXd exposures = Exposures(grid, camera);
   const Eigen::Vector2d landing_step_px = LandingStepPx(camera, grid);

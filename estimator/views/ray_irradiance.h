@@ -25,9 +25,9 @@ std::vector<float> RelativeFalloff(const model::LightFieldGrid& grid, const mode
 // Returns the image of a uniform radiance 1: for each pixel the mean of RelativeFalloff, by
 // `weights`, over the rays that land nearest to the pixel, one per view. A ray that is not a sample
 // of the grid is left out; where none is a sample, all rays are used as if they were samples.
-std::vector<float> FalloffOfPicture(const model::LightFieldGrid& grid, const model::Camera& camera,
-                                    const Eigen::ArrayXXd& weights, int width_px, int height_px,
-                                    int threads = 1);
+std::vector<float> FalloffOfImage(const model::LightFieldGrid& grid, const model::Camera& camera,
+                                  const Eigen::ArrayXXd& weights, int width_px, int height_px,
+                                  int threads = 1);
 
 }  // namespace thicklens::estimator
 

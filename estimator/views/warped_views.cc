@@ -10,12 +10,12 @@
 #include "thicklens/base/parallel.h"
 
 namespace thicklens::estimator {
-model::LinearPicture WithoutFalloff(const model::LinearPicture& photograph,
-                                    const model::LightFieldGrid& grid, const model::Camera& camera,
-                                    const Eigen::ArrayXXd& weights, int threads) {
+model::LinearImage WithoutFalloff(const model::LinearImage& photograph,
+                                  const model::LightFieldGrid& grid, const model::Camera& camera,
+                                  const Eigen::ArrayXXd& weights, int threads) {
   const std::vector<float> share =
-      FalloffOfPicture(grid, camera, weights, photograph.width_px, photograph.height_px, threads);
-  model::LinearPicture radiance = photograph;
+      FalloffOfImage(grid, camera, weights, photograph.width_px, photograph.height_px, threads);
+  model::LinearImage radiance = photograph;
   for (std::size_t i = 0; i < radiance.values.size(); ++i) {
     radiance.values[i] /= share[i / Index(radiance.channels)];
   }
@@ -25,12 +25,12 @@ model::LinearPicture WithoutFalloff(const model::LinearPicture& photograph,
 model::LightField WarpToAllViews(const EstimateInput& input, bool falloff, int threads,
                                  std::vector<std::vector<float>>* disparity) {
   model::LightField warped = FrameOf(input);
-  const model::LinearPicture radiance =
-      falloff && input.camera ? WithoutFalloff(input.picture, *input.grid,
-                                               input.camera_of_falloff(), input.weights, threads)
-                              : input.picture;
+  const model::LinearImage radiance =
+      falloff && input.camera ? WithoutFalloff(input.image, *input.grid, input.camera_of_falloff(),
+                                               input.weights, threads)
+                              : input.image;
   const DisparityRenderer renderer(input.disparity);
-  const PictureWarper warper(radiance, input.disparity);
+  const ImageWarper warper(radiance, input.disparity);
   const int views = warped.u_count * warped.v_count;
   if (disparity != nullptr) disparity->resize(Index(views));
   ParallelFor(views, threads, [&](int view) {

@@ -18,7 +18,7 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr std::size_t kPacket = AperturePrior<float>::kPacket;
 // Number of points for one call of ParallelFor's work.
 constexpr std::size_t kChunk = 256 * kPacket;
-constexpr int kMostSamples = 64;  // along an axis
+constexpr int kMaxSamples = 64;  // along an axis
 
 // Orthonormal DCT-II of one axis. Even functions need only the sums of the samples at the same
 // distance from the middle, odd ones only the differences: `values` has count x (count + 1)/2
@@ -38,8 +38,8 @@ inline __attribute__((always_inline)) void Forward(const Transform<Real>& transf
                                                    std::ptrdiff_t stride, Real* x) {
   const int count = kCount > 0 ? kCount : transform.count;
   const int half = (count + 1) / 2, pairs = count / 2;
-  Lanes<Real> sums[kCount > 0 ? kCount : kMostSamples];
-  Lanes<Real> differences[kCount > 0 ? kCount : kMostSamples];
+  Lanes<Real> sums[kCount > 0 ? kCount : kMaxSamples];
+  Lanes<Real> differences[kCount > 0 ? kCount : kMaxSamples];
 #pragma GCC unroll 8
   for (int k = 0; k < pairs; ++k) {
     Lanes<Real> a, b;
@@ -72,7 +72,7 @@ inline __attribute__((always_inline)) void Backward(const Transform<Real>& trans
                                                     std::ptrdiff_t stride, Real* x) {
   const int count = kCount > 0 ? kCount : transform.count;
   const int half = (count + 1) / 2, pairs = count / 2;
-  Lanes<Real> waves[kCount > 0 ? kCount : kMostSamples];
+  Lanes<Real> waves[kCount > 0 ? kCount : kMaxSamples];
 #pragma GCC unroll 16
   for (int i = 0; i < count; ++i) Load(x + i * stride, &waves[i]);
 #pragma GCC unroll 8
@@ -206,9 +206,9 @@ std::vector<Real> TransformOf(int count) {
 template <typename Real>
 AperturePrior<Real>::AperturePrior(int u_count, int v_count, double gamma, double mu)
     : u_count_(u_count), v_count_(v_count) {
-  if (std::max(u_count, v_count) > kMostSamples) {
+  if (std::max(u_count, v_count) > kMaxSamples) {
     throw Error(fmt::format("views are {}x{}: there may be at most {} across and down", u_count,
-                            v_count, kMostSamples));
+                            v_count, kMaxSamples));
   }
   across_ = TransformOf<Real>(u_count);
   down_ = TransformOf<Real>(v_count);

@@ -6,7 +6,7 @@
 
 namespace thicklens::kernels {
 
-// The innermost loops of picture_filter.h, compiled once for each kind of processor. Their
+// The innermost loops of image_filter.h, compiled once for each kind of processor. Their
 // arguments are raw memory, because a file that is compiled for one kind of processor must not
 // instantiate a function that the linker could use in place of that of another file.
 
@@ -17,7 +17,7 @@ struct FilterTerm {
   const Real* x = nullptr;
 };
 
-// Rows [first, last) of a PixelRuns.
+// Rows [first, last) of a PixelBlockedCsr.
 template <typename Real>
 struct RunRange {
   const std::int32_t* pixel = nullptr;
@@ -27,7 +27,7 @@ struct RunRange {
   std::size_t first = 0, last = 0;
 };
 
-constexpr int kMostChannels = 4;  // maximum number that a loop processes together
+constexpr int kMaxChannels = 4;  // maximum number that a loop processes together
 
 template <typename Real>
 struct FilterLoops {

@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "kernels/cpu/filter_loops.h"
-#include "thicklens/kernels/picture_filter.h"
+#include "thicklens/kernels/image_filter.h"
 
 // The loops of filter_loops.h, for the processor for which the including file is compiled. Each
 // including file has its own copy (hence the unnamed namespace).
@@ -73,10 +73,10 @@ void SumTermsOf(const FilterTerm<Real>* terms, int term_count, std::ptrdiff_t ah
                 std::ptrdiff_t x_stride, int count, Real* y, std::ptrdiff_t y_stride) {
   constexpr int kLanes = kVectorBytes / static_cast<int>(sizeof(Real));
   // The sums and a weight fit into 16 registers.
-  constexpr int kMost = kChannels == 1 ? 8 : kChannels == 4 ? 2 : 4;
+  constexpr int kMax = kChannels == 1 ? 8 : kChannels == 4 ? 2 : 4;
   int p = 0;
-  for (; p + kMost * kLanes <= count; p += kMost * kLanes) {
-    SumGroup<Real, kChannels, kMost>(terms, term_count, ahead, x_stride, p, y, y_stride);
+  for (; p + kMax * kLanes <= count; p += kMax * kLanes) {
+    SumGroup<Real, kChannels, kMax>(terms, term_count, ahead, x_stride, p, y, y_stride);
   }
   // The remaining pixels are computed by vectors that overlap finished pixels; these get the same
   // numbers again.

@@ -28,13 +28,13 @@ class PatchFilter {
     std::vector<Real> from, sum, weight, columns;
   };
 
-  PatchFilter(int width_px, int height_px, int channels, const std::vector<Real>& picture,
+  PatchFilter(int width_px, int height_px, int channels, const std::vector<Real>& image,
               Real threshold, std::vector<Real>* to)
       : width_px_(width_px),
         height_px_(height_px),
         channels_(channels),
         stride_((width_px + kPatchChunkPx - 1) / kPatchChunkPx * kPatchChunkPx + 2 * kPatchPx),
-        picture_(picture),
+        image_(image),
         threshold_(threshold),
         to_(*to) {}
 
@@ -75,13 +75,13 @@ class PatchFilter {
   // Read and Write convert a row between the channels and the filtered sums and differences.
   void Read(int channel, int y, Real* row) const {
     if (channels_ != kColours) {
-      std::copy_n(picture_.data() + Start(channel, y), width_px_, row);
+      std::copy_n(image_.data() + Start(channel, y), width_px_, row);
       return;
     }
     std::fill(row, row + width_px_, Real(0));
     for (int colour = 0; colour < kColours; ++colour) {
       const Real share = static_cast<Real>(kOpponents[Index(channel)][Index(colour)]);
-      const Real* from = picture_.data() + Start(colour, y);
+      const Real* from = image_.data() + Start(colour, y);
       for (int x = 0; x < width_px_; ++x) row[x] += share * from[x];
     }
   }
@@ -98,7 +98,7 @@ class PatchFilter {
   }
 
   const int width_px_, height_px_, channels_, stride_;
-  const std::vector<Real>& picture_;
+  const std::vector<Real>& image_;
   const Real threshold_;
   std::vector<Real>& to_;
 };
@@ -107,11 +107,11 @@ class PatchFilter {
 
 template <typename Real>
 std::vector<Real> FilterPatches(int width_px, int height_px, int channels,
-                                const std::vector<Real>& picture, double threshold, int threads) {
-  if (std::min(width_px, height_px) < kPatchPx) return picture;
-  std::vector<Real> filtered(picture.size());
-  const PatchFilter<Real> filter(width_px, height_px, channels, picture,
-                                 static_cast<Real>(threshold), &filtered);
+                                const std::vector<Real>& image, double threshold, int threads) {
+  if (std::min(width_px, height_px) < kPatchPx) return image;
+  std::vector<Real> filtered(image.size());
+  const PatchFilter<Real> filter(width_px, height_px, channels, image, static_cast<Real>(threshold),
+                                 &filtered);
   const int bands = (height_px + kBandRows - 1) / kBandRows;
   const int used = BandCount(bands, threads, 1);
   // The memory is allocated before the threads start, because threads must not throw.

@@ -7,13 +7,14 @@
 
 namespace thicklens::kernels {
 
-// Rows of P x: pull x, plus the transposed differences of the smoothness times the differences.
+// Rows of P x: tikhonov_weight x, plus the transposed differences of the gradient weights times the
+// differences.
 template <typename Real>
 class PriorRows {
  public:
   PriorRows(const QuadraticPrior<Real>& prior, int width_px, int height_px)
-      : pull_(prior.pull.data()),
-        t_(prior.smoothness.empty() ? nullptr : prior.smoothness.data()),
+      : tikhonov_weight_(prior.tikhonov_weight.data()),
+        t_(prior.gradient_weight.empty() ? nullptr : prior.gradient_weight.data()),
         width_(width_px),
         height_(height_px) {}
 
@@ -24,8 +25,8 @@ class PriorRows {
                                                       Real* __restrict out) const {
     const std::ptrdiff_t row = std::ptrdiff_t{y} * width_;
     const Real* x = plane + row;
-    const Real* pull = pull_ + row;
-    for (int i = 0; i < width_; ++i) out[i] = pull[i] * x[i];
+    const Real* tikhonov_weight = tikhonov_weight_ + row;
+    for (int i = 0; i < width_; ++i) out[i] = tikhonov_weight[i] * x[i];
     if (t_ == nullptr) return;
     const Real* t = t_ + row;
     across[0] = 0;
@@ -42,10 +43,10 @@ class PriorRows {
     }
   }
 
-  // Adds the smoothness of all differences that include a pixel, and its pull.
+  // Adds the gradient weight of all differences that include a pixel, and its Tikhonov weight.
   void AddDiagonal(int y, Real* out) const {
-    const Real* pull = pull_ + std::ptrdiff_t{y} * width_;
-    for (int i = 0; i < width_; ++i) out[i] += pull[i];
+    const Real* tikhonov_weight = tikhonov_weight_ + std::ptrdiff_t{y} * width_;
+    for (int i = 0; i < width_; ++i) out[i] += tikhonov_weight[i];
     if (t_ == nullptr) return;
     const Real* t = t_ + std::ptrdiff_t{y} * width_;
     for (int i = 0; i < width_; ++i) {
@@ -57,7 +58,7 @@ class PriorRows {
   }
 
  private:
-  const Real* pull_;
+  const Real* tikhonov_weight_;
   const Real* t_;
   int width_, height_;
 };

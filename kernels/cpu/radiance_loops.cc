@@ -39,7 +39,7 @@ THICKLENS_INLINE double Total(const Doubles& lanes) {
 template <typename Real>
 THICKLENS_INLINE ResidualSums Update(const ResidualRow<Real>& given, int count) {
   const ResidualRow<Real> row = given;
-  Doubles squared{}, preconditioned{}, with_former{};
+  Doubles squared{}, preconditioned{}, with_previous{};
   int i = 0;
   for (; i + kLanes <= count; i += kLanes) {
     Lanes<Real> r, prior, m, former;
@@ -48,11 +48,11 @@ THICKLENS_INLINE ResidualSums Update(const ResidualRow<Real>& given, int count) 
     Load(row.inverse_diagonal + i, &m);
     Load(row.residual + i, &former);
     r -= prior;
-    if (row.pull != nullptr) {
-      Lanes<Real> pull, target;
-      Load(row.pull + i, &pull);
+    if (row.tikhonov_weight != nullptr) {
+      Lanes<Real> tikhonov_weight, target;
+      Load(row.tikhonov_weight + i, &tikhonov_weight);
       Load(row.target + i, &target);
-      r += pull * target;
+      r += tikhonov_weight * target;
     }
     Store(r, row.residual + i);
     const Doubles wide = __builtin_convertvector(r, Doubles);
@@ -60,23 +60,24 @@ THICKLENS_INLINE ResidualSums Update(const ResidualRow<Real>& given, int count) 
     const Doubles wide_step = __builtin_convertvector(step, Doubles);
     squared += wide * wide;
     preconditioned += wide * wide_step;
-    with_former += __builtin_convertvector(former, Doubles) * wide_step;
+    with_previous += __builtin_convertvector(former, Doubles) * wide_step;
   }
-  ResidualSums sums{Total(squared), Total(preconditioned), Total(with_former)};
+  ResidualSums sums{Total(squared), Total(preconditioned), Total(with_previous)};
   for (; i < count; ++i) {
     Real r = row.data[i] - row.prior[i];
-    if (row.pull != nullptr) r += row.pull[i] * row.target[i];
+    if (row.tikhonov_weight != nullptr) r += row.tikhonov_weight[i] * row.target[i];
     const double step = static_cast<double>(row.inverse_diagonal[i] * r);
     sums.squared += static_cast<double>(r) * static_cast<double>(r);
     sums.preconditioned += static_cast<double>(r) * step;
-    sums.with_former += static_cast<double>(row.residual[i]) * step;
+    sums.with_previous += static_cast<double>(row.residual[i]) * step;
     row.residual[i] = r;
   }
   return sums;
 }
 
 template <typename Real>
-THICKLENS_INLINE double Turn(const Real* m, const Real* r, Real beta, int count, Real* p) {
+THICKLENS_INLINE double UpdateDirection(const Real* m, const Real* r, Real beta, int count,
+                                        Real* p) {
   Doubles sum{};
   int i = 0;
   for (; i + kLanes <= count; i += kLanes) {
@@ -112,8 +113,8 @@ THICKLENS_INLINE double Dot(const Real* x, const Real* y, int count) {
 }
 
 template <typename Real>
-THICKLENS_INLINE void Advance(Real step, const Real* p, const Real* product, int count,
-                              Real* __restrict x, Real* __restrict r) {
+THICKLENS_INLINE void UpdateSolution(Real step, const Real* p, const Real* product, int count,
+                                     Real* __restrict x, Real* __restrict r) {
   for (int i = 0; i < count; ++i) x[i] += step * p[i];
   for (int i = 0; i < count; ++i) r[i] -= step * product[i];
 }
@@ -127,11 +128,11 @@ THICKLENS_INLINE void AddSquares(const Real* x, const Real* below, int count,
 }
 
 template <typename Real>
-THICKLENS_INLINE void Touch(const Real* slope_squared, const Real* squares, Real half, Real floor,
-                            int count, Real* __restrict smoothness) {
+THICKLENS_INLINE void Reweight(const Real* slope_squared, const Real* squares, Real half,
+                               Real floor, int count, Real* __restrict gradient_weight) {
   for (int i = 0; i < count; ++i) {
     const Real s2 = slope_squared[i];
-    smoothness[i] = half * s2 / std::sqrt(s2 * squares[i] + floor);
+    gradient_weight[i] = half * s2 / std::sqrt(s2 * squares[i] + floor);
   }
 }
 
@@ -144,17 +145,18 @@ THICKLENS_FMA ResidualSums UpdateFma(const ResidualRow<Real>& row, int count) {
   return Update(row, count);
 }
 template <typename Real>
-THICKLENS_FMA double TurnFma(const Real* m, const Real* r, Real beta, int count, Real* p) {
-  return Turn(m, r, beta, count, p);
+THICKLENS_FMA double UpdateDirectionFma(const Real* m, const Real* r, Real beta, int count,
+                                        Real* p) {
+  return UpdateDirection(m, r, beta, count, p);
 }
 template <typename Real>
 THICKLENS_FMA double DotFma(const Real* x, const Real* y, int count) {
   return Dot(x, y, count);
 }
 template <typename Real>
-THICKLENS_FMA void AdvanceFma(Real step, const Real* p, const Real* product, int count, Real* x,
-                              Real* r) {
-  Advance(step, p, product, count, x, r);
+THICKLENS_FMA void UpdateSolutionFma(Real step, const Real* p, const Real* product, int count,
+                                     Real* x, Real* r) {
+  UpdateSolution(step, p, product, count, x, r);
 }
 template <typename Real>
 THICKLENS_FMA void MultiplyFma(const PriorRows<Real>& prior, const Real* plane, int y, Real* across,
@@ -166,9 +168,9 @@ THICKLENS_FMA void AddSquaresFma(const Real* x, const Real* below, int count, Re
   AddSquares(x, below, count, squares);
 }
 template <typename Real>
-THICKLENS_FMA void TouchFma(const Real* slope_squared, const Real* squares, Real half, Real floor,
-                            int count, Real* smoothness) {
-  Touch(slope_squared, squares, half, floor, count, smoothness);
+THICKLENS_FMA void ReweightFma(const Real* slope_squared, const Real* squares, Real half,
+                               Real floor, int count, Real* gradient_weight) {
+  Reweight(slope_squared, squares, half, floor, count, gradient_weight);
 }
 #define THICKLENS_BEST(fma, plain) \
   if (HasAvx2AndFma()) return fma; \
@@ -186,8 +188,8 @@ ResidualSums UpdateRow(const ResidualRow<Real>& row, int count) {
 }
 
 template <typename Real>
-double TurnRow(const Real* m, const Real* r, Real beta, int count, Real* p) {
-  THICKLENS_BEST(TurnFma(m, r, beta, count, p), Turn(m, r, beta, count, p));
+double UpdateDirectionRow(const Real* m, const Real* r, Real beta, int count, Real* p) {
+  THICKLENS_BEST(UpdateDirectionFma(m, r, beta, count, p), UpdateDirection(m, r, beta, count, p));
 }
 
 template <typename Real>
@@ -196,8 +198,9 @@ double DotRow(const Real* x, const Real* y, int count) {
 }
 
 template <typename Real>
-void AdvanceRow(Real step, const Real* p, const Real* product, int count, Real* x, Real* r) {
-  THICKLENS_BEST(AdvanceFma(step, p, product, count, x, r), Advance(step, p, product, count, x, r));
+void UpdateSolutionRow(Real step, const Real* p, const Real* product, int count, Real* x, Real* r) {
+  THICKLENS_BEST(UpdateSolutionFma(step, p, product, count, x, r),
+                 UpdateSolution(step, p, product, count, x, r));
 }
 
 template <typename Real>
@@ -213,21 +216,21 @@ void AddSquaredDifferences(const Real* x, const Real* below, int count, Real* sq
 }
 
 template <typename Real>
-void TouchRow(const Real* slope_squared, const Real* squares, Real half, Real floor, int count,
-              Real* smoothness) {
-  THICKLENS_BEST(TouchFma(slope_squared, squares, half, floor, count, smoothness),
-                 Touch(slope_squared, squares, half, floor, count, smoothness));
+void ReweightRow(const Real* slope_squared, const Real* squares, Real half, Real floor, int count,
+                 Real* gradient_weight) {
+  THICKLENS_BEST(ReweightFma(slope_squared, squares, half, floor, count, gradient_weight),
+                 Reweight(slope_squared, squares, half, floor, count, gradient_weight));
 }
 
 #define THICKLENS_ROWS(Real)                                                                     \
   template ResidualSums UpdateRow(const ResidualRow<Real>&, int);                                \
-  template double TurnRow(const Real*, const Real*, Real, int, Real*);                           \
+  template double UpdateDirectionRow(const Real*, const Real*, Real, int, Real*);                \
   template double DotRow(const Real*, const Real*, int);                                         \
-  template void AdvanceRow(Real, const Real*, const Real*, int, Real*, Real*);                   \
+  template void UpdateSolutionRow(Real, const Real*, const Real*, int, Real*, Real*);            \
   template void MultiplyPriorRow(const QuadraticPrior<Real>&, int, int, const Real*, int, Real*, \
                                  Real*);                                                         \
   template void AddSquaredDifferences(const Real*, const Real*, int, Real*);                     \
-  template void TouchRow(const Real*, const Real*, Real, Real, int, Real*);
+  template void ReweightRow(const Real*, const Real*, Real, Real, int, Real*);
 THICKLENS_ROWS(float)
 THICKLENS_ROWS(double)
 #undef THICKLENS_ROWS

@@ -90,13 +90,13 @@ RowWarper::Places::Places(int width_px)
       fraction_x(Index(width_px)),
       fraction_y(Index(width_px)) {}
 
-RowWarper::RowWarper(const SurfacePicture& picture)
-    : width_px_(picture.width_px),
-      height_px_(picture.height_px),
-      channels_(picture.channels),
-      tolerance_(picture.tolerance),
-      disparity_(*picture.disparity) {
-  CopyPixels(*picture.values);
+RowWarper::RowWarper(const SurfaceImage& image)
+    : width_px_(image.width_px),
+      height_px_(image.height_px),
+      channels_(image.channels),
+      tolerance_(image.tolerance),
+      disparity_(*image.disparity) {
+  CopyPixels(*image.values);
   FindRanges();
 }
 
@@ -263,10 +263,10 @@ void RowWarper::Bilinear(int x0, int y0, float fraction_x, float fraction_y, flo
   }
 }
 
-void RowWarper::Mix(const std::vector<MixedSample>& mixed, float* warped) const {
+void RowWarper::Mix(const std::vector<BoundarySample>& mixed, float* warped) const {
   const auto limit_px = static_cast<float>(width_px_ + height_px_);
   std::vector<float> value(Index(channels_));
-  for (const MixedSample& sample : mixed) {
+  for (const BoundarySample& sample : mixed) {
     const int x = sample.index % width_px_, y = sample.index / width_px_;
     std::int32_t x0 = 0, y0 = 0;
     float fx = 0, fy = 0;

@@ -12,8 +12,8 @@ namespace {
 
 // The code has no branches, for the vector instructions of the caller that it is inlined into. NaN
 // fails every comparison.
-inline __attribute__((always_inline)) void Add(const SeenRow& given, float* share) {
-  const SeenRow row = given;
+inline __attribute__((always_inline)) void Add(const VisibleRow& given, float* share) {
+  const VisibleRow row = given;
   const auto outer_x = static_cast<float>(row.width_px) - 0.5F;
   const auto outer_y = static_cast<float>(row.height_px) - 0.5F;
   // No two of the arrays overlap.
@@ -47,13 +47,15 @@ inline __attribute__((always_inline)) void Add(const SeenRow& given, float* shar
 
 #if defined(__x86_64__)
 
-__attribute__((target("avx2"))) void AddAvx2(const SeenRow& row, float* share) { Add(row, share); }
+__attribute__((target("avx2"))) void AddAvx2(const VisibleRow& row, float* share) {
+  Add(row, share);
+}
 
 #endif
 
 }  // namespace
 
-void AddSeen(const SeenRow& row, float* share) {
+void AddVisible(const VisibleRow& row, float* share) {
 #if defined(__x86_64__)
   if (HasAvx2()) return AddAvx2(row, share);
 #endif

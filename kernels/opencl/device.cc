@@ -16,7 +16,7 @@
 namespace thicklens::kernels {
 namespace {
 
-class TwinBackend : public Backend {
+class ReferenceBackend : public Backend {
  public:
   bool is_opencl() const override { return false; }
   bool has_double() const override { return true; }
@@ -25,13 +25,13 @@ class TwinBackend : public Backend {
   std::unique_ptr<Kernels<float>> NewFloat() override { return NewReference<float>(); }
   std::unique_ptr<Kernels<double>> NewDouble() override { return NewReference<double>(); }
   std::unique_ptr<RadianceSteps<float>> NewSteps(const DataTerm<float>& data) override {
-    return NewNativeSteps(data);
+    return NewCpuRadianceSteps(data);
   }
   std::unique_ptr<RadianceSteps<double>> NewSteps(const DataTerm<double>& data) override {
-    return NewNativeSteps(data);
+    return NewCpuRadianceSteps(data);
   }
-  std::unique_ptr<ViewWarp> NewWarp(const SurfacePicture& picture) override {
-    return NewReferenceWarp(picture);
+  std::unique_ptr<ViewWarp> NewWarp(const SurfaceImage& image) override {
+    return NewReferenceWarp(image);
   }
 };
 
@@ -55,8 +55,8 @@ class OpenClBackend : public Backend {
   std::unique_ptr<RadianceSteps<double>> NewSteps(const DataTerm<double>& data) override {
     return NewOpenClSteps(device_, Built("double", &double_program_), data);
   }
-  std::unique_ptr<ViewWarp> NewWarp(const SurfacePicture& picture) override {
-    return NewOpenClWarp(device_, Built("float", &float_program_), picture);
+  std::unique_ptr<ViewWarp> NewWarp(const SurfaceImage& image) override {
+    return NewOpenClWarp(device_, Built("float", &float_program_), image);
   }
 
  private:
@@ -100,7 +100,7 @@ std::shared_ptr<Backend> OpenBestDevice(const DeviceRequest& request, const Stop
 std::shared_ptr<Backend> OpenBackend(const DeviceRequest& request, std::string* notice,
                                      const std::function<void()>& stop) {
   if (notice != nullptr) notice->clear();
-  if (request.kind == DeviceRequest::Kind::kCpu) return std::make_shared<TwinBackend>();
+  if (request.kind == DeviceRequest::Kind::kCpu) return std::make_shared<ReferenceBackend>();
 
   // One call at a time: the child processes must end before OpenCL is in use.
   static std::mutex mutex;
@@ -123,7 +123,7 @@ std::shared_ptr<Backend> OpenBackend(const DeviceRequest& request, std::string* 
   if (notice != nullptr) {
     *notice = "no OpenCL device can be used, so C++ code computes: " + why;
   }
-  return std::make_shared<TwinBackend>();
+  return std::make_shared<ReferenceBackend>();
 }
 
 }  // namespace thicklens::kernels

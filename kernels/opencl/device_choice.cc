@@ -11,7 +11,7 @@
 namespace thicklens::kernels {
 namespace {
 
-constexpr std::size_t kMostDigits = 3;
+constexpr std::size_t kMaxDigits = 3;
 
 bool IsSimulator(const DeviceDescription& device) {
   std::string names = device.platform_name + " " + device.name;
@@ -50,7 +50,7 @@ std::string ListOf(const std::vector<DeviceDescription>& devices) {
 
 // Reads the whole number from `begin` to `end`; returns false for any other text.
 bool ReadIndex(const std::string& text, std::size_t begin, std::size_t end, int* index) {
-  if (end <= begin || end - begin > kMostDigits) return false;
+  if (end <= begin || end - begin > kMaxDigits) return false;
   *index = 0;
   for (std::size_t i = begin; i < end; ++i) {
     if (text[i] < '0' || text[i] > '9') return false;

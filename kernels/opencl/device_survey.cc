@@ -15,10 +15,10 @@
 namespace thicklens::kernels {
 namespace {
 
-constexpr int kLeastMajor = 1;
-constexpr int kLeastMinor = 2;
-constexpr std::uint64_t kLeastAllocationBytes = std::uint64_t{16} << 20;
-constexpr std::uint64_t kLeastWorkGroup = 64;
+constexpr int kMinMajor = 1;
+constexpr int kMinMinor = 2;
+constexpr std::uint64_t kMinAllocationBytes = std::uint64_t{16} << 20;
+constexpr std::uint64_t kMinWorkGroup = 64;
 
 // Returns the fields of a line; the last one may be empty.
 std::vector<std::string> SplitAtTabs(const std::string& line) {
@@ -38,8 +38,8 @@ class SurveyReader {
  public:
   explicit SurveyReader(DeviceSurvey* survey) : survey_(survey) {}
 
-  void Read(const std::string& told) {
-    std::istringstream lines(told);
+  void Read(const std::string& reported) {
+    std::istringstream lines(reported);
     for (std::string line; std::getline(lines, line);) {
       // A line that the child did not finish is left out.
       if (!lines.eof()) ReadLine(SplitAtTabs(line));
@@ -100,7 +100,7 @@ bool IsNewEnough(const std::string& version) {
   int major = 0;
   int minor = 0;
   if (std::sscanf(version.c_str(), "OpenCL %d.%d", &major, &minor) != 2) return true;
-  return major > kLeastMajor || (major == kLeastMajor && minor >= kLeastMinor);
+  return major > kMinMajor || (major == kMinMajor && minor >= kMinMinor);
 }
 
 std::string ProblemOf(const cl::Device& device, const DeviceDescription& known) {
@@ -109,16 +109,16 @@ std::string ProblemOf(const cl::Device& device, const DeviceDescription& known) 
     return "its driver has no compiler";
   }
   if (!IsNewEnough(known.version)) {
-    return fmt::format("it is of {}; {}.{} or later is needed", known.version, kLeastMajor,
-                       kLeastMinor);
+    return fmt::format("it is of {}; {}.{} or later is needed", known.version, kMinMajor,
+                       kMinMinor);
   }
-  if (known.max_allocation_bytes < kLeastAllocationBytes) {
+  if (known.max_allocation_bytes < kMinAllocationBytes) {
     return fmt::format("its largest buffer has {} bytes; {} are needed", known.max_allocation_bytes,
-                       kLeastAllocationBytes);
+                       kMinAllocationBytes);
   }
-  if (known.max_work_group < kLeastWorkGroup) {
+  if (known.max_work_group < kMinWorkGroup) {
     return fmt::format("its largest work group has {} items; {} are needed", known.max_work_group,
-                       kLeastWorkGroup);
+                       kMinWorkGroup);
   }
   return "";
 }
@@ -185,28 +185,28 @@ std::vector<cl_device_id> DevicesOf(cl_platform_id platform, cl_int* error) {
   return devices;
 }
 
-void ListPlatform(int index, cl_platform_id id, const Tell& tell) {
+void ListPlatform(int index, cl_platform_id id, const SubprocessReport& report) {
   const cl::Platform platform(id);
   const std::string name = OneLine(platform.getInfo<CL_PLATFORM_NAME>());
-  tell(PlatformLine(index, name));
+  report(PlatformLine(index, name));
   cl_int error = CL_SUCCESS;
   const std::vector<cl_device_id> devices = DevicesOf(id, &error);
   if (error != CL_SUCCESS) {
-    tell(ProblemLine(PlatformLabel(index, name) + NoDeviceAdvice(error, name)));
+    report(ProblemLine(PlatformLabel(index, name) + NoDeviceAdvice(error, name)));
     return;
   }
   for (std::size_t i = 0; i < devices.size(); ++i) {
     DeviceDescription known = Describe(platform, cl::Device(devices[i]));
     known.platform = index;
     known.device = static_cast<int>(i);
-    tell(DeviceLine(known));
+    report(DeviceLine(known));
   }
 }
 
 DeviceSurvey SurveyHere() {
   DeviceSurvey survey;
   SurveyReader reader(&survey);
-  ListOpenClDevices(0, [&reader](const std::string& told) { reader.Read(told); });
+  ListOpenClDevices(0, [&reader](const std::string& reported) { reader.Read(reported); });
   return survey;
 }
 
@@ -229,25 +229,25 @@ std::string ProblemLine(const std::string& problem) {
   return fmt::format("problem\t{}\n", OneLine(problem));
 }
 
-void ListOpenClDevices(int first_platform, const Tell& tell) {
+void ListOpenClDevices(int first_platform, const SubprocessReport& report) {
   cl_uint count = 0;
   cl_int error = ::clGetPlatformIDs(0, nullptr, &count);
   if (error != CL_SUCCESS || count == 0) {
-    tell(ProblemLine(NoPlatformAdvice(error)));
+    report(ProblemLine(NoPlatformAdvice(error)));
     return;
   }
   std::vector<cl_platform_id> platforms(count);
   error = ::clGetPlatformIDs(count, platforms.data(), nullptr);
   if (error != CL_SUCCESS) {
-    tell(ProblemLine(NoPlatformAdvice(error)));
+    report(ProblemLine(NoPlatformAdvice(error)));
     return;
   }
   for (int i = first_platform; i < static_cast<int>(count); ++i) {
     try {
-      ListPlatform(i, platforms[static_cast<std::size_t>(i)], tell);
+      ListPlatform(i, platforms[static_cast<std::size_t>(i)], report);
     } catch (const cl::Error& failure) {
-      tell(ProblemLine(PlatformLabel(i, "") + failure.what() + ": " +
-                       OpenClErrorText(failure.err())));
+      report(ProblemLine(PlatformLabel(i, "") + failure.what() + ": " +
+                         OpenClErrorText(failure.err())));
     }
   }
 }
@@ -256,10 +256,10 @@ DeviceSurvey SurveyWith(const ListDevices& list, double limit_s, const StopCheck
   DeviceSurvey survey;
   int first_platform = 0;
   while (true) {
-    const ChildOutcome outcome =
-        RunInChild([&](const Tell& tell) { list(first_platform, tell); }, limit_s, stop);
+    const SubprocessOutcome outcome = RunInSubprocess(
+        [&](const SubprocessReport& report) { list(first_platform, report); }, limit_s, stop);
     SurveyReader reader(&survey);
-    reader.Read(outcome.told);
+    reader.Read(outcome.reported);
     if (outcome.failure.empty()) return survey;
     if (reader.platform() < first_platform) {
       survey.problems.push_back(fmt::format(

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "kernels/opencl/guarded_child.h"
+#include "kernels/opencl/isolated_subprocess.h"
 #include "kernels/opencl/opencl_device.h"
 #include "thicklens/kernels/device.h"
 
@@ -15,8 +15,8 @@ namespace thicklens::kernels {
 constexpr double kChildLimitS = 60;
 
 // The work of the child: reports platforms and devices from `first_platform` on.
-using ListDevices = std::function<void(int first_platform, const Tell& tell)>;
-void ListOpenClDevices(int first_platform, const Tell& tell);
+using ListDevices = std::function<void(int first_platform, const SubprocessReport& report)>;
+void ListOpenClDevices(int first_platform, const SubprocessReport& report);
 
 // Runs `list` in a child. After a platform that crashes the child, a new child continues with the
 // next platform.

@@ -87,10 +87,12 @@ std::string TryDeviceOnce(int platform, int device, const StopCheck& stop) {
   if (IsOpenClInUse()) {
     problem = TryDevice(platform, device, EmbeddedKernelFiles());
   } else {
-    const ChildOutcome outcome = RunInChild(
-        [&](const Tell& tell) { tell(TryDevice(platform, device, EmbeddedKernelFiles())); },
+    const SubprocessOutcome outcome = RunInSubprocess(
+        [&](const SubprocessReport& report) {
+          report(TryDevice(platform, device, EmbeddedKernelFiles()));
+        },
         kChildLimitS, stop);
-    problem = OneLine(outcome.told);
+    problem = OneLine(outcome.reported);
     if (!outcome.failure.empty()) {
       problem = fmt::format("device opencl:{}:{}: its driver {} when a small kernel was tried",
                             platform, device, outcome.failure);

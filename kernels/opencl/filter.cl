@@ -1,5 +1,5 @@
 // Linear maps between images with separate weights for each pixel: the device's form of
-// picture_filter.h, in the layout of opencl_projection.cc.
+// image_filter.h, in the layout of opencl_projection.cc.
 //
 // An item computes LANES adjacent pixels. On a CPU they are a vector, because compilers vectorise
 // straight code but not loops over terms. On other devices LANES is 1, so that neighbouring items
@@ -30,7 +30,7 @@ typedef struct {
 
 // Computes y = sum_k c_k x(p + (first + k) step), times `weight` if `weighted` is set; it is added
 // to y if `add` is set. One item computes LANES pixels of all channels.
-kernel void FilterPicture(const Layout layout, const int channels, const int step,
+kernel void FilterImage(const Layout layout, const int channels, const int step,
                           global const int* first_term, global const int* start,
                           global const REAL* coefficients, global const REAL* x, const int weighted,
                           global const REAL* weight, const int add, global REAL* y) {
@@ -104,13 +104,13 @@ kernel void TakePixels(const Layout layout, const int channel, const int channel
   values[i] = FourOf(x + layout.margin + pixel[i], layout.plane, channel, channels);
 }
 
-// Computes y(pixel) += sum_e weight_e values(index_e), times `picture_weight` of the pixel if
+// Computes y(pixel) += sum_e weight_e values(index_e), times `image_weight` of the pixel if
 // `weighted` is set. One item per row; entry e of row `lane` of a slice is at start + e SLICE +
 // lane. Entries are added in four sums, so that no sum waits for the previous one.
 kernel void AddRows(const Layout layout, const int channel, const int channels, const int rows,
                     global const int* pixel, global const long* start, global const int* index,
                     global const REAL* weight, global const REAL4* values, const int weighted,
-                    global const REAL* picture_weight, global REAL* y) {
+                    global const REAL* image_weight, global REAL* y) {
   const int row = (int)get_global_id(0);
   if (row >= rows) return;
   const int slice = row / SLICE;
@@ -132,7 +132,7 @@ kernel void AddRows(const Layout layout, const int channel, const int channels, 
   for (; e < entries; ++e) sum0 += weight[e * SLICE] * values[index[e * SLICE]];
   REAL4 sum = (sum0 + sum1) + (sum2 + sum3);
   const int p = layout.margin + pixel[row];
-  if (weighted) sum *= picture_weight[p];
+  if (weighted) sum *= image_weight[p];
   y += (size_t)channel * layout.plane + p;
   y[0] += sum.s0;
   if (channel + 1 < channels) y[layout.plane] += sum.s1;

@@ -51,7 +51,7 @@ void OpenClQueue::Finish() {
   Guarded(*device_, "queue", [&] { return queue_.finish(); });
 }
 
-void OpenClQueue::Settle() noexcept {
+void OpenClQueue::WaitNoThrow() noexcept {
   try {
     queue_.finish();
   } catch (...) {  // the original error is the one to report
@@ -96,8 +96,8 @@ cl::Buffer OpenClQueue::NewBuffer(const std::string& what, void* data, std::size
   });
 }
 
-cl::Event OpenClQueue::SendHome(const std::string& what, const cl::Buffer& buffer, void* data,
-                                std::size_t bytes) {
+cl::Event OpenClQueue::EnqueueCopyToHost(const std::string& what, const cl::Buffer& buffer,
+                                         void* data, std::size_t bytes) {
   return Guarded(*device_, what, [&] {
     cl::Event sent;
     if (memory_ == HostMemory::kCopied) {
@@ -119,8 +119,8 @@ DeviceArray::DeviceArray(OpenClQueue* queue, const std::string& what, void* data
       bytes_(bytes),
       buffer_(queue->NewBuffer(what, data, bytes, holds == Holds::kData, true)) {}
 
-void DeviceArray::BringHome() {
-  const cl::Event sent = queue_->SendHome(what_, buffer_, data_, bytes_);
+void DeviceArray::CopyToHost() {
+  const cl::Event sent = queue_->EnqueueCopyToHost(what_, buffer_, data_, bytes_);
   Guarded(*queue_->device_, what_, [&] {
     queue_->queue_.finish();
     sent.wait();
@@ -206,7 +206,7 @@ void OpenClCall::Run(std::size_t items) {
     Enqueue(items);
     for (Array& array : arrays_) {
       if (!array.is_written) continue;
-      array.sent = queue_->SendHome(array.what, array.buffer, array.data, array.bytes);
+      array.sent = queue_->EnqueueCopyToHost(array.what, array.buffer, array.data, array.bytes);
     }
     // One wait for everything, because on a CPU each wait costs as much as a small kernel. An error
     // while the kernel runs is reported with its name.
@@ -215,7 +215,7 @@ void OpenClCall::Run(std::size_t items) {
       if (array.is_written) Guarded(*queue_->device_, array.what, [&] { array.sent.wait(); });
     }
   } catch (...) {
-    queue_->Settle();  // the arrays may be destroyed after the error
+    queue_->WaitNoThrow();  // the arrays may be destroyed after the error
     throw;
   }
 }

@@ -31,7 +31,7 @@ class OpenClQueue {
   // Waits until all data sent are available for other queues as well.
   void Finish();
   // Waits until no command uses shared memory; errors are ignored.
-  void Settle() noexcept;
+  void WaitNoThrow() noexcept;
   // Throws Error if the device does not allow a buffer of this size.
   void CheckAllocation(const std::string& what, std::size_t bytes) const;
 
@@ -49,8 +49,8 @@ class OpenClQueue {
                        bool is_written);
   // Returns at once. The data are available when the queue is done, and the event reports the
   // success.
-  cl::Event SendHome(const std::string& what, const cl::Buffer& buffer, void* data,
-                     std::size_t bytes);
+  cl::Event EnqueueCopyToHost(const std::string& what, const cl::Buffer& buffer, void* data,
+                              std::size_t bytes);
 
   std::shared_ptr<const OpenClDevice> device_;
   cl::Program program_;
@@ -61,7 +61,7 @@ class OpenClQueue {
 };
 
 // Numbers that stay on the device from call to call. `data` is their memory on the host. It must
-// outlive this object and must not be accessed before BringHome.
+// outlive this object and must not be accessed before CopyToHost.
 class DeviceArray {
  public:
   enum class Holds {
@@ -72,10 +72,10 @@ class DeviceArray {
               Holds holds = Holds::kData);
   // Waits for calls that still use the memory, because an error may have occurred before they
   // ended.
-  ~DeviceArray() { queue_->Settle(); }
+  ~DeviceArray() { queue_->WaitNoThrow(); }
   DeviceArray(const DeviceArray&) = default;
   DeviceArray& operator=(const DeviceArray&) = default;
-  void BringHome();
+  void CopyToHost();
 
  private:
   friend class OpenClCall;

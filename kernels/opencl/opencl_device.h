@@ -63,7 +63,7 @@ std::unique_ptr<RadianceSteps<Real>> NewOpenClSteps(std::shared_ptr<const OpenCl
                                                     const cl::Program& program,
                                                     const DataTerm<Real>& data);
 std::unique_ptr<ViewWarp> NewOpenClWarp(std::shared_ptr<const OpenClDevice> device,
-                                        const cl::Program& program, const SurfacePicture& picture);
+                                        const cl::Program& program, const SurfaceImage& image);
 
 }  // namespace thicklens::kernels
 

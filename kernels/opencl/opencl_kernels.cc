@@ -50,7 +50,7 @@ EllMatrix<Real> NewEll(int rows, int columns, int slots) {
   return {rows, columns, slots, std::vector<std::int32_t>(entries), std::vector<Real>(entries)};
 }
 
-// Each method checks its arguments like the twin, handles empty arguments itself, and runs the
+// Each method checks its arguments like the reference, handles empty arguments itself, and runs the
 // kernel of the same name otherwise.
 template <typename Real>
 class OpenClKernels : public Kernels<Real> {
@@ -75,16 +75,16 @@ class OpenClKernels : public Kernels<Real> {
     return rays;
   }
 
-  EllMatrix<Real> WeighRays(const BlockGeometry& block, Splat splat,
-                            const std::vector<std::int32_t>& rays,
-                            const std::vector<Real>& irradiance) override {
+  EllMatrix<Real> WeightRays(const BlockGeometry& block, Splat splat,
+                             const std::vector<std::int32_t>& rays,
+                             const std::vector<Real>& irradiance) override {
     CheckRayNumbers(block, 1);
     CheckRays(block, splat, rays);
     if (!irradiance.empty()) CheckSize("irradiance", irradiance.size(), Index(block.rays()));
     auto h = NewEll<Real>(block.pixels(), block.rays(), RaySlots(block, splat));
     if (rays.empty()) return h;
     const std::vector<Real> slot_weights = SlotWeights<Real>(block, splat);
-    OpenClCall(queue_.get(), "WeighRays")
+    OpenClCall(queue_.get(), "WeightRays")
         .Value(cl_int{h.rows})
         .Value(cl_int{h.slots})
         .Input("slot weights", slot_weights)
@@ -144,25 +144,25 @@ class OpenClKernels : public Kernels<Real> {
         .Run(values->size());
   }
 
-  std::vector<Real> FormPicture(const BlockGeometry& whole, Splat splat,
-                                const std::vector<Real>& views) override {
+  std::vector<Real> FormImage(const BlockGeometry& whole, Splat splat,
+                              const std::vector<Real>& views) override {
     CheckBlock(whole);
-    CheckSize("light field to form a picture of", views.size(),
+    CheckSize("light field to form an image of", views.size(),
               Index(whole.s_count) * Index(whole.t_count) * Index(whole.views()));
-    std::vector<Real> picture(Index(whole.pixels()));
-    if (picture.empty() || views.empty()) return picture;
+    std::vector<Real> image(Index(whole.pixels()));
+    if (image.empty() || views.empty()) return image;
     constexpr std::size_t kStripPx = 16;  // equal to STRIP in render.cl
     const std::size_t strips = (Index(whole.width_px) + kStripPx - 1) / kStripPx;
-    OpenClCall(queue_.get(), "FormPicture")
+    OpenClCall(queue_.get(), "FormImage")
         .Value(ArgumentOf(whole))
         .Value(cl_int{TapCount(splat)})
         .Input("shifts", ShiftsOf(whole))
         .Input("fractions", RealsOf<Real>(whole.s_fraction, whole.t_fraction))
         .Input("view weights", RealsOf<Real>(whole.view_weight, {}))
         .Input("views", views)
-        .Output("picture", &picture)
+        .Output("image", &image)
         .Run(strips * Index(whole.height_px));
-    return picture;
+    return image;
   }
 
   void StartWhole(int s_count, int t_count, int u_count, int v_count, int channels) override {
@@ -192,7 +192,7 @@ class OpenClKernels : public Kernels<Real> {
   }
 
   std::vector<float> FinishWhole() override {
-    for (DeviceArray& channel : channels_) channel.BringHome();
+    for (DeviceArray& channel : channels_) channel.CopyToHost();
     channels_.clear();
     shape_ = {};
     return std::exchange(whole_, {});

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "kernels/opencl/guarded_child.h"
+#include "kernels/opencl/isolated_subprocess.h"
 #include "kernels/opencl/opencl_use.h"
 #include "thicklens/base/error.h"
 

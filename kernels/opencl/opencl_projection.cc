@@ -10,7 +10,7 @@ namespace {
 constexpr int kTogether = 4;  // channels that an entry of a row processes together
 // Minimum number of numbers before and after planes that items may read beyond the reach of
 // filters: a vector and a neighbour.
-constexpr int kLeastMargin = 64;
+constexpr int kMinMargin = 64;
 
 // The pixels that rows read, as ascending places on the plane, and for each pixel of the image its
 // index among them (-1: none).
@@ -18,7 +18,7 @@ struct ReadPixels {
   std::vector<std::int32_t> pixel, place_of;
 };
 template <typename Real>
-ReadPixels ReadPixelsOf(const PixelRows<Real>& rows, const PackedPlane& plane) {
+ReadPixels ReadPixelsOf(const PixelCsr<Real>& rows, const PackedPlane& plane) {
   ReadPixels read;
   const std::vector<std::int32_t> places = PackedPlaces(plane);
   std::vector<char> is_read(places.size(), 0);
@@ -35,14 +35,14 @@ ReadPixels ReadPixelsOf(const PixelRows<Real>& rows, const PackedPlane& plane) {
 }  // namespace
 
 template <typename Real>
-DevicePicture<Real>::DevicePicture(OpenClQueue* queue, const std::string& what,
-                                   const PictureLayout& layout, int channels)
+DeviceImage<Real>::DeviceImage(OpenClQueue* queue, const std::string& what,
+                               const ImageLayout& layout, int channels)
     : layout_(layout), memory_(queue, what, layout.size(channels) * sizeof(Real)) {
   memory_.Clear();
 }
 
 template <typename Real>
-void DevicePicture<Real>::Write(const std::vector<Real>& planes, Real beside) {
+void DeviceImage<Real>::Write(const std::vector<Real>& planes, Real beside) {
   std::vector<Real> padded(memory_.bytes() / sizeof(Real), Real{0});
   const std::size_t width = Index(layout_.width_px);
   const std::size_t rows = planes.size() / width;
@@ -55,7 +55,7 @@ void DevicePicture<Real>::Write(const std::vector<Real>& planes, Real beside) {
 }
 
 template <typename Real>
-std::vector<Real> DevicePicture<Real>::Read(int channels) const {
+std::vector<Real> DeviceImage<Real>::Read(int channels) const {
   std::vector<Real> padded(memory_.bytes() / sizeof(Real));
   memory_.Read(padded.data());
   const std::size_t width = Index(layout_.width_px);
@@ -73,9 +73,9 @@ OpenClProjection<Real>::OpenClProjection(OpenClQueue* queue, const DataTerm<Real
                                          const ItemForm& form)
     : queue_(queue), form_(form) {
   const PackedPlane plane = PackedPlaneOf(data.width_px, data.height_px, form.tile);
-  const PixelRows<Real> rows = RowsOf(*data.filters.rows);
+  const PixelCsr<Real> rows = RowsOf(*data.filters.rows);
   int reach = 0;
-  const auto pack = [&](const PixelFilter<Real>& filter, bool transposed, bool leave_out) {
+  const auto pack = [&](const VaryingFilter<Real>& filter, bool transposed, bool leave_out) {
     const PackedFilter<Real> packed =
         Pack(filter, transposed, leave_out ? rows.pixel : std::vector<std::int32_t>(), plane,
              form.tile, data.threads);
@@ -92,7 +92,7 @@ OpenClProjection<Real>::OpenClProjection(OpenClQueue* queue, const DataTerm<Real
   layout_.height_px = plane.height_px;
   layout_.stride_px = plane.stride_px;
   layout_.plane = static_cast<cl_int>(plane.size());
-  layout_.margin = (reach + 2 * kLeastMargin - 1) / kLeastMargin * kLeastMargin;
+  layout_.margin = (reach + 2 * kMinMargin - 1) / kMinMargin * kMinMargin;
 
   const ReadPixels read = ReadPixelsOf(rows, plane);
   const PackedRows<Real> packed = Pack(rows, read.place_of, plane, form.slice, data.threads);
@@ -107,8 +107,8 @@ OpenClProjection<Real>::OpenClProjection(OpenClQueue* queue, const DataTerm<Real
   rows_transposed_ = std::make_unique<Rows>(
       ToDevice(Pack(Transposed(rows), row_of, plane, form.slice, data.threads)));
 
-  between_ = std::make_unique<DevicePicture<Real>>(queue, "picture between two filters", layout_,
-                                                   data.channels);
+  between_ = std::make_unique<DeviceImage<Real>>(queue, "image between two filters", layout_,
+                                                 data.channels);
   const std::size_t together = kTogether * sizeof(Real);
   if (rows_->count == 0) return;
   of_pixels_ =
@@ -135,10 +135,9 @@ typename OpenClProjection<Real>::Rows OpenClProjection<Real>::ToDevice(
 }
 
 template <typename Real>
-void OpenClProjection<Real>::Run(const Filter& filter, const DevicePicture<Real>& x, int channels,
-                                 const DevicePicture<Real>* weight, bool add,
-                                 DevicePicture<Real>* y) {
-  OpenClCall(queue_, "FilterPicture")
+void OpenClProjection<Real>::Run(const Filter& filter, const DeviceImage<Real>& x, int channels,
+                                 const DeviceImage<Real>* weight, bool add, DeviceImage<Real>* y) {
+  OpenClCall(queue_, "FilterImage")
       .Value(layout_)
       .Value(cl_int{channels})
       .Value(cl_int{filter.step})
@@ -155,8 +154,8 @@ void OpenClProjection<Real>::Run(const Filter& filter, const DevicePicture<Real>
 
 template <typename Real>
 void OpenClProjection<Real>::Add(const Rows& rows, const DeviceMemory& values, int channel,
-                                 int channels, const DevicePicture<Real>* weight,
-                                 DevicePicture<Real>* y) {
+                                 int channels, const DeviceImage<Real>* weight,
+                                 DeviceImage<Real>* y) {
   OpenClCall(queue_, "AddRows")
       .Value(layout_)
       .Value(cl_int{channel})
@@ -174,7 +173,7 @@ void OpenClProjection<Real>::Add(const Rows& rows, const DeviceMemory& values, i
 }
 
 template <typename Real>
-void OpenClProjection<Real>::Take(const DevicePicture<Real>& from, int channel, int channels,
+void OpenClProjection<Real>::Take(const DeviceImage<Real>& from, int channel, int channels,
                                   int count, const DeviceMemory& pixel, const DeviceMemory& to) {
   if (count == 0) return;
   OpenClCall(queue_, "TakePixels")
@@ -189,8 +188,8 @@ void OpenClProjection<Real>::Take(const DevicePicture<Real>& from, int channel, 
 }
 
 template <typename Real>
-void OpenClProjection<Real>::Apply(const DevicePicture<Real>& x, int channels,
-                                   const DevicePicture<Real>* weight, DevicePicture<Real>* y) {
+void OpenClProjection<Real>::Apply(const DeviceImage<Real>& x, int channels,
+                                   const DeviceImage<Real>* weight, DeviceImage<Real>* y) {
   if (products_.empty()) y->Clear();
   for (std::size_t i = 0; i < products_.size(); ++i) {
     Run(products_[i].across, x, channels, nullptr, false, between_.get());
@@ -203,8 +202,8 @@ void OpenClProjection<Real>::Apply(const DevicePicture<Real>& x, int channels,
 }
 
 template <typename Real>
-void OpenClProjection<Real>::ApplyTransposed(const DevicePicture<Real>& y, int channels,
-                                             DevicePicture<Real>* x) {
+void OpenClProjection<Real>::ApplyTransposed(const DeviceImage<Real>& y, int channels,
+                                             DeviceImage<Real>* x) {
   if (products_.empty()) x->Clear();
   for (std::size_t i = 0; i < products_.size(); ++i) {
     Run(products_[i].down_transposed, y, channels, nullptr, false, between_.get());
@@ -216,8 +215,8 @@ void OpenClProjection<Real>::ApplyTransposed(const DevicePicture<Real>& y, int c
   }
 }
 
-template class DevicePicture<float>;
-template class DevicePicture<double>;
+template class DeviceImage<float>;
+template class DeviceImage<double>;
 template class OpenClProjection<float>;
 template class OpenClProjection<double>;
 

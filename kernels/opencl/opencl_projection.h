@@ -15,7 +15,7 @@
 namespace thicklens::kernels {
 
 // The layout of images on a device: Layout in filter.cl.
-struct PictureLayout {
+struct ImageLayout {
   cl_int width_px = 0, height_px = 0, stride_px = 0, plane = 0, margin = 0;
 
   std::size_t size(int channels) const {
@@ -27,10 +27,9 @@ struct PictureLayout {
 // An image on a device; it is converted from and to planes without gaps. The numbers beside the
 // planes are 0.
 template <typename Real>
-class DevicePicture {
+class DeviceImage {
  public:
-  DevicePicture(OpenClQueue* queue, const std::string& what, const PictureLayout& layout,
-                int channels);
+  DeviceImage(OpenClQueue* queue, const std::string& what, const ImageLayout& layout, int channels);
   // Writes as many planes as `planes` has. Numbers of a row beyond the image become `beside`.
   void Write(const std::vector<Real>& planes, Real beside = 0);
   std::vector<Real> Read(int channels) const;
@@ -38,7 +37,7 @@ class DevicePicture {
   const DeviceMemory& memory() const { return memory_; }
 
  private:
-  PictureLayout layout_;
+  ImageLayout layout_;
   DeviceMemory memory_;
 };
 
@@ -50,11 +49,11 @@ class OpenClProjection {
   // kept.
   OpenClProjection(OpenClQueue* queue, const DataTerm<Real>& data, const ItemForm& form);
 
-  const PictureLayout& layout() const { return layout_; }
+  const ImageLayout& layout() const { return layout_; }
   // Computes y = H x, or with a plane of weights W, y = W H x.
-  void Apply(const DevicePicture<Real>& x, int channels, const DevicePicture<Real>* weight,
-             DevicePicture<Real>* y);
-  void ApplyTransposed(const DevicePicture<Real>& y, int channels, DevicePicture<Real>* x);
+  void Apply(const DeviceImage<Real>& x, int channels, const DeviceImage<Real>* weight,
+             DeviceImage<Real>* y);
+  void ApplyTransposed(const DeviceImage<Real>& y, int channels, DeviceImage<Real>* x);
 
  private:
   struct Filter {
@@ -74,22 +73,22 @@ class OpenClProjection {
   };
   Filter ToDevice(const PackedFilter<Real>& packed, int step);
   Rows ToDevice(const PackedRows<Real>& packed);
-  void Run(const Filter& filter, const DevicePicture<Real>& x, int channels,
-           const DevicePicture<Real>* weight, bool add, DevicePicture<Real>* y);
+  void Run(const Filter& filter, const DeviceImage<Real>& x, int channels,
+           const DeviceImage<Real>* weight, bool add, DeviceImage<Real>* y);
   void Add(const Rows& rows, const DeviceMemory& values, int channel, int channels,
-           const DevicePicture<Real>* weight, DevicePicture<Real>* y);
+           const DeviceImage<Real>* weight, DeviceImage<Real>* y);
 
   // Copies four channels of the given pixels.
-  void Take(const DevicePicture<Real>& from, int channel, int channels, int count,
+  void Take(const DeviceImage<Real>& from, int channel, int channels, int count,
             const DeviceMemory& pixel, const DeviceMemory& to);
 
   OpenClQueue* queue_;
   ItemForm form_;
-  PictureLayout layout_;
+  ImageLayout layout_;
   std::vector<Product> products_;
   std::unique_ptr<Rows> rows_, rows_transposed_;
   std::unique_ptr<Pixels> read_;  // pixels that rows read
-  std::unique_ptr<DevicePicture<Real>> between_;
+  std::unique_ptr<DeviceImage<Real>> between_;
   // Four adjacent channels of the pixels that rows read and of those that have rows.
   std::unique_ptr<DeviceMemory> of_pixels_, of_rows_;
 };

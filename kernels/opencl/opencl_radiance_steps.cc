@@ -35,10 +35,10 @@ class OpenClSteps : public RadianceSteps<Real> {
         sums_(queue_.get(), "sums", SumGroups() * kSums * sizeof(double)) {
     photograph_.Write(data.photograph);
     weight_.Write(data.weight);
-    WeighBack(photograph_, data.channels, &right_);
-    // The approximate diagonal, as in the twin.
-    other_photograph_.Write(data.squared_row);
-    WeighBack(other_photograph_, 1, &data_diagonal_);
+    BackprojectWeighted(photograph_, data.channels, &right_);
+    // The approximate diagonal, as in the reference.
+    other_photograph_.Write(data.row_norm2);
+    BackprojectWeighted(other_photograph_, 1, &data_diagonal_);
   }
 
   void SetPrior(const QuadraticPrior<Real>& prior) override {
@@ -46,14 +46,14 @@ class OpenClSteps : public RadianceSteps<Real> {
               : prior.target.empty()     ? Target::kNone
                                          : Target::kGiven;
     if (target_ == Target::kGiven) {
-      if (!given_target_) given_target_.emplace(NewPicture("target", most_channels_));
+      if (!given_target_) given_target_.emplace(NewImage("target", most_channels_));
       given_target_->Write(prior.target);
     }
-    SetPull(prior.pull);
-    if (prior.smoothness.empty()) {
-      smoothness_.Clear();
+    SetTikhonovWeight(prior.tikhonov_weight);
+    if (prior.gradient_weight.empty()) {
+      gradient_weight_.Clear();
     } else {
-      smoothness_.Write(prior.smoothness);
+      gradient_weight_.Write(prior.gradient_weight);
     }
   }
 
@@ -63,19 +63,19 @@ class OpenClSteps : public RadianceSteps<Real> {
     slope_squared_.Write(*variation.slope_squared);
   }
 
-  void TouchVariation() override {
+  void ReweightVariation() override {
     target_ = Target::kNone;
-    if (pull_value_ != variation_.pull) {
-      SetPull(std::vector<Real>(pixels_, static_cast<Real>(variation_.pull)));
-      pull_value_ = variation_.pull;
+    if (tikhonov_value_ != variation_.tikhonov_weight) {
+      SetTikhonovWeight(std::vector<Real>(pixels_, static_cast<Real>(variation_.tikhonov_weight)));
+      tikhonov_value_ = variation_.tikhonov_weight;
     }
-    Call("TouchVariation")
+    Call("ReweightVariation")
         .Value(cl_int{channels_})
         .Value(static_cast<Real>(variation_.strength / 2))
         .Value(static_cast<Real>(variation_.eps * variation_.eps))
         .OnDevice(slope_squared_.memory())
         .OnDevice(x_.memory())
-        .OnDevice(smoothness_.memory())
+        .OnDevice(gradient_weight_.memory())
         .Enqueue(PlaneItems());
   }
 
@@ -89,7 +89,7 @@ class OpenClSteps : public RadianceSteps<Real> {
   void StartFor(const std::vector<Real>& photograph, const std::vector<Real>& x) override {
     channels_ = 1;
     other_photograph_.Write(photograph);
-    WeighBack(other_photograph_, 1, &other_right_);
+    BackprojectWeighted(other_photograph_, 1, &other_right_);
     started_photograph_ = &other_photograph_;
     started_right_ = &other_right_;
     StartAt(x);
@@ -98,29 +98,29 @@ class OpenClSteps : public RadianceSteps<Real> {
   double SquaredRightSide() override {
     return RunSums(Call("SquareRightSide")
                        .Value(cl_int{channels_})
-                       .OnDevice(pull_.memory())
+                       .OnDevice(tikhonov_weight_.memory())
                        .OnDevice(started_right_->memory())
                        .Value(cl_int{target_ != Target::kNone})
-                       .OnDevice(TargetPicture().memory()))[0];
+                       .OnDevice(TargetImage().memory()))[0];
   }
 
   ResidualSums UpdateResidual() override {
     const auto sums = RunSums(Call("UpdateResidual")
                                   .Value(cl_int{channels_})
                                   .OnDevice(data_diagonal_.memory())
-                                  .OnDevice(pull_.memory())
-                                  .OnDevice(smoothness_.memory())
+                                  .OnDevice(tikhonov_weight_.memory())
+                                  .OnDevice(gradient_weight_.memory())
                                   .OnDevice(x_.memory())
                                   .OnDevice(data_residual_.memory())
                                   .Value(cl_int{target_ != Target::kNone})
-                                  .OnDevice(TargetPicture().memory())
+                                  .OnDevice(TargetImage().memory())
                                   .OnDevice(inverse_diagonal_.memory())
                                   .OnDevice(residual_.memory()));
     return {sums[0], sums[1], sums[2]};
   }
 
-  double Turn(double beta) override {
-    return RunSums(Call("TurnDirection")
+  double UpdateDirection(double beta) override {
+    return RunSums(Call("UpdateDirection")
                        .Value(cl_int{channels_})
                        .Value(static_cast<Real>(beta))
                        .OnDevice(inverse_diagonal_.memory())
@@ -128,19 +128,19 @@ class OpenClSteps : public RadianceSteps<Real> {
                        .OnDevice(direction_.memory()))[0];
   }
 
-  double Curvature() override {
+  double ApplyNormalOperator() override {
     projection_.Apply(direction_, channels_, &weight_, &projected_);
     projection_.ApplyTransposed(projected_, channels_, &product_);
-    const auto sums = RunSums(Call("MeasureCurvature")
+    const auto sums = RunSums(Call("ApplyNormalOperator")
                                   .Value(cl_int{channels_})
-                                  .OnDevice(pull_.memory())
-                                  .OnDevice(smoothness_.memory())
+                                  .OnDevice(tikhonov_weight_.memory())
+                                  .OnDevice(gradient_weight_.memory())
                                   .OnDevice(direction_.memory())
                                   .OnDevice(product_.memory()));
     return sums[0] + sums[1];
   }
 
-  void Advance(double step) override {
+  void UpdateSolution(double step) override {
     AddScaled(step, direction_, &x_);
     AddScaled(-step, product_, &data_residual_);
   }
@@ -165,7 +165,7 @@ class OpenClSteps : public RadianceSteps<Real> {
   enum class Target { kNone, kPhotograph, kGiven };
 
   // Without a target, any image is returned.
-  const DevicePicture<Real>& TargetPicture() const {
+  const DeviceImage<Real>& TargetImage() const {
     return target_ == Target::kGiven ? *given_target_ : *started_photograph_;
   }
 
@@ -179,28 +179,28 @@ class OpenClSteps : public RadianceSteps<Real> {
     return call;
   }
 
-  DevicePicture<Real> NewPicture(const char* what, int channels) {
-    return DevicePicture<Real>(queue_.get(), what, layout_, channels);
+  DeviceImage<Real> NewImage(const char* what, int channels) {
+    return DeviceImage<Real>(queue_.get(), what, layout_, channels);
   }
 
-  // The pull is 1 beside the image, so that the preconditioner is finite there.
-  void SetPull(const std::vector<Real>& pull) {
-    pull_.Write(pull, 1);
-    pull_value_ = std::nan("");
+  // The Tikhonov weight is 1 beside the image, so that the preconditioner is finite there.
+  void SetTikhonovWeight(const std::vector<Real>& tikhonov_weight) {
+    tikhonov_weight_.Write(tikhonov_weight, 1);
+    tikhonov_value_ = std::nan("");
   }
 
-  // Computes to = H^T W picture.
-  void WeighBack(const DevicePicture<Real>& picture, int channels, DevicePicture<Real>* to) {
+  // Computes to = H^T W image.
+  void BackprojectWeighted(const DeviceImage<Real>& image, int channels, DeviceImage<Real>* to) {
     Call("MultiplyPlanes")
         .Value(cl_int{channels})
         .OnDevice(weight_.memory())
-        .OnDevice(picture.memory())
+        .OnDevice(image.memory())
         .OnDevice(projected_.memory())
         .Enqueue(PlaneItems());
     projection_.ApplyTransposed(projected_, channels, to);
   }
 
-  void AddScaled(double scale, const DevicePicture<Real>& x, DevicePicture<Real>* y) {
+  void AddScaled(double scale, const DeviceImage<Real>& x, DeviceImage<Real>* y) {
     Call("AddScaled")
         .Value(cl_int{channels_})
         .Value(static_cast<Real>(scale))
@@ -243,32 +243,32 @@ class OpenClSteps : public RadianceSteps<Real> {
   const int most_channels_;
   const std::size_t pixels_;
   OpenClProjection<Real> projection_;
-  const PictureLayout layout_;
+  const ImageLayout layout_;
   DeviceMemory sums_;
-  DevicePicture<Real> photograph_ = NewPicture("photograph", most_channels_);
-  DevicePicture<Real> weight_ = NewPicture("weights", 1);
-  DevicePicture<Real> right_ = NewPicture("right side", most_channels_);
-  DevicePicture<Real> other_photograph_ = NewPicture("probe", 1);
-  DevicePicture<Real> other_right_ = NewPicture("right side of a probe", 1);
-  DevicePicture<Real> data_diagonal_ = NewPicture("diagonal", 1);
-  DevicePicture<Real> inverse_diagonal_ = NewPicture("preconditioner", 1);
-  DevicePicture<Real> pull_ = NewPicture("pull", 1);
-  DevicePicture<Real> smoothness_ = NewPicture("smoothness", 1);
-  DevicePicture<Real> slope_squared_ = NewPicture("slopes", 1);
-  DevicePicture<Real> x_ = NewPicture("radiance", most_channels_);
-  DevicePicture<Real> data_residual_ = NewPicture("residual of the data", most_channels_);
-  DevicePicture<Real> residual_ = NewPicture("residual", most_channels_);
-  DevicePicture<Real> direction_ = NewPicture("direction", most_channels_);
-  DevicePicture<Real> product_ = NewPicture("product", most_channels_);
-  DevicePicture<Real> projected_ = NewPicture("projected picture", most_channels_);
+  DeviceImage<Real> photograph_ = NewImage("photograph", most_channels_);
+  DeviceImage<Real> weight_ = NewImage("weights", 1);
+  DeviceImage<Real> right_ = NewImage("right side", most_channels_);
+  DeviceImage<Real> other_photograph_ = NewImage("probe", 1);
+  DeviceImage<Real> other_right_ = NewImage("right side of a probe", 1);
+  DeviceImage<Real> data_diagonal_ = NewImage("diagonal", 1);
+  DeviceImage<Real> inverse_diagonal_ = NewImage("preconditioner", 1);
+  DeviceImage<Real> tikhonov_weight_ = NewImage("tikhonov_weight", 1);
+  DeviceImage<Real> gradient_weight_ = NewImage("gradient_weight", 1);
+  DeviceImage<Real> slope_squared_ = NewImage("slopes", 1);
+  DeviceImage<Real> x_ = NewImage("radiance", most_channels_);
+  DeviceImage<Real> data_residual_ = NewImage("residual of the data", most_channels_);
+  DeviceImage<Real> residual_ = NewImage("residual", most_channels_);
+  DeviceImage<Real> direction_ = NewImage("direction", most_channels_);
+  DeviceImage<Real> product_ = NewImage("product", most_channels_);
+  DeviceImage<Real> projected_ = NewImage("projected image", most_channels_);
 
   TotalVariation<Real> variation_;
-  double pull_value_ = std::nan("");  // value of all pixels; NaN if they differ
+  double tikhonov_value_ = std::nan("");  // value of all pixels; NaN if they differ
   Target target_ = Target::kNone;
-  std::optional<DevicePicture<Real>> given_target_;
+  std::optional<DeviceImage<Real>> given_target_;
   int channels_ = 1;
-  const DevicePicture<Real>* started_photograph_ = nullptr;
-  const DevicePicture<Real>* started_right_ = nullptr;
+  const DeviceImage<Real>* started_photograph_ = nullptr;
+  const DeviceImage<Real>* started_right_ = nullptr;
 };
 
 }  // namespace

@@ -25,22 +25,21 @@ struct SurfacesArgument {
 };
 
 // Returns the pixels of an image in the layout of warp.cl.
-std::vector<float> PixelsOf(const SurfacePicture& picture) {
-  const int of_pixel = picture.channels == 1 ? 1 : kFour;
-  const int planes = (picture.channels + of_pixel - 1) / of_pixel;
-  std::vector<float> pixels(Index(picture.width_px + kBefore + kAfter) *
-                            Index(picture.height_px + kBefore + kAfter) * Index(of_pixel) *
+std::vector<float> PixelsOf(const SurfaceImage& image) {
+  const int of_pixel = image.channels == 1 ? 1 : kFour;
+  const int planes = (image.channels + of_pixel - 1) / of_pixel;
+  std::vector<float> pixels(Index(image.width_px + kBefore + kAfter) *
+                            Index(image.height_px + kBefore + kAfter) * Index(of_pixel) *
                             Index(planes));
   float* to = pixels.data();
   for (int plane = 0; plane < planes; ++plane) {
     const int first = plane * of_pixel;
-    const int count = std::min(of_pixel, picture.channels - first);
-    for (int y = -kBefore; y < picture.height_px + kAfter; ++y) {
-      const std::size_t row =
-          Index(std::clamp(y, 0, picture.height_px - 1)) * Index(picture.width_px);
-      for (int x = -kBefore; x < picture.width_px + kAfter; ++x, to += of_pixel) {
-        const std::size_t pixel = row + Index(std::clamp(x, 0, picture.width_px - 1));
-        std::copy_n(picture.values->data() + pixel * Index(picture.channels) + first, count, to);
+    const int count = std::min(of_pixel, image.channels - first);
+    for (int y = -kBefore; y < image.height_px + kAfter; ++y) {
+      const std::size_t row = Index(std::clamp(y, 0, image.height_px - 1)) * Index(image.width_px);
+      for (int x = -kBefore; x < image.width_px + kAfter; ++x, to += of_pixel) {
+        const std::size_t pixel = row + Index(std::clamp(x, 0, image.width_px - 1));
+        std::copy_n(image.values->data() + pixel * Index(image.channels) + first, count, to);
       }
     }
   }
@@ -48,8 +47,8 @@ std::vector<float> PixelsOf(const SurfacePicture& picture) {
 }
 
 // Returns the shift of a view as floats, and their rounding errors. A device without double then
-// finds the sources with the full precision of float, like the twin. The product with a shift above
-// the bound is outside of any image.
+// finds the sources with the full precision of float, like the reference. The product with a shift
+// above the bound is outside of any image.
 cl_float4 ShiftOf(const ViewSources& view) {
   constexpr double kBound = 1e30;
   const double x = std::clamp(view.shift_x, -kBound, kBound);
@@ -58,8 +57,8 @@ cl_float4 ShiftOf(const ViewSources& view) {
   return {{float_x, float_y, static_cast<float>(x - float_x), static_cast<float>(y - float_y)}};
 }
 
-static_assert(sizeof(HiddenSample) == 16, "Hidden in warp.cl");
-static_assert(sizeof(MixedSample) == 24, "Mixed in warp.cl");
+static_assert(sizeof(OccludedSample) == 16, "Occluded in warp.cl");
+static_assert(sizeof(BoundarySample) == 24, "Boundary in warp.cl");
 
 // Returns minimum and maximum alternately, pixel by pixel.
 std::vector<float> PairsOf(const TapRanges& ranges) {
@@ -73,27 +72,28 @@ std::vector<float> PairsOf(const TapRanges& ranges) {
 
 class OpenClWarp : public ViewWarp {
  public:
-  OpenClWarp(std::unique_ptr<OpenClQueue> queue, const SurfacePicture& picture,
-             const TapRanges& ranges, int lanes)
+  OpenClWarp(std::unique_ptr<OpenClQueue> queue, const SurfaceImage& image, const TapRanges& ranges,
+             int lanes)
       : queue_(std::move(queue)),
         lanes_(lanes),
-        picture_(picture),
-        pixels_(Copied(queue_.get(), "picture of surfaces", PixelsOf(picture))),
-        disparity_(Copied(queue_.get(), "disparity of a picture", *picture.disparity)),
+        image_(image),
+        pixels_(Copied(queue_.get(), "image of surfaces", PixelsOf(image))),
+        disparity_(Copied(queue_.get(), "disparity of an image", *image.disparity)),
         ranges_(Copied(queue_.get(), "ranges of disparities", PairsOf(ranges))) {
     queue_->Finish();  // the queues that read the image are not synchronised with this one
   }
 
   void Warp(const ViewSources& view, std::vector<float>* values) override {
-    CheckView(picture_, view);
-    const SurfacesArgument surfaces{picture_.width_px, picture_.height_px, picture_.channels,
-                                    picture_.tolerance,
-                                    static_cast<cl_float>(picture_.width_px + picture_.height_px)};
+    CheckView(image_, view);
+    const SurfacesArgument surfaces{image_.width_px, image_.height_px, image_.channels,
+                                    image_.tolerance,
+                                    static_cast<cl_float>(image_.width_px + image_.height_px)};
     // Replaces an empty list, which OpenCL does not allow.
-    const std::vector<HiddenSample> no_sample(1);
-    const std::vector<HiddenSample>& hidden = view.hidden->empty() ? no_sample : *view.hidden;
-    const auto hidden_count = static_cast<int>(view.hidden->size());
-    values->resize(picture_.values->size());
+    const std::vector<OccludedSample> no_sample(1);
+    const std::vector<OccludedSample>& occluded =
+        view.occluded->empty() ? no_sample : *view.occluded;
+    const auto occluded_count = static_cast<int>(view.occluded->size());
+    values->resize(image_.values->size());
     std::unique_ptr<OpenClQueue> queue = TakeQueue();
     DeviceArray made(queue.get(), "view", values->data(), values->size() * sizeof(float),
                      DeviceArray::Holds::kNothing);
@@ -104,21 +104,21 @@ class OpenClWarp : public ViewWarp {
         .OnDevice(ranges_)
         .Input("disparity of a view", *view.disparity)
         .Value(ShiftOf(view))
-        .Input("hidden samples of a view", hidden)
-        .Value(static_cast<cl_int>(hidden_count))
+        .Input("occluded samples of a view", occluded)
+        .Value(static_cast<cl_int>(occluded_count))
         .OnDevice(made)
-        .Enqueue(ItemsOf(picture_.width_px) * Index(picture_.height_px) + ItemsOf(hidden_count));
-    if (view.mixed != nullptr && !view.mixed->empty()) {
+        .Enqueue(ItemsOf(image_.width_px) * Index(image_.height_px) + ItemsOf(occluded_count));
+    if (view.boundary != nullptr && !view.boundary->empty()) {
       OpenClCall(queue.get(), "MixSamples")
           .Value(surfaces)
           .OnDevice(pixels_)
           .OnDevice(disparity_)
-          .Input("mixed samples of a view", *view.mixed)
-          .Value(static_cast<cl_int>(view.mixed->size()))
+          .Input("boundary samples of a view", *view.boundary)
+          .Value(static_cast<cl_int>(view.boundary->size()))
           .OnDevice(made)
-          .Enqueue(view.mixed->size());
+          .Enqueue(view.boundary->size());
     }
-    made.BringHome();
+    made.CopyToHost();
     const std::lock_guard<std::mutex> lock(mutex_);
     spare_queues_.push_back(std::move(queue));
   }
@@ -137,7 +137,7 @@ class OpenClWarp : public ViewWarp {
 
   const std::unique_ptr<OpenClQueue> queue_;  // queue that sent the image
   const int lanes_;                           // samples per item
-  const SurfacePicture picture_;
+  const SurfaceImage image_;
   const DeviceMemory pixels_, disparity_, ranges_;
   std::mutex mutex_;
   std::vector<std::unique_ptr<OpenClQueue>> spare_queues_;
@@ -146,12 +146,12 @@ class OpenClWarp : public ViewWarp {
 }  // namespace
 
 std::unique_ptr<ViewWarp> NewOpenClWarp(std::shared_ptr<const OpenClDevice> device,
-                                        const cl::Program& program, const SurfacePicture& picture) {
-  const TapRanges ranges = TapRangesOf(picture);
+                                        const cl::Program& program, const SurfaceImage& image) {
+  const TapRanges ranges = TapRangesOf(image);
   const HostMemory memory = HostMemoryOf(*device);
   const int lanes = FormOf(*device, sizeof(float)).lanes;
   return std::make_unique<OpenClWarp>(
-      std::make_unique<OpenClQueue>(std::move(device), program, memory), picture, ranges, lanes);
+      std::make_unique<OpenClQueue>(std::move(device), program, memory), image, ranges, lanes);
 }
 
 }  // namespace thicklens::kernels

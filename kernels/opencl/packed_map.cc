@@ -17,7 +17,7 @@ constexpr int kWindowSlices = 16;  // number of slices in a window over which ro
 template <typename Real>
 class Coefficients {
  public:
-  Coefficients(const PixelFilter<Real>& filter, const std::vector<std::int32_t>& left_out)
+  Coefficients(const VaryingFilter<Real>& filter, const std::vector<std::int32_t>& left_out)
       : filter_(filter), is_left_out_(Index(filter.width_px) * Index(filter.height_px), 0) {
     for (const std::int32_t pixel : left_out) is_left_out_[Index(pixel)] = 1;
     for (const std::int32_t radius : filter.radius_px) most_ = std::max(most_, radius);
@@ -61,7 +61,7 @@ class Coefficients {
   }
 
  private:
-  const PixelFilter<Real>& filter_;
+  const VaryingFilter<Real>& filter_;
   std::vector<unsigned char> is_left_out_;
   int most_ = 0;
 };
@@ -84,7 +84,7 @@ std::vector<std::int32_t> PackedPlaces(const PackedPlane& plane) {
 }
 
 template <typename Real>
-PackedFilter<Real> Pack(const PixelFilter<Real>& filter, bool transposed,
+PackedFilter<Real> Pack(const VaryingFilter<Real>& filter, bool transposed,
                         const std::vector<std::int32_t>& left_out, const PackedPlane& plane,
                         int tile_px, int threads) {
   const Coefficients<Real> coefficients(filter, left_out);
@@ -140,7 +140,7 @@ PackedFilter<Real> Pack(const PixelFilter<Real>& filter, bool transposed,
 }
 
 template <typename Real>
-PackedRows<Real> Pack(const PixelRows<Real>& rows, const std::vector<std::int32_t>& place_of,
+PackedRows<Real> Pack(const PixelCsr<Real>& rows, const std::vector<std::int32_t>& place_of,
                       const PackedPlane& plane, int slice, int threads) {
   PackedRows<Real> packed;
   const int count = static_cast<int>(rows.pixel.size());
@@ -184,13 +184,13 @@ PackedRows<Real> Pack(const PixelRows<Real>& rows, const std::vector<std::int32_
   return packed;
 }
 
-template PackedFilter<float> Pack(const PixelFilter<float>&, bool, const std::vector<std::int32_t>&,
-                                  const PackedPlane&, int, int);
-template PackedFilter<double> Pack(const PixelFilter<double>&, bool,
+template PackedFilter<float> Pack(const VaryingFilter<float>&, bool,
+                                  const std::vector<std::int32_t>&, const PackedPlane&, int, int);
+template PackedFilter<double> Pack(const VaryingFilter<double>&, bool,
                                    const std::vector<std::int32_t>&, const PackedPlane&, int, int);
-template PackedRows<float> Pack(const PixelRows<float>&, const std::vector<std::int32_t>&,
+template PackedRows<float> Pack(const PixelCsr<float>&, const std::vector<std::int32_t>&,
                                 const PackedPlane&, int, int);
-template PackedRows<double> Pack(const PixelRows<double>&, const std::vector<std::int32_t>&,
+template PackedRows<double> Pack(const PixelCsr<double>&, const std::vector<std::int32_t>&,
                                  const PackedPlane&, int, int);
 
 }  // namespace thicklens::kernels

@@ -5,11 +5,11 @@
 #include <cstdint>
 #include <vector>
 
-#include "thicklens/kernels/picture_filter.h"
+#include "thicklens/kernels/image_filter.h"
 
 namespace thicklens::kernels {
 
-// The numbers of picture_filter.h in the layout of kernels: items that run side by side read
+// The numbers of image_filter.h in the layout of kernels: items that run side by side read
 // adjacent numbers.
 
 // Planes with rows of stride_px numbers; those beyond the width are 0.
@@ -37,7 +37,7 @@ struct PackedFilter {
 };
 // `left_out`: pixels of the untransposed filter's result that are set to 0.
 template <typename Real>
-PackedFilter<Real> Pack(const PixelFilter<Real>& filter, bool transposed,
+PackedFilter<Real> Pack(const VaryingFilter<Real>& filter, bool transposed,
                         const std::vector<std::int32_t>& left_out, const PackedPlane& plane,
                         int tile_px, int threads);
 
@@ -55,7 +55,7 @@ struct PackedRows {
 };
 // `place_of` maps the indices of the rows to packed indices.
 template <typename Real>
-PackedRows<Real> Pack(const PixelRows<Real>& rows, const std::vector<std::int32_t>& place_of,
+PackedRows<Real> Pack(const PixelCsr<Real>& rows, const std::vector<std::int32_t>& place_of,
                       const PackedPlane& plane, int slice, int threads);
 
 // Returns the place on the packed plane of each pixel of the image.

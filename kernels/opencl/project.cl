@@ -4,7 +4,7 @@
 // reference.cc, term by term and in the same order, and differs from it only by rounding. Items
 // beyond the last do nothing, because the number of items is rounded up to whole groups.
 
-// Fusing is off as in the C++ twin: where 1 - w is 0 there, it must be 0 here.
+// Fusing is off as in the C++ reference: where 1 - w is 0 there, it must be 0 here.
 #pragma OPENCL FP_CONTRACT OFF
 
 // The structure BlockGeometry. Its lists are buffers: `shift` holds s_shift, then t_shift;
@@ -61,7 +61,7 @@ kernel void FindRays(const Block block, const int taps, global const int* shift,
 }
 
 // One item per pixel, which reads its slots twice: for the sum, then for the division by it.
-kernel void WeighRays(const int pixels, const int slots, global const REAL* slot_weight,
+kernel void WeightRays(const int pixels, const int slots, global const REAL* slot_weight,
                       global const int* rays, const int has_irradiance,
                       global const REAL* irradiance, global int* column, global REAL* value) {
   const int pixel = (int)get_global_id(0);

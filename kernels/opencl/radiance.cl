@@ -22,7 +22,7 @@ NUMBERS HasLeft(int x, int width_px) {
   return REAL_OF(clamp(min((WHOLE)x + ORDER, (WHOLE)(width_px - x) - ORDER), (WHOLE)0, (WHOLE)1));
 }
 
-// The smoothness t of the four differences that include a pixel; 0 where there is none.
+// The gradient weight t of the four differences that include a pixel; 0 where there is none.
 typedef struct {
   NUMBERS right, left, below, above;
 } Ties;
@@ -40,12 +40,12 @@ Ties TiesAt(const Layout layout, int p, global const REAL* t) {
 }
 
 // Returns P r of one channel.
-NUMBERS PriorOf(const Layout layout, int p, const Ties ties, NUMBERS pull, global const REAL* r) {
+NUMBERS PriorOf(const Layout layout, int p, const Ties ties, NUMBERS tikhonov_weight, global const REAL* r) {
   const int y = p / layout.stride_px;
   const int down = y + 1 < layout.height_px ? layout.stride_px : 0;
   const int up = y > 0 ? layout.stride_px : 0;
   const NUMBERS here = LOAD(r + p);
-  return pull * here + ties.right * (here - LOAD(r + p + 1)) +
+  return tikhonov_weight * here + ties.right * (here - LOAD(r + p + 1)) +
          ties.left * (here - LOAD(r + p - 1)) + ties.below * (here - LOAD(r + p + down)) +
          ties.above * (here - LOAD(r + p - up));
 }
@@ -93,7 +93,7 @@ void AddUp(local const SUM* of_item, global SUM* sums) {
 }
 // Sets the quadratic that touches the total variation at x: t = half s^2/(s^2 |dx|^2 +
 // floor)^(1/2).
-kernel void TouchVariation(const Layout layout, const int channels, const REAL half_strength,
+kernel void ReweightVariation(const Layout layout, const int channels, const REAL half_strength,
                            const REAL floor_squared, global const REAL* slope_squared,
                            global const REAL* x, global REAL* t) {
   const int p = (int)get_global_id(0) * LANES;
@@ -113,43 +113,43 @@ kernel void TouchVariation(const Layout layout, const int channels, const REAL h
   STORE(half_strength * s2 / sqrt(s2 * squares + floor_squared), t + layout.margin + p);
 }
 
-// Sets r = data_residual - P x + pull target, m = M^-1, and computes the sums r.r, r.m r and r.m
+// Sets r = data_residual - P x + tikhonov_weight target, m = M^-1, and computes the sums r.r, r.m r and r.m
 // (previous r).
 kernel void UpdateResidual(const Layout layout, const int channels,
-                           global const REAL* data_diagonal, global const REAL* pull,
+                           global const REAL* data_diagonal, global const REAL* tikhonov_weight,
                            global const REAL* t, global const REAL* x,
                            global const REAL* data_residual, const int has_target,
                            global const REAL* target, global REAL* m, global REAL* r,
                            global SUM* sums) {
   NUMBERS squared = 0;
   NUMBERS preconditioned = 0;
-  NUMBERS with_former = 0;
+  NUMBERS with_previous = 0;
   FOR_PIXELS(p) {
     const Ties ties = TiesAt(layout, p, t + layout.margin);
-    const NUMBERS pull_here = LOAD(pull + layout.margin + p);
-    const NUMBERS m_here = 1 / (LOAD(data_diagonal + layout.margin + p) + pull_here + ties.right +
+    const NUMBERS tikhonov_here = LOAD(tikhonov_weight + layout.margin + p);
+    const NUMBERS m_here = 1 / (LOAD(data_diagonal + layout.margin + p) + tikhonov_here + ties.right +
                                 ties.left + ties.below + ties.above);
     STORE(m_here, m + layout.margin + p);
     for (int channel = 0; channel < channels; ++channel) {
       const size_t plane = layout.margin + (size_t)channel * layout.plane;
       NUMBERS now = LOAD(data_residual + plane + p) -
-                    PriorOf(layout, p, ties, pull_here, x + plane);
-      if (has_target) now += pull_here * LOAD(target + plane + p);
+                    PriorOf(layout, p, ties, tikhonov_here, x + plane);
+      if (has_target) now += tikhonov_here * LOAD(target + plane + p);
       const NUMBERS weighted = m_here * now;
       squared += now * now;
       preconditioned += now * weighted;
-      with_former += LOAD(r + plane + p) * weighted;
+      with_previous += LOAD(r + plane + p) * weighted;
       STORE(now, r + plane + p);
     }
   }
   local SUM of_item[SUMS * MOST_ITEMS];
-  PutSums(SumOf(squared), SumOf(preconditioned), SumOf(with_former), of_item);
+  PutSums(SumOf(squared), SumOf(preconditioned), SumOf(with_previous), of_item);
   barrier(CLK_LOCAL_MEM_FENCE);
   if (get_local_id(0) == 0) AddUp(of_item, sums);
 }
 
 // Computes |b|^2.
-kernel void SquareRightSide(const Layout layout, const int channels, global const REAL* pull,
+kernel void SquareRightSide(const Layout layout, const int channels, global const REAL* tikhonov_weight,
                             global const REAL* right, const int has_target,
                             global const REAL* target, global SUM* sums) {
   NUMBERS squared = 0;
@@ -157,7 +157,7 @@ kernel void SquareRightSide(const Layout layout, const int channels, global cons
     for (int channel = 0; channel < channels; ++channel) {
       const size_t at = layout.margin + (size_t)channel * layout.plane + p;
       NUMBERS b = LOAD(right + at);
-      if (has_target) b += LOAD(pull + layout.margin + p) * LOAD(target + at);
+      if (has_target) b += LOAD(tikhonov_weight + layout.margin + p) * LOAD(target + at);
       squared += b * b;
     }
   }
@@ -168,7 +168,7 @@ kernel void SquareRightSide(const Layout layout, const int channels, global cons
 }
 
 // Sets direction = m r + beta direction and computes the sum direction.r.
-kernel void TurnDirection(const Layout layout, const int channels, const REAL beta,
+kernel void UpdateDirection(const Layout layout, const int channels, const REAL beta,
                           global const REAL* m, global const REAL* r, global REAL* direction,
                           global SUM* sums) {
   NUMBERS steepness = 0;
@@ -189,18 +189,18 @@ kernel void TurnDirection(const Layout layout, const int channels, const REAL be
 }
 
 // Computes the sums direction.P direction and direction.product.
-kernel void MeasureCurvature(const Layout layout, const int channels, global const REAL* pull,
+kernel void ApplyNormalOperator(const Layout layout, const int channels, global const REAL* tikhonov_weight,
                              global const REAL* t, global const REAL* direction,
                              global const REAL* product, global SUM* sums) {
   NUMBERS of_prior = 0;
   NUMBERS of_data = 0;
   FOR_PIXELS(p) {
     const Ties ties = TiesAt(layout, p, t + layout.margin);
-    const NUMBERS pull_here = LOAD(pull + layout.margin + p);
+    const NUMBERS tikhonov_here = LOAD(tikhonov_weight + layout.margin + p);
     for (int channel = 0; channel < channels; ++channel) {
       const size_t plane = layout.margin + (size_t)channel * layout.plane;
       const NUMBERS here = LOAD(direction + plane + p);
-      of_prior += here * PriorOf(layout, p, ties, pull_here, direction + plane);
+      of_prior += here * PriorOf(layout, p, ties, tikhonov_here, direction + plane);
       of_data += here * LOAD(product + plane + p);
     }
   }

@@ -1,6 +1,6 @@
 // Kernels from a light field to its image, and from blocks to a light field.
 
-// Number of pixels of a row that one item of FormPicture sums up. It is a constant, so that the
+// Number of pixels of a row that one item of FormImage sums up. It is a constant, so that the
 // loops over them are unrolled and vectorised.
 #define STRIP 16
 
@@ -9,9 +9,9 @@
 // length that is known only at run time, is never vectorised on a CPU. The strips cost a GPU some
 // coalescing and divide the memory streams of a CPU into pieces of a strip. Every sample is read
 // once for each tap.
-kernel void FormPicture(const Block whole, const int taps, global const int* shift,
+kernel void FormImage(const Block whole, const int taps, global const int* shift,
                         global const REAL* fraction, global const REAL* view_weight,
-                        global const REAL* views, global REAL* picture) {
+                        global const REAL* views, global REAL* image) {
   const int strips = (whole.width_px + STRIP - 1) / STRIP;
   const int y = (int)(get_global_id(0) / strips);
   const int x = (int)(get_global_id(0) % strips) * STRIP;
@@ -57,7 +57,7 @@ kernel void FormPicture(const Block whole, const int taps, global const int* shi
     }
   }
   for (int i = 0; i < STRIP && x + i < whole.width_px; ++i) {
-    picture[(size_t)y * whole.width_px + x + i] = weights[i] > 0 ? sum[i] / weights[i] : 0;
+    image[(size_t)y * whole.width_px + x + i] = weights[i] > 0 ? sum[i] / weights[i] : 0;
   }
 }
 

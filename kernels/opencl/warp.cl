@@ -1,6 +1,6 @@
 // Reads an image for the samples of a view: view_warp.h, reference_warp.cc.
 
-// Fusing is off as in the C++ twin, because the same numbers must decide which taps are used.
+// Fusing is off as in the C++ reference, because the same numbers must decide which taps are used.
 #pragma OPENCL FP_CONTRACT OFF
 
 // LANES numbers (filter.cl), which need not be REAL; WHOLE is from radiance.cl.
@@ -24,18 +24,18 @@ typedef struct {
   float tolerance, limit_px;
 } Surfaces;
 
-// HiddenSample in view_warp.h.
+// OccludedSample in view_warp.h.
 typedef struct {
   int index;
   float source_x, source_y, disparity;
-} Hidden;
+} Occluded;
 
-// MixedSample in view_warp.h.
+// BoundarySample in view_warp.h.
 typedef struct {
   int index;
-  Hidden other;
+  Occluded other;
   float share;
-} Mixed;
+} Boundary;
 
 // Returns the pixels before the positions of samples on a line, and sets `rest` to the distances to
 // the positions.
@@ -84,18 +84,18 @@ float4 BicubicOfFour(global const float4* tap, int stride, float16 weight_x, flo
 }
 
 // Returns the shares of the four surrounding pixels; only pixels of the surface have one.
-float4 Shares(const Surfaces picture, global const float* disparity, int x, int y, float rest_x,
+float4 Shares(const Surfaces image, global const float* disparity, int x, int y, float rest_x,
               float rest_y, float d) {
   // Beyond the last pixel the weight is 0.
-  const int there = y * picture.width_px + x;
-  const int right = min(x + 1, picture.width_px - 1) - x;
-  const int below = (min(y + 1, picture.height_px - 1) - y) * picture.width_px;
+  const int there = y * image.width_px + x;
+  const int right = min(x + 1, image.width_px - 1) - x;
+  const int below = (min(y + 1, image.height_px - 1) - y) * image.width_px;
   const float4 weight = (float4)((1 - rest_x) * (1 - rest_y), rest_x * (1 - rest_y),
                                  (1 - rest_x) * rest_y, rest_x * rest_y);
   const float4 away = fabs((float4)(disparity[there], disparity[there + right],
                                     disparity[there + below], disparity[there + below + right]) -
                            d);
-  const float4 weighed = select(weight, (float4)(0), away > picture.tolerance);
+  const float4 weighed = select(weight, (float4)(0), away > image.tolerance);
   float sum_of_weights = 0;
   sum_of_weights += weighed.s0;
   sum_of_weights += weighed.s1;
@@ -133,41 +133,41 @@ FLOATS LoadSamples(global const float* from, int count) {
 }
 
 // One item computes LANES samples of a row (see filter.cl). The items after those of all rows
-// compute LANES hidden samples each, at any position. `ranges`: minimum and maximum of the
+// compute LANES occluded samples each, at any position. `ranges`: minimum and maximum of the
 // disparities around each pixel. `shift`: across and down, then the rounding errors of these
 // floats.
-kernel void WarpView(const Surfaces picture, global const float* pixels,
+kernel void WarpView(const Surfaces image, global const float* pixels,
                      global const float* disparity, global const float2* ranges,
                      global const float* view_disparity, const float4 shift,
-                     global const Hidden* hidden, const int hidden_count, global float* values) {
-  const int items_in_row = (picture.width_px + LANES - 1) / LANES;
+                     global const Occluded* occluded, const int occluded_count, global float* values) {
+  const int items_in_row = (image.width_px + LANES - 1) / LANES;
   const int row = (int)get_global_id(0) / items_in_row;
   int count, sample[LANES];
   float sample_disparity[LANES];
   WHOLE sample_x, sample_y;
   FLOATS source_x, source_y;
-  if (row < picture.height_px) {
+  if (row < image.height_px) {
     const int first = (int)get_global_id(0) % items_in_row * LANES;
-    count = min(LANES, picture.width_px - first);
+    count = min(LANES, image.width_px - first);
     sample_x = (WHOLE)first + ORDER;
     sample_y = (WHOLE)row;
-    STORE_LANES((WHOLE)(row * picture.width_px) + sample_x, sample);
+    STORE_LANES((WHOLE)(row * image.width_px) + sample_x, sample);
     const FLOATS seen =
-        LoadSamples(view_disparity + (size_t)row * picture.width_px + first, count);
+        LoadSamples(view_disparity + (size_t)row * image.width_px + first, count);
     source_x = fma((FLOATS)shift.s0, seen, shift.s2 * seen);
     source_y = fma((FLOATS)shift.s1, seen, shift.s3 * seen);
     STORE_LANES(seen, sample_disparity);
   } else {
-    const int first = ((int)get_global_id(0) - items_in_row * picture.height_px) * LANES;
-    count = min(LANES, hidden_count - first);
+    const int first = ((int)get_global_id(0) - items_in_row * image.height_px) * LANES;
+    count = min(LANES, occluded_count - first);
     if (count <= 0) return;
     int column[LANES], line[LANES];
     float across[LANES], down[LANES];
     for (int lane = 0; lane < LANES; ++lane) {
-      const Hidden one = hidden[first + min(lane, count - 1)];
+      const Occluded one = occluded[first + min(lane, count - 1)];
       sample[lane] = one.index;
-      column[lane] = one.index % picture.width_px;
-      line[lane] = one.index / picture.width_px;
+      column[lane] = one.index % image.width_px;
+      line[lane] = one.index / image.width_px;
       across[lane] = one.source_x;
       down[lane] = one.source_y;
       sample_disparity[lane] = one.disparity;
@@ -181,32 +181,32 @@ kernel void WarpView(const Surfaces picture, global const float* pixels,
   FLOATS rests_x, rests_y;
   int pixel_x[LANES], pixel_y[LANES];
   float rest_x[LANES], rest_y[LANES];
-  STORE_LANES(PixelsBefore(sample_x, source_x, picture.width_px, picture.limit_px, &rests_x),
+  STORE_LANES(PixelsBefore(sample_x, source_x, image.width_px, image.limit_px, &rests_x),
               pixel_x);
-  STORE_LANES(PixelsBefore(sample_y, source_y, picture.height_px, picture.limit_px, &rests_y),
+  STORE_LANES(PixelsBefore(sample_y, source_y, image.height_px, image.limit_px, &rests_y),
               pixel_y);
   STORE_LANES(rests_x, rest_x);
   STORE_LANES(rests_y, rest_y);
 
-  const int stride = picture.width_px + 3;
-  const int plane = stride * (picture.height_px + 3);
+  const int stride = image.width_px + 3;
+  const int plane = stride * (image.height_px + 3);
   for (int lane = 0; lane < count; ++lane) {
     const float d = sample_disparity[lane];
-    if (isnan(d)) continue;  // a hidden sample, which another item reads
+    if (isnan(d)) continue;  // an occluded sample, which another item reads
     const int x = pixel_x[lane];
     const int y = pixel_y[lane];
-    global float* to = values + (size_t)sample[lane] * picture.channels;
-    const float2 range = ranges[y * picture.width_px + x];
+    global float* to = values + (size_t)sample[lane] * image.channels;
+    const float2 range = ranges[y * image.width_px + x];
     const bool is_cubic =
-        fabs(range.s0 - d) <= picture.tolerance && fabs(range.s1 - d) <= picture.tolerance;
-    if (picture.channels == 1) {
+        fabs(range.s0 - d) <= image.tolerance && fabs(range.s1 - d) <= image.tolerance;
+    if (image.channels == 1) {
       global const float* tap = pixels + y * stride + x;  // at -1, -1
       if (is_cubic) {
         *to = BicubicOfOne(tap, stride, CatmullRom(rest_x[lane]), CatmullRom(rest_y[lane]));
         continue;
       }
       tap += stride + 1;
-      *to = dot(Shares(picture, disparity, x, y, rest_x[lane], rest_y[lane], d),
+      *to = dot(Shares(image, disparity, x, y, rest_x[lane], rest_y[lane], d),
                 (float4)(tap[0], tap[1], tap[stride], tap[stride + 1]));
       continue;
     }
@@ -214,52 +214,52 @@ kernel void WarpView(const Surfaces picture, global const float* pixels,
     if (is_cubic) {
       const float16 weight_x = CatmullRomOfFour(rest_x[lane]);
       const float4 weight_y = CatmullRom(rest_y[lane]);
-      for (int c = 0; c < picture.channels; c += 4, tap += plane) {
-        StoreChannels(BicubicOfFour(tap, stride, weight_x, weight_y), picture.channels - c, to + c);
+      for (int c = 0; c < image.channels; c += 4, tap += plane) {
+        StoreChannels(BicubicOfFour(tap, stride, weight_x, weight_y), image.channels - c, to + c);
       }
       continue;
     }
-    const float4 share = Shares(picture, disparity, x, y, rest_x[lane], rest_y[lane], d);
+    const float4 share = Shares(image, disparity, x, y, rest_x[lane], rest_y[lane], d);
     tap += stride + 1;
-    for (int c = 0; c < picture.channels; c += 4, tap += plane) {
+    for (int c = 0; c < image.channels; c += 4, tap += plane) {
       StoreChannels(share.s0 * tap[0] + share.s1 * tap[1] + share.s2 * tap[stride] +
                         share.s3 * tap[stride + 1],
-                    picture.channels - c, to + c);
+                    image.channels - c, to + c);
     }
   }
 }
 
 // One item per sample whose pixel two surfaces share; it runs after WarpView.
-kernel void MixSamples(const Surfaces picture, global const float* pixels,
-                       global const float* disparity, global const Mixed* mixed, const int count,
+kernel void MixSamples(const Surfaces image, global const float* pixels,
+                       global const float* disparity, global const Boundary* boundary, const int count,
                        global float* values) {
   if ((int)get_global_id(0) >= count) return;
-  const Mixed one = mixed[get_global_id(0)];
-  const float source_x = clamp(one.other.source_x, -picture.limit_px, picture.limit_px);
-  const float source_y = clamp(one.other.source_y, -picture.limit_px, picture.limit_px);
-  const int at_x = one.index % picture.width_px + (int)floor(source_x);
-  const int at_y = one.index / picture.width_px + (int)floor(source_y);
-  const int x = clamp(at_x, 0, picture.width_px - 1);
-  const int y = clamp(at_y, 0, picture.height_px - 1);
-  const float rest_x = at_x == x && x < picture.width_px - 1 ? source_x - floor(source_x) : 0;
-  const float rest_y = at_y == y && y < picture.height_px - 1 ? source_y - floor(source_y) : 0;
-  const float4 share = Shares(picture, disparity, x, y, rest_x, rest_y, one.other.disparity);
-  const int stride = picture.width_px + 3;
-  const int plane = stride * (picture.height_px + 3);
+  const Boundary one = boundary[get_global_id(0)];
+  const float source_x = clamp(one.other.source_x, -image.limit_px, image.limit_px);
+  const float source_y = clamp(one.other.source_y, -image.limit_px, image.limit_px);
+  const int at_x = one.index % image.width_px + (int)floor(source_x);
+  const int at_y = one.index / image.width_px + (int)floor(source_y);
+  const int x = clamp(at_x, 0, image.width_px - 1);
+  const int y = clamp(at_y, 0, image.height_px - 1);
+  const float rest_x = at_x == x && x < image.width_px - 1 ? source_x - floor(source_x) : 0;
+  const float rest_y = at_y == y && y < image.height_px - 1 ? source_y - floor(source_y) : 0;
+  const float4 share = Shares(image, disparity, x, y, rest_x, rest_y, one.other.disparity);
+  const int stride = image.width_px + 3;
+  const int plane = stride * (image.height_px + 3);
   const int there = (y + 1) * stride + x + 1;
-  global float* to = values + (size_t)one.index * picture.channels;
-  if (picture.channels == 1) {
+  global float* to = values + (size_t)one.index * image.channels;
+  if (image.channels == 1) {
     global const float* tap = pixels + there;
     const float value = dot(share, (float4)(tap[0], tap[1], tap[stride], tap[stride + 1]));
     *to += one.share * (value - *to);
     return;
   }
   global const float4* tap = (global const float4*)pixels + there;
-  for (int c = 0; c < picture.channels; c += 4, tap += plane) {
+  for (int c = 0; c < image.channels; c += 4, tap += plane) {
     const float4 value = share.s0 * tap[0] + share.s1 * tap[1] + share.s2 * tap[stride] +
                          share.s3 * tap[stride + 1];
     const float of_four[4] = {value.s0, value.s1, value.s2, value.s3};
-    for (int n = 0; n < min(4, picture.channels - c); ++n) {
+    for (int n = 0; n < min(4, image.channels - c); ++n) {
       to[c + n] += one.share * (of_four[n] - to[c + n]);
     }
   }

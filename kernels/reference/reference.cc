@@ -143,9 +143,9 @@ class Reference : public Kernels<Real> {
   }
 
   // [M16]: H(x, ray) = E(ray) H0(x, ray) / sum over rays of H0(x, ray), H0 = view weight * g.
-  EllMatrix<Real> WeighRays(const BlockGeometry& block, Splat splat,
-                            const std::vector<std::int32_t>& rays,
-                            const std::vector<Real>& irradiance) override {
+  EllMatrix<Real> WeightRays(const BlockGeometry& block, Splat splat,
+                             const std::vector<std::int32_t>& rays,
+                             const std::vector<Real>& irradiance) override {
     CheckRayNumbers(block, 1);
     CheckRays(block, splat, rays);
     if (!irradiance.empty()) CheckSize("irradiance", irradiance.size(), Index(block.rays()));
@@ -279,13 +279,12 @@ class Reference : public Kernels<Real> {
   // Computes I(x) = sum over rays of H0(x, ray) L(ray) / sum over rays of H0(x, ray). One row of
   // the image is computed at a time, so that the sums stay in the cache while the views are read in
   // their order.
-  std::vector<Real> FormPicture(const BlockGeometry& whole, Splat splat,
-                                const std::vector<Real>& views) override {
+  std::vector<Real> FormImage(const BlockGeometry& whole, Splat splat,
+                              const std::vector<Real>& views) override {
     CheckBlock(whole);
     const std::size_t view_samples = Index(whole.s_count) * Index(whole.t_count);
-    CheckSize("light field to form a picture of", views.size(),
-              view_samples * Index(whole.views()));
-    std::vector<Real> picture(Index(whole.pixels()));
+    CheckSize("light field to form an image of", views.size(), view_samples * Index(whole.views()));
+    std::vector<Real> image(Index(whole.pixels()));
     std::vector<Real> sums(Index(whole.width_px));
     std::vector<Real> weights(Index(whole.width_px));
     for (int y = 0; y < whole.height_px; ++y) {
@@ -297,12 +296,12 @@ class Reference : public Kernels<Real> {
                   &sums, &weights);
         }
       }
-      Real* row = picture.data() + Index(y) * Index(whole.width_px);
+      Real* row = image.data() + Index(y) * Index(whole.width_px);
       for (std::size_t x = 0; x < sums.size(); ++x) {
         row[x] = weights[x] > 0 ? sums[x] / weights[x] : Real{0};
       }
     }
-    return picture;
+    return image;
   }
 
   void StartWhole(int s_count, int t_count, int u_count, int v_count, int channels) override {

@@ -16,8 +16,8 @@
 namespace thicklens::kernels {
 namespace {
 
-std::size_t PixelsOf(const SurfacePicture& picture) {
-  return Index(picture.width_px) * Index(picture.height_px);
+std::size_t PixelsOf(const SurfaceImage& image) {
+  return Index(image.width_px) * Index(image.height_px);
 }
 
 // A position on a line of pixels: the pixel before it, and the distance from that pixel, < 1.
@@ -36,23 +36,23 @@ Place PlaceAt(int sample, float source, int count, float limit_px) {
 
 class ReferenceWarp : public ViewWarp {
  public:
-  explicit ReferenceWarp(const SurfacePicture& picture)
-      : picture_(picture), ranges_(TapRangesOf(picture)) {}
+  explicit ReferenceWarp(const SurfaceImage& image) : image_(image), ranges_(TapRangesOf(image)) {}
 
   void Warp(const ViewSources& view, std::vector<float>* values) override {
-    CheckView(picture_, view);
-    values->resize(picture_.values->size());
+    CheckView(image_, view);
+    values->resize(image_.values->size());
     for (std::size_t i = 0; i < view.disparity->size(); ++i) {
       const float disparity = (*view.disparity)[i];
       if (std::isnan(disparity)) continue;
       ReadSample(i, static_cast<float>(view.shift_x * disparity),
                  static_cast<float>(view.shift_y * disparity), disparity, values);
     }
-    for (const HiddenSample& hidden : *view.hidden) {
-      ReadSample(Index(hidden.index), hidden.source_x, hidden.source_y, hidden.disparity, values);
+    for (const OccludedSample& occluded : *view.occluded) {
+      ReadSample(Index(occluded.index), occluded.source_x, occluded.source_y, occluded.disparity,
+                 values);
     }
-    if (view.mixed == nullptr) return;
-    for (const MixedSample& mixed : *view.mixed) MixInto(mixed, values);
+    if (view.boundary == nullptr) return;
+    for (const BoundarySample& boundary : *view.boundary) MixInto(boundary, values);
   }
 
  private:
@@ -63,19 +63,19 @@ class ReferenceWarp : public ViewWarp {
     const std::size_t there = At(across.pixel, down.pixel);
     const bool cubic = IsOnSurface(ranges_.lowest[there], disparity) &&
                        IsOnSurface(ranges_.highest[there], disparity);
-    for (int channel = 0; channel < picture_.channels; ++channel) {
-      (*values)[sample * Index(picture_.channels) + Index(channel)] =
+    for (int channel = 0; channel < image_.channels; ++channel) {
+      (*values)[sample * Index(image_.channels) + Index(channel)] =
           cubic ? Cubic(across, down, channel) : Linear(across, down, disparity, channel);
     }
   }
 
-  void MixInto(const MixedSample& mixed, std::vector<float>* values) const {
-    const std::size_t sample = Index(mixed.index);
-    const SourcePlace source = PlaceOf(sample, mixed.other.source_x, mixed.other.source_y);
-    for (int channel = 0; channel < picture_.channels; ++channel) {
-      float& value = (*values)[sample * Index(picture_.channels) + Index(channel)];
-      const float other = Linear(source.across, source.down, mixed.other.disparity, channel);
-      value += mixed.share * (other - value);
+  void MixInto(const BoundarySample& boundary, std::vector<float>* values) const {
+    const std::size_t sample = Index(boundary.index);
+    const SourcePlace source = PlaceOf(sample, boundary.other.source_x, boundary.other.source_y);
+    for (int channel = 0; channel < image_.channels; ++channel) {
+      float& value = (*values)[sample * Index(image_.channels) + Index(channel)];
+      const float other = Linear(source.across, source.down, boundary.other.disparity, channel);
+      value += boundary.share * (other - value);
     }
   }
 
@@ -83,22 +83,22 @@ class ReferenceWarp : public ViewWarp {
     Place across, down;
   };
   SourcePlace PlaceOf(std::size_t sample, float source_x, float source_y) const {
-    const auto limit_px = static_cast<float>(picture_.width_px + picture_.height_px);
-    const int x = static_cast<int>(sample % Index(picture_.width_px));
-    const int y = static_cast<int>(sample / Index(picture_.width_px));
-    return {PlaceAt(x, source_x, picture_.width_px, limit_px),
-            PlaceAt(y, source_y, picture_.height_px, limit_px)};
+    const auto limit_px = static_cast<float>(image_.width_px + image_.height_px);
+    const int x = static_cast<int>(sample % Index(image_.width_px));
+    const int y = static_cast<int>(sample / Index(image_.width_px));
+    return {PlaceAt(x, source_x, image_.width_px, limit_px),
+            PlaceAt(y, source_y, image_.height_px, limit_px)};
   }
 
   std::size_t At(int x, int y) const {
-    return Index(std::clamp(y, 0, picture_.height_px - 1)) * Index(picture_.width_px) +
-           Index(std::clamp(x, 0, picture_.width_px - 1));
+    return Index(std::clamp(y, 0, image_.height_px - 1)) * Index(image_.width_px) +
+           Index(std::clamp(x, 0, image_.width_px - 1));
   }
   float ValueAt(int x, int y, int channel) const {
-    return (*picture_.values)[At(x, y) * Index(picture_.channels) + Index(channel)];
+    return (*image_.values)[At(x, y) * Index(image_.channels) + Index(channel)];
   }
   bool IsOnSurface(float there, float disparity) const {
-    return std::abs(there - disparity) <= picture_.tolerance;
+    return std::abs(there - disparity) <= image_.tolerance;
   }
 
   float Cubic(const Place& across, const Place& down, int channel) const {
@@ -124,7 +124,7 @@ class ReferenceWarp : public ViewWarp {
             (i == 0 ? 1 - across.rest : across.rest) * (j == 0 ? 1 - down.rest : down.rest);
         if (weight == 0) continue;  // may be outside of the image
         const int x = across.pixel + i, y = down.pixel + j;
-        const float there = (*picture_.disparity)[At(x, y)];
+        const float there = (*image_.disparity)[At(x, y)];
         if (std::abs(there - disparity) < closest) {
           closest = std::abs(there - disparity);
           closest_value = ValueAt(x, y, channel);
@@ -137,7 +137,7 @@ class ReferenceWarp : public ViewWarp {
     return sum_of_weights > 0 ? sum / sum_of_weights : closest_value;
   }
 
-  const SurfacePicture picture_;
+  const SurfaceImage image_;
   const TapRanges ranges_;
 };
 
@@ -149,67 +149,67 @@ void CheckCount(const char* what, const std::vector<float>* numbers, std::size_t
 
 }  // namespace
 
-void CheckPicture(const SurfacePicture& picture) {
-  if (picture.width_px < 1 || picture.height_px < 1 || picture.channels < 1) {
-    throw Error(fmt::format("picture of surfaces: {}x{} px in {} channels: each must be >= 1",
-                            picture.width_px, picture.height_px, picture.channels));
+void CheckImage(const SurfaceImage& image) {
+  if (image.width_px < 1 || image.height_px < 1 || image.channels < 1) {
+    throw Error(fmt::format("image of surfaces: {}x{} px in {} channels: each must be >= 1",
+                            image.width_px, image.height_px, image.channels));
   }
-  CheckCount("picture of surfaces", picture.values, PixelsOf(picture) * Index(picture.channels));
-  CheckCount("disparity of a picture", picture.disparity, PixelsOf(picture));
-  if (!(picture.tolerance >= 0)) {
-    throw Error(fmt::format("tolerance of a surface is {}: it must be >= 0", picture.tolerance));
+  CheckCount("image of surfaces", image.values, PixelsOf(image) * Index(image.channels));
+  CheckCount("disparity of an image", image.disparity, PixelsOf(image));
+  if (!(image.tolerance >= 0)) {
+    throw Error(fmt::format("tolerance of a surface is {}: it must be >= 0", image.tolerance));
   }
 }
 
 namespace {
 
-void CheckMixed(const std::vector<MixedSample>& mixed, std::size_t pixels) {
+void CheckBoundarySamples(const std::vector<BoundarySample>& boundary, std::size_t pixels) {
   std::int32_t before = -1;  // otherwise two items of a device would write one sample
-  for (const MixedSample& one : mixed) {
+  for (const BoundarySample& one : boundary) {
     if (one.index <= before || Index(one.index) >= pixels) {
       throw Error(
-          fmt::format("mixed sample of a view has the index {} after {}: indices must grow "
+          fmt::format("boundary sample of a view has the index {} after {}: indices must grow "
                       "from 0 to {} at most",
                       one.index, before, pixels - 1));
     }
     before = one.index;
     if (one.share >= 0 && one.share <= 1) continue;
-    throw Error(fmt::format("mixed sample {} of a view has the share {}: it must be 0 to 1",
+    throw Error(fmt::format("boundary sample {} of a view has the share {}: it must be 0 to 1",
                             one.index, one.share));
   }
 }
 
 }  // namespace
 
-void CheckView(const SurfacePicture& picture, const ViewSources& view) {
-  CheckCount("disparity of a view", view.disparity, PixelsOf(picture));
+void CheckView(const SurfaceImage& image, const ViewSources& view) {
+  CheckCount("disparity of a view", view.disparity, PixelsOf(image));
   for (const double shift : {view.shift_x, view.shift_y}) {
     if (std::isfinite(shift)) continue;
     throw Error(fmt::format("shift of a view is {}: it must be finite", shift));
   }
-  if (view.hidden == nullptr) throw Error("hidden samples of a view: there must be a list");
-  for (const HiddenSample& hidden : *view.hidden) {
-    if (!(hidden.index >= 0 && Index(hidden.index) < PixelsOf(picture))) {
-      throw Error(fmt::format("hidden sample of a view has the index {}: it must be 0 to {}",
-                              hidden.index, PixelsOf(picture) - 1));
+  if (view.occluded == nullptr) throw Error("occluded samples of a view: there must be a list");
+  for (const OccludedSample& occluded : *view.occluded) {
+    if (!(occluded.index >= 0 && Index(occluded.index) < PixelsOf(image))) {
+      throw Error(fmt::format("occluded sample of a view has the index {}: it must be 0 to {}",
+                              occluded.index, PixelsOf(image) - 1));
     }
     // Otherwise two items of a device would write this sample.
-    const float seen = (*view.disparity)[Index(hidden.index)];
+    const float seen = (*view.disparity)[Index(occluded.index)];
     if (std::isnan(seen)) continue;
     throw Error(
-        fmt::format("hidden sample {} of a view is of disparity {} among those that are "
+        fmt::format("occluded sample {} of a view is of disparity {} among those that are "
                     "seen: it must be NaN there",
-                    hidden.index, seen));
+                    occluded.index, seen));
   }
-  if (view.mixed != nullptr) CheckMixed(*view.mixed, PixelsOf(picture));
+  if (view.boundary != nullptr) CheckBoundarySamples(*view.boundary, PixelsOf(image));
 }
 
-TapRanges TapRangesOf(const SurfacePicture& picture) {
-  CheckPicture(picture);
-  const int width = picture.width_px, height = picture.height_px;
-  TapRanges ranges{std::vector<float>(PixelsOf(picture)), std::vector<float>(PixelsOf(picture))};
+TapRanges TapRangesOf(const SurfaceImage& image) {
+  CheckImage(image);
+  const int width = image.width_px, height = image.height_px;
+  TapRanges ranges{std::vector<float>(PixelsOf(image)), std::vector<float>(PixelsOf(image))};
   const auto row_at = [&](int y) {
-    return picture.disparity->data() + Index(std::clamp(y, 0, height - 1)) * Index(width);
+    return image.disparity->data() + Index(std::clamp(y, 0, height - 1)) * Index(width);
   };
   // The extremes of the four pixels in each column, then of four columns.
   std::vector<float> lowest(Index(width)), highest(Index(width));
@@ -232,8 +232,8 @@ TapRanges TapRangesOf(const SurfacePicture& picture) {
   return ranges;
 }
 
-std::unique_ptr<ViewWarp> NewReferenceWarp(const SurfacePicture& picture) {
-  return std::make_unique<ReferenceWarp>(picture);
+std::unique_ptr<ViewWarp> NewReferenceWarp(const SurfaceImage& image) {
+  return std::make_unique<ReferenceWarp>(image);
 }
 
 }  // namespace thicklens::kernels

@@ -6,15 +6,15 @@
 namespace thicklens::kernels {
 
 // Both functions throw Error for sizes and indices that do not fit.
-void CheckPicture(const SurfacePicture& picture);
-void CheckView(const SurfacePicture& picture, const ViewSources& view);
+void CheckImage(const SurfaceImage& image);
+void CheckView(const SurfaceImage& image, const ViewSources& view);
 
 // Minimum and maximum of the disparities of the 4 x 4 pixels at -1 to 2 around each pixel, clamped
 // to the image.
 struct TapRanges {
   std::vector<float> lowest, highest;
 };
-TapRanges TapRangesOf(const SurfacePicture& picture);
+TapRanges TapRangesOf(const SurfaceImage& image);
 
 }  // namespace thicklens::kernels
 

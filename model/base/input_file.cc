@@ -136,18 +136,18 @@ std::string ReadOwnFile(const std::string& path, std::uint64_t most_bytes) {
 }
 
 std::string ReadWholeFile(const std::string& path) {
-  TellInput(path);
+  ReportInput(path);
   return ReadOwnFile(path, kMaxInputBytes);
 }
 
 std::string ReadTextFile(const std::string& path) {
-  TellInput(path);
+  ReportInput(path);
   return ReadOwnFile(path, kMaxTextBytes);
 }
 
 void WatchInputs(InputWatch watch) { Watch() = std::move(watch); }
 
-void TellInput(const std::string& path) {
+void ReportInput(const std::string& path) {
   if (Watch()) Watch()(path);
 }
 

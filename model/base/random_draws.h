@@ -18,7 +18,7 @@ class RandomDraws {
     kLamp = 3,
     kDrift = 4,
     kSensor = 5,
-    kStoredNoise = 6,
+    kEncodedNoise = 6,
     kReadout = 7
   };
 

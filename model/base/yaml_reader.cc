@@ -69,7 +69,7 @@ std::string Shown(const std::string& text) {
 
 // Limits of numbers. Beyond them no length, angle or count is meaningful, and products of several
 // numbers overflow.
-constexpr double kMostMagnitude = 1e30, kLeastPositive = 1e-30;
+constexpr double kMaxMagnitude = 1e30, kMinPositive = 1e-30;
 
 std::string KindOf(const YAML::Node& node) {
   switch (node.Type()) {
@@ -270,9 +270,9 @@ double YamlNode::Number() const {
   }
   if (!std::isfinite(value))
     throw ErrorHere(fmt::format("a finite number is expected, found '{}'", Shown(text)));
-  if (!(std::abs(value) <= kMostMagnitude)) {
+  if (!(std::abs(value) <= kMaxMagnitude)) {
     throw ErrorHere(fmt::format("a number between {} and {} is expected, found '{}'",
-                                -kMostMagnitude, kMostMagnitude, Shown(text)));
+                                -kMaxMagnitude, kMaxMagnitude, Shown(text)));
   }
   return value;
 }
@@ -280,8 +280,8 @@ double YamlNode::Number() const {
 double YamlNode::PositiveNumber() const {
   const double value = Number();
   if (!(value > 0)) throw ErrorHere(fmt::format("must be > 0, found {}", value));
-  if (!(value >= kLeastPositive))
-    throw ErrorHere(fmt::format("must be at least {}, found {}", kLeastPositive, value));
+  if (!(value >= kMinPositive))
+    throw ErrorHere(fmt::format("must be at least {}, found {}", kMinPositive, value));
   return value;
 }
 
@@ -328,7 +328,7 @@ std::string YamlNode::ResolvePath(const std::string& relative) const {
   const std::filesystem::path folder = std::filesystem::path(impl_->source).parent_path();
   const std::string resolved =
       path.is_absolute() ? relative : (folder / path).lexically_normal().string();
-  TellInput(resolved);
+  ReportInput(resolved);
   return resolved;
 }
 

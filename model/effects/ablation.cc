@@ -2,8 +2,9 @@
 
 namespace thicklens::model {
 
-EffectChoice AllInsteadOfAuto(EffectChoice choice) {
-  if (choice.base == EffectChoice::Base::kAuto) choice.base = EffectChoice::Base::kAll;
+EffectSelectionOptions AllInsteadOfAuto(EffectSelectionOptions choice) {
+  if (choice.base == EffectSelectionOptions::Base::kAuto)
+    choice.base = EffectSelectionOptions::Base::kAll;
   return choice;
 }
 

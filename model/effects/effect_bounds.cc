@@ -9,22 +9,22 @@
 namespace thicklens::model {
 namespace {
 
-double Range(const EffectPlace& place) { return std::max(0.0, place.bright - place.dark); }
+double Range(const EffectSite& place) { return std::max(0.0, place.bright - place.dark); }
 
 }  // namespace
 
-EffectOptics::EffectOptics(const EffectConditions& given, const EffectSet& of_picture)
+EffectOptics::EffectOptics(const EffectConditions& given, const EffectSet& of_image)
     : conditions_(given),
       inverse_focus_(1 / given.camera.focus_depth_mm()),
       aperture_sigma_mm_(given.camera.blur_ratio() * given.camera.lens.aperture_radius_mm),
       scale_px_(given.camera.focal_scale_px()) {
   const auto& floor = given.camera.calibration->blur_floor_px;
   if (floor) floor_px_ = floor->value;
-  image_distance_mm_ = of_picture.Has(Effect::kThickness)
+  image_distance_mm_ = of_image.Has(Effect::kThickness)
                            ? given.camera.image_distance_mm()
                            : scale_px_ * given.camera.sensor.pixel_pitch_mm;
-  transfer_ = of_picture.Has(Effect::kTransferCurve) ? given.camera.sensor.transfer
-                                                     : TransferCurve::Linear();
+  transfer_ =
+      of_image.Has(Effect::kTransferCurve) ? given.camera.sensor.transfer : TransferCurve::Linear();
 }
 
 double EffectOptics::DefocusPx(double depth_mm) const {
@@ -34,7 +34,7 @@ double EffectOptics::DefocusPx(double depth_mm) const {
 // The sharpest of the surfaces at different depths determines the smoothing. Between two surfaces
 // on both sides of the plane of focus there may be one in that plane.
 EffectOptics::Smoothing EffectOptics::SmoothingBy(const EffectSet& effects,
-                                                  const EffectPlace& place) const {
+                                                  const EffectSite& place) const {
   Smoothing smoothing;
   smoothing.boxed = effects.Has(Effect::kPixelBox);
   if (effects.Has(Effect::kLensFloor)) smoothing.gaussian_px2 = floor_px_ * floor_px_;
@@ -65,7 +65,7 @@ EffectOptics::Smoothing EffectOptics::SmoothingBy(const EffectSet& effects,
 // averaged over a disc D of radius b,
 //   |I - L| <= R/2 integral |k * D - D| <= R/2 E|d_n| (perimeter/area of D) = R/b E|d_n|.
 // The range bounds the jumps of the radiance in the last two cases.
-double BlurChange(const EffectPlace& place, double variance_px2,
+double BlurChange(const EffectSite& place, double variance_px2,
                   const EffectOptics::Smoothing& other) {
   if (!(variance_px2 > 0)) return 0;
   const double sigma_px = std::sqrt(variance_px2);
@@ -88,8 +88,7 @@ double BlurChange(const EffectPlace& place, double variance_px2,
 // it is at most sqrt(2) J |d| [D49]. After a Gaussian blur of variance g it is at most
 // R |d|/sqrt(2 pi g), after a disc of radius b at most R |d| 2/(pi b): the maximum is that of an
 // edge.
-double ShiftChange(const EffectPlace& place, double shift_px,
-                   const EffectOptics::Smoothing& other) {
+double ShiftChange(const EffectSite& place, double shift_px, const EffectOptics::Smoothing& other) {
   const double range = Range(place);
   double slope = place.slope + std::sqrt(2.0) * place.jump;
   if (!other.boxed && place.jump > 0) slope = std::numeric_limits<double>::infinity();
@@ -100,7 +99,7 @@ double ShiftChange(const EffectPlace& place, double shift_px,
 }
 
 // Transfer curves are concave: the same change of light has the largest effect where it is dark.
-double StoredChange(const EffectOptics& optics, const EffectPlace& place, double change) {
+double EncodedChange(const EffectOptics& optics, const EffectSite& place, double change) {
   const TransferCurve& transfer = optics.transfer();
   const double dark = std::clamp(place.dark, 0.0, 1.0);
   const double lit = std::min(dark + change, std::clamp(place.bright, dark, 1.0));
@@ -108,14 +107,14 @@ double StoredChange(const EffectOptics& optics, const EffectPlace& place, double
 }
 
 // Encode(L) - Encode(L (1 - e)) increases with L for curves that are powers of light, or straight.
-double StoredScaling(const EffectOptics& optics, const EffectPlace& place, double relative) {
+double EncodedScaling(const EffectOptics& optics, const EffectSite& place, double relative) {
   const TransferCurve& transfer = optics.transfer();
   const double bright = std::clamp(place.bright, 0.0, 1.0);
   const double other = std::clamp(bright * (1 - std::abs(relative)), 0.0, 1.0);
   return 255 * (transfer.Encode(bright) - transfer.Encode(other));
 }
 
-double StoredSigma(const EffectOptics& optics, const EffectPlace& place, double sigma) {
+double EncodedSigma(const EffectOptics& optics, const EffectSite& place, double sigma) {
   const TransferCurve& transfer = optics.transfer();
   const double dark = std::clamp(place.dark, 0.0, 1.0);
   return 255 * (transfer.Encode(dark + sigma) - transfer.Encode(dark - sigma)) / 2;

@@ -11,7 +11,7 @@ namespace thicklens::model {
 // once. Keeps a reference to the conditions, which must outlive it.
 class EffectOptics {
  public:
-  EffectOptics(const EffectConditions& given, const EffectSet& of_picture);
+  EffectOptics(const EffectConditions& given, const EffectSet& of_image);
 
   const EffectConditions& conditions() const { return conditions_; }
   const Camera& camera() const { return conditions_.camera; }
@@ -34,7 +34,7 @@ class EffectOptics {
     double disc_px = 0;       // radius of the disc
     bool boxed = false;       // true: the box of a pixel has turned jumps into ramps
   };
-  Smoothing SmoothingBy(const EffectSet& effects, const EffectPlace& place) const;
+  Smoothing SmoothingBy(const EffectSet& effects, const EffectSite& place) const;
 
  private:
   const EffectConditions& conditions_;
@@ -47,66 +47,66 @@ class EffectOptics {
 
 // Change by a blur of zero mean and `variance_px2` per axis, applied to an image that already has
 // the smoothing `other`.
-double BlurChange(const EffectPlace& place, double variance_px2,
+double BlurChange(const EffectSite& place, double variance_px2,
                   const EffectOptics::Smoothing& other);
 // Change by a displacement, px, of an image that already has the smoothing `other`.
-double ShiftChange(const EffectPlace& place, double shift_px, const EffectOptics::Smoothing& other);
+double ShiftChange(const EffectSite& place, double shift_px, const EffectOptics::Smoothing& other);
 
-// Bounds of changes of stored values, 255 at full scale.
+// Bounds of changes of encoded values, 255 at full scale.
 
 // Stored change for a change of the radiance anywhere between `dark` and `bright` of the place.
-double StoredChange(const EffectOptics& optics, const EffectPlace& place, double change);
+double EncodedChange(const EffectOptics& optics, const EffectSite& place, double change);
 // Stored change for light that is scaled by (1 + relative).
-double StoredScaling(const EffectOptics& optics, const EffectPlace& place, double relative);
-// Standard deviation of stored values for a standard deviation in linear light where the place is
+double EncodedScaling(const EffectOptics& optics, const EffectSite& place, double relative);
+// Standard deviation of encoded values for a standard deviation in linear light where the place is
 // darkest. Curves are continued as odd functions below black (TransferCurve::Encode).
-double StoredSigma(const EffectOptics& optics, const EffectPlace& place, double sigma);
+double EncodedSigma(const EffectOptics& optics, const EffectSite& place, double sigma);
 
 // Throws Error if the conditions are not valid or there is no place.
-void CheckEffects(const EffectConditions& conditions, const std::vector<EffectPlace>& places);
+void CheckEffects(const EffectConditions& conditions, const std::vector<EffectSite>& places);
 bool MattersMore(const EffectImpact& a, const EffectImpact& b);
 // The place with the largest impact of the effect in an image that also has `others`.
-EffectFinding FindImpact(Effect effect, const EffectConditions& conditions,
-                         const std::vector<EffectPlace>& places, const EffectSet& others);
+LargestEffectImpact FindImpact(Effect effect, const EffectConditions& conditions,
+                               const std::vector<EffectSite>& places, const EffectSet& others);
 
 // The impact of each effect: one function per effect.
-EffectImpact ThicknessImpact(const EffectOptics& optics, const EffectPlace& place,
+EffectImpact ThicknessImpact(const EffectOptics& optics, const EffectSite& place,
                              const EffectSet& others);
-EffectImpact DefocusImpact(const EffectOptics& optics, const EffectPlace& place,
+EffectImpact DefocusImpact(const EffectOptics& optics, const EffectSite& place,
                            const EffectSet& others);
-EffectImpact ApertureShapeImpact(const EffectOptics& optics, const EffectPlace& place,
+EffectImpact ApertureShapeImpact(const EffectOptics& optics, const EffectSite& place,
                                  const EffectSet& others);
-EffectImpact FalloffImpact(const EffectOptics& optics, const EffectPlace& place,
+EffectImpact FalloffImpact(const EffectOptics& optics, const EffectSite& place,
                            const EffectSet& others);
-EffectImpact VignettingImpact(const EffectOptics& optics, const EffectPlace& place,
+EffectImpact VignettingImpact(const EffectOptics& optics, const EffectSite& place,
                               const EffectSet& others);
-EffectImpact OcclusionImpact(const EffectOptics& optics, const EffectPlace& place,
+EffectImpact OcclusionImpact(const EffectOptics& optics, const EffectSite& place,
                              const EffectSet& others);
-EffectImpact PixelBoxImpact(const EffectOptics& optics, const EffectPlace& place,
+EffectImpact PixelBoxImpact(const EffectOptics& optics, const EffectSite& place,
                             const EffectSet& others);
-EffectImpact LensFloorImpact(const EffectOptics& optics, const EffectPlace& place,
+EffectImpact LensFloorImpact(const EffectOptics& optics, const EffectSite& place,
                              const EffectSet& others);
-EffectImpact DiffractionImpact(const EffectOptics& optics, const EffectPlace& place,
+EffectImpact DiffractionImpact(const EffectOptics& optics, const EffectSite& place,
                                const EffectSet& others);
-EffectImpact ShotNoiseImpact(const EffectOptics& optics, const EffectPlace& place,
+EffectImpact ShotNoiseImpact(const EffectOptics& optics, const EffectSite& place,
                              const EffectSet& others);
-EffectImpact ReadNoiseImpact(const EffectOptics& optics, const EffectPlace& place,
+EffectImpact ReadNoiseImpact(const EffectOptics& optics, const EffectSite& place,
                              const EffectSet& others);
-EffectImpact QuantisationImpact(const EffectOptics& optics, const EffectPlace& place,
+EffectImpact QuantisationImpact(const EffectOptics& optics, const EffectSite& place,
                                 const EffectSet& others);
-EffectImpact TransferCurveImpact(const EffectOptics& optics, const EffectPlace& place,
+EffectImpact TransferCurveImpact(const EffectOptics& optics, const EffectSite& place,
                                  const EffectSet& others);
-EffectImpact LampFalloffImpact(const EffectOptics& optics, const EffectPlace& place,
+EffectImpact LampFalloffImpact(const EffectOptics& optics, const EffectSite& place,
                                const EffectSet& others);
-EffectImpact FlickerImpact(const EffectOptics& optics, const EffectPlace& place,
+EffectImpact FlickerImpact(const EffectOptics& optics, const EffectSite& place,
                            const EffectSet& others);
-EffectImpact MagnificationImpact(const EffectOptics& optics, const EffectPlace& place,
+EffectImpact MagnificationImpact(const EffectOptics& optics, const EffectSite& place,
                                  const EffectSet& others);
-EffectImpact DriftImpact(const EffectOptics& optics, const EffectPlace& place,
+EffectImpact DriftImpact(const EffectOptics& optics, const EffectSite& place,
                          const EffectSet& others);
-EffectImpact TiltImpact(const EffectOptics& optics, const EffectPlace& place,
+EffectImpact TiltImpact(const EffectOptics& optics, const EffectSite& place,
                         const EffectSet& others);
-EffectImpact ReadingErrorImpact(const EffectOptics& optics, const EffectPlace& place,
+EffectImpact ReadingErrorImpact(const EffectOptics& optics, const EffectSite& place,
                                 const EffectSet& others);
 
 }  // namespace thicklens::model

@@ -16,7 +16,7 @@
 namespace thicklens::model {
 namespace {
 
-using Section = EffectImpact (*)(const EffectOptics&, const EffectPlace&, const EffectSet&);
+using Section = EffectImpact (*)(const EffectOptics&, const EffectSite&, const EffectSet&);
 
 Section SectionOf(Effect effect) {
   switch (effect) {
@@ -68,18 +68,18 @@ bool MattersMore(const EffectImpact& a, const EffectImpact& b) {
   return std::pair(a.grey_levels, a.amount) > std::pair(b.grey_levels, b.amount);
 }
 
-void CheckEffects(const EffectConditions& conditions, const std::vector<EffectPlace>& places) {
+void CheckEffects(const EffectConditions& conditions, const std::vector<EffectSite>& places) {
   std::string why;
   if (!conditions.IsValid(&why)) throw Error("effects: " + why);
   if (places.empty()) throw Error("effects: there is no place to look at: at least one is needed");
 }
 
-EffectFinding FindImpact(Effect effect, const EffectConditions& conditions,
-                         const std::vector<EffectPlace>& places, const EffectSet& others) {
+LargestEffectImpact FindImpact(Effect effect, const EffectConditions& conditions,
+                               const std::vector<EffectSite>& places, const EffectSet& others) {
   const Section section = SectionOf(effect);
   const EffectOptics optics(conditions, others.With({effect}));
-  EffectFinding finding{effect, section(optics, places.front(), others), places.front()};
-  for (const EffectPlace& place : places) {
+  LargestEffectImpact finding{effect, section(optics, places.front(), others), places.front()};
+  for (const EffectSite& place : places) {
     const EffectImpact impact = section(optics, place, others);
     if (MattersMore(impact, finding.impact)) finding = {effect, impact, place};
   }
@@ -116,7 +116,7 @@ bool EffectConditions::IsValid(std::string* why) const {
     return Fail(why, fmt::format("bits is {}: it must be from 1 to 32", bits));
   }
   std::vector<std::pair<const char*, double>> amounts = {
-      {"stored_noise_grey_levels", stored_noise_grey_levels},
+      {"encoded_noise_grey_levels", encoded_noise_grey_levels},
       {"full_well_electrons", full_well_electrons},
       {"read_noise_electrons", read_noise_electrons}};
   if (bench) {
@@ -136,19 +136,19 @@ bool EffectConditions::IsValid(std::string* why) const {
   return true;
 }
 
-EffectImpact ImpactAt(Effect effect, const EffectConditions& conditions, const EffectPlace& place,
+EffectImpact ImpactAt(Effect effect, const EffectConditions& conditions, const EffectSite& place,
                       const EffectSet& others) {
   CheckEffects(conditions, {place});
   return SectionOf(effect)(EffectOptics(conditions, others.With({effect})), place,
                            others.Without({effect}));
 }
 
-std::vector<EffectFinding> FindImpacts(const EffectConditions& conditions,
-                                       const std::vector<EffectPlace>& places,
-                                       const EffectSet& effects, int threads) {
+std::vector<LargestEffectImpact> FindImpacts(const EffectConditions& conditions,
+                                             const std::vector<EffectSite>& places,
+                                             const EffectSet& effects, int threads) {
   CheckEffects(conditions, places);
   const std::vector<Effect> each = effects.Effects();
-  std::vector<EffectFinding> findings(each.size());
+  std::vector<LargestEffectImpact> findings(each.size());
   ParallelFor(static_cast<int>(each.size()), threads, [&](int i) {
     const Effect effect = each[static_cast<std::size_t>(i)];
     findings[static_cast<std::size_t>(i)] =
@@ -157,8 +157,8 @@ std::vector<EffectFinding> FindImpacts(const EffectConditions& conditions,
   return findings;
 }
 
-std::vector<EffectPlace> PlacesBetween(const Camera& camera, double near_mm, double far_mm,
-                                       bool occlusion) {
+std::vector<EffectSite> PlacesBetween(const Camera& camera, double near_mm, double far_mm,
+                                      bool occlusion) {
   if (!(near_mm > 0) || !(far_mm >= near_mm) || !std::isfinite(near_mm)) {
     throw Error(
         fmt::format("depths from {} to {} mm: they must be > 0, the first finite and not "
@@ -173,12 +173,12 @@ std::vector<EffectPlace> PlacesBetween(const Camera& camera, double near_mm, dou
   const Eigen::Vector2d corner_px = (2 * middle_px.array() > last_px.array())
                                         .select(Eigen::Array2d::Zero(), last_px.array())
                                         .matrix();
-  std::vector<EffectPlace> places;
+  std::vector<EffectSite> places;
   for (int i = 0; i < kSteps; ++i) {
     const double share = static_cast<double>(i) / (kSteps - 1);
     const double depth_mm = i == 0 ? near_mm : 1 / ((1 - share) / near_mm + share / far_mm);
     for (const Eigen::Vector2d& position_px : {middle_px, corner_px}) {
-      EffectPlace place;
+      EffectSite place;
       place.position_px = position_px;
       place.depth_mm = depth_mm;
       places.push_back(place);

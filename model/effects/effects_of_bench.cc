@@ -8,13 +8,13 @@
 namespace thicklens::model {
 namespace {
 
-Eigen::Vector2d FromAxisPx(const EffectOptics& optics, const EffectPlace& place) {
+Eigen::Vector2d FromAxisPx(const EffectOptics& optics, const EffectSite& place) {
   return place.position_px - optics.camera().sensor.principal_point_px;
 }
 
 // Bound of the change in linear light by the blur at a place when its depth changes by `shift_mm`
 // in either direction.
-double ChangeByDepth(const EffectOptics& optics, const EffectPlace& place, double shift_mm,
+double ChangeByDepth(const EffectOptics& optics, const EffectSite& place, double shift_mm,
                      const EffectSet& others) {
   if (!others.Has(Effect::kDefocus) || !std::isfinite(place.depth_mm)) return 0;
   double largest = 0;
@@ -22,7 +22,7 @@ double ChangeByDepth(const EffectOptics& optics, const EffectPlace& place, doubl
   for (const double sign : {-1.0, 1.0}) {
     const double depth_mm = std::max(place.depth_mm + sign * shift_mm, place.depth_mm / 2);
     const double there_px = optics.DefocusPx(depth_mm);
-    EffectPlace both = place;
+    EffectSite both = place;
     both.other_depth_mm = depth_mm;
     const double added_px2 = std::abs(there_px * there_px - here_px * here_px);
     largest = std::max(largest, BlurChange(both, added_px2, optics.SmoothingBy(others, both)));
@@ -35,45 +35,46 @@ double ChangeByDepth(const EffectOptics& optics, const EffectPlace& place, doubl
 // Lamp fall-off [D55]. Formula: the irradiance by a lamp at the camera of a target at z is (zf/z)^2
 // times the irradiance in the plane of focus. Bound: the scaling of the brightest light. Enters: a
 // factor of each frame.
-EffectImpact LampFalloffImpact(const EffectOptics& optics, const EffectPlace& place,
+EffectImpact LampFalloffImpact(const EffectOptics& optics, const EffectSite& place,
                                const EffectSet& /*others*/) {
   const auto& bench = optics.conditions().bench;
   if (!bench || !bench->lamp_at_camera || !(optics.inverse_focus() > 0)) return {};
   const double light = std::pow(1 / (place.depth_mm * optics.inverse_focus()), 2);
-  // The loss is relative to the brighter of the two, as in StoredScaling.
-  return {std::abs(light - 1), StoredScaling(optics, place, light < 1 ? 1 - light : 1 - 1 / light)};
+  // The loss is relative to the brighter of the two, as in EncodedScaling.
+  return {std::abs(light - 1),
+          EncodedScaling(optics, place, light < 1 ? 1 - light : 1 - 1 / light)};
 }
 
 // Flicker. Formula: a normal factor of each frame with a relative standard deviation. Enters: a
 // factor of each frame.
-EffectImpact FlickerImpact(const EffectOptics& optics, const EffectPlace& place,
+EffectImpact FlickerImpact(const EffectOptics& optics, const EffectSite& place,
                            const EffectSet& /*others*/) {
   const auto& bench = optics.conditions().bench;
   if (!bench) return {};
-  return {bench->flicker, StoredScaling(optics, place, bench->flicker)};
+  return {bench->flicker, EncodedScaling(optics, place, bench->flicker)};
 }
 
 // Magnification. Formula: |m| = f1 D/(f2 z), which is zf/z relative to the plane of focus. Bound:
 // ShiftChange of the displacement of the place. Enters: the scale of each frame.
-EffectImpact MagnificationImpact(const EffectOptics& optics, const EffectPlace& place,
+EffectImpact MagnificationImpact(const EffectOptics& optics, const EffectSite& place,
                                  const EffectSet& others) {
   if (!optics.conditions().bench || !(optics.inverse_focus() > 0)) return {};
   const double scale = 1 / (place.depth_mm * optics.inverse_focus());
   const double shift_px = FromAxisPx(optics, place).norm() * std::abs(scale - 1);
-  return {shift_px, StoredChange(optics, place,
-                                 ShiftChange(place, shift_px, optics.SmoothingBy(others, place)))};
+  return {shift_px, EncodedChange(optics, place,
+                                  ShiftChange(place, shift_px, optics.SmoothingBy(others, place)))};
 }
 
 // Drift. Formula: a normal displacement of the target in each frame, with its standard deviation
 // per axis in px at zf. Bound: ShiftChange of that standard deviation, for either axis. Enters: the
 // position of the target in each frame.
-EffectImpact DriftImpact(const EffectOptics& optics, const EffectPlace& place,
+EffectImpact DriftImpact(const EffectOptics& optics, const EffectSite& place,
                          const EffectSet& others) {
   const auto& bench = optics.conditions().bench;
   if (!bench) return {};
   const double shift_px = bench->drift_sigma_px;
-  return {shift_px, StoredChange(optics, place,
-                                 ShiftChange(place, shift_px, optics.SmoothingBy(others, place)))};
+  return {shift_px, EncodedChange(optics, place,
+                                  ShiftChange(place, shift_px, optics.SmoothingBy(others, place)))};
 }
 
 // Tilt. Formula: the depth at which a chief ray meets the target is z0/N, N = 1 + (x p/K)
@@ -81,7 +82,7 @@ EffectImpact DriftImpact(const EffectOptics& optics, const EffectPlace& place,
 // the axis. Bound: the sum of the change of the blur by the depth, for either sign of the tilt, of
 // the displacement, and of the light of a lamp at the camera, which is in proportion to N^2.
 // Enters: the depth of each column of a frame.
-EffectImpact TiltImpact(const EffectOptics& optics, const EffectPlace& place,
+EffectImpact TiltImpact(const EffectOptics& optics, const EffectSite& place,
                         const EffectSet& others) {
   const auto& bench = optics.conditions().bench;
   if (!bench || bench->tilt_deg == 0 || !std::isfinite(place.depth_mm)) return {};
@@ -99,9 +100,9 @@ EffectImpact TiltImpact(const EffectOptics& optics, const EffectPlace& place,
   }
   const double change = ChangeByDepth(optics, place, shift_mm, others) +
                         ShiftChange(place, displaced_px, optics.SmoothingBy(others, place));
-  double grey_levels = StoredChange(optics, place, std::min(change, place.bright - place.dark));
+  double grey_levels = EncodedChange(optics, place, std::min(change, place.bright - place.dark));
   if (bench->lamp_at_camera && others.Has(Effect::kLampFalloff)) {
-    grey_levels += StoredScaling(optics, place, 1 - std::pow(1 - beside, 2));
+    grey_levels += EncodedScaling(optics, place, 1 - std::pow(1 - beside, 2));
   }
   return {place.depth_mm * beside, grey_levels};
 }
@@ -109,12 +110,12 @@ EffectImpact TiltImpact(const EffectOptics& optics, const EffectPlace& place,
 // Reading error. Formula: a normal error of the recorded reading, not of the position of the
 // target, so that no image changes. Its grey levels are those of a frame at the depth that was
 // read. Enters: the readings.
-EffectImpact ReadingErrorImpact(const EffectOptics& optics, const EffectPlace& place,
+EffectImpact ReadingErrorImpact(const EffectOptics& optics, const EffectSite& place,
                                 const EffectSet& others) {
   const auto& bench = optics.conditions().bench;
   if (!bench) return {};
   const double sigma_mm = bench->reading_sigma_mm;
-  return {sigma_mm, StoredChange(optics, place, ChangeByDepth(optics, place, sigma_mm, others))};
+  return {sigma_mm, EncodedChange(optics, place, ChangeByDepth(optics, place, sigma_mm, others))};
 }
 
 }  // namespace thicklens::model

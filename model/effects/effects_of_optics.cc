@@ -10,7 +10,7 @@
 namespace thicklens::model {
 namespace {
 
-double SigmaPx(const EffectOptics& optics, const EffectPlace& place) {
+double SigmaPx(const EffectOptics& optics, const EffectSite& place) {
   return std::max(std::abs(optics.DefocusPx(place.depth_mm)),
                   std::abs(optics.DefocusPx(place.other_depth_mm.value_or(place.depth_mm))));
 }
@@ -20,8 +20,8 @@ double SigmaPx(const EffectOptics& optics, const EffectPlace& place) {
 // covariance of the weights with the radiance along the rays. The standard deviation of that
 // radiance is at most sqrt((I - dark)(bright - I)), where I is its mean, and at most the change by
 // the displacement of the rays by defocus.
-double WeighingChange(const EffectOptics& optics, const EffectPlace& place, Aperture aperture,
-                      const std::vector<double>& weights, const EffectSet& others) {
+double WeightChange(const EffectOptics& optics, const EffectSite& place, Aperture aperture,
+                    const std::vector<double>& weights, const EffectSet& others) {
   double square = 0;
   for (std::size_t i = 0; i < weights.size(); ++i) {
     square += AperturePoints(aperture)[i].weight * std::pow(weights[i] - 1, 2);
@@ -33,32 +33,32 @@ double WeighingChange(const EffectOptics& optics, const EffectPlace& place, Aper
   const double displaced = ShiftChange(place, SigmaPx(optics, place), boxed);
   constexpr int kLevels = 16;
   double most = 0;
-  EffectPlace level = place;
+  EffectSite level = place;
   for (int i = 0; i < kLevels; ++i) {
     level.dark = place.dark + (place.bright - place.dark) * i / kLevels;
     const double seen = std::sqrt((level.dark - place.dark) * (place.bright - level.dark));
-    most = std::max(most, StoredChange(optics, level, sd * std::min(seen, displaced)));
+    most = std::max(most, EncodedChange(optics, level, sd * std::min(seen, displaced)));
   }
   return most;
 }
 
 // Bound of the stored change when the fall-off of the whole aperture replaces that of its middle.
-double FalloffOfAperture(const EffectOptics& optics, const EffectPlace& place,
+double FalloffOfAperture(const EffectOptics& optics, const EffectSite& place,
                          const EffectSet& others, Aperture aperture) {
   if (!others.Has(Effect::kFalloff)) return 0;
   const double distance_mm = optics.image_distance_mm();
   const Irradiance whole = IrradianceAt(optics, place.position_px, distance_mm, aperture);
   const Irradiance middle =
       IrradianceAt(optics, place.position_px, distance_mm, Aperture::kPinhole);
-  return StoredScaling(optics, place, whole.mean / middle.mean - 1) +
-         WeighingChange(optics, place, aperture, whole.over_mean, others);
+  return EncodedScaling(optics, place, whole.mean / middle.mean - 1) +
+         WeightChange(optics, place, aperture, whole.over_mean, others);
 }
 
 // Bound of the stored change when the fall-off of a disc replaces that of a Gaussian. Weights that
 // are linear over the aperture, g A, change the weighted radiance of the rays by at most
 // g R/2 integral |A_x| |D|, where D is the difference of both densities. That is 0.587 of
 // g sigma R/2, the value of the Gaussian.
-double FalloffOfShape(const EffectOptics& optics, const EffectPlace& place,
+double FalloffOfShape(const EffectOptics& optics, const EffectSite& place,
                       const EffectSet& others) {
   if (!others.Has(Effect::kFalloff)) return 0;
   constexpr double kNotShared = 0.587;
@@ -66,9 +66,8 @@ double FalloffOfShape(const EffectOptics& optics, const EffectPlace& place,
   const Irradiance disc = IrradianceAt(optics, place.position_px, distance_mm, Aperture::kDisc);
   const Irradiance gaussian =
       IrradianceAt(optics, place.position_px, distance_mm, Aperture::kGaussian);
-  return StoredScaling(optics, place, gaussian.mean / disc.mean - 1) +
-         kNotShared *
-             WeighingChange(optics, place, Aperture::kGaussian, gaussian.over_mean, others);
+  return EncodedScaling(optics, place, gaussian.mean / disc.mean - 1) +
+         kNotShared * WeightChange(optics, place, Aperture::kGaussian, gaussian.over_mean, others);
 }
 
 }  // namespace
@@ -79,7 +78,7 @@ double FalloffOfShape(const EffectOptics& optics, const EffectPlace& place,
 // differs. Bound: the ratio of both irradiances, and of their weights of the rays. Enters: the
 // camera is replaced by its thin counterpart. Amount: the ratio's distance from 1; no ray is
 // displaced.
-EffectImpact ThicknessImpact(const EffectOptics& optics, const EffectPlace& place,
+EffectImpact ThicknessImpact(const EffectOptics& optics, const EffectSite& place,
                              const EffectSet& others) {
   if (!others.Has(Effect::kFalloff)) return {};
   const Aperture aperture = ApertureOf(optics, others);
@@ -91,21 +90,21 @@ EffectImpact ThicknessImpact(const EffectOptics& optics, const EffectPlace& plac
     thick.over_mean[i] += 1 - thin.over_mean[i];
   }
   const double change = thin.mean / thick.mean - 1;
-  return {std::abs(change), StoredScaling(optics, place, change) +
-                                WeighingChange(optics, place, aperture, thick.over_mean, others)};
+  return {std::abs(change), EncodedScaling(optics, place, change) +
+                                WeightChange(optics, place, aperture, thick.over_mean, others)};
 }
 
 // Defocus. Formula: sigma = kappa r |c(z)|/p [D4], [S25], [S26]. Bound: the sum of BlurChange of
 // its variance and FalloffOfAperture. Enters: rays pass through the whole aperture instead of its
 // middle.
-EffectImpact DefocusImpact(const EffectOptics& optics, const EffectPlace& place,
+EffectImpact DefocusImpact(const EffectOptics& optics, const EffectSite& place,
                            const EffectSet& others) {
   const double sigma_px = SigmaPx(optics, place);
   const double change = BlurChange(place, sigma_px * sigma_px, optics.SmoothingBy(others, place));
   EffectSet all = others;
   all.Add(Effect::kDefocus);
   const double of_falloff = FalloffOfAperture(optics, place, others, ApertureOf(optics, all));
-  return {sigma_px, StoredChange(optics, place, change) + of_falloff, of_falloff};
+  return {sigma_px, EncodedChange(optics, place, change) + of_falloff, of_falloff};
 }
 
 // Aperture shape. Formula: a disc of radius 2 sigma replaces a Gaussian of sigma with the same
@@ -119,35 +118,34 @@ EffectImpact DefocusImpact(const EffectOptics& optics, const EffectPlace& place,
 // the jump; at a corner of two jumps it is at most twice that. FalloffOfShape is added. Amount:
 // 0.0404 as a displacement of the edge, times sigma sqrt(2 pi). Enters: the positions of the rays
 // in the aperture.
-EffectImpact ApertureShapeImpact(const EffectOptics& optics, const EffectPlace& place,
+EffectImpact ApertureShapeImpact(const EffectOptics& optics, const EffectSite& place,
                                  const EffectSet& others) {
   if (!optics.is_disc() || !others.Has(Effect::kDefocus)) return {};
-  constexpr double kNotShared = 0.2887, kOfSlope = 0.2216, kOfBend = 0.0940, kEdge = 0.0404;
+  constexpr double kNotShared = 0.2887, kOfSlope = 0.2216, kOfNonlinearity = 0.0940, kEdge = 0.0404;
   const double sigma_px = SigmaPx(optics, place);
-  const double smooth =
-      std::min(kOfSlope * sigma_px * place.slope, kOfBend * sigma_px * sigma_px * place.bend);
+  const double smooth = std::min(kOfSlope * sigma_px * place.slope,
+                                 kOfNonlinearity * sigma_px * sigma_px * place.bend);
   const double blurred =
       2 * BlurChange(place, sigma_px * sigma_px,
                      optics.SmoothingBy(others.Without({Effect::kDefocus}), place));
   const double change = std::min(
       {kNotShared * (place.bright - place.dark), smooth + 2 * kEdge * place.jump, blurred});
   const double of_falloff = FalloffOfShape(optics, place, others);
-  return {kEdge * std::sqrt(2 * kPi) * sigma_px, StoredChange(optics, place, change) + of_falloff,
+  return {kEdge * std::sqrt(2 * kPi) * sigma_px, EncodedChange(optics, place, change) + of_falloff,
           of_falloff};
 }
 
 // Fall-off. Formula: [S12], cos(alpha) cos^3(beta), which the exposure scales to 1 at the principal
 // point. Bound: its mean over the aperture scales the radiance; its deviations from that mean are
 // weights of the radiance along the rays. Enters: a weight of each ray.
-EffectImpact FalloffImpact(const EffectOptics& optics, const EffectPlace& place,
+EffectImpact FalloffImpact(const EffectOptics& optics, const EffectSite& place,
                            const EffectSet& others) {
   const Aperture aperture = ApertureOf(optics, others);
   const Irradiance irradiance =
       IrradianceAt(optics, place.position_px, optics.image_distance_mm(), aperture);
   const double loss = 1 - irradiance.mean;
-  return {std::abs(loss),
-          StoredScaling(optics, place, loss) +
-              WeighingChange(optics, place, aperture, irradiance.over_mean, others)};
+  return {std::abs(loss), EncodedScaling(optics, place, loss) +
+                              WeightChange(optics, place, aperture, irradiance.over_mean, others)};
 }
 
 // Vignetting. Formula: by [S10], rays of directional samples at u cross the aperture at
@@ -156,7 +154,7 @@ EffectImpact FalloffImpact(const EffectOptics& optics, const EffectPlace& place,
 // Gaussian displaced by w differ in the share erf(w/(2 sqrt(2))) of their light [D52], which is the
 // weight of the radiance along the rays; the weights of the bundle are normalised. Enters: weights
 // of the views that depend on the pixel.
-EffectImpact VignettingImpact(const EffectOptics& optics, const EffectPlace& place,
+EffectImpact VignettingImpact(const EffectOptics& optics, const EffectSite& place,
                               const EffectSet& others) {
   const auto& planes = optics.conditions().planes;
   if (!planes || planes->uv_depth_mm == 0 || !others.Has(Effect::kDefocus) ||
@@ -169,25 +167,25 @@ EffectImpact VignettingImpact(const EffectOptics& optics, const EffectPlace& pla
   const double wander =
       std::abs(planes->uv_depth_mm * s_mm / planes->plane_spacing_mm) / optics.aperture_sigma_mm();
   const double lost = std::erf(wander / (2 * std::sqrt(2.0)));
-  return {lost, StoredChange(optics, place, lost * (place.bright - place.dark))};
+  return {lost, EncodedChange(optics, place, lost * (place.bright - place.dark))};
 }
 
 // Occlusion [D53]. Formula: the parallax between both sides of a depth edge,
 // kappa r |c(z1) - c(z2)|/p for each standard deviation of the aperture. Bound: rays that pass the
 // edge meet another surface. The bound is therefore that of a jump with the height of the range:
 // BlurChange of the parallax. Enters: each ray is traced to the first surface that it meets.
-EffectImpact OcclusionImpact(const EffectOptics& optics, const EffectPlace& place,
+EffectImpact OcclusionImpact(const EffectOptics& optics, const EffectSite& place,
                              const EffectSet& others) {
   if (!place.other_depth_mm || !others.Has(Effect::kDefocus)) return {};
   const double parallax_px =
       std::abs(optics.DefocusPx(place.depth_mm) - optics.DefocusPx(*place.other_depth_mm));
-  EffectPlace edge = place;
+  EffectSite edge = place;
   edge.jump = place.bright - place.dark;
   edge.slope = edge.bend = 0;
   EffectOptics::Smoothing boxed;
   boxed.boxed = others.Has(Effect::kPixelBox);
   return {parallax_px,
-          StoredChange(optics, place, BlurChange(edge, parallax_px * parallax_px, boxed))};
+          EncodedChange(optics, place, BlurChange(edge, parallax_px * parallax_px, boxed))};
 }
 
 }  // namespace thicklens::model

@@ -192,35 +192,35 @@ LightField DescriptionOf(const LightField& light_field) {
   return description;
 }
 
-LinearPicture ViewPicture(const LightField& light_field, int k, int l) {
+LinearImage ViewImage(const LightField& light_field, int k, int l) {
   RequireView(light_field, k, l);
-  LinearPicture picture{light_field.s_count, light_field.t_count, light_field.channels, {}};
+  LinearImage image{light_field.s_count, light_field.t_count, light_field.channels, {}};
   const std::size_t pixels = light_field.view_size();
   const auto channels = static_cast<std::size_t>(light_field.channels);
-  picture.values.resize(pixels * channels);
+  image.values.resize(pixels * channels);
   for (int channel = 0; channel < light_field.channels; ++channel) {
     const float* plane = light_field.values.data() + light_field.ViewStart(channel, k, l);
-    float* value = picture.values.data() + channel;
+    float* value = image.values.data() + channel;
     for (std::size_t i = 0; i < pixels; ++i) value[i * channels] = plane[i];
   }
-  return picture;
+  return image;
 }
 
-void SetView(LightField* light_field, int k, int l, const LinearPicture& picture) {
+void SetView(LightField* light_field, int k, int l, const LinearImage& image) {
   RequireView(*light_field, k, l);
   const std::size_t pixels = light_field->view_size();
   const auto channels = static_cast<std::size_t>(light_field->channels);
-  if (picture.width_px != light_field->s_count || picture.height_px != light_field->t_count ||
-      picture.channels != light_field->channels || picture.values.size() != pixels * channels) {
+  if (image.width_px != light_field->s_count || image.height_px != light_field->t_count ||
+      image.channels != light_field->channels || image.values.size() != pixels * channels) {
     throw Error(fmt::format(
-        "view ({}, {}): the picture has {}x{} px in {} channels, the light field {}x{} in {}: they "
+        "view ({}, {}): the image has {}x{} px in {} channels, the light field {}x{} in {}: they "
         "must be equal",
-        k, l, picture.width_px, picture.height_px, picture.channels, light_field->s_count,
+        k, l, image.width_px, image.height_px, image.channels, light_field->s_count,
         light_field->t_count, light_field->channels));
   }
   for (int channel = 0; channel < light_field->channels; ++channel) {
     float* plane = light_field->values.data() + light_field->ViewStart(channel, k, l);
-    const float* value = picture.values.data() + channel;
+    const float* value = image.values.data() + channel;
     for (std::size_t i = 0; i < pixels; ++i) plane[i] = value[i * channels];
   }
   if (light_field->present.empty()) return;
@@ -290,16 +290,16 @@ LightField CropViews(const LightField& light_field, const PixelRect& rect) {
   return cropped;
 }
 
-LinearPicture CropPicture(const LinearPicture& picture, const PixelRect& rect) {
-  RequireInside("picture", rect, picture.width_px, picture.height_px);
-  return {rect.width, rect.height, picture.channels,
-          CutOut(picture.values, picture.width_px, picture.channels, rect)};
+LinearImage CropImage(const LinearImage& image, const PixelRect& rect) {
+  RequireInside("image", rect, image.width_px, image.height_px);
+  return {rect.width, rect.height, image.channels,
+          CutOut(image.values, image.width_px, image.channels, rect)};
 }
 
-StoredPicture CropPicture(const StoredPicture& picture, const PixelRect& rect) {
-  RequireInside("picture", rect, picture.width_px, picture.height_px);
-  return {rect.width, rect.height, picture.channels, picture.bits,
-          CutOut(picture.values, picture.width_px, picture.channels, rect)};
+EncodedImage CropImage(const EncodedImage& image, const PixelRect& rect) {
+  RequireInside("image", rect, image.width_px, image.height_px);
+  return {rect.width, rect.height, image.channels, image.bits,
+          CutOut(image.values, image.width_px, image.channels, rect)};
 }
 
 RawDepthMap CropDepth(const RawDepthMap& map, const PixelRect& rect) {

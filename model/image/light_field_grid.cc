@@ -109,7 +109,7 @@ Eigen::Vector2d PositionAtDepthMm(const LightFieldPlanes& planes, const Ray& ray
   return {st_share * ray.s_mm + uv_share * ray.u_mm, st_share * ray.t_mm + uv_share * ray.v_mm};
 }
 
-Eigen::Vector2d PicturePositionPx(const Sensor& sensor, const Eigen::Vector2d& landing_mm) {
+Eigen::Vector2d ImagePositionPx(const Sensor& sensor, const Eigen::Vector2d& landing_mm) {
   return sensor.principal_point_px - landing_mm / sensor.pixel_pitch_mm;
 }
 

@@ -11,7 +11,7 @@
 #include "model/base/random_draws.h"
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
-#include "thicklens/model/stored_levels.h"
+#include "thicklens/model/quantised_levels.h"
 
 namespace thicklens::model {
 namespace {
@@ -40,7 +40,7 @@ void CheckSize(const std::string& what, int width_px, int height_px, int channel
 
 void CheckBits(int bits) {
   if (bits != 8 && bits != 16) {
-    throw Error(fmt::format("picture: {} bits a value: it must be 8 or 16", bits));
+    throw Error(fmt::format("image: {} bits a value: it must be 8 or 16", bits));
   }
 }
 
@@ -56,17 +56,16 @@ std::uint16_t RoundedLevel(double stored, double full_scale) {
   return static_cast<std::uint16_t>(level > 0 ? std::min(level, full_scale) : 0.0);
 }
 
-// Stored image; `level_of` gives the level of each value.
+// Encoded image; `level_of` gives the level of each value.
 template <typename LevelOf>
-StoredPicture StoredBy(const LinearPicture& picture, int bits, const LevelOf& level_of) {
-  CheckSize("picture", picture.width_px, picture.height_px, picture.channels,
-            picture.values.size());
-  StoredPicture stored{picture.width_px, picture.height_px, picture.channels, bits, {}};
-  stored.values.resize(picture.values.size());
-  for (std::size_t first = 0; first < picture.values.size(); first += kValuesAtOnce) {
+EncodedImage EncodedBy(const LinearImage& image, int bits, const LevelOf& level_of) {
+  CheckSize("image", image.width_px, image.height_px, image.channels, image.values.size());
+  EncodedImage stored{image.width_px, image.height_px, image.channels, bits, {}};
+  stored.values.resize(image.values.size());
+  for (std::size_t first = 0; first < image.values.size(); first += kValuesAtOnce) {
     ThrowIfCancelled();
-    const std::size_t last = std::min(first + kValuesAtOnce, picture.values.size());
-    std::transform(picture.values.data() + first, picture.values.data() + last,
+    const std::size_t last = std::min(first + kValuesAtOnce, image.values.size());
+    std::transform(image.values.data() + first, image.values.data() + last,
                    stored.values.data() + first, level_of);
   }
   return stored;
@@ -199,7 +198,7 @@ void CheckPlausible(const Camera& camera, const DepthStatistics& depth,
 
 }  // namespace
 
-StoredLevels::StoredLevels(const TransferCurve& transfer, int bits) : bits_(bits) {
+QuantisedLevels::QuantisedLevels(const TransferCurve& transfer, int bits) : bits_(bits) {
   const double full_scale = FullScale(bits);
   const auto level_of = [&](float light) {
     return RoundedLevel(transfer.Encode(light), full_scale);
@@ -223,68 +222,65 @@ StoredLevels::StoredLevels(const TransferCurve& transfer, int bits) : bits_(bits
   }
 }
 
-LinearPicture ToLinear(const StoredPicture& picture, const TransferCurve& transfer) {
-  CheckBits(picture.bits);
-  CheckSize("picture", picture.width_px, picture.height_px, picture.channels,
-            picture.values.size());
+LinearImage ToLinear(const EncodedImage& image, const TransferCurve& transfer) {
+  CheckBits(image.bits);
+  CheckSize("image", image.width_px, image.height_px, image.channels, image.values.size());
   // A table with one entry for each possible value costs far less than a power function per pixel.
-  std::vector<float> light_of(static_cast<std::size_t>(picture.full_scale()) + 1);
+  std::vector<float> light_of(static_cast<std::size_t>(image.full_scale()) + 1);
   for (std::size_t value = 0; value < light_of.size(); ++value) {
     light_of[value] =
-        static_cast<float>(transfer.Decode(static_cast<double>(value) / picture.full_scale()));
+        static_cast<float>(transfer.Decode(static_cast<double>(value) / image.full_scale()));
   }
-  LinearPicture linear{picture.width_px, picture.height_px, picture.channels, {}};
-  linear.values.reserve(picture.values.size());
-  for (const std::uint16_t value : picture.values) {
+  LinearImage linear{image.width_px, image.height_px, image.channels, {}};
+  linear.values.reserve(image.values.size());
+  for (const std::uint16_t value : image.values) {
     if (linear.values.size() % kValuesAtOnce == 0) ThrowIfCancelled();
     if (value >= light_of.size()) {
-      throw Error(fmt::format("picture: a value is {}: at {} bits it must be at most {}", value,
-                              picture.bits, picture.full_scale()));
+      throw Error(fmt::format("image: a value is {}: at {} bits it must be at most {}", value,
+                              image.bits, image.full_scale()));
     }
     linear.values.push_back(light_of[value]);
   }
   return linear;
 }
 
-StoredPicture ToStored(const LinearPicture& picture, const TransferCurve& transfer, int bits) {
+EncodedImage ToEncoded(const LinearImage& image, const TransferCurve& transfer, int bits) {
   const double full_scale = FullScale(bits);
-  return StoredBy(picture, bits,
-                  [&](float light) { return RoundedLevel(transfer.Encode(light), full_scale); });
+  return EncodedBy(image, bits,
+                   [&](float light) { return RoundedLevel(transfer.Encode(light), full_scale); });
 }
 
-StoredPicture ToStored(const LinearPicture& picture, const StoredLevels& levels) {
-  return StoredBy(picture, levels.bits(), [&](float light) { return levels.LevelOf(light); });
+EncodedImage ToEncoded(const LinearImage& image, const QuantisedLevels& levels) {
+  return EncodedBy(image, levels.bits(), [&](float light) { return levels.LevelOf(light); });
 }
 
-StoredPicture ToStoredWithNoise(const LinearPicture& picture, const TransferCurve& transfer,
-                                int bits, double sigma, std::uint64_t seed) {
+EncodedImage ToEncodedWithNoise(const LinearImage& image, const TransferCurve& transfer, int bits,
+                                double sigma, std::uint64_t seed) {
   if (!(sigma >= 0) || !std::isfinite(sigma)) {
     throw Error(
-        fmt::format("picture: the noise is {} full scales: it must be finite and >= 0", sigma));
+        fmt::format("image: the noise is {} full scales: it must be finite and >= 0", sigma));
   }
-  if (sigma == 0) return ToStored(picture, transfer, bits);
+  if (sigma == 0) return ToEncoded(image, transfer, bits);
   const double full_scale = FullScale(bits);
-  RandomDraws draws(seed, RandomDraws::Purpose::kStoredNoise, 0);
-  return StoredBy(picture, bits, [&](float light) {
+  RandomDraws draws(seed, RandomDraws::Purpose::kEncodedNoise, 0);
+  return EncodedBy(image, bits, [&](float light) {
     return RoundedLevel(transfer.Encode(light) + sigma * draws.Normal(), full_scale);
   });
 }
 
-LinearPicture ToGrey(const LinearPicture& picture) {
-  CheckSize("picture", picture.width_px, picture.height_px, picture.channels,
-            picture.values.size());
-  if (picture.channels == 1) return picture;
-  if (picture.channels != 3 && picture.channels != 4) {
-    throw Error(
-        fmt::format("picture: {} channels: it must have 1 (grey), 3 (RGB) or 4 (RGB and alpha)",
-                    picture.channels));
+LinearImage ToGrey(const LinearImage& image) {
+  CheckSize("image", image.width_px, image.height_px, image.channels, image.values.size());
+  if (image.channels == 1) return image;
+  if (image.channels != 3 && image.channels != 4) {
+    throw Error(fmt::format(
+        "image: {} channels: it must have 1 (grey), 3 (RGB) or 4 (RGB and alpha)", image.channels));
   }
-  LinearPicture grey{picture.width_px, picture.height_px, 1, {}};
-  const auto step = static_cast<std::size_t>(picture.channels);
-  grey.values.reserve(picture.values.size() / step);
-  for (std::size_t i = 0; i < picture.values.size(); i += step) {
-    grey.values.push_back(0.2126F * picture.values[i] + 0.7152F * picture.values[i + 1] +
-                          0.0722F * picture.values[i + 2]);
+  LinearImage grey{image.width_px, image.height_px, 1, {}};
+  const auto step = static_cast<std::size_t>(image.channels);
+  grey.values.reserve(image.values.size() / step);
+  for (std::size_t i = 0; i < image.values.size(); i += step) {
+    grey.values.push_back(0.2126F * image.values[i] + 0.7152F * image.values[i + 1] +
+                          0.0722F * image.values[i + 2]);
   }
   return grey;
 }
@@ -304,15 +300,14 @@ double DepthUnitMm(const std::string& name) {
   throw Error(fmt::format("depth unit \"{}\" is unknown: it must be mm, cm, m or tum5000", name));
 }
 
-Scene MakeScene(const Camera& camera, LinearPicture picture, const RawDepthMap& map,
+Scene MakeScene(const Camera& camera, LinearImage image, const RawDepthMap& map,
                 const DepthConvention& convention, const std::string& depth_name) {
-  CheckSize("picture", picture.width_px, picture.height_px, picture.channels,
-            picture.values.size());
+  CheckSize("image", image.width_px, image.height_px, image.channels, image.values.size());
   CheckSize(depth_name, map.width_px, map.height_px, 1, map.values.size());
-  if (map.width_px != picture.width_px || map.height_px != picture.height_px) {
-    throw Error(fmt::format("{}: it is {}x{} px, the picture {}x{} px: the sizes must be equal",
-                            depth_name, map.width_px, map.height_px, picture.width_px,
-                            picture.height_px));
+  if (map.width_px != image.width_px || map.height_px != image.height_px) {
+    throw Error(fmt::format("{}: it is {}x{} px, the image {}x{} px: the sizes must be equal",
+                            depth_name, map.width_px, map.height_px, image.width_px,
+                            image.height_px));
   }
   CheckConvention(convention, depth_name);
 
@@ -344,7 +339,7 @@ Scene MakeScene(const Camera& camera, LinearPicture picture, const RawDepthMap& 
                  convention.kind == DepthKind::kDisparity
                      ? "are scale and offset of the disparity right, or is the map a depth?"
                      : "is the unit right?");
-  scene.picture = std::move(picture);
+  scene.image = std::move(image);
   return scene;
 }
 

@@ -99,9 +99,9 @@ std::vector<std::string> AssumedFields(const Camera& camera) {
   return fields;
 }
 
-Camera ThinTwin(const Camera& camera) {
+Camera ThinLensEquivalent(const Camera& camera) {
   Camera thin = camera;
-  thin.lens = ThinCounterpart(camera.lens);
+  thin.lens = ThinLensEquivalent(camera.lens);
   thin.calibration->image_distance_mm->value =
       camera.focal_scale_px() * camera.sensor.pixel_pitch_mm;
   return thin;

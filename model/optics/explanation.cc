@@ -50,7 +50,7 @@ double DefocusErrorPx(const Camera& camera, const Explanation& known, const Dept
 
 DepthRow RowAt(const Camera& camera, const Explanation& known, double depth_mm) {
   const double pitch_mm = camera.sensor.pixel_pitch_mm;
-  const ThickLens thin = ThinCounterpart(camera.lens);
+  const ThickLens thin = ThinLensEquivalent(camera.lens);
   DepthRow row;
   row.depth_mm = depth_mm;
   row.blur_radius_mm = RadiusMm(camera.lens, known.image_distance_mm, depth_mm);
@@ -85,7 +85,7 @@ double ThinUpToMm(const Camera& camera, double image_distance_mm) {
 // the same at every depth.
 ThinComparison CompareWithThin(const Camera& camera, double image_distance_mm) {
   const ThickLens& lens = camera.lens;
-  const ThickLens thin = ThinCounterpart(lens);
+  const ThickLens thin = ThinLensEquivalent(lens);
   ThinComparison comparison;
   comparison.same_lens =
       lens.front_focal_length_mm == lens.rear_focal_length_mm && lens.lens_thickness_mm == 0;

@@ -20,7 +20,7 @@ constexpr int kGaussianNodes = 72;
 // Legendre's rule of n nodes in A^2 is exact to rounding for J0(x A/sigma) up to about x = n - 30.
 constexpr int kDiscNodesBeyond = 40;
 // The series for the disc's edge is not accurate enough below this x.
-constexpr double kLeastDiscReach = 40;
+constexpr double kMinDiscReach = 40;
 constexpr int kMomentNodes = 32;
 
 // Nodes of A^2 for a T of sigma 1, and their weights, which sum to 1.
@@ -220,7 +220,7 @@ PupilProfile::PupilProfile(PupilLaw law, const PupilOptics& optics, double large
                     optics.sigma_mm, optics.focus_depth_mm, optics.image_distance_mm));
   }
   const bool is_disc = psf_ == Psf::kDisc;
-  const double reach = is_disc ? std::max(largest_x, kLeastDiscReach) : kGaussianReach;
+  const double reach = is_disc ? std::max(largest_x, kMinDiscReach) : kGaussianReach;
   const Rule rule =
       GaussRule(psf_, is_disc ? static_cast<int>(reach) + kDiscNodesBeyond : kGaussianNodes);
   const Law of_light(law, optics, rule);

@@ -68,7 +68,7 @@ bool ThickLens::IsValid(std::string* why) const {
   return IsPositive("aperture_radius_mm", aperture_radius_mm, why);
 }
 
-ThickLens ThinCounterpart(const ThickLens& lens) {
+ThickLens ThinLensEquivalent(const ThickLens& lens) {
   ThickLens thin = lens;
   thin.rear_focal_length_mm = lens.front_focal_length_mm;
   thin.lens_thickness_mm = 0;

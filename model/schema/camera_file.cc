@@ -24,7 +24,7 @@ constexpr int kMaxImageSizePx = 100000;
 YamlNode ValueNode(const YamlNode& node, Camera* camera) {
   if (!node.IsMap()) return node;
   node.RequireKeys({"value", "tolerance", "assumed"});
-  Statement statement;
+  Provenance statement;
   if (const auto tolerance = node.Find("tolerance"))
     statement.tolerance = tolerance->NonNegativeNumber();
   if (const auto assumed = node.Find("assumed")) statement.assumed = assumed->Boolean();
@@ -143,14 +143,14 @@ class CameraWriter {
   }
 
  private:
-  const Statement* StatementOf(const std::string& field) const {
+  const Provenance* StatementOf(const std::string& field) const {
     const auto statement = camera_.statements.find(field);
     return statement == camera_.statements.end() ? nullptr : &statement->second;
   }
 
   // Writes the entries of the map {value: .., tolerance: .., assumed: ..} that is open, and ends
   // it.
-  void FinishStated(double value, const Statement& statement) {
+  void FinishStated(double value, const Provenance& statement) {
     out_.Number("value", value);
     if (statement.tolerance != 0) out_.Number("tolerance", statement.tolerance);
     if (statement.assumed) out_.Text("assumed", "true");
@@ -158,7 +158,7 @@ class CameraWriter {
   }
 
   void Stated(const std::string& section, const std::string& key, double value) {
-    if (const Statement* statement = StatementOf(section + key)) {
+    if (const Provenance* statement = StatementOf(section + key)) {
       out_.BeginMapInLine(key);
       FinishStated(value, *statement);
     } else {
@@ -167,7 +167,7 @@ class CameraWriter {
   }
 
   void StatedElement(const std::string& field, double value) {
-    if (const Statement* statement = StatementOf(field)) {
+    if (const Provenance* statement = StatementOf(field)) {
       out_.BeginMapInLine();
       FinishStated(value, *statement);
     } else {

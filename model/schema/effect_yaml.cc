@@ -6,7 +6,7 @@
 
 namespace thicklens::model {
 
-void ReadEffectChoice(const YamlNode& root, EffectChoice* choice) {
+void ReadEffectSelectionOptions(const YamlNode& root, EffectSelectionOptions* choice) {
   const auto names = [](const YamlNode& node) {
     EffectSet effects;
     for (const YamlNode& name : node.Elements()) {
@@ -21,10 +21,10 @@ void ReadEffectChoice(const YamlNode& root, EffectChoice* choice) {
   };
   if (const auto effects = root.Find("effects")) {
     if (effects->IsSequence()) {
-      choice->base = EffectChoice::Base::kGiven;
+      choice->base = EffectSelectionOptions::Base::kGiven;
       choice->given = names(*effects);
     } else {
-      *choice = EffectChoiceFromText(effects->OneOf({"auto", "all", "none"}), "", "");
+      *choice = EffectSelectionOptionsFromText(effects->OneOf({"auto", "all", "none"}), "", "");
     }
   }
   if (const auto without = root.Find("without")) choice->without = names(*without);
@@ -38,7 +38,7 @@ void ReadEffectChoice(const YamlNode& root, EffectChoice* choice) {
   }
 }
 
-void WriteEffects(const EffectRecord& record, YamlWriter* out) {
+void WriteEffects(const EffectSelectionRecord& record, YamlWriter* out) {
   out->List("effects", record.on);
   out->BeginMapInLine("left_out_grey_levels");
   for (const auto& [name, grey_levels] : record.left_out_grey_levels)

@@ -48,8 +48,8 @@ std::optional<double> ToNumber(const std::string& cell) {
   const char* end = cell.data() + cell.size();
   double value = 0;
   const auto [rest, status] = std::from_chars(begin, end, value);
-  constexpr double kMostMagnitude = 1e30;  // the limit of numbers in YAML
-  const bool is_number = status == std::errc() && rest == end && std::abs(value) <= kMostMagnitude;
+  constexpr double kMaxMagnitude = 1e30;  // the limit of numbers in YAML
+  const bool is_number = status == std::errc() && rest == end && std::abs(value) <= kMaxMagnitude;
   if (!is_number) return std::nullopt;
   return value;
 }

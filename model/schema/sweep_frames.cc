@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 // create for every file ("._frame.png").
 bool IsHidden(const fs::path& file) { return file.filename().string().rfind('.', 0) == 0; }
 
-bool IsPictureName(const fs::path& file) {
+bool IsImageName(const fs::path& file) {
   static const std::set<std::string> kEndings = {".png", ".jpg", ".jpeg", ".tif", ".tiff",
                                                  ".bmp", ".pgm", ".ppm",  ".pnm"};
   std::string ending = file.extension().string();
@@ -54,7 +54,7 @@ std::vector<std::string> FilesMatching(const YamlNode& node) {
 
 // The images in the folder itself or, if it contains none, in its direct sub-folders: a user may
 // name the folder that contains both the table and "frames/".
-std::vector<std::string> PicturesIn(const std::string& folder) {
+std::vector<std::string> ImagesIn(const std::string& folder) {
   std::error_code failure;
   if (!fs::is_directory(folder, failure)) throw Error(fmt::format("{}: no such folder", folder));
   fs::directory_iterator entries(folder, failure);
@@ -62,11 +62,11 @@ std::vector<std::string> PicturesIn(const std::string& folder) {
   std::vector<std::string> here, below;
   for (const auto& entry : entries) {
     if (IsHidden(entry.path())) continue;
-    if (entry.is_regular_file(failure) && IsPictureName(entry.path()))
+    if (entry.is_regular_file(failure) && IsImageName(entry.path()))
       here.push_back(entry.path().string());
     if (!entry.is_directory(failure)) continue;
     for (const auto& inner : fs::directory_iterator(entry.path(), failure)) {
-      if (!IsHidden(inner.path()) && inner.is_regular_file(failure) && IsPictureName(inner.path()))
+      if (!IsHidden(inner.path()) && inner.is_regular_file(failure) && IsImageName(inner.path()))
         below.push_back(inner.path().string());
     }
   }
@@ -77,7 +77,7 @@ std::vector<std::string> PicturesIn(const std::string& folder) {
 
 // Checks a frame early, because frames are read long after their names are known.
 void RequireFrame(const std::string& path, const std::string& place) {
-  TellInput(path);
+  ReportInput(path);
   try {
     RequireRegularFile(path);
   } catch (const Error& error) {
@@ -149,7 +149,7 @@ std::vector<SweepFrame> ReadSweepFrames(const YamlNode& root, double mm_per_unit
       if (files.empty())
         throw pattern->ErrorHere(fmt::format("no file matches '{}'", pattern->Text()));
     } else {
-      files = PicturesIn(folder.empty() ? "." : folder);
+      files = ImagesIn(folder.empty() ? "." : folder);
     }
     return JoinRowsAndFiles(ReadReadingsTable(csv), csv, files, folder, mm_per_unit);
   }
@@ -180,7 +180,7 @@ std::vector<SweepFrame> ReadSweepFrames(const YamlNode& root, double mm_per_unit
 }
 
 std::vector<SweepFrame> FramesOfFolder(const std::string& folder, const std::string& readings_csv) {
-  return JoinRowsAndFiles(ReadReadingsTable(readings_csv), readings_csv, PicturesIn(folder), folder,
+  return JoinRowsAndFiles(ReadReadingsTable(readings_csv), readings_csv, ImagesIn(folder), folder,
                           1);
 }
 

@@ -13,7 +13,7 @@ constexpr std::size_t kValuesAtOnce = 4096;
 }  // namespace
 
 void AddSensorNoise(const SensorNoise& noise, const EffectSet& on, std::uint64_t seed,
-                    std::uint32_t item, LinearPicture* picture) {
+                    std::uint32_t item, LinearImage* image) {
   const double full_well = noise.full_well_electrons;
   const bool shot = on.Has(Effect::kShotNoise);
   const bool read = on.Has(Effect::kReadNoise) && noise.read_noise_electrons > 0;
@@ -21,7 +21,7 @@ void AddSensorNoise(const SensorNoise& noise, const EffectSet& on, std::uint64_t
   RandomDraws shots(seed, RandomDraws::Purpose::kSensor, item);
   RandomDraws reads(seed, RandomDraws::Purpose::kReadout, item);
   std::size_t count = 0;
-  for (float& light : picture->values) {
+  for (float& light : image->values) {
     if (count++ % kValuesAtOnce == 0) ThrowIfCancelled();
     double electrons = static_cast<double>(light) * full_well;
     if (shot) electrons = shots.Poisson(electrons);

@@ -18,7 +18,7 @@ struct SensorNoise {
 // effect (shot-noise, read-noise) is on. The random draws of each depend only on `seed` and `item`
 // (a frame's index), whether or not the other is on.
 void AddSensorNoise(const SensorNoise& noise, const EffectSet& on, std::uint64_t seed,
-                    std::uint32_t item, LinearPicture* picture);
+                    std::uint32_t item, LinearImage* image);
 
 }  // namespace thicklens::model
 

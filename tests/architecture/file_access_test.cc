@@ -29,21 +29,21 @@ const std::regex& WaysToOpenAFile() {
 // Sources that may open files, each with the reason.
 const std::set<std::string>& Known() {
   static const std::set<std::string> known = {
-      "model/base/input_file.cc",              // the reader
-      "model/base/output_file.cc",             // the writers
-      "model/base/output_folder.cc",           //
-      "model/base/output_part.cc",             //
-      "model/base/output_target.cc",           //
-      "tools/io/journal_file.cc",              // grows during a run
-      "tools/io/float_tiff.cc",                // writes a file in an output folder
-      "tools/io/picture_kind.cc",              // libtiff reads from memory
-      "tools/system/standard_descriptors.cc",  // the null device
-      "kernels/opencl/guarded_child.cc",       // the null device
-      "model/base/run_cost.cc",                // files of /proc
-      "tools/system/machine.cc",               //
-      "tools/io/block_checkpoint.cc",          //
-      "model/base/memory_available.cc",        //
-      "tools/system/peak_memory.cc"};          //
+      "model/base/input_file.cc",               // the reader
+      "model/base/output_file.cc",              // the writers
+      "model/base/output_folder.cc",            //
+      "model/base/output_part.cc",              //
+      "model/base/output_target.cc",            //
+      "tools/io/journal_file.cc",               // grows during a run
+      "tools/io/float_tiff.cc",                 // writes a file in an output folder
+      "tools/io/image_file_kind.cc",            // libtiff reads from memory
+      "tools/system/standard_descriptors.cc",   // the null device
+      "kernels/opencl/isolated_subprocess.cc",  // the null device
+      "model/base/run_cost.cc",                 // files of /proc
+      "tools/system/machine.cc",                //
+      "tools/io/block_checkpoint.cc",           //
+      "model/base/memory_available.cc",         //
+      "tools/system/peak_memory.cc"};           //
   return known;
 }
 

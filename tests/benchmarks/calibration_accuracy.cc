@@ -26,7 +26,7 @@ const std::vector<std::string> kCases = {"i", "ii", "iii", "iv", "v"};
 const std::vector<model::TargetKind> kTargets = {
     model::TargetKind::kWhiteNoise,   model::TargetKind::kPinkNoise,
     model::TargetKind::kCheckerboard, model::TargetKind::kSiemensStar,
-    model::TargetKind::kDeadLeaves,   model::TargetKind::kPicture,
+    model::TargetKind::kDeadLeaves,   model::TargetKind::kImage,
     model::TargetKind::kKnifeEdge};
 
 struct Arguments {
@@ -37,7 +37,7 @@ struct Arguments {
   int threads = 0;
   TrialSettings settings;
   std::string psf = "gaussian";
-  std::string picture_path;
+  std::string image_path;
   std::string json_path;
   bool faults = false;
   bool pupil_laws = false;
@@ -49,30 +49,29 @@ std::vector<std::string> TargetNames() {
   return names;
 }
 
-// Reads a picture as a screen would show it: sRGB light is made linear.
-model::LinearPicture ReadPicture(const std::string& path) {
+// Reads an image as a screen would show it: sRGB light is made linear.
+model::LinearImage ReadImage(const std::string& path) {
   const cv::Mat stored = cv::imread(path, cv::IMREAD_GRAYSCALE);
   if (stored.empty())
     throw Error(path +
-                ": cannot be read as a picture; a PNG, JPEG or TIFF file is "
+                ": cannot be read as an image; a PNG, JPEG or TIFF file is "
                 "expected");
-  model::LinearPicture picture{stored.cols, stored.rows, 1, {}};
+  model::LinearImage image{stored.cols, stored.rows, 1, {}};
   for (int y = 0; y < stored.rows; ++y) {
     for (int x = 0; x < stored.cols; ++x) {
-      picture.values.push_back(static_cast<float>(
+      image.values.push_back(static_cast<float>(
           model::TransferCurve::Srgb().Decode(stored.at<std::uint8_t>(y, x) / 255.0)));
     }
   }
-  return picture;
+  return image;
 }
 
 void AddOptions(CLI::App* app, Arguments* arguments) {
   const auto positive = CLI::PositiveNumber;
   app->add_option("--case", arguments->cases, "cases of configs/sweeps: i ii iii iv v (all)")
       ->check(CLI::IsMember(kCases));
-  app->add_option(
-         "--target", arguments->targets,
-         "targets (all; `picture` with --picture alone): " + CLI::detail::join(TargetNames()))
+  app->add_option("--target", arguments->targets,
+                  "targets (all; `image` with --image alone): " + CLI::detail::join(TargetNames()))
       ->check(CLI::IsMember(TargetNames()));
   app->add_option(
          "--floor", arguments->floors,
@@ -84,7 +83,7 @@ void AddOptions(CLI::App* app, Arguments* arguments) {
       ->check(CLI::Range(64, 4096));
   app->add_option("--psf", arguments->psf, "gaussian (default) or disc")
       ->check(CLI::IsMember({"gaussian", "disc"}));
-  app->add_option("--picture", arguments->picture_path, "photograph for the target `picture`")
+  app->add_option("--image", arguments->image_path, "photograph for the target `image`")
       ->check(CLI::ExistingFile);
   app->add_option("--seed", arguments->settings.first_seed, "of the first sweep (1)")
       ->check(positive);
@@ -107,10 +106,10 @@ std::vector<model::TargetKind> Targets(const Arguments& arguments) {
   for (const model::TargetKind kind : kTargets) {
     const std::string name = model::TargetKindName(kind);
     const bool named = std::count(arguments.targets.begin(), arguments.targets.end(), name) > 0;
-    const bool is_picture = kind == model::TargetKind::kPicture;
-    if (named && is_picture && arguments.picture_path.empty())
-      throw Error("--target picture: the photograph is missing; give it with --picture FILE");
-    if (named || (arguments.targets.empty() && !(is_picture && arguments.picture_path.empty())))
+    const bool is_image = kind == model::TargetKind::kImage;
+    if (named && is_image && arguments.image_path.empty())
+      throw Error("--target image: the photograph is missing; give it with --image FILE");
+    if (named || (arguments.targets.empty() && !(is_image && arguments.image_path.empty())))
       targets.push_back(kind);
   }
   return targets;
@@ -153,8 +152,7 @@ void RunAll(const Arguments& arguments, Run* run) {
 
 void RunStudy(Arguments arguments) {
   if (arguments.psf == "disc") arguments.settings.psf = model::Psf::kDisc;
-  if (!arguments.picture_path.empty())
-    arguments.settings.picture = ReadPicture(arguments.picture_path);
+  if (!arguments.image_path.empty()) arguments.settings.image = ReadImage(arguments.image_path);
   nlohmann::ordered_json json;
   if (arguments.faults) {
     json["faults"] = RunFaultStudy(arguments.cases, arguments.settings, arguments.threads);

@@ -26,9 +26,8 @@ const model::SweepSimulator& Bench() {
 }
 
 cv::Mat Frame(int index) {
-  const model::LinearPicture picture = Bench().RenderNoiseless(index);
-  return cv::Mat(picture.height_px, picture.width_px, CV_32F,
-                 const_cast<float*>(picture.values.data()))
+  const model::LinearImage image = Bench().RenderNoiseless(index);
+  return cv::Mat(image.height_px, image.width_px, CV_32F, const_cast<float*>(image.values.data()))
       .clone();
 }
 

@@ -1,7 +1,7 @@
-// Measures the cost of each effect of image formation. Pictures of five typical scenes, 320 x 240
+// Measures the cost of each effect of image formation. Images of five typical scenes, 320 x 240
 // px, are made without any effect, with one effect alone, with those that matter, and with all. The
-// time is that of the whole picture, including its textures, survey and noise. `to_none` is the
-// processor time relative to that of the same picture without effects, and `rays` is the mean
+// time is that of the whole image, including its textures, survey and noise. `to_none` is the
+// processor time relative to that of the same image without effects, and `rays` is the mean
 // number of rays per pixel. Run it with ./dev bench --benchmark_filter=Effects/
 #include <benchmark/benchmark.h>
 
@@ -98,23 +98,23 @@ std::vector<std::pair<std::string, SceneSimulationOptions>> Scenes() {
 
 double CpuSeconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
-// Makes the picture and returns the mean number of rays per pixel.
-double MakePicture(const SceneSimulationOptions& options) {
+// Makes the image and returns the mean number of rays per pixel.
+double MakeImage(const SceneSimulationOptions& options) {
   const SceneSimulator simulator(options, {}, kThreads);
   benchmark::DoNotOptimize(simulator.Store(simulator.RenderNoiseless({kThreads, {}})));
   return simulator.mean_rays_per_pixel();
 }
 
-// Processor time, in s, of the scene's picture without effects: the minimum of three runs.
+// Processor time, in s, of the scene's image without effects: the minimum of three runs.
 double SecondsOfNone(const std::string& scene, SceneSimulationOptions options) {
   static std::map<std::string, double> known;
   const auto found = known.find(scene);
   if (found != known.end()) return found->second;
-  options.effects = EffectChoiceFromText("none", "", "");
+  options.effects = EffectSelectionOptionsFromText("none", "", "");
   double least = 0;
   for (int i = 0; i < 3; ++i) {
     const double start = CpuSeconds();
-    MakePicture(options);
+    MakeImage(options);
     const double seconds = CpuSeconds() - start;
     least = i == 0 ? seconds : std::min(least, seconds);
   }
@@ -123,11 +123,11 @@ double SecondsOfNone(const std::string& scene, SceneSimulationOptions options) {
 
 void CostOf(benchmark::State& state, const std::string& scene, SceneSimulationOptions options,
             const std::string& effects) {
-  options.effects = EffectChoiceFromText(effects, "", "");
+  options.effects = EffectSelectionOptionsFromText(effects, "", "");
   const double of_none = SecondsOfNone(scene, options);
   double rays = 0;
   const double start = CpuSeconds();
-  for (auto _ : state) rays = MakePicture(options);
+  for (auto _ : state) rays = MakeImage(options);
   const double seconds = (CpuSeconds() - start) / static_cast<double>(state.iterations());
   state.counters["rays"] = rays;
   state.counters["to_none"] = seconds / of_none;
@@ -137,7 +137,7 @@ void CostOf(benchmark::State& state, const std::string& scene, SceneSimulationOp
 const bool kRegistered = [] {
   for (const auto& [scene, options] : Scenes()) {
     std::vector<std::string> rows = {"none"};
-    for (const std::string& name : PictureEffects().Names()) rows.push_back(name);
+    for (const std::string& name : ImageEffects().Names()) rows.push_back(name);
     rows.insert(rows.end(), {"auto", "all"});
     for (const std::string& row : rows) {
       benchmark::RegisterBenchmark(("Effects/" + scene + "/" + row).c_str(), CostOf, scene, options,

@@ -1,11 +1,11 @@
 // Measures H of the solver `scene`, which is limited by memory bandwidth, on a slanted plane of
 // 2048 x 1536 px, 7 x 7 views of one weight, one channel. `bytes_per_second` counts the minimum
-// traffic of H (its tables, the picture that it reads and the one that it writes, once each).
+// traffic of H (its tables, the image that it reads and the one that it writes, once each).
 // Compare it with that of the triad, which is the bandwidth of this machine for two threads. Steps
 // and H on an OpenCL device are compared by time. If the device is the processor, column CPU (all
 // threads of the process) can be compared as well. FormNative measures H of a whole light field, as
 // `thicklens bench source --table 2` does; its minimum traffic is the light field, which it reads,
-// and the picture, which it writes.
+// and the image, which it writes.
 #include <benchmark/benchmark.h>
 
 #include <Eigen/Core>
@@ -33,7 +33,7 @@ namespace {
 
 constexpr int kThreads = 2;
 constexpr int kWidth = 2048, kHeight = 1536, kViews = 7;
-constexpr double kMostDisparityPx = 1;
+constexpr double kMaxDisparityPx = 1;
 constexpr double kMu = 1e-2;  // weight of the ridge
 
 void Report(benchmark::State* state, double bytes) {
@@ -71,7 +71,7 @@ struct Problem {
     for (int y = 0; y < kHeight; ++y) {
       for (int x = 0; x < kWidth; ++x) {
         disparity.disparity.push_back(
-            static_cast<float>(kMostDisparityPx * (2.0 * x / (kWidth - 1) - 1)));
+            static_cast<float>(kMaxDisparityPx * (2.0 * x / (kWidth - 1) - 1)));
         data.photograph.push_back(static_cast<float>((x / 16 + y / 16) % 2));
       }
     }
@@ -93,7 +93,7 @@ struct Problem {
     }
     data.filters.rows = &projection.rows;
     data.weight.assign(data.pixels(), 1.0F);
-    data.squared_row = SquaredRows<float>(disparity, weights);
+    data.row_norm2 = SquaredRows<float>(disparity, weights);
   }
   Problem(const Problem&) = delete;
 
@@ -129,7 +129,7 @@ void FormNative(benchmark::State& state) {
   Report(&state, sizeof(float) * static_cast<double>(field.values.size() + field.view_size()));
 }
 
-// The pictures are on the device.
+// The images are on the device.
 void ForwardOpenCl(benchmark::State& state) {
   const Problem& problem = TheProblem();
   const kernels::DeviceRequest place = kernels::ParseDeviceRequest(
@@ -139,8 +139,8 @@ void ForwardOpenCl(benchmark::State& state) {
                              kernels::HostMemory::kCopied);
   kernels::OpenClProjection<float> projection(&queue, problem.data,
                                               kernels::FormOf(*device, sizeof(float)));
-  kernels::DevicePicture<float> x(&queue, "picture", projection.layout(), 1);
-  kernels::DevicePicture<float> y(&queue, "photograph", projection.layout(), 1);
+  kernels::DeviceImage<float> x(&queue, "image", projection.layout(), 1);
+  kernels::DeviceImage<float> y(&queue, "photograph", projection.layout(), 1);
   x.Write(problem.data.photograph);
   const kernels::DeviceMemory last(&queue, "last", sizeof(double));
   double unused = 0;
@@ -158,8 +158,8 @@ void RunSteps(benchmark::State* state, kernels::RadianceSteps<float>* steps) {
   const Problem& problem = TheProblem();
   const auto run_one = [&] {
     steps->UpdateResidual();
-    const double steepness = steps->Turn(0);
-    steps->Advance(steepness / steps->Curvature());
+    const double steepness = steps->UpdateDirection(0);
+    steps->UpdateSolution(steepness / steps->ApplyNormalOperator());
   };
   steps->SetPrior(RidgePrior(problem.data.weight, kMu));
   steps->Start(problem.data.photograph);
@@ -169,7 +169,7 @@ void RunSteps(benchmark::State* state, kernels::RadianceSteps<float>* steps) {
   for (auto _ : *state) run_one();
 }
 void StepNative(benchmark::State& state) {
-  RunSteps(&state, kernels::NewNativeSteps(TheProblem().data).get());
+  RunSteps(&state, kernels::NewCpuRadianceSteps(TheProblem().data).get());
 }
 void StepOpenCl(benchmark::State& state) {
   const auto backend = kernels::OpenBackend(kernels::ParseDeviceRequest("opencl"), nullptr);

@@ -71,12 +71,12 @@ Simulated Simulate(const std::string& scene, double noise_grey_levels, const Arg
   simulated.truth = simulator.RenderLightField(arguments.views, arguments.views, run);
   estimator::EstimateInput& input = simulated.input;
   input.transfer = options.camera.sensor.transfer;
-  input.picture = model::ToLinear(simulator.Store(simulator.RenderNoiseless(run)), input.transfer);
+  input.image = model::ToLinear(simulator.Store(simulator.RenderNoiseless(run)), input.transfer);
   input.camera = options.camera;
   input.grid = simulated.truth.grid;
   input.weights = simulated.truth.weights;
   input.disparity = estimator::DisparityOnGrid(*input.grid, simulator.RenderDepth().values,
-                                               input.picture.width_px, input.picture.height_px);
+                                               input.image.width_px, input.image.height_px);
   AddNoise(arguments.depth_noise_px, options.seed, &input.disparity);
   const std::optional<double> found_px = estimator::DepthNoisePx(input.disparity);
   if (!arguments.keep_depth_noise && found_px && *found_px > estimator::kSmoothedNoisePx) {
@@ -93,10 +93,9 @@ Row Measure(const Simulated& simulated, const std::string& scene, double noise_g
   options.threads = arguments.threads;
   estimator::SceneSummary summary;
   const model::LightField estimate = estimator::EstimateScene(input, options, &summary, nullptr);
-  const estimator::DibrInput dibr{
-      estimator::WithoutFalloff(input.picture, *input.grid, *input.camera, input.weights,
-                                arguments.threads),
-      input.disparity};
+  const estimator::DibrInput dibr{estimator::WithoutFalloff(input.image, *input.grid, *input.camera,
+                                                            input.weights, arguments.threads),
+                                  input.disparity};
   const estimator::LightFieldScores scores = estimator::CompareLightFields(
       simulated.truth, estimate, arguments.border_px, dibr, arguments.threads);
   Row row{scene, prior, noise_grey_levels};

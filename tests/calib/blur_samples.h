@@ -19,7 +19,7 @@ struct BlurBench {
   double pitch_mm = 0.006;
   double focus_mm = 400, ratio = 0.45, floor_px2 = 0.25;
   double offset_mm = 30;
-  calib::BlurLaw law = calib::BlurLaw::kPerspective;
+  calib::BlurModel law = calib::BlurModel::kPerspective;
   model::BenchDirection direction = model::BenchDirection::kAway;
   double first_mm = 330, last_mm = 480;
   int count = 31;
@@ -44,7 +44,7 @@ struct BlurBench {
   double Variance(double depth_mm) const {
     const double d1_mm = model::ImageDistanceMm(lens, focus_mm);
     double radius_mm = 0;
-    if (law == calib::BlurLaw::kPerspective) {
+    if (law == calib::BlurModel::kPerspective) {
       radius_mm = model::BlurRadiusMm(lens, d1_mm, depth_mm);
     } else {
       radius_mm = lens.aperture_radius_mm * model::DefocusScaleMm(lens, d1_mm) *
@@ -53,7 +53,7 @@ struct BlurBench {
     return floor_px2 + std::pow(ratio * radius_mm / pitch_mm, 2);
   }
   double Scale(double depth_mm) const {
-    return law == calib::BlurLaw::kPerspective ? Depth(reference) / depth_mm : 1;
+    return law == calib::BlurModel::kPerspective ? Depth(reference) / depth_mm : 1;
   }
   double OnTarget(double depth_mm) const {
     return Variance(depth_mm) / std::pow(Scale(depth_mm), 2);
@@ -124,8 +124,8 @@ inline constexpr double kReferencePx2 = 1.7;
 inline calib::BlurFitSetup WithEdge(const BlurBench& bench, double error_px2,
                                     std::mt19937* random) {
   calib::BlurFitSetup setup = bench.Setup(random);
-  setup.meters = {bench.Absolute(error_px2, 0, random)};
-  setup.meters[0].held_softness_px2 = 0;
+  setup.estimators = {bench.Absolute(error_px2, 0, random)};
+  setup.estimators[0].held_softness_px2 = 0;
   return setup;
 }
 
@@ -133,7 +133,7 @@ inline calib::BlurFitSetup WithTexture(const BlurBench& bench, double error_px2,
                                        double floor_sigma_px2, std::mt19937* random) {
   std::normal_distribution<double> normal(0, 1);
   calib::BlurFitSetup setup = bench.Setup(random);
-  setup.meters = {bench.Relative(error_px2, kReferencePx2, random)};
+  setup.estimators = {bench.Relative(error_px2, kReferencePx2, random)};
   // A given floor was measured, so it scatters with its error.
   setup.floor_variance_px2 = model::Estimate{
       bench.floor_px2 + bench.noise * floor_sigma_px2 * normal(*random), floor_sigma_px2};

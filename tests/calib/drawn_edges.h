@@ -63,7 +63,7 @@ inline cv::Mat Stored(const cv::Mat& grey, double noise_levels, int levels, unsi
 }
 
 // Stores the image as 8-bit values.
-inline cv::Mat StoredBytes(const cv::Mat& grey, double noise_levels, unsigned seed) {
+inline cv::Mat EncodedBytes(const cv::Mat& grey, double noise_levels, unsigned seed) {
   cv::Mat bytes;
   Stored(grey, noise_levels, 256, seed).convertTo(bytes, CV_8U, 255);
   return bytes;

@@ -17,7 +17,7 @@ namespace thicklens::testing {
 // A sweep whose blur is known in closed form, as SolveFocus gets it: gated, with depths, measured.
 // A dark frame comes first, so that a frame of the fit is not the frame of that number.
 struct FocusCase {
-  static constexpr std::size_t kGated = 1;
+  static constexpr std::size_t kChecked = 1;
 
   BlurBench bench;
   calib::FocusSweep sweep;
@@ -44,7 +44,7 @@ struct FocusCase {
       frame.image = "bench/frame-" + std::to_string(i) + ".png";
       frame.image_scale = evidence.setup.frames[i].scale;
       calibration.frames.push_back(frame);
-      evidence.frames.push_back(i + kGated);
+      evidence.frames.push_back(i + kChecked);
       WriteReading(i, evidence.setup.frames[i].reading_mm);
     }
   }
@@ -58,18 +58,18 @@ struct FocusCase {
   }
 
   FocusCase& WithTexture(double error_px2) {
-    evidence.spectrum = static_cast<int>(evidence.setup.meters.size());
-    evidence.setup.meters.push_back(bench.Relative(error_px2, kReferencePx2, &random));
+    evidence.spectrum = static_cast<int>(evidence.setup.estimators.size());
+    evidence.setup.estimators.push_back(bench.Relative(error_px2, kReferencePx2, &random));
     return *this;
   }
   FocusCase& WithKnifeEdge(double error_px2) {
     WithPrintedEdge(error_px2, 0);
-    evidence.setup.meters.back().held_softness_px2 = 0;
+    evidence.setup.estimators.back().held_softness_px2 = 0;
     return *this;
   }
   FocusCase& WithPrintedEdge(double error_px2, double ink_px2) {
-    evidence.edges = static_cast<int>(evidence.setup.meters.size());
-    evidence.setup.meters.push_back(bench.Absolute(error_px2, ink_px2, &random));
+    evidence.edges = static_cast<int>(evidence.setup.estimators.size());
+    evidence.setup.estimators.push_back(bench.Absolute(error_px2, ink_px2, &random));
     return *this;
   }
   FocusCase& WithFloor(double floor_px, double sigma_px) {
@@ -86,7 +86,7 @@ struct FocusCase {
   }
 
   calib::FrameMeasurement& frame(std::size_t fit_frame) {
-    return calibration.frames[fit_frame + kGated];
+    return calibration.frames[fit_frame + kChecked];
   }
   const calib::SystematicPart* Part(const std::string& name) const {
     for (const calib::SystematicPart& part : calibration.systematic_parts) {
@@ -99,7 +99,7 @@ struct FocusCase {
 // What linear error propagation gives for exact readings: the covariance of (d1, kappa, floor in
 // px, bench zero), by finite differences of the bench's own formulas. `softness_is_free`: every V
 // has an unknown constant in common. `floor_sigma_px`: of a floor that was given, 0 for none.
-struct LinearTwin {
+struct LinearReference {
   double error_px2 = 0;
   bool softness_is_free = false;
   double floor_sigma_px = 0;

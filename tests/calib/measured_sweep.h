@@ -77,7 +77,7 @@ inline SimulatedSweep Rendered(model::TargetKind kind, model::Psf psf = model::P
   return Simulate(options);
 }
 
-// Pictures are not written to: one rendering serves all tests of a target.
+// Images are not written to: one rendering serves all tests of a target.
 inline const SimulatedSweep& Leaves() {
   static const SimulatedSweep rendered = Rendered(model::TargetKind::kDeadLeaves);
   return rendered;
@@ -94,8 +94,8 @@ inline MeasuredSweep Measured(const SimulatedSweep& simulated,
   return m;
 }
 
-// V of every sample against the truth: px^2 of the target; a relative meter's reference has what it
-// was expected to have.
+// V of every sample against the truth: px^2 of the target; a relative estimator's reference has
+// what it was expected to have.
 inline void ExpectTrueVariances(const MeasuredSweep& m, const calib::BlurEvidence& evidence,
                                 const calib::BlurSamples& samples, double within_px2) {
   ASSERT_EQ(samples.variances_px2.size(), static_cast<Eigen::Index>(samples.frames.size()));
@@ -111,7 +111,7 @@ inline void ExpectTrueVariances(const MeasuredSweep& m, const calib::BlurEvidenc
 }
 
 inline const calib::BlurSamples& Spectrum(const calib::BlurEvidence& evidence) {
-  return evidence.setup.meters.at(static_cast<std::size_t>(evidence.spectrum));
+  return evidence.setup.estimators.at(static_cast<std::size_t>(evidence.spectrum));
 }
 
 }  // namespace thicklens::testing

@@ -16,15 +16,15 @@
 
 namespace thicklens::testing {
 
-// A picture as the camera stores it, as a matrix.
-inline cv::Mat StoredMat(const model::StoredPicture& picture) {
-  cv::Mat stored(picture.height_px, picture.width_px, picture.bits == 8 ? CV_8U : CV_16U);
+// An image as the camera stores it, as a matrix.
+inline cv::Mat EncodedMat(const model::EncodedImage& image) {
+  cv::Mat stored(image.height_px, image.width_px, image.bits == 8 ? CV_8U : CV_16U);
   for (int y = 0; y < stored.rows; ++y) {
     for (int x = 0; x < stored.cols; ++x) {
       const auto value =
-          picture.values[static_cast<std::size_t>(y) * static_cast<std::size_t>(stored.cols) +
-                         static_cast<std::size_t>(x)];
-      if (picture.bits == 8) {
+          image.values[static_cast<std::size_t>(y) * static_cast<std::size_t>(stored.cols) +
+                       static_cast<std::size_t>(x)];
+      if (image.bits == 8) {
         stored.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(value);
       } else {
         stored.at<std::uint16_t>(y, x) = value;
@@ -66,10 +66,10 @@ struct SimulatedSweep {
   }
 };
 
-// `target_picture` is for a target of that kind alone.
+// `target_image` is for a target of that kind alone.
 inline SimulatedSweep Simulate(const model::SweepSimulationOptions& options,
-                               const model::LinearPicture& target_picture = {}) {
-  const model::SweepSimulator simulator(options, target_picture);
+                               const model::LinearImage& target_image = {}) {
+  const model::SweepSimulator simulator(options, target_image);
   SimulatedSweep result;
   result.truth = simulator.truth();
   result.stored = std::make_shared<std::vector<cv::Mat>>();
@@ -80,7 +80,7 @@ inline SimulatedSweep Simulate(const model::SweepSimulationOptions& options,
   result.sweep.camera.calibration.reset();
   for (int i = 0; i < options.frame_count; ++i) {
     const auto index = static_cast<std::size_t>(i);
-    result.stored->push_back(StoredMat(simulator.RenderFrame(i)));
+    result.stored->push_back(EncodedMat(simulator.RenderFrame(i)));
     result.sweep.frames.push_back(
         {"frame-" + std::to_string(i), result.truth.frames[index].reading_mm});
   }

@@ -68,9 +68,9 @@ EstimateInput RandomInput(int width_px, int height_px, float least_px, float mos
   std::uniform_real_distribution<float> light(0.2F, 0.7F), disparity(least_px, most_px);
   EstimateInput input;
   const auto pixels = static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px);
-  input.picture = {width_px, height_px, 3, {}};
-  input.picture.values.resize(3 * pixels);
-  for (float& value : input.picture.values) value = light(engine);
+  input.image = {width_px, height_px, 3, {}};
+  input.image.values.resize(3 * pixels);
+  for (float& value : input.image.values) value = light(engine);
   input.disparity = {width_px, height_px, {}, {1, 1}};
   for (std::size_t i = 0; i < pixels; ++i) input.disparity.disparity.push_back(disparity(engine));
   input.weights = model::ApertureWeights(model::ApertureShape::kUniform, 3, 3);
@@ -133,7 +133,7 @@ TEST(CancelledEstimate, TheBlockSolverStops) {
     options.block_px = 8;
     options.threads = 1;
     options.progress = progress;
-    EstimateSummary summary;
+    BlockSummary summary;
     EstimateByBlocks(input, options, backend.get(), &summary);
   });
 }

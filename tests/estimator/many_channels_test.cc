@@ -1,5 +1,5 @@
-// Pictures of other bands than one or three: every solver takes each band as it takes a grey
-// picture.
+// Images of other bands than one or three: every solver takes each band as it takes a grey
+// image.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,7 +8,7 @@
 #include <functional>
 #include <vector>
 
-#include "estimator/scene/stored_slope.h"
+#include "estimator/scene/encoding_slope.h"
 #include "tests/estimator/solver_inputs.h"
 #include "thicklens/estimator/block_solver.h"
 #include "thicklens/estimator/functional_solver.h"
@@ -33,10 +33,10 @@ EstimateInput InputOf(int channels) {
       5);
 }
 
-model::LinearPicture Band(const model::LinearPicture& picture, int channel) {
-  model::LinearPicture band{picture.width_px, picture.height_px, 1, {}};
-  for (int y = 0; y < picture.height_px; ++y) {
-    for (int x = 0; x < picture.width_px; ++x) band.values.push_back(picture.at(x, y, channel));
+model::LinearImage Band(const model::LinearImage& image, int channel) {
+  model::LinearImage band{image.width_px, image.height_px, 1, {}};
+  for (int y = 0; y < image.height_px; ++y) {
+    for (int x = 0; x < image.width_px; ++x) band.values.push_back(image.at(x, y, channel));
   }
   return band;
 }
@@ -50,7 +50,7 @@ void ExpectBandByBand(const Estimator& estimate, double accuracy) {
     ASSERT_EQ(all.channels, channels);
     for (int channel = 0; channel < channels; ++channel) {
       EstimateInput grey = input;
-      grey.picture = Band(input.picture, channel);
+      grey.image = Band(input.image, channel);
       const model::LightField one = estimate(grey);
       const float* found = all.values.data() + all.ViewStart(channel, 0, 0);
       for (std::size_t i = 0; i < one.values.size(); ++i) {
@@ -64,7 +64,7 @@ TEST(ManyChannels, TheBlockSolverTakesEachBandAlone) {
   const auto backend = kernels::OpenBackend(kernels::ParseDeviceRequest("cpu"), nullptr);
   ExpectBandByBand(
       [&](const EstimateInput& input) {
-        EstimateSummary summary;
+        BlockSummary summary;
         return EstimateByBlocks(input, {}, backend.get(), &summary);
       },
       0);
@@ -117,8 +117,8 @@ TEST(ManyChannels, TheSceneSolverWithItsDefaultsKeepsSixBands) {
 }
 
 TEST(ManyChannels, TheSlopeIsTheirMeans) {
-  const model::LinearPicture bands = InputOf(4).picture;
-  model::LinearPicture mean{kWidth, kHeight, 1, {}};
+  const model::LinearImage bands = InputOf(4).image;
+  model::LinearImage mean{kWidth, kHeight, 1, {}};
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 0; x < kWidth; ++x) {
       mean.values.push_back(
@@ -126,8 +126,8 @@ TEST(ManyChannels, TheSlopeIsTheirMeans) {
     }
   }
   const model::TransferCurve srgb = model::TransferCurve::Srgb();
-  const std::vector<double> found = StoredSlopes(bands, srgb, 1);
-  const std::vector<double> expected = StoredSlopes(mean, srgb, 1);
+  const std::vector<double> found = EncodingSlopes(bands, srgb, 1);
+  const std::vector<double> expected = EncodingSlopes(mean, srgb, 1);
   ASSERT_EQ(found.size(), expected.size());
   for (std::size_t i = 0; i < found.size(); ++i) ASSERT_NEAR(found[i], expected[i], 1e-5);
 }

@@ -8,7 +8,7 @@ namespace thicklens::estimator::testing {
 namespace {
 
 // The pixels and weights that the sample i reads from a source.
-Eigen::RowVectorXd Taps(const DisparityMap& map, int i, const kernels::HiddenSample& from) {
+Eigen::RowVectorXd Taps(const DisparityMap& map, int i, const kernels::OccludedSample& from) {
   const double tolerance = 0.3 / map.step.cwiseAbs().maxCoeff();
   const int pixels = map.width_px * map.height_px;
   Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(pixels);
@@ -48,9 +48,10 @@ Eigen::MatrixXd ViewMatrix(const DisparityMap& map, double a, double b) {
     const auto at = static_cast<std::size_t>(i);
     matrix.row(i) = Taps(map, i, {i, view.source_x[at], view.source_y[at], view.disparity[at]});
   }
-  for (const kernels::MixedSample& mixed : view.mixed) {
-    matrix.row(mixed.index) *= 1 - double{mixed.share};
-    matrix.row(mixed.index) += double{mixed.share} * Taps(map, mixed.index, mixed.other);
+  for (const kernels::BoundarySample& boundary : view.boundary) {
+    matrix.row(boundary.index) *= 1 - double{boundary.share};
+    matrix.row(boundary.index) +=
+        double{boundary.share} * Taps(map, boundary.index, boundary.other);
   }
   return matrix;
 }

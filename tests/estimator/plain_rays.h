@@ -8,7 +8,7 @@
 
 namespace thicklens::estimator::testing {
 
-// The matrix that maps a picture to the view (a, b): bilinear at each sample's source, from the
+// The matrix that maps an image to the view (a, b): bilinear at each sample's source, from the
 // pixels within 0.3 px per view step of its disparity, or otherwise from the closest of these.
 Eigen::MatrixXd ViewMatrix(const DisparityMap& map, double a, double b);
 

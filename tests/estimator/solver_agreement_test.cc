@@ -1,6 +1,6 @@
 // Every solver is compared with one closed form, and with itself on other numbers of threads. If
 // the whole scene has one disparity of whole pixels, each step is a product in the Fourier domain.
-// The picture is even at its borders, whose effect decays before it reaches the other parts.
+// The image is even at its borders, whose effect decays before it reaches the other parts.
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
@@ -38,12 +38,12 @@ constexpr double kFloat = 1e-4;
 
 EstimateInput EvenAtTheBorders() {
   EstimateInput input;
-  input.picture = {kAcross, kDown, 1, {}};
+  input.image = {kAcross, kDown, 1, {}};
   for (int y = 0; y < kDown; ++y) {
     for (int x = 0; x < kAcross; ++x) {
       const double dx = x - 31.5, dy = y - 30.2;
       const double wave = 1 + std::cos(1.9 * dx + 0.6 * dy);
-      input.picture.values.push_back(
+      input.image.values.push_back(
           static_cast<float>(0.4 + 0.25 * wave * std::exp(-(dx * dx + dy * dy) / 4.5)));
     }
   }
@@ -54,9 +54,9 @@ EstimateInput EvenAtTheBorders() {
   return input;
 }
 
-Eigen::MatrixXd PictureOf(const EstimateInput& input) {
+Eigen::MatrixXd ImageFrom(const EstimateInput& input) {
   return Eigen::Map<const Eigen::Matrix<float, kDown, kAcross, Eigen::RowMajor>>(
-             input.picture.values.data())
+             input.image.values.data())
       .cast<double>();
 }
 
@@ -95,7 +95,7 @@ using RaysOfWave = std::function<Eigen::VectorXcd(const Eigen::VectorXcd& h)>;
 std::vector<Eigen::MatrixXd> ExactViewsByWaves(const EstimateInput& input,
                                                const RaysOfWave& rays_of_wave) {
   const Eigen::MatrixXcd across = Waves(kAcross), down = Waves(kDown);
-  const Eigen::MatrixXcd photograph = down * PictureOf(input) * across.transpose();
+  const Eigen::MatrixXcd photograph = down * ImageFrom(input) * across.transpose();
   std::vector<Eigen::MatrixXcd> views(kViews * kViews, Eigen::MatrixXcd(kDown, kAcross));
   for (int j = 0; j < kDown; ++j) {
     for (int i = 0; i < kAcross; ++i) {
@@ -203,9 +203,9 @@ std::vector<Way> BlockWays(int block_px) {
            options.tolerance = 1e-12;
            options.max_iterations = 5000;
            options.threads = threads;
-           EstimateSummary summary;
-           const auto twin = kernels::OpenBackend(kernels::ParseDeviceRequest("cpu"), nullptr);
-           return EstimateByBlocks(input, options, twin.get(), &summary).values;
+           BlockSummary summary;
+           const auto reference = kernels::OpenBackend(kernels::ParseDeviceRequest("cpu"), nullptr);
+           return EstimateByBlocks(input, options, reference.get(), &summary).values;
          }});
   }
   return ways;
@@ -241,7 +241,7 @@ void ExpectAll(const std::vector<Way>& ways, const std::vector<float>& expected,
   }
 }
 
-TEST(SolverAgreement, TheClosedFormIsNotTheWarpedPicture) {
+TEST(SolverAgreement, TheClosedFormIsNotTheWarpedImage) {
   const EstimateInput input = EvenAtTheBorders();
   const std::vector<float> warped = WarpedLightField(input, true, 1).values;
   const std::vector<float> functional = ViewsByWaves(input, RaysOfTheFunctional);
@@ -267,9 +267,9 @@ TEST(SolverAgreement, TheRadianceInDoubleIsTheClosedForm) {
   const EstimateInput input = EvenAtTheBorders();
   const Eigen::MatrixXd expected = ExactViewsByWaves(input, RaysOfTheScene)[kViews * kViews / 2];
   const auto projection = MakeSceneProjection<double>(input.disparity, input.weights, {});
-  DataTerm<double> data = DataTermOf(projection, input.picture, 1);
+  DataTerm<double> data = DataTermOf(projection, input.image, 1);
   data.weight.assign(data.pixels(), 1);
-  data.squared_row = SquaredRows<double>(input.disparity, input.weights);
+  data.row_norm2 = SquaredRows<double>(input.disparity, input.weights);
   RadianceLimits limits;
   limits.tolerance = 1e-14;
   limits.max_iterations = 1000;

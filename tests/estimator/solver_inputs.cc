@@ -17,9 +17,9 @@ EstimateInput NoiseInput(int width_px, int height_px, int channels, const Eigen:
   std::mt19937 engine(seed);
   std::uniform_real_distribution<float> uniform(0.1F, 0.9F);
   EstimateInput input;
-  input.picture = {width_px, height_px, channels, {}};
+  input.image = {width_px, height_px, channels, {}};
   for (int i = 0; i < width_px * height_px * channels; ++i) {
-    input.picture.values.push_back(uniform(engine));
+    input.image.values.push_back(uniform(engine));
   }
   input.disparity = {width_px, height_px, {}, {1, 1}};
   for (int y = 0; y < height_px; ++y) {
@@ -33,7 +33,7 @@ EstimateInput NoiseInput(int width_px, int height_px, int channels, const Eigen:
 
 EstimateInput WithSolverCamera(EstimateInput input, const model::LightFieldPlanes& planes,
                                const std::function<double(int x)>& depth_mm) {
-  const int width_px = input.picture.width_px, height_px = input.picture.height_px;
+  const int width_px = input.image.width_px, height_px = input.image.height_px;
   const model::Camera camera = thicklens::testing::SolverCamera(width_px, height_px);
   input.grid = model::GridOnPlanes(
       camera, planes,

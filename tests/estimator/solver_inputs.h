@@ -16,7 +16,7 @@ namespace thicklens::estimator::testing {
 
 Eigen::ArrayXXd GaussianWeights(int u_count, int v_count);
 
-// A picture of uniform noise from 0.1 to 0.9, which has texture everywhere, with the disparity of
+// An image of uniform noise from 0.1 to 0.9, which has texture everywhere, with the disparity of
 // each pixel, px per view step.
 EstimateInput NoiseInput(int width_px, int height_px, int channels, const Eigen::ArrayXXd& weights,
                          const std::function<double(int x, int y)>& disparity, unsigned seed = 1);

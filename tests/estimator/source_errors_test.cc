@@ -60,9 +60,9 @@ Eigen::MatrixXd SixTerms(const BlockGeometry& block, const std::vector<double>& 
 }
 
 Eigen::MatrixXd ProjectionH(const BlockGeometry& block) {
-  const auto twin = kernels::NewReference<double>();
-  return ToDense(twin->WeighRays(block, kernels::Splat::kNearest,
-                                 twin->FindRays(block, kernels::Splat::kNearest), {}));
+  const auto reference = kernels::NewReference<double>();
+  return ToDense(reference->WeightRays(block, kernels::Splat::kNearest,
+                                       reference->FindRays(block, kernels::Splat::kNearest), {}));
 }
 
 Eigen::Index RankOf(const Eigen::MatrixXd& matrix) {
@@ -73,7 +73,7 @@ Eigen::Index RankOf(const Eigen::MatrixXd& matrix) {
 
 // Supplement, section 3, [S19], [S20], [S21]: "H has linearly independent columns, then it is
 // invertible" (H^t H).
-TEST(SourceErrors, WithGammaZeroTheRankIsThatOfThePicture) {
+TEST(SourceErrors, WithGammaZeroTheRankIsThatOfTheImage) {
   const BlockGeometry block = Block(6, 5, 3, 3);
   const Eigen::MatrixXd h = ProjectionH(block);
   EXPECT_EQ(h.cols(), 270);
@@ -129,7 +129,7 @@ TEST(SourceErrors, AStencilThatReadsZeroOutsideDarkensTheBorders) {
     return Eigen::VectorXd(system.partialPivLu().solve(white));
   };
   const Eigen::VectorXd dark = solve(g, 0);
-  EXPECT_LT(dark(0), 0.5) << "a white picture's corner ray";
+  EXPECT_LT(dark(0), 0.5) << "a white image's corner ray";
   const Eigen::VectorXd white = solve(SixTerms(block, Constant(block, 0.5)), 1e-3);
   EXPECT_NEAR(white.minCoeff(), 1, 1e-9);
 }

@@ -109,9 +109,9 @@ const std::vector<FuzzedReader>& FuzzedReaders() {
                io::ReadLightField(fs::path(path).parent_path().parent_path().string(), {});
              }),
       OfFile("depth-map", "depth.pfm", [](const std::string& path) { io::ReadDepthMap(path); }),
-      {"picture",
+      {"image",
        [](const std::string& bytes, const TemporaryFolder&) {
-         io::ToStoredPicture(io::DecodePicture(bytes, "picture.png"));
+         io::ToEncodedImage(io::DecodeImage(bytes, "picture.png"));
        }},
       OfFile("photo-exif", "photo.jpg",
              [](const std::string& path) { io::ReadPhotoExif(path, 640, 480); }),
@@ -127,7 +127,7 @@ const std::vector<FuzzedReader>& FuzzedReaders() {
 }
 
 void PrepareFuzzFolder(const TemporaryFolder& folder) {
-  const model::StoredPicture grey{4, 3, 1, 8, std::vector<std::uint16_t>(12, 100)};
+  const model::EncodedImage grey{4, 3, 1, 8, std::vector<std::uint16_t>(12, 100)};
   const std::string png = io::EncodePng(grey);
   for (int i = 0; i < kViews; ++i) folder.Put("frames/frame_00" + std::to_string(i) + ".png", png);
   for (int i = 0; i < kViews * kViews; ++i) {

@@ -50,9 +50,9 @@ THICKLENS_SITUATION(
 }
 
 THICKLENS_SITUATION(HostileDataSets, ViewsThatAreLinksElsewhere,
-                    "Views of a light field are links to a picture elsewhere, to `/etc/passwd` and "
+                    "Views of a light field are links to an image elsewhere, to `/etc/passwd` and "
                     "to a file that may not be read",
-                    "A picture is read; all else is refused by the view, and nothing of it is "
+                    "An image is read; all else is refused by the view, and nothing of it is "
                     "shown") {
   const std::string view = Work("lf/views/view_00_01.png");
   fs::rename(view, Work("elsewhere.png"));
@@ -118,7 +118,7 @@ THICKLENS_SITUATION(HostileDataSets, LibrariesInTheCurrentFolder,
                    "20"),
              {"new count", "new traps"});
   ExpectDone(Shell("cd traps; \"$T\" explain ../camera.yaml --depth-range 290:310 --quiet"), {});
-  // This library is loaded as soon as a picture needs it.
+  // This library is loaded as soon as an image needs it.
   ExpectDone(Shell("cd traps; echo trap > thicklens_opencv_codecs.so; printf 'P5\\n2 "
                    "2\\n255\\nabcd' > ../a.pgm; \"$T\" compare ../a.pgm ../a.pgm --quiet"),
              {"new a.pgm", "new traps/thicklens_opencv_codecs.so"});

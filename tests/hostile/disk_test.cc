@@ -24,7 +24,7 @@ class HostileDisk : public HostileTest {
             Estimate("disk/new --format tiff"),
             "\"$T\" estimate picture.png depth.pfm --depth-kind z --depth-unit mm --camera "
             "camera.yaml --views 2x2 --quiet -o disk/new --json disk/new.json",
-            "\"$T\" simulate picture scene.yaml --quiet -o disk/new"};
+            "\"$T\" simulate image scene.yaml --quiet -o disk/new"};
   }
 
   // Mounts a file system with these options at disk, runs the command there, and prints which
@@ -130,9 +130,9 @@ class HostileWrites : public HostileTest {
     SCOPED_TRACE(script + ", " + reason);
     ASSERT_EQ(Shell(script).exit_code, 0);
     const FolderTree older = TreeOf(Work("disk"));
-    constexpr int kMostCalls = 120;
+    constexpr int kMaxCalls = 120;
     int failed = 0;
-    for (int call = 1; call <= kMostCalls; ++call) {
+    for (int call = 1; call <= kMaxCalls; ++call) {
       SCOPED_TRACE(call);
       // Linked libraries write nothing there.
       const Outcome outcome =
@@ -160,7 +160,7 @@ class HostileWrites : public HostileTest {
         EXPECT_EQ(names, older_names);
       }
     }
-    ADD_FAILURE() << "more than " << kMostCalls << " calls";
+    ADD_FAILURE() << "more than " << kMaxCalls << " calls";
   }
 };
 

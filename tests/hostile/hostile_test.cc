@@ -7,11 +7,6 @@
 #include <filesystem>
 #include <sstream>
 
-#include "thicklens/io/depth_io.h"
-#include "thicklens/io/image_io.h"
-#include "thicklens/io/light_field_io.h"
-#include "thicklens/base/printable_text.h"
-#include "tools/system/program_run.h"
 #include "support/test_cameras.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/base/printable_text.h"
@@ -53,12 +48,12 @@ model::Camera SmallCamera() {
   return WithMethod(camera);
 }
 
-// A picture whose values differ from pixel to pixel.
-model::StoredPicture SmallPicture() {
-  model::StoredPicture picture{kWidthPx, kHeightPx, 3, 8, {}};
+// An image whose values differ from pixel to pixel.
+model::EncodedImage SmallImage() {
+  model::EncodedImage image{kWidthPx, kHeightPx, 3, 8, {}};
   for (int i = 0; i < kWidthPx * kHeightPx * 3; ++i)
-    picture.values.push_back(static_cast<std::uint16_t>(60 + i * 37 % 120));
-  return picture;
+    image.values.push_back(static_cast<std::uint16_t>(60 + i * 37 % 120));
+  return image;
 }
 
 std::vector<std::string> LinesOf(const std::string& text) {
@@ -96,7 +91,7 @@ HostileTest::HostileTest() {
   for (const char* folder : {"work", "tmp", "run"}) fs::create_directory(root_ / folder);
   const model::Camera camera = SmallCamera();
   Put("camera.yaml", model::CameraToYaml(camera));
-  Put("picture.png", io::EncodePng(SmallPicture()));
+  Put("picture.png", io::EncodePng(SmallImage()));
   model::RawDepthMap depth{kWidthPx, kHeightPx, {}};
   for (int i = 0; i < kWidthPx * kHeightPx; ++i)
     depth.values.push_back(301.0F + 0.01F * static_cast<float>(i % kWidthPx));
@@ -145,14 +140,14 @@ Outcome HostileTest::Shell(const std::string& script, double limit_seconds) {
 }
 
 void HostileTest::ExpectRefused(const Outcome& outcome, int exit_code,
-                                const std::vector<std::string>& told) const {
+                                const std::vector<std::string>& reported) const {
   EXPECT_EQ(outcome.exit_code, exit_code) << outcome.err;
   const std::vector<std::string> errors = ErrorsIn(outcome.err);
   EXPECT_EQ(errors.size(), 1U) << outcome.err.substr(0, kLongestMessageBytes);
   for (const std::string& error : errors) {
     EXPECT_LE(error.size(), kLongestMessageBytes);
     EXPECT_EQ(thicklens::PrintableUtf8(error), error);
-    for (const std::string& text : told)
+    for (const std::string& text : reported)
       EXPECT_THAT(error.substr(0, kLongestMessageBytes), HasSubstr(text));
   }
   EXPECT_THAT(outcome.changes, IsEmpty());

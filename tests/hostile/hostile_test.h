@@ -26,7 +26,7 @@ struct Outcome {
 // user would. The inputs are:
 //   camera.yaml picture.png depth.pfm     a photograph of 24 x 16 px with its camera and its depth
 //   lf/                                   a light field of 2 x 2 views of that size
-//   scene.yaml recipe.yaml                for `simulate picture` and `simulate sweep`
+//   scene.yaml recipe.yaml                for `simulate image` and `simulate sweep`
 // and, after MakeSweep(), also sweep/: 11 simulated frames of 96 x 96 px that can be calibrated.
 class HostileTest : public ::testing::Test {
  protected:
@@ -40,7 +40,7 @@ class HostileTest : public ::testing::Test {
   // Checks that the program refused: with this exit code and one line of error, which contains all
   // these texts and no control characters for a terminal, and without a change to the work folder.
   void ExpectRefused(const Outcome& outcome, int exit_code,
-                     const std::vector<std::string>& told) const;
+                     const std::vector<std::string>& reported) const;
   // Checks that the program succeeded: exit code 0, no error, and these changes.
   void ExpectDone(const Outcome& outcome, const std::vector<std::string>& changes) const;
   // Checks what holds after every script, whether it succeeded or not: the inputs are unchanged,

@@ -11,9 +11,9 @@ namespace {
 class HostileImages : public HostileTest {
  protected:
   // Each image is refused as an image and as a depth map, soon and with little memory.
-  void ExpectRefusedSoon(const std::string& name, const std::vector<std::string>& told) {
+  void ExpectRefusedSoon(const std::string& name, const std::vector<std::string>& reported) {
     std::vector<std::string> all = {name};
-    all.insert(all.end(), told.begin(), told.end());
+    all.insert(all.end(), reported.begin(), reported.end());
     const std::string limit = testing::kIsSanitized ? "" : "ulimit -v 1200000; ";
     const std::string depth_words = " --depth-kind z --depth-unit mm --camera camera.yaml -o new";
     SCOPED_TRACE(name);
@@ -27,19 +27,19 @@ THICKLENS_SITUATION(HostileImages, HeadersThatAnnounceTwoToThe31Pixels,
                     "PNG, TIFF, PFM, EXR, BMP, PNM and JPEG files of a few bytes announce 2^31 x "
                     "2^31, 2^31 x 1 or 65,535 x 65,535 pixels",
                     "Refused with the file, at once and with little memory") {
-  constexpr std::uint32_t kMost = 0x7FFFFFFFU;
+  constexpr std::uint32_t kMax = 0x7FFFFFFFU;
   const std::vector<std::pair<std::string, std::string>> files = {
-      {"square.png", PngOf(kMost, kMost, 8, 0, Deflated(std::string(1000, '\0')))},
-      {"row.png", PngOf(kMost, 1, 16, 6, Deflated(std::string(1000, '\0')))},
+      {"square.png", PngOf(kMax, kMax, 8, 0, Deflated(std::string(1000, '\0')))},
+      {"row.png", PngOf(kMax, 1, 16, 6, Deflated(std::string(1000, '\0')))},
       {"large.png", PngOf(60000, 60000, 8, 2, Deflated(std::string(1000, '\0')))},
-      {"square.tiff", TiffOf({kMost, kMost, 8, 1, std::string(100, '\0')})},
-      {"row.tiff", TiffOf({kMost, 1, 32, 1, std::string(100, '\0')})},
+      {"square.tiff", TiffOf({kMax, kMax, 8, 1, std::string(100, '\0')})},
+      {"row.tiff", TiffOf({kMax, 1, 32, 1, std::string(100, '\0')})},
       {"large.tiff", TiffOf({60000, 60000, 32, 1, std::string(100, '\0')})},
       {"square.pfm", "Pf\n2147483647 2147483647\n-1\n" + std::string(100, '\0')},
       {"large.pfm", "Pf\n65535 65535\n-1\n" + std::string(100, '\0')},
-      {"square.exr", ExrOf(static_cast<std::int32_t>(kMost - 1))},
+      {"square.exr", ExrOf(static_cast<std::int32_t>(kMax - 1))},
       {"large.exr", ExrOf(65534)},
-      {"square.bmp", BmpOf(static_cast<std::int32_t>(kMost))},
+      {"square.bmp", BmpOf(static_cast<std::int32_t>(kMax))},
       {"square.pgm", "P5\n2147483647 2147483647\n255\n" + std::string(100, '\0')},
       {"digits.pgm", "P5\n" + std::string(100000, '9') + " 3\n255\n"},
       {"large.jpg", std::string("\xFF\xD8\xFF\xC0\0\x0B\x08\xFF\xFF\xFF\xFF\x01\x01\x11\0", 15) +

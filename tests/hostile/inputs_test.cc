@@ -34,7 +34,7 @@ const std::vector<std::string>& Slots() {
       "calibrate @ -o new", "calibrate frames --readings @ --camera camera.yaml -o new",
       "calibrate one.yaml --camera @ -o new", "calibrate one.yaml --truth @ -o new",
       "calibrate one.yaml --floor-from @ -o new", "simulate sweep @ -o new",
-      "simulate picture @ -o new", "simulate light-field @ -o new", "report @ -o new",
+      "simulate image @ -o new", "simulate light-field @ -o new", "report @ -o new",
       "report lf --photo @ --depth depth.pfm --depth-kind disparity -o new",
       "report lf --photo picture.png --depth @ --depth-kind disparity -o new",
       "report lf --truth @ -o new", "report lf --sweep @ -o new",
@@ -43,7 +43,7 @@ const std::vector<std::string>& Slots() {
       "camera init --from-exif @ --focal-mm 50 --f-number 2 --pitch-um 5 -o new",
       // Inputs that other files name.
       "calibrate sweep-of-it.yaml -o new", "calibrate camera-of-it.yaml -o new",
-      "simulate picture texture-of-it.yaml -o new", "simulate picture scene-of-it.yaml -o new",
+      "simulate image texture-of-it.yaml -o new", "simulate image scene-of-it.yaml -o new",
       "render views-of-it --as-captured -o new"};
   return slots;
 }
@@ -75,7 +75,7 @@ class HostileInputs : public HostileTest {
                                  "\nframes:\n  - {image: frames/a.png, reading_mm: 1}\n");
     std::string scene = testing::ContentOf(Work("scene.yaml"));
     const std::size_t kind = scene.find("kind: noise");
-    scene.replace(kind, scene.find('}', kind) - kind, "kind: picture, picture: " + name);
+    scene.replace(kind, scene.find('}', kind) - kind, "kind: image, image: " + name);
     Put("texture-of-it.yaml", scene);
     scene = testing::ContentOf(Work("scene.yaml"));
     const std::string camera = "camera: camera.yaml";

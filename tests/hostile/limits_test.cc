@@ -20,7 +20,7 @@ class HostileLimits : public HostileTest {
   // The command either succeeds or is refused with a reason by the program, by the loader, which
   // has no memory for it, or by a library that needs threads. Only if it succeeds does it leave an
   // output, and it leaves nothing besides.
-  Outcome ExpectDoneOrTold(const std::string& limit, const std::string& script) {
+  Outcome ExpectDoneOrReported(const std::string& limit, const std::string& script) {
     SCOPED_TRACE(limit + script);
     const Outcome outcome = Shell(limit + script);
     ExpectNothingBut(outcome, {"new"});
@@ -44,9 +44,9 @@ THICKLENS_SITUATION(HostileLimits, Memory, "`ulimit -v` allows from 60 to 400 MB
   MakeSweep();
   for (const std::string& script : {Estimate("new"), Calibrate("new"), Render("new")}) {
     for (int megabytes = 60; megabytes <= 400; megabytes += 68) {
-      ExpectDoneOrTold("ulimit -v " + std::to_string(megabytes * 1000) + "; ", script);
+      ExpectDoneOrReported("ulimit -v " + std::to_string(megabytes * 1000) + "; ", script);
     }
-    EXPECT_EQ(ExpectDoneOrTold("ulimit -v 4000000; ", script).exit_code, 0);
+    EXPECT_EQ(ExpectDoneOrReported("ulimit -v 4000000; ", script).exit_code, 0);
   }
 }
 
@@ -56,12 +56,13 @@ THICKLENS_SITUATION(HostileLimits, OpenFiles, "`ulimit -n` allows 3, 4, 5, ... 1
   MakeSweep();
   for (const std::string& script : {Render("new"), Estimate("new"), Calibrate("new")}) {
     for (int files = 3; files <= 12; ++files) {
-      const Outcome outcome = ExpectDoneOrTold("ulimit -n " + std::to_string(files) + "; ", script);
+      const Outcome outcome =
+          ExpectDoneOrReported("ulimit -n " + std::to_string(files) + "; ", script);
       if (outcome.exit_code == 1) {
         EXPECT_THAT(outcome.err, HasSubstr("Too many open files"));
       }
     }
-    EXPECT_EQ(ExpectDoneOrTold("ulimit -n 16; ", script).exit_code, 0);
+    EXPECT_EQ(ExpectDoneOrReported("ulimit -n 16; ", script).exit_code, 0);
   }
 }
 
@@ -114,12 +115,12 @@ THICKLENS_SITUATION(HostileLimits, Stack, "`ulimit -s` allows 64 to 1,024 KiB, o
   for (const std::string& script : {Render("new"), Estimate("new"), Calibrate("new")}) {
     for (const char* kibibytes : {"64", "128", "256", "512", "1024", "unlimited"}) {
       const Outcome outcome =
-          ExpectDoneOrTold(std::string("ulimit -s ") + kibibytes + "; ", script);
+          ExpectDoneOrReported(std::string("ulimit -s ") + kibibytes + "; ", script);
       if (outcome.exit_code == 1) {
         EXPECT_THAT(outcome.err, HasSubstr("ulimit -s"));
       }
     }
-    EXPECT_EQ(ExpectDoneOrTold("ulimit -s 1024; ", script).exit_code, 0);
+    EXPECT_EQ(ExpectDoneOrReported("ulimit -s 1024; ", script).exit_code, 0);
   }
 }
 

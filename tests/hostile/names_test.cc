@@ -171,7 +171,7 @@ THICKLENS_SITUATION(HostileNames, AnEmptyName,
       Estimate("''"),
       Render("''"),
       "\"$T\" explain '' --depth-range 290:310",
-      "\"$T\" simulate picture scene.yaml -o ''",
+      "\"$T\" simulate image scene.yaml -o ''",
       "\"$T\" estimate picture.png depth.pfm --depth-kind z --depth-unit mm --camera '' -o new",
       "\"$T\" report lf -o new.html --truth ''",
       "\"$T\" camera init --focal-mm 50 --f-number 2 --pitch-um 5 --size 10x10 -o ''"};

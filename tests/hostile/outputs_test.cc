@@ -23,7 +23,7 @@ class HostileOutputs : public HostileTest {
             "\"$T\" camera init --focal-mm 50 --f-number 2 --pitch-um 5 --size 10x10 -o " + output};
   }
   static std::vector<std::string> ToFolder(const std::string& output) {
-    return {Estimate(output), "\"$T\" simulate picture scene.yaml --quiet -o " + output,
+    return {Estimate(output), "\"$T\" simulate image scene.yaml --quiet -o " + output,
             "\"$T\" simulate sweep recipe.yaml --quiet -o " + output,
             "\"$T\" simulate light-field scene.yaml --views 2x2 --quiet -o " + output,
             "\"$T\" render lf --convert hci --quiet -o " + output};

@@ -37,8 +37,8 @@ class HostileProcess : public HostileTest {
       EXPECT_THAT(ErrorsIn(outcome.err), ::testing::ElementsAre(HasSubstr("interrupted")));
     }
     // The program promises to stop within 1 s, but a busy machine may take longer.
-    constexpr int kMostMs = 10000;
-    EXPECT_LE(std::atoi(outcome.out.c_str()), kMostMs);
+    constexpr int kMaxMs = 10000;
+    EXPECT_LE(std::atoi(outcome.out.c_str()), kMaxMs);
     fs::remove_all(Work("new"));
   }
 
@@ -49,9 +49,8 @@ class HostileProcess : public HostileTest {
         "/configs/cameras/case-ii.yaml\ntruth: {focus_depth_mm: 300, blur_ratio: 0.45}\n"
         "layers:\n  - plane: {depth_mm: 310, slope: [0.4, 0]}\n"
         "    texture: {kind: noise, colour: [0.5, 0.5, 0.45]}\n");
-    for (const std::string& script :
-         {std::string("\"$T\" simulate picture long.yaml --quiet -o new"), Calibrate("new"),
-          Estimate("new")}) {
+    for (const std::string& script : {std::string("\"$T\" simulate image long.yaml --quiet -o new"),
+                                      Calibrate("new"), Estimate("new")}) {
       for (const double seconds : {0.01, 0.06, 0.15}) Stop(script, signal, seconds);
     }
   }
@@ -59,7 +58,7 @@ class HostileProcess : public HostileTest {
 
 THICKLENS_SITUATION(HostileProcess, ClosedDescriptors,
                     "Standard input, output and error are closed at the start, in each combination",
-                    "The outputs are those of a usual run, byte for byte; nothing that is told "
+                    "The outputs are those of a usual run, byte for byte; nothing that is reported "
                     "gets into them") {
   ASSERT_EQ(Shell(Explain("usual.json")).exit_code, 0);
   const std::string usual = testing::ContentOf(Work("usual.json"));
@@ -105,9 +104,9 @@ THICKLENS_SITUATION(HostileProcess, AReaderThatGoesAway,
   }
 }
 
-THICKLENS_SITUATION(HostileProcess, NoRoomForWhatIsPrinted,
-                    "Standard output is `/dev/full`; standard error is",
-                    "Results that cannot be printed are an error; what cannot be told is none") {
+THICKLENS_SITUATION(
+    HostileProcess, NoRoomForWhatIsPrinted, "Standard output is `/dev/full`; standard error is",
+    "Results that cannot be printed are an error; what cannot be determined is none") {
   if (!fs::exists("/dev/full")) GTEST_SKIP() << "there is no /dev/full here";
   ExpectRefused(Shell("\"$T\" explain camera.yaml --depth-range 290:310 > /dev/full"), 1,
                 {"standard output cannot be written", "No space left"});

@@ -25,9 +25,10 @@ class HostileText : public HostileTest {
     const std::string limit = testing::kIsSanitized ? "" : "ulimit -v 2000000; ";
     return Shell(limit + "\"$T\" explain hostile.yaml --depth-range 290:310", 60);
   }
-  void ExpectCameraRefused(const std::string& content, const std::vector<std::string>& told = {}) {
+  void ExpectCameraRefused(const std::string& content,
+                           const std::vector<std::string>& reported = {}) {
     std::vector<std::string> all = {"hostile.yaml"};
-    all.insert(all.end(), told.begin(), told.end());
+    all.insert(all.end(), reported.begin(), reported.end());
     ExpectRefused(ExplainCamera(content), 1, all);
   }
   Outcome CalibrateTable(const std::string& content) {
@@ -216,11 +217,11 @@ THICKLENS_SITUATION(HostileText, ADamagedProfile,
       {with("threads", "1e300"), "threads"},
       {with("schema", "\"" + std::string(1000000, 'x') + "\""), "schema"},
       {with("runs", "\"" + std::string(1000000, 'x') + "\""), "runs"}};
-  for (const auto& [content, told] : damaged) {
+  for (const auto& [content, reported] : damaged) {
     SCOPED_TRACE(content.substr(0, 60));
     Put("profile.json", content);
     ExpectRefused(Shell(Estimate("new --profile profile.json --within 3600s")), 1,
-                  {"profile.json", told});
+                  {"profile.json", reported});
   }
 }
 

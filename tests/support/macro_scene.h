@@ -67,7 +67,7 @@ struct MacroScene {
     model::SceneSimulationOptions options;
     options.camera = camera;
     options.layers = std::move(layers);
-    options.effects.base = model::EffectChoice::Base::kGiven;
+    options.effects.base = model::EffectSelectionOptions::Base::kGiven;
     options.effects.given = effects;
     options.sampling_error_grey_levels = 0;
     options.rays_per_pixel = rays;

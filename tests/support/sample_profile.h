@@ -7,7 +7,7 @@
 
 namespace thicklens::testing {
 
-// A picture of one megapixel whose files take no time.
+// An image of one megapixel whose files take no time.
 inline constexpr estimator::Workload kSampleWorkload{1, 1, 25, 1, 0};
 
 // A plan of the scene solver that takes `seconds` for each megapixel.

@@ -12,13 +12,13 @@
 
 namespace thicklens::testing {
 
-// Random maps between pictures, as numbers and as the dense matrix that they represent.
+// Random maps between images, as numbers and as the dense matrix that they represent.
 
 // A filter with radii from 0 to `most_radius`, which change from block to block.
 template <typename Real>
-kernels::PixelFilter<Real> SampleFilter(kernels::Axis axis, int width, int height, int most_radius,
-                                        std::uint32_t seed) {
-  kernels::PixelFilter<Real> filter;
+kernels::VaryingFilter<Real> SampleFilter(kernels::Axis axis, int width, int height,
+                                          int most_radius, std::uint32_t seed) {
+  kernels::VaryingFilter<Real> filter;
   filter.axis = axis;
   filter.width_px = width;
   filter.height_px = height;
@@ -45,7 +45,7 @@ kernels::PixelFilter<Real> SampleFilter(kernels::Axis axis, int width, int heigh
 }
 
 template <typename Real>
-Eigen::MatrixXd DenseOf(const kernels::PixelFilter<Real>& filter) {
+Eigen::MatrixXd DenseOf(const kernels::VaryingFilter<Real>& filter) {
   const int pixels = filter.width_px * filter.height_px;
   Eigen::MatrixXd dense = Eigen::MatrixXd::Zero(pixels, pixels);
   for (int p = 0; p < pixels; ++p) {
@@ -69,8 +69,8 @@ Eigen::MatrixXd DenseOf(const kernels::PixelFilter<Real>& filter) {
 
 // About every `every`-th pixel has a row of 0 to 40 entries. Some pixels are read twice.
 template <typename Real>
-kernels::PixelRows<Real> SampleRows(int pixels, unsigned every, std::uint32_t seed) {
-  kernels::PixelRows<Real> rows;
+kernels::PixelCsr<Real> SampleRows(int pixels, unsigned every, std::uint32_t seed) {
+  kernels::PixelCsr<Real> rows;
   rows.pixels = pixels;
   rows.start = {0};
   std::mt19937 random(seed);
@@ -101,7 +101,7 @@ class SampleProjection {
       filters_.push_back(SampleFilter<Real>(kernels::Axis::kDown, width, height, 5, ++seed));
       dense_ += DenseOf(filters_[filters_.size() - 1]) * DenseOf(filters_[filters_.size() - 2]);
     }
-    const kernels::PixelRows<Real> rows = SampleRows<Real>(pixels, every, ++seed);
+    const kernels::PixelCsr<Real> rows = SampleRows<Real>(pixels, every, ++seed);
     for (std::size_t r = 0; r < rows.pixel.size(); ++r) {
       dense_.row(rows.pixel[r]).setZero();
       for (auto e = static_cast<std::size_t>(rows.start[r]);
@@ -155,7 +155,7 @@ class SampleProjection {
     data.photograph = Numbers(static_cast<std::size_t>(channels) * data.pixels(), ++seed);
     data.weight = Numbers(data.pixels(), ++seed);
     for (Eigen::Index i = 0; i < dense_.rows(); ++i) {
-      data.squared_row.push_back(static_cast<Real>(dense_.row(i).squaredNorm()));
+      data.row_norm2.push_back(static_cast<Real>(dense_.row(i).squaredNorm()));
     }
     return data;
   }
@@ -170,8 +170,8 @@ class SampleProjection {
 
  private:
   int width_, height_;
-  std::vector<kernels::PixelFilter<Real>> filters_;  // across, down, across, ...
-  kernels::PixelRuns<Real> rows_;
+  std::vector<kernels::VaryingFilter<Real>> filters_;  // across, down, across, ...
+  kernels::PixelBlockedCsr<Real> rows_;
   Eigen::MatrixXd dense_;
 };
 

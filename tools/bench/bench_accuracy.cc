@@ -30,9 +30,9 @@
 #include "tools/bench/bench_report.h"
 #include "tools/bench/bench_scene.h"
 #include "tools/bench/bench_solvers.h"
-#include "tools/bench/price_page.h"
-#include "tools/bench/price_plans.h"
-#include "tools/bench/price_rows.h"
+#include "tools/bench/cost_page.h"
+#include "tools/bench/cost_plans.h"
+#include "tools/bench/cost_rows.h"
 #include "tools/bench/profile_measurement.h"
 #include "tools/options/bench_options.h"
 #include "tools/options/estimate_profile.h"
@@ -49,7 +49,7 @@ namespace {
 struct BenchAccuracyOptions {
   CommonOptions common;
   std::vector<std::string> scenes;  // empty: UsualScenes()
-  std::vector<int> views;  // empty: kUsualViews, and 3 and 7 for each solver with its defaults
+  std::vector<int> views;  // empty: kDefaultViews, and 3 and 7 for each solver with its defaults
   std::optional<int> size_px;
   std::string device = "auto";
   int repeat = 5;
@@ -67,9 +67,9 @@ const std::vector<std::string>& UsualScenes() {
 bool IsOfTheBench(const std::string& scene) {
   return std::count(UsualScenes().begin(), UsualScenes().end(), scene) > 0;
 }
-constexpr int kUsualViews = 5;
-constexpr int kUsualSizePx = 256;
-constexpr std::uint64_t kUsualSeed = 1;
+constexpr int kDefaultViews = 5;
+constexpr int kDefaultSizePx = 256;
+constexpr std::uint64_t kDefaultSeed = 1;
 
 // The backends that plans are computed on.
 struct Backends {
@@ -77,7 +77,7 @@ struct Backends {
   int threads = 1;
 };
 
-// A built-in scene of the bench, or a description with the pictures that it names.
+// A built-in scene of the bench, or a description with the images that it names.
 struct Scene {
   std::string name;
   std::optional<model::SceneSimulationOptions> description;
@@ -119,8 +119,8 @@ BenchScene Simulate(const BenchAccuracyOptions& options, const Scene& scene, int
     ThrowIfCancelled();
     progress.Show(done, total);
   };
-  const std::uint64_t seed = options.seed.value_or(kUsualSeed);
-  const int size_px = options.size_px.value_or(kUsualSizePx);
+  const std::uint64_t seed = options.seed.value_or(kDefaultSeed);
+  const int size_px = options.size_px.value_or(kDefaultSizePx);
   if (!scene.description) {
     const bool is_slanted = scene.name == UsualScenes().front();
     return is_slanted ? MakeBenchScene(size_px, size_px, views, views, seed, threads, tell)
@@ -131,50 +131,48 @@ BenchScene Simulate(const BenchAccuracyOptions& options, const Scene& scene, int
   return SimulateBenchScene(description, scene.pixels, {threads, tell});
 }
 
-void TakeRun(const PlanRun& run, PriceRow* row) {
+void TakeRun(const PlanRun& run, CostRow* row) {
   row->setup_seconds.push_back(run.setup_seconds);
   row->solve_seconds.push_back(run.solve_seconds);
   row->views_seconds.push_back(run.views_seconds);
   row->seconds.push_back(run.seconds());
 }
 
-void Score(const SampledPicture& picture, const std::vector<model::LightField>& estimates,
-           int threads, PriceRow* row) {
-  row->scored = ScoredAreaOf(picture);
-  row->scores = ScoresOfViews(picture, estimates, threads);
-  row->reprojection_db = ScoresOfPictures(picture, estimates, threads).psnr_db;
+void Score(const SampledImage& image, const std::vector<model::LightField>& estimates, int threads,
+           CostRow* row) {
+  row->scored = ScoredAreaOf(image);
+  row->scores = ScoresOfViews(image, estimates, threads);
+  row->reprojection_db = ScoresOfImages(image, estimates, threads).psnr_db;
 }
 
-void RunBlocks(const SampledPicture& picture, int threads, kernels::Backend* backend,
-               PriceRow* row) {
+void RunBlocks(const SampledImage& image, int threads, kernels::Backend* backend, CostRow* row) {
   const bool is_first = row->seconds.empty();
-  if (is_first) WarmUp(picture, row->plan, backend);
-  const PartsRun run = RunParts(picture, row->plan, threads, backend);
+  if (is_first) WarmUp(image, row->plan, backend);
+  const PartsRun run = RunParts(image, row->plan, threads, backend);
   row->setup_seconds.push_back(run.setup_seconds);
   row->solve_seconds.push_back(run.solve_seconds);
   row->views_seconds.push_back(0);  // the solver computes the views directly
   row->seconds.push_back(run.seconds());
   if (!is_first) return;
-  row->sample = picture.sample;
+  row->sample = image.sample;
   row->iterations = run.iterations;
   row->converged = run.converged;
   row->relative_residual = run.relative_residual;
   row->rcond = run.rcond;
-  Score(picture, run.estimates, threads, row);
+  Score(image, run.estimates, threads, row);
 }
 
-void RunWhole(const SampledPicture& picture, int threads, kernels::Backend* backend,
-              PriceRow* row) {
+void RunWhole(const SampledImage& image, int threads, kernels::Backend* backend, CostRow* row) {
   const bool is_first = row->seconds.empty();
   const auto run_once = [&] {
-    return row->is_warping ? RunWarping(picture.whole.input, threads)
-                           : RunPlan(row->plan, picture.whole.input, threads, backend);
+    return row->is_warping ? RunWarping(image.whole.input, threads)
+                           : RunPlan(row->plan, image.whole.input, threads, backend);
   };
   // A device compiles only once; on the processor one part warms up as well as the blocks do.
   if (is_first && row->plan.on_opencl) {
     run_once();
   } else if (is_first) {
-    WarmUpWhole(picture, [&](const estimator::EstimateInput& input) {
+    WarmUpWhole(image, [&](const estimator::EstimateInput& input) {
       row->is_warping ? RunWarping(input, threads) : RunPlan(row->plan, input, threads, backend);
     });
   }
@@ -186,17 +184,17 @@ void RunWhole(const SampledPicture& picture, int threads, kernels::Backend* back
   row->iterations = run.iterations;
   row->converged = run.converged;
   row->relative_residual = run.relative_residual;
-  Score(picture, PartsOf(picture, run.light_field), threads, row);
+  Score(image, PartsOf(image, run.light_field), threads, row);
 }
 
 // A row that fails states the reason, and the other rows go on.
-void RunRow(const SampledPicture& picture, const Backends& backends, PriceRow* row) {
+void RunRow(const SampledImage& image, const Backends& backends, CostRow* row) {
   kernels::Backend* backend = (row->plan.on_opencl ? backends.device : backends.processor).get();
   try {
     if (!row->is_warping && row->plan.solver == "blocks") {
-      RunBlocks(picture, backends.threads, backend, row);
+      RunBlocks(image, backends.threads, backend, row);
     } else {
-      RunWhole(picture, backends.threads, backend, row);
+      RunWhole(image, backends.threads, backend, row);
     }
   } catch (const Interrupted&) {
     throw;
@@ -205,28 +203,28 @@ void RunRow(const SampledPicture& picture, const Backends& backends, PriceRow* r
   }
 }
 
-void Measure(const BenchAccuracyOptions& options, const SampledPicture& picture,
-             const Backends& backends, std::vector<PriceRow>* rows) {
+void Measure(const BenchAccuracyOptions& options, const SampledImage& image,
+             const Backends& backends, std::vector<CostRow>* rows) {
   // For plans that take this long, fewer runs are sufficient.
   constexpr double kEnoughSeconds = 20;
   ProgressLine progress("measuring", options.common.quiet);
   std::vector<double> spent(rows->size());
   MeasureInRounds(options.repeat, rows->size(), &progress, [&](int, std::size_t i) {
-    PriceRow& row = (*rows)[i];
+    CostRow& row = (*rows)[i];
     if (!row.failure.empty() || !(spent[i] < kEnoughSeconds)) return;
     const Clock::time_point start = Clock::now();
-    RunRow(picture, backends, &row);
+    RunRow(image, backends, &row);
     spent[i] += SecondsSince(start);
   });
 }
 
-std::vector<PriceRow> MeasureScene(const BenchAccuracyOptions& options, const Scene& scene,
-                                   int views, const PlanGrid& grid, const Backends& backends) {
-  SampledPicture picture;
-  picture.whole = Simulate(options, scene, views, backends.threads);
-  CutParts(options.full, PartCount::kFour, &picture);
-  std::vector<PriceRow> rows;
-  PriceRow row;
+std::vector<CostRow> MeasureScene(const BenchAccuracyOptions& options, const Scene& scene,
+                                  int views, const PlanGrid& grid, const Backends& backends) {
+  SampledImage image;
+  image.whole = Simulate(options, scene, views, backends.threads);
+  CutParts(options.full, PartCount::kFour, &image);
+  std::vector<CostRow> rows;
+  CostRow row;
   row.scene = scene.name;
   row.views = views;
   for (const estimator::EstimatePlan& plan : PlansOf(grid)) {
@@ -236,23 +234,23 @@ std::vector<PriceRow> MeasureScene(const BenchAccuracyOptions& options, const Sc
   row.plan = {};
   row.is_warping = true;
   rows.push_back(row);
-  Measure(options, picture, backends, &rows);
+  Measure(options, image, backends, &rows);
   return rows;
 }
 
-std::vector<PriceRow> MeasureAll(const BenchAccuracyOptions& options,
-                                 const std::vector<Scene>& scenes, const Backends& backends) {
+std::vector<CostRow> MeasureAll(const BenchAccuracyOptions& options,
+                                const std::vector<Scene>& scenes, const Backends& backends) {
   PlanGrid all;
   all.full = options.full;
   all.opencl = backends.device != nullptr;
   PlanGrid base = all;
   base.base_only = !options.full;
   const bool are_given = !options.views.empty();
-  std::vector<PriceRow> rows;
+  std::vector<CostRow> rows;
   for (const Scene& scene : scenes) {
-    for (const int views : are_given ? options.views : std::vector<int>{kUsualViews, 3, 7}) {
-      const bool is_main = are_given || views == kUsualViews;
-      for (PriceRow& row : MeasureScene(options, scene, views, is_main ? all : base, backends)) {
+    for (const int views : are_given ? options.views : std::vector<int>{kDefaultViews, 3, 7}) {
+      const bool is_main = are_given || views == kDefaultViews;
+      for (CostRow& row : MeasureScene(options, scene, views, is_main ? all : base, backends)) {
         rows.push_back(std::move(row));
       }
     }
@@ -294,7 +292,7 @@ CommandResult SaveProfile(const BenchAccuracyOptions& options) {
   ProfileRun run;
   run.threads = ResolveThreads(options.common.threads);
   run.repeat = options.repeat;
-  run.seed = options.seed.value_or(kUsualSeed);
+  run.seed = options.seed.value_or(kDefaultSeed);
   MeasuredProfile measured;
   {
     ProgressLine progress("measuring", options.common.quiet);
@@ -319,7 +317,7 @@ CommandResult SaveProfile(const BenchAccuracyOptions& options) {
       for (const estimator::TimedWorkload& timed : *of_plan) {
         loads.push_back(
             {{"plan", estimator::PlanName(plan.plan)},
-             {"in_the_law", of_plan == &measured.loads[i]},
+             {"in_the_model", of_plan == &measured.loads[i]},
              {"megapixels", timed.load.megapixels},
              {"channels", timed.load.channels},
              {"views", timed.load.views},
@@ -355,28 +353,28 @@ CommandResult BenchAccuracy(const BenchAccuracyOptions& options) {
     if (!notice.empty()) spdlog::warn("rows with OpenCL are left out: {}", notice);
   }
   const double triad = TriadBytesPerSecond(backends.threads);
-  const std::vector<PriceRow> rows = MeasureAll(options, scenes, backends);
+  const std::vector<CostRow> rows = MeasureAll(options, scenes, backends);
   const std::string about = AboutText(options, backends, triad);
   std::vector<Plot> figures;
-  for (const std::vector<PriceRow>& group : PriceGroups(rows)) {
-    figures.push_back(PriceFigure(group, fmt::format("prices-{}", figures.size() + 1)));
+  for (const std::vector<CostRow>& group : CostGroups(rows)) {
+    figures.push_back(CostFigure(group, fmt::format("prices-{}", figures.size() + 1)));
   }
-  report.Commit(PricePage(rows, about), PriceCsv(rows), figures);
+  report.Commit(CostPage(rows, about), CostCsv(rows), figures);
   std::string text =
-      about + "\n" + PriceTable(rows) +
+      about + "\n" + CostTable(rows) +
       "\n> on the Pareto front: no other plan is both faster and better. Seconds of the solver, "
       "without reading and writing; differences below the spread are a tie.\nMiB: largest increase "
       "of memory during the run. photo: PSNR of the photograph computed from the views.\n";
-  if (std::any_of(rows.begin(), rows.end(), [](const PriceRow& row) { return row.sample; })) {
+  if (std::any_of(rows.begin(), rows.end(), [](const CostRow& row) { return row.sample; })) {
     text +=
         "extrapol.: from four parts of 64 x 64 px, with the worst of their iterations, residuals "
         "and rcond;\nthe front uses these seconds as they are. --full runs everything.\n";
   }
   PrintResult(options.common, text);
   nlohmann::json json_rows = nlohmann::json::array();
-  for (const PriceRow& row : rows) json_rows.push_back(PriceRowJson(row));
+  for (const CostRow& row : rows) json_rows.push_back(CostRowJson(row));
   nlohmann::json summary = BenchSummary({{"repeat", options.repeat},
-                                         {"seed", options.seed.value_or(kUsualSeed)},
+                                         {"seed", options.seed.value_or(kDefaultSeed)},
                                          {"full", options.full},
                                          {"rows", json_rows}});
   summary["machine"]["triad_bytes_per_second"] = triad;
@@ -394,7 +392,7 @@ void AddBenchAccuracyCommand(CLI::App* bench, CommandAction* action) {
   const auto options = std::make_shared<BenchAccuracyOptions>();
   command
       ->add_option("--scene", options->scenes,
-                   "slanted, cards (both), or the file of a scene, as for simulate picture")
+                   "slanted, cards (both), or the file of a scene, as for simulate image")
       ->type_name("SCENE");
   command
       ->add_option("--views", options->views,
@@ -405,7 +403,7 @@ void AddBenchAccuracyCommand(CLI::App* bench, CommandAction* action) {
   command
       ->add_option(
           "--size-px", options->size_px,
-          fmt::format("Side of the pictures of slanted and cards (default {})", kUsualSizePx))
+          fmt::format("Side of the images of slanted and cards (default {})", kDefaultSizePx))
       ->check(CLI::Range(64, 4096))
       ->type_name("PX");
   AddRepeatOption(command, &options->repeat);

@@ -37,8 +37,8 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int kUsualSweeps = 24, kFullSweeps = 100;
-constexpr int kFewestFieldPx = 16;
+constexpr int kDefaultSweeps = 24, kFullSweeps = 100;
+constexpr int kMinFieldPx = 16;
 
 struct BenchCalibrationOptions {
   CommonOptions common;
@@ -189,9 +189,9 @@ Grid GridOf(const BenchCalibrationOptions& options,
   const int count = description.frame_count;
   const model::Sensor& sensor = description.camera.sensor;
   const int side_px = std::min(sensor.width_px, sensor.height_px);
-  if (side_px < kFewestFieldPx) {
+  if (side_px < kMinFieldPx) {
     throw Error(fmt::format("{}: the sensor's shorter side is {} px, at least {} px are needed",
-                            options.sweep_path, side_px, kFewestFieldPx));
+                            options.sweep_path, side_px, kMinFieldPx));
   }
   if (!options.frames.empty()) {
     grid.frames = WithinOrThrow("--frames", options.frames, 1, count, "the frames of the sweep");
@@ -201,7 +201,7 @@ Grid GridOf(const BenchCalibrationOptions& options,
     grid.frames.push_back(count);
   }
   if (!options.fields.empty()) {
-    grid.fields_px = WithinOrThrow("--field-px", options.fields, kFewestFieldPx, side_px,
+    grid.fields_px = WithinOrThrow("--field-px", options.fields, kMinFieldPx, side_px,
                                    "the sensor's shorter side");
   } else {
     for (const int field_px : options.full ? std::vector<int>{64, 96, 128, 192, 256, 384}
@@ -274,7 +274,7 @@ void MeasureSweep(const BenchSweep& bench, const Grid& grid, const std::vector<M
 std::vector<CalibrationRow> Measure(const BenchCalibrationOptions& options,
                                     const model::SweepSimulationOptions& description,
                                     const Grid& grid, int sweeps) {
-  const model::LinearPicture target_picture = io::ReadTargetPicture(description.target);
+  const model::LinearImage target_image = io::ReadTargetImage(description.target);
   const std::vector<Method> methods = Methods();
   TrialTable table(grid, methods, sweeps);
   const int runs = static_cast<int>(methods.size() * grid.fields_px.size() * grid.frames.size());
@@ -283,7 +283,7 @@ std::vector<CalibrationRow> Measure(const BenchCalibrationOptions& options,
   cv::setNumThreads(1);  // otherwise the CPU time of its threads is not counted
   ParallelFor(sweeps, options.common.threads, [&](int i) {
     const BenchSweep bench =
-        MakeBenchSweep(description, target_picture, grid.fields_px.front(),
+        MakeBenchSweep(description, target_image, grid.fields_px.front(),
                        static_cast<std::uint64_t>(options.seed) + static_cast<std::uint64_t>(i));
     MeasureSweep(
         bench, grid, methods, static_cast<std::size_t>(i),
@@ -332,7 +332,7 @@ CommandResult BenchCalibration(const BenchCalibrationOptions& options) {
       options.sweep_path.empty() ? BenchSweepOptions()
                                  : model::ReadSweepSimulation(options.sweep_path);
   const Grid grid = GridOf(options, description);
-  const int sweeps = options.sweeps.value_or(options.full ? kFullSweeps : kUsualSweeps);
+  const int sweeps = options.sweeps.value_or(options.full ? kFullSweeps : kDefaultSweeps);
   BenchReport report(options.report_folder);
 
   const std::vector<CalibrationRow> rows = Measure(options, description, grid, sweeps);
@@ -342,8 +342,8 @@ CommandResult BenchCalibration(const BenchCalibrationOptions& options) {
                                {"seconds_are", "CPU time of one thread"}});
   const std::string about =
       AboutText(options, description, sweeps, summary["machine"]["processor"].get<std::string>());
-  report.Commit(CalibrationPricePage(rows, about), CalibrationRowsCsv(rows),
-                {CalibrationPriceFigure(rows)});
+  report.Commit(CalibrationCostPage(rows, about), CalibrationRowsCsv(rows),
+                {CalibrationCostFigure(rows)});
   json json_rows = json::array();
   for (const CalibrationRow& row : rows) json_rows.push_back(CalibrationRowJson(row));
   summary["rows"] = json_rows;
@@ -375,7 +375,7 @@ void AddBenchCalibrationCommand(CLI::App* bench, CommandAction* action) {
   command
       ->add_option("--sweeps", options->sweeps,
                    fmt::format("Number of simulated sweeps; default {}, with --full {}",
-                               kUsualSweeps, kFullSweeps))
+                               kDefaultSweeps, kFullSweeps))
       ->check(CLI::Range(1, 100000))
       ->type_name("N");
   command->add_flag("--full", options->full, "More fields, more numbers of frames, more sweeps");

@@ -100,7 +100,7 @@ std::string TableOfFewerHtml(const std::vector<CalibrationRow>& rows) {
 
 }  // namespace
 
-Plot CalibrationPriceFigure(const std::vector<CalibrationRow>& rows) {
+Plot CalibrationCostFigure(const std::vector<CalibrationRow>& rows) {
   Plot plot;
   plot.id = "prices-calibration";
   plot.title = "Median error of d1 against seconds of the calibration";
@@ -141,13 +141,12 @@ Plot CalibrationPriceFigure(const std::vector<CalibrationRow>& rows) {
   return plot;
 }
 
-std::string CalibrationPricePage(const std::vector<CalibrationRow>& rows,
-                                 const std::string& about) {
+std::string CalibrationCostPage(const std::vector<CalibrationRow>& rows, const std::string& about) {
   constexpr char kTitle[] = "Accuracy and run time of calibrations";
   std::string html = PageHead(kTitle, SvgPlotStyle() + LightFieldFigureStyle());
   html += fmt::format("<h1>{}</h1>\n<p class=\"under-title\">{}</p>\n", kTitle,
                       EscapeXml(PrintableUtf8(about)));
-  html += Figure(SvgPlot(CalibrationPriceFigure(rows)), "Each method, by frames and field",
+  html += Figure(SvgPlot(CalibrationCostFigure(rows)), "Each method, by frames and field",
                  "Median over the sweeps of the error of d1; down and to the left is better. "
                  "Pointing at a mark shows its name.");
   html += TableHtml(rows) + TableOfFewerHtml(rows);

@@ -11,10 +11,10 @@ namespace thicklens::tools {
 
 // Plots the median error of d1 against seconds on logarithmic axes: one colour for each method,
 // with the Pareto front joined. Rows that cannot be compared are left out.
-Plot CalibrationPriceFigure(const std::vector<CalibrationRow>& rows);
+Plot CalibrationCostFigure(const std::vector<CalibrationRow>& rows);
 
 // Makes a page with the figure and all rows. `about` says what was calibrated on which machine.
-std::string CalibrationPricePage(const std::vector<CalibrationRow>& rows, const std::string& about);
+std::string CalibrationCostPage(const std::vector<CalibrationRow>& rows, const std::string& about);
 
 }  // namespace thicklens::tools
 

@@ -62,7 +62,7 @@ struct ConditioningRow {
 estimator::EstimateInput InputOf(const Setting& setting, int size_px) {
   estimator::EstimateInput input;
   const auto pixels = static_cast<std::size_t>(size_px) * static_cast<std::size_t>(size_px);
-  input.picture = model::LinearPicture{size_px, size_px, 1, std::vector<float>(pixels, 0.5F)};
+  input.image = model::LinearImage{size_px, size_px, 1, std::vector<float>(pixels, 0.5F)};
   input.disparity.width_px = input.disparity.height_px = size_px;
   for (int i = 0; i < size_px * size_px; ++i) {
     input.disparity.disparity.push_back(static_cast<float>(
@@ -157,7 +157,7 @@ void AddBenchConditioningCommand(CLI::App* bench, CommandAction* action) {
                             "Condition numbers of the system of each discretisation against gamma, "
                             "ridge, blur and views, and where float fails and double does not");
   const auto options = std::make_shared<BenchConditioningOptions>();
-  command->add_option("--size", options->size_px, "Edge of the picture, px")
+  command->add_option("--size", options->size_px, "Edge of the image, px")
       ->check(Between(3, 12, "pixels"))
       ->capture_default_str()
       ->type_name("PX");

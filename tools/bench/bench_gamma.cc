@@ -54,7 +54,7 @@ struct GammaRow {
   std::optional<double> ridge;  // absent: the default of this program
   std::vector<double> seconds;
   std::string failure;  // why the solver stopped; the values below are then unknown
-  double rcond = 0, relative_residual = 0, psnr_true_views_db = 0, psnr_picture_db = 0;
+  double rcond = 0, relative_residual = 0, psnr_true_views_db = 0, psnr_image_db = 0;
   bool IsRefused() const { return !(rcond >= estimator::BlockOptions().rcond_min); }
 };
 
@@ -67,7 +67,7 @@ void Run(const BenchScene& scene, const BenchGammaOptions& options, kernels::Bac
   blocks.rcond_min = 0;  // shows the results that `estimate` would refuse
   blocks.threads = options.common.threads;
   blocks.progress = [](int, int) { ThrowIfCancelled(); };
-  estimator::EstimateSummary summary;
+  estimator::BlockSummary summary;
   model::LightField estimate;
   try {
     estimate = estimator::EstimateByBlocks(scene.input, blocks, backend, &summary);
@@ -86,12 +86,12 @@ void Run(const BenchScene& scene, const BenchGammaOptions& options, kernels::Bac
   row->psnr_true_views_db = estimator::CompareLightFields(scene.truth, estimate, border_px,
                                                           std::nullopt, options.common.threads)
                                 .mean.psnr_db;
-  const model::LinearPicture again =
+  const model::LinearImage again =
       estimator::Photograph(estimate, scene.input.weights, &*scene.input.camera, nullptr, nullptr,
                             options.common.threads);
-  row->psnr_picture_db =
-      estimator::ComparePictures(model::StoredValuesOf(scene.input.picture, scene.input.transfer),
-                                 model::StoredValuesOf(again, scene.input.transfer), border_px)
+  row->psnr_image_db =
+      estimator::CompareImages(model::EncodedValuesOf(scene.input.image, scene.input.transfer),
+                               model::EncodedValuesOf(again, scene.input.transfer), border_px)
           .psnr_db;
 }
 
@@ -102,7 +102,7 @@ std::string RowText(const GammaRow& row) {
   }
   return fmt::format("{:>7.0e}{:>9}{:>10.3g}{:>10.1e}{:>11.1e}{:>12.2f}{:>11.2f}  {}\n", row.gamma,
                      row.ridge ? "none" : "usual", Median(row.seconds), row.rcond,
-                     row.relative_residual, row.psnr_picture_db, row.psnr_true_views_db,
+                     row.relative_residual, row.psnr_image_db, row.psnr_true_views_db,
                      row.IsRefused() ? "estimate refuses this" : "");
 }
 
@@ -115,7 +115,7 @@ json RowJson(const GammaRow& row) {
               {"seconds_of_runs", row.seconds},
               {"rcond_min", row.rcond},
               {"relative_residual", row.relative_residual},
-              {"psnr_picture_db", row.psnr_picture_db},
+              {"psnr_image_db", row.psnr_image_db},
               {"psnr_true_views_db", row.psnr_true_views_db},
               {"refused", row.IsRefused()}});
   return out;
@@ -150,14 +150,14 @@ CommandResult BenchGamma(const BenchGammaOptions& options) {
       "dB\n\n{:>7}{:>9}{:>10}{:>10}{:>11}{:>12}{:>11}\n",
       estimator::BlockSolverName(estimator::DefaultBlockSolver()), options.size_px, options.size_px,
       options.views, options.views, options.repeat, dibr_db, "gamma", "ridge", "seconds", "rcond",
-      "residual", "picture dB", "views dB");
+      "residual", "image dB", "views dB");
   json json_rows = json::array();
   for (const GammaRow& row : rows) {
     text += RowText(row);
     json_rows.push_back(RowJson(row));
   }
   text +=
-      "\npicture: PSNR of the photograph computed from the views, which is the equation that is "
+      "\nimage: PSNR of the photograph computed from the views, which is the equation that is "
       "solved;\nviews: PSNR against the true views. Below an rcond of 1e-12 `estimate` ends with "
       "an error.\n";
   PrintResult(options.common, text);

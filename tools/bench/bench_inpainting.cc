@@ -42,11 +42,11 @@ struct BenchInpaintingOptions {
 
 // The samples of each view that are judged, without those in the border.
 struct Regions {
-  std::vector<cv::Mat> hidden, band;  // masks of 0 or 255
+  std::vector<cv::Mat> occluded, band;  // masks of 0 or 255
 };
 
 constexpr int kBorderPx = 20;
-constexpr int kBandPx = 4;  // around the hidden samples
+constexpr int kBandPx = 4;  // around the occluded samples
 constexpr int kWarmPx = 64;
 
 Regions RegionsOf(const BenchScene& scene) {
@@ -61,31 +61,32 @@ Regions RegionsOf(const BenchScene& scene) {
   for (int l = 0; l < truth.v_count; ++l) {
     for (int k = 0; k < truth.u_count; ++k) {
       const estimator::ViewDisparity view = renderer.Render(truth.u_offset(k), truth.v_offset(l));
-      cv::Mat hidden = cv::Mat::zeros(map.height_px, map.width_px, CV_8UC1);
-      std::transform(view.seen.begin(), view.seen.end(), hidden.begin<std::uint8_t>(),
-                     [](estimator::Seen seen) {
-                       return static_cast<std::uint8_t>(seen == estimator::Seen::kHidden ? 255 : 0);
+      cv::Mat occluded = cv::Mat::zeros(map.height_px, map.width_px, CV_8UC1);
+      std::transform(view.visibility.begin(), view.visibility.end(), occluded.begin<std::uint8_t>(),
+                     [](estimator::Visibility visibility) {
+                       return static_cast<std::uint8_t>(
+                           visibility == estimator::Visibility::kOccluded ? 255 : 0);
                      });
-      cv::Mat inside = cv::Mat::zeros(hidden.size(), CV_8UC1);
-      hidden(inner).copyTo(inside(inner));
-      cv::Mat wide, band = cv::Mat::zeros(hidden.size(), CV_8UC1);
+      cv::Mat inside = cv::Mat::zeros(occluded.size(), CV_8UC1);
+      occluded(inner).copyTo(inside(inner));
+      cv::Mat wide, band = cv::Mat::zeros(occluded.size(), CV_8UC1);
       cv::dilate(inside, wide, around);
       wide(inner).copyTo(band(inner));
-      regions.hidden.push_back(inside);
+      regions.occluded.push_back(inside);
       regions.band.push_back(band);
     }
   }
   return regions;
 }
 
-// Returns the PSNR of stored values over the samples of all views together.
+// Returns the PSNR of encoded values over the samples of all views together.
 double PsnrWithin(const std::vector<cv::Mat>& region, const model::LightField& truth,
                   const model::LightField& estimate) {
   double sum = 0, count = 0;
   for (int l = 0; l < truth.v_count; ++l) {
     for (int k = 0; k < truth.u_count; ++k) {
       const auto of = [&](const model::LightField& light_field) {
-        return model::StoredValuesOf(model::ViewPicture(light_field, k, l), truth.transfer).values;
+        return model::EncodedValuesOf(model::ViewImage(light_field, k, l), truth.transfer).values;
       };
       const std::vector<float> a = of(truth), b = of(estimate);
       const cv::Mat& mask = region[static_cast<std::size_t>(l * truth.u_count + k)];
@@ -104,7 +105,7 @@ double PsnrWithin(const std::vector<cv::Mat>& region, const model::LightField& t
 struct InpaintingRow {
   std::string solver, fill;
   std::vector<double> seconds, fill_seconds;
-  double psnr_db = 0, psnr_band_db = 0, psnr_hidden_db = 0;
+  double psnr_db = 0, psnr_band_db = 0, psnr_occluded_db = 0;
 };
 
 void Judge(const BenchScene& scene, const Regions& regions, const model::LightField& estimate,
@@ -113,7 +114,7 @@ void Judge(const BenchScene& scene, const Regions& regions, const model::LightFi
       estimator::CompareLightFields(scene.truth, estimate, kBorderPx, std::nullopt, threads)
           .mean.psnr_db;
   row->psnr_band_db = PsnrWithin(regions.band, scene.truth, estimate);
-  row->psnr_hidden_db = PsnrWithin(regions.hidden, scene.truth, estimate);
+  row->psnr_occluded_db = PsnrWithin(regions.occluded, scene.truth, estimate);
 }
 
 // Runs a solver once, and judges its result as it is and with inpainting.
@@ -129,7 +130,7 @@ void Run(const LightFieldSolver& solver, const BenchScene& scene, const Regions&
   options.threads = threads;
   options.progress = [](int, int) { ThrowIfCancelled(); };
   estimator::InpaintSummary summary;
-  estimator::InpaintHiddenRays(scene.input.disparity, options, &estimate, &summary);
+  estimator::InpaintOccludedRays(scene.input.disparity, options, &estimate, &summary);
   telea->seconds.push_back(seconds + summary.seconds);
   telea->fill_seconds.push_back(summary.seconds);
   if (is_first) Judge(scene, regions, estimate, threads, telea);
@@ -143,7 +144,7 @@ json RowJson(const InpaintingRow& row) {
           {"fill_seconds", row.fill_seconds.empty() ? json() : json(Median(row.fill_seconds))},
           {"psnr_true_views_db", row.psnr_db},
           {"psnr_band_db", row.psnr_band_db},
-          {"psnr_hidden_db", row.psnr_hidden_db}};
+          {"psnr_occluded_db", row.psnr_occluded_db}};
 }
 
 CommandResult BenchInpainting(const BenchInpaintingOptions& options) {
@@ -162,7 +163,7 @@ CommandResult BenchInpainting(const BenchInpaintingOptions& options) {
       kernels::OpenBackend(kernels::ParseDeviceRequest("cpu"), nullptr, ThrowIfCancelled);
   std::vector<LightFieldSolver> solvers = {
       SolverByBlocks(estimator::DefaultBlockSolver(), threads, backend.get())};
-  for (LightFieldSolver& solver : WholePictureSolvers(threads)) {
+  for (LightFieldSolver& solver : WholeImageSolvers(threads)) {
     if (solver.prior == "tv" || solver.solver == "dibr") solvers.push_back(std::move(solver));
   }
   std::vector<InpaintingRow> rows;
@@ -192,7 +193,7 @@ CommandResult BenchInpainting(const BenchInpaintingOptions& options) {
         "{:<9}{:<8}{:>9.3g}{:>14}{:>9.2f}{:>9.2f}{:>9.2f}\n", row.solver, row.fill,
         Median(row.seconds),
         row.fill_seconds.empty() ? "-" : fmt::format("{:.3g}", Median(row.fill_seconds)),
-        row.psnr_db, row.psnr_band_db, row.psnr_hidden_db);
+        row.psnr_db, row.psnr_band_db, row.psnr_occluded_db);
     json_rows.push_back(RowJson(row));
   }
   PrintResult(options.common, text);
@@ -207,7 +208,7 @@ CommandResult BenchInpainting(const BenchInpaintingOptions& options) {
 
 void AddBenchInpaintingCommand(CLI::App* bench, CommandAction* action) {
   CLI::App* command = bench->add_subcommand(
-      "inpainting", "The paper's inpainting of hidden rays against the solvers' own filling");
+      "inpainting", "The paper's inpainting of occluded rays against the solvers' own filling");
   const auto options = std::make_shared<BenchInpaintingOptions>();
   AddSizeOption(command, 96, &options->size_px);
   AddSquareViewsOption(command, &options->views);

@@ -22,7 +22,7 @@ struct BlockSample {
 };
 
 // An image, and the parts that represent it where the whole would take too long.
-struct SampledPicture {
+struct SampledImage {
   BenchScene whole;
   std::vector<model::PixelRect> rects;  // of the parts
   std::vector<BenchScene> parts;
@@ -35,7 +35,7 @@ enum class PartCount { kOne = 1, kTwo = 2, kFour = 4 };
 
 // Cuts parts of four by four blocks in the middles of these quarters. If the image is hardly larger
 // than four parts, or if `full` is set, the part is the whole image.
-void CutParts(bool full, PartCount count, SampledPicture* picture);
+void CutParts(bool full, PartCount count, SampledImage* image);
 
 // Estimates of the parts, made one after the other by blocks, and their extrapolation to the whole.
 struct PartsRun {
@@ -49,28 +49,28 @@ struct PartsRun {
   std::optional<double> rcond;   // minimum over the parts
   std::string device;
 };
-PartsRun RunParts(const SampledPicture& picture, const estimator::EstimatePlan& plan, int threads,
+PartsRun RunParts(const SampledImage& image, const estimator::EstimatePlan& plan, int threads,
                   kernels::Backend* backend);
 // Solves one block, so that one-time work of a device is done before times are measured.
-void WarmUp(const SampledPicture& picture, const estimator::EstimatePlan& plan,
+void WarmUp(const SampledImage& image, const estimator::EstimatePlan& plan,
             kernels::Backend* backend);
 // Runs a solver of the whole image on one part, so that it is as warm as the solvers of blocks.
-using WholePictureRun = std::function<void(const estimator::EstimateInput&)>;
-void WarmUpWhole(const SampledPicture& picture, const WholePictureRun& run);
+using WholeImageRun = std::function<void(const estimator::EstimateInput&)>;
+void WarmUpWhole(const SampledImage& image, const WholeImageRun& run);
 
 // Cuts the parts out of an estimate of the whole.
-std::vector<model::LightField> PartsOf(const SampledPicture& picture,
+std::vector<model::LightField> PartsOf(const SampledImage& image,
                                        const model::LightField& estimate);
 
 // Returns the width of the border of such an image that scores leave out.
-int BorderPx(const model::LinearPicture& picture);
+int BorderPx(const model::LinearImage& image);
 
 // The area that scores are computed on: the middles of `parts` parts, without their borders.
 struct ScoredArea {
   int parts = 1;
   int width_px = 0, height_px = 0;  // of each part
 };
-ScoredArea ScoredAreaOf(const SampledPicture& picture);
+ScoredArea ScoredAreaOf(const SampledImage& image);
 std::string ScoredAreaText(const ScoredArea& area);  // "4 areas of 32 x 32 px"
 nlohmann::json ScoredAreaJson(const ScoredArea& area);
 
@@ -80,8 +80,8 @@ struct PartScores {
   double ssim_mean = 0, ssim_centre = 0, ssim_corner = 0;
 };
 // Scores the estimates against the true views, which must be known.
-PartScores ScoresOfViews(const SampledPicture& picture,
-                         const std::vector<model::LightField>& estimates, int threads);
+PartScores ScoresOfViews(const SampledImage& image, const std::vector<model::LightField>& estimates,
+                         int threads);
 
 // Scores of the photographs formed again from the estimates, against the given one: means over the
 // parts.
@@ -90,8 +90,8 @@ struct FidelityScores {
   std::optional<double> macade_standin;  // absent: a part has no edges
   double delta_e94_mean = 0;
 };
-FidelityScores ScoresOfPictures(const SampledPicture& picture,
-                                const std::vector<model::LightField>& estimates, int threads);
+FidelityScores ScoresOfImages(const SampledImage& image,
+                              const std::vector<model::LightField>& estimates, int threads);
 
 }  // namespace thicklens::tools
 

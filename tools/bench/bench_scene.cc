@@ -18,7 +18,7 @@ namespace {
 constexpr double kFocusDepthMm = 1000;
 constexpr double kNearMm = 750, kFarMm = 1500;
 
-// A plane of this slope is linear in 1/z over the picture: (1 - slope tan)/depth.
+// A plane of this slope is linear in 1/z over the image: (1 - slope tan)/depth.
 model::PlaneOptions SlantedPlane(const model::Camera& camera) {
   const double left = 1 / kNearMm, right = 1 / kFarMm;
   const double half_width = (camera.sensor.width_px - 1) / 2.0 / camera.focal_scale_px();
@@ -40,7 +40,7 @@ model::LightField GreyViews(const model::LightField& colours) {
   grey.landing_step_px = colours.landing_step_px;
   for (int l = 0; l < colours.v_count; ++l) {
     for (int k = 0; k < colours.u_count; ++k)
-      model::SetView(&grey, k, l, model::ToGrey(model::ViewPicture(colours, k, l)));
+      model::SetView(&grey, k, l, model::ToGrey(model::ViewImage(colours, k, l)));
   }
   return grey;
 }
@@ -90,7 +90,7 @@ BenchScene SimulateInGrey(const model::SceneSimulationOptions& options,
   BenchScene scene =
       SimulateBenchScene(options, std::vector<model::LayerPixels>(options.layers.size()), run);
   scene.truth = GreyViews(scene.truth);
-  scene.input.picture = model::ToGrey(scene.input.picture);
+  scene.input.image = model::ToGrey(scene.input.image);
   return scene;
 }
 
@@ -132,7 +132,7 @@ BenchScene SimulateBenchScene(const model::SceneSimulationOptions& options,
   estimator::EstimateInput& input = scene.input;
   input.camera = camera;
   input.transfer = camera.sensor.transfer;
-  input.picture = model::ToLinear(simulator.Store(simulator.RenderNoiseless(run)), input.transfer);
+  input.image = model::ToLinear(simulator.Store(simulator.RenderNoiseless(run)), input.transfer);
   input.grid = model::DefaultGrid(camera, options.u_count, options.v_count);
   input.weights =
       model::ApertureWeights(model::ApertureShapeOf(camera.psf), options.u_count, options.v_count);
@@ -164,7 +164,7 @@ BenchScene PartOf(const BenchScene& scene, const model::PixelRect& part) {
   BenchScene cut;
   if (scene.has_truth()) cut.truth = model::CropViews(scene.truth, part);
   cut.input = whole;
-  cut.input.picture = model::CropPicture(whole.picture, part);
+  cut.input.image = model::CropImage(whole.image, part);
   if (whole.camera) cut.input.camera = model::CropCamera(*whole.camera, part);
   if (whole.falloff_camera) {
     cut.input.falloff_camera = model::CropCamera(*whole.falloff_camera, part);
@@ -179,7 +179,7 @@ BenchScene PartOf(const BenchScene& scene, const model::PixelRect& part) {
   cut.input.disparity.disparity.clear();
   for (int y = part.y; y < part.y + part.height; ++y) {
     const auto row = whole.disparity.disparity.begin() +
-                     static_cast<std::ptrdiff_t>(y) * whole.picture.width_px + part.x;
+                     static_cast<std::ptrdiff_t>(y) * whole.image.width_px + part.x;
     cut.input.disparity.disparity.insert(cut.input.disparity.disparity.end(), row,
                                          row + part.width);
   }
@@ -187,8 +187,8 @@ BenchScene PartOf(const BenchScene& scene, const model::PixelRect& part) {
 }
 
 BenchScene MiddleOf(const BenchScene& scene, int width_px, int height_px) {
-  const model::LinearPicture& picture = scene.input.picture;
-  return PartOf(scene, {(picture.width_px - width_px) / 2, (picture.height_px - height_px) / 2,
+  const model::LinearImage& image = scene.input.image;
+  return PartOf(scene, {(image.width_px - width_px) / 2, (image.height_px - height_px) / 2,
                         width_px, height_px});
 }
 

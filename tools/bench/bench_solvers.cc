@@ -24,7 +24,7 @@ estimator::EstimatePlan SourcePlan(estimator::BlockSolver solver) {
   return plan;
 }
 
-std::vector<estimator::EstimatePlan> WholePicturePlans() {
+std::vector<estimator::EstimatePlan> WholeImagePlans() {
   std::vector<estimator::EstimatePlan> plans;
   for (const auto prior : {estimator::Prior::kRidge, estimator::Prior::kGradient,
                            estimator::Prior::kTotalVariation, estimator::Prior::kPatches}) {
@@ -45,9 +45,9 @@ LightFieldSolver SolverByBlocks(estimator::BlockSolver solver, int threads,
   return SolverOf(SourcePlan(solver), threads, backend);
 }
 
-std::vector<LightFieldSolver> WholePictureSolvers(int threads) {
+std::vector<LightFieldSolver> WholeImageSolvers(int threads) {
   std::vector<LightFieldSolver> solvers;
-  for (const estimator::EstimatePlan& plan : WholePicturePlans()) {
+  for (const estimator::EstimatePlan& plan : WholeImagePlans()) {
     solvers.push_back(SolverOf(plan, threads, nullptr));
   }
   solvers.push_back({"dibr", "", "", [threads](const estimator::EstimateInput& input) {

@@ -15,7 +15,7 @@ namespace thicklens::tools {
 // Returns the plan by blocks of the paper's size, with its gamma of 1.
 estimator::EstimatePlan SourcePlan(estimator::BlockSolver solver);
 // Returns the plans for the whole image: scene with each prior, functional, grid.
-std::vector<estimator::EstimatePlan> WholePicturePlans();
+std::vector<estimator::EstimatePlan> WholeImagePlans();
 
 // One complete way from photograph and depth to the views. An interrupt stops it.
 struct LightFieldSolver {
@@ -25,8 +25,8 @@ struct LightFieldSolver {
 // The result keeps `backend`.
 LightFieldSolver SolverByBlocks(estimator::BlockSolver solver, int threads,
                                 kernels::Backend* backend);
-// Returns the solvers of WholePicturePlans(), followed by the baseline DIBR.
-std::vector<LightFieldSolver> WholePictureSolvers(int threads);
+// Returns the solvers of WholeImagePlans(), followed by the baseline DIBR.
+std::vector<LightFieldSolver> WholeImageSolvers(int threads);
 
 }  // namespace thicklens::tools
 

@@ -39,7 +39,7 @@ struct BenchSourceOptions {
   std::vector<int> tables;         // empty: all
   std::vector<int> views;          // empty: 3, 5 and 7, and kViewsOfTable4 for table 4
   std::vector<std::string> sizes;  // empty: K and L
-  EstimateOptions given;           // picture, depth, camera
+  EstimateOptions given;           // image, depth, camera
   std::string device = "auto";
   int repeat = 5;
   bool full = false;
@@ -48,7 +48,7 @@ struct BenchSourceOptions {
 
 // The paper does not state the number of views of its table 4.
 constexpr int kViewsOfTable4 = 5;
-constexpr std::uint64_t kUsualSeed = 1;
+constexpr std::uint64_t kDefaultSeed = 1;
 
 // The bench's lens with a thickness of 3 mm and another rear focal length, with the same focus.
 model::Camera ThickBenchCamera(int width_px, int height_px) {
@@ -83,13 +83,13 @@ void Measure(const BenchSourceOptions& options, std::vector<SourceContender>* co
   for (SourceContender& contender : *contenders) rows->push_back(std::move(contender.row));
 }
 
-struct PictureSize {
+struct ImageSize {
   std::string name;
   int width_px = 0, height_px = 0;
 };
 
-std::vector<PictureSize> SizesOf(const BenchSourceOptions& options) {
-  std::vector<PictureSize> sizes;
+std::vector<ImageSize> SizesOf(const BenchSourceOptions& options) {
+  std::vector<ImageSize> sizes;
   for (const std::string& text :
        options.sizes.empty() ? std::vector<std::string>{"L", "K"} : options.sizes) {
     if (text == "K") {
@@ -108,56 +108,56 @@ std::vector<PictureSize> SizesOf(const BenchSourceOptions& options) {
   return sizes;
 }
 
-SourcePicture Simulated(const BenchSourceOptions& options, const PictureSize& size,
-                        const model::Camera& camera, int views) {
+SourceImage Simulated(const BenchSourceOptions& options, const ImageSize& size,
+                      const model::Camera& camera, int views) {
   ProgressLine progress("simulating", options.common.quiet);
-  SourcePicture picture;
-  picture.name = size.name;
-  picture.views = views;
-  picture.whole = MakeBenchScene(camera, views, views, options.seed.value_or(kUsualSeed),
-                                 options.common.threads, [&](int done, int total) {
-                                   ThrowIfCancelled();
-                                   progress.Show(done, total);
-                                 });
-  Cut(options.full, &picture);
-  return picture;
+  SourceImage image;
+  image.name = size.name;
+  image.views = views;
+  image.whole = MakeBenchScene(camera, views, views, options.seed.value_or(kDefaultSeed),
+                               options.common.threads, [&](int done, int total) {
+                                 ThrowIfCancelled();
+                                 progress.Show(done, total);
+                               });
+  Cut(options.full, &image);
+  return image;
 }
 
-SourcePicture Given(const BenchSourceOptions& options, int views) {
+SourceImage Given(const BenchSourceOptions& options, int views) {
   EstimateOptions given = options.given;
   given.common = options.common;
   given.views.text = fmt::format("{0}x{0}", views);
   given.ignore_exif = true;  // the times do not depend on it
   PreparedEstimate prepared = PrepareEstimate(given);
-  SourcePicture picture;
-  picture.name = std::filesystem::path(given.picture_path).stem().string();
-  picture.views = views;
-  picture.whole.input = std::move(prepared.input);
-  Cut(options.full, &picture);
-  return picture;
+  SourceImage image;
+  image.name = std::filesystem::path(given.image_path).stem().string();
+  image.views = views;
+  image.whole.input = std::move(prepared.input);
+  Cut(options.full, &image);
+  return image;
 }
 
 void MeasureTimes(const BenchSourceOptions& options, const SourceBench& bench,
-                  const std::set<int>& tables, const SourcePicture& picture,
+                  const std::set<int>& tables, const SourceImage& image,
                   std::vector<SourceRow>* rows) {
   std::vector<SourceContender> contenders;
-  if (tables.count(1) > 0) AddTable1(bench, picture, &contenders);
-  if (tables.count(2) > 0) AddTable2(bench, picture, &contenders);
-  if (tables.count(3) > 0) AddTable3(bench, picture, &contenders);
+  if (tables.count(1) > 0) AddTable1(bench, image, &contenders);
+  if (tables.count(2) > 0) AddTable2(bench, image, &contenders);
+  if (tables.count(3) > 0) AddTable3(bench, image, &contenders);
   Measure(options, &contenders, rows);
 }
 
 void MeasureLenses(const BenchSourceOptions& options, const SourceBench& bench,
-                   const SourcePicture& picture, std::vector<SourceRow>* rows) {
+                   const SourceImage& image, std::vector<SourceRow>* rows) {
   std::vector<SourceContender> contenders;
-  AddTable4(bench, picture, &contenders);
+  AddTable4(bench, image, &contenders);
   Measure(options, &contenders, rows);
 }
 
 std::set<int> TablesOf(const BenchSourceOptions& options) {
   std::set<int> tables(options.tables.begin(), options.tables.end());
   if (tables.empty()) tables = {1, 2, 3, 4};
-  if (!options.given.picture_path.empty() && options.given.camera_path.empty()) {
+  if (!options.given.image_path.empty() && options.given.camera_path.empty()) {
     if (!options.tables.empty() && tables.count(4) > 0) {
       throw UsageError("--table 4 compares lenses: with --image it needs --camera");
     }
@@ -173,14 +173,14 @@ std::vector<SourceRow> MeasureAll(const BenchSourceOptions& options, const Sourc
   const int views_of_lenses = options.views.empty() ? kViewsOfTable4 : *views.rbegin();
   const bool times = *tables.begin()<4, lenses = tables.count(4)> 0;
   std::vector<SourceRow> rows;
-  if (!options.given.picture_path.empty()) {
+  if (!options.given.image_path.empty()) {
     for (const int count : views) {
       if (times) MeasureTimes(options, bench, tables, Given(options, count), &rows);
     }
     if (lenses) MeasureLenses(options, bench, Given(options, views_of_lenses), &rows);
     return rows;
   }
-  for (const PictureSize& size : SizesOf(options)) {
+  for (const ImageSize& size : SizesOf(options)) {
     const model::Camera thin = BenchCamera(size.width_px, size.height_px);
     for (const int count : views) {
       if (times) MeasureTimes(options, bench, tables, Simulated(options, size, thin, count), &rows);
@@ -194,22 +194,22 @@ std::vector<SourceRow> MeasureAll(const BenchSourceOptions& options, const Sourc
 
 void CheckUsage(const BenchSourceOptions& options) {
   const EstimateOptions& given = options.given;
-  const bool has_picture = !given.picture_path.empty();
+  const bool has_image = !given.image_path.empty();
   const auto needs = [](bool is_given, bool fits, const std::string& message) {
     if (is_given && !fits) throw UsageError(message);
   };
-  needs(has_picture != !given.depth_path.empty(), false,
+  needs(has_image != !given.depth_path.empty(), false,
         "--image and --depth must be given together");
-  needs(!given.camera_path.empty(), has_picture, "--camera requires --image");
+  needs(!given.camera_path.empty(), has_image, "--camera requires --image");
   const DepthOptions usual;
   needs(!given.depth.kind.empty() || !given.depth.unit.empty() ||
             given.depth.disparity_scale != usual.disparity_scale ||
             given.depth.disparity_offset_px != usual.disparity_offset_px,
-        has_picture, "--depth-kind and its settings require --depth");
-  needs(!options.sizes.empty(), !has_picture,
-        "--size is for simulated pictures and cannot be used with --image");
-  needs(options.seed.has_value(), !has_picture,
-        "--seed is for simulated pictures and cannot be used with --image");
+        has_image, "--depth-kind and its settings require --depth");
+  needs(!options.sizes.empty(), !has_image,
+        "--size is for simulated images and cannot be used with --image");
+  needs(options.seed.has_value(), !has_image,
+        "--seed is for simulated images and cannot be used with --image");
 }
 
 CommandResult BenchSource(const BenchSourceOptions& options) {
@@ -231,7 +231,7 @@ CommandResult BenchSource(const BenchSourceOptions& options) {
 
   std::string text = fmt::format(
       "Medians of {} runs, or of as many as fit into a minute. Machines differ, so compare the "
-      "ratios\ninside a table. Published: means of the paper's four pictures.\n{}\n",
+      "ratios\ninside a table. Published: means of the paper's four images.\n{}\n",
       options.repeat,
       bench.device ? "OpenCL: " + bench.device->description() : std::string("No OpenCL device"));
   nlohmann::json json_rows = nlohmann::json::array();
@@ -245,7 +245,7 @@ CommandResult BenchSource(const BenchSourceOptions& options) {
   }
   PrintResult(options.common, text);
   nlohmann::json summary = BenchSummary({{"repeat", options.repeat},
-                                         {"seed", options.seed.value_or(kUsualSeed)},
+                                         {"seed", options.seed.value_or(kDefaultSeed)},
                                          {"full", options.full},
                                          {"rows", json_rows}});
   summary["machine"]["triad_bytes_per_second"] = bench.triad_bytes_per_second;
@@ -273,11 +273,10 @@ void AddBenchSourceCommand(CLI::App* bench, CommandAction* action) {
   command
       ->add_option(
           "--size", options->sizes,
-          "Size of simulated pictures: K (640x480), L (256x256) or WIDTHxHEIGHT (default L K)")
+          "Size of simulated images: K (640x480), L (256x256) or WIDTHxHEIGHT (default L K)")
       ->type_name("SIZE");
   command
-      ->add_option("--image", options->given.picture_path,
-                   "Picture to use instead of simulated ones")
+      ->add_option("--image", options->given.image_path, "Image to use instead of simulated ones")
       ->type_name("FILE");
   command->add_option("--depth", options->given.depth_path, "Depth map of --image")
       ->type_name("FILE");
@@ -285,7 +284,7 @@ void AddBenchSourceCommand(CLI::App* bench, CommandAction* action) {
       ->type_name("FILE");
   AddDepthOptions(command, &options->given.depth);
   AddRepeatOption(command, &options->repeat);
-  command->add_flag("--full", options->full, "Solve all blocks of the pictures, not a sample");
+  command->add_flag("--full", options->full, "Solve all blocks of the images, not a sample");
   command->add_option("--seed", options->seed, "Seed of texture and noise (default 1)")
       ->type_name("N");
   AddDeviceOption(command, &options->device);
@@ -294,7 +293,7 @@ void AddBenchSourceCommand(CLI::App* bench, CommandAction* action) {
     *action = [options] {
       const EstimateOptions& given = options->given;
       RequireDistinctFiles({options->common.json_path},
-                           {given.picture_path, given.depth_path, given.camera_path});
+                           {given.image_path, given.depth_path, given.camera_path});
       RunCommand(options->common, [&] { return BenchSource(*options); });
     };
   });

@@ -29,21 +29,21 @@ std::string Heading(int table) {
   switch (table) {
     case 1:
       return fmt::format(
-          "Table 1. Light field from a picture by blocks of 16 px ({}, gamma 1): matrices "
+          "Table 1. Light field from an image by blocks of 16 px ({}, gamma 1): matrices "
           "by\nOpenCL kernels, or everything on one thread; below, the other solvers of this "
           "program",
           UsualSolver());
     case 2:
-      return "Table 2. Picture from a light field: OpenCL, transfers included, against one "
+      return "Table 2. Image from a light field: OpenCL, transfers included, against one "
              "thread;\nbelow, the fastest code of this program for the processor. The second of "
-             "two pictures;\nbandwidth: bytes that must be moved per second, divided by the "
+             "two images;\nbandwidth: bytes that must be moved per second, divided by the "
              "machine's triad";
     case 3:
       return "Table 3. Linear solvers of the blocks (16 px, gamma 1; iterations to 1e-6, "
-             "residual\nrecomputed), then the whole picture at once; one thread each, except "
+             "residual\nrecomputed), then the whole image at once; one thread each, except "
              "ViennaCL, which\nselects an OpenCL device itself";
     default:
-      return "Table 4. Thick against thin lens, focused on the same plane: the picture formed "
+      return "Table 4. Thick against thin lens, focused on the same plane: the image formed "
              "again\n"
              "from the estimate (what the source measured), and what that does not see, the true\n"
              "views";
@@ -55,7 +55,7 @@ std::string BaseOf(int table) { return table == 3 ? UsualSolver() : "cpu"; }
 
 const SourceRow* BaseRow(const SourceRow& row, const std::vector<SourceRow>& rows) {
   const auto base = std::find_if(rows.begin(), rows.end(), [&](const SourceRow& other) {
-    return other.failure.empty() && other.table == row.table && other.picture == row.picture &&
+    return other.failure.empty() && other.table == row.table && other.image == row.image &&
            other.views == row.views && other.implementation == BaseOf(row.table);
   });
   return base == rows.end() ? nullptr : &*base;
@@ -77,7 +77,7 @@ std::optional<double> BandwidthShare(const SourceRow& row) {
 }
 
 std::string NameColumns(const SourceRow& row) {
-  return fmt::format("{:<9} {:>5}  {:<17}", row.picture, fmt::format("{0}x{0}", row.views),
+  return fmt::format("{:<9} {:>5}  {:<17}", row.image, fmt::format("{0}x{0}", row.views),
                      row.implementation);
 }
 
@@ -118,31 +118,31 @@ std::string FidelityLine(const SourceRow& row) {
 }
 
 std::string Columns(int table) {
-  const auto names = [](const char* picture, const char* views) {
-    return fmt::format("{:<9} {:>5}  {:<17}", picture, views, "");
+  const auto names = [](const char* image, const char* views) {
+    return fmt::format("{:<9} {:>5}  {:<17}", image, views, "");
   };
   if (table == 4) {
     constexpr char kForm[] = "{}{:>10}{:>10}{:>9}{:>8}{:>12}{:>8}{:>9}\n";
     return fmt::format(kForm, names("", ""), "seconds", "seconds", "", "", "", "", "") +
-           fmt::format(kForm, names("picture", "views"), "measured", "extrapol.", "MACADE'",
-                       "M-dE94", "published:", "", "PSNR dB");
+           fmt::format(kForm, names("image", "views"), "measured", "extrapol.", "MACADE'", "M-dE94",
+                       "published:", "", "PSNR dB");
   }
   const char* more = table == 2 ? "  bandwidth" : table == 3 ? "   residual" : "";
   constexpr char kForm[] = "{}{:>8}{:>10}{:>10}{:>22}{:>9}{:>9}{:>11}{:>9}{:>9}{}\n";
   return fmt::format(kForm, names("", ""), "", "seconds", "seconds", "", "x faster", "x faster", "",
                      "", "", "") +
-         fmt::format(kForm, names("picture", "views"), "threads", "measured", "extrapol.", "runs",
+         fmt::format(kForm, names("image", "views"), "threads", "measured", "extrapol.", "runs",
                      "as much", "unlike", "published:", "x faster", "PSNR dB", more);
 }
 
-// Groups rows of one picture with one number of views, whose scores have the same area.
+// Groups rows of one image with one number of views, whose scores have the same area.
 std::string SourceGroupOf(const SourceRow& row) {
-  return fmt::format("{} {}", row.picture, row.views);
+  return fmt::format("{} {}", row.image, row.views);
 }
 
 std::string GroupLine(const SourceRow& row) {
   if (!row.scored || !(row.psnr_true_views_db || row.delta_e94_mean)) return "";
-  return fmt::format("{0}, {1} x {1} views: scores are for {2}\n", PrintableUtf8(row.picture),
+  return fmt::format("{0}, {1} x {1} views: scores are for {2}\n", PrintableUtf8(row.image),
                      row.views, ScoredAreaText(*row.scored));
 }
 
@@ -153,7 +153,7 @@ std::string Footnotes(int table, const std::vector<SourceRow>& rows) {
     if (row.table != table || !row.extrapolated) continue;
     const std::string sample =
         fmt::format("{} of {} of {} with {}x{} views", row.extrapolated->solved,
-                    row.extrapolated->all, row.picture, row.views, row.views);
+                    row.extrapolated->all, row.image, row.views, row.views);
     if (std::find(samples.begin(), samples.end(), sample) == samples.end())
       samples.push_back(sample);
   }
@@ -186,14 +186,14 @@ json SourceRowJson(const SourceRow& row, const std::vector<SourceRow>& rows) {
   const auto or_null = [](const std::string& text) { return text.empty() ? json() : json(text); };
   if (!row.failure.empty()) {
     return {{"table", row.table},
-            {"picture", row.picture},
+            {"image", row.image},
             {"size", {row.width_px, row.height_px}},
             {"views", {row.views, row.views}},
             {"implementation", row.implementation},
             {"failure", row.failure}};
   }
   json out = {{"table", row.table},
-              {"picture", row.picture},
+              {"image", row.image},
               {"size", {row.width_px, row.height_px}},
               {"views", {row.views, row.views}},
               {"implementation", row.implementation},
@@ -204,7 +204,7 @@ json SourceRowJson(const SourceRow& row, const std::vector<SourceRow>& rows) {
               {"extrapolated_from", nullptr},
               {"scored_area", row.scored ? ScoredAreaJson(*row.scored) : json()},
               {"published_seconds", nullptr},
-              {"published_seconds_of_pictures", OrNull(row.published)},
+              {"published_seconds_of_images", OrNull(row.published)},
               {"psnr_true_views_db", OrNull(row.psnr_true_views_db)}};
   out.update(TimeOf(row).Json());
   if (row.extrapolated) {
@@ -227,11 +227,11 @@ json SourceRowJson(const SourceRow& row, const std::vector<SourceRow>& rows) {
   if (row.table == 4) {
     out["macade_standin"] = OrNull(row.macade_standin);
     out["delta_e94_mean"] = OrNull(row.delta_e94_mean);
-    out["published_macade_of_pictures"] = nullptr;
-    out["published_delta_e94_mean_of_pictures"] = nullptr;
+    out["published_macade_of_images"] = nullptr;
+    out["published_delta_e94_mean_of_images"] = nullptr;
     if (row.published_fidelity) {
-      out["published_macade_of_pictures"] = row.published_fidelity->macade;
-      out["published_delta_e94_mean_of_pictures"] = row.published_fidelity->delta_e94_mean;
+      out["published_macade_of_images"] = row.published_fidelity->macade;
+      out["published_delta_e94_mean_of_images"] = row.published_fidelity->delta_e94_mean;
     }
   }
   return out;

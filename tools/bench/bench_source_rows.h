@@ -14,7 +14,7 @@ namespace thicklens::tools {
 // One line of one of the paper's tables, measured here.
 struct SourceRow {
   int table = 0;
-  std::string picture;  // "K", "L", or the name of a file
+  std::string image;  // "K", "L", or the name of a file
   int width_px = 0, height_px = 0;
   int views = 0;  // across and down
   std::string implementation;

@@ -13,14 +13,14 @@
 namespace thicklens::tools {
 
 // An image with one number of views.
-struct SourcePicture : SampledPicture {
+struct SourceImage : SampledImage {
   std::string name;
   char size = ' ';  // the paper's size 'K' or 'L'
   int views = 0;
 };
 
 // Cuts as CutParts does, with fewer parts for many views, and names the size.
-void Cut(bool full, SourcePicture* picture);
+void Cut(bool full, SourceImage* image);
 
 // A row to be measured. `run` runs it once and returns the seconds that this took, or would take
 // for the whole image. The first run also fills in the other fields of the row.
@@ -36,15 +36,15 @@ struct SourceBench {
   std::shared_ptr<kernels::Backend> processor, device;  // device: null where there is none
 };
 
-// Appends the rows of one of the paper's tables. The rows keep references to `bench` and `picture`.
-void AddTable1(const SourceBench& bench, const SourcePicture& picture,
+// Appends the rows of one of the paper's tables. The rows keep references to `bench` and `image`.
+void AddTable1(const SourceBench& bench, const SourceImage& image,
                std::vector<SourceContender>* contenders);
-void AddTable2(const SourceBench& bench, const SourcePicture& picture,
+void AddTable2(const SourceBench& bench, const SourceImage& image,
                std::vector<SourceContender>* contenders);
-void AddTable3(const SourceBench& bench, const SourcePicture& picture,
+void AddTable3(const SourceBench& bench, const SourceImage& image,
                std::vector<SourceContender>* contenders);
 // Compares the image's lens with its thin counterpart.
-void AddTable4(const SourceBench& bench, const SourcePicture& picture,
+void AddTable4(const SourceBench& bench, const SourceImage& image,
                std::vector<SourceContender>* contenders);
 
 }  // namespace thicklens::tools

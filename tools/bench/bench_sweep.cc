@@ -83,7 +83,7 @@ model::SweepSimulationOptions BenchSweepOptions() {
 }
 
 BenchSweep MakeBenchSweep(const model::SweepSimulationOptions& description,
-                          const model::LinearPicture& target_picture, int field_px,
+                          const model::LinearImage& target_image, int field_px,
                           std::uint64_t seed) {
   Draws draws(seed);
   model::SweepSimulationOptions options = description;
@@ -91,7 +91,7 @@ BenchSweep MakeBenchSweep(const model::SweepSimulationOptions& description,
   options.camera =
       model::CropCamera(description.camera, MiddleOf(description.camera.sensor, field_px));
   options.first_depth_mm += (draws.Uniform() - 0.5) * options.step_mm;
-  const model::SweepSimulator simulator(options, target_picture);
+  const model::SweepSimulator simulator(options, target_image);
 
   BenchSweep bench;
   bench.frames_phase = draws.Uniform();

@@ -28,8 +28,7 @@ model::SweepSimulationOptions BenchSweepOptions();
 //   floor that has an error but is stated without one makes the errors of the results look too
 //   large.
 BenchSweep MakeBenchSweep(const model::SweepSimulationOptions& description,
-                          const model::LinearPicture& target_picture, int field_px,
-                          std::uint64_t seed);
+                          const model::LinearImage& target_image, int field_px, std::uint64_t seed);
 
 // Returns `frames` of the same photographs, evenly spread, and field_px x field_px px of their
 // middle.

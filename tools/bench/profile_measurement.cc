@@ -41,7 +41,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Warnings about simulated pictures are not of interest.
+// Warnings about simulated images are not of interest.
 class OnlyErrors {
  public:
   OnlyErrors() : level_(spdlog::get_level()) { spdlog::set_level(spdlog::level::err); }
@@ -54,7 +54,7 @@ class OnlyErrors {
 };
 
 // The files in the folder of a case; each run has a folder of its own.
-constexpr char kPicture[] = "picture.png", kDepth[] = "depth.pfm", kCamera[] = "camera.yaml";
+constexpr char kImage[] = "picture.png", kDepth[] = "depth.pfm", kCamera[] = "camera.yaml";
 constexpr char kLightField[] = "light-field", kSummary[] = "summary.json";
 
 struct Prepared {
@@ -70,13 +70,12 @@ struct CaseRuns {
   std::vector<double> file_seconds;                         // of each round
 };
 
-model::StoredPicture FirstChannel(const model::StoredPicture& picture) {
-  model::StoredPicture grey = picture;
+model::EncodedImage FirstChannel(const model::EncodedImage& image) {
+  model::EncodedImage grey = image;
   grey.channels = 1;
   grey.values.clear();
-  for (std::size_t i = 0; i < picture.values.size();
-       i += static_cast<std::size_t>(picture.channels)) {
-    grey.values.push_back(picture.values[i]);
+  for (std::size_t i = 0; i < image.values.size(); i += static_cast<std::size_t>(image.channels)) {
+    grey.values.push_back(image.values[i]);
   }
   return grey;
 }
@@ -93,16 +92,16 @@ Prepared Prepare(const ProfileCase& what, const ProfileRun& run, const fs::path&
   const model::SceneRun stoppable = {run.threads, [](int, int) { ThrowIfCancelled(); }};
   const model::SceneSimulator simulator(scene, std::vector<model::LayerPixels>(scene.layers.size()),
                                         run.threads);
-  const model::StoredPicture stored = simulator.Store(simulator.RenderNoiseless(stoppable));
+  const model::EncodedImage stored = simulator.Store(simulator.RenderNoiseless(stoppable));
   fs::create_directories(folder);
   Prepared prepared;
   prepared.folder = folder;
   EstimateOptions& options = prepared.options;
-  options.picture_path = (folder / kPicture).string();
+  options.image_path = (folder / kImage).string();
   options.depth_path = (folder / kDepth).string();
   options.camera_path = (folder / kCamera).string();
   options.output_folder = (folder / kLightField).string();
-  WriteFileAtomically(options.picture_path,
+  WriteFileAtomically(options.image_path,
                       io::EncodePng(what.colour ? stored : FirstChannel(stored)));
   WriteFileAtomically(options.depth_path, io::EncodePfm(simulator.RenderDepth()));
   WriteFileAtomically(options.camera_path, model::CameraToYaml(simulator.camera()));
@@ -131,7 +130,7 @@ nlohmann::json RunOnce(const std::string& program, const Prepared& prepared,
                        const estimator::EstimatePlan& plan) {
   const EstimateOptions& options = prepared.options;
   std::vector<std::string> words = {"estimate",
-                                    kPicture,
+                                    kImage,
                                     kDepth,
                                     "--camera",
                                     kCamera,
@@ -244,7 +243,7 @@ const std::vector<ProfileCase>& UsualProfileCases() {
 
 std::vector<estimator::EstimatePlan> PlansOfProfile() {
   std::vector<estimator::EstimatePlan> plans;
-  for (estimator::EstimatePlan plan : WholePicturePlans()) {
+  for (estimator::EstimatePlan plan : WholeImagePlans()) {
     if (plan.solver == "grid") continue;
     plans.push_back(plan);
     if (plan.prior == "ridge" || plan.prior == "gradient") continue;
@@ -329,7 +328,7 @@ MeasuredProfile MeasureProfile(const std::vector<estimator::EstimatePlan>& plans
 
 std::string ProfileTable(const MeasuredProfile& measured) {
   const estimator::EstimateProfile& profile = measured.profile;
-  // For people to compare: a picture of a common size, that takes to encode what these do.
+  // For people to compare: an image of a common size, that takes to encode what these do.
   const auto millions = [](const estimator::Workload& load) {
     return load.megapixels * load.channels * load.views;
   };
@@ -349,13 +348,13 @@ std::string ProfileTable(const MeasuredProfile& measured) {
   }
   text += fmt::format(
       "{:<32}{:>10.2f}{:>10.2f}\n\n"
-      "PSNR: against the true views, mean over {} of the {} pictures. K: 640 x 480 px in colour, 7 "
+      "PSNR: against the true views, mean over {} of the {} images. K: 640 x 480 px in colour, 7 "
       "x 7\nviews, blur of 2 px, after it is read. model error: error of the predicted time, with "
-      "reading, for\na picture of a size that the model was not fitted to.\n\n",
+      "reading, for\na image of a size that the model was not fitted to.\n\n",
       "warping (DIBR)", profile.warping_psnr_db, profile.best_psnr_db() - profile.warping_psnr_db,
       measured.judged, measured.loads.front().size());
   if (measured.checks.front().empty()) return text;
-  text += "Larger pictures than any of these, as the model predicted them:\n";
+  text += "Larger images than any of these, as the model predicted them:\n";
   std::vector<double> ratios;
   for (std::size_t i = 0; i < profile.plans.size(); ++i) {
     for (const estimator::TimedWorkload& check : measured.checks[i]) {

@@ -36,7 +36,7 @@ std::string SampledTable(const SolversRun& run, const std::vector<SolversRow>& r
   return text + fmt::format(
                     "\nThe part: {}, in the middle of the {} x {} px that blocks solved; every "
                     "solver is judged on it.\nextrapolated: multiplied by {:.4g}, the pixels of "
-                    "the whole picture over those solved; its ratio\ncompares a measured with an "
+                    "the whole image over those solved; its ratio\ncompares a measured with an "
                     "extrapolated time. --full solves and judges everything.\n",
                     ScoredAreaText(run.part), run.solved_px, run.solved_px, run.pixels_ratio);
 }

@@ -77,62 +77,62 @@ std::vector<Contender> Contenders(int threads, kernels::Backend* backend) {
                             estimator::BlockSolver::kEigen}) {
     if (estimator::IsBuiltIn(solver)) add(SolverByBlocks(solver, threads, backend), true);
   }
-  for (LightFieldSolver& solver : WholePictureSolvers(threads)) add(std::move(solver), false);
+  for (LightFieldSolver& solver : WholeImageSolvers(threads)) add(std::move(solver), false);
   return contenders;
 }
 
-// Returns the picture, and the part in its middle that the blocks solve and on which all solvers
+// Returns the image, and the part in its middle that the blocks solve and on which all solvers
 // are judged.
-SampledPicture WithPartInTheMiddle(BenchScene whole, bool full) {
-  SampledPicture picture;
-  picture.whole = std::move(whole);
-  const model::LinearPicture& pixels = picture.whole.input.picture;
+SampledImage WithPartInTheMiddle(BenchScene whole, bool full) {
+  SampledImage image;
+  image.whole = std::move(whole);
+  const model::LinearImage& pixels = image.whole.input.image;
   if (full || (pixels.width_px == kSamplePx && pixels.height_px == kSamplePx)) {
-    picture.rects = {{0, 0, pixels.width_px, pixels.height_px}};
-    picture.parts = {picture.whole};
-    return picture;
+    image.rects = {{0, 0, pixels.width_px, pixels.height_px}};
+    image.parts = {image.whole};
+    return image;
   }
-  picture.rects = {{(pixels.width_px - kSamplePx) / 2, (pixels.height_px - kSamplePx) / 2,
-                    kSamplePx, kSamplePx}};
-  picture.parts = {PartOf(picture.whole, picture.rects.front())};
-  picture.sample = BlockSample{};
-  picture.pixels_per_part_pixel =
+  image.rects = {{(pixels.width_px - kSamplePx) / 2, (pixels.height_px - kSamplePx) / 2, kSamplePx,
+                  kSamplePx}};
+  image.parts = {PartOf(image.whole, image.rects.front())};
+  image.sample = BlockSample{};
+  image.pixels_per_part_pixel =
       static_cast<double>(pixels.width_px) * pixels.height_px / (kSamplePx * kSamplePx);
-  return picture;
+  return image;
 }
 
 double PsnrOfWholeDb(const BenchScene& scene, const model::LightField& estimate, int threads) {
-  return estimator::CompareLightFields(scene.truth, estimate, BorderPx(scene.input.picture),
+  return estimator::CompareLightFields(scene.truth, estimate, BorderPx(scene.input.image),
                                        std::nullopt, threads)
       .mean.psnr_db;
 }
 
-void JudgeSolver(const SampledPicture& picture, const model::LightField& estimate, bool is_whole,
+void JudgeSolver(const SampledImage& image, const model::LightField& estimate, bool is_whole,
                  int threads, SolversRow* row) {
   const std::vector<model::LightField> parts =
-      is_whole ? PartsOf(picture, estimate) : std::vector<model::LightField>{estimate};
-  row->psnr_part_db = ScoresOfViews(picture, parts, threads).psnr_mean_db;
-  if (is_whole) row->psnr_whole_db = PsnrOfWholeDb(picture.whole, estimate, threads);
+      is_whole ? PartsOf(image, estimate) : std::vector<model::LightField>{estimate};
+  row->psnr_part_db = ScoresOfViews(image, parts, threads).psnr_mean_db;
+  if (is_whole) row->psnr_whole_db = PsnrOfWholeDb(image.whole, estimate, threads);
 }
 
 // The first run of each solver, on the part, is not counted.
-void Measure(const BenchOptions& options, const SampledPicture& picture, int threads,
+void Measure(const BenchOptions& options, const SampledImage& image, int threads,
              std::vector<Contender>* contenders) {
   ProgressLine progress("measuring", options.common.quiet);
   MeasureInRounds(options.repeat, contenders->size(), &progress, [&](int round, std::size_t i) {
     Contender& contender = (*contenders)[i];
-    const bool is_sampled = contender.by_blocks && picture.sample.has_value();
-    const BenchScene& scene = is_sampled ? picture.parts.front() : picture.whole;
+    const bool is_sampled = contender.by_blocks && image.sample.has_value();
+    const BenchScene& scene = is_sampled ? image.parts.front() : image.whole;
     if (round == 0) {
-      WarmUpWhole(picture,
+      WarmUpWhole(image,
                   [&](const estimator::EstimateInput& input) { contender.way.estimate(input); });
     }
     const Clock::time_point start = Clock::now();
     const model::LightField estimate = contender.way.estimate(scene.input);
     contender.row.time.seconds.push_back(SecondsSince(start) *
-                                         (is_sampled ? picture.pixels_per_part_pixel : 1));
+                                         (is_sampled ? image.pixels_per_part_pixel : 1));
     contender.row.time.is_extrapolated = is_sampled;
-    if (round == 0) JudgeSolver(picture, estimate, !is_sampled, threads, &contender.row);
+    if (round == 0) JudgeSolver(image, estimate, !is_sampled, threads, &contender.row);
   });
 }
 
@@ -143,10 +143,10 @@ CommandResult BenchSolvers(const BenchOptions& options) {
   if (run.u_count == 0) run.u_count = run.v_count = 7;
   run.threads = ResolveThreads(options.common.threads);
   run.repeat = options.repeat;
-  SampledPicture picture;
+  SampledImage image;
   {
     ProgressLine progress("simulating", options.common.quiet);
-    picture = WithPartInTheMiddle(
+    image = WithPartInTheMiddle(
         MakeBenchScene(run.width_px, run.height_px, run.u_count, run.v_count, options.seed, 0,
                        [&](int done, int total) {
                          ThrowIfCancelled();
@@ -154,21 +154,21 @@ CommandResult BenchSolvers(const BenchOptions& options) {
                        }),
         options.full);
   }
-  run.part = ScoredAreaOf(picture);
-  run.is_sampled = picture.sample.has_value();
-  run.pixels_ratio = picture.pixels_per_part_pixel;
+  run.part = ScoredAreaOf(image);
+  run.is_sampled = image.sample.has_value();
+  run.pixels_ratio = image.pixels_per_part_pixel;
   run.solved_px = kSamplePx;
   const auto backend =
       kernels::OpenBackend(kernels::ParseDeviceRequest("cpu"), nullptr, ThrowIfCancelled);
   std::vector<Contender> contenders = Contenders(run.threads, backend.get());
-  Measure(options, picture, run.threads, &contenders);
+  Measure(options, image, run.threads, &contenders);
 
   std::vector<SolversRow> rows;
   for (Contender& contender : contenders) rows.push_back(std::move(contender.row));
   PrintResult(options.common, SolversTableText(run, rows));
   nlohmann::json json_rows = nlohmann::json::array();
   for (const SolversRow& row : rows) json_rows.push_back(SolversRowJson(run, row, rows.front()));
-  const model::PixelRect& rect = picture.rects.front();
+  const model::PixelRect& rect = image.rects.front();
   return {
       BenchSummary(
           {{"scene", {{"kind", "slanted plane of noise"}, {"channels", 1}, {"seed", options.seed}}},
@@ -194,14 +194,14 @@ void AddBenchCommand(CLI::App* program, CommandAction* action) {
   AddBenchInpaintingCommand(bench, action);
   AddBenchCalibrationCommand(bench, action);
   CLI::App* command = bench->add_subcommand(
-      "solvers", "All light-field solvers on one simulated picture, in one run");
+      "solvers", "All light-field solvers on one simulated image, in one run");
   const auto options = std::make_shared<BenchOptions>();
-  command->add_option("--size", options->size, "Size of the picture, px")
+  command->add_option("--size", options->size, "Size of the image, px")
       ->capture_default_str()
       ->type_name("WIDTHxHEIGHT");
   AddViewsOption(command, &options->views, "Number of views across and down; default 7x7");
   AddRepeatOption(command, &options->repeat);
-  command->add_flag("--full", options->full, "Solve all blocks of the picture, not a sample");
+  command->add_flag("--full", options->full, "Solve all blocks of the image, not a sample");
   AddSeedOption(command, &options->seed);
   AddCommonOptions(command, &options->common);
   command->callback([options, action] {

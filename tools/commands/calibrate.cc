@@ -26,8 +26,8 @@
 #include "tools/report/calibration_json.h"
 #include "tools/report/calibration_report.h"
 #include "tools/report/calibration_summary.h"
+#include "tools/report/input_summary.h"
 #include "tools/report/report_folder.h"
-#include "tools/report/sweep_understanding.h"
 #include "tools/system/build_info.h"
 #include "tools/system/progress_line.h"
 
@@ -191,7 +191,7 @@ CommandResult RunDry(const CalibrateOptions& options, const SweepInput& input) {
 CommandResult Calibrate(const CalibrateOptions& options) {
   const SweepInput input = ReadSweepInput(options.sweep);
   for (const std::string& notice : input.notices) spdlog::warn("{}", PrintableUtf8(notice));
-  TellAssumedFields(input.sweep.camera);
+  ReportAssumedFields(input.sweep.camera);
   return options.dry_run ? RunDry(options, input) : RunCalibration(options, input);
 }
 

@@ -127,8 +127,8 @@ CommandResult InitCamera(const CameraInitOptions& options) {
   std::optional<io::PhotoExif> photo;
   std::optional<Eigen::Vector2i> photo_size_px;
   if (!options.photo_path.empty()) {
-    const cv::Mat picture = io::ReadPictureFile(options.photo_path);
-    photo_size_px = Eigen::Vector2i(picture.cols, picture.rows);
+    const cv::Mat image = io::ReadImageFile(options.photo_path);
+    photo_size_px = Eigen::Vector2i(image.cols, image.rows);
     const Eigen::Vector2i size_px = options.camera.size_px.value_or(*photo_size_px);
     photo = io::ReadPhotoExif(options.photo_path, size_px.x(), size_px.y());
   }
@@ -136,7 +136,7 @@ CommandResult InitCamera(const CameraInitOptions& options) {
   const std::string yaml = model::CameraToYaml(camera);
   if (output) output->Commit(yaml);
   if (!output) PrintResult(options.common, yaml);
-  TellAssumedFields(camera);
+  ReportAssumedFields(camera);
   CommandResult result;
   result.is_written = output.has_value();
   result.summary = {{"status", "ok"},
@@ -186,7 +186,7 @@ void AddSensorOptions(CLI::App* command, CameraInitOptions* options) {
       ->check(Between(0, kMaxPitchUm, "micrometres"))
       ->type_name("UM");
   command
-      ->add_option("--size", options->size, "Size of the pictures; default: that of the photograph")
+      ->add_option("--size", options->size, "Size of the images; default: that of the photograph")
       ->type_name("WIDTHxHEIGHT");
   command
       ->add_option("--principal-point", options->principal_point,
@@ -195,7 +195,7 @@ void AddSensorOptions(CLI::App* command, CameraInitOptions* options) {
       ->type_name("X,Y");
   command
       ->add_option("--transfer", camera.transfer,
-                   "How light becomes stored values: linear, srgb or gamma-2.2")
+                   "How light becomes encoded values: linear, srgb or gamma-2.2")
       ->check(TransferName())
       ->capture_default_str()
       ->type_name("NAME");
@@ -228,7 +228,7 @@ model::Camera DescribedCamera(const CameraDescription& description,
   const Known pitch = Require(GivenOr(pitch_mm, exif.pixel_pitch_mm),
                               "the pixel pitch: --pitch-um UM" + why_no_pitch, &missing);
   const auto size_px = description.size_px ? description.size_px : photo_size_px;
-  if (!size_px) missing.emplace_back("the picture size: --size WIDTHxHEIGHT");
+  if (!size_px) missing.emplace_back("the image size: --size WIDTHxHEIGHT");
   if (!missing.empty()) throw Error(fmt::format("missing: {}", fmt::join(missing, "; ")));
 
   model::Camera camera;

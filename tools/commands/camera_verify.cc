@@ -89,7 +89,7 @@ CommandResult VerifyCamera(const CameraVerifyOptions& options) {
   const model::Camera stored = ReadStoredCamera(options.camera_path);
   SweepInput input = ReadSweepInput(options.sweep);
   for (const std::string& notice : input.notices) spdlog::warn("{}", PrintableUtf8(notice));
-  TellAssumedFields(stored);
+  ReportAssumedFields(stored);
   input.sweep.camera.calibration.reset();
   const calib::Calibration found = CalibrateNewSweep(options, input);
   ThrowIfCancelled();
@@ -97,7 +97,7 @@ CommandResult VerifyCamera(const CameraVerifyOptions& options) {
       calib::VerifyCalibration(stored, input.sweep, found, options.verification);
   const std::string& of_stored = stored.calibration->evidence.data_sha256;
   if (!of_stored.empty() && of_stored == input.frame_files->DataSha256()) {
-    verification.verdict = calib::Verdict::kCannotTell;
+    verification.verdict = calib::Verdict::kUndetermined;
     verification.reason =
         "this is the sweep that the stored calibration was made from: take a new one";
   }

@@ -1,4 +1,4 @@
-// thicklens compare: compares a picture or a light field with the true one.
+// thicklens compare: compares an image or a light field with the true one.
 #include "thicklens/estimator/compare.h"
 
 #include <fmt/format.h>
@@ -26,8 +26,8 @@
 #include "tools/commands/commands.h"
 #include "tools/options/command_frame.h"
 #include "tools/options/light_field_options.h"
-#include "tools/options/naming_the_file.h"
 #include "tools/options/option_values.h"
+#include "tools/options/with_file_context.h"
 #include "tools/report/compare_table.h"
 
 namespace thicklens::tools {
@@ -56,44 +56,44 @@ bool IsFolder(const std::string& path) {
   return fs::is_directory(status);
 }
 
-// Returns false for a picture that has the rectangle's size already: it was cropped before.
+// Returns false for an image that has the rectangle's size already: it was cropped before.
 bool IsToCrop(const Rect& crop, int width_px, int height_px) {
   return crop && (crop->width != width_px || crop->height != height_px);
 }
 
-model::StoredPicture ReadPicture(const std::string& path) {
-  return io::ToStoredPicture(io::ReadPictureFile(path));
+model::EncodedImage ReadImage(const std::string& path) {
+  return io::ToEncodedImage(io::ReadImageFile(path));
 }
 
-model::StoredPicture Cropped(const model::StoredPicture& picture, const Rect& crop,
-                             const std::string& path) {
-  if (!IsToCrop(crop, picture.width_px, picture.height_px)) return picture;
-  return NamingTheFile(path, [&] { return model::CropPicture(picture, *crop); });
+model::EncodedImage Cropped(const model::EncodedImage& image, const Rect& crop,
+                            const std::string& path) {
+  if (!IsToCrop(crop, image.width_px, image.height_px)) return image;
+  return WithFileContext(path, [&] { return model::CropImage(image, *crop); });
 }
 
-// ---- Two pictures.
+// ---- Two images.
 
-CommandResult ComparePictureFiles(const CompareOptions& options) {
+CommandResult CompareImageFiles(const CompareOptions& options) {
   const io::LightFieldReading reading = ReadingOf(options.reading);
   if (reading.grid > 0 || reading.sparse || reading.u_count > 0 || !options.dibr_paths.empty()) {
-    throw UsageError(fmt::format(
-        "--grid, --sparse, --views and --dibr are for light fields, but {} is a picture",
-        PrintableUtf8(options.reference_path)));
+    throw UsageError(
+        fmt::format("--grid, --sparse, --views and --dibr are for light fields, but {} is an image",
+                    PrintableUtf8(options.reference_path)));
   }
-  model::StoredPicture reference = ReadPicture(options.reference_path);
+  model::EncodedImage reference = ReadImage(options.reference_path);
   if (reading.crop) {
-    reference = NamingTheFile(options.reference_path,
-                              [&] { return model::CropPicture(reference, *reading.crop); });
+    reference = WithFileContext(options.reference_path,
+                                [&] { return model::CropImage(reference, *reading.crop); });
   }
-  const model::StoredPicture other =
-      Cropped(ReadPicture(options.other_path), reading.crop, options.other_path);
-  const estimator::PictureScores scores = NamingTheFile(options.other_path, [&] {
-    return estimator::ComparePictures(model::StoredValuesOf(reference),
-                                      model::StoredValuesOf(other), options.border_px);
+  const model::EncodedImage other =
+      Cropped(ReadImage(options.other_path), reading.crop, options.other_path);
+  const estimator::ImageScores scores = WithFileContext(options.other_path, [&] {
+    return estimator::CompareImages(model::EncodedValuesOf(reference),
+                                    model::EncodedValuesOf(other), options.border_px);
   });
-  PrintResult(options.common, PictureScoresText(scores, options.border_px));
+  PrintResult(options.common, ImageScoresText(scores, options.border_px));
   CommandResult result;
-  result.summary = PictureScoresJson(scores);
+  result.summary = ImageScoresJson(scores);
   result.summary["status"] = "ok";
   result.summary["reason"] = "";
   result.summary["size"] = {reference.width_px, reference.height_px};
@@ -113,7 +113,7 @@ void TakeCommonViews(const CompareOptions& options, model::LightField* reference
     const int all_u = light_field->u_count;
     const int all_v = light_field->v_count;
     *light_field =
-        NamingTheFile(path, [&] { return model::InnerViews(*light_field, u_count, v_count); });
+        WithFileContext(path, [&] { return model::InnerViews(*light_field, u_count, v_count); });
     spdlog::warn("{}: the inner {}x{} of its {}x{} views are compared", PrintableUtf8(path),
                  u_count, v_count, all_u, all_v);
   };
@@ -121,20 +121,20 @@ void TakeCommonViews(const CompareOptions& options, model::LightField* reference
   take(other, options.other_path);
 }
 
-model::LinearPicture Photograph(const CompareOptions& options, const Rect& crop,
-                                const model::LightField& reference) {
+model::LinearImage Photograph(const CompareOptions& options, const Rect& crop,
+                              const model::LightField& reference) {
   const std::string& path = options.dibr_paths.front();
-  model::StoredPicture stored = Cropped(ReadPicture(path), crop, path);
+  model::EncodedImage stored = Cropped(ReadImage(path), crop, path);
   const int channels = stored.channels;
   if (channels == 1 && reference.channels == 3) {
     throw Error(fmt::format(
         "{}: a photograph in colour is expected because the views are in colour; it is grey",
         PrintableUtf8(path)));
   }
-  model::LinearPicture light = model::ToLinear(stored, reference.transfer);
+  model::LinearImage light = model::ToLinear(stored, reference.transfer);
   if (reference.channels == 1) return model::ToGrey(light);
   if (channels != 4) return light;
-  model::LinearPicture opaque{light.width_px, light.height_px, 3, {}};  // without alpha
+  model::LinearImage opaque{light.width_px, light.height_px, 3, {}};  // without alpha
   opaque.values.reserve(light.values.size() / 4 * 3);
   for (std::size_t i = 0; i < light.values.size(); ++i) {
     if (i % 4 != 3) opaque.values.push_back(light.values[i]);
@@ -165,7 +165,7 @@ std::optional<estimator::DibrInput> ReadDibr(const CompareOptions& options, cons
   }
   model::RawDepthMap map = io::ReadDepthMap(map_path);
   if (IsToCrop(crop, map.width_px, map.height_px))
-    map = NamingTheFile(map_path, [&] { return model::CropDepth(map, *crop); });
+    map = WithFileContext(map_path, [&] { return model::CropDepth(map, *crop); });
   PreparedDepth prepared = PrepareDepth(map, map_path, depth, dibr.photograph,
                                         reference.camera ? &*reference.camera : nullptr,
                                         reference.grid ? &*reference.grid : nullptr);
@@ -182,14 +182,14 @@ CommandResult CompareFolders(const CompareOptions& options) {
   const Rect crop = std::exchange(reading.crop, std::nullopt);
   model::LightField other = io::ReadLightField(options.other_path, reading);
   if (IsToCrop(crop, other.s_count, other.t_count))
-    other = NamingTheFile(options.other_path, [&] { return model::CropViews(other, *crop); });
+    other = WithFileContext(options.other_path, [&] { return model::CropViews(other, *crop); });
   if (const auto warning =
           io::DifferentApertures(options.reference_path, reference, options.other_path, other)) {
     spdlog::warn("{}", *warning);
   }
   TakeCommonViews(options, &reference, &other);
   const std::optional<estimator::DibrInput> dibr = ReadDibr(options, crop, reference);
-  const estimator::LightFieldScores scores = NamingTheFile(options.other_path, [&] {
+  const estimator::LightFieldScores scores = WithFileContext(options.other_path, [&] {
     return estimator::CompareLightFields(reference, other, options.border_px, dibr,
                                          options.common.threads);
   });
@@ -204,11 +204,11 @@ CommandResult Compare(const CompareOptions& options) {
     const std::string& folder = is_folder ? options.reference_path : options.other_path;
     const std::string& file = is_folder ? options.other_path : options.reference_path;
     throw Error(
-        fmt::format("two pictures or two folders with light fields are expected, found the "
+        fmt::format("two images or two folders with light fields are expected, found the "
                     "folder {} and the file {}",
                     PrintableUtf8(folder), PrintableUtf8(file)));
   }
-  return is_folder ? CompareFolders(options) : ComparePictureFiles(options);
+  return is_folder ? CompareFolders(options) : CompareImageFiles(options);
 }
 
 // ---- The command line.
@@ -237,15 +237,15 @@ void AddDibrOptions(CLI::App* command, CompareOptions* options) {
 
 void AddCompareCommand(CLI::App* program, CommandAction* action) {
   CLI::App* command = program->add_subcommand(
-      "compare", "PSNR, SSIM, mean CIE94 difference and edge orientation against a true picture");
+      "compare", "PSNR, SSIM, mean CIE94 difference and edge orientation against a true image");
   const auto options = std::make_shared<CompareOptions>();
-  command->add_option("reference", options->reference_path, "The true picture or light field")
+  command->add_option("reference", options->reference_path, "The true image or light field")
       ->required()
       ->type_name("REFERENCE");
   command
       ->add_option("other", options->other_path,
-                   "Picture or light field to compare with it. Of light fields with different "
-                   "counts the inner views of the larger one are used. With --crop, a picture that "
+                   "Image or light field to compare with it. Of light fields with different "
+                   "counts the inner views of the larger one are used. With --crop, an image that "
                    "has the rectangle's size already is not cropped")
       ->required()
       ->type_name("OTHER");

@@ -21,7 +21,7 @@
 #include "tools/io/opencv_codecs.h"
 #include "tools/options/command_frame.h"
 #include "tools/options/light_field_options.h"
-#include "tools/stress/hard_cases.h"
+#include "tools/stress/stress_suite.h"
 #include "tools/system/build_info.h"
 
 namespace thicklens::tools {
@@ -33,7 +33,7 @@ struct DoctorOptions {
   CommonOptions common;
   std::string device = "auto";
   bool hard_cases = false;
-  HardCasesOptions hard;
+  StressSuiteOptions hard;
 };
 
 // The results of the examination.
@@ -42,11 +42,11 @@ struct Findings {
   int threads = 0;
   std::string blas;
   std::vector<std::string> block_solvers;
-  std::string picture_files;
+  std::string image_files;
   std::optional<kernels::DeviceSurvey> survey;   // none if OpenCL must not be used
   std::string used, used_description, used_why;  // empty: nothing can be used
   std::string notice;                            // reports the fallback from OpenCL
-  std::optional<kernels::AgreementCheck> agreement;
+  std::optional<kernels::BackendSelfTest> self_test;
   std::string refusal;
 };
 
@@ -67,7 +67,7 @@ std::string WhyUsed(const DoctorOptions& options, const kernels::Backend& backen
                                   : "requested by --device " + options.device + ": " + tried;
 }
 
-std::string Disagreement(const std::string& device, const kernels::AgreementCheck& check) {
+std::string Disagreement(const std::string& device, const kernels::BackendSelfTest& check) {
   return fmt::format(
       "device {} and the C++ code differ by {:.2g} in float (limit {:g}) and {:.2g} in double "
       "(limit {:g}), relative; the largest difference is in {}: update its driver, or use another "
@@ -90,9 +90,9 @@ void ExamineDevice(const DoctorOptions& options, Findings* findings) {
     findings->used = backend->name();
     findings->used_description = backend->description();
     findings->used_why = WhyUsed(options, *backend, notice);
-    findings->agreement = kernels::CheckAgreement(backend.get());
-    if (!findings->agreement->agrees) {
-      findings->refusal = Disagreement(backend->name(), *findings->agreement);
+    findings->self_test = kernels::RunBackendSelfTest(backend.get());
+    if (!findings->self_test->agrees) {
+      findings->refusal = Disagreement(backend->name(), *findings->self_test);
     }
   } catch (const Interrupted&) {
     throw;
@@ -101,12 +101,12 @@ void ExamineDevice(const DoctorOptions& options, Findings* findings) {
   }
 }
 
-void ExaminePictureFiles(Findings* findings) {
+void ExamineImageFiles(Findings* findings) {
   try {
     io::LoadedOpenCvCodecs();
-    findings->picture_files = "PNG; JPEG, TIFF, EXR, BMP and PNM by OpenCV";
+    findings->image_files = "PNG; JPEG, TIFF, EXR, BMP and PNM by OpenCV";
   } catch (const Error& error) {
-    findings->picture_files = "PNG only";
+    findings->image_files = "PNG only";
     if (findings->refusal.empty()) findings->refusal = error.what();
   }
 }
@@ -146,13 +146,13 @@ std::string SurveyText(const Findings& findings) {
   return text;
 }
 
-std::string AgreementText(const kernels::AgreementCheck& check) {
+std::string SelfTestText(const kernels::BackendSelfTest& check) {
   const std::string in_double =
       std::isnan(check.double_error)
           ? "no double"
           : fmt::format("double {:.2g} (limit {:g})", check.double_error, check.double_limit);
   return fmt::format(
-      "agreement      {}: largest relative differences from the C++ code: float {:.2g} (limit "
+      "self-test      {}: largest relative differences from the C++ code: float {:.2g} (limit "
       "{:g}), {}{}\n",
       check.agrees ? "yes" : "NO", check.float_error, check.float_limit, in_double,
       check.worst.empty() ? "" : "; the largest in " + check.worst);
@@ -165,13 +165,13 @@ std::string FindingsText(const Findings& findings) {
   text += fmt::format("blas           {}\n", PrintableUtf8(findings.blas));
   text += fmt::format("block solvers  {} (default {})\n", Joined(findings.block_solvers),
                       estimator::BlockSolverName(estimator::DefaultBlockSolver()));
-  text += fmt::format("pictures       {}\n", findings.picture_files);
+  text += fmt::format("images       {}\n", findings.image_files);
   text += SurveyText(findings);
   if (!findings.used.empty()) {
     text += fmt::format("used           {}: {}\n               {}\n", findings.used,
                         PrintableUtf8(findings.used_description), PrintableUtf8(findings.used_why));
   }
-  if (findings.agreement) text += AgreementText(*findings.agreement);
+  if (findings.self_test) text += SelfTestText(*findings.self_test);
   return text;
 }
 
@@ -217,19 +217,19 @@ nlohmann::json FindingsJson(const Findings& findings) {
       {"blas", PrintableUtf8(findings.blas)},
       {"block_solvers", findings.block_solvers},
       {"default_block_solver", estimator::BlockSolverName(estimator::DefaultBlockSolver())},
-      {"picture_files", findings.picture_files},
+      {"image_files", findings.image_files},
       {"opencl", SurveyJson(findings)},
       {"notice", PrintableUtf8(findings.notice)},
       {"used", nullptr},
-      {"agreement", nullptr}};
+      {"self_test", nullptr}};
   if (!findings.used.empty()) {
     json["used"] = {{"name", findings.used},
                     {"description", PrintableUtf8(findings.used_description)},
                     {"why", PrintableUtf8(findings.used_why)}};
   }
-  if (findings.agreement) {
-    const kernels::AgreementCheck& check = *findings.agreement;
-    json["agreement"] = {{"agrees", check.agrees},
+  if (findings.self_test) {
+    const kernels::BackendSelfTest& check = *findings.self_test;
+    json["self_test"] = {{"agrees", check.agrees},
                          {"float_relative_error", NumberJson(check.float_error)},
                          {"float_relative_limit", check.float_limit},
                          {"double_relative_error", NumberJson(check.double_error)},
@@ -246,7 +246,7 @@ CommandResult Doctor(const DoctorOptions& options) {
   findings.blas = estimator::BlasDescription();
   findings.block_solvers = BuiltInSolvers();
   ExamineDevice(options, &findings);
-  ExaminePictureFiles(&findings);
+  ExamineImageFiles(&findings);
   PrintResult(options.common, FindingsText(findings));
   return {FindingsJson(findings), findings.refusal};
 }
@@ -278,7 +278,7 @@ void AddDoctorCommand(CLI::App* program, CommandAction* action) {
   command->callback([options, action] {
     *action = [options] {
       RunCommand(options->common, [&] {
-        return options->hard_cases ? RunHardCases(options->hard, options->common)
+        return options->hard_cases ? RunStressCases(options->hard, options->common)
                                    : Doctor(*options);
       });
     };

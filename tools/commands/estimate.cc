@@ -1,4 +1,4 @@
-// thicklens estimate: estimates a light field from one picture and its depth map.
+// thicklens estimate: estimates a light field from one image and its depth map.
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
@@ -86,9 +86,9 @@ struct Outputs {
   const LastWords last_words_{[this] { return WhatIsKept(); }};
 };
 
-// The maximum size of a part of the picture that is solved as a whole: larger parts take more
+// The maximum size of a part of the image that is solved as a whole: larger parts take more
 // memory and time per pixel, and the result does not improve.
-constexpr double kMostBandPixels = 3e6;
+constexpr double kMaxBandPixels = 3e6;
 
 estimator::SceneOptions SceneSettings(const EstimateOptions& options,
                                       const estimator::EstimateInput& input,
@@ -96,7 +96,7 @@ estimator::SceneOptions SceneSettings(const EstimateOptions& options,
   estimator::SceneOptions settings = SceneOptionsOf(options, on, progress);
   if (!settings.memory_limit_mib) settings.memory_limit_mib = UsualMemoryLimitMib();
   const auto pixels = static_cast<double>(input.disparity.disparity.size());
-  settings.least_bands = std::max(1, static_cast<int>(std::ceil(pixels / kMostBandPixels)));
+  settings.least_bands = std::max(1, static_cast<int>(std::ceil(pixels / kMaxBandPixels)));
   return settings;
 }
 
@@ -131,13 +131,13 @@ void SolveScene(const EstimateOptions& options, const estimator::EstimateInput& 
         estimator::EstimateScene(input, settings, &scene, &outcome->maps, backend.get());
   } else {
     estimator::SceneViewSink sink;
-    sink.take = [writer](int k, int l, const model::LinearPicture& view,
+    sink.take = [writer](int k, int l, const model::LinearImage& view,
                          const std::vector<estimator::Confidence>& confidence) {
       ThrowIfCancelled();
       writer->WriteView(k, l, view);
       writer->WriteConfidence(k, l, confidence, view.width_px);
     };
-    sink.bytes = writer->BytesForView(static_cast<double>(input.picture.values.size()));
+    sink.bytes = writer->BytesForView(static_cast<double>(input.image.values.size()));
     outcome->light_field =
         estimator::EstimateSceneViews(input, settings, sink, &scene, &outcome->maps, backend.get());
   }
@@ -171,7 +171,7 @@ void SolveBlocks(const EstimateOptions& options, const estimator::EstimateInput&
     settings.block_px = checkpoint->block_px();
     *settings.memory_limit_mib *= kLittle;
   }
-  estimator::EstimateSummary blocks;
+  estimator::BlockSummary blocks;
   outcome->light_field = estimator::EstimateByBlocks(input, settings, backend.get(), &blocks);
   outcome->seconds.setup += blocks.setup_seconds;
   outcome->seconds.solve = blocks.solve_seconds;
@@ -252,8 +252,8 @@ void Inpaint(const EstimateOptions& options, const estimator::EstimateInput& inp
     line.Show(done, total);
   };
   outcome->inpainting.emplace();
-  estimator::InpaintHiddenRays(input.disparity, settings, &outcome->light_field,
-                               &*outcome->inpainting);
+  estimator::InpaintOccludedRays(input.disparity, settings, &outcome->light_field,
+                                 &*outcome->inpainting);
   outcome->light_field.origin.method += "+telea";
   outcome->seconds.views += outcome->inpainting->seconds;
 }
@@ -301,12 +301,12 @@ std::vector<std::pair<std::string, std::string>> SourcesOf(const EstimateOptions
   }
   const std::string from = summary["transfer_from"];
   const std::string said = from == "option" ? "--transfer" : from == "camera" ? "the camera" : "";
-  return {{"photograph", options.picture_path},
+  return {{"photograph", options.image_path},
           {"depth map", fmt::format("{} ({})", options.depth_path, how)},
           {"camera", options.camera_path},
           {"part of both", options.crop.text},
-          {"stored values", fmt::format("{} ({})", summary["transfer"].get<std::string>(),
-                                        said.empty() ? "assumed" : "from " + said)},
+          {"encoded values", fmt::format("{} ({})", summary["transfer"].get<std::string>(),
+                                         said.empty() ? "assumed" : "from " + said)},
           {"aperture", aperture}};
 }
 
@@ -317,7 +317,7 @@ std::string Page(const EstimateOptions& options, PreparedEstimate prepared,
   page.name = options.output_folder;
   page.light_field = &outcome.light_field;
   page.depth = DepthForPage(prepared);
-  page.photo = std::move(prepared.input.picture);
+  page.photo = std::move(prepared.input.image);
   page.estimate =
       ParseEstimateRecord(summary.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace),
                           options.common.json_path);
@@ -406,7 +406,7 @@ CommandResult RunEstimate(const EstimateOptions& given) {
 
 void AddEstimateCommand(CLI::App* program, CommandAction* action) {
   CLI::App* command = program->add_subcommand(
-      "estimate", "Estimate the light field of one picture with its depth map");
+      "estimate", "Estimate the light field of one image with its depth map");
   const auto options = std::make_shared<EstimateOptions>();
   AddEstimateOptions(command, options.get());
   command->callback([options, action] {
@@ -414,7 +414,7 @@ void AddEstimateCommand(CLI::App* program, CommandAction* action) {
       CheckEstimateUsage(*options);
       RequireDistinctFiles({options->common.json_path, options->output_folder,
                             options->report_path(), options->checkpoint_path},
-                           {options->picture_path, options->depth_path, options->camera_path,
+                           {options->image_path, options->depth_path, options->camera_path,
                             options->aperture_of, options->profile_path});
       RunCommand(options->common, [&] { return RunEstimate(*options); });
     };

@@ -66,7 +66,7 @@ model::DepthRange ParseDepthRange(const std::string& text) {
 // The known part of what is photographed.
 struct ExplainedScene {
   model::DepthRange range;
-  std::vector<model::EffectPlace> places;
+  std::vector<model::EffectSite> places;
 };
 
 ExplainedScene SceneOf(const ExplainOptions& options, const model::Camera& camera) {
@@ -82,15 +82,15 @@ ExplainedScene SceneOf(const ExplainOptions& options, const model::Camera& camer
         "equal",
         options.depth_path, map.width_px, map.height_px, sensor.width_px, sensor.height_px));
   }
-  model::LinearPicture empty{map.width_px, map.height_px, 1, {}};
+  model::LinearImage empty{map.width_px, map.height_px, 1, {}};
   empty.values.assign(map.values.size(), 0.0F);
   const model::Scene scene = model::MakeScene(camera, std::move(empty), map,
                                               ConventionOf(options.depth), options.depth_path);
   return {{scene.depth.min_mm, scene.depth.max_mm}, PlacesOfDepth(camera, scene)};
 }
 
-model::EffectDecision Decide(const ExplainOptions& options, const model::Camera& camera,
-                             const std::vector<model::EffectPlace>& places) {
+model::EffectSelection Decide(const ExplainOptions& options, const model::Camera& camera,
+                              const std::vector<model::EffectSite>& places) {
   model::EffectConditions conditions;
   conditions.camera = camera;
   conditions.bits = options.bits;
@@ -100,15 +100,15 @@ model::EffectDecision Decide(const ExplainOptions& options, const model::Camera&
   if (options.uv_depth_mm) {
     conditions.planes = {*options.uv_depth_mm, camera.focus_depth_mm() - *options.uv_depth_mm};
   }
-  model::EffectChoice choice;
-  // A simulated picture always has these effects.
+  model::EffectSelectionOptions choice;
+  // A simulated image always has these effects.
   choice.kept = {model::Effect::kQuantisation, model::Effect::kTransferCurve};
   ApplyEffectOptions(options.effects, &choice);
-  return model::DecideEffects(choice, conditions, places, model::EffectSet::All());
+  return model::SelectEffects(choice, conditions, places, model::EffectSet::All());
 }
 
 model::EffectCosts CostsOf(const ExplainOptions& options, const model::Camera& camera,
-                           const model::DepthRange& range, const model::EffectDecision& decision) {
+                           const model::DepthRange& range, const model::EffectSelection& decision) {
   model::SceneSimulationOptions sensor;
   sensor.full_well_electrons = options.full_well_electrons;
   sensor.read_noise_electrons = options.read_noise_electrons;
@@ -124,15 +124,15 @@ model::EffectCosts CostsOf(const ExplainOptions& options, const model::Camera& c
     throw;
   } catch (const Error& error) {
     throw Error(
-        fmt::format("--costs: a picture of depths from {:g} to {:g} mm cannot be simulated: "
+        fmt::format("--costs: an image of depths from {:g} to {:g} mm cannot be simulated: "
                     "{}",
                     range.near_mm, range.far_mm, error.what()));
   }
 }
 
 void AddCosts(const model::EffectCosts& costs, nlohmann::json* summary) {
-  (*summary)["picture_seconds"] = costs.seconds;
-  (*summary)["seconds_are"] = "extrapolated from a part of the picture";
+  (*summary)["image_seconds"] = costs.seconds;
+  (*summary)["seconds_are"] = "extrapolated from a part of the image";
   for (nlohmann::json& effect : (*summary)["effects"]) {
     for (const auto& [of, seconds] : costs.of_effect) {
       if (effect["name"] == model::EffectName(of)) effect["cost_seconds"] = seconds;
@@ -142,7 +142,7 @@ void AddCosts(const model::EffectCosts& costs, nlohmann::json* summary) {
 
 std::string CostsText(const model::EffectCosts& costs) {
   return fmt::format(
-      "cost: additional time of the effect for a simulated picture of this size, extrapolated "
+      "cost: additional time of the effect for a simulated image of this size, extrapolated "
       "from\na part of it, in seconds on one core of this machine, with all other effects as "
       "listed here;\nwith these the simulation takes {:.3g}; ~0 is less than can be measured\n",
       costs.seconds);
@@ -152,10 +152,10 @@ CommandResult Explain(const ExplainOptions& options) {
   std::optional<OutputFile> figure;
   if (!options.figure_path.empty()) figure.emplace(options.figure_path);
   const model::Camera camera = model::ReadCamera(options.camera_path);
-  TellAssumedFields(camera);
+  ReportAssumedFields(camera);
   const ExplainedScene scene = SceneOf(options, camera);
   const model::Explanation explanation = model::ExplainCamera(camera, scene.range, options.steps);
-  const model::EffectDecision decision = Decide(options, camera, scene.places);
+  const model::EffectSelection decision = Decide(options, camera, scene.places);
   CommandResult result{ExplanationJson(explanation), ""};
   result.summary["effects"] = EffectsJson(decision);
   std::optional<model::EffectCosts> costs;
@@ -230,7 +230,7 @@ void AddExplainCommand(CLI::App* program, CommandAction* action) {
       ->capture_default_str()
       ->type_name("N");
   AddEffectOptions(command, &options->effects);
-  command->add_option("--bits", options->bits, "Bits per value of the stored picture")
+  command->add_option("--bits", options->bits, "Bits per value of the encoded image")
       ->check(CLI::Range(1, 32))
       ->capture_default_str()
       ->type_name("N");
@@ -268,7 +268,7 @@ void AddExplainCommand(CLI::App* program, CommandAction* action) {
       ->check(Finite())
       ->type_name("MM");
   command->add_flag("--costs", options->costs,
-                    "Also measure the run time of each effect in a simulated picture of this "
+                    "Also measure the run time of each effect in a simulated image of this "
                     "camera at these depths; takes some seconds");
   command
       ->add_option("--figure", options->figure_path,

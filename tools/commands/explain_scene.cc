@@ -20,12 +20,12 @@ class DepthBlocks {
         axis_px_(camera.sensor.principal_point_px) {}
 
   // Returns none if the block contains only holes.
-  std::optional<model::EffectPlace> PlaceOf(int x0, int y0) const {
-    model::EffectPlace place;
+  std::optional<model::EffectSite> PlaceOf(int x0, int y0) const {
+    model::EffectSite place;
     bool found = false;
     double steepest = 0;
-    for (int y = y0; y < std::min(y0 + kBlockPx, scene_.picture.height_px); ++y) {
-      for (int x = x0; x < std::min(x0 + kBlockPx, scene_.picture.width_px); ++x) {
+    for (int y = y0; y < std::min(y0 + kBlockPx, scene_.image.height_px); ++y) {
+      for (int x = x0; x < std::min(x0 + kBlockPx, scene_.image.width_px); ++x) {
         const double here = InverseDepth(x, y);
         if (std::isnan(here)) continue;
         if (!found || std::abs(here - focus_) > std::abs(1 / place.depth_mm - focus_)) {
@@ -49,13 +49,13 @@ class DepthBlocks {
 
  private:
   double InverseDepth(int x, int y) const {
-    return 1 / static_cast<double>(
-                   scene_.depth_mm[static_cast<std::size_t>(y) *
-                                       static_cast<std::size_t>(scene_.picture.width_px) +
-                                   static_cast<std::size_t>(x)]);
+    return 1 /
+           static_cast<double>(scene_.depth_mm[static_cast<std::size_t>(y) *
+                                                   static_cast<std::size_t>(scene_.image.width_px) +
+                                               static_cast<std::size_t>(x)]);
   }
   double Step(double here, int x, int y) const {
-    if (x >= scene_.picture.width_px || y >= scene_.picture.height_px) return 0;
+    if (x >= scene_.image.width_px || y >= scene_.image.height_px) return 0;
     const double step = std::abs(InverseDepth(x, y) - here);
     return std::isnan(step) ? 0 : step;
   }
@@ -67,13 +67,13 @@ class DepthBlocks {
 
 }  // namespace
 
-std::vector<model::EffectPlace> PlacesOfDepth(const model::Camera& camera,
-                                              const model::Scene& scene) {
+std::vector<model::EffectSite> PlacesOfDepth(const model::Camera& camera,
+                                             const model::Scene& scene) {
   const DepthBlocks blocks(camera, scene);
-  std::vector<model::EffectPlace> places;
-  for (int y = 0; y < scene.picture.height_px; y += kBlockPx) {
+  std::vector<model::EffectSite> places;
+  for (int y = 0; y < scene.image.height_px; y += kBlockPx) {
     ThrowIfCancelled();
-    for (int x = 0; x < scene.picture.width_px; x += kBlockPx) {
+    for (int x = 0; x < scene.image.width_px; x += kBlockPx) {
       if (const auto place = blocks.PlaceOf(x, y)) places.push_back(*place);
     }
   }

@@ -12,8 +12,8 @@ namespace thicklens::tools {
 // from the axis, the depth of maximum blur, and, across the steepest step between neighbours in the
 // block, the depth on the other side. The photographed object is not known, so an edge between
 // black and white is assumed everywhere.
-std::vector<model::EffectPlace> PlacesOfDepth(const model::Camera& camera,
-                                              const model::Scene& scene);
+std::vector<model::EffectSite> PlacesOfDepth(const model::Camera& camera,
+                                             const model::Scene& scene);
 
 }  // namespace thicklens::tools
 

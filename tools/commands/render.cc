@@ -1,4 +1,4 @@
-// thicklens render: renders pictures from a light field, or converts it to another layout.
+// thicklens render: renders images from a light field, or converts it to another layout.
 #include "thicklens/estimator/render.h"
 
 #include <fmt/format.h>
@@ -19,9 +19,9 @@
 #include "thicklens/base/output_file.h"
 #include "thicklens/base/stopwatch.h"
 #include "thicklens/io/aperture_statement.h"
+#include "thicklens/io/image_description.h"
 #include "thicklens/io/image_io.h"
 #include "thicklens/io/light_field_io.h"
-#include "thicklens/io/picture_description.h"
 #include "thicklens/kernels/device.h"
 #include "thicklens/model/scene.h"
 #include "tools/commands/commands.h"
@@ -37,7 +37,7 @@ using model::Effect;
 
 constexpr int kMosaicGapPx = 2;
 constexpr int kEpipolarRepeatPx = 8;  // one line per view would be too thin to see
-constexpr double kStoredLevels = 255;
+constexpr double kEncodedLevels = 255;
 constexpr double kMaxLengthMm = 1e9;
 constexpr int kDefaultBits = 8;
 
@@ -111,11 +111,11 @@ void CheckUsage(RenderOptions* options) {
                "--as-captured");
   RefuseUnless(options->as_captured, options->effects.tolerance.has_value(), "--tolerance",
                "--as-captured");
-  const bool is_picture = options->convert.empty();
-  const char* const kPictures = "a picture as output, not --convert";
-  RefuseUnless(is_picture, options->noise_levels.has_value(), "--noise", kPictures);
-  RefuseUnless(is_picture, options->bits.has_value(), "--bits", kPictures);
-  RefuseUnless(is_picture, options->seed.has_value(), "--seed", kPictures);
+  const bool is_image = options->convert.empty();
+  const char* const kImages = "an image as output, not --convert";
+  RefuseUnless(is_image, options->noise_levels.has_value(), "--noise", kImages);
+  RefuseUnless(is_image, options->bits.has_value(), "--bits", kImages);
+  RefuseUnless(is_image, options->seed.has_value(), "--seed", kImages);
 }
 
 struct ViewPlace {
@@ -123,12 +123,12 @@ struct ViewPlace {
   int k = 0, l = 0;
 };
 
-constexpr int kMostViewIndex = 9999;
+constexpr int kMaxViewIndex = 9999;
 
 ViewPlace ParseView(const std::string& text) {
   if (text == "centre") return {true, 0, 0};
   const std::string form = "u,v (view indices from 0) or centre";
-  const std::vector<int> place = SplitWhole("--view", text, ',', form, 0, kMostViewIndex);
+  const std::vector<int> place = SplitWhole("--view", text, ',', form, 0, kMaxViewIndex);
   if (place.size() != 2)
     throw UsageError(fmt::format("--view: {} is expected, found '{}'", form, text));
   return {false, place[0], place[1]};
@@ -163,7 +163,7 @@ EpiLine ParseEpi(const std::string& text) {
 // --- What is rendered.
 
 struct Rendering {
-  model::LinearPicture picture;
+  model::LinearImage image;
   std::string what;  // for the text output
   nlohmann::json details;
   std::string effects{};  // for the text output, a line of its own; may be empty
@@ -225,7 +225,7 @@ Eigen::ArrayXXd PhotographWeights(const RenderOptions& options,
 // views.
 estimator::Vignetting VignettingOf(const RenderOptions& options,
                                    const model::LightField& light_field,
-                                   const model::EffectDecision& effects) {
+                                   const model::EffectSelection& effects) {
   using model::ApertureShape;
   if (!effects.on.Has(Effect::kApertureShape)) return {ApertureShape::kGaussian, {}};
   if (!options.aperture_shape.empty()) {
@@ -242,7 +242,7 @@ estimator::Vignetting VignettingOf(const RenderOptions& options,
 // Light that the views do not contain cannot be restored by weights.
 void WarnOfWander(const model::LightField& light_field) {
   constexpr double kMuch = 0.4;
-  const double wander = estimator::LargestWander(light_field);
+  const double wander = estimator::MaxPupilShift(light_field);
   if (!(wander > kMuch)) return;
   spdlog::warn(
       "with the UV plane at {:g} mm the rays of the outermost pixels cross the aperture off its "
@@ -261,13 +261,13 @@ Rendering RenderPhotograph(const RenderOptions& options, const model::LightField
   const auto kernels = backend->is_opencl() ? backend->NewFloat() : nullptr;
   Rendering rendering;
   rendering.details = {{"rendered", "as-captured"}, {"device", backend->name()}};
-  const model::EffectDecision effects = DecidePhotographEffects(options.effects, light_field);
+  const model::EffectSelection effects = DecidePhotographEffects(options.effects, light_field);
   rendering.details["effects"] = effects.on.Names();
   rendering.details["effect_impacts"] = EffectsJson(effects);
   std::optional<model::Camera> falloff;
   if (effects.on.Has(Effect::kFalloff)) {
     falloff = effects.on.Has(Effect::kThickness) ? *light_field.camera
-                                                 : model::ThinTwin(*light_field.camera);
+                                                 : model::ThinLensEquivalent(*light_field.camera);
   }
   std::optional<estimator::Vignetting> vignetting;
   // An aperture of radius 0 is a single view.
@@ -275,7 +275,7 @@ Rendering RenderPhotograph(const RenderOptions& options, const model::LightField
     vignetting = VignettingOf(options, light_field, effects);
     WarnOfWander(light_field);
   }
-  rendering.picture = estimator::Photograph(
+  rendering.image = estimator::Photograph(
       light_field, PhotographWeights(options, light_field, effects.on, &rendering.details),
       falloff ? &*falloff : nullptr, vignetting ? &*vignetting : nullptr, kernels.get(),
       options.common.threads);
@@ -314,8 +314,8 @@ Rendering RenderFocused(const RenderOptions& options, const model::LightField& l
                        {"disparity_px", {disparity_px.x(), disparity_px.y()}}};
   if (options.focus_mm) rendering.details["focus_depth_mm"] = *options.focus_mm;
   const Eigen::ArrayXXd weights = WeightsOf(options, light_field, &rendering.details);
-  rendering.picture = estimator::Refocus(light_field, disparity_px.x(), disparity_px.y(), weights,
-                                         options.common.threads);
+  rendering.image = estimator::Refocus(light_field, disparity_px.x(), disparity_px.y(), weights,
+                                       options.common.threads);
   rendering.what = options.focus_mm
                        ? fmt::format("focus at {:g} mm (disparity {:.4g} px per view step)",
                                      *options.focus_mm, disparity_px.x())
@@ -346,7 +346,7 @@ Rendering RenderView(const RenderOptions& options, const model::LightField& ligh
   }
   if (!light_field.IsPresent(k, l))
     throw Error(fmt::format("--view {},{}: {} has no such view", k, l, options.light_field));
-  return {model::ViewPicture(light_field, k, l),
+  return {model::ViewImage(light_field, k, l),
           fmt::format("view ({}, {})", k, l),
           {{"rendered", "view"}, {"u", k}, {"v", l}}};
 }
@@ -413,7 +413,7 @@ std::string Description(const Rendering& rendering) {
                      names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", ")));
 }
 
-CommandResult RenderPicture(const RenderOptions& options) {
+CommandResult RenderImage(const RenderOptions& options) {
   const auto start = Clock::now();
   OutputFile output(options.output);
   const model::LightField light_field =
@@ -425,19 +425,19 @@ CommandResult RenderPicture(const RenderOptions& options) {
   const int bits = options.bits.value_or(kDefaultBits);
   const double noise_levels = options.noise_levels.value_or(0);
   const auto seed = static_cast<std::uint64_t>(options.seed.value_or(0));
-  const model::LinearPicture& picture = rendering.picture;
-  const std::size_t clipped = io::CountClipped(picture, light_field.transfer, bits);
+  const model::LinearImage& image = rendering.image;
+  const std::size_t clipped = io::CountClipped(image, light_field.transfer, bits);
   output.Commit(io::WithDescription(
-      io::EncodePng(model::ToStoredWithNoise(picture, light_field.transfer, bits,
-                                             noise_levels / kStoredLevels, seed)),
+      io::EncodePng(model::ToEncodedWithNoise(image, light_field.transfer, bits,
+                                              noise_levels / kEncodedLevels, seed)),
       Description(rendering)));
 
-  const double fraction = static_cast<double>(clipped) / static_cast<double>(picture.values.size());
+  const double fraction = static_cast<double>(clipped) / static_cast<double>(image.values.size());
   CommandResult result;
   result.is_written = true;
   result.summary = std::move(rendering.details);
-  result.summary.update({{"width_px", picture.width_px},
-                         {"height_px", picture.height_px},
+  result.summary.update({{"width_px", image.width_px},
+                         {"height_px", image.height_px},
                          {"bits", bits},
                          {"noise_levels", noise_levels},
                          {"seed", seed}});
@@ -446,9 +446,9 @@ CommandResult RenderPicture(const RenderOptions& options) {
       noise_levels > 0 ? fmt::format(", noise {:g}/255 (seed {})", noise_levels, seed) : "";
   PrintResult(options.common,
               fmt::format("{}\n{} x {} views -> {} x {} px, {} channel(s), {} bit{}: {}\n{}",
-                          rendering.what, light_field.u_count, light_field.v_count,
-                          picture.width_px, picture.height_px, picture.channels, bits, noise,
-                          options.output, ClippedText(fraction)) +
+                          rendering.what, light_field.u_count, light_field.v_count, image.width_px,
+                          image.height_px, image.channels, bits, noise, options.output,
+                          ClippedText(fraction)) +
                   rendering.effects);
   return result;
 }
@@ -500,9 +500,8 @@ void AddWhatToRender(CLI::App* command, RenderOptions* options) {
       ->type_name("PX");
   command->add_flag("--mosaic", options->mosaic, "All views side by side");
   command
-      ->add_option(
-          "--epi", options->epi,
-          "Epipolar picture: row=T[,v=L] or column=S[,u=K]; the middle row without a value")
+      ->add_option("--epi", options->epi,
+                   "Epipolar image: row=T[,v=L] or column=S[,u=K]; the middle row without a value")
       ->expected(0, 1)
       ->type_name("LINE");
   command
@@ -524,13 +523,13 @@ void AddHowToRender(CLI::App* command, RenderOptions* options) {
   AddEffectOptions(command, &options->effects);
   command
       ->add_option("--noise", options->noise_levels,
-                   "Add normally distributed noise of N/255 to the stored values")
+                   "Add normally distributed noise of N/255 to the encoded values")
       ->check(NonNegative())
       ->type_name("N");
   command->add_option("--seed", options->seed, "Seed of the noise; default 0")
       ->check(CLI::Range(std::int64_t{0}, std::numeric_limits<std::int64_t>::max()))
       ->type_name("N");
-  command->add_option("--bits", options->bits, "Bits per value of the picture: 8 (default) or 16")
+  command->add_option("--bits", options->bits, "Bits per value of the image: 8 (default) or 16")
       ->check(CLI::IsMember({8, 16}))
       ->type_name("N");
   AddDeviceOption(command, &options->device);
@@ -540,7 +539,7 @@ void AddHowToRender(CLI::App* command, RenderOptions* options) {
 
 void AddRenderCommand(CLI::App* program, CommandAction* action) {
   CLI::App* command = program->add_subcommand(
-      "render", "Render pictures from a light field, or convert it to another layout");
+      "render", "Render images from a light field, or convert it to another layout");
   const auto options = std::make_shared<RenderOptions>();
   command
       ->add_option("light_field", options->light_field,
@@ -563,7 +562,7 @@ void AddRenderCommand(CLI::App* program, CommandAction* action) {
       ReadingOf(options->reading);
       RequireDistinctFiles({options->common.json_path, options->output}, {options->light_field});
       RunCommand(options->common, [&] {
-        return options->convert.empty() ? RenderPicture(*options) : Convert(*options);
+        return options->convert.empty() ? RenderImage(*options) : Convert(*options);
       });
     };
   });

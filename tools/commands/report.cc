@@ -29,10 +29,10 @@
 #include "tools/commands/commands.h"
 #include "tools/options/command_frame.h"
 #include "tools/options/light_field_options.h"
-#include "tools/options/naming_the_file.h"
 #include "tools/options/option_values.h"
+#include "tools/options/with_file_context.h"
+#include "tools/report/embedded_report.h"
 #include "tools/report/estimate_records.h"
-#include "tools/report/inlined_report.h"
 #include "tools/report/light_field_page.h"
 #include "tools/system/build_info.h"
 
@@ -53,7 +53,7 @@ struct ReportOptions {
   ReadingOptions reading;
 };
 
-// --crop applies to files of the whole picture; files that were made from that crop stay as they
+// --crop applies to files of the whole image; files that were made from that crop stay as they
 // are.
 bool NeedsCrop(const std::optional<model::PixelRect>& crop, int width_px, int height_px) {
   return crop && (crop->width != width_px || crop->height != height_px);
@@ -71,7 +71,7 @@ model::LightField ReadCropped(const std::string& path, io::LightFieldReading rea
   const std::optional<model::PixelRect> crop = std::exchange(reading.crop, std::nullopt);
   const model::LightField light_field = io::ReadLightField(path, reading);
   if (NeedsCrop(crop, light_field.s_count, light_field.t_count)) {
-    return NamingTheFile(path, [&] { return model::CropViews(light_field, *crop); });
+    return WithFileContext(path, [&] { return model::CropViews(light_field, *crop); });
   }
   return light_field;
 }
@@ -113,18 +113,18 @@ model::LightField ReadTruth(const ReportOptions& options, const model::LightFiel
     spdlog::warn("{}", *warning);
   }
   if (truth.u_count == light_field.u_count && truth.v_count == light_field.v_count) return truth;
-  return NamingTheFile(options.truth_path, [&] {
+  return WithFileContext(options.truth_path, [&] {
     return model::InnerViews(truth, light_field.u_count, light_field.v_count);
   });
 }
 
-model::LinearPicture ReadPhoto(const ReportOptions& options, const model::LightField& light_field) {
+model::LinearImage ReadPhoto(const ReportOptions& options, const model::LightField& light_field) {
   const auto crop = CropRect(options.reading.crop);
-  cv::Mat stored = io::ReadPictureFile(options.photo_path);
+  cv::Mat stored = io::ReadImageFile(options.photo_path);
   if (stored.channels() == 4) cv::cvtColor(stored, stored, cv::COLOR_RGBA2RGB);
-  model::StoredPicture photo = io::ToStoredPicture(stored);
+  model::EncodedImage photo = io::ToEncodedImage(stored);
   if (NeedsCrop(crop, photo.width_px, photo.height_px)) {
-    photo = NamingTheFile(options.photo_path, [&] { return model::CropPicture(photo, *crop); });
+    photo = WithFileContext(options.photo_path, [&] { return model::CropImage(photo, *crop); });
   }
   if (photo.width_px != light_field.s_count || photo.height_px != light_field.t_count) {
     ThrowOtherSize(options.photo_path, photo.width_px, photo.height_px, light_field);
@@ -143,14 +143,14 @@ PageDepth ReadDepth(const ReportOptions& options, const model::LightField& light
   model::RawDepthMap map = io::ReadDepthMap(options.depth_path);
   const auto crop = CropRect(options.reading.crop);
   if (NeedsCrop(crop, map.width_px, map.height_px)) {
-    map = NamingTheFile(options.depth_path, [&] { return model::CropDepth(map, *crop); });
+    map = WithFileContext(options.depth_path, [&] { return model::CropDepth(map, *crop); });
   }
   if (map.width_px != light_field.s_count || map.height_px != light_field.t_count) {
     ThrowOtherSize(options.depth_path, map.width_px, map.height_px, light_field);
   }
   PageDepth depth{map.width_px, map.height_px, {}, light_field.camera.has_value()};
   if (!light_field.camera) {
-    depth.values = NamingTheFile(options.depth_path, [&] {
+    depth.values = WithFileContext(options.depth_path, [&] {
       return estimator::DisparityFromMap(map, convention.disparity_scale,
                                          convention.disparity_offset_px)
           .disparity;
@@ -161,11 +161,11 @@ PageDepth ReadDepth(const ReportOptions& options, const model::LightField& light
   // One view step along u, or along v if u has one view.
   const Eigen::Vector2d step_mm = model::ApertureStepsMm(grid, *light_field.camera);
   convention.aperture_step_mm = std::abs(step_mm.x() != 0 ? step_mm.x() : step_mm.y());
-  // Only the size of the picture matters here.
-  model::LinearPicture picture{map.width_px, map.height_px, 1, {}};
-  picture.values.assign(map.values.size(), 0.0F);
+  // Only the size of the image matters here.
+  model::LinearImage image{map.width_px, map.height_px, 1, {}};
+  image.values.assign(map.values.size(), 0.0F);
   depth.values =
-      model::MakeScene(*light_field.camera, std::move(picture), map, convention, options.depth_path)
+      model::MakeScene(*light_field.camera, std::move(image), map, convention, options.depth_path)
           .depth_mm;
   return depth;
 }
@@ -215,12 +215,12 @@ std::vector<std::size_t> ShotIndices(std::size_t count, std::size_t middle) {
 // Returns the middle of the frame, or of the region of interest, because blur is visible only at
 // full size.
 cv::Mat MiddleOf(const cv::Mat& frame, const model::RegionOfInterest& roi) {
-  constexpr int kLeastPx = 128, kMostPx = 320;
+  constexpr int kMinPx = 128, kMaxPx = 320;
   cv::Rect whole(0, 0, frame.cols, frame.rows);
   if (roi.width > 0) whole &= cv::Rect(roi.x, roi.y, roi.width, roi.height);
   if (whole.empty()) whole = cv::Rect(0, 0, frame.cols, frame.rows);
   const int shorter_px = std::min(whole.width, whole.height);
-  const int edge_px = std::min(shorter_px, std::clamp(shorter_px / 4, kLeastPx, kMostPx));
+  const int edge_px = std::min(shorter_px, std::clamp(shorter_px / 4, kMinPx, kMaxPx));
   return frame(cv::Rect(whole.x + (whole.width - edge_px) / 2,
                         whole.y + (whole.height - edge_px) / 2, edge_px, edge_px))
       .clone();
@@ -246,13 +246,13 @@ SweepStrip ReadSweepStrip(const std::string& path, const std::optional<model::Ca
        ShotIndices(sweep.frames.size(), focus.value_or((sweep.frames.size() - 1) / 2))) {
     ThrowIfCancelled();
     const model::SweepFrame& frame = sweep.frames[i];
-    strip.shots.push_back({MiddleOf(io::ReadPictureFile(frame.image), sweep.roi), frame.image,
+    strip.shots.push_back({MiddleOf(io::ReadImageFile(frame.image), sweep.roi), frame.image,
                            frame.reading_mm, focus == i});
   }
   return strip;
 }
 
-// A record of another run would show wrong numbers beside these pictures.
+// A record of another run would show wrong numbers beside these images.
 EstimateRecord ReadMatchingRecord(const ReportOptions& options,
                                   const model::LightField& light_field) {
   EstimateRecord record = ReadEstimateRecord(options.estimate_path);

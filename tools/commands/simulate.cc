@@ -24,8 +24,8 @@
 #include "tools/commands/simulate_scene.h"
 #include "tools/options/command_frame.h"
 #include "tools/options/effect_options.h"
+#include "tools/report/ablation_page.h"
 #include "tools/report/ablation_run.h"
-#include "tools/report/attribution_page.h"
 #include "tools/system/progress_line.h"
 
 namespace thicklens::tools {
@@ -40,11 +40,11 @@ struct SimulateOptions {
   std::string output_folder;
   std::optional<std::int64_t> seed;
   bool unknown_offset = false;
-  bool attribute = false;
+  bool ablate = false;
   EffectOptions effects{{}, {}, {}, ""};  // auto has nothing to choose
 };
 
-// Returns the bits per stored value.
+// Returns the bits per encoded value.
 int RenderFrames(const model::SweepSimulator& simulator, const CommonOptions& common,
                  OutputFolder* folder) {
   const auto& frames = simulator.truth().frames;
@@ -53,7 +53,7 @@ int RenderFrames(const model::SweepSimulator& simulator, const CommonOptions& co
   std::atomic<int> done{0}, bits{0};
   ParallelFor(count, common.threads, [&](int i) {
     ThrowIfCancelled();
-    const model::StoredPicture stored = simulator.RenderFrame(i);
+    const model::EncodedImage stored = simulator.RenderFrame(i);
     bits = stored.bits;
     folder->Write(frames[static_cast<std::size_t>(i)].image, io::EncodePng(stored));
     progress.Show(++done, count);
@@ -94,10 +94,10 @@ CommandResult SimulateSweep(const SimulateOptions& options) {
   ApplyEffectOptions(options.effects, &simulation.effects);
   OutputFolder folder(
       options.output_folder, kMarkerFile,
-      {"frames", "sweep.yaml", "camera.yaml", kMarkerFile, kAttributionPage, kAttributionTable});
+      {"frames", "sweep.yaml", "camera.yaml", kMarkerFile, kAblationPage, kAblationTable});
 
-  const model::LinearPicture target_picture = io::ReadTargetPicture(simulation.target);
-  const model::SweepSimulator simulator(simulation, target_picture);
+  const model::LinearImage target_image = io::ReadTargetImage(simulation.target);
+  const model::SweepSimulator simulator(simulation, target_image);
   const int bits = RenderFrames(simulator, options.common, &folder);
   model::Camera camera = simulator.camera();
   camera.calibration.reset();  // a calibration of this sweep must find it
@@ -105,12 +105,12 @@ CommandResult SimulateSweep(const SimulateOptions& options) {
   folder.Write("sweep.yaml", model::SweepToYaml(
                                  io::DescribeSweep(simulation, simulator, options.unknown_offset)));
   folder.Write(kMarkerFile, model::SweepTruthToYaml(simulator.truth()));
-  Attribution attribution;
-  if (options.attribute) {
-    ProgressLine progress("attributing", options.common.quiet);
-    attribution.sweep = AblateSweepOf(options.config_path, simulation, options.unknown_offset,
-                                      AblationRunWith(options.common, &progress));
-    WriteAttribution(attribution, options.config_path, &folder);
+  Ablation ablation;
+  if (options.ablate) {
+    ProgressLine progress("ablating", options.common.quiet);
+    ablation.sweep = AblateSweepOf(options.config_path, simulation, options.unknown_offset,
+                                   AblationRunWith(options.common, &progress));
+    WriteAblation(ablation, options.config_path, &folder);
   }
   ThrowIfCancelled();
   folder.Commit();
@@ -126,8 +126,8 @@ CommandResult SimulateSweep(const SimulateOptions& options) {
                           camera.sensor.width_px, camera.sensor.height_px, seconds.count(),
                           options.output_folder) +
                   EffectsText(simulator.effects()) +
-                  (options.attribute ? AttributionText(attribution) : ""));
-  if (options.attribute) result.summary["attribution"] = AttributionJson(attribution);
+                  (options.ablate ? AblationText(ablation) : ""));
+  if (options.ablate) result.summary["ablation"] = AblationJson(ablation);
   return result;
 }
 
@@ -154,7 +154,7 @@ void AddSimulateCommand(CLI::App* program, CommandAction* action) {
       "--unknown-offset", options->unknown_offset,
       "Leave the bench offset out of sweep.yaml, so that a calibration has to find it");
   AddEffectOptions(command, &options->effects);
-  command->add_flag("--attribute", options->attribute,
+  command->add_flag("--ablate", options->ablate,
                     "Also simulate and calibrate without each effect in turn, and report what each "
                     "effect changes: a table, attribution.csv and the page attribution.html");
   AddCommonOptions(command, &options->common);

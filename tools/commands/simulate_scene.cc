@@ -1,4 +1,4 @@
-// thicklens simulate picture, thicklens simulate light-field: simulate a photograph with its depth
+// thicklens simulate image, thicklens simulate light-field: simulate a photograph with its depth
 // map, and the true light field of the same scene.
 #include "tools/commands/simulate_scene.h"
 
@@ -18,9 +18,9 @@
 #include "thicklens/base/stopwatch.h"
 #include "thicklens/base/utc_time.h"
 #include "thicklens/io/depth_io.h"
+#include "thicklens/io/image_description.h"
 #include "thicklens/io/image_io.h"
 #include "thicklens/io/light_field_io.h"
-#include "thicklens/io/picture_description.h"
 #include "thicklens/io/scene_pixels.h"
 #include "thicklens/io/simulated_sweep.h"
 #include "thicklens/model/camera_file.h"
@@ -28,8 +28,8 @@
 #include "tools/options/effect_options.h"
 #include "tools/options/light_field_options.h"
 #include "tools/options/option_values.h"
+#include "tools/report/ablation_page.h"
 #include "tools/report/ablation_run.h"
-#include "tools/report/attribution_page.h"
 #include "tools/system/build_info.h"
 #include "tools/system/progress_line.h"
 
@@ -37,7 +37,7 @@ namespace thicklens::tools {
 namespace {
 
 // A folder with this file was written by this program, which may replace it.
-constexpr char kPictureMarker[] = "truth.yaml";
+constexpr char kImageMarker[] = "truth.yaml";
 
 struct SceneOptions {
   CommonOptions common;
@@ -45,8 +45,8 @@ struct SceneOptions {
   std::string output_folder;
   std::optional<std::int64_t> seed;
   EffectOptions effects;
-  bool attribute = false;             // picture
-  std::string sweep_path;             // picture; for the attribution
+  bool ablate = false;                // image
+  std::string sweep_path;             // image; for the ablation
   ViewsOption views;                  // light-field
   std::optional<double> uv_depth_mm;  // light-field
   std::string format = "png";         // light-field
@@ -55,7 +55,7 @@ struct SceneOptions {
 model::SceneSimulationOptions ReadConfig(const SceneOptions& options) {
   model::SceneSimulationOptions scene = model::ReadSceneSimulation(options.config_path);
   if (options.seed) scene.seed = static_cast<std::uint64_t>(*options.seed);
-  CheckEffectNames(options.effects, model::PictureEffects());
+  CheckEffectNames(options.effects, model::ImageEffects());
   ApplyEffectOptions(options.effects, &scene.effects);
   const auto [u_count, v_count] = ViewCounts(options.views);
   if (u_count > 0) {
@@ -106,9 +106,9 @@ std::string SamplingText(const model::SceneSimulationOptions& scene,
                          : "");
 }
 
-Attribution Attribute(const SceneOptions& options, const model::SceneSimulationOptions& scene,
-                      const std::vector<model::LayerPixels>& pixels) {
-  Attribution attribution;
+Ablation Attribute(const SceneOptions& options, const model::SceneSimulationOptions& scene,
+                   const std::vector<model::LayerPixels>& pixels) {
+  Ablation ablation;
   std::optional<model::SweepSimulationOptions> sweep;
   if (!options.sweep_path.empty()) {  // read before anything that takes long
     sweep = model::ReadSweepSimulation(options.sweep_path);
@@ -116,21 +116,21 @@ Attribution Attribute(const SceneOptions& options, const model::SceneSimulationO
   }
   // The sweep is read first, because it may have no calibration to compare with.
   if (sweep) {
-    ProgressLine progress("attributing the sweep", options.common.quiet);
-    attribution.sweep = AblateSweepOf(options.sweep_path, *sweep, false,
-                                      AblationRunWith(options.common, &progress));
+    ProgressLine progress("ablating the sweep", options.common.quiet);
+    ablation.sweep = AblateSweepOf(options.sweep_path, *sweep, false,
+                                   AblationRunWith(options.common, &progress));
   }
-  ProgressLine progress("attributing", options.common.quiet);
-  attribution.scene = AblateSceneOf(scene, pixels, AblationRunWith(options.common, &progress));
-  return attribution;
+  ProgressLine progress("ablating", options.common.quiet);
+  ablation.scene = AblateSceneOf(scene, pixels, AblationRunWith(options.common, &progress));
+  return ablation;
 }
 
-CommandResult SimulatePicture(const SceneOptions& options) {
+CommandResult SimulateImage(const SceneOptions& options) {
   const auto start = Clock::now();
   const model::SceneSimulationOptions scene = ReadConfig(options);
-  OutputFolder folder(options.output_folder, kPictureMarker,
-                      {"picture.png", "depth.pfm", "camera.yaml", kPictureMarker, kAttributionPage,
-                       kAttributionTable});
+  OutputFolder folder(
+      options.output_folder, kImageMarker,
+      {"picture.png", "depth.pfm", "camera.yaml", kImageMarker, kAblationPage, kAblationTable});
 
   const std::vector<model::LayerPixels> pixels = io::ReadScenePixels(scene);
   const model::SceneSimulator simulator(scene, pixels, options.common.threads);
@@ -139,9 +139,8 @@ CommandResult SimulatePicture(const SceneOptions& options) {
   int bits = 0;
   {
     ProgressLine progress("rendering", options.common.quiet);
-    const model::LinearPicture picture =
-        simulator.RenderNoiseless(RunWith(options.common, &progress));
-    const model::StoredPicture stored = simulator.Store(picture);
+    const model::LinearImage image = simulator.RenderNoiseless(RunWith(options.common, &progress));
+    const model::EncodedImage stored = simulator.Store(image);
     bits = stored.bits;
     folder.Write("picture.png",
                  io::WithDescription(io::EncodePng(stored),
@@ -150,11 +149,11 @@ CommandResult SimulatePicture(const SceneOptions& options) {
   }
   folder.Write("depth.pfm", io::EncodePfm(depth));
   folder.Write("camera.yaml", model::CameraToYaml(simulator.camera()));
-  folder.Write(kPictureMarker, model::SceneTruthToYaml(truth));
-  Attribution attribution;
-  if (options.attribute) {
-    attribution = Attribute(options, scene, pixels);
-    WriteAttribution(attribution, options.config_path, &folder);
+  folder.Write(kImageMarker, model::SceneTruthToYaml(truth));
+  Ablation ablation;
+  if (options.ablate) {
+    ablation = Attribute(options, scene, pixels);
+    WriteAblation(ablation, options.config_path, &folder);
   }
   ThrowIfCancelled();
   folder.Commit();
@@ -169,14 +168,14 @@ CommandResult SimulatePicture(const SceneOptions& options) {
   result.summary["mean_rays_per_pixel"] = simulator.mean_rays_per_pixel();
   PrintResult(
       options.common,
-      fmt::format("a picture of {} x {} px, depths from {:.6g} to {:.6g} mm, blur sigma up "
+      fmt::format("an image of {} x {} px, depths from {:.6g} to {:.6g} mm, blur sigma up "
                   "to {:.3g} px, in {:.1f} s: {}\n",
                   scene.camera.sensor.width_px, scene.camera.sensor.height_px,
                   truth.nearest_depth_mm, truth.farthest_depth_mm, truth.largest_blur_sigma_px,
                   result.summary["seconds"].get<double>(), options.output_folder) +
           EffectsText(simulator.effects()) + SamplingText(scene, simulator) +
-          (options.attribute ? AttributionText(attribution) : ""));
-  if (options.attribute) result.summary["attribution"] = AttributionJson(attribution);
+          (options.ablate ? AblationText(ablation) : ""));
+  if (options.ablate) result.summary["ablation"] = AblationJson(ablation);
   return result;
 }
 
@@ -237,29 +236,29 @@ CLI::App* AddSceneCommand(CLI::App* simulate, const std::string& name, const std
 }  // namespace
 
 void AddSimulateSceneCommands(CLI::App* simulate, CommandAction* action) {
-  const auto picture = std::make_shared<SceneOptions>();
+  const auto image = std::make_shared<SceneOptions>();
   CLI::App* command =
-      AddSceneCommand(simulate, "picture",
+      AddSceneCommand(simulate, "image",
                       "A photograph of a scene: picture.png, depth.pfm (z in mm), camera.yaml (the "
                       "true calibration) and truth.yaml",
-                      picture.get());
+                      image.get());
   command->add_flag(
-      "--attribute", picture->attribute,
-      "Also simulate the picture and estimate its light field without each effect in turn, and "
+      "--ablate", image->ablate,
+      "Also simulate the image and estimate its light field without each effect in turn, and "
       "report what each effect changes: a table, attribution.csv and the page attribution.html");
   command
-      ->add_option("--sweep", picture->sweep_path,
-                   "For --attribute: a simulated sweep (as for simulate sweep), to report what "
+      ->add_option("--sweep", image->sweep_path,
+                   "For --ablate: a simulated sweep (as for simulate sweep), to report what "
                    "each effect changes in its calibration")
       ->type_name("SWEEP");
-  command->callback([picture, action] {
-    *action = [picture] {
-      if (!picture->sweep_path.empty() && !picture->attribute) {
-        throw UsageError("--sweep requires --attribute");
+  command->callback([image, action] {
+    *action = [image] {
+      if (!image->sweep_path.empty() && !image->ablate) {
+        throw UsageError("--sweep requires --ablate");
       }
-      RequireDistinctFiles({picture->common.json_path, picture->output_folder},
-                           {picture->config_path, picture->sweep_path});
-      RunCommand(picture->common, [&] { return SimulatePicture(*picture); });
+      RequireDistinctFiles({image->common.json_path, image->output_folder},
+                           {image->config_path, image->sweep_path});
+      RunCommand(image->common, [&] { return SimulateImage(*image); });
     };
   });
 
@@ -273,8 +272,9 @@ void AddSimulateSceneCommands(CLI::App* simulate, CommandAction* action) {
       ->check(Finite())
       ->type_name("MM");
   command
-      ->add_option("--format", views->format,
-                   "Format of the views: png (16 bit, stored values) or tiff (float, linear light)")
+      ->add_option(
+          "--format", views->format,
+          "Format of the views: png (16 bit, encoded values) or tiff (float, linear light)")
       ->check(CLI::IsMember({"png", "tiff"}))
       ->capture_default_str()
       ->type_name("NAME");

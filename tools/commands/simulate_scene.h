@@ -7,7 +7,7 @@
 
 namespace thicklens::tools {
 
-// Adds `picture` and `light-field` below `simulate`.
+// Adds `image` and `light-field` below `simulate`.
 void AddSimulateSceneCommands(CLI::App* simulate, CommandAction* action);
 
 }  // namespace thicklens::tools

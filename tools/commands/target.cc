@@ -27,10 +27,10 @@ constexpr double kShortestSideMm = 50;
 constexpr double kLongestSideMm = 2000;
 constexpr double kMaxFeatureMm = 50;
 constexpr double kMaxDistanceMm = 1e6;
-constexpr double kLeastDpi = 72, kMostDpi = 4800;
+constexpr double kMinDpi = 72, kMaxDpi = 4800;
 // In this range the pixels along both axes of the edge have many phases, and the plateaus stay
 // wide.
-constexpr double kLeastEdgeDeg = 2, kMostEdgeDeg = 20;
+constexpr double kMinEdgeDeg = 2, kMaxEdgeDeg = 20;
 
 enum class Format { kPdf, kSvg, kPng };
 
@@ -113,7 +113,7 @@ CommandResult MakeTarget(const TargetOptions& options, Format format,
                          model::TargetRequest request) {
   if (!options.camera_path.empty()) {
     const model::Camera camera = model::ReadCamera(options.camera_path);
-    TellAssumedFields(camera);
+    ReportAssumedFields(camera);
     request.view = model::ViewOfTarget(camera, options.distance_mm);
   }
   const model::TargetPage page = model::LayOutTarget(request);
@@ -177,13 +177,13 @@ void AddTargetOptions(CLI::App* command, TargetOptions* options) {
   command
       ->add_option("--edge-angle-deg", options->request.edge_angle_deg,
                    "Angle of the edge from the vertical, upper end to the right")
-      ->check(Between(kLeastEdgeDeg, kMostEdgeDeg, "degrees from the vertical"))
+      ->check(Between(kMinEdgeDeg, kMaxEdgeDeg, "degrees from the vertical"))
       ->capture_default_str()
       ->type_name("A");
   command->add_flag("--two-tone", options->request.two_tone,
                     "Only black and white, for printers that print greys as dots");
   command->add_option("--dpi", options->dots_per_inch, "Resolution of a .png, dots per inch")
-      ->check(Between(kLeastDpi, kMostDpi, "dots per inch"))
+      ->check(Between(kMinDpi, kMaxDpi, "dots per inch"))
       ->capture_default_str()
       ->type_name("N");
   command->add_option("--seed", options->seed, "Seed of the texture")

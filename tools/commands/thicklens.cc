@@ -97,7 +97,7 @@ int Main(int argc, char** argv) {
   tools::WatchSignals();
   const CancelScope scope(tools::ProgramToken());
   CLI::App program(
-      "Thick-lens camera calibration from focus sweeps, and light fields from one picture",
+      "Thick-lens camera calibration from focus sweeps, and light fields from one image",
       "thicklens");
   program.set_version_flag("--version", tools::BuildInfo(),
                            "Print the version and the libraries it was built with");

@@ -16,25 +16,25 @@
 namespace thicklens {
 namespace {
 
-ImageScores ScoresOf(const estimator::PictureScores& scores) {
+ImageScores ScoresOf(const estimator::ImageScores& scores) {
   return {scores.psnr_db, scores.ssim, scores.delta_e94_mean, scores.macade_standin};
 }
-std::optional<ImageScores> ScoresOf(const std::optional<estimator::PictureScores>& scores) {
+std::optional<ImageScores> ScoresOf(const std::optional<estimator::ImageScores>& scores) {
   if (!scores) return std::nullopt;
   return ScoresOf(*scores);
 }
 
 // The baseline's photograph in the channels of the reference, without alpha.
-model::LinearPicture PhotographFor(const Image& photo, const LightField& reference) {
+model::LinearImage PhotographFor(const Image& photo, const LightField& reference) {
   const std::string name = photo.source().empty() ? "photo" : photo.source();
   if (photo.channels() == 1 && reference.channels == 3) {
     throw Error(
         fmt::format("{}: a photograph in colour is expected, as the views are; it is grey", name));
   }
-  model::LinearPicture light = photo.ToLight(reference.transfer);
+  model::LinearImage light = photo.ToLight(reference.transfer);
   if (reference.channels == 1) return model::ToGrey(light);
   if (light.channels != 4) return light;
-  model::LinearPicture opaque{light.width_px, light.height_px, 3, {}};
+  model::LinearImage opaque{light.width_px, light.height_px, 3, {}};
   opaque.values.reserve(light.values.size() / 4 * 3);
   for (std::size_t i = 0; i < light.values.size(); ++i) {
     if (i % 4 != 3) opaque.values.push_back(light.values[i]);
@@ -82,9 +82,9 @@ ImageScores CompareImages(const Image& reference, const Image& other,
                           const CompareOptions& options) {
   checks::RequireValid(options);
   if (options.baseline) throw OptionError("baseline", "baseline: is for light fields");
-  return ScoresOf(estimator::ComparePictures(model::StoredValuesOf(reference.encoded()),
-                                             model::StoredValuesOf(other.encoded()),
-                                             options.border_px));
+  return ScoresOf(estimator::CompareImages(model::EncodedValuesOf(reference.encoded()),
+                                           model::EncodedValuesOf(other.encoded()),
+                                           options.border_px));
 }
 
 LightFieldScores CompareLightFields(const LightField& reference, const LightField& other,

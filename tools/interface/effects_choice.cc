@@ -6,12 +6,12 @@
 
 namespace thicklens {
 
-model::EffectChoice ChoiceOf(const EffectSelection& selection) {
+model::EffectSelectionOptions ChoiceOf(const EffectSelection& selection) {
   using Base = EffectSelection::Base;
-  model::EffectChoice choice;
-  choice.base = selection.base == Base::kAuto  ? model::EffectChoice::Base::kAuto
-                : selection.base == Base::kAll ? model::EffectChoice::Base::kAll
-                                               : model::EffectChoice::Base::kGiven;
+  model::EffectSelectionOptions choice;
+  choice.base = selection.base == Base::kAuto  ? model::EffectSelectionOptions::Base::kAuto
+                : selection.base == Base::kAll ? model::EffectSelectionOptions::Base::kAll
+                                               : model::EffectSelectionOptions::Base::kGiven;
   choice.given = selection.given;
   choice.without = selection.without;
   if (selection.tolerance) choice.tolerance = *selection.tolerance;
@@ -26,8 +26,8 @@ void RequireEffectsOf(const EffectSelection& selection, const EffectSet& of_mode
                                 model::JoinedNames(unknown), model::JoinedNames(of_model)));
 }
 
-model::EffectDecision DecideWithoutCamera(const EffectSelection& selection,
-                                          const EffectSet& of_model) {
+model::EffectSelection DecideWithoutCamera(const EffectSelection& selection,
+                                           const EffectSet& of_model) {
   if (selection.tolerance) {
     throw OptionError("effects.tolerance",
                       "effects.tolerance: needs a camera, without which no impact is known");

@@ -6,13 +6,13 @@
 namespace thicklens {
 
 // The model's form of a selection.
-model::EffectChoice ChoiceOf(const EffectSelection& selection);
+model::EffectSelectionOptions ChoiceOf(const EffectSelection& selection);
 // Throws OptionError if the selection names an effect that the forward model lacks.
 void RequireEffectsOf(const EffectSelection& selection, const EffectSet& of_model);
 // The decision without a camera, without which no impact is known. Throws OptionError for a
 // tolerance.
-model::EffectDecision DecideWithoutCamera(const EffectSelection& selection,
-                                          const EffectSet& of_model);
+model::EffectSelection DecideWithoutCamera(const EffectSelection& selection,
+                                           const EffectSet& of_model);
 
 }  // namespace thicklens
 

@@ -65,7 +65,7 @@ void FindConfidence(const estimator::EstimateInput& input, int threads, const Ta
 class CountingSink : public ViewSink {
  public:
   explicit CountingSink(ViewSink* sink) : sink_(sink) {}
-  void TakeView(int k, int l, const model::LinearPicture& view) override {
+  void TakeView(int k, int l, const model::LinearImage& view) override {
     sink_->TakeView(k, l, view);
   }
   void TakeConfidence(int k, int l, const std::vector<std::uint8_t>& confidence,
@@ -94,7 +94,7 @@ void Inpaint(const estimator::EstimateInput& input, RunScope* run, LightFieldEst
   settings.threads = run->threads();
   settings.progress = run->ProgressOf("inpainting");
   estimator::InpaintSummary summary;
-  estimator::InpaintHiddenRays(input.disparity, settings, &estimate->light_field, &summary);
+  estimator::InpaintOccludedRays(input.disparity, settings, &estimate->light_field, &summary);
   estimate->light_field.origin.method += "+telea";
   estimate->summary.seconds.views += summary.seconds;
   estimate->diagnostics.inpainted_rays = summary.holes;
@@ -111,12 +111,12 @@ void CheckResult(const PreparedProblem& prepared, const Solved& solved,
   if (!solved.maps) return;
   const double noise_sigma = found.noise_sigma.value_or(0);
   for (const estimator::ResidualPatch& patch :
-       estimator::ResidualPatches(solved.maps->residual, solved.maps->hidden_share,
+       estimator::ResidualPatches(solved.maps->residual, solved.maps->occluded_fraction,
                                   disparity.width_px, disparity.height_px, noise_sigma)) {
     found.patches.push_back({patch.x, patch.y, patch.width_px, patch.height_px, patch.rms});
   }
   found.unexplained_share =
-      estimator::UnexplainedShare(solved.maps->residual, solved.maps->hidden_share,
+      estimator::UnexplainedShare(solved.maps->residual, solved.maps->occluded_fraction,
                                   disparity.width_px, disparity.height_px, noise_sigma);
 }
 
@@ -124,11 +124,11 @@ void CheckResult(const PreparedProblem& prepared, const Solved& solved,
 std::vector<std::string> WarningsOf(const DepthMap& depth, const std::optional<Camera>& camera,
                                     const LightFieldEstimate& estimate) {
   const EstimateDiagnostics& found = estimate.diagnostics;
-  const EstimateSummary& summary = estimate.summary;
+  const BlockSummary& summary = estimate.summary;
   const std::string name = depth.source.empty() ? "depth" : depth.source;
   std::vector<std::string> warnings;
-  constexpr double kMostHoles = 0.5;
-  if (found.holes_share > kMostHoles) {
+  constexpr double kMaxHoles = 0.5;
+  if (found.holes_share > kMaxHoles) {
     warnings.push_back(
         fmt::format("{}: {} of its {} values are no depth: they are filled from the "
                     "others",
@@ -165,7 +165,7 @@ std::vector<std::string> WarningsOf(const DepthMap& depth, const std::optional<C
         found.patches.size(), worst.x, worst.x + worst.width_px - 1, worst.y,
         worst.y + worst.height_px - 1, kEightBitLevels * worst.residual_rms, noise_levels));
   }
-  if (found.unexplained_share && *found.unexplained_share > estimator::kMostUnexplained) {
+  if (found.unexplained_share && *found.unexplained_share > estimator::kMaxUnexplained) {
     warnings.push_back(fmt::format(
         "{:.0f} % of the photograph is not explained beyond its noise of {:.1f} grey levels: most "
         "likely it is sharper than this depth and aperture say",
@@ -205,7 +205,7 @@ void GiveRays(const PreparedProblem& prepared, const Solved& solved, int threads
   if (sink == nullptr || solved.views_in_sink) return;
   ParallelFor(light_field.u_count * light_field.v_count, threads, [&](int i) {
     const int k = i % light_field.u_count, l = i / light_field.u_count;
-    if (light_field.IsPresent(k, l)) sink->TakeView(k, l, model::ViewPicture(light_field, k, l));
+    if (light_field.IsPresent(k, l)) sink->TakeView(k, l, model::ViewImage(light_field, k, l));
     const auto first = estimate->confidence.begin() + index(k, l);
     sink->TakeConfidence(k, l, {first, first + static_cast<std::ptrdiff_t>(view_size)},
                          light_field.s_count);
@@ -217,7 +217,7 @@ void GiveRays(const PreparedProblem& prepared, const Solved& solved, int threads
 void FillSummary(const SolverSummary& solver, const AnySolver& chosen, int threads,
                  LightFieldEstimate* estimate) {
   const LightField& light_field = estimate->light_field;
-  EstimateSummary& summary = estimate->summary;
+  BlockSummary& summary = estimate->summary;
   summary.message = solver.message;
   summary.solver = SolverName(chosen);
   summary.prior = light_field.origin.prior;
@@ -282,8 +282,8 @@ LightFieldEstimate Estimate(ViewSink* given_sink, const Image& photo, const Dept
   if (!sink) own.Count(estimate.confidence.begin(), estimate.confidence.end());
   const estimator::ConfidenceShares shares =
       estimator::SharesOf(sink ? sink->counts() : own.counts());
-  estimate.diagnostics.rays_seen = shares.seen;
-  estimate.diagnostics.rays_partly_seen = shares.partly_seen;
+  estimate.diagnostics.rays_visible = shares.visible;
+  estimate.diagnostics.rays_partly_visible = shares.partly_visible;
   estimate.diagnostics.rays_blurred = shares.blurred;
   estimate.diagnostics.rays_filled_in = shares.filled_in;
   estimate.summary.warnings = WarningsOf(depth, camera, estimate);
@@ -324,7 +324,7 @@ Problem PrepareProblem(const Image& photo, const DepthMap& depth,
   return problem;
 }
 
-std::string EstimateSummary::BriefReport() const {
+std::string BlockSummary::BriefReport() const {
   if (u_count == 0) return "light field: " + message;
   std::string text = fmt::format("light field: {} x {} views of {} x {} px by {}", u_count, v_count,
                                  width_px, height_px, solver);

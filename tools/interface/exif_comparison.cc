@@ -118,9 +118,9 @@ std::optional<ExifComparison> FocusDistanceFinding(double exif_mm, const model::
     constexpr double kMmPerMetre = 1000;
     // Whole metres may be exact or rounded: a value that agrees only within half a metre of
     // rounding is left undecided.
-    constexpr double kMostRoundingMm = 50;
+    constexpr double kMaxRoundingMm = 50;
     const double whole_mm = kMmPerMetre * RoundingOf(exif_mm / kMmPerMetre);
-    const double close_mm = exif_mm < kFarMm / 2 ? std::min(kMostRoundingMm, whole_mm) : whole_mm;
+    const double close_mm = exif_mm < kFarMm / 2 ? std::min(kMaxRoundingMm, whole_mm) : whole_mm;
     const auto lies_within = [&](double share_below, double share_above, double rounding_mm) {
       return Outside(exif_mm, zf_mm * share_below - rounding_mm,
                      far_mm * share_above + rounding_mm) == 0;
@@ -137,7 +137,7 @@ std::optional<ExifComparison> FocusDistanceFinding(double exif_mm, const model::
   return finding;
 }
 
-// Returns whether the picture has the size that the camera made, or the size of the camera file's
+// Returns whether the image has the size that the camera made, or the size of the camera file's
 // sensor.
 bool IsOfSize(const io::PhotoExif& exif, int width_px, int height_px) {
   if (!exif.made_width_px || !exif.made_height_px) return true;
@@ -162,7 +162,7 @@ std::optional<ExifComparison> SizeFinding(const io::PhotoExif& exif, const model
   const bool is_scaled = std::abs(across / down - 1) < 0.01;
   if (is_scaled && exif.made_pixel_pitch_mm &&
       std::abs(*exif.made_pixel_pitch_mm * across / sensor.pixel_pitch_mm - 1) <= kNominalPitch) {
-    return finding;  // the camera file describes pictures scaled in the same way
+    return finding;  // the camera file describes images scaled in the same way
   }
   finding.verdict = ExifComparison::Verdict::kUndecided;
   finding.remark = fmt::format(

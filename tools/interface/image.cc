@@ -10,15 +10,15 @@
 
 #include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
+#include "thicklens/io/image_description.h"
 #include "thicklens/io/image_io.h"
 #include "thicklens/io/light_field_io.h"
-#include "thicklens/io/picture_description.h"
 #include "tools/interface/validation.h"
 
 namespace thicklens {
 namespace {
 
-constexpr double kStoredLevels = 255;
+constexpr double kEncodedLevels = 255;
 
 int ChannelsOf(ChannelOrder order) {
   switch (order) {
@@ -87,7 +87,7 @@ Image Image::FromEncoded(int width_px, int height_px, ChannelOrder order, int bi
   }
   ArrangeChannels(order, &values);
   Image image;
-  image.pixels_ = model::StoredPicture{width_px, height_px, channels, bits, std::move(values)};
+  image.pixels_ = model::EncodedImage{width_px, height_px, channels, bits, std::move(values)};
   image.transfer_ = transfer;
   image.source_ = std::move(source);
   return image;
@@ -104,7 +104,7 @@ Image Image::FromLight(int width_px, int height_px, ChannelOrder order, std::vec
   }
   ArrangeChannels(order, &values);
   Image image;
-  image.pixels_ = model::LinearPicture{width_px, height_px, channels, std::move(values)};
+  image.pixels_ = model::LinearImage{width_px, height_px, channels, std::move(values)};
   image.transfer_ = transfer;
   image.source_ = std::move(source);
   return image;
@@ -125,16 +125,16 @@ ChannelOrder Image::order() const {
 }
 int Image::bits() const { return is_linear() ? 32 : encoded().bits; }
 
-const model::StoredPicture& Image::encoded() const {
-  const auto* stored = std::get_if<model::StoredPicture>(&pixels_);
+const model::EncodedImage& Image::encoded() const {
+  const auto* stored = std::get_if<model::EncodedImage>(&pixels_);
   if (stored == nullptr) {
     throw Error(fmt::format("{}: encoded values are expected, found linear light",
                             source_.empty() ? "image" : source_));
   }
   return *stored;
 }
-const model::LinearPicture& Image::light() const {
-  const auto* light = std::get_if<model::LinearPicture>(&pixels_);
+const model::LinearImage& Image::light() const {
+  const auto* light = std::get_if<model::LinearImage>(&pixels_);
   if (light == nullptr) {
     throw Error(fmt::format("{}: linear light is expected, found encoded values",
                             source_.empty() ? "image" : source_));
@@ -142,7 +142,7 @@ const model::LinearPicture& Image::light() const {
   return *light;
 }
 
-model::LinearPicture Image::ToLight(const TransferCurve& transfer) const {
+model::LinearImage Image::ToLight(const TransferCurve& transfer) const {
   return is_linear() ? light() : model::ToLinear(encoded(), transfer);
 }
 
@@ -150,8 +150,8 @@ Image Image::WithoutAlpha() const {
   if (channels() != 4) return *this;
   Image opaque = *this;
   if (is_linear()) {
-    const model::LinearPicture& four = light();
-    model::LinearPicture three{four.width_px, four.height_px, 3, {}};
+    const model::LinearImage& four = light();
+    model::LinearImage three{four.width_px, four.height_px, 3, {}};
     three.values.reserve(four.values.size() / 4 * 3);
     for (std::size_t i = 0; i < four.values.size(); ++i) {
       if (i % 4 != 3) three.values.push_back(four.values[i]);
@@ -165,7 +165,7 @@ Image Image::WithoutAlpha() const {
 
 Image ReadImage(const std::string& path, std::optional<TransferCurve> transfer) {
   Image image;
-  image.pixels_ = io::ToStoredPicture(io::ReadPictureFile(path));
+  image.pixels_ = io::ToEncodedImage(io::ReadImageFile(path));
   image.transfer_ = transfer;
   image.source_ = path;
   image.is_from_file_ = true;
@@ -177,12 +177,12 @@ std::size_t WriteImage(const std::string& path, const Image& image,
   checks::RequireValid(options);
   OutputFile output(path);
   std::size_t clipped = 0;
-  model::StoredPicture stored;
+  model::EncodedImage stored;
   if (image.is_linear()) {
     const TransferCurve transfer = image.transfer().value_or(TransferCurve::Srgb());
     clipped = io::CountClipped(image.light(), transfer, options.bits);
-    stored = model::ToStoredWithNoise(image.light(), transfer, options.bits,
-                                      options.noise_levels / kStoredLevels, options.seed);
+    stored = model::ToEncodedWithNoise(image.light(), transfer, options.bits,
+                                       options.noise_levels / kEncodedLevels, options.seed);
   } else {
     if (options.noise_levels != 0) {
       throw OptionError("noise_levels", "noise_levels: is for linear light only");

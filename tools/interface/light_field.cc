@@ -28,10 +28,10 @@ io::LightFieldReading ReadingOf(const LightFieldReadOptions& options) {
   return reading;
 }
 
-ChannelOrder OrderOf(const model::LinearPicture& picture) {
-  if (picture.channels == 1) return ChannelOrder::kGrey;
-  if (picture.channels == 3) return ChannelOrder::kRgb;
-  throw Error(fmt::format("image: 1 or 3 channels are expected, found {}", picture.channels));
+ChannelOrder OrderOf(const model::LinearImage& image) {
+  if (image.channels == 1) return ChannelOrder::kGrey;
+  if (image.channels == 3) return ChannelOrder::kRgb;
+  throw Error(fmt::format("image: 1 or 3 channels are expected, found {}", image.channels));
 }
 
 }  // namespace
@@ -50,7 +50,7 @@ ApertureViews ReadApertureViews(const std::string& folder, const LightFieldReadO
 }
 
 Image ViewOf(const LightField& light_field, int k, int l) {
-  model::LinearPicture view = model::ViewPicture(light_field, k, l);
+  model::LinearImage view = model::ViewImage(light_field, k, l);
   const ChannelOrder order = OrderOf(view);
   return Image::FromLight(view.width_px, view.height_px, order, std::move(view.values),
                           light_field.transfer, fmt::format("view ({}, {})", k, l));

@@ -30,13 +30,13 @@ double ApertureStepMm(const model::LightFieldGrid& grid, const Camera& camera) {
 }
 
 estimator::DisparityMap WithoutHoles(const estimator::DisparityMap& map,
-                                     const model::LinearPicture& picture, double at_infinity,
+                                     const model::LinearImage& image, double at_infinity,
                                      PreparedDepth* prepared) {
   for (const float disparity : map.disparity) prepared->was_hole.push_back(std::isnan(disparity));
-  return estimator::FillHoles(map, picture, &prepared->holes, at_infinity);
+  return estimator::FillHoles(map, image, &prepared->holes, at_infinity);
 }
 
-PreparedDepth PrepareByCamera(const DepthMap& map, const model::LinearPicture& picture,
+PreparedDepth PrepareByCamera(const DepthMap& map, const model::LinearImage& image,
                               const Camera& camera, const model::LightFieldGrid& grid) {
   model::DepthConvention convention;
   convention.kind = map.meaning.kind;
@@ -47,7 +47,7 @@ PreparedDepth PrepareByCamera(const DepthMap& map, const model::LinearPicture& p
     convention.aperture_step_mm = ApertureStepMm(grid, camera);
   }
   // Of the image, only its size counts here.
-  model::LinearPicture empty{map.width_px, map.height_px, 1, {}};
+  model::LinearImage empty{map.width_px, map.height_px, 1, {}};
   empty.values.assign(map.values.size(), 0.0F);
   const model::Scene scene =
       model::MakeScene(camera, std::move(empty), RawOf(map), convention, NameOf(map));
@@ -55,7 +55,7 @@ PreparedDepth PrepareByCamera(const DepthMap& map, const model::LinearPicture& p
   prepared.depth = scene.depth;
   prepared.disparity = WithFileContext(NameOf(map), [&] {
     return WithoutHoles(
-        estimator::DisparityOnGrid(grid, scene.depth_mm, map.width_px, map.height_px), picture,
+        estimator::DisparityOnGrid(grid, scene.depth_mm, map.width_px, map.height_px), image,
         estimator::DisparityAtInfinity(grid), &prepared);
   });
   return prepared;
@@ -63,14 +63,14 @@ PreparedDepth PrepareByCamera(const DepthMap& map, const model::LinearPicture& p
 
 }  // namespace
 
-PreparedDepth PrepareDepth(const DepthMap& map, const model::LinearPicture& picture,
+PreparedDepth PrepareDepth(const DepthMap& map, const model::LinearImage& image,
                            const Camera* camera, const model::LightFieldGrid* grid) {
-  if (map.width_px != picture.width_px || map.height_px != picture.height_px) {
+  if (map.width_px != image.width_px || map.height_px != image.height_px) {
     throw Error(fmt::format("{}: it is {}x{} px, the image {}x{} px: the sizes must be equal",
-                            NameOf(map), map.width_px, map.height_px, picture.width_px,
-                            picture.height_px));
+                            NameOf(map), map.width_px, map.height_px, image.width_px,
+                            image.height_px));
   }
-  if (camera != nullptr) return PrepareByCamera(map, picture, *camera, *grid);
+  if (camera != nullptr) return PrepareByCamera(map, image, *camera, *grid);
   if (map.meaning.kind != DepthKind::kDisparity) {
     throw OptionError("depth.meaning.kind",
                       "depth.meaning.kind: millimetres need a camera; without one the map must be "
@@ -80,7 +80,7 @@ PreparedDepth PrepareDepth(const DepthMap& map, const model::LinearPicture& pict
   prepared.disparity = WithFileContext(NameOf(map), [&] {
     return WithoutHoles(estimator::DisparityFromMap(RawOf(map), map.meaning.disparity_scale,
                                                     map.meaning.disparity_offset_px),
-                        picture, -std::numeric_limits<double>::infinity(), &prepared);
+                        image, -std::numeric_limits<double>::infinity(), &prepared);
   });
   return prepared;
 }

@@ -30,11 +30,11 @@ std::string NameOf(const Camera& camera) { return fmt::format("camera '{}'", cam
 
 Image Cropped(const Image& photo, const PixelRect& rect) {
   if (photo.is_linear()) {
-    model::LinearPicture part = model::CropPicture(photo.light(), rect);
+    model::LinearImage part = model::CropImage(photo.light(), rect);
     return Image::FromLight(part.width_px, part.height_px, photo.order(), std::move(part.values),
                             photo.transfer().value_or(TransferCurve::Srgb()), photo.source());
   }
-  model::StoredPicture part = model::CropPicture(photo.encoded(), rect);
+  model::EncodedImage part = model::CropImage(photo.encoded(), rect);
   return Image::FromEncoded(part.width_px, part.height_px, photo.order(), part.bits,
                             std::move(part.values), photo.transfer(), photo.source());
 }
@@ -136,7 +136,7 @@ TransferCurve TransferFor(const Image& photo, const std::optional<Camera>& camer
   diagnostics->transfer_from = photo.transfer() ? "image" : camera ? "camera" : "assumed";
   if (camera) return camera->sensor.transfer;
   if (photo.transfer()) return *photo.transfer();
-  run->Inform(fmt::format("{}: stored values are taken as sRGB", NameOf(photo)));
+  run->Inform(fmt::format("{}: encoded values are taken as sRGB", NameOf(photo)));
   return TransferCurve::Srgb();
 }
 
@@ -177,10 +177,11 @@ void CheckViewCounts(const Eigen::ArrayXXd& weights, RunScope* run) {
 // A depth far from what the camera is focused at is possible, but more often its unit is wrong.
 void WarnOfUnlikelyDepth(const DepthMap& map, const Camera& camera,
                          const model::DepthStatistics& depth, RunScope* run) {
-  constexpr double kUsual = 4;
+  constexpr double kDefault = 4;
   const double focus_depth_mm = camera.focus_depth_mm();
   if (std::isinf(focus_depth_mm)) return;  // any depth is far from it
-  if (depth.median_mm <= kUsual * focus_depth_mm && depth.median_mm >= focus_depth_mm / kUsual) {
+  if (depth.median_mm <= kDefault * focus_depth_mm &&
+      depth.median_mm >= focus_depth_mm / kDefault) {
     return;
   }
   run->Warn(fmt::format(
@@ -229,12 +230,12 @@ EffectSet EffectsOfModel(const AnySolver& solver, bool camera) {
   return camera ? effects.With({Effect::kThickness, Effect::kFalloff}) : effects;
 }
 
-model::EffectDecision DecideEffects(const EstimateOptions& options,
-                                    const std::optional<Camera>& camera,
-                                    const std::optional<model::DepthStatistics>& depth) {
+model::EffectSelection SelectEffects(const EstimateOptions& options,
+                                     const std::optional<Camera>& camera,
+                                     const std::optional<model::DepthStatistics>& depth) {
   const EffectSet of_model = EffectsOfModel(options.solver, camera.has_value());
   RequireEffectsOf(options.effects, of_model);
-  model::EffectChoice choice = ChoiceOf(options.effects);
+  model::EffectSelectionOptions choice = ChoiceOf(options.effects);
   // The solution's own, which cost what they bring.
   choice.kept = EffectsOfModel(options.solver, false);
   const bool is_gaussian = !options.aperture.shape && options.aperture.views_of == nullptr &&
@@ -254,7 +255,7 @@ model::EffectDecision DecideEffects(const EstimateOptions& options,
   model::EffectConditions conditions;
   conditions.camera = *camera;
   const double focus_depth_mm = camera->focus_depth_mm();
-  return model::DecideEffects(choice, conditions,
+  return model::SelectEffects(choice, conditions,
                               model::PlacesBetween(*camera, depth ? depth->min_mm : focus_depth_mm,
                                                    depth ? depth->max_mm : focus_depth_mm, true),
                               of_model);
@@ -288,7 +289,7 @@ PreparedProblem Prepare(const Image& photo, const DepthMap& depth,
   }
   input.transfer = TransferFor(photo, input.camera, diagnostics, run);
   diagnostics->transfer = input.transfer;
-  input.picture = part.ToLight(input.transfer);
+  input.image = part.ToLight(input.transfer);
   const Camera* const known = input.camera ? &*input.camera : nullptr;
   const PreparedAperture aperture = PrepareAperture(options, known, run);
   diagnostics->aperture_shape = aperture.shape;
@@ -300,7 +301,7 @@ PreparedProblem Prepare(const Image& photo, const DepthMap& depth,
     WarnOfOtherSteps(options, aperture, *input.grid, *input.camera, run);
   }
   PreparedDepth prepared_depth =
-      PrepareDepth(map, input.picture, known, input.grid ? &*input.grid : nullptr);
+      PrepareDepth(map, input.image, known, input.grid ? &*input.grid : nullptr);
   input.disparity = std::move(prepared_depth.disparity);
   prepared.was_hole = std::move(prepared_depth.was_hole);
   diagnostics->depth = prepared_depth.depth;
@@ -313,10 +314,10 @@ PreparedProblem Prepare(const Image& photo, const DepthMap& depth,
   CheckDisparities(map, input.disparity);
   SmoothNoisyDepth(options, &input.disparity, diagnostics, run->threads());
   diagnostics->disparity_range_px = DisparityRangePx(input.disparity);
-  prepared.effects = DecideEffects(options, input.camera, prepared_depth.depth);
+  prepared.effects = SelectEffects(options, input.camera, prepared_depth.depth);
   diagnostics->effects = prepared.effects;
   if (input.camera && !prepared.effects.on.Has(Effect::kThickness)) {
-    input.falloff_camera = model::ThinTwin(*input.camera);
+    input.falloff_camera = model::ThinLensEquivalent(*input.camera);
   }
   if (input.grid) {
     const bool falloff = prepared.effects.on.Has(Effect::kFalloff);

@@ -14,7 +14,7 @@ namespace thicklens {
 // What the steps before the solver make.
 struct PreparedProblem {
   std::shared_ptr<estimator::EstimateInput> input;
-  model::EffectDecision effects;
+  model::EffectSelection effects;
   std::vector<bool> was_hole;  // per pixel of the depth map
 };
 
@@ -33,7 +33,7 @@ struct PreparedDepth {
   std::optional<model::DepthStatistics> depth;  // mm from Ap, with a camera
 };
 // `camera` and `grid` are both null or both set. Throws Error that names the map's source.
-PreparedDepth PrepareDepth(const DepthMap& map, const model::LinearPicture& picture,
+PreparedDepth PrepareDepth(const DepthMap& map, const model::LinearImage& image,
                            const Camera* camera, const model::LightFieldGrid* grid);
 
 }  // namespace thicklens

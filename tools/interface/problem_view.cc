@@ -15,12 +15,12 @@ Problem::Problem(std::shared_ptr<const estimator::EstimateInput> input) : input_
   if (input_ == nullptr) throw Error("problem: an input is expected, found null");
 }
 
-int Problem::width_px() const { return input_->picture.width_px; }
-int Problem::height_px() const { return input_->picture.height_px; }
-int Problem::channels() const { return input_->picture.channels; }
+int Problem::width_px() const { return input_->image.width_px; }
+int Problem::height_px() const { return input_->image.height_px; }
+int Problem::channels() const { return input_->image.channels; }
 int Problem::u_count() const { return static_cast<int>(input_->weights.cols()); }
 int Problem::v_count() const { return static_cast<int>(input_->weights.rows()); }
-const model::LinearPicture& Problem::photograph() const { return input_->picture; }
+const model::LinearImage& Problem::photograph() const { return input_->image; }
 const std::vector<float>& Problem::disparity() const { return input_->disparity.disparity; }
 Eigen::Vector2d Problem::disparity_step() const { return input_->disparity.step; }
 const Eigen::ArrayXXd& Problem::weights() const { return input_->weights; }
@@ -32,7 +32,7 @@ LightField Problem::WarpToViews(const RunControl& run) const {
   return estimator::WarpedLightField(*input_, falloff_, run.threads);
 }
 
-LightField Problem::WarpToViews(const model::LinearPicture& image, const RunControl& run) const {
+LightField Problem::WarpToViews(const model::LinearImage& image, const RunControl& run) const {
   if (image.width_px != width_px() || image.height_px != height_px() ||
       image.channels != channels()) {
     throw Error(fmt::format("image: {}x{} px in {} channel(s) are expected, found {}x{} in {}",
@@ -41,12 +41,11 @@ LightField Problem::WarpToViews(const model::LinearPicture& image, const RunCont
   }
   const RunScope scope(run);
   estimator::EstimateInput input = *input_;
-  input.picture = image;
+  input.image = image;
   return estimator::WarpedLightField(input, falloff_, run.threads);
 }
 
-model::LinearPicture Problem::Photograph(const LightField& light_field,
-                                         const RunControl& run) const {
+model::LinearImage Problem::Photograph(const LightField& light_field, const RunControl& run) const {
   const RunScope scope(run);
   const Camera* const falloff = falloff_ && input_->camera ? &input_->camera_of_falloff() : nullptr;
   return estimator::Photograph(light_field, input_->weights, falloff, nullptr, nullptr,

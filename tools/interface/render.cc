@@ -18,27 +18,26 @@
 namespace thicklens {
 namespace {
 
-Image ImageOf(model::LinearPicture picture, const LightField& light_field) {
-  if (picture.channels != 1 && picture.channels != 3) {
-    throw Error(
-        fmt::format("light field: 1 or 3 channels are expected, found {}", picture.channels));
+Image ImageOf(model::LinearImage image, const LightField& light_field) {
+  if (image.channels != 1 && image.channels != 3) {
+    throw Error(fmt::format("light field: 1 or 3 channels are expected, found {}", image.channels));
   }
-  return Image::FromLight(picture.width_px, picture.height_px,
-                          picture.channels == 1 ? ChannelOrder::kGrey : ChannelOrder::kRgb,
-                          std::move(picture.values), light_field.transfer);
+  return Image::FromLight(image.width_px, image.height_px,
+                          image.channels == 1 ? ChannelOrder::kGrey : ChannelOrder::kRgb,
+                          std::move(image.values), light_field.transfer);
 }
 
 // Which effects of a photograph of the light field are taken into account. Occlusion is contained
 // in the views.
-model::EffectDecision DecideEffects(const EffectSelection& selection,
-                                    const LightField& light_field) {
+model::EffectSelection SelectEffects(const EffectSelection& selection,
+                                     const LightField& light_field) {
   const EffectSet of_views = {Effect::kDefocus, Effect::kApertureShape};
   EffectSet of_model =
       light_field.camera ? of_views.With({Effect::kThickness, Effect::kFalloff}) : of_views;
   if (estimator::IsOffAperture(light_field)) of_model.Add(Effect::kVignetting);
   RequireEffectsOf(selection, of_model);
   if (!light_field.camera) return DecideWithoutCamera(selection, of_model);
-  model::EffectChoice choice = ChoiceOf(selection);
+  model::EffectSelectionOptions choice = ChoiceOf(selection);
   choice.kept = of_views;
   model::EffectConditions conditions;
   conditions.camera = *light_field.camera;
@@ -46,8 +45,8 @@ model::EffectDecision DecideEffects(const EffectSelection& selection,
   // Views do not state their depths: any depth from half of that of the plane of focus on.
   constexpr double kFarMm = 1e6;
   const double near_mm = std::min(light_field.camera->focus_depth_mm(), kFarMm) / 2;
-  model::EffectDecision decision =
-      model::DecideEffects(choice, conditions,
+  model::EffectSelection decision =
+      model::SelectEffects(choice, conditions,
                            model::PlacesBetween(*light_field.camera, near_mm,
                                                 std::numeric_limits<double>::infinity(), false),
                            of_model);
@@ -92,7 +91,7 @@ estimator::Vignetting VignettingOf(const RenderAperture& aperture, const LightFi
 
 void WarnOfShiftedPupil(const LightField& light_field, RunScope* run) {
   constexpr double kMuch = 0.4;
-  const double shift = estimator::LargestWander(light_field);
+  const double shift = estimator::MaxPupilShift(light_field);
   if (!(shift > kMuch)) return;
   run->Warn(fmt::format(
       "with the UV plane at {:g} mm the rays of the outermost pixels cross the aperture beside its "
@@ -114,12 +113,12 @@ Image RenderPhotograph(const LightField& light_field, const PhotographOptions& o
   if (!notice.empty()) run.Warn(notice);
   // The processor is faster without the kernels.
   const auto kernels = backend->is_opencl() ? backend->NewFloat() : nullptr;
-  const EffectSet on = DecideEffects(options.effects, light_field).on;
+  const EffectSet on = SelectEffects(options.effects, light_field).on;
   if (effects_on != nullptr) *effects_on = on.Names();
   std::optional<Camera> falloff;
   if (on.Has(Effect::kFalloff)) {
-    falloff =
-        on.Has(Effect::kThickness) ? *light_field.camera : model::ThinTwin(*light_field.camera);
+    falloff = on.Has(Effect::kThickness) ? *light_field.camera
+                                         : model::ThinLensEquivalent(*light_field.camera);
   }
   std::optional<estimator::Vignetting> vignetting;
   // An aperture of no size is one view.

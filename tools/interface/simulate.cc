@@ -43,7 +43,7 @@ Sweep SimulateSweep(const SweepSimulation& simulation, const std::string& folder
   OutputFolder output(
       folder, kTruthFile,
       {"frames", "sweep.yaml", "camera.yaml", kTruthFile, "attribution.html", "attribution.csv"});
-  const model::SweepSimulator simulator(simulation, io::ReadTargetPicture(simulation.target));
+  const model::SweepSimulator simulator(simulation, io::ReadTargetImage(simulation.target));
   const auto& frames = simulator.truth().frames;
   const int count = static_cast<int>(frames.size());
   const auto progress = run.ProgressOf("rendering");
@@ -74,8 +74,8 @@ SimulatedPhotograph SimulatePhotograph(const SceneSimulation& simulation,
                                         control.threads);
   model::RawDepthMap depth = simulator.RenderDepth();
   const model::SceneTruth truth = simulator.Truth(depth);
-  const model::LinearPicture light = simulator.RenderNoiseless(SceneRunOf(run));
-  model::StoredPicture stored = simulator.Store(light);
+  const model::LinearImage light = simulator.RenderNoiseless(SceneRunOf(run));
+  model::EncodedImage stored = simulator.Store(light);
   return {Image::FromEncoded(stored.width_px, stored.height_px, ChannelOrder::kRgb, stored.bits,
                              std::move(stored.values), simulator.camera().sensor.transfer),
           {depth.width_px,

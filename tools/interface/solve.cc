@@ -22,7 +22,7 @@ namespace {
 
 // No part of an image that is solved for as a whole is larger: the memory grows, and nothing gets
 // better by it.
-constexpr double kMostBandPixels = 3e6;
+constexpr double kMaxBandPixels = 3e6;
 
 std::optional<double> SceneMemoryLimitMib(const EstimateOptions& options) {
   return options.memory_limit_mib ? options.memory_limit_mib : UsualMemoryLimitMib();
@@ -93,7 +93,7 @@ void TakeIterations(const Summary& from, SolverSummary* to) {
 // Takes the views of SceneSolver for a sink of the interface.
 estimator::SceneViewSink SinkOf(ViewSink* sink, double values) {
   estimator::SceneViewSink views;
-  views.take = [sink](int k, int l, const model::LinearPicture& view,
+  views.take = [sink](int k, int l, const model::LinearImage& view,
                       const std::vector<estimator::Confidence>& confidence) {
     ThrowIfCancelled();
     sink->TakeView(k, l, view);
@@ -122,7 +122,7 @@ Solved SolveScene(const SceneSolver& solver, const PreparedProblem& prepared,
   settings.memory_limit_mib = SceneMemoryLimitMib(options);
   settings.least_bands =
       std::max(1, static_cast<int>(std::ceil(static_cast<double>(input.disparity.disparity.size()) /
-                                             kMostBandPixels)));
+                                             kMaxBandPixels)));
   settings.progress = run->ProgressOf("estimating");
   Solved solved;
   if (solver.check_blur) {
@@ -140,7 +140,7 @@ Solved SolveScene(const SceneSolver& solver, const PreparedProblem& prepared,
   solved.light_field =
       solved.views_in_sink
           ? estimator::EstimateSceneViews(
-                input, settings, SinkOf(sink, static_cast<double>(input.picture.values.size())),
+                input, settings, SinkOf(sink, static_cast<double>(input.image.values.size())),
                 &scene, &*solved.maps, backend.get())
           : estimator::EstimateScene(input, settings, &scene, &*solved.maps, backend.get());
   solved.maps->radiance = {};  // the middle of the light field contains it
@@ -154,7 +154,7 @@ Solved SolveScene(const SceneSolver& solver, const PreparedProblem& prepared,
   diagnostics->noise_sigma = scene.noise_sigma;
   diagnostics->residual_rms = scene.residual_rms;
   diagnostics->row_share = scene.row_share;
-  diagnostics->hidden_share = scene.hidden_share;
+  diagnostics->occluded_fraction = scene.occluded_fraction;
   diagnostics->bands = scene.bands;
   diagnostics->reweightings = scene.reweightings;
   return solved;
@@ -180,7 +180,7 @@ Solved SolveBlocks(const BlockSolver& solver, const PreparedProblem& prepared,
   settings.threads = run->threads();
   settings.progress = run->ProgressOf("estimating");
   settings.store = solver.store.get();
-  estimator::EstimateSummary blocks;
+  estimator::BlockSummary blocks;
   Solved solved;
   solved.light_field =
       estimator::EstimateByBlocks(*prepared.input, settings, backend.get(), &blocks);

@@ -78,7 +78,7 @@ std::optional<model::SweepTruth> ReadTruth(const std::string& truth_path,
   const fs::path beside = fs::path(sweep_yaml).parent_path() / kTruthName;
   std::error_code failure;
   if (!fs::is_regular_file(beside, failure)) return std::nullopt;
-  TellInput(beside.string());  // also where it is not used: it belongs to the sweep
+  ReportInput(beside.string());  // also where it is not used: it belongs to the sweep
   try {
     return model::ReadSweepTruth(beside.string());
   } catch (const Error& error) {

@@ -16,7 +16,7 @@
 #include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/base/printable_text.h"
-#include "tools/io/picture_kind.h"
+#include "tools/io/image_file_kind.h"
 #include "tools/io/png_check.h"
 
 namespace thicklens::io {
@@ -64,7 +64,7 @@ float FloatFromBytes(const char* bytes, bool little_endian) {
   return value;
 }
 
-// The magnitude of the scale is the unit of the picture's light; it has no meaning for depth.
+// The magnitude of the scale is the unit of the image's light; it has no meaning for depth.
 model::RawDepthMap DecodePfm(const std::string& bytes, const std::string& name) {
   std::size_t at = 2;  // behind "Pf"
   model::RawDepthMap map;
@@ -97,33 +97,33 @@ model::RawDepthMap DecodePfm(const std::string& bytes, const std::string& name) 
   return map;
 }
 
-std::string TypeName(const cv::Mat& picture) {
+std::string TypeName(const cv::Mat& image) {
   static const char* const kNames[] = {"8-bit",         "signed 8-bit",  "16-bit",
                                        "signed 16-bit", "signed 32-bit", "32-bit float",
                                        "64-bit float",  "16-bit float"};
-  return fmt::format("{} values in {} channel(s)", kNames[picture.depth()], picture.channels());
+  return fmt::format("{} values in {} channel(s)", kNames[image.depth()], image.channels());
 }
 
-const std::vector<PictureKind> kDepthKinds = {PictureKind::kPng, PictureKind::kTiff,
-                                              PictureKind::kExr};
+const std::vector<ImageFileKind> kDepthKinds = {ImageFileKind::kPng, ImageFileKind::kTiff,
+                                                ImageFileKind::kExr};
 
 // A PNG of fewer bits would be spread over 8 when decoded.
-bool IsAsExpected(const cv::Mat& picture, PictureKind kind, const std::string& bytes) {
-  if (kind == PictureKind::kPng)
-    return PngBits(bytes) >= 8 && (picture.type() == CV_8UC1 || picture.type() == CV_16UC1);
-  return picture.type() == CV_32FC1 || (kind == PictureKind::kTiff && picture.type() == CV_16UC1);
+bool IsAsExpected(const cv::Mat& image, ImageFileKind kind, const std::string& bytes) {
+  if (kind == ImageFileKind::kPng)
+    return PngBits(bytes) >= 8 && (image.type() == CV_8UC1 || image.type() == CV_16UC1);
+  return image.type() == CV_32FC1 || (kind == ImageFileKind::kTiff && image.type() == CV_16UC1);
 }
 
-std::string ExpectedOf(PictureKind kind) {
-  if (kind == PictureKind::kPng) return "a PNG depth map has 8- or 16-bit values";
-  if (kind == PictureKind::kTiff) return "a TIFF depth map has 16-bit or 32-bit float values";
+std::string ExpectedOf(ImageFileKind kind) {
+  if (kind == ImageFileKind::kPng) return "a PNG depth map has 8- or 16-bit values";
+  if (kind == ImageFileKind::kTiff) return "a TIFF depth map has 16-bit or 32-bit float values";
   return "an EXR depth map has float values";
 }
 
 cv::Mat Decode(const std::string& bytes, const std::string& name) {
   std::string why;
-  cv::Mat picture = DecodeUnchanged(bytes, name, kDepthKinds, &why);
-  if (!picture.empty()) return picture;
+  cv::Mat image = DecodeUnchanged(bytes, name, kDepthKinds, &why);
+  if (!image.empty()) return image;
   throw Error(fmt::format("{}: cannot be decoded as a depth map ({} bytes){}", name, bytes.size(),
                           why.empty() ? "" : ": " + why));
 }
@@ -136,19 +136,19 @@ model::RawDepthMap ReadDepthMap(const std::string& path) {
     throw Error(
         fmt::format("{}: a PFM file with three channels; a depth map has one channel", path));
   if (StartsWith(bytes, "Pf")) return DecodePfm(bytes, path);
-  const std::optional<PictureKind> kind = KindOfPicture(bytes);
+  const std::optional<ImageFileKind> kind = KindOfImage(bytes);
   if (!kind || std::find(kDepthKinds.begin(), kDepthKinds.end(), *kind) == kDepthKinds.end()) {
     throw Error(fmt::format("{}: not a depth map: a PFM, PNG, TIFF or EXR file is expected", path));
   }
-  const cv::Mat picture = Decode(bytes, path);
-  if (!IsAsExpected(picture, *kind, bytes)) {
+  const cv::Mat image = Decode(bytes, path);
+  if (!IsAsExpected(image, *kind, bytes)) {
     throw Error(fmt::format(
-        "{}: {} in one channel, found {}{}", path, ExpectedOf(*kind), TypeName(picture),
-        *kind == PictureKind::kPng ? fmt::format(" ({} bits in the file)", PngBits(bytes)) : ""));
+        "{}: {} in one channel, found {}{}", path, ExpectedOf(*kind), TypeName(image),
+        *kind == ImageFileKind::kPng ? fmt::format(" ({} bits in the file)", PngBits(bytes)) : ""));
   }
-  model::RawDepthMap map{picture.cols, picture.rows, {}, picture.depth() != CV_32F};
+  model::RawDepthMap map{image.cols, image.rows, {}, image.depth() != CV_32F};
   cv::Mat values;
-  picture.convertTo(values, CV_32F);  // exact: float holds every 16-bit number
+  image.convertTo(values, CV_32F);  // exact: float holds every 16-bit number
   map.values.reserve(values.total());
   for (int y = 0; y < values.rows; ++y) {
     ThrowIfCancelled();

@@ -37,8 +37,8 @@ double ResolutionUnitMm(const Exiv2::ExifData& exif) {
 
 std::optional<int> WholePixels(const Exiv2::ExifData& exif, const char* key) {
   const std::optional<double> value = PositiveValue(exif, key);
-  constexpr double kMostPx = 1e6;
-  if (!value || *value != std::floor(*value) || *value > kMostPx) return std::nullopt;
+  constexpr double kMaxPx = 1e6;
+  if (!value || *value != std::floor(*value) || *value > kMaxPx) return std::nullopt;
   return static_cast<int>(*value);
 }
 
@@ -56,7 +56,7 @@ std::optional<double> SubjectDistanceMm(const Exiv2::ExifData& exif) {
   return *metres * kMmPerMetre;
 }
 
-void TakePicture(const Exiv2::ExifData& exif, PhotoExif* photo) {
+void TakeImage(const Exiv2::ExifData& exif, PhotoExif* photo) {
   photo->subject_distance_mm = SubjectDistanceMm(exif);
   photo->focal_length_35mm = PositiveValue(exif, "Exif.Photo.FocalLengthIn35mmFilm");
   photo->digital_zoom = PositiveValue(exif, "Exif.Photo.DigitalZoomRatio");
@@ -69,7 +69,7 @@ void TakePicture(const Exiv2::ExifData& exif, PhotoExif* photo) {
   }
 }
 
-// The resolution refers to the picture as the camera made it. It says nothing about a picture that
+// The resolution refers to the image as the camera made it. It says nothing about an image that
 // was scaled or cropped afterwards, because how is unknown.
 void TakePitch(const Exiv2::ExifData& exif, int width_px, int height_px, PhotoExif* photo) {
   const auto x_per_unit = PositiveValue(exif, "Exif.Photo.FocalPlaneXResolution");
@@ -86,7 +86,7 @@ void TakePitch(const Exiv2::ExifData& exif, int width_px, int height_px, PhotoEx
       PositiveValue(exif, "Exif.Photo.PixelYDimension").value_or(height_px);
   if (made_width_px != width_px || made_height_px != height_px) {
     photo->why_no_pitch =
-        fmt::format("the pictures are {} x {} px, EXIF states {} x {}: they were scaled or cropped",
+        fmt::format("the images are {} x {} px, EXIF states {} x {}: they were scaled or cropped",
                     width_px, height_px, made_width_px, made_height_px);
     return;
   }
@@ -123,7 +123,7 @@ PhotoExif ReadPhotoExif(const std::string& path, int width_px, int height_px) {
     TakePitch(exif, width_px, height_px, &photo);
     const auto model = exif.findKey(Exiv2::ExifKey("Exif.Image.Model"));
     if (model != exif.end()) photo.model = model->toString();
-    TakePicture(exif, &photo);
+    TakeImage(exif, &photo);
   } catch (const Exiv2::AnyError& error) {
     throw Error(fmt::format("{}: its metadata cannot be read: {}", path, error.what()));
   }

@@ -45,10 +45,10 @@ TiffFile OpenForWriting(const std::string& path, std::string* message) {
 }
 
 // Returns false if libtiff fails.
-bool Write(const model::LinearPicture& picture, TIFF* tiff) {
-  const auto width = static_cast<std::uint32_t>(picture.width_px);
-  const auto height = static_cast<std::uint32_t>(picture.height_px);
-  const int channels = picture.channels;
+bool Write(const model::LinearImage& image, TIFF* tiff) {
+  const auto width = static_cast<std::uint32_t>(image.width_px);
+  const auto height = static_cast<std::uint32_t>(image.height_px);
+  const int channels = image.channels;
   const std::size_t row_values = std::size_t{width} * static_cast<std::size_t>(channels);
   const auto strip_rows = static_cast<std::uint32_t>(
       std::clamp<std::size_t>(kStripBytes / (row_values * sizeof(float)), 1, height));
@@ -69,7 +69,7 @@ bool Write(const model::LinearPicture& picture, TIFF* tiff) {
     ThrowIfCancelled();
     const std::size_t rows = std::min(strip_rows, height - y);
     // libtiff only reads them: the values are in the byte order of this machine, as is the file.
-    float* values = const_cast<float*>(picture.values.data()) + y * row_values;  // NOLINT
+    float* values = const_cast<float*>(image.values.data()) + y * row_values;  // NOLINT
     const auto bytes = static_cast<tmsize_t>(rows * row_values * sizeof(float));
     done = TIFFWriteEncodedStrip(tiff, y / strip_rows, values, bytes) == bytes;
   }
@@ -78,20 +78,20 @@ bool Write(const model::LinearPicture& picture, TIFF* tiff) {
 
 }  // namespace
 
-void WriteFloatTiff(const model::LinearPicture& picture, const std::string& path,
+void WriteFloatTiff(const model::LinearImage& image, const std::string& path,
                     const std::string& shown_name) {
   constexpr std::size_t kRoomForDirectory = 1 << 20;
-  const std::size_t bytes = picture.values.size() * sizeof(float);
+  const std::size_t bytes = image.values.size() * sizeof(float);
   if (bytes > std::numeric_limits<std::uint32_t>::max() - kRoomForDirectory) {
     throw Error(fmt::format(
         "{}: {}x{} px take {} bytes, but a TIFF file holds at most 4 GiB; --format png is "
         "smaller",
-        shown_name, picture.width_px, picture.height_px, bytes));
+        shown_name, image.width_px, image.height_px, bytes));
   }
   errno = 0;
   std::string message;
   const TiffFile tiff = OpenForWriting(path, &message);
-  if (tiff && Write(picture, tiff.get())) return;
+  if (tiff && Write(image, tiff.get())) return;
   throw Error(fmt::format("{}: cannot be written: {}", shown_name,
                           errno != 0 ? std::strerror(errno) : message));
 }

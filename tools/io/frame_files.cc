@@ -27,7 +27,7 @@ std::string FrameFiles::ReadAndDigest(std::size_t index) {
 }
 
 cv::Mat FrameFiles::Read(std::size_t index) {
-  return DecodePicture(ReadAndDigest(index), frames_.at(index).image);
+  return DecodeImage(ReadAndDigest(index), frames_.at(index).image);
 }
 
 std::string FrameFiles::DataSha256() {

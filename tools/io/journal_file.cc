@@ -105,8 +105,8 @@ void JournalFile::Open() {
   if (path_ == "-") {
     throw Error("-: the checkpoint cannot be written to standard output; name a file");
   }
-  constexpr int kMostTries = 100;
-  for (int i = 0; i < kMostTries; ++i) {
+  constexpr int kMaxTries = 100;
+  for (int i = 0; i < kMaxTries; ++i) {
     file_ = OpenOrMake(path_);
     if (file_ < 0) continue;
     if (::flock(file_, LOCK_EX | LOCK_NB) != 0) {
@@ -149,8 +149,8 @@ void JournalFile::ReadRecords(const std::function<void()>& stop) {
   }
   bytes_left_out_ += file_bytes - end_;
   // A run that is killed right after its start leaves at most this many bytes.
-  constexpr std::uint64_t kMostWithoutWorth = 1 << 16;
-  if (records_.empty() && bytes_left_out_ > kMostWithoutWorth) {
+  constexpr std::uint64_t kMaxWithoutWorth = 1 << 16;
+  if (records_.empty() && bytes_left_out_ > kMaxWithoutWorth) {
     throw Error(fmt::format(
         "{}: is damaged: none of its {} bytes can be read; remove it or name another file", path_,
         file_bytes));

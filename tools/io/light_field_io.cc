@@ -26,7 +26,7 @@
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/light_field_file.h"
 #include "tools/io/float_tiff.h"
-#include "tools/io/picture_kind.h"
+#include "tools/io/image_file_kind.h"
 
 namespace thicklens::io {
 
@@ -52,7 +52,7 @@ struct ViewSource {
   std::string folder;
   model::LightField frame;
   // Reads the view (k, l) of the frame in linear light; called from several threads.
-  std::function<model::LinearPicture(int k, int l)> read;
+  std::function<model::LinearImage(int k, int l)> read;
 };
 
 std::string NameOf(ViewFormat format) { return format == ViewFormat::kPng ? "png" : "tiff"; }
@@ -62,29 +62,29 @@ Error ViewError(int k, int l, const std::string& what) {
   return Error(fmt::format("view ({}, {}): {}", k, l, what));
 }
 
-model::LinearPicture ReadPngView(const std::string& path, const model::TransferCurve& transfer) {
-  return model::ToLinear(WithoutAlpha(ToStoredPicture(ReadPictureFile(path))), transfer);
+model::LinearImage ReadPngView(const std::string& path, const model::TransferCurve& transfer) {
+  return model::ToLinear(WithoutAlpha(ToEncodedImage(ReadImageFile(path))), transfer);
 }
 
-model::LinearPicture ReadTiffView(const std::string& path) {
+model::LinearImage ReadTiffView(const std::string& path) {
   const std::string bytes = ReadWholeFile(path);
   std::string why;
-  const cv::Mat picture = DecodeUnchanged(bytes, path, {PictureKind::kTiff}, &why);
-  if (picture.empty()) {
+  const cv::Mat image = DecodeUnchanged(bytes, path, {ImageFileKind::kTiff}, &why);
+  if (image.empty()) {
     throw Error(fmt::format("{}: cannot be decoded as a TIFF file ({} bytes)", path, bytes.size()));
   }
-  if (picture.type() != CV_32FC1 && picture.type() != CV_32FC3) {
+  if (image.type() != CV_32FC1 && image.type() != CV_32FC3) {
     throw Error(fmt::format(
         "{}: float values in 1 or 3 channels are expected, found {} channel(s) of {} bits{}", path,
-        picture.channels(), 8 * picture.elemSize1(), picture.depth() >= CV_32F ? ", float" : ""));
+        image.channels(), 8 * image.elemSize1(), image.depth() >= CV_32F ? ", float" : ""));
   }
-  model::LinearPicture light{picture.cols, picture.rows, picture.channels(), {}};
-  light.values.reserve(picture.total() * static_cast<std::size_t>(picture.channels()));
-  for (int y = 0; y < picture.rows; ++y) {
+  model::LinearImage light{image.cols, image.rows, image.channels(), {}};
+  light.values.reserve(image.total() * static_cast<std::size_t>(image.channels()));
+  for (int y = 0; y < image.rows; ++y) {
     ThrowIfCancelled();
-    const auto* row = picture.ptr<float>(y);
+    const auto* row = image.ptr<float>(y);
     light.values.insert(light.values.end(), row,
-                        row + static_cast<std::ptrdiff_t>(picture.cols) * picture.channels());
+                        row + static_cast<std::ptrdiff_t>(image.cols) * image.channels());
   }
   return light;
 }
@@ -114,14 +114,14 @@ std::string ConfidenceFile(int k, int l) {
 }
 
 // Includes the views that were not requested: the light field as a whole is the input.
-void TellFilesOf(const std::string& folder, const model::LightFieldDescription& description) {
+void ReportFilesOf(const std::string& folder, const model::LightFieldDescription& description) {
   const model::LightField& frame = description.light_field;
   for (int l = 0; l < frame.v_count; ++l) {
     for (int k = 0; k < frame.u_count; ++k) {
       if (!frame.IsPresent(k, l)) continue;
-      TellInput((fs::path(folder) / ViewFile(k, l, description.view_format)).string());
+      ReportInput((fs::path(folder) / ViewFile(k, l, description.view_format)).string());
       if (!description.has_confidence) continue;
-      TellInput((fs::path(folder) / ConfidenceFile(k, l)).string());
+      ReportInput((fs::path(folder) / ConfidenceFile(k, l)).string());
     }
   }
 }
@@ -152,7 +152,7 @@ ViewSource OpenOwn(const std::string& folder, bool sparse) {
     }
   }
   if (!missing.empty() && !sparse) throw MissingViews(folder, missing);
-  TellFilesOf(folder, description);
+  ReportFilesOf(folder, description);
 
   const bool is_png = description.view_format == "png";
   source.read = [folder, is_png, format = description.view_format, transfer = frame.transfer](
@@ -229,7 +229,7 @@ ViewSource OpenHci(const std::string& folder, int grid, bool sparse) {
     throw Error(fmt::format("{}: not a light field: neither {} nor {}, {}, ... are in it", folder,
                             kLightFieldMarker, HciFile(0), HciFile(1)));
   }
-  for (const int number : numbers) TellInput((fs::path(folder) / HciFile(number)).string());
+  for (const int number : numbers) ReportInput((fs::path(folder) / HciFile(number)).string());
   const int row = grid > 0 ? grid : InferredRowLength(folder, numbers);
   int first_u = row, last_u = 0;
   for (const int number : numbers) {
@@ -275,7 +275,7 @@ class ViewReader {
   ViewReader(const ViewSource& source, int first_k, int first_l)
       : source_(source), first_k_(first_k), first_l_(first_l) {}
 
-  model::LinearPicture Read(int k, int l) const {
+  model::LinearImage Read(int k, int l) const {
     ThrowIfCancelled();
     try {
       return source_.read(first_k_ + k, first_l_ + l);
@@ -287,24 +287,24 @@ class ViewReader {
   }
 
   // Reads a view likewise, and requires the size and channels of the frame.
-  model::LinearPicture ReadLike(const model::LightField& frame, int k, int l) const {
-    model::LinearPicture picture = Read(k, l);
-    RequireLike(frame, k, l, picture);
-    return picture;
+  model::LinearImage ReadLike(const model::LightField& frame, int k, int l) const {
+    model::LinearImage image = Read(k, l);
+    RequireLike(frame, k, l, image);
+    return image;
   }
 
   // Throws Error unless the view has the size and channels of the frame.
   void RequireLike(const model::LightField& frame, int k, int l,
-                   const model::LinearPicture& picture) const {
-    if (picture.width_px == frame.s_count && picture.height_px == frame.t_count &&
-        picture.channels == frame.channels) {
+                   const model::LinearImage& image) const {
+    if (image.width_px == frame.s_count && image.height_px == frame.t_count &&
+        image.channels == frame.channels) {
       return;
     }
     throw Error(fmt::format(
         "{}: view ({}, {}) has {}x{} px in {} channel(s), the light field {}x{} in {}: they must "
         "be equal",
-        source_.folder, first_k_ + k, first_l_ + l, picture.width_px, picture.height_px,
-        picture.channels, frame.s_count, frame.t_count, frame.channels));
+        source_.folder, first_k_ + k, first_l_ + l, image.width_px, image.height_px, image.channels,
+        frame.s_count, frame.t_count, frame.channels));
   }
 
  private:
@@ -347,14 +347,14 @@ void RequireValid(const model::LightField& light_field) {
   RequireStorable(light_field.channels);
 }
 
-// Calls write(k, l, picture) for every view that is present, on several threads.
+// Calls write(k, l, image) for every view that is present, on several threads.
 void ForEachView(const model::LightField& light_field,
-                 const std::function<void(int, int, const model::LinearPicture&)>& write) {
+                 const std::function<void(int, int, const model::LinearImage&)>& write) {
   ParallelFor(light_field.u_count * light_field.v_count, Threads(), [&](int i) {
     ThrowIfCancelled();
     const int k = i % light_field.u_count;
     const int l = i / light_field.u_count;
-    if (light_field.IsPresent(k, l)) write(k, l, model::ViewPicture(light_field, k, l));
+    if (light_field.IsPresent(k, l)) write(k, l, model::ViewImage(light_field, k, l));
   });
 }
 
@@ -406,7 +406,7 @@ model::LightField ReadLightField(const std::string& folder, const LightFieldRead
   const ViewReader reader(source, (source.frame.u_count - frame.u_count) / 2,
                           (source.frame.v_count - frame.v_count) / 2);
   const std::pair<int, int> first_place = FirstPresent(frame);
-  model::LinearPicture first = reader.Read(first_place.first, first_place.second);
+  model::LinearImage first = reader.Read(first_place.first, first_place.second);
   if (frame.s_count == 0) {  // the size is known only from the views themselves
     frame.s_count = first.width_px;
     frame.t_count = first.height_px;
@@ -426,8 +426,8 @@ model::LightField ReadLightField(const std::string& folder, const LightFieldRead
     const int l = i / frame.u_count;
     if (!frame.IsPresent(k, l)) return;
     const bool is_first = std::pair(k, l) == first_place;
-    model::LinearPicture view = is_first ? std::move(first) : reader.ReadLike(frame, k, l);
-    if (reading.crop) view = model::CropPicture(view, *reading.crop);
+    model::LinearImage view = is_first ? std::move(first) : reader.ReadLike(frame, k, l);
+    if (reading.crop) view = model::CropImage(view, *reading.crop);
     model::SetView(&light_field, k, l, view);
   });
   light_field.present = present;
@@ -456,11 +456,11 @@ LightFieldWriter::LightFieldWriter(const model::TransferCurve& transfer, ViewFor
 }
 
 double LightFieldWriter::BytesForView(double values) const {
-  constexpr double kPngBytes = 10;  // stored values, their rows, and the growing file
+  constexpr double kPngBytes = 10;  // encoded values, their rows, and the growing file
   return format_ == ViewFormat::kTiff ? 0 : values * kPngBytes;
 }
 
-void LightFieldWriter::WriteView(int k, int l, const model::LinearPicture& view) {
+void LightFieldWriter::WriteView(int k, int l, const model::LinearImage& view) {
   RequireStorable(view.channels);
   const auto start = Clock::now();
   const std::string name = ViewFile(k, l, NameOf(format_));
@@ -470,7 +470,7 @@ void LightFieldWriter::WriteView(int k, int l, const model::LinearPicture& view)
       WriteFloatTiff(view, path, shown);
     });
   } else {
-    folder_->Write(name, EncodePng(model::ToStored(view, *levels_)));
+    folder_->Write(name, EncodePng(model::ToEncoded(view, *levels_)));
     clipped = CountClipped(view, transfer_, levels_->bits());
   }
   const std::lock_guard<std::mutex> lock(mutex_);
@@ -505,9 +505,8 @@ std::size_t LightFieldWriter::Finish(const model::LightField& light_field) {
 
 void WriteViews(const model::LightField& light_field, LightFieldWriter* writer) {
   RequireValid(light_field);
-  ForEachView(light_field, [&](int k, int l, const model::LinearPicture& view) {
-    writer->WriteView(k, l, view);
-  });
+  ForEachView(light_field,
+              [&](int k, int l, const model::LinearImage& view) { writer->WriteView(k, l, view); });
 }
 
 std::size_t WriteLightField(const model::LightField& light_field, ViewFormat format,
@@ -527,9 +526,9 @@ OutputFolder ClaimHciFolder(const std::string& path) {
                     "replaced; choose another name",
                     path));
   }
-  constexpr int kMostViews = 10000;
+  constexpr int kMaxViews = 10000;
   std::vector<std::string> entries = {kHciMarker};
-  for (int i = 0; i < kMostViews; ++i) entries.push_back(HciFile(i));
+  for (int i = 0; i < kMaxViews; ++i) entries.push_back(HciFile(i));
   return OutputFolder(path, kHciMarker, entries);
 }
 
@@ -537,23 +536,23 @@ std::size_t WriteHciLightField(const model::LightField& light_field, OutputFolde
   RequireValid(light_field);
   constexpr int kBits = 8;
   const model::TransferCurve srgb = model::TransferCurve::Srgb();
-  const model::StoredLevels levels(srgb, kBits);
+  const model::QuantisedLevels levels(srgb, kBits);
   std::atomic<std::size_t> clipped{0};
-  ForEachView(light_field, [&](int k, int l, const model::LinearPicture& view) {
-    folder->Write(HciFile(l * light_field.u_count + k), EncodePng(model::ToStored(view, levels)));
+  ForEachView(light_field, [&](int k, int l, const model::LinearImage& view) {
+    folder->Write(HciFile(l * light_field.u_count + k), EncodePng(model::ToEncoded(view, levels)));
     clipped += CountClipped(view, srgb, kBits);
   });
   folder->Write(kHciMarker, HciParameters(light_field));
   return clipped;
 }
 
-std::size_t CountClipped(const model::LinearPicture& picture, const model::TransferCurve& transfer,
+std::size_t CountClipped(const model::LinearImage& image, const model::TransferCurve& transfer,
                          int bits) {
   const double half_level = 0.5 / (bits == 8 ? 255.0 : 65535.0);
   const auto least = static_cast<float>(transfer.Decode(-half_level));
   const auto most = static_cast<float>(transfer.Decode(1 + half_level));
   return static_cast<std::size_t>(
-      std::count_if(picture.values.begin(), picture.values.end(),
+      std::count_if(image.values.begin(), image.values.end(),
                     [=](float light) { return !(light >= least && light <= most); }));
 }
 

@@ -15,7 +15,7 @@ struct OpenCvCodecs {
   // `why` then gets the reason if it is known.
   cv::Mat (*decode)(const std::string& bytes, std::string* why);
   // 8 bits, 1 or 3 channels, red first; empty if the image cannot be encoded.
-  std::vector<unsigned char> (*encode_jpeg)(const cv::Mat& picture, int quality);
+  std::vector<unsigned char> (*encode_jpeg)(const cv::Mat& image, int quality);
 };
 
 // Throws Error if that library is missing from the program's installation. Many threads may call

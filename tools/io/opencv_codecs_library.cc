@@ -12,13 +12,13 @@ namespace {
 
 // OpenCV stores colours as BGR, the project as RGB. Pixel types that are not swapped here are
 // rejected later by their type.
-cv::Mat SwapRedAndBlue(const cv::Mat& picture) {
-  const int channels = picture.channels(), depth = picture.depth();
+cv::Mat SwapRedAndBlue(const cv::Mat& image) {
+  const int channels = image.channels(), depth = image.depth();
   const bool has_colours = channels == 3 || channels == 4;
   const bool is_known = depth == CV_8U || depth == CV_16U || depth == CV_32F;
-  if (picture.empty() || !has_colours || !is_known) return picture;
+  if (image.empty() || !has_colours || !is_known) return image;
   cv::Mat swapped;
-  cv::cvtColor(picture, swapped, channels == 3 ? cv::COLOR_BGR2RGB : cv::COLOR_BGRA2RGBA);
+  cv::cvtColor(image, swapped, channels == 3 ? cv::COLOR_BGR2RGB : cv::COLOR_BGRA2RGBA);
   return swapped;
 }
 
@@ -39,10 +39,10 @@ cv::Mat Decode(const std::string& bytes, std::string* why) {
   }
 }
 
-std::vector<unsigned char> EncodeJpeg(const cv::Mat& picture, int quality) {
+std::vector<unsigned char> EncodeJpeg(const cv::Mat& image, int quality) {
   std::vector<unsigned char> bytes;
   const bool done =
-      cv::imencode(".jpg", SwapRedAndBlue(picture), bytes, {cv::IMWRITE_JPEG_QUALITY, quality});
+      cv::imencode(".jpg", SwapRedAndBlue(image), bytes, {cv::IMWRITE_JPEG_QUALITY, quality});
   return done ? bytes : std::vector<unsigned char>();
 }
 

@@ -71,9 +71,8 @@ void RequireWholePng(const std::string& bytes, const std::string& name) {
   for (std::size_t at = kSignatureBytes;;) {
     const std::optional<std::size_t> length = ContentBytes(bytes, at);
     if (!length) {
-      throw Error(
-          fmt::format("{}: broken PNG: it ends after {} bytes, in the middle of the picture", name,
-                      bytes.size()));
+      throw Error(fmt::format("{}: broken PNG: it ends after {} bytes, in the middle of the image",
+                              name, bytes.size()));
     }
     const std::size_t type_at = at + kLengthBytes;
     const std::size_t crc_at = type_at + kTypeBytes + *length;

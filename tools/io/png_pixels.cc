@@ -16,9 +16,9 @@
 namespace thicklens::io {
 namespace {
 
-// The maximum side of a picture; a larger one means a broken header.
-constexpr std::uint32_t kMostSidePx = 1 << 20;
-constexpr double kMostPixels = 1 << 30;
+// The maximum side of an image; a larger one means a broken header.
+constexpr std::uint32_t kMaxSidePx = 1 << 20;
+constexpr double kMaxPngPixels = 1 << 30;
 
 struct FreeContext {
   void operator()(spng_ctx* context) const { spng_ctx_free(context); }
@@ -60,7 +60,7 @@ struct Effort {
   int filters, level, strategy;
 };
 
-// In 16-bit pictures compression meets only noise.
+// In 16-bit images compression meets only noise.
 Effort EffortOf(PngPacking packing) {
   switch (packing) {
     case PngPacking::kFast:
@@ -75,27 +75,27 @@ Effort EffortOf(PngPacking packing) {
 
 // Decodes row by row, so that it can be cancelled between two rows. An interlaced image passes each
 // row several times.
-int DecodeRows(const Decoding& decoding, spng_ctx* context, cv::Mat* picture) {
+int DecodeRows(const Decoding& decoding, spng_ctx* context, cv::Mat* image) {
   int code = spng_decode_image(context, nullptr, 0, decoding.format,
                                decoding.flags | SPNG_DECODE_PROGRESSIVE);
-  const std::size_t row_bytes = static_cast<std::size_t>(picture->cols) * picture->elemSize();
+  const std::size_t row_bytes = static_cast<std::size_t>(image->cols) * image->elemSize();
   while (code == SPNG_OK) {
     ThrowIfCancelled();
     spng_row_info row{};
     code = spng_get_row_info(context, &row);
     if (code != SPNG_OK) break;
-    code = spng_decode_row(context, picture->ptr(static_cast<int>(row.row_num)), row_bytes);
+    code = spng_decode_row(context, image->ptr(static_cast<int>(row.row_num)), row_bytes);
   }
   return code == SPNG_EOI ? SPNG_OK : code;
 }
 
-int EncodeRows(const cv::Mat& picture, spng_ctx* context) {
+int EncodeRows(const cv::Mat& image, spng_ctx* context) {
   int code = spng_encode_image(context, nullptr, 0, SPNG_FMT_PNG,
                                SPNG_ENCODE_PROGRESSIVE | SPNG_ENCODE_FINALIZE);
-  const std::size_t row_bytes = static_cast<std::size_t>(picture.cols) * picture.elemSize();
-  for (int y = 0; y < picture.rows && code == SPNG_OK; ++y) {
+  const std::size_t row_bytes = static_cast<std::size_t>(image.cols) * image.elemSize();
+  for (int y = 0; y < image.rows && code == SPNG_OK; ++y) {
     ThrowIfCancelled();
-    code = spng_encode_row(context, picture.ptr(y), row_bytes);
+    code = spng_encode_row(context, image.ptr(y), row_bytes);
   }
   return code == SPNG_EOI ? SPNG_OK : code;
 }
@@ -111,13 +111,13 @@ cv::Mat DecodePngPixels(const std::string& bytes, std::string* why) {
     return code == SPNG_OK;
   };
   spng_ihdr header{};
-  cv::Mat picture;
-  if (error == SPNG_OK && works(spng_set_image_limits(context.get(), kMostSidePx, kMostSidePx)) &&
+  cv::Mat image;
+  if (error == SPNG_OK && works(spng_set_image_limits(context.get(), kMaxSidePx, kMaxSidePx)) &&
       works(spng_set_png_buffer(context.get(), pixels.data(), pixels.size())) &&
       works(spng_get_ihdr(context.get(), &header))) {
-    if (static_cast<double>(header.width) * header.height > kMostPixels) {
+    if (static_cast<double>(header.width) * header.height > kMaxPngPixels) {
       *why = fmt::format("{}x{} px exceed the maximum of {:.0f} px", header.width, header.height,
-                         kMostPixels);
+                         kMaxPngPixels);
       return {};
     }
     spng_trns transparency{};
@@ -125,18 +125,18 @@ cv::Mat DecodePngPixels(const std::string& bytes, std::string* why) {
     const int found = spng_get_trns(context.get(), &transparency);
     if (works(found == SPNG_ECHUNKAVAIL ? SPNG_OK : found)) {
       const Decoding decoding = DecodingOf(header, found == SPNG_OK);
-      picture.create(static_cast<int>(header.height), static_cast<int>(header.width),
-                     CV_MAKETYPE(decoding.depth, decoding.channels));
-      works(DecodeRows(decoding, context.get(), &picture));
+      image.create(static_cast<int>(header.height), static_cast<int>(header.width),
+                   CV_MAKETYPE(decoding.depth, decoding.channels));
+      works(DecodeRows(decoding, context.get(), &image));
     }
   }
-  if (error == SPNG_OK) return picture;
+  if (error == SPNG_OK) return image;
   *why = spng_strerror(error);
   return {};
 }
 
-std::string EncodePngPixels(const cv::Mat& picture, PngPacking packing) {
-  const cv::Mat whole = picture.isContinuous() ? picture : picture.clone();
+std::string EncodePngPixels(const cv::Mat& image, PngPacking packing) {
+  const cv::Mat whole = image.isContinuous() ? image : image.clone();
   const Context context(spng_ctx_new(SPNG_CTX_ENCODER));
   spng_ihdr header{};
   header.width = static_cast<std::uint32_t>(whole.cols);
@@ -159,7 +159,7 @@ std::string EncodePngPixels(const cv::Mat& picture, PngPacking packing) {
   std::unique_ptr<void, Free> file;
   if (error == SPNG_OK) file.reset(spng_get_png_buffer(context.get(), &size, &error));
   if (error != SPNG_OK || file == nullptr) {
-    throw Error(fmt::format("a picture of {}x{} px could not be encoded as PNG: {}", whole.cols,
+    throw Error(fmt::format("an image of {}x{} px could not be encoded as PNG: {}", whole.cols,
                             whole.rows, spng_strerror(error)));
   }
   return {static_cast<const char*>(file.get()), size};

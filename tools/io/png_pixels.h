@@ -18,7 +18,7 @@ enum class PngPacking {
 };
 
 // Encodes 8 or 16 bits; 1, 3 (RGB) or 4 (RGBA) channels. Throws Error if memory is short.
-std::string EncodePngPixels(const cv::Mat& picture, PngPacking packing);
+std::string EncodePngPixels(const cv::Mat& image, PngPacking packing);
 
 }  // namespace thicklens::io
 

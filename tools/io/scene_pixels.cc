@@ -9,13 +9,12 @@ std::vector<model::LayerPixels> ReadScenePixels(const model::SceneSimulationOpti
   std::vector<model::LayerPixels> pixels(scene.layers.size());
   for (std::size_t i = 0; i < scene.layers.size(); ++i) {
     const model::SceneLayer& layer = scene.layers[i];
-    if (layer.texture.kind == model::TextureKind::kPicture) {
-      pixels[i].texture =
-          model::ToLinear(ToStoredPicture(ReadPictureFile(layer.texture.picture_path)),
-                          model::TransferCurve::Srgb());
+    if (layer.texture.kind == model::TextureKind::kImage) {
+      pixels[i].texture = model::ToLinear(ToEncodedImage(ReadImageFile(layer.texture.image_path)),
+                                          model::TransferCurve::Srgb());
     }
     if (layer.outline.shape == model::OutlineOptions::Shape::kMask) {
-      pixels[i].mask = model::ToLinear(ToStoredPicture(ReadPictureFile(layer.outline.mask_path)),
+      pixels[i].mask = model::ToLinear(ToEncodedImage(ReadImageFile(layer.outline.mask_path)),
                                        model::TransferCurve::Linear());
     }
     if (layer.depth) pixels[i].depth = ReadDepthMap(layer.depth->map_path);

@@ -21,10 +21,10 @@ model::SweepTarget SweepTargetOf(model::TargetKind kind) {
 
 }  // namespace
 
-// Picture files of unknown origin are assumed to be sRGB, as a screen would show them.
-model::LinearPicture ReadTargetPicture(const model::TargetOptions& target) {
-  if (target.kind != model::TargetKind::kPicture) return {};
-  const model::StoredPicture stored = ToStoredPicture(ReadPictureFile(target.picture_path));
+// Image files of unknown origin are assumed to be sRGB, as a screen would show them.
+model::LinearImage ReadTargetImage(const model::TargetOptions& target) {
+  if (target.kind != model::TargetKind::kImage) return {};
+  const model::EncodedImage stored = ToEncodedImage(ReadImageFile(target.image_path));
   return model::ToGrey(model::ToLinear(stored, model::TransferCurve::Srgb()));
 }
 
@@ -45,11 +45,11 @@ model::SweepFile DescribeSweep(const model::SweepSimulationOptions& simulation,
   return sweep;
 }
 
-cv::Mat AsFile(const model::StoredPicture& picture) {
-  const cv::Mat values(picture.height_px, picture.width_px, CV_16UC(picture.channels),
-                       const_cast<std::uint16_t*>(picture.values.data()));  // NOLINT: only read
+cv::Mat AsFile(const model::EncodedImage& image) {
+  const cv::Mat values(image.height_px, image.width_px, CV_16UC(image.channels),
+                       const_cast<std::uint16_t*>(image.values.data()));  // NOLINT: only read
   cv::Mat file;
-  values.convertTo(file, picture.bits == 8 ? CV_8U : CV_16U);
+  values.convertTo(file, image.bits == 8 ? CV_8U : CV_16U);
   return file;
 }
 

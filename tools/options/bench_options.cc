@@ -16,7 +16,7 @@ void AddSeedOption(CLI::App* command, std::uint64_t* seed) {
 }
 
 void AddSizeOption(CLI::App* command, int least, int* size_px) {
-  command->add_option("--size-px", *size_px, "Side of the simulated picture")
+  command->add_option("--size-px", *size_px, "Side of the simulated image")
       ->check(CLI::Range(least, 4096))
       ->capture_default_str()
       ->type_name("PX");

@@ -38,7 +38,7 @@ std::string JsonText(const nlohmann::json& summary) {
 
 // Returns whether the reason of a refusal may be written to `path`. A user who has mixed up names
 // may have given one of the inputs, and a run that is refused early does not know all of them.
-bool MayTellRefusal(const std::string& path) {
+bool MayReportRefusal(const std::string& path) {
   std::error_code ignored;
   if (!fs::exists(path, ignored)) return true;
   try {
@@ -65,7 +65,7 @@ class SummaryOutput {
     spdlog::debug("{} written", path_);
   }
   void WriteRefusal(const std::string& reason) {
-    if (file_ && !MayTellRefusal(path_)) {
+    if (file_ && !MayReportRefusal(path_)) {
       spdlog::warn(
           "{}: this file is not JSON and is not overwritten; the reason is not written there",
           PrintableUtf8(path_));
@@ -122,7 +122,7 @@ void PrintResult(const CommonOptions& options, const std::string& text) {
     std::fwrite(text.data(), 1, text.size(), stdout);
 }
 
-void TellAssumedFields(const model::Camera& camera) {
+void ReportAssumedFields(const model::Camera& camera) {
   for (const std::string& notice : camera.notices) spdlog::warn("{}", PrintableUtf8(notice));
   const std::vector<std::string> fields = model::AssumedFields(camera);
   if (fields.empty()) return;

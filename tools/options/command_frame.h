@@ -38,7 +38,7 @@ void RunCommand(const CommonOptions& options, const std::function<CommandResult(
 void PrintResult(const CommonOptions& options, const std::string& text);
 
 // Reports on stderr, in one line, which numbers of the camera are assumed.
-void TellAssumedFields(const model::Camera& camera);
+void ReportAssumedFields(const model::Camera& camera);
 
 // When the command line asks for a command, its action is set.
 using CommandAction = std::function<void()>;

@@ -21,7 +21,7 @@ auto Parsed(const std::string& option, const Parse& parse) {
   }
 }
 
-std::string BoundText(const model::EffectFinding& finding) {
+std::string BoundText(const model::LargestEffectImpact& finding) {
   const double grey_levels = finding.impact.grey_levels;
   if (grey_levels == 0) return "0";
   if (grey_levels < 0.001) return "< 0.001";
@@ -57,7 +57,7 @@ void AddEffectOptions(CLI::App* command, EffectOptions* options) {
 }
 
 void CheckEffectNames(const EffectOptions& options, const model::EffectSet& of_model) {
-  model::EffectChoice named;
+  model::EffectSelectionOptions named;
   ApplyEffectOptions(options, &named);
   for (const auto& [option, effects] :
        {std::pair("--effects", named.given), std::pair("--without", named.without)}) {
@@ -68,14 +68,15 @@ void CheckEffectNames(const EffectOptions& options, const model::EffectSet& of_m
   }
 }
 
-void ApplyEffectOptions(const EffectOptions& options, model::EffectChoice* choice) {
+void ApplyEffectOptions(const EffectOptions& options, model::EffectSelectionOptions* choice) {
   if (options.effects && options.effects->empty()) {
     throw UsageError(
         "--effects: auto, all, none or names separated by commas are expected, found ''");
   }
   if (options.effects) {
-    const model::EffectChoice given =
-        Parsed("--effects", [&] { return model::EffectChoiceFromText(*options.effects, "", ""); });
+    const model::EffectSelectionOptions given = Parsed("--effects", [&] {
+      return model::EffectSelectionOptionsFromText(*options.effects, "", "");
+    });
     choice->base = given.base;
     choice->given = given.given;
   }
@@ -89,16 +90,16 @@ void ApplyEffectOptions(const EffectOptions& options, model::EffectChoice* choic
   }
 }
 
-std::string EffectPlaceText(const model::EffectPlace& place) {
+std::string EffectSiteText(const model::EffectSite& place) {
   const std::string depth =
       std::isfinite(place.depth_mm) ? fmt::format("{:.5g} mm", place.depth_mm) : "infinity";
   return fmt::format("{}, at ({:.0f}, {:.0f})", depth, place.position_px.x(),
                      place.position_px.y());
 }
 
-nlohmann::json EffectsJson(const model::EffectDecision& decision) {
+nlohmann::json EffectsJson(const model::EffectSelection& decision) {
   nlohmann::json json = nlohmann::json::array();
-  for (const model::EffectFinding& finding : decision.findings) {
+  for (const model::LargestEffectImpact& finding : decision.findings) {
     const model::EffectFacts& facts = model::FactsOf(finding.effect);
     const double depth_mm = finding.place.depth_mm;
     json.push_back(
@@ -115,9 +116,9 @@ nlohmann::json EffectsJson(const model::EffectDecision& decision) {
   return json;
 }
 
-std::string EffectsText(const model::EffectDecision& decision) {
+std::string EffectsText(const model::EffectSelection& decision) {
   std::string left_out;
-  for (const model::EffectFinding& finding : decision.findings) {
+  for (const model::LargestEffectImpact& finding : decision.findings) {
     if (decision.on.Has(finding.effect)) continue;
     left_out += fmt::format("{}{} ({})", left_out.empty() ? "" : ", ",
                             model::EffectName(finding.effect), BoundText(finding));
@@ -126,12 +127,12 @@ std::string EffectsText(const model::EffectDecision& decision) {
                      model::JoinedNames(decision.on), left_out.empty() ? "none" : left_out);
 }
 
-std::string EffectsTable(const model::EffectDecision& decision,
+std::string EffectsTable(const model::EffectSelection& decision,
                          const std::vector<std::pair<model::Effect, double>>* cost_seconds) {
   std::string text =
       fmt::format("{:<15} {:>22} {:>13}{}  {:<4} {}\n", "effect", "largest impact", "grey levels",
                   cost_seconds != nullptr ? fmt::format("{:>10}", "cost s") : "", "", "where");
-  for (const model::EffectFinding& finding : decision.findings) {
+  for (const model::LargestEffectImpact& finding : decision.findings) {
     const model::EffectFacts& facts = model::FactsOf(finding.effect);
     const std::string unit =
         facts.unit == model::EffectUnit::kGreyLevels ? "levels" : model::EffectUnitName(facts.unit);
@@ -146,7 +147,7 @@ std::string EffectsTable(const model::EffectDecision& decision,
     text += fmt::format(
         "{:<15} {:>22} {:>13}{}  {:<4} {}\n", facts.name,
         fmt::format("{}{:.4g} {}", facts.random ? "sd " : "", finding.impact.amount, unit),
-        BoundText(finding), cost, on, EffectPlaceText(finding.place));
+        BoundText(finding), cost, on, EffectSiteText(finding.place));
   }
   return text;
 }

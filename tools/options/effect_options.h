@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "thicklens/model/effect_choice.h"
+#include "thicklens/model/effect_selection.h"
 
 namespace thicklens::tools {
 
@@ -22,18 +22,18 @@ void AddEffectOptions(CLI::App* command, EffectOptions* options);
 // Throws UsageError for named effects that the forward model does not have.
 void CheckEffectNames(const EffectOptions& options, const model::EffectSet& of_model);
 // Overrides `choice` with the given options. Throws UsageError.
-void ApplyEffectOptions(const EffectOptions& options, model::EffectChoice* choice);
+void ApplyEffectOptions(const EffectOptions& options, model::EffectSelectionOptions* choice);
 
 // "250 mm, at (0, 479)".
-std::string EffectPlaceText(const model::EffectPlace& place);
+std::string EffectSiteText(const model::EffectSite& place);
 // One entry for each effect: name, impact with its unit, bound in grey levels, on, where.
-nlohmann::json EffectsJson(const model::EffectDecision& decision);
+nlohmann::json EffectsJson(const model::EffectSelection& decision);
 // One line on the effects that were on and those that were left out.
-std::string EffectsText(const model::EffectDecision& decision);
+std::string EffectsText(const model::EffectSelection& decision);
 // One line for each effect. `cost_seconds` may be null; otherwise it holds the costs of some
 // effects, shown in a column of their own.
 std::string EffectsTable(
-    const model::EffectDecision& decision,
+    const model::EffectSelection& decision,
     const std::vector<std::pair<model::Effect, double>>* cost_seconds = nullptr);
 
 }  // namespace thicklens::tools

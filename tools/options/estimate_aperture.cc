@@ -16,7 +16,7 @@
 namespace thicklens::tools {
 namespace {
 
-constexpr int kUsualViewCount = 7;
+constexpr int kDefaultViewCount = 7;
 
 struct ShapeAndSource {
   model::ApertureShape shape = model::ApertureShape::kUniform;
@@ -43,7 +43,7 @@ model::LightField ReadViewsOfAperture(const EstimateOptions& options) {
   return io::ReadLightField(options.aperture_of, reading);
 }
 
-void TellAssumedShape(const EstimateOptions& options) {
+void ReportAssumedShape(const EstimateOptions& options) {
   spdlog::warn(
       "{}: neither the light field nor a camera states the aperture of the photograph, so a "
       "uniform one is assumed; --aperture-shape gaussian or disc states another",
@@ -87,7 +87,7 @@ EstimateAperture ApertureFor(const EstimateOptions& options, const model::Camera
   aperture.from = unstated.from;
   if (options.aperture_of.empty()) {
     auto [u_count, v_count] = ViewCounts(options.views);
-    if (u_count == 0) u_count = v_count = kUsualViewCount;
+    if (u_count == 0) u_count = v_count = kDefaultViewCount;
     aperture.weights = model::ApertureWeights(unstated.shape, u_count, v_count);
     return aperture;
   }
@@ -98,7 +98,7 @@ EstimateAperture ApertureFor(const EstimateOptions& options, const model::Camera
     aperture.step_mm = model::ApertureStepsMm(grid, *light_field.camera).cwiseAbs();
   }
   if (!io::StatesAperture(options.aperture_of)) {
-    if (aperture.from == "assumed") TellAssumedShape(options);
+    if (aperture.from == "assumed") ReportAssumedShape(options);
     aperture.weights = io::ShapeOfPresentViews(unstated.shape, light_field);
     return aperture;
   }

@@ -15,7 +15,7 @@ namespace thicklens::tools {
 
 struct PreparedEstimate {
   estimator::EstimateInput input;
-  model::EffectDecision effects;
+  model::EffectSelection effects;
   PreparedDepth depth;  // without its disparity, which is in `input`
   // Noise of the disparity, px per view step: as read, and after smoothing if it was smoothed.
   std::optional<double> depth_noise_px, depth_noise_left_px;

@@ -49,7 +49,7 @@ CLI::Validator NotEmpty(const std::string& what) {
 }
 
 void AddInputOptions(CLI::App* command, EstimateOptions* options) {
-  command->add_option("picture", options->picture_path, "The photograph (PNG, JPEG or TIFF)")
+  command->add_option("image", options->image_path, "The photograph (PNG, JPEG or TIFF)")
       ->required()
       ->type_name("IMAGE");
   command->add_option("depth", options->depth_path, "Its depth map, of the same size")
@@ -61,7 +61,7 @@ void AddInputOptions(CLI::App* command, EstimateOptions* options) {
       ->type_name("CAMERA.yaml");
   command
       ->add_option("--sensor-origin", options->sensor_origin,
-                   "Position on the camera's sensor of a picture that is a part of it, px")
+                   "Position on the camera's sensor of an image that is a part of it, px")
       ->type_name("X,Y");
   command->add_flag("--ignore-exif", options->ignore_exif,
                     "Continue even if the EXIF of the photograph states another lens, setting or "
@@ -78,7 +78,7 @@ void AddInputOptions(CLI::App* command, EstimateOptions* options) {
   AddCropOption(command, &options->crop);
   command
       ->add_option("--transfer", options->transfer,
-                   "How light became stored values: linear, srgb or gamma-2.2; default: as the "
+                   "How light became encoded values: linear, srgb or gamma-2.2; default: as the "
                    "camera file states, or srgb without a camera")
       ->check(CLI::IsMember({"linear", "srgb", "gamma-2.2"}))
       ->type_name("NAME");
@@ -114,8 +114,9 @@ void AddLightFieldOptions(CLI::App* command, EstimateOptions* options) {
       ->type_name("NAME");
   AddEffectOptions(command, &options->effects);
   command
-      ->add_option("--format", options->format,
-                   "Format of the views: png (16 bit, stored values) or tiff (float, linear light)")
+      ->add_option(
+          "--format", options->format,
+          "Format of the views: png (16 bit, encoded values) or tiff (float, linear light)")
       ->check(CLI::IsMember({"png", "tiff"}))
       ->capture_default_str()
       ->type_name("NAME");
@@ -124,9 +125,9 @@ void AddLightFieldOptions(CLI::App* command, EstimateOptions* options) {
 void AddSolverOptions(CLI::App* command, EstimateOptions* options) {
   command
       ->add_option("--solver", options->solver,
-                   "scene: solves for the whole picture at once. For comparison: blocks, the "
+                   "scene: solves for the whole image at once. For comparison: blocks, the "
                    "paper's method, block by block; functional and grid, the paper's functional "
-                   "for the whole picture, on the rays of scene points or of the views")
+                   "for the whole image, on the rays of scene points or of the views")
       ->check(CLI::IsMember({"scene", "blocks", "functional", "grid"}))
       ->capture_default_str()
       ->type_name("NAME");
@@ -145,12 +146,12 @@ void AddSceneOptions(CLI::App* command, EstimateOptions* options) {
                    "Regularisation prior of the radiance (solver scene): ridge, gradient, tv "
                    "(total variation, default) or patches (tv plus few frequencies per patch and "
                    "shading that follows the relief of the depth: better but slower if depth and "
-                   "camera explain the picture well)")
+                   "camera explain the image well)")
       ->check(CLI::IsMember({"ridge", "gradient", "tv", "patches"}))
       ->type_name("NAME");
   command
       ->add_option("--strength", options->strength,
-                   "Weight of the prior (solver scene): auto (from the picture's noise, default), "
+                   "Weight of the prior (solver scene): auto (from the image's noise, default), "
                    "gcv (cross-validation) or a number")
       ->check(IsStrength())
       ->type_name("RULE");
@@ -171,7 +172,7 @@ void AddFunctionalOptions(CLI::App* command, EstimateOptions* options) {
       ->type_name("X");
   command
       ->add_option("--ridge", options->ridge,
-                   "Weight mu of the distance to the warped picture (solvers blocks, functional, "
+                   "Weight mu of the distance to the warped image (solvers blocks, functional, "
                    "grid); default 0.01/(U V)")
       ->check(Finite())
       ->type_name("X");
@@ -246,8 +247,8 @@ struct OptionOfSolvers {
 std::vector<OptionOfSolvers> OptionsOfSolvers(const EstimateOptions& options) {
   const std::vector<std::string> scene = {"scene"}, blocks = {"blocks"};
   const std::vector<std::string> smooth = {"blocks", "functional", "grid"};
-  const std::vector<std::string> whole_picture = {"scene", "functional", "grid"};
-  std::vector<std::string> iterative = whole_picture;
+  const std::vector<std::string> whole_image = {"scene", "functional", "grid"};
+  std::vector<std::string> iterative = whole_image;
   if (options.block_solver &&
       estimator::IsIterative(estimator::BlockSolverFromName(*options.block_solver))) {
     iterative.emplace_back("blocks");
@@ -257,7 +258,7 @@ std::vector<OptionOfSolvers> OptionsOfSolvers(const EstimateOptions& options) {
           {"--check-blur", options.check_blur, scene},
           {"--tolerance", options.tolerance.has_value(), iterative},
           {"--max-iterations", options.max_iterations.has_value(), iterative},
-          {"--double", options.double_precision, whole_picture},
+          {"--double", options.double_precision, whole_image},
           {"--gamma", options.gamma.has_value(), smooth},
           {"--ridge", options.ridge.has_value(), smooth},
           {"--block-solver", options.block_solver.has_value(), blocks},

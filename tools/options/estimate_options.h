@@ -21,7 +21,7 @@ namespace thicklens::tools {
 // The command line of `thicklens estimate`. An empty or absent value was not given.
 struct EstimateOptions {
   CommonOptions common;
-  std::string picture_path, depth_path, camera_path, output_folder, report_folder;
+  std::string image_path, depth_path, camera_path, output_folder, report_folder;
   DepthOptions depth;
   ViewsOption views;
   CropOption crop;

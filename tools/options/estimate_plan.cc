@@ -160,7 +160,7 @@ PlanRun RunPlan(const estimator::EstimatePlan& plan, const estimator::EstimateIn
     TakeIterations(summary, &run);
     run.device = summary.device;
   } else if (plan.solver == "blocks") {
-    estimator::EstimateSummary summary;
+    estimator::BlockSummary summary;
     run.light_field = estimator::EstimateByBlocks(input, BlockOptionsOf(options, on, StopWhenAsked),
                                                   backend, &summary);
     run.setup_seconds = summary.setup_seconds;

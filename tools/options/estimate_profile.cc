@@ -199,10 +199,10 @@ double ProbeSeconds(int threads) {
   constexpr int kSizePx = 256, kViews = 5, kRuns = 3;
   // The content of the scene does not matter: it is a plane with the same blur everywhere.
   estimator::EstimateInput input;
-  input.picture = model::LinearPicture{kSizePx, kSizePx, 1, {}};
-  input.picture.values.resize(kSizePx * kSizePx);
-  for (std::size_t i = 0; i < input.picture.values.size(); ++i) {
-    input.picture.values[i] =
+  input.image = model::LinearImage{kSizePx, kSizePx, 1, {}};
+  input.image.values.resize(kSizePx * kSizePx);
+  for (std::size_t i = 0; i < input.image.values.size(); ++i) {
+    input.image.values[i] =
         0.5F + 0.4F * static_cast<float>(std::sin(0.7 * static_cast<double>(i % 977)));
   }
   input.disparity.width_px = input.disparity.height_px = kSizePx;

@@ -20,37 +20,38 @@ EffectSet EffectsOf(const std::string& solver, bool camera) {
   return camera ? effects.With({Effect::kThickness, Effect::kFalloff}) : effects;
 }
 
-model::EffectChoice ChoiceOf(const EffectOptions& options) {
-  model::EffectChoice choice;
+model::EffectSelectionOptions ChoiceOf(const EffectOptions& options) {
+  model::EffectSelectionOptions choice;
   ApplyEffectOptions(options, &choice);
   return choice;
 }
 
-model::EffectDecision DecisionWithoutCamera(const EffectOptions& options,
-                                            const EffectSet& of_model) {
+model::EffectSelection DecisionWithoutCamera(const EffectOptions& options,
+                                             const EffectSet& of_model) {
   if (options.tolerance) {
     throw UsageError(options.tolerance_option +
                      ": without a camera, which effects are relevant is unknown");
   }
-  const model::EffectChoice choice = ChoiceOf(options);
-  const EffectSet base = choice.base == model::EffectChoice::Base::kGiven ? choice.given : of_model;
+  const model::EffectSelectionOptions choice = ChoiceOf(options);
+  const EffectSet base =
+      choice.base == model::EffectSelectionOptions::Base::kGiven ? choice.given : of_model;
   return {base.Without(choice.without), {}};
 }
 
 }  // namespace
 
 bool IsLeftOut(const EffectOptions& options, Effect effect) {
-  const model::EffectChoice choice = ChoiceOf(options);
+  const model::EffectSelectionOptions choice = ChoiceOf(options);
   return choice.without.Has(effect) ||
-         (choice.base == model::EffectChoice::Base::kGiven && !choice.given.Has(effect));
+         (choice.base == model::EffectSelectionOptions::Base::kGiven && !choice.given.Has(effect));
 }
 
-model::EffectDecision DecideEstimateEffects(const EstimateOptions& options,
-                                            const std::optional<model::Camera>& camera,
-                                            const std::optional<model::DepthStatistics>& depth) {
+model::EffectSelection DecideEstimateEffects(const EstimateOptions& options,
+                                             const std::optional<model::Camera>& camera,
+                                             const std::optional<model::DepthStatistics>& depth) {
   const EffectSet of_model = EffectsOf(options.solver, camera.has_value());
   CheckEffectNames(options.effects, of_model);
-  model::EffectChoice choice = ChoiceOf(options.effects);
+  model::EffectSelectionOptions choice = ChoiceOf(options.effects);
   // Effects of the solution itself, which cost the time that they take.
   choice.kept = EffectsOf(options.solver, false);
   const bool is_gaussian = options.aperture_shape.empty() && options.aperture_of.empty() &&
@@ -59,7 +60,7 @@ model::EffectDecision DecideEstimateEffects(const EstimateOptions& options,
   if (IsLeftOut(options.effects, Effect::kDefocus)) {
     throw UsageError(
         "--effects, --without: defocus is what an estimate inverts and cannot be left out; "
-        "thicklens compare --dibr measures the picture that is only warped by its depth");
+        "thicklens compare --dibr measures the image that is only warped by its depth");
   }
   if (of_model.Has(Effect::kOcclusion) && IsLeftOut(options.effects, Effect::kOcclusion)) {
     throw UsageError(
@@ -70,21 +71,21 @@ model::EffectDecision DecideEstimateEffects(const EstimateOptions& options,
   model::EffectConditions conditions;
   conditions.camera = *camera;
   const double focus_depth_mm = camera->focus_depth_mm();
-  return model::DecideEffects(choice, conditions,
+  return model::SelectEffects(choice, conditions,
                               model::PlacesBetween(*camera, depth ? depth->min_mm : focus_depth_mm,
                                                    depth ? depth->max_mm : focus_depth_mm, true),
                               of_model);
 }
 
-model::EffectDecision DecidePhotographEffects(const EffectOptions& options,
-                                              const model::LightField& light_field) {
+model::EffectSelection DecidePhotographEffects(const EffectOptions& options,
+                                               const model::LightField& light_field) {
   const EffectSet of_views = {Effect::kDefocus, Effect::kApertureShape};
   EffectSet of_model =
       light_field.camera ? of_views.With({Effect::kThickness, Effect::kFalloff}) : of_views;
   if (estimator::IsOffAperture(light_field)) of_model.Add(Effect::kVignetting);
   CheckEffectNames(options, of_model);
   if (!light_field.camera) return DecisionWithoutCamera(options, of_model);
-  model::EffectChoice choice = ChoiceOf(options);
+  model::EffectSelectionOptions choice = ChoiceOf(options);
   choice.kept = of_views;
   model::EffectConditions conditions;
   conditions.camera = *light_field.camera;
@@ -93,15 +94,15 @@ model::EffectDecision DecidePhotographEffects(const EffectOptions& options,
   // The impact of defocus and aperture shape is therefore not reported.
   constexpr double kFarMm = 1e6;
   const double near_mm = std::min(light_field.camera->focus_depth_mm(), kFarMm) / 2;
-  model::EffectDecision decision =
-      model::DecideEffects(choice, conditions,
+  model::EffectSelection decision =
+      model::SelectEffects(choice, conditions,
                            model::PlacesBetween(*light_field.camera, near_mm,
                                                 std::numeric_limits<double>::infinity(), false),
                            of_model);
   // Without defocus each pixel has one ray.
   if (!decision.on.Has(Effect::kDefocus)) decision.on.Remove(Effect::kVignetting);
   decision.findings.erase(std::remove_if(decision.findings.begin(), decision.findings.end(),
-                                         [&](const model::EffectFinding& finding) {
+                                         [&](const model::LargestEffectImpact& finding) {
                                            return of_views.Has(finding.effect);
                                          }),
                           decision.findings.end());

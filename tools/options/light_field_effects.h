@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "thicklens/model/camera.h"
-#include "thicklens/model/effect_choice.h"
+#include "thicklens/model/effect_selection.h"
 #include "thicklens/model/light_field.h"
 #include "thicklens/model/scene.h"
 #include "tools/options/effect_options.h"
@@ -21,14 +21,14 @@ bool IsLeftOut(const EffectOptions& options, model::Effect effect);
 // functional solver has no occlusion. `depth` is the range of the map, if there is a camera. Throws
 // UsageError if defocus or occlusion is left out, because an estimate is about them, and for
 // effects that it does not have.
-model::EffectDecision DecideEstimateEffects(const EstimateOptions& options,
-                                            const std::optional<model::Camera>& camera,
-                                            const std::optional<model::DepthStatistics>& depth);
+model::EffectSelection DecideEstimateEffects(const EstimateOptions& options,
+                                             const std::optional<model::Camera>& camera,
+                                             const std::optional<model::DepthStatistics>& depth);
 
 // Decides the same for a photograph that is rendered from a light field. Without defocus the
 // photograph is that of the views in the middle. Occlusion is contained in the views.
-model::EffectDecision DecidePhotographEffects(const EffectOptions& options,
-                                              const model::LightField& light_field);
+model::EffectSelection DecidePhotographEffects(const EffectOptions& options,
+                                               const model::LightField& light_field);
 
 }  // namespace thicklens::tools
 

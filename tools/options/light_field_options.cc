@@ -9,8 +9,8 @@
 #include "thicklens/base/error.h"
 #include "thicklens/estimator/fill_holes.h"
 #include "thicklens/kernels/device.h"
-#include "tools/options/naming_the_file.h"
 #include "tools/options/option_values.h"
+#include "tools/options/with_file_context.h"
 
 namespace thicklens::tools {
 namespace {
@@ -24,35 +24,33 @@ double ApertureStepMm(const model::LightFieldGrid& grid, const model::Camera& ca
 }
 
 estimator::DisparityMap WithoutHoles(const estimator::DisparityMap& map,
-                                     const model::LinearPicture& picture, double at_infinity,
+                                     const model::LinearImage& image, double at_infinity,
                                      PreparedDepth* prepared) {
   for (const float disparity : map.disparity) prepared->was_hole.push_back(std::isnan(disparity));
-  return estimator::FillHoles(map, picture, &prepared->holes, at_infinity);
+  return estimator::FillHoles(map, image, &prepared->holes, at_infinity);
 }
 
 void RequireSize(const model::RawDepthMap& map, const std::string& map_name,
-                 const model::LinearPicture& picture) {
-  if (map.width_px == picture.width_px && map.height_px == picture.height_px) return;
-  throw Error(fmt::format("{}: it is {}x{} px, the picture is {}x{} px: the sizes must be equal",
-                          map_name, map.width_px, map.height_px, picture.width_px,
-                          picture.height_px));
+                 const model::LinearImage& image) {
+  if (map.width_px == image.width_px && map.height_px == image.height_px) return;
+  throw Error(fmt::format("{}: it is {}x{} px, the image is {}x{} px: the sizes must be equal",
+                          map_name, map.width_px, map.height_px, image.width_px, image.height_px));
 }
 
 PreparedDepth PrepareByCamera(const model::RawDepthMap& map, const std::string& map_name,
-                              model::DepthConvention convention,
-                              const model::LinearPicture& picture, const model::Camera& camera,
-                              const model::LightFieldGrid& grid) {
+                              model::DepthConvention convention, const model::LinearImage& image,
+                              const model::Camera& camera, const model::LightFieldGrid& grid) {
   if (convention.kind == model::DepthKind::kDisparity)
     convention.aperture_step_mm = ApertureStepMm(grid, camera);
-  // Only the size of the picture matters here.
-  model::LinearPicture empty{map.width_px, map.height_px, 1, {}};
+  // Only the size of the image matters here.
+  model::LinearImage empty{map.width_px, map.height_px, 1, {}};
   empty.values.assign(map.values.size(), 0.0F);
   const model::Scene scene = model::MakeScene(camera, std::move(empty), map, convention, map_name);
   PreparedDepth prepared;
   prepared.depth = scene.depth;
-  prepared.disparity = NamingTheFile(map_name, [&] {
+  prepared.disparity = WithFileContext(map_name, [&] {
     return WithoutHoles(
-        estimator::DisparityOnGrid(grid, scene.depth_mm, map.width_px, map.height_px), picture,
+        estimator::DisparityOnGrid(grid, scene.depth_mm, map.width_px, map.height_px), image,
         estimator::DisparityAtInfinity(grid), &prepared);
   });
   return prepared;
@@ -211,11 +209,11 @@ void AddDeviceOption(CLI::App* command, std::string* text) {
 }
 
 PreparedDepth PrepareDepth(const model::RawDepthMap& map, const std::string& map_name,
-                           const DepthOptions& options, const model::LinearPicture& picture,
+                           const DepthOptions& options, const model::LinearImage& image,
                            const model::Camera* camera, const model::LightFieldGrid* grid) {
   const model::DepthConvention convention = ConventionOf(options);
-  RequireSize(map, map_name, picture);
-  if (camera != nullptr) return PrepareByCamera(map, map_name, convention, picture, *camera, *grid);
+  RequireSize(map, map_name, image);
+  if (camera != nullptr) return PrepareByCamera(map, map_name, convention, image, *camera, *grid);
   if (convention.kind != model::DepthKind::kDisparity) {
     throw UsageError(
         fmt::format("--depth-kind {}: millimetres need a camera (--camera CAMERA.yaml); without a "
@@ -223,10 +221,10 @@ PreparedDepth PrepareDepth(const model::RawDepthMap& map, const std::string& map
                     options.kind));
   }
   PreparedDepth prepared;
-  prepared.disparity = NamingTheFile(map_name, [&] {
+  prepared.disparity = WithFileContext(map_name, [&] {
     return WithoutHoles(estimator::DisparityFromMap(map, convention.disparity_scale,
                                                     convention.disparity_offset_px),
-                        picture, -std::numeric_limits<double>::infinity(), &prepared);
+                        image, -std::numeric_limits<double>::infinity(), &prepared);
   });
   return prepared;
 }

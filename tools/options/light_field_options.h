@@ -70,9 +70,9 @@ struct PreparedDepth {
 };
 // Prepares a depth map. Without a camera the map must be a disparity, otherwise UsageError is
 // thrown. With a camera, `grid` is that of its light field, and model::MakeScene checks the map.
-// The sizes must be those of `picture`. Throws Error.
+// The sizes must be those of `image`. Throws Error.
 PreparedDepth PrepareDepth(const model::RawDepthMap& map, const std::string& map_name,
-                           const DepthOptions& options, const model::LinearPicture& picture,
+                           const DepthOptions& options, const model::LinearImage& image,
                            const model::Camera* camera, const model::LightFieldGrid* grid);
 
 }  // namespace thicklens::tools

@@ -159,7 +159,7 @@ std::optional<model::SweepTruth> ReadTruth(const SweepArguments& arguments,
   std::error_code failure;
   if (!fs::is_regular_file(beside, failure)) return std::nullopt;
   // The file is reported even if it is not used: it belongs to the sweep.
-  TellInput(beside.string());
+  ReportInput(beside.string());
   try {
     return model::ReadSweepTruth(beside.string());
   } catch (const Error& error) {

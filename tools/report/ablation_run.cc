@@ -25,13 +25,14 @@ double PsnrDbOfEstimate(const model::SceneToEstimate& scene, int threads) {
   const int u_count = scene.truth.u_count, v_count = scene.truth.v_count;
   input.camera = scene.camera;
   input.transfer = scene.camera.sensor.transfer;
-  input.picture = model::ToLinear(scene.photograph, input.transfer);
+  input.image = model::ToLinear(scene.photograph, input.transfer);
   input.grid = model::DefaultGrid(scene.camera, u_count, v_count);
   input.weights =
       model::ApertureWeights(model::ApertureShapeOf(scene.camera.psf), u_count, v_count);
   input.disparity = estimator::DisparityOnGrid(*input.grid, scene.depth.values,
                                                scene.depth.width_px, scene.depth.height_px);
-  if (!scene.on.Has(Effect::kThickness)) input.falloff_camera = model::ThinTwin(scene.camera);
+  if (!scene.on.Has(Effect::kThickness))
+    input.falloff_camera = model::ThinLensEquivalent(scene.camera);
   const bool falloff = scene.on.Has(Effect::kFalloff);
   model::LightField estimate;
   if (scene.on.Has(Effect::kDefocus)) {
@@ -96,12 +97,12 @@ model::SceneAblation AblateSceneOf(const model::SceneSimulationOptions& scene,
 model::SweepAblation AblateSweepOf(const std::string& path,
                                    const model::SweepSimulationOptions& sweep, bool unknown_offset,
                                    const model::AblationRun& run) {
-  const model::LinearPicture target_picture = io::ReadTargetPicture(sweep.target);
+  const model::LinearImage target_image = io::ReadTargetImage(sweep.target);
   const auto calibrate = [&](const model::SweepToCalibrate& simulated) {
     return CalibrationOf(simulated, unknown_offset, run.threads);
   };
   try {
-    return model::AblateSweep(sweep, target_picture, calibrate, run);
+    return model::AblateSweep(sweep, target_image, calibrate, run);
   } catch (const Interrupted&) {
     throw;
   } catch (const Error& error) {

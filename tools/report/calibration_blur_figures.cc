@@ -7,7 +7,7 @@
 #include "thicklens/calib/blur_model.h"
 #include "tools/report/calibration_figures.h"
 #include "tools/report/calibration_sections.h"
-#include "tools/report/calibration_words.h"
+#include "tools/report/calibration_text.h"
 
 namespace thicklens::tools {
 namespace {
@@ -24,7 +24,7 @@ struct BlurPoints {
   PlotSeries fitted = Points("in the fit", Ink::kFit, Mark::kDot);
   PlotSeries doubted = Points("down-weighted", Ink::kFit, Mark::kRing);
   PlotSeries left_out = Points("left out", Ink::kData, Mark::kCross);
-  PlotSeries zhuo_sim = Points("source's meter (Zhuo-Sim)", Ink::kMuted, Mark::kDiamond);
+  PlotSeries zhuo_sim = Points("source's estimator (Zhuo-Sim)", Ink::kMuted, Mark::kDiamond);
   PlotSeries fitted_residuals = Points("", Ink::kFit, Mark::kDot);
   PlotSeries doubted_residuals = Points("", Ink::kFit, Mark::kRing);
   std::vector<double> xs;
@@ -57,7 +57,7 @@ BlurPoints BlurPointsOf(const Calibration& calibration, const std::optional<cali
   return points;
 }
 
-CurvePoints LawCurve(const calib::BlurModel& law, const std::pair<double, double>& x_range) {
+CurvePoints ModelCurve(const calib::BlurModel& law, const std::pair<double, double>& x_range) {
   CurvePoints curve;
   for (int i = 0; i <= kCurveSteps; ++i) {
     const double z_mm = x_range.first + (x_range.second - x_range.first) * i / kCurveSteps;
@@ -66,7 +66,7 @@ CurvePoints LawCurve(const calib::BlurModel& law, const std::pair<double, double
   return curve;
 }
 
-PlotBand LawBand(const calib::BlurModel& law, const CurvePoints& curve) {
+PlotBand ModelBand(const calib::BlurModel& law, const CurvePoints& curve) {
   PlotBand band;
   band.label = "its uncertainty, ± 2 sd";
   for (const auto& [z_mm, sigma_px] : curve) {
@@ -81,7 +81,7 @@ PlotBand LawBand(const calib::BlurModel& law, const CurvePoints& curve) {
 
 PlotSeries SideCurve(std::string label, Stroke stroke, const calib::BlurModel& law,
                      const std::pair<double, double>& x_range) {
-  PlotSeries series = Curve(std::move(label), Ink::kData, stroke, LawCurve(law, x_range));
+  PlotSeries series = Curve(std::move(label), Ink::kData, stroke, ModelCurve(law, x_range));
   series.thin = true;
   return series;
 }
@@ -98,13 +98,13 @@ std::pair<double, double> XRange(const std::vector<double>& xs,
   return range;
 }
 
-void AddLaws(const FocusSweep& sweep, const Calibration& calibration,
-             const std::optional<calib::BlurModel>& law, const std::pair<double, double>& x_range,
-             Plot* plot) {
+void AddModels(const FocusSweep& sweep, const Calibration& calibration,
+               const std::optional<calib::BlurModel>& law, const std::pair<double, double>& x_range,
+               Plot* plot) {
   if (law) {
-    const CurvePoints curve = LawCurve(*law, x_range);
+    const CurvePoints curve = ModelCurve(*law, x_range);
     plot->series.push_back(Curve("fitted law", Ink::kFit, Stroke::kSolid, curve));
-    plot->bands.push_back(LawBand(*law, curve));
+    plot->bands.push_back(ModelBand(*law, curve));
   }
   if (const auto side = calib::BlurModel::OfSide(sweep, calibration, calibration.nearer))
     plot->series.push_back(SideCurve("nearer side alone", Stroke::kSolid, *side, x_range));
@@ -169,10 +169,10 @@ std::vector<ReportFigure> BlurFigures(const FocusSweep& sweep, const Calibration
   std::pair<double, double> x_range = XRange(points.xs, plot.lines);
   plot.series = {std::move(points.zhuo_sim), std::move(points.left_out), std::move(points.fitted),
                  std::move(points.doubted)};
-  if (abscissa.is_depth) AddLaws(sweep, calibration, law, x_range, &plot);
+  if (abscissa.is_depth) AddModels(sweep, calibration, law, x_range, &plot);
   if (truth != nullptr && abscissa.is_depth)
     plot.series.push_back(Curve("true law", Ink::kTruth, Stroke::kDashed,
-                                LawCurve(calib::BlurModel::OfTruth(sweep, *truth), x_range)));
+                                ModelCurve(calib::BlurModel::OfTruth(sweep, *truth), x_range)));
   const double pad = 0.04 * (x_range.second - x_range.first);
   x_range = {x_range.first - pad, x_range.second + pad};
   plot.x_axis.range = x_range;

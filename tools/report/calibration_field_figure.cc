@@ -7,7 +7,7 @@
 
 #include "thicklens/base/printable_text.h"
 #include "tools/report/calibration_figures.h"
-#include "tools/report/page_pictures.h"
+#include "tools/report/page_images.h"
 #include "tools/report/rounding.h"
 
 namespace thicklens::tools {
@@ -29,7 +29,7 @@ struct Layout {
   double Y(int row) const { return kTopPx + row * tile_height_px; }
 };
 
-// The tiles in the shape that they have in the picture, but not too flat for the words.
+// The tiles in the shape that they have in the image, but not too flat for the words.
 Layout LayoutOf(const FieldMap& field) {
   Layout layout;
   layout.tile_width_px = std::min(kWidestTilePx, (kWidthPx - kLeftPx) / field.columns);
@@ -70,10 +70,10 @@ double MedianSigmaMm(const FieldMap& field) {
 
 // The range of the colours: wide enough that noise alone does not run through all of them.
 ColourRange WideEnough(ColourRange range, double sigma_mm) {
-  constexpr double kFewestSigmas = 3;  // on each side of the middle
+  constexpr double kMinSigmas = 3;  // on each side of the middle
   const double middle = (range.lo + range.hi) / 2;
-  range.lo = std::min(range.lo, middle - kFewestSigmas * sigma_mm);
-  range.hi = std::max(range.hi, middle + kFewestSigmas * sigma_mm);
+  range.lo = std::min(range.lo, middle - kMinSigmas * sigma_mm);
+  range.hi = std::max(range.hi, middle + kMinSigmas * sigma_mm);
   return range;
 }
 
@@ -127,10 +127,10 @@ std::string Margins(const FieldMap& field, const Layout& layout) {
     svg += Word(layout.X(column) + layout.tile_width_px / 2, layout.Y(field.rows) + 17, "",
                 fmt::format("{:.0f}", centre_px(column, 0).x()));
   svg += Word((layout.X(0) + layout.X(field.columns)) / 2, layout.Y(field.rows) + 36, "name",
-              "x in the picture [px]");
+              "x in the image [px]");
   svg += fmt::format(
       "<text class=\"name\" text-anchor=\"middle\" transform=\"translate(13 {:.1f}) "
-      "rotate(-90)\">y in the picture [px]</text>\n",
+      "rotate(-90)\">y in the image [px]</text>\n",
       (layout.Y(0) + layout.Y(field.rows)) / 2);
   return svg;
 }
@@ -177,7 +177,7 @@ ReportFigure FieldFigure(const FieldMap& field) {
   if (colours.hi > colours.lo) svg += ColourBar(colours, bar_top);
   svg += "</svg>\n";
   return {{{"field", svg}},
-          "Depth of focus zf [mm] of each part of the picture fitted alone, with its standard "
+          "Depth of focus zf [mm] of each part of the image fitted alone, with its standard "
           "deviation. One side brighter than the other: the target is tilted; bright or dark from "
           "the centre outward: the field is curved. The colours span at least ± 3 of the median "
           "standard deviation.",

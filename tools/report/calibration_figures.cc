@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <utility>
 
-#include "tools/report/calibration_words.h"
+#include "tools/report/calibration_text.h"
 #include "tools/report/page_style.h"
 #include "tools/report/rounding.h"
 
@@ -20,7 +20,7 @@ using calib::FrameMeasurement;
 
 constexpr int kExampleWidthPx = 290;
 constexpr int kExampleHeightPx = 250;
-constexpr std::size_t kMostExamples = 3;
+constexpr std::size_t kMaxExamples = 3;
 
 // The plane of focus that the normalised index picks, if it is another frame's than the raw one's.
 void AddNormalisedSharpest(const calib::SourceRecipe& source, Plot* plot) {
@@ -41,7 +41,7 @@ struct ScalePoints {
 };
 
 ScalePoints ScalePointsOf(const FocusSweep& sweep, const Calibration& calibration) {
-  const calib::ScaleLaw& scale = calibration.scale;
+  const calib::ScaleModel& scale = calibration.scale;
   const double sign = model::DirectionSign(sweep.direction);
   ScalePoints points;
   for (const FrameMeasurement& frame : calibration.frames) {
@@ -56,9 +56,9 @@ ScalePoints ScalePointsOf(const FocusSweep& sweep, const Calibration& calibratio
       AddPoint(series, frame.reading_mm, inverse, name);
       continue;
     }
-    const double law_reading_mm =
+    const double model_reading_mm =
         sign * (scale.reference_depth_mm * inverse - scale.line_zero_mm());
-    const double residual_mm = frame.reading_mm - law_reading_mm;
+    const double residual_mm = frame.reading_mm - model_reading_mm;
     name += fmt::format(", reading off by {:+.2g} mm", residual_mm);
     AddPoint(series, frame.reading_mm, inverse, name);
     PlotSeries* residuals =
@@ -79,7 +79,7 @@ Plot ScalePlot() {
   return plot;
 }
 
-ReportFigure ScaleWithoutLaw(const calib::ScaleLaw& scale, ScalePoints points) {
+ReportFigure ScaleWithoutModel(const calib::ScaleModel& scale, ScalePoints points) {
   points.fitted.label.clear();
   points.left_out.label.clear();
   Plot plot = ScalePlot();
@@ -91,10 +91,10 @@ ReportFigure ScaleWithoutLaw(const calib::ScaleLaw& scale, ScalePoints points) {
 }
 
 std::string ShortenedName(const std::string& image) {
-  constexpr std::size_t kMost = 18;
+  constexpr std::size_t kMax = 18;
   const std::string name = FrameName(image);
   const bool ascii = std::all_of(name.begin(), name.end(), [](char c) { return (c & 0x80) == 0; });
-  return name.size() <= kMost || !ascii ? name : "…" + name.substr(name.size() - kMost);
+  return name.size() <= kMax || !ascii ? name : "…" + name.substr(name.size() - kMax);
 }
 
 Plot ExamplePlot(const calib::BlurExample& example, const FrameMeasurement& frame, std::size_t i) {
@@ -185,11 +185,11 @@ ReportFigure SharpnessFigure(const Calibration& calibration, const std::vector<R
 }
 
 ReportFigure ScaleFigure(const FocusSweep& sweep, const Calibration& calibration) {
-  const calib::ScaleLaw& scale = calibration.scale;
+  const calib::ScaleModel& scale = calibration.scale;
   ScalePoints points = ScalePointsOf(sweep, calibration);
   if (points.fitted.x.size() + points.left_out.x.size() < 2) return {};
   if (!scale.done || !(scale.reference_depth_mm > 0))
-    return ScaleWithoutLaw(scale, std::move(points));
+    return ScaleWithoutModel(scale, std::move(points));
   const double sign = model::DirectionSign(sweep.direction);
   // z = 0, where 1/scale = (offset + sign b)/z_reference vanishes: b = -sign offset.
   const double zero_reading_mm = -sign * scale.offset_mm.value;
@@ -233,7 +233,7 @@ ReportFigure ExampleFigure(const Calibration& calibration) {
   std::vector<Plot> plots;
   bool edges = false;
   for (const calib::BlurExample& example : calibration.examples) {
-    if (plots.size() == kMostExamples) break;
+    if (plots.size() == kMaxExamples) break;
     if (example.frame < 0 || example.frame >= static_cast<int>(calibration.frames.size()) ||
         std::min(example.x.size(), example.measured.size()) < 2)
       continue;
@@ -245,7 +245,7 @@ ReportFigure ExampleFigure(const Calibration& calibration) {
   ReportFigure figure = FigureOf(
       plots, edges ? "Edges as they were measured, with the fits: the points should follow a "
                      "curve from the dark side to the bright one without overshoot (a sharpened "
-                     "or compressed picture has one)."
+                     "or compressed image has one)."
                    : "How much of each spatial frequency is left against the sharpest frame, with "
                      "the fits: the points should fall along a curve; a floor that they do not "
                      "leave is noise.");

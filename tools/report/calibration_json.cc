@@ -11,7 +11,7 @@
 #include "thicklens/base/printable_text.h"
 #include "thicklens/calib/blur_model.h"
 #include "tools/report/calibration_summary.h"
-#include "tools/report/calibration_words.h"
+#include "tools/report/calibration_text.h"
 #include "tools/report/determined.h"
 
 namespace thicklens::tools {
@@ -19,16 +19,18 @@ namespace {
 
 using nlohmann::json;
 
-json Number(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }
+json NumberOrNull(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }
 
-json Number(const std::optional<double>& value) { return value ? Number(*value) : json(nullptr); }
+json NumberOrNull(const std::optional<double>& value) {
+  return value ? NumberOrNull(*value) : json(nullptr);
+}
 
-// A meter that did not run leaves 0, which no meter measures.
-json Measured(double value) { return value == 0 ? json(nullptr) : Number(value); }
+// An estimator that did not run leaves 0, which no estimator measures.
+json Measured(double value) { return value == 0 ? json(nullptr) : NumberOrNull(value); }
 
 json ResultJson(const std::optional<calib::Result>& result) {
   if (!result || (!std::isfinite(result->value) && !result->systematic)) return nullptr;
-  json out = {{"value", Number(result->value)}, {"sigma", Number(result->sigma)}};
+  json out = {{"value", NumberOrNull(result->value)}, {"sigma", NumberOrNull(result->sigma)}};
   out["systematic"] = nullptr;
   if (result->systematic && result->systematic->allFinite())
     out["systematic"] = json::array({result->systematic->x(), result->systematic->y()});
@@ -42,7 +44,7 @@ json SourceResultJson(const std::optional<double>& value) {
 }
 
 json EstimateJson(const model::Estimate& estimate) {
-  return {{"value", Number(estimate.value)}, {"sigma", Number(estimate.sigma)}};
+  return {{"value", NumberOrNull(estimate.value)}, {"sigma", NumberOrNull(estimate.sigma)}};
 }
 
 json EstimateJson(const std::optional<model::Estimate>& estimate) {
@@ -51,12 +53,12 @@ json EstimateJson(const std::optional<model::Estimate>& estimate) {
 
 json NumbersJson(const std::vector<double>& values) {
   json out = json::array();
-  for (double value : values) out.push_back(Number(value));
+  for (double value : values) out.push_back(NumberOrNull(value));
   return out;
 }
 
 json RangeJson(const Eigen::Vector2d& range) {
-  return json::array({Number(range.x()), Number(range.y())});
+  return json::array({NumberOrNull(range.x()), NumberOrNull(range.y())});
 }
 
 json TextsJson(const std::vector<std::string>& texts) {
@@ -75,17 +77,17 @@ json Count(bool done, int count) { return done ? json(count) : json(nullptr); }
 // No frame that was opened has all of these at 0 and passes.
 bool IsMeasured(const calib::FrameMeasurement& frame) {
   const calib::FrameStatistics& s = frame.statistics;
-  return !frame.rejection.empty() || s.mean_stored != 0 || s.contrast != 0 || s.noise_sigma != 0;
+  return !frame.rejection.empty() || s.mean_encoded != 0 || s.contrast != 0 || s.noise_sigma != 0;
 }
 
 json StatisticsJson(const calib::FrameStatistics& statistics) {
-  return {{"mean_stored", Number(statistics.mean_stored)},
-          {"mean_linear", Number(statistics.mean_linear)},
-          {"contrast", Number(statistics.contrast)},
-          {"noise_sigma", Number(statistics.noise_sigma)},
-          {"top_gradient_per_px", Number(statistics.top_gradient)},
-          {"saturated_fraction", Number(statistics.saturated_fraction)},
-          {"saturation_level", Number(statistics.saturation_level)}};
+  return {{"mean_encoded", NumberOrNull(statistics.mean_encoded)},
+          {"mean_linear", NumberOrNull(statistics.mean_linear)},
+          {"contrast", NumberOrNull(statistics.contrast)},
+          {"noise_sigma", NumberOrNull(statistics.noise_sigma)},
+          {"top_gradient_per_px", NumberOrNull(statistics.top_gradient)},
+          {"saturated_fraction", NumberOrNull(statistics.saturated_fraction)},
+          {"saturation_level", NumberOrNull(statistics.saturation_level)}};
 }
 
 // Frame by frame what the figures show. `law` may be null.
@@ -96,7 +98,7 @@ json FrameJson(const calib::FrameMeasurement& frame, const calib::BlurModel* law
   const bool has_law = law != nullptr && calib::IsDepth(frame.depth_mm);
   json out = {
       {"image", PrintableUtf8(frame.image)},
-      {"reading_mm", Number(frame.reading_mm)},
+      {"reading_mm", NumberOrNull(frame.reading_mm)},
       {"depth_mm", Measured(frame.depth_mm)},
       {"rejection", TextJson(frame.rejection)},
       {"not_in_fit", TextJson(frame.not_in_fit)},
@@ -105,19 +107,21 @@ json FrameJson(const calib::FrameMeasurement& frame, const calib::BlurModel* law
       {"normalised_edge_slope_per_px", Measured(frame.normalised_edge_slope)},
       {"edge_count", Count(has_edges, frame.edge_count)},
       {"source_blur_sigma_px", Measured(frame.source_blur_sigma_px)},
-      {"blur_sigma_px", has_blur ? Number(frame.blur_sigma_px) : json(nullptr)},
-      {"blur_sigma_error_px", has_blur ? Number(frame.blur_sigma_error_px) : json(nullptr)},
+      {"blur_sigma_px", has_blur ? NumberOrNull(frame.blur_sigma_px) : json(nullptr)},
+      {"blur_sigma_error_px", has_blur ? NumberOrNull(frame.blur_sigma_error_px) : json(nullptr)},
       {"in_blur_fit", frame.in_blur_fit},
-      {"blur_fit_weight", frame.in_blur_fit ? Number(frame.blur_fit_weight) : json(nullptr)},
-      {"image_scale", Number(frame.image_scale)},
+      {"blur_fit_weight", frame.in_blur_fit ? NumberOrNull(frame.blur_fit_weight) : json(nullptr)},
+      {"image_scale", NumberOrNull(frame.image_scale)},
       {"image_scale_sigma", Measured(frame.image_scale ? frame.image_scale_sigma : 0)},
       {"in_scale_fit", frame.in_scale_fit},
-      {"reading_error_mm", has_reading_error ? Number(frame.reading_error_mm) : json(nullptr)},
+      {"reading_error_mm",
+       has_reading_error ? NumberOrNull(frame.reading_error_mm) : json(nullptr)},
       {"reading_error_sigma_mm",
-       has_reading_error ? Number(frame.reading_error_sigma_mm) : json(nullptr)}};
-  out["blur_law_sigma_px"] = has_law ? Number(law->SigmaPx(frame.depth_mm)) : json(nullptr);
-  out["blur_law_error_px"] = has_law ? Number(law->SigmaErrorPx(frame.depth_mm)) : json(nullptr);
-  out["blur_residual_sigmas"] = has_law ? Number(law->ResidualSigmas(frame)) : json(nullptr);
+       has_reading_error ? NumberOrNull(frame.reading_error_sigma_mm) : json(nullptr)}};
+  out["blur_model_sigma_px"] = has_law ? NumberOrNull(law->SigmaPx(frame.depth_mm)) : json(nullptr);
+  out["blur_model_error_px"] =
+      has_law ? NumberOrNull(law->SigmaErrorPx(frame.depth_mm)) : json(nullptr);
+  out["blur_residual_sigmas"] = has_law ? NumberOrNull(law->ResidualSigmas(frame)) : json(nullptr);
   return out;
 }
 
@@ -152,24 +156,25 @@ json SharpnessPeakJson(const calib::Calibration& calibration, const std::vector<
   out["fitted_depths_mm"] = nullptr;
   out["log_parabola"] = nullptr;
   if (peak.done) {
-    out["fitted_depths_mm"] = json::array({Number(peak.from_depth_mm), Number(peak.to_depth_mm)});
+    out["fitted_depths_mm"] =
+        json::array({NumberOrNull(peak.from_depth_mm), NumberOrNull(peak.to_depth_mm)});
     const Eigen::Vector3d& c = peak.log_parabola;
     out["log_parabola"] = {{"coefficients", NumbersJson({c[0], c[1], c[2]})},
-                           {"reference_depth_mm", Number(peak.reference_depth_mm)}};
+                           {"reference_depth_mm", NumberOrNull(peak.reference_depth_mm)}};
   }
   return out;
 }
 
-json ScaleLawJson(const calib::Calibration& calibration) {
-  const calib::ScaleLaw& scale = calibration.scale;
+json ScaleModelJson(const calib::Calibration& calibration) {
+  const calib::ScaleModel& scale = calibration.scale;
   const bool done = scale.done;
   return {{"done", done},
           {"message", PrintableUtf8(scale.message)},
           {"kind", ScaleKindName(scale.kind)},
           {"reference_image", ImageJson(calibration, scale.reference_frame)},
           {"offset_mm", done ? ResultJson(scale.offset_mm) : json(nullptr)},
-          {"reference_depth_mm", done ? Number(scale.reference_depth_mm) : json(nullptr)},
-          {"reading_rms_mm", done ? Number(scale.reading_rms_mm) : json(nullptr)},
+          {"reference_depth_mm", done ? NumberOrNull(scale.reference_depth_mm) : json(nullptr)},
+          {"reading_rms_mm", done ? NumberOrNull(scale.reading_rms_mm) : json(nullptr)},
           {"frames_used", Count(done, scale.frames_used)},
           {"change_over_sweep", EstimateJson(scale.change_over_sweep)},
           {"distortion_at_corner", EstimateJson(scale.distortion_at_corner)}};
@@ -181,7 +186,7 @@ json CovarianceJson(const calib::Calibration& calibration) {
   for (Eigen::Index i = 0; i < calibration.covariance.rows(); ++i) {
     json row = json::array();
     for (Eigen::Index j = 0; j < calibration.covariance.cols(); ++j)
-      row.push_back(Number(calibration.covariance(i, j)));
+      row.push_back(NumberOrNull(calibration.covariance(i, j)));
     rows.push_back(std::move(row));
   }
   return {{"order", TextsJson(calibration.covariance_order)}, {"rows", std::move(rows)}};
@@ -190,11 +195,11 @@ json CovarianceJson(const calib::Calibration& calibration) {
 json TruthJson(const std::vector<ResultRow>& rows) {
   json fit = json::object(), source = json::object(), peak = json::object(), out;
   for (const ResultRow& row : rows) {
-    out[row.key] = Number(row.truth);
+    out[row.key] = NumberOrNull(row.truth);
     if (!row.truth) continue;
-    if (row.fit) fit[row.key] = Number(row.fit->value - *row.truth);
-    if (row.source) source[row.key] = Number(*row.source - *row.truth);
-    if (row.peak) peak[row.key] = Number(row.peak->value - *row.truth);
+    if (row.fit) fit[row.key] = NumberOrNull(row.fit->value - *row.truth);
+    if (row.source) source[row.key] = NumberOrNull(*row.source - *row.truth);
+    if (row.peak) peak[row.key] = NumberOrNull(row.peak->value - *row.truth);
   }
   out["errors"] = {{"fit", fit}, {"source", source}, {"sharpness_peak", peak}};
   return out;
@@ -205,15 +210,15 @@ json BlurFitJson(const calib::BlurFit& blur) {
   return {{"done", blur.done},
           {"message", PrintableUtf8(blur.message)},
           {"frames_used", Count(blur.done, blur.frames_used)},
-          {"meter", TextJson(blur.meter)},
+          {"estimator", TextJson(blur.estimator)},
           {"family", model::PsfName(blur.family)},
           {"band", blur.band ? json(*blur.band) : json(nullptr)},
           {"tails", blur.tails > 0 ? json(blur.tails) : json(nullptr)},
           {"weak_direction", TextJson(blur.weak_direction)},
           {"better_psf", compared ? json(model::PsfName(blur.better_psf)) : json(nullptr)},
-          {"gaussian_misfit_chi2_per_dof", Number(blur.gaussian_misfit)},
-          {"disc_misfit_chi2_per_dof", Number(blur.disc_misfit)},
-          {"outside_sweep_mm", blur.done ? Number(blur.outside_mm) : json(nullptr)}};
+          {"gaussian_misfit_chi2_per_dof", NumberOrNull(blur.gaussian_misfit)},
+          {"disc_misfit_chi2_per_dof", NumberOrNull(blur.disc_misfit)},
+          {"outside_sweep_mm", blur.done ? NumberOrNull(blur.outside_mm) : json(nullptr)}};
 }
 
 json SideJson(const calib::SideFit& side) {
@@ -261,8 +266,8 @@ json ChannelsJson(const std::vector<calib::ChannelFocus>& channels) {
 
 json MagnificationJson(const std::optional<calib::MagnificationCheck>& check) {
   if (!check) return nullptr;
-  return {{"period_px", Number(check->period_px)},
-          {"period_mm", Number(check->period_mm)},
+  return {{"period_px", NumberOrNull(check->period_px)},
+          {"period_mm", NumberOrNull(check->period_mm)},
           {"image_distance_mm", EstimateJson(check->image_distance_mm)}};
 }
 
@@ -293,7 +298,7 @@ json ExamplesJson(const calib::Calibration& calibration) {
 // What the fit alone says, the results apart.
 json FitJson(const calib::Calibration& calibration) {
   const bool done = calibration.blur.done;
-  return {{"chi2_per_dof", done ? Number(calibration.blur.chi2_per_dof) : json(nullptr)},
+  return {{"chi2_per_dof", done ? NumberOrNull(calibration.blur.chi2_per_dof) : json(nullptr)},
           {"undetermined", TextsJson(calibration.blur.undetermined)},
           {"covariance", CovarianceJson(calibration)},
           {"blur_fit", BlurFitJson(calibration.blur)},
@@ -352,11 +357,11 @@ json CalibrationJson(const calib::FocusSweep& sweep, const calib::Calibration& c
   out["method"] = use_source_recipe ? "source" : "fit";
   out["frames"] = FramesJson(sweep, calibration);
   out["frames_rejected"] = RejectedJson(calibration);
-  out["seconds"] = Number(calibration.seconds);
+  out["seconds"] = NumberOrNull(calibration.seconds);
   out["camera"] = PrintableUtf8(sweep.camera.name);
   out["assumed_fields"] = TextsJson(model::AssumedFields(sweep.camera));
   out["warnings"] = TextsJson(calibration.warnings);
-  out["scale_law"] = ScaleLawJson(calibration);
+  out["scale_model"] = ScaleModelJson(calibration);
   out["sharpest_reading"] = SharpestJson(calibration);
   out["diagnoses"] = DiagnosesJson(calibration);
   out["frame_structure"] = StructureJson(calibration.structure);

@@ -9,7 +9,7 @@
 #include "thicklens/base/printable_text.h"
 #include "thicklens/calib/rejection_groups.h"
 #include "tools/report/calibration_sections.h"
-#include "tools/report/page_pictures.h"
+#include "tools/report/page_images.h"
 #include "tools/report/page_style.h"
 #include "tools/report/rejection_words.h"
 
@@ -20,25 +20,25 @@ using calib::Calibration;
 using calib::FocusSweep;
 using calib::FrameMeasurement;
 
-constexpr std::size_t kMostThumbnails = 12;
-constexpr std::size_t kMostRuns = 12;  // of one kind in the table
-constexpr int kThumbnailPx = 220;      // longest edge
+constexpr std::size_t kMaxThumbnails = 12;
+constexpr std::size_t kMaxRuns = 12;  // of one kind in the table
+constexpr int kThumbnailPx = 220;     // longest edge
 
 std::string GroupRows(const Calibration& calibration, const calib::RejectionGroup& group) {
   const std::vector<std::string> details = TextsOfRuns(calibration.frames, group);
   std::string html;
-  int told = 0;
-  for (std::size_t i = 0; i < std::min(group.runs.size(), kMostRuns); ++i) {
+  int reported = 0;
+  for (std::size_t i = 0; i < std::min(group.runs.size(), kMaxRuns); ++i) {
     const calib::RejectionRun& run = group.runs[i];
     html += "<tr>" + TableCell(i == 0 ? group.kind : "", "name") +
             TableCell(i == 0 ? fmt::format("{}", group.frames) : "") +
             TableCell(Typeset(RunName(calibration.frames, run)), "name") +
             TableCell(Typeset(details[i]), "words") + "</tr>\n";
-    told += run.count();
+    reported += run.count();
   }
-  if (told < group.frames) {
+  if (reported < group.frames) {
     html += "<tr>" + TableCell("", "name") + TableCell("") +
-            TableCell(fmt::format("and {} more", group.frames - told), "name") +
+            TableCell(fmt::format("and {} more", group.frames - reported), "name") +
             TableCell("in the table below", "words") + "</tr>\n";
   }
   return html;
@@ -64,7 +64,7 @@ std::string LevelsTable(const Calibration& calibration, std::size_t rejected) {
     if (frame.rejection.empty()) continue;
     html += "<tr>" + TableCell(FrameName(frame.image), "name") +
             TableCell(fmt::format("{:.6g}", frame.reading_mm)) +
-            TableCell(fmt::format("{:.4f}", frame.statistics.mean_stored)) +
+            TableCell(fmt::format("{:.4f}", frame.statistics.mean_encoded)) +
             TableCell(fmt::format("{:.3f}", frame.statistics.contrast)) +
             TableCell(fmt::format("{:.1f} %", 100 * frame.statistics.saturated_fraction)) +
             TableCell(frame.rejection, "words") + "</tr>\n";
@@ -86,7 +86,7 @@ std::vector<std::size_t> ChosenForShow(const std::vector<calib::RejectionGroup>&
     const std::size_t before = chosen.size();
     for (const calib::RejectionGroup& group : groups) {
       const std::vector<int> frames = FramesOf(group);
-      if (turn < frames.size() && chosen.size() < kMostThumbnails)
+      if (turn < frames.size() && chosen.size() < kMaxThumbnails)
         chosen.push_back(static_cast<std::size_t>(frames[turn]));
     }
     if (chosen.size() == before) break;
@@ -97,7 +97,7 @@ std::vector<std::size_t> ChosenForShow(const std::vector<calib::RejectionGroup>&
 
 // Shrunk and encoded as a screen expects it.
 cv::Mat Thumbnail(const cv::Mat& stored, const model::TransferCurve& transfer) {
-  cv::Mat shown = ShownPicture(stored);
+  cv::Mat shown = ShownImage(stored);
   const int longest = std::max(shown.cols, shown.rows);
   if (longest > kThumbnailPx) {
     const double scale = static_cast<double>(kThumbnailPx) / longest;
@@ -120,17 +120,17 @@ cv::Mat Thumbnail(const cv::Mat& stored, const model::TransferCurve& transfer) {
 
 std::string Thumbnails(const FocusSweep& sweep, const Calibration& calibration,
                        const std::vector<std::size_t>& chosen, std::size_t rejected,
-                       const FramePictures& pictures) {
+                       const FrameImages& images) {
   std::string cells;
   for (const std::size_t i : chosen) {
-    const cv::Mat stored = pictures(i);
+    const cv::Mat stored = images(i);
     if (stored.empty()) continue;
     const FrameMeasurement& frame = calibration.frames[i];
     const std::string name = FrameName(frame.image);
     cells += fmt::format("<div>{}<span><b>{}</b> at {:.6g} mm: {}</span></div>\n",
-                         EmbeddedPicture(Thumbnail(stored, sweep.camera.sensor.transfer),
-                                         fmt::format("{}, rejected: {}", name, frame.rejection),
-                                         Packing::kSmall, kThumbnailPx),
+                         EmbeddedImage(Thumbnail(stored, sweep.camera.sensor.transfer),
+                                       fmt::format("{}, rejected: {}", name, frame.rejection),
+                                       Packing::kSmall, kThumbnailPx),
                          EscapeXml(name), frame.reading_mm, EscapeXml(frame.rejection));
   }
   if (cells.empty()) return "";
@@ -140,7 +140,7 @@ std::string Thumbnails(const FocusSweep& sweep, const Calibration& calibration,
   return html;
 }
 
-// Frames that passed the gates and still say nothing of the blur, by reason.
+// Frames that passed the quality checks and still say nothing of the blur, by reason.
 std::string NotInFit(const Calibration& calibration) {
   std::map<std::string, calib::RejectionGroup> groups;
   int count = 0;
@@ -157,7 +157,7 @@ std::string NotInFit(const Calibration& calibration) {
   }
   if (count == 0) return "";
   std::string html =
-      fmt::format("<p>{} more {} the gates and {} nothing of the blur:</p>\n<ul>\n", count,
+      fmt::format("<p>{} more {} the quality checks and {} nothing of the blur:</p>\n<ul>\n", count,
                   count == 1 ? "frame passed" : "frames passed", count == 1 ? "says" : "say");
   for (const auto& [reason, group] : groups) {
     std::vector<std::string> names;
@@ -172,7 +172,7 @@ std::string NotInFit(const Calibration& calibration) {
 }  // namespace
 
 std::string RejectedSection(const FocusSweep& sweep, const Calibration& calibration,
-                            const FramePictures& pictures) {
+                            const FrameImages& images) {
   const std::vector<calib::RejectionGroup> groups = calib::RejectionGroups(calibration.frames);
   std::string html = "<h2>Rejected frames</h2>\n";
   if (groups.empty()) return html + "<p>None.</p>\n" + NotInFit(calibration);
@@ -180,7 +180,7 @@ std::string RejectedSection(const FocusSweep& sweep, const Calibration& calibrat
       std::count_if(calibration.frames.begin(), calibration.frames.end(),
                     [](const FrameMeasurement& frame) { return !frame.rejection.empty(); }));
   html += GroupsTable(calibration, groups) + NotInFit(calibration);
-  if (pictures) html += Thumbnails(sweep, calibration, ChosenForShow(groups), rejected, pictures);
+  if (images) html += Thumbnails(sweep, calibration, ChosenForShow(groups), rejected, images);
   return html + LevelsTable(calibration, rejected);
 }
 

@@ -155,7 +155,7 @@ std::string MeasuredSection(const FocusSweep& sweep, const Calibration& calibrat
 
 CalibrationReport MakeCalibrationReport(const FocusSweep& sweep, const Calibration& calibration,
                                         const model::SweepTruth* truth, const ReportOrigin& origin,
-                                        const FramePictures& pictures) {
+                                        const FrameImages& images) {
   const std::vector<ResultRow> rows = ResultRows(calibration, truth);
   const std::string title = "Calibration of " + sweep.camera.name;
   const std::string about = fmt::format("Focus sweep {}, {} frames · {}", origin.sweep_name,
@@ -171,7 +171,7 @@ CalibrationReport MakeCalibrationReport(const FocusSweep& sweep, const Calibrati
   report.html += OtherWaysSection(calibration, rows);
   report.html += MeasuredSection(sweep, calibration, rows, truth, &figures);
   report.html += FieldSection(calibration, &figures);
-  report.html += RejectedSection(sweep, calibration, pictures);
+  report.html += RejectedSection(sweep, calibration, images);
   report.html += CorrelationSection(calibration);
   report.html += HowItWasMade(sweep, calibration, origin);
   report.html += "</main>\n</body>\n</html>\n";

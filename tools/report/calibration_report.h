@@ -33,11 +33,11 @@ struct CalibrationReport {
   std::string captions;             // plain text: the file and the content of each figure
 };
 
-// `truth` may be null and `pictures` empty. Figures without data are left out.
+// `truth` may be null and `images` empty. Figures without data are left out.
 CalibrationReport MakeCalibrationReport(const calib::FocusSweep& sweep,
                                         const calib::Calibration& calibration,
                                         const model::SweepTruth* truth, const ReportOrigin& origin,
-                                        const FramePictures& pictures = {});
+                                        const FrameImages& images = {});
 
 // Names that figures of a report can have.
 std::vector<std::string> ReportFigureNames();

@@ -32,10 +32,10 @@ std::string FieldWords(const calib::Calibration& calibration);
 std::string CorrelationSection(const calib::Calibration& calibration);
 
 // Returns the image of a frame as its file stores it; an empty matrix if there is none.
-using FramePictures = std::function<cv::Mat(std::size_t index)>;
-// `pictures` may be empty; there are then no thumbnails.
+using FrameImages = std::function<cv::Mat(std::size_t index)>;
+// `images` may be empty; there are then no thumbnails.
 std::string RejectedSection(const calib::FocusSweep& sweep, const calib::Calibration& calibration,
-                            const FramePictures& pictures);
+                            const FrameImages& images);
 
 // Replaces plain characters by typographic ones: "+-" by ±, hyphens of numbers by minus signs, " ..
 // " by an ellipsis, "chi2" by χ², " deg" by °.

@@ -8,7 +8,7 @@
 #include <filesystem>
 
 #include "thicklens/base/printable_text.h"
-#include "tools/report/calibration_words.h"
+#include "tools/report/calibration_text.h"
 #include "tools/report/determined.h"
 #include "tools/report/rejection_words.h"
 
@@ -16,7 +16,7 @@ namespace thicklens::tools {
 namespace {
 
 constexpr char kNotRun[] = "not run";
-constexpr std::size_t kPartsTold = 3;  // systematic parts in the text; the rest is in the JSON
+constexpr std::size_t kReportedParts = 3;  // systematic parts in the text; the rest is in the JSON
 
 std::optional<std::string> ImageOf(const calib::Calibration& calibration, int index) {
   if (index < 0 || index >= static_cast<int>(calibration.frames.size())) return std::nullopt;
@@ -129,7 +129,7 @@ std::string SecondaryLines(const calib::Calibration& calibration,
   }
   AddLine("sharpest", SharpestLine(calibration), &text);
   AddLine("focus", FocusReadingLine(calibration), &text);
-  const calib::ScaleLaw& scale = calibration.scale;
+  const calib::ScaleModel& scale = calibration.scale;
   if (!scale.done) AddLine("image scale", ScaleChangeLine(scale), &text);
   text += scale.done
               ? fmt::format(
@@ -142,7 +142,8 @@ std::string SecondaryLines(const calib::Calibration& calibration,
   AddLine("image scale", DistortionLine(scale), &text);
   AddLine("magnification", MagnificationLine(calibration), &text);
   text += blur.done ? fmt::format("blur fit: chi2/dof {:.2f}, {} frames{}\n", blur.chi2_per_dof,
-                                  blur.frames_used, blur.meter.empty() ? "" : ", by " + blur.meter)
+                                  blur.frames_used,
+                                  blur.estimator.empty() ? "" : ", by " + blur.estimator)
                     : fmt::format("blur fit: none, {}\n", PrintableUtf8(blur.message));
   for (const std::string& name : blur.undetermined)
     text += fmt::format("blur fit: the data do not determine {}\n", PrintableUtf8(name));
@@ -162,7 +163,7 @@ std::string DetailLines(const calib::FocusSweep& sweep, const calib::Calibration
     AddLine("field", "no map, " + calibration.field.message, &text);
   AddLine("colours", ChannelLine(calibration.channels), &text);
   const std::vector<calib::SystematicPart>& parts = calibration.systematic_parts;
-  for (std::size_t i = 0; i < std::min(parts.size(), kPartsTold); ++i)
+  for (std::size_t i = 0; i < std::min(parts.size(), kReportedParts); ++i)
     AddLine("systematic",
             fmt::format("{}: zf {} mm, d1 {} mm, kappa {}", parts[i].name,
                         PartRange(parts[i].focus_depth_mm), PartRange(parts[i].image_distance_mm),

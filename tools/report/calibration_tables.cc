@@ -7,7 +7,7 @@
 #include "thicklens/base/printable_text.h"
 #include "tools/interface/missing_tolerances.h"
 #include "tools/report/calibration_sections.h"
-#include "tools/report/calibration_words.h"
+#include "tools/report/calibration_text.h"
 #include "tools/report/page_style.h"
 #include "tools/report/rounding.h"
 

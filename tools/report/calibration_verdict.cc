@@ -5,7 +5,7 @@
 
 #include "thicklens/base/printable_text.h"
 #include "tools/report/calibration_sections.h"
-#include "tools/report/calibration_words.h"
+#include "tools/report/calibration_text.h"
 #include "tools/report/determined.h"
 #include "tools/report/rounding.h"
 

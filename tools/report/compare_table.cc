@@ -10,8 +10,8 @@
 namespace thicklens::tools {
 namespace {
 
+using estimator::ImageScores;
 using estimator::LightFieldScores;
-using estimator::PictureScores;
 using estimator::ViewScores;
 
 std::string NumberText(double value, int digits) {
@@ -27,14 +27,14 @@ std::string HeadLine() {
                      "MACADE stand-in");
 }
 
-std::string Line(const std::string& name, const PictureScores& scores) {
+std::string Line(const std::string& name, const ImageScores& scores) {
   return fmt::format("{:<14}{:>10}{:>9}{:>9}{:>17}\n", name, PsnrText(scores.psnr_db),
                      NumberText(scores.ssim, 4), NumberText(scores.delta_e94_mean, 3),
                      scores.macade_standin ? NumberText(*scores.macade_standin, 4) : "-");
 }
 
-std::string LinesWithDibr(const std::string& name, const PictureScores& scores,
-                          const std::optional<PictureScores>& dibr) {
+std::string LinesWithDibr(const std::string& name, const ImageScores& scores,
+                          const std::optional<ImageScores>& dibr) {
   return Line(name, scores) + (dibr ? Line("  DIBR", *dibr) : "");
 }
 
@@ -42,11 +42,11 @@ nlohmann::json FiniteOrNull(double value) {
   return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);
 }
 
-nlohmann::json ScoresOrNull(const std::optional<PictureScores>& scores) {
-  return scores ? PictureScoresJson(*scores) : nlohmann::json(nullptr);
+nlohmann::json ScoresOrNull(const std::optional<ImageScores>& scores) {
+  return scores ? ImageScoresJson(*scores) : nlohmann::json(nullptr);
 }
 
-bool IsIdentical(const PictureScores& scores) { return std::isinf(scores.psnr_db); }
+bool IsIdentical(const ImageScores& scores) { return std::isinf(scores.psnr_db); }
 
 std::size_t CountIdentical(const LightFieldScores& scores) {
   return static_cast<std::size_t>(
@@ -76,11 +76,11 @@ nlohmann::json ViewJson(const ViewScores& view) {
 
 }  // namespace
 
-std::string PictureScoresText(const PictureScores& scores, int border_px) {
+std::string ImageScoresText(const ImageScores& scores, int border_px) {
   return HeadLine() + Line(fmt::format("border {} px", border_px), scores);
 }
 
-nlohmann::json PictureScoresJson(const PictureScores& scores) {
+nlohmann::json ImageScoresJson(const ImageScores& scores) {
   return {{"psnr_db", FiniteOrNull(scores.psnr_db)},
           {"identical", IsIdentical(scores)},
           {"ssim", FiniteOrNull(scores.ssim)},
@@ -131,9 +131,9 @@ nlohmann::json LightFieldScoresJson(const LightFieldScores& scores,
                          {"views", {reference.u_count, reference.v_count}},
                          {"size", {reference.s_count, reference.t_count}},
                          {"border_px", border_px},
-                         {"mean", PictureScoresJson(scores.mean)},
-                         {"centre", PictureScoresJson(scores.centre)},
-                         {"corner", PictureScoresJson(scores.corner)},
+                         {"mean", ImageScoresJson(scores.mean)},
+                         {"centre", ImageScoresJson(scores.centre)},
+                         {"corner", ImageScoresJson(scores.corner)},
                          {"identical_views", CountIdentical(scores)},
                          {"views_in_psnr_mean", ViewsInPsnrMean(scores)},
                          {"per_view", nlohmann::json::array()},

@@ -11,8 +11,8 @@ namespace thicklens::tools {
 
 // Equal images have an infinite PSNR: texts say "identical"; JSON, which has no infinity, has null
 // and `identical: true`. A score that is not defined is "-" in texts and null in JSON.
-std::string PictureScoresText(const estimator::PictureScores& scores, int border_px);
-nlohmann::json PictureScoresJson(const estimator::PictureScores& scores);
+std::string ImageScoresText(const estimator::ImageScores& scores, int border_px);
+nlohmann::json ImageScoresJson(const estimator::ImageScores& scores);
 
 // Number of views whose PSNR is above that of DIBR; 0 without DIBR.
 int ViewsAboveDibr(const estimator::LightFieldScores& scores);

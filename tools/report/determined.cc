@@ -13,7 +13,7 @@
 namespace thicklens::tools {
 namespace {
 
-constexpr std::size_t kCausesTold = 4;  // of one symptom in the text; the rest is in the JSON
+constexpr std::size_t kReportedCauses = 4;  // of one symptom in the text; the rest is in the JSON
 
 nlohmann::json FiniteNumber(double value) {
   return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);
@@ -51,7 +51,7 @@ std::string FocusReadingLine(const calib::Calibration& calibration) {
       WithError(calibration.focus_reading_mm->value, calibration.focus_reading_mm->sigma, "mm"));
 }
 
-std::string ScaleChangeLine(const calib::ScaleLaw& scale) {
+std::string ScaleChangeLine(const calib::ScaleModel& scale) {
   if (!scale.change_over_sweep) return "";
   const model::Estimate& change = *scale.change_over_sweep;
   const bool is_seen = std::abs(change.value) > 4 * change.sigma;
@@ -66,7 +66,7 @@ std::vector<std::string> DiagnosisLines(const calib::Calibration& calibration) {
   std::vector<std::string> lines;
   for (const calib::Diagnosis& diagnosis : calibration.diagnoses) {
     std::vector<std::string> causes;
-    for (std::size_t i = 0; i < std::min(diagnosis.causes.size(), kCausesTold); ++i)
+    for (std::size_t i = 0; i < std::min(diagnosis.causes.size(), kReportedCauses); ++i)
       causes.push_back(fmt::format("{} (chi2 {:.3g}{})", diagnosis.causes[i].cause,
                                    diagnosis.causes[i].chi2, i < diagnosis.named ? ", named" : ""));
     causes.push_back(fmt::format("nothing at all (chi2 {:.3g})", diagnosis.chi2_of_none));

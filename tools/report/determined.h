@@ -19,7 +19,7 @@ std::string SharpestLine(const calib::Calibration& calibration);
 std::string FocusReadingLine(const calib::Calibration& calibration);
 // "1/scale changes by +10.1 +- 0.1 % over the sweep: the target looks smaller at larger readings";
 // empty if it was not measured.
-std::string ScaleChangeLine(const calib::ScaleLaw& scale);
+std::string ScaleChangeLine(const calib::ScaleModel& scale);
 // "the image scale against the readings: the target moves as stated (chi2 31); then ...": one line
 // for each comparison.
 std::vector<std::string> DiagnosisLines(const calib::Calibration& calibration);

@@ -12,7 +12,7 @@
 #include "thicklens/base/cancel.h"
 #include "thicklens/estimator/estimate_checks.h"
 #include "tools/report/page_figures.h"
-#include "tools/report/page_pictures.h"
+#include "tools/report/page_images.h"
 #include "tools/report/page_style.h"
 
 namespace thicklens::tools {
@@ -24,7 +24,7 @@ constexpr int kMosaicGapPx = 2;
 constexpr double kLevelsOfFigure = 255;
 
 // What is known of a pixel; of several, the one that stands last here.
-enum class Confidence : std::size_t { kSeen, kPartlySeen, kBlurred, kFilledIn };
+enum class Confidence : std::size_t { kSeen, kPartlyVisible, kBlurred, kFilledIn };
 struct ConfidenceLook {
   const char* words;
   std::array<std::uint8_t, 3> colour;
@@ -39,20 +39,20 @@ const std::array<ConfidenceLook, 4>& ConfidenceLooks() {
   return looks;
 }
 
-Confidence ConfidenceOf(float hidden_share, float blur_sigma_px) {
-  constexpr float kSeenShare = 0.01F, kFilledShare = 0.5F;
-  if (hidden_share > kFilledShare) return Confidence::kFilledIn;
+Confidence ConfidenceOf(float occluded_fraction, float blur_sigma_px) {
+  constexpr float kVisibleFraction = 0.01F, kFilledShare = 0.5F;
+  if (occluded_fraction > kFilledShare) return Confidence::kFilledIn;
   if (blur_sigma_px > static_cast<float>(estimator::kUnresolvedBlurSigmaPx)) {
     return Confidence::kBlurred;
   }
-  return hidden_share > kSeenShare ? Confidence::kPartlySeen : Confidence::kSeen;
+  return occluded_fraction > kVisibleFraction ? Confidence::kPartlyVisible : Confidence::kSeen;
 }
 
 std::string Css(const std::array<std::uint8_t, 3>& colour) {
   return fmt::format("#{:02x}{:02x}{:02x}", colour[0], colour[1], colour[2]);
 }
 
-// The residual that the map shows as white (and black, if negative), in stored values: a round
+// The residual that the map shows as white (and black, if negative), in encoded values: a round
 // number of grey levels below which 99 of 100 pixels are.
 double ResidualRange(const std::vector<float>& residual) {
   std::vector<float> sizes;
@@ -70,13 +70,13 @@ double ResidualRange(const std::vector<float>& residual) {
 cv::Mat ConfidenceMap(const LightFieldPageInput& input, const std::vector<Confidence>& known) {
   constexpr double kTint = 0.6;
   const int width_px = input.light_field->s_count, height_px = input.light_field->t_count;
-  model::LinearPicture photo{width_px, height_px, 1, {}};
+  model::LinearImage photo{width_px, height_px, 1, {}};
   if (input.photo) {
     photo = model::ToGrey(*input.photo);
   } else {
     photo.values.assign(known.size(), 0.2F);
   }
-  const cv::Mat grey = ShownPicture(photo, kMapPx);
+  const cv::Mat grey = ShownImage(photo, kMapPx);
   cv::Mat shown(grey.size(), CV_8UC3);
   for (int y = 0; y < shown.rows; ++y) {
     ThrowIfCancelled();
@@ -125,7 +125,8 @@ std::string ResidualFigure(const LightFieldPageInput& input) {
                     return Css({grey, grey, grey});
                   });
   std::string caption =
-      "The light field put through the aperture again, less the photograph, in stored values (mean "
+      "The light field put through the aperture again, less the photograph, in encoded values "
+      "(mean "
       "of the channels). Grey is no difference, bright what the estimate has too much. Noise alone "
       "should be left; where outlines or patches stand out, the depth or the blur is wrong. Too "
       "little blur fits and does not show here.";
@@ -137,23 +138,23 @@ std::string ResidualFigure(const LightFieldPageInput& input) {
         kLevelsOfFigure * *input.estimate->noise_sigma);
   }
   return Figure(
-      fmt::format("<div class=\"pictures\" style=\"--columns: 1\"><div>{}{}</div></div>\n",
-                  EmbeddedPicture(shown, "Residual of the photograph", Packing::kExact, PlacePx(1)),
+      fmt::format("<div class=\"images\" style=\"--columns: 1\"><div>{}{}</div></div>\n",
+                  EmbeddedImage(shown, "Residual of the photograph", Packing::kExact, PlacePx(1)),
                   scale),
       "What is not explained", caption);
 }
 
 std::string ConfidenceFigure(const LightFieldPageInput& input) {
-  if (input.maps == nullptr || input.maps->hidden_share.empty()) return "";
+  if (input.maps == nullptr || input.maps->occluded_fraction.empty()) return "";
   const estimator::SceneMaps& maps = *input.maps;
   std::vector<Confidence> known;
-  known.reserve(maps.hidden_share.size());
-  for (std::size_t i = 0; i < maps.hidden_share.size(); ++i) {
-    known.push_back(ConfidenceOf(maps.hidden_share[i], maps.blur_sigma_px[i]));
+  known.reserve(maps.occluded_fraction.size());
+  for (std::size_t i = 0; i < maps.occluded_fraction.size(); ++i) {
+    known.push_back(ConfidenceOf(maps.occluded_fraction[i], maps.blur_sigma_px[i]));
   }
   const cv::Mat map = ConfidenceMap(input, known);
   return Figure(
-      Grid(1, Cell(EmbeddedPicture(map, "Confidence of the estimate", Packing::kSmall, PlacePx(1)),
+      Grid(1, Cell(EmbeddedImage(map, "Confidence of the estimate", Packing::kSmall, PlacePx(1)),
                    "")) +
           ConfidenceLegend(known),
       "How far to trust it",
@@ -174,7 +175,7 @@ std::string MosaicFigure(const LightFieldPageInput& input) {
   for (int l = 0; l < light_field.v_count; ++l) {
     for (int k = 0; k < light_field.u_count; ++k) {
       if (!light_field.IsPresent(k, l)) continue;
-      const cv::Mat shown = ShownPicture(model::ViewPicture(light_field, k, l), view_px);
+      const cv::Mat shown = ShownImage(model::ViewImage(light_field, k, l), view_px);
       const int across_px = shown.cols + kMosaicGapPx, down_px = shown.rows + kMosaicGapPx;
       if (mosaic.empty()) {
         mosaic = cv::Mat::zeros(light_field.v_count * down_px - kMosaicGapPx,
@@ -184,8 +185,7 @@ std::string MosaicFigure(const LightFieldPageInput& input) {
     }
   }
   return Figure(
-      Grid(1,
-           Cell(EmbeddedPicture(mosaic, "Mosaic of the views", Packing::kSmall, PlacePx(1)), "")),
+      Grid(1, Cell(EmbeddedImage(mosaic, "Mosaic of the views", Packing::kSmall, PlacePx(1)), "")),
       "The views",
       fmt::format("All {} × {} views side by side, each as a pinhole at that place of the aperture "
                   "would see the scene: u counts from left to right, v from top to bottom. Going "

@@ -189,7 +189,7 @@ EstimateRecord ParseEstimateRecord(const std::string& text, const std::string& n
   record.noise_sigma = fields.Number("noise_sigma");
   record.residual_rms = fields.Number("residual_rms");
   record.row_share = fields.Number("row_share");
-  record.hidden_share = fields.Number("hidden_share");
+  record.occluded_fraction = fields.Number("occluded_fraction");
   record.iterations = fields.Count("iterations");
   record.converged = fields.YesOrNo("converged");
   record.gamma = fields.Number("gamma");

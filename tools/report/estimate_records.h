@@ -12,10 +12,11 @@ namespace thicklens::tools {
 struct EstimateRecord {
   std::string solver;
   int u_count = 0, v_count = 0, s_count = 0, t_count = 0;
-  std::string block_solver, stencil, splat, device;           // empty: absent
-  std::string prior, strength_rule;                           // empty: absent
-  std::optional<double> strength, noise_sigma, residual_rms;  // noise and residual in stored values
-  std::optional<double> row_share, hidden_share;
+  std::string block_solver, stencil, splat, device;  // empty: absent
+  std::string prior, strength_rule;                  // empty: absent
+  std::optional<double> strength, noise_sigma,
+      residual_rms;  // noise and residual in encoded values
+  std::optional<double> row_share, occluded_fraction;
   std::optional<int> iterations;
   std::optional<bool> converged;
   std::optional<double> gamma, ridge;

@@ -63,7 +63,7 @@ void AddScene(const EstimateOptions& options, const EstimateOutcome& outcome, js
                {"relative_residual", scene.relative_residual},
                {"rcond_min", nullptr},
                {"row_share", scene.row_share},
-               {"hidden_share", scene.hidden_share},
+               {"occluded_fraction", scene.occluded_fraction},
                {"residual_rms", scene.residual_rms},
                {"residual_patches", PatchesJson(outcome.patches)},
                {"unexplained_share", nullptr},
@@ -73,7 +73,7 @@ void AddScene(const EstimateOptions& options, const EstimateOutcome& outcome, js
 }
 
 void AddBlocks(const EstimateOutcome& outcome, json* out) {
-  const estimator::EstimateSummary& blocks = *outcome.blocks;
+  const estimator::BlockSummary& blocks = *outcome.blocks;
   const model::LightFieldOrigin& origin = outcome.light_field.origin;
   // A direct solver has no iterations, and an iterative one no factor.
   json iterations, converged, rcond_min;
@@ -102,7 +102,7 @@ void AddBlocks(const EstimateOutcome& outcome, json* out) {
                {"relative_residual", blocks.relative_residual},
                {"rcond_min", rcond_min},
                {"row_share", nullptr},
-               {"hidden_share", nullptr},
+               {"occluded_fraction", nullptr},
                {"residual_rms", nullptr}});
 }
 
@@ -121,7 +121,7 @@ void AddFunctional(const estimator::FunctionalSummary& functional, json* out) {
                {"relative_residual", functional.relative_residual},
                {"rcond_min", nullptr},
                {"row_share", nullptr},
-               {"hidden_share", nullptr},
+               {"occluded_fraction", nullptr},
                {"residual_rms", nullptr}});
 }
 
@@ -178,7 +178,7 @@ std::string SolverText(const json& summary, const EstimateOutcome& outcome) {
   }
   const estimator::SceneSummary& scene = *outcome.scene;
   return fmt::format("solver       scene: {}\n", scene.message) +
-         fmt::format("picture      noise {:.2f} grey levels, explained to {:.2f} (rms)\n",
+         fmt::format("image      noise {:.2f} grey levels, explained to {:.2f} (rms)\n",
                      kEightBitLevels * scene.noise_sigma, kEightBitLevels * scene.residual_rms);
 }
 
@@ -217,7 +217,7 @@ std::string ConfidenceText(const estimator::ConfidenceShares& of_rays) {
       "rays         {:.1f} % seen, {:.1f} % seen in part, {:.1f} % blurred too strongly for "
       "details, "
       "{:.1f} % filled in\n",
-      100 * of_rays.seen, 100 * of_rays.partly_seen, 100 * of_rays.blurred,
+      100 * of_rays.visible, 100 * of_rays.partly_visible, 100 * of_rays.blurred,
       100 * of_rays.filled_in);
 }
 
@@ -249,20 +249,20 @@ void CheckOutcome(const PreparedEstimate& prepared, EstimateOutcome* outcome) {
   outcome->depth_noise_px = prepared.depth_noise_px;
   outcome->depth_noise_left_px = prepared.depth_noise_left_px;
   if (!outcome->scene) return;
-  outcome->patches = estimator::ResidualPatches(outcome->maps.residual, outcome->maps.hidden_share,
-                                                disparity.width_px, disparity.height_px,
-                                                outcome->scene->noise_sigma);
+  outcome->patches = estimator::ResidualPatches(outcome->maps.residual,
+                                                outcome->maps.occluded_fraction, disparity.width_px,
+                                                disparity.height_px, outcome->scene->noise_sigma);
   outcome->unexplained_share = estimator::UnexplainedShare(
-      outcome->maps.residual, outcome->maps.hidden_share, disparity.width_px, disparity.height_px,
-      outcome->scene->noise_sigma);
+      outcome->maps.residual, outcome->maps.occluded_fraction, disparity.width_px,
+      disparity.height_px, outcome->scene->noise_sigma);
 }
 
 std::vector<std::string> EstimateWarnings(const EstimateOptions& options,
                                           const PreparedEstimate& prepared,
                                           const EstimateOutcome& outcome) {
   std::vector<std::string> warnings;
-  constexpr double kMostHoles = 0.5;
-  if (HoleShare(prepared) > kMostHoles) {
+  constexpr double kMaxHoles = 0.5;
+  if (HoleShare(prepared) > kMaxHoles) {
     warnings.push_back(fmt::format(
         "{}: {} of its {} values are no depth: what stands there is guessed from the "
         "others",
@@ -297,7 +297,7 @@ std::vector<std::string> EstimateWarnings(const EstimateOptions& options,
         worst.y + worst.height_px - 1, kEightBitLevels * worst.rms,
         kEightBitLevels * outcome.scene->noise_sigma));
   }
-  if (outcome.unexplained_share && *outcome.unexplained_share > estimator::kMostUnexplained) {
+  if (outcome.unexplained_share && *outcome.unexplained_share > estimator::kMaxUnexplained) {
     warnings.push_back(fmt::format(
         "{:.0f} % of the photograph is not explained beyond its noise of {:.1f} grey levels: most "
         "likely it is sharper than this depth and aperture say; {}",
@@ -311,8 +311,8 @@ std::vector<std::string> EstimateWarnings(const EstimateOptions& options,
       outcome.scene->residual_rms > kUnexplained * outcome.scene->noise_sigma) {
     warnings.push_back(fmt::format(
         "the photograph is explained to {:.1f} grey levels (noise: {:.1f}), and hardly any of it "
-        "is seen by the whole aperture: it is wide for a picture of {} x {} px, or the depth is "
-        "rough; whether that is right cannot be told",
+        "is seen by the whole aperture: it is wide for an image of {} x {} px, or the depth is "
+        "rough; whether that is right cannot be determined",
         kEightBitLevels * outcome.scene->residual_rms, kEightBitLevels * outcome.scene->noise_sigma,
         prepared.input.disparity.width_px, prepared.input.disparity.height_px));
   }
@@ -354,8 +354,8 @@ json EstimateJson(const EstimateOptions& options, const PreparedEstimate& prepar
               {"holes_share", HoleShare(prepared)},
               {"clipped_fraction", outcome.clipped_fraction},
               {"rays",
-               {{"seen_share", outcome.confidence.seen},
-                {"partly_seen_share", outcome.confidence.partly_seen},
+               {{"visible_fraction", outcome.confidence.visible},
+                {"partly_visible_fraction", outcome.confidence.partly_visible},
                 {"blurred_share", outcome.confidence.blurred},
                 {"filled_in_share", outcome.confidence.filled_in}}},
               {"disparity",

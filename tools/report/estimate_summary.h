@@ -34,7 +34,7 @@ struct EstimateOutcome {
   model::LightField light_field;
   std::optional<estimator::SceneSummary> scene;
   estimator::SceneMaps maps;  // of solver scene
-  std::optional<estimator::EstimateSummary> blocks;
+  std::optional<estimator::BlockSummary> blocks;
   std::optional<estimator::FunctionalSummary> functional;  // also of solver grid
   std::optional<BlurProposal> blur;                        // of solver scene, if requested
   std::optional<estimator::InpaintSummary> inpainting;     // --fill telea

@@ -66,10 +66,10 @@ std::string ThinText(const model::Explanation& known) {
   if (thin.same_lens) return "thick against thin: this lens is a thin one (f1 = f2, thickness 0)\n";
   return fmt::format(
       "thick against thin (f1 = f2 = the front focal length, thickness 0)\n"
-      "  same plane of focus: blur and picture positions are the same; only cos(beta), the fall "
+      "  same plane of focus: blur and image positions are the same; only cos(beta), the fall "
       "of\n"
       "  brightness toward the corners, differs, because the image distance does\n"
-      "  same image distance: plane of focus {}; picture scale {:+.4f} %, which is {:+.3f} px at "
+      "  same image distance: plane of focus {}; image scale {:+.4f} %, which is {:+.3f} px at "
       "the\n"
       "  farthest corner; its blur radius is in the last column\n"
       "  with that image distance, the blur of thin is within {} px of that of thick up to {} "

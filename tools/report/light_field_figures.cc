@@ -12,21 +12,21 @@
 #include "tools/report/calibration_summary.h"
 #include "tools/report/estimate_figures.h"
 #include "tools/report/page_figures.h"
-#include "tools/report/page_pictures.h"
+#include "tools/report/page_images.h"
 #include "tools/report/page_style.h"
 #include "tools/report/svg_plot.h"
 
 namespace thicklens::tools {
 namespace {
 
-// Longest edges of the pictures in the page. Twice what a page of 940 px shows, where that does not
+// Longest edges of the images in the page. Twice what a page of 940 px shows, where that does not
 // make it too heavy.
 constexpr int kThumbnailPx = 240;
 constexpr int kTriplePx = 512;
 constexpr int kPhotoPx = 640;
 constexpr int kRefocusPx = 400;
 constexpr int kEpipolarPx = 1000;
-constexpr int kMostViews = 5;  // per axis, as thumbnails
+constexpr int kMaxThumbnailViews = 5;  // per axis, as thumbnails
 constexpr int kRefocusDepths = 5;
 // Of the depths, how many of the nearest and of the farthest are outliers.
 constexpr double kOutliers = 0.01;
@@ -93,7 +93,7 @@ std::string DepthCell(const PageDepth& depth, bool zero_in_focus, std::string* c
   const cv::Mat shown =
       ColourMapped(depth.values, depth.width_px, depth.height_px, range, kPhotoPx);
   return fmt::format("<div>{}{}</div>\n",
-                     EmbeddedPicture(shown, "Depth map in colours", Packing::kExact, PlacePx(2)),
+                     EmbeddedImage(shown, "Depth map in colours", Packing::kExact, PlacePx(2)),
                      scale);
 }
 
@@ -101,8 +101,8 @@ std::string ViewName(int k, int l) { return fmt::format("u {}, v {}", k, l); }
 
 std::string ViewThumbnails(const LightFieldPageInput& input) {
   const model::LightField& light_field = *input.light_field;
-  const std::vector<int> columns = EvenlyChosen(light_field.u_count, kMostViews);
-  const std::vector<int> rows = EvenlyChosen(light_field.v_count, kMostViews);
+  const std::vector<int> columns = EvenlyChosen(light_field.u_count, kMaxThumbnailViews);
+  const std::vector<int> rows = EvenlyChosen(light_field.v_count, kMaxThumbnailViews);
   std::string cells;
   for (int l : rows) {
     for (int k : columns) {
@@ -110,9 +110,9 @@ std::string ViewThumbnails(const LightFieldPageInput& input) {
         cells += Cell("", fmt::format("{}: not there", ViewName(k, l)));
         continue;
       }
-      const cv::Mat shown = ShownPicture(model::ViewPicture(light_field, k, l), kThumbnailPx);
-      cells += Cell(EmbeddedPicture(shown, "View " + ViewName(k, l), Packing::kSmall,
-                                    PlacePx(static_cast<int>(columns.size()))),
+      const cv::Mat shown = ShownImage(model::ViewImage(light_field, k, l), kThumbnailPx);
+      cells += Cell(EmbeddedImage(shown, "View " + ViewName(k, l), Packing::kSmall,
+                                  PlacePx(static_cast<int>(columns.size()))),
                     ViewName(k, l));
     }
   }
@@ -165,10 +165,10 @@ std::string LargeViews(const LightFieldPageInput& input) {
   std::string cells;
   const auto add = [&](const cv::Mat& shown, const std::string& what, const ViewIndex& view) {
     const std::string label = fmt::format("{}, {}", what, ViewName(view.k, view.l));
-    cells += Cell(EmbeddedPicture(shown, label, Packing::kSmall, PlacePx(columns)), label);
+    cells += Cell(EmbeddedImage(shown, label, Packing::kSmall, PlacePx(columns)), label);
   };
   const auto shown_view = [](const model::LightField& light_field, const ViewIndex& view) {
-    return ShownPicture(model::ViewPicture(light_field, view.k, view.l), kTriplePx);
+    return ShownImage(model::ViewImage(light_field, view.k, view.l), kTriplePx);
   };
   for (const ViewIndex& view : views) {
     const cv::Mat shown = shown_view(*input.light_field, view);
@@ -202,7 +202,7 @@ std::string LargeViews(const LightFieldPageInput& input) {
           direction, gain));
 }
 
-// How often each row of an epipolar picture is repeated, so that all of it is about as high as a
+// How often each row of an epipolar image is repeated, so that all of it is about as high as a
 // thumbnail where the page shows it.
 int EpipolarRepeat(const model::LightField& light_field) {
   constexpr double kHeightPx = 130;
@@ -270,11 +270,11 @@ std::string SweepFigure(const LightFieldPageInput& input) {
     } else if (i + 1 == sweep.shots.size()) {
       label += ", far";
     }
-    cells += Cell(EmbeddedPicture(ShownPicture(shot.picture), FrameName(shot.image),
-                                  Packing::kExact, PlacePx(columns)),
+    cells += Cell(EmbeddedImage(ShownImage(shot.image), FrameName(shot.file_name), Packing::kExact,
+                                PlacePx(columns)),
                   TrueMinus(label));
   }
-  const cv::Mat& first = sweep.shots.front().picture;
+  const cv::Mat& first = sweep.shots.front().image;
   return Figure(
       Grid(columns, cells, "strip"), "The target at several distances",
       fmt::format("{} of the {} frames of {} from near to far, with their bench readings; of each "
@@ -285,12 +285,12 @@ std::string SweepFigure(const LightFieldPageInput& input) {
                   first.rows, focus_is_known ? "sharpest near the frame marked focus; " : ""));
 }
 
-std::string PictureAndDepthFigure(const LightFieldPageInput& input) {
+std::string ImageAndDepthFigure(const LightFieldPageInput& input) {
   std::string cells, title, caption;
   if (input.photo) {
     cells += Cell(
-        EmbeddedPicture(ShownPicture(*input.photo, kPhotoPx),
-                        "The photograph through the whole aperture", Packing::kSmall, PlacePx(2)),
+        EmbeddedImage(ShownImage(*input.photo, kPhotoPx),
+                      "The photograph through the whole aperture", Packing::kSmall, PlacePx(2)),
         "");
     title = "The photograph";
     caption =
@@ -314,10 +314,8 @@ std::string EpipolarFigure(const LightFieldPageInput& input) {
   const int l = light_field.v_count / 2;
   const int repeat_px = EpipolarRepeat(light_field);
   const auto cell = [&](const model::LightField& shown, int t, const std::string& what) {
-    const cv::Mat picture =
-        ShownPicture(estimator::EpipolarRow(shown, t, l, repeat_px), kEpipolarPx);
-    return Cell(EmbeddedPicture(picture, "Epipolar picture, " + what, Packing::kExact, PlacePx(1)),
-                what);
+    const cv::Mat image = ShownImage(estimator::EpipolarRow(shown, t, l, repeat_px), kEpipolarPx);
+    return Cell(EmbeddedImage(image, "Epipolar image, " + what, Packing::kExact, PlacePx(1)), what);
   };
   const int middle = light_field.t_count / 2;
   std::string cells, rows;
@@ -330,7 +328,7 @@ std::string EpipolarFigure(const LightFieldPageInput& input) {
     rows = fmt::format("{} {}", chosen.size() == 1 ? "Row" : "Rows", fmt::join(chosen, ", "));
   }
   return Figure(
-      Grid(1, cells), "Epipolar pictures",
+      Grid(1, cells), "Epipolar images",
       fmt::format(
           "{} of the {} views with v = {}, one above the other, the leftmost view at the top. "
           "Every point of the scene draws a line: upright in the plane of focus, "
@@ -345,32 +343,32 @@ std::string RefocusFigure(const LightFieldPageInput& input) {
   const int columns = static_cast<int>(planes.size());
   std::string cells;
   for (const RefocusPlane& plane : planes) {
-    const cv::Mat shown = ShownPicture(
+    const cv::Mat shown = ShownImage(
         estimator::Refocus(*input.light_field, plane.disparity_px.x(), plane.disparity_px.y(),
                            input.light_field->weights, input.threads),
         kRefocusPx);
-    cells += Cell(
-        EmbeddedPicture(shown, "Refocused to " + plane.label, Packing::kSmall, PlacePx(columns)),
-        plane.label);
+    cells +=
+        Cell(EmbeddedImage(shown, "Refocused to " + plane.label, Packing::kSmall, PlacePx(columns)),
+             plane.label);
   }
   return Figure(
       Grid(columns, cells, "strip"), "Focus moved after the exposure",
       fmt::format("The views, shifted and averaged so that things {} come together, from near to "
-                  "far. In each picture another part should be sharp; doubled contours elsewhere "
+                  "far. In each image another part should be sharp; doubled contours elsewhere "
                   "mean that the views are too few for so much blur.",
-                  input.depth->in_mm ? "at the depth below each picture"
-                                     : "of the disparity below each picture (per view step)"));
+                  input.depth->in_mm ? "at the depth below each image"
+                                     : "of the disparity below each image (per view step)"));
 }
 
 std::string LightFieldFigureStyle() {
   return R"(h4 { font-size: 14px; margin: 20px 0 6px; font-weight: 600; }
 .plain { --verdict: var(--soft); }
 .verdict.plain .outcome { color: var(--ink); }
-.pictures { display: grid; gap: 12px 10px; grid-template-columns:
+.images { display: grid; gap: 12px 10px; grid-template-columns:
   repeat(var(--columns), minmax(0, 1fr)); }
-.pictures img { display: block; width: 100%; height: auto; border-radius: 2px; }
-.pictures img.crisp { image-rendering: pixelated; }
-.pictures span { display: block; margin-top: 3px; color: var(--soft); font-size: 12px;
+.images img { display: block; width: 100%; height: auto; border-radius: 2px; }
+.images img.crisp { image-rendering: pixelated; }
+.images span { display: block; margin-top: 3px; color: var(--soft); font-size: 12px;
   line-height: 1.3; font-variant-numeric: tabular-nums; }
 .views { gap: 8px 6px; }
 .scale { display: block; max-width: 100%; height: auto; margin-top: 8px; color: var(--soft);
@@ -384,7 +382,7 @@ std::string LightFieldFigureStyle() {
 .inlined h3 { font-size: 16px; margin-top: 32px; }
 @media (max-width: 640px) { .strip { --columns: 3 !important; } .pair { --columns: 1 !important; }
   .inlined { padding-left: 10px; } }
-@media print { .pictures > div { break-inside: avoid; } }
+@media print { .images > div { break-inside: avoid; } }
 )";
 }
 

@@ -10,7 +10,7 @@ namespace thicklens::tools {
 // The sections of the page about a light field that show images, each without its heading and empty
 // if the input has nothing to show.
 std::string SweepFigure(const LightFieldPageInput& input);
-std::string PictureAndDepthFigure(const LightFieldPageInput& input);
+std::string ImageAndDepthFigure(const LightFieldPageInput& input);
 std::string ViewFigures(const LightFieldPageInput& input);
 std::string EpipolarFigure(const LightFieldPageInput& input);
 std::string RefocusFigure(const LightFieldPageInput& input);

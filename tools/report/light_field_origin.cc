@@ -9,7 +9,7 @@
 namespace thicklens::tools {
 
 bool IsEstimated(const LightFieldPageInput& input) {
-  // Without what filled its hidden rays: "scene" of "scene+telea".
+  // Without what filled its occluded rays: "scene" of "scene+telea".
   const std::string& whole = input.light_field->origin.method;
   const std::string method = whole.substr(0, whole.find('+'));
   return input.estimate || method == "scene" || method == "blocks" || method == "functional" ||
@@ -142,7 +142,7 @@ std::string HowItWasMade(const LightFieldPageInput& input) {
   rows += OriginRow("strength of the prior", StrengthInWords(record));
   rows += OriginRow("noise of the photograph", GreyLevels(record.noise_sigma));
   rows += OriginRow("residual of the photograph (rms)", GreyLevels(record.residual_rms));
-  rows += OriginRow("rays that the centre view does not show", Percent(record.hidden_share));
+  rows += OriginRow("rays that the centre view does not show", Percent(record.occluded_fraction));
   rows += OriginRow("pixels with a row of their own", Percent(record.row_share));
   rows += OriginRow("iterations", IterationsInWords(record));
   rows += OriginRow("solver of a block", record.block_solver);

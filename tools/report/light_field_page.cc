@@ -14,7 +14,7 @@
 #include "tools/report/estimate_figures.h"
 #include "tools/report/light_field_figures.h"
 #include "tools/report/light_field_origin.h"
-#include "tools/report/page_pictures.h"
+#include "tools/report/page_images.h"
 #include "tools/report/page_style.h"
 #include "tools/report/svg_plot.h"
 
@@ -289,7 +289,7 @@ LightFieldPage MakeLightFieldPage(const LightFieldPageInput& input) {
   add("calibration", "",
       input.calibration.empty() ? ""
                                 : "<div class=\"inlined\">\n" + input.calibration + "</div>\n");
-  add("picture", "What the estimate starts from", PictureAndDepthFigure(input));
+  add("image", "What the estimate starts from", ImageAndDepthFigure(input));
   add("residual", "What the estimate leaves", ResidualFigure(input));
   add("confidence", "What is known and what is made up", ConfidenceFigure(input));
   add("views", "The views", ViewFigures(input));

@@ -16,8 +16,8 @@ namespace thicklens::tools {
 
 // Some frames of a focus sweep.
 struct SweepShot {
-  cv::Mat picture;  // as stored, cropped to the region that is shown
-  std::string image;
+  cv::Mat image;  // as stored, cropped to the region that is shown
+  std::string file_name;
   double reading_mm = 0;
   bool nearest_to_focus = false;
 };
@@ -40,7 +40,7 @@ struct LightFieldPageInput {
   std::string name;  // of the light field, as the user gave it
   const model::LightField* light_field = nullptr;
   const model::LightField* truth = nullptr;  // of the same views and size
-  std::optional<model::LinearPicture> photo;
+  std::optional<model::LinearImage> photo;
   std::optional<PageDepth> depth;
   std::optional<SweepStrip> sweep;
   std::string calibration;                     // from InlinedCalibrationReport

@@ -10,14 +10,14 @@
 
 namespace thicklens::tools {
 
-std::string Cell(const std::string& picture, const std::string& label) {
-  return fmt::format("<div>{}{}</div>\n", picture,
+std::string Cell(const std::string& image, const std::string& label) {
+  return fmt::format("<div>{}{}</div>\n", image,
                      label.empty() ? "" : fmt::format("<span>{}</span>", EscapeXml(label)));
 }
 
 std::string Grid(int columns, const std::string& cells, const std::string& css_class) {
   return fmt::format("<div class=\"{}\" style=\"--columns: {}\">\n{}</div>\n",
-                     css_class.empty() ? "pictures" : "pictures " + css_class, columns, cells);
+                     css_class.empty() ? "images" : "images " + css_class, columns, cells);
 }
 
 std::string Figure(const std::string& content, const std::string& title,

@@ -13,7 +13,7 @@ constexpr int kPageColumnPx = 890;
 inline int PlacePx(int columns) { return kPageColumnPx / columns; }
 
 // One image with its label beneath.
-std::string Cell(const std::string& picture, const std::string& label);
+std::string Cell(const std::string& image, const std::string& label);
 std::string Grid(int columns, const std::string& cells, const std::string& css_class = "");
 std::string Figure(const std::string& content, const std::string& title,
                    const std::string& caption);

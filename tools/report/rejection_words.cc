@@ -11,7 +11,7 @@
 namespace thicklens::tools {
 namespace {
 
-constexpr std::size_t kMostRuns = 6;     // of one kind in the text
+constexpr std::size_t kMaxRuns = 6;      // of one kind in the text
 constexpr std::size_t kLongEnding = 20;  // characters that are worth leaving out
 constexpr char kLeftOut[] = "...";
 
@@ -55,7 +55,7 @@ std::string GroupLines(const std::vector<calib::FrameMeasurement>& frames,
   std::string text = fmt::format("  {} ({} frames):\n", PrintableUtf8(group.kind), group.frames);
   const std::vector<std::string> details = TextsOfRuns(frames, group);
   int told = 0;
-  for (std::size_t i = 0; i < std::min(group.runs.size(), kMostRuns); ++i) {
+  for (std::size_t i = 0; i < std::min(group.runs.size(), kMaxRuns); ++i) {
     const calib::RejectionRun& run = group.runs[i];
     text += fmt::format("    {}\n", PrintableUtf8(Reason(RunName(frames, run), details[i])));
     told += run.count();

@@ -25,9 +25,9 @@ namespace {
 constexpr double kPointsPerMm = 72 / 25.4;
 constexpr double kInchesPerMetre = 1 / 0.0254;
 constexpr double kMmPerMetre = 1000;
-constexpr double kMostPixels = 150e6;
-constexpr int kLongestSidePx = 32767;  // of a picture in cairo
-constexpr double kFewestFeaturePx = 2;
+constexpr double kMaxDrawingPixels = 150e6;
+constexpr int kLongestSidePx = 32767;  // of an image in cairo
+constexpr double kMinFeaturePx = 2;
 constexpr double kFullGrey = 255;
 constexpr int kLeavesPerLook = 4096;
 
@@ -199,20 +199,20 @@ PngSize TargetPngSize(const model::TargetPage& page, double dots_per_inch) {
   const double pixels_per_metre = std::round(dots_per_inch * kInchesPerMetre);
   const double width_px = std::round(page.width_mm * pixels_per_metre / kMmPerMetre);
   const double height_px = std::round(page.height_mm * pixels_per_metre / kMmPerMetre);
-  if (!(width_px * height_px <= kMostPixels) || !(width_px <= kLongestSidePx) ||
+  if (!(width_px * height_px <= kMaxDrawingPixels) || !(width_px <= kLongestSidePx) ||
       !(height_px <= kLongestSidePx)) {
     throw Error(fmt::format(
         "{:g} x {:g} mm at {:g} dpi are {:.0f} x {:.0f} px, more than {:g} million or than {} in a "
         "row: take a smaller --dpi or --size, or write a PDF, which has no px",
-        page.width_mm, page.height_mm, dots_per_inch, width_px, height_px, kMostPixels / 1e6,
+        page.width_mm, page.height_mm, dots_per_inch, width_px, height_px, kMaxDrawingPixels / 1e6,
         kLongestSidePx));
   }
   const double feature_px = page.feature_mm * pixels_per_metre / kMmPerMetre;
-  if (!(feature_px >= kFewestFeaturePx)) {
+  if (!(feature_px >= kMinFeaturePx)) {
     throw Error(
         fmt::format("features of {:g} mm are {:.2f} px at {:g} dpi, below {:g}: take a larger "
                     "--dpi or --feature-mm, or write a PDF, which has no px",
-                    page.feature_mm, feature_px, dots_per_inch, kFewestFeaturePx));
+                    page.feature_mm, feature_px, dots_per_inch, kMinFeaturePx));
   }
   return {static_cast<int>(pixels_per_metre), static_cast<int>(width_px),
           static_cast<int>(height_px)};
@@ -220,7 +220,7 @@ PngSize TargetPngSize(const model::TargetPage& page, double dots_per_inch) {
 
 std::string TargetPng(const model::TargetPage& page, const std::vector<model::TargetLeaf>& leaves,
                       const PngSize& size) {
-  model::StoredPicture picture{size.width_px, size.height_px, 1, 8, {}};
+  model::EncodedImage image{size.width_px, size.height_px, 1, 8, {}};
   {
     const Surface surface(
         cairo_image_surface_create(CAIRO_FORMAT_RGB24, size.width_px, size.height_px));
@@ -230,16 +230,16 @@ std::string TargetPng(const model::TargetPage& page, const std::vector<model::Ta
     const unsigned char* bytes = cairo_image_surface_get_data(surface.get());
     const auto stride = static_cast<std::size_t>(cairo_image_surface_get_stride(surface.get()));
     const auto width = static_cast<std::size_t>(size.width_px);
-    picture.values.reserve(width * static_cast<std::size_t>(size.height_px));
+    image.values.reserve(width * static_cast<std::size_t>(size.height_px));
     for (std::size_t y = 0; y < static_cast<std::size_t>(size.height_px); ++y) {
       ThrowIfCancelled();
       // A px of RGB24 is a word of 32 bits with blue in its lowest byte; all colours are alike.
       const auto* row = reinterpret_cast<const std::uint32_t*>(bytes + y * stride);
       for (std::size_t x = 0; x < width; ++x)
-        picture.values.push_back(static_cast<std::uint16_t>(row[x] & 0xFFU));
+        image.values.push_back(static_cast<std::uint16_t>(row[x] & 0xFFU));
     }
   }
-  return io::WithPngResolution(io::EncodePng(picture), size.pixels_per_metre);
+  return io::WithPngResolution(io::EncodePng(image), size.pixels_per_metre);
 }
 
 }  // namespace thicklens::tools

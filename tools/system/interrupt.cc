@@ -94,7 +94,7 @@ std::string WordsToSay() {
   return lock.owns_lock() && last_words ? last_words() : "";
 }
 
-void RemoveAndTell() {
+void RemoveAndReport() {
   EndChildPrograms();
   const std::vector<std::string> in_place = AbandonOutputs(kCleaningSeconds);
   std::string text = ::isatty(STDERR_FILENO) == 1 ? "\r\033[K" : "";  // a line of progress
@@ -108,7 +108,7 @@ void RemoveAndTell() {
   int code = kNobody;
   if (end_code.compare_exchange_strong(code, kInterruptedCode)) {
     try {
-      RemoveAndTell();
+      RemoveAndReport();
     } catch (const std::exception&) {  // out of memory: the process ends without a message
     }
     ::_exit(kInterruptedCode);

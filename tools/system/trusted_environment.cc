@@ -74,18 +74,18 @@ bool IsFoundHere(const std::string& name) {
          (name.find('/') != std::string::npos || fs::exists(name, unreachable) || unreachable);
 }
 
-void TakeOut(const char* name, std::vector<std::string>* told) {
-  told->push_back(RelativePathIsIgnored(name, ValueOf(name)));
+void TakeOut(const char* name, std::vector<std::string>* reported) {
+  reported->push_back(RelativePathIsIgnored(name, ValueOf(name)));
   ::unsetenv(name);
 }
 
 // An empty part, which a line such as X="$X:/opt/share" in a shell's start-up file leaves, means
 // the current folder to some libraries. Nobody intends that, so it is removed without a warning.
-void KeepAbsoluteParts(const char* name, std::vector<std::string>* told) {
+void KeepAbsoluteParts(const char* name, std::vector<std::string>* reported) {
   const std::string value = ValueOf(name);
   const ListOfPaths list(value);
   for (const std::string& part : list.relative) {
-    told->push_back(
+    reported->push_back(
         fmt::format("{}: its part '{}' is ignored, because it would be looked for in the current "
                     "folder; an absolute path is expected",
                     name, PrintableUtf8(part)));
@@ -122,22 +122,22 @@ std::string RelativePathIsIgnored(const std::string& name, const std::string& va
 }
 
 std::vector<std::string> DistrustRelativePaths() {
-  std::vector<std::string> told;
+  std::vector<std::string> reported;
   for (const char* name : kPaths) {
-    if (IsRelative(ValueOf(name))) TakeOut(name, &told);
+    if (IsRelative(ValueOf(name))) TakeOut(name, &reported);
   }
   for (const char* name : kPathLists) {
-    KeepAbsoluteParts(name, &told);
+    KeepAbsoluteParts(name, &reported);
   }
   for (const char* name : kPathsOrNames) {
     std::istringstream parts(ValueOf(name));
     bool is_found_here = false;
     for (std::string part; std::getline(parts, part, ':');)
       is_found_here = is_found_here || IsFoundHere(part);
-    if (is_found_here) TakeOut(name, &told);
+    if (is_found_here) TakeOut(name, &reported);
   }
   GivePoclAPrivateCache();
-  return told;
+  return reported;
 }
 
 }  // namespace thicklens::tools

@@ -13,7 +13,7 @@ namespace {
 constexpr int kPatchWidthPx = 96, kPatchHeightPx = 64;
 constexpr int kRounds = 5;
 constexpr double kFarthestMm = 1e6;
-// Of the picture's time; what is less is lost in what one run differs from the next.
+// Of the image's time; what is less is lost in what one run differs from the next.
 constexpr double kMeasurable = 0.05;
 
 SceneLayer Leaves(double depth_mm) {
@@ -37,7 +37,7 @@ SceneSimulationOptions PatchOf(const Camera& camera, const DepthRange& range,
   card.outline.size = {static_cast<double>(width_px), 4.0 * height_px};
   patch.layers = {Leaves(std::min(range.far_mm, kFarthestMm)), card};
   patch.effects = {};
-  patch.effects.base = EffectChoice::Base::kGiven;
+  patch.effects.base = EffectSelectionOptions::Base::kGiven;
   return patch;
 }
 
@@ -57,14 +57,15 @@ double Median(std::vector<double> values) {
 }  // namespace
 
 EffectCosts MeasureEffectCosts(const Camera& camera, const DepthRange& range,
-                               const SceneSimulationOptions& sensor, const EffectDecision& decision,
+                               const SceneSimulationOptions& sensor,
+                               const EffectSelection& decision,
                                const std::function<void(int done, int total)>& tell) {
   SceneSimulationOptions patch = PatchOf(camera, range, sensor);
-  const EffectSet known = decision.on.Both(PictureEffects());
+  const EffectSet known = decision.on.Both(ImageEffects());
   EffectCosts costs;
   std::vector<Effect> effects;
-  for (const EffectFinding& finding : decision.findings) {
-    if (!PictureEffects().Has(finding.effect)) continue;
+  for (const LargestEffectImpact& finding : decision.findings) {
+    if (!ImageEffects().Has(finding.effect)) continue;
     if (finding.impact.amount == 0 && finding.impact.grey_levels == 0) {
       costs.of_effect.emplace_back(finding.effect, 0);
     } else {

@@ -100,12 +100,12 @@ double HeightField::ShiftAt(const Eigen::Vector2d& position_px) const {
   return above + (y_px - y) * (below - above);
 }
 
-double HeightField::SteepestOver(const PictureRegion& region) const {
+double HeightField::SteepestOver(const ImageRegion& region) const {
   return std::sqrt(2.0) * slopes_.Over(region).high;
 }
 
-PictureRegion HeightField::Reached(const PictureRegion& region, const ApertureBox& aperture,
-                                   const ValueRange& shifts) {
+ImageRegion HeightField::ReachedRegion(const ImageRegion& region, const ApertureBox& aperture,
+                                       const ValueRange& shifts) {
   const Eigen::Array2d ends_px[] = {shifts.low * aperture.low_mm, shifts.low * aperture.high_mm,
                                     shifts.high * aperture.low_mm, shifts.high * aperture.high_mm};
   const Eigen::Array2d low_px = ends_px[0].min(ends_px[1]).min(ends_px[2].min(ends_px[3]));
@@ -115,17 +115,19 @@ PictureRegion HeightField::Reached(const PictureRegion& region, const ApertureBo
 
 // If bounds of the shifts are known, they also bound the positions that the rays pass. Bounds of V
 // over these positions are then narrower bounds of the shifts.
-ValueRange HeightField::MetFrom(const PictureRegion& region, const ApertureBox& aperture) const {
+ValueRange HeightField::IntersectionShiftBounds(const ImageRegion& region,
+                                                const ApertureBox& aperture) const {
   ValueRange met = all_;
-  for (int i = 0; i < kNarrowings; ++i) met = ShiftsOver(Reached(region, aperture, met));
+  for (int i = 0; i < kNarrowings; ++i) met = ShiftsOver(ReachedRegion(region, aperture, met));
   return met;
 }
 
 // Let t be the distance from the start. Then h(t) = +-(V(x + A V(t)) - V(t)) >= 0 at the start. On
 // a cell h = q0 + q1 t + q2 t^2 from its entry. The first zero is 2 q0/(-q1 + sqrt(q1^2 - 4 q2
 // q0)); where that is not positive, it is behind the ray.
-double HeightField::FirstMet(const Eigen::Vector2d& position_px, const Eigen::Vector2d& aperture_mm,
-                             double from, double to) const {
+double HeightField::FirstIntersection(const Eigen::Vector2d& position_px,
+                                      const Eigen::Vector2d& aperture_mm, double from,
+                                      double to) const {
   const double sign = to < from ? -1 : 1;
   const double length = std::abs(to - from);
   const Eigen::Vector2d start_px = position_px + from * aperture_mm;
@@ -164,12 +166,12 @@ double HeightField::FirstMet(const Eigen::Vector2d& position_px, const Eigen::Ve
   }
 }
 
-double HeightField::MetNearShift(const Eigen::Vector2d& position_px,
-                                 const Eigen::Vector2d& aperture_mm, double shift,
-                                 const ValueRange& bounds) const {
+double HeightField::IntersectionNearShift(const Eigen::Vector2d& position_px,
+                                          const Eigen::Vector2d& aperture_mm, double shift,
+                                          const ValueRange& bounds) const {
   const bool is_before = ShiftAt(position_px + shift * aperture_mm) < shift;
-  return FirstMet(position_px, aperture_mm, shift,
-                  is_before ? std::min(bounds.low, shift) : std::max(bounds.high, shift));
+  return FirstIntersection(position_px, aperture_mm, shift,
+                           is_before ? std::min(bounds.low, shift) : std::max(bounds.high, shift));
 }
 
 }  // namespace thicklens::model

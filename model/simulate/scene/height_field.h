@@ -5,8 +5,8 @@
 #include <cstddef>
 #include <vector>
 
-#include "model/simulate/scene/picture_bounds.h"
-#include "model/simulate/scene/picture_region.h"
+#include "model/simulate/scene/image_bounds.h"
+#include "model/simulate/scene/image_region.h"
 
 namespace thicklens::model {
 
@@ -33,30 +33,32 @@ class HeightField {
   double ShiftAt(const Eigen::Vector2d& position_px) const;
   double DepthMm(double shift) const { return 1 / (inverse_focus_per_mm_ + shift / scale_px_); }
   // Bounds of V over a region.
-  ValueRange ShiftsOver(const PictureRegion& region) const { return shifts_.Over(region); }
+  ValueRange ShiftsOver(const ImageRegion& region) const { return shifts_.Over(region); }
   // Upper bounds over the region, px per mm per px: SteepestOver of |grad V|, SharpestOver of the
   // jumps of its components between cells.
-  double SteepestOver(const PictureRegion& region) const;
-  double SharpestOver(const PictureRegion& region) const { return bends_.Over(region).high; }
+  double SteepestOver(const ImageRegion& region) const;
+  double SharpestOver(const ImageRegion& region) const { return bends_.Over(region).high; }
 
-  // MetFrom returns bounds of the shifts at which rays of positions in the region meet the surface.
-  // Reached returns a region that contains all positions that such rays pass at these shifts.
-  ValueRange MetFrom(const PictureRegion& region, const ApertureBox& aperture) const;
-  static PictureRegion Reached(const PictureRegion& region, const ApertureBox& aperture,
-                               const ValueRange& shifts);
+  // IntersectionShiftBounds returns bounds of the shifts at which rays of positions in the region
+  // meet the surface. ReachedRegion returns a region that contains all positions that such rays
+  // pass at these shifts.
+  ValueRange IntersectionShiftBounds(const ImageRegion& region, const ApertureBox& aperture) const;
+  static ImageRegion ReachedRegion(const ImageRegion& region, const ApertureBox& aperture,
+                                   const ValueRange& shifts);
 
   // Returns the first shift at which the ray (x, A) meets the surface on its way from one shift to
-  // another, or `to` if it does not meet the surface. From the upper end of MetFrom to the lower
-  // end, the result is the visible point.
-  double FirstMet(const Eigen::Vector2d& position_px, const Eigen::Vector2d& aperture_mm,
-                  double from, double to) const;
+  // another, or `to` if it does not meet the surface. From the upper end of IntersectionShiftBounds
+  // to the lower end, the result is the visible point.
+  double FirstIntersection(const Eigen::Vector2d& position_px, const Eigen::Vector2d& aperture_mm,
+                           double from, double to) const;
   // Returns the shift at which the ray first meets the surface from `shift` on. The search goes to
   // nearer or farther points, depending on the side on which the ray crosses the surface within
   // `bounds`. From the shift at the middle of the aperture, the result is the visible point if no
   // part of the surface occludes another. Where a ray meets the surface only once, it equals that
-  // of FirstMet.
-  double MetNearShift(const Eigen::Vector2d& position_px, const Eigen::Vector2d& aperture_mm,
-                      double shift, const ValueRange& bounds) const;
+  // of FirstIntersection.
+  double IntersectionNearShift(const Eigen::Vector2d& position_px,
+                               const Eigen::Vector2d& aperture_mm, double shift,
+                               const ValueRange& bounds) const;
 
  private:
   struct Corners {
@@ -70,7 +72,7 @@ class HeightField {
   const int width_px_, height_px_;
   const double scale_px_, inverse_focus_per_mm_;
   const std::vector<double> shift_;
-  const PictureBounds shifts_, slopes_, bends_;
+  const ImageBounds shifts_, slopes_, bends_;
   const ValueRange all_;  // bounds of all shifts
 };
 

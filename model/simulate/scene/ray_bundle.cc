@@ -118,15 +118,15 @@ ChiefHit RayBundle::ChiefAt(const Eigen::Vector2d& centre_px, std::size_t layer)
     chief.shift = field->ShiftAt(centre_px);
     chief.depth_mm = field->DepthMm(chief.shift);
     chief.on_texture = centre_px;
-    const PictureRegion landing = {centre_px + farthest_landing_.low_px,
-                                   centre_px + farthest_landing_.high_px};
-    chief.shifts = field->MetFrom(landing, aperture_);
+    const ImageRegion landing = {centre_px + farthest_landing_.low_px,
+                                 centre_px + farthest_landing_.high_px};
+    chief.shifts = field->IntersectionShiftBounds(landing, aperture_);
     // The rays meet the field once if V grows more slowly along x + A V than V itself.
     const double farthest_mm =
         aperture_.low_mm.cwiseAbs().cwiseMax(aperture_.high_mm.cwiseAbs()).norm();
-    chief.is_met_once =
-        farthest_mm * field->SteepestOver(HeightField::Reached(landing, aperture_, chief.shifts)) <
-        1;
+    chief.is_met_once = farthest_mm * field->SteepestOver(HeightField::ReachedRegion(
+                                          landing, aperture_, chief.shifts)) <
+                        1;
     return chief;
   }
   chief.facing = 1 - plane.slope.dot(chief.slope);
@@ -175,8 +175,8 @@ RayBundle::Meeting RayBundle::MeetHeights(const HeightField& field, const ChiefH
     const Eigen::Vector2d position_px = chief.on_texture + landings_px_[ray];
     const double shift =
         occlusion_ && !chief.is_met_once
-            ? field.FirstMet(position_px, aperture_mm, chief.shifts.high, chief.shifts.low)
-            : field.MetNearShift(position_px, aperture_mm, chief.shift, chief.shifts);
+            ? field.FirstIntersection(position_px, aperture_mm, chief.shifts.high, chief.shifts.low)
+            : field.IntersectionNearShift(position_px, aperture_mm, chief.shift, chief.shifts);
     const Eigen::Vector2d from_chief_px = landings_px_[ray] + shift * aperture_mm;
     meeting.x(i) = static_cast<float>(from_chief_px.x());
     meeting.y(i) = static_cast<float>(from_chief_px.y());

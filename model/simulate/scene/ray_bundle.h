@@ -89,7 +89,7 @@ class RayBundle {
   std::vector<SceneRay> rays_;
   std::vector<Eigen::Vector2d> landings_px_;  // landing points of the rays, relative to the pixel's
                                               // centre
-  PictureRegion farthest_landing_{{0, 0}, {0, 0}};
+  ImageRegion farthest_landing_{{0, 0}, {0, 0}};
   ApertureBox aperture_;  // bounding box of the aperture positions of all rays
   Eigen::ArrayXf slope_x_, slope_y_;
   std::vector<OnLayer> on_layer_;

@@ -14,13 +14,13 @@ struct SamplingSpread {
   double irradiance = 0;  // relative sd of the irradiance of rays through the aperture
 };
 
-// [D45] Returns the rms error of stored values, 255 at full scale, of pixels that are the mean of
+// [D45] Returns the rms error of encoded values, 255 at full scale, of pixels that are the mean of
 // `rays` rays. The formula was measured with the sets of ray_set.h on leaves, noise and edges. For
 // 16 rays
 //   E = hypot(0.02 slope landing, min(0.06 slope defocus, 0.04 range), min(0.1 slope airy, 0.05
 //   range)).
 // For a place with jumps it is hypot(0.026 range, min(0.065 jump defocus, 0.08 range)). The error
-// decreases as (16/n)^0.85, with jumps as (16/n)^0.7; slope and range are in stored values. A term
+// decreases as (16/n)^0.85, with jumps as (16/n)^0.7; slope and range are in encoded values. A term
 // of 0.06 times the spread of the irradiance over the aperture is added. The result is at least a
 // quarter above the measured error, but regular patterns can exceed it by half.
 double SamplingError(const SceneBlock& block, const SamplingSpread& spread,

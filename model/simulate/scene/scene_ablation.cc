@@ -35,18 +35,18 @@ class SceneWorld {
         seconds_(SecondsSince(start_)) {}
 
   const SceneSimulator& simulator() const { return simulator_; }
-  const StoredPicture& stored() const { return stored_; }
+  const EncodedImage& stored() const { return stored_; }
   double seconds() const { return seconds_; }
-  StoredValues Values(bool with_noise) const {
-    return with_noise ? StoredValuesOf(stored_)
-                      : StoredValuesOf(noiseless_, simulator_.camera().sensor.transfer);
+  EncodedValues Values(bool with_noise) const {
+    return with_noise ? EncodedValuesOf(stored_)
+                      : EncodedValuesOf(noiseless_, simulator_.camera().sensor.transfer);
   }
 
  private:
   Clock::time_point start_;
   SceneSimulator simulator_;
-  LinearPicture noiseless_;
-  StoredPicture stored_;
+  LinearImage noiseless_;
+  EncodedImage stored_;
   double seconds_;
 };
 
@@ -58,7 +58,7 @@ class SceneAblator {
 
   SceneAblation Run() {
     SceneSimulationOptions by_auto = scene_;
-    by_auto.effects.base = EffectChoice::Base::kAuto;
+    by_auto.effects.base = EffectSelectionOptions::Base::kAuto;
     const EffectSet kept = SceneSimulator(by_auto, pixels_, step_.run.threads).effects().on;
 
     scene_.effects = AllInsteadOfAuto(scene_.effects);
@@ -70,13 +70,13 @@ class SceneAblator {
     step_.total = static_cast<int>(result_.on.Effects().size()) + 1;
     result_.u_count = scene_.u_count;
     result_.v_count = scene_.v_count;
-    result_.picture = base_->stored();
-    result_.picture_seconds = base_->seconds();
+    result_.image = base_->stored();
+    result_.image_seconds = base_->seconds();
     result_.sampling_error_grey_levels = simulator.sampling_error_grey_levels();
     const auto start = Clock::now();
     result_.light_field_psnr_db = Estimate(base_->stored(), simulator.camera(), truth_, result_.on);
     result_.estimate_seconds = SecondsSince(start);
-    for (const EffectFinding& finding : simulator.effects().findings) {
+    for (const LargestEffectImpact& finding : simulator.effects().findings) {
       if (!result_.on.Has(finding.effect)) continue;
       ++step_.done;
       step_.Tell();
@@ -100,7 +100,7 @@ class SceneAblator {
     return truth;
   }
 
-  double Estimate(const StoredPicture& photograph, const Camera& camera, const LightField& truth,
+  double Estimate(const EncodedImage& photograph, const Camera& camera, const LightField& truth,
                   const EffectSet& on) const {
     return estimate_({photograph, camera, depth_, truth, on, [this] { step_.Tell(); }});
   }
@@ -111,9 +111,9 @@ class SceneAblator {
     // A lens that has the other shape, whose views lie where an estimate with that shape has them.
     if (row->effect == Effect::kApertureShape) options.camera.psf = Psf::kGaussian;
     const SceneWorld world(options, pixels_, step_);
-    row->picture_seconds = world.seconds();
+    row->image_seconds = world.seconds();
     Compare(world, row);
-    row->absent = row->picture.nothing();
+    row->absent = row->image.nothing();
     if (row->absent) return;
 
     const EffectSet fewer = result_.on.Without({row->effect});
@@ -137,13 +137,13 @@ class SceneAblator {
 
   void Compare(const SceneWorld& world, AblatedSceneEffect* row) const {
     const bool with_noise = IsOfStorage(row->effect);
-    const StoredValues with = base_->Values(with_noise);
-    const StoredValues without = world.Values(with_noise);
-    PictureChangeMeter meter;
+    const EncodedValues with = base_->Values(with_noise);
+    const EncodedValues without = world.Values(with_noise);
+    ImageChangeAccumulator meter;
     meter.Add(with, without);
-    row->picture = meter.Result();
+    row->image = meter.Result();
     row->difference = {with.width_px, with.height_px, GreyLevelDifference(with, without),
-                       "the picture"};
+                       "the image"};
   }
 
   SceneSimulationOptions scene_;

@@ -53,7 +53,7 @@ void SceneGeometry::AddPixels(const Camera& camera, std::size_t index, const Lay
   if (!layer.depth) return;
   const std::string name = fmt::format("{}: depth.map '{}'", place, layer.depth->map_path);
   if (pixels.depth.values.empty()) throw Error(name + " is empty");
-  LinearPicture same_size{sensor_.width_px, sensor_.height_px, 1, {}};
+  LinearImage same_size{sensor_.width_px, sensor_.height_px, 1, {}};
   same_size.values.resize(static_cast<std::size_t>(sensor_.width_px) *
                           static_cast<std::size_t>(sensor_.height_px));
   const Scene scene =
@@ -98,8 +98,9 @@ SceneHit SceneGeometry::HitOn(std::size_t layer, const SceneRay& ray) const {
     return {layer, field.DepthMm(field.ShiftAt(position_px)), position_px};
   }
   const ValueRange shifts =
-      field.MetFrom({position_px, position_px}, {ray.aperture_mm, ray.aperture_mm});
-  const double shift = field.FirstMet(position_px, ray.aperture_mm, shifts.high, shifts.low);
+      field.IntersectionShiftBounds({position_px, position_px}, {ray.aperture_mm, ray.aperture_mm});
+  const double shift =
+      field.FirstIntersection(position_px, ray.aperture_mm, shifts.high, shifts.low);
   return {layer, field.DepthMm(shift), position_px + shift * ray.aperture_mm};
 }
 
@@ -131,7 +132,7 @@ SceneHit SceneGeometry::Trace(const SceneRay& ray, const std::vector<std::size_t
 
 // The points that chief rays meet of a convex region form a convex set, and so do outlines except
 // masks. Corners therefore suffice.
-bool SceneGeometry::Covers(std::size_t index, const PictureRegion& region) const {
+bool SceneGeometry::Covers(std::size_t index, const ImageRegion& region) const {
   const SceneLayer& layer = layers_[index];
   if (layer.outline.shape == OutlineOptions::Shape::kWhole) return true;
   const bool is_mask = layer.outline.shape == OutlineOptions::Shape::kMask;
@@ -145,7 +146,7 @@ bool SceneGeometry::Covers(std::size_t index, const PictureRegion& region) const
   return true;
 }
 
-bool SceneGeometry::MayTouch(std::size_t index, const PictureRegion& region) const {
+bool SceneGeometry::MayTouch(std::size_t index, const ImageRegion& region) const {
   const SceneLayer& layer = layers_[index];
   const OutlineOptions& outline = layer.outline;
   if (outline.shape == OutlineOptions::Shape::kWhole) return true;
@@ -162,7 +163,7 @@ bool SceneGeometry::MayTouch(std::size_t index, const PictureRegion& region) con
   return (2 * away.array() <= outline.size.array()).all();
 }
 
-PictureRegion SceneGeometry::WholePicture() const {
+ImageRegion SceneGeometry::WholeImage() const {
   return {{-0.5, -0.5}, {sensor_.width_px - 0.5, sensor_.height_px - 0.5}};
 }
 
@@ -172,7 +173,7 @@ std::vector<SceneRay> SceneGeometry::OutermostRays(double deviations) const {
   std::vector<SceneRay> rays;
   const double reach_mm = deviations * aperture_sigma_mm_;
   for (const Eigen::Vector2d& position_px :
-       WholePicture().Widened(deviations * floor_px_).Corners()) {
+       WholeImage().Widened(deviations * floor_px_).Corners()) {
     for (const double x : {-reach_mm, reach_mm}) {
       for (const double y : {-reach_mm, reach_mm}) rays.push_back(RayAt(position_px, {x, y}));
     }
@@ -181,8 +182,8 @@ std::vector<SceneRay> SceneGeometry::OutermostRays(double deviations) const {
 }
 
 // The image positions at which chief rays show the points of the plane that rays meet.
-PictureRegion SceneGeometry::ChiefRegion(const PlaneOptions& plane) const {
-  PictureRegion region = WholePicture();
+ImageRegion SceneGeometry::ChiefRegion(const PlaneOptions& plane) const {
+  ImageRegion region = WholeImage();
   for (const SceneRay& ray : OutermostRays(kTextureDeviations)) {
     const double depth_mm = HitDepthMm(plane, ray);
     const Eigen::Vector2d at_px = ChiefPositionPx(ray.PositionMm(depth_mm), depth_mm);
@@ -200,7 +201,7 @@ void SceneGeometry::CheckPlane(const std::string& place, const PlaneOptions& pla
     const double above = plane.depth_mm + plane.slope.dot(ray.aperture_mm);
     if (below > 0 && above > focal_mm_ * below) continue;
     throw Error(fmt::format(
-        "{}: its plane, depth_mm {} and slope [{}, {}], is not met by every ray of the picture "
+        "{}: its plane, depth_mm {} and slope [{}, {}], is not met by every ray of the image "
         "farther than the lens's front focal length {} mm: less slope or more depth is needed",
         place, plane.depth_mm, plane.slope.x(), plane.slope.y(), focal_mm_));
   }
@@ -210,7 +211,7 @@ void SceneGeometry::CheckPlane(const std::string& place, const PlaneOptions& pla
 // px is p/K times dX/dt = z 1 + z^2/z0 t g^T, whose norm is at most z + z^2/z0 |t| |g|.
 double SceneGeometry::CoarsestPixelMm(const PlaneOptions& plane) const {
   double largest_mm = 0;
-  for (const Eigen::Vector2d& corner_px : WholePicture().Corners()) {
+  for (const Eigen::Vector2d& corner_px : WholeImage().Corners()) {
     const SceneRay ray = RayAt(corner_px, {0, 0});
     const double depth_mm = HitDepthMm(plane, ray);
     const double stretch = 1 + depth_mm / plane.depth_mm * ray.slope.norm() * plane.slope.norm();
@@ -222,7 +223,7 @@ double SceneGeometry::CoarsestPixelMm(const PlaneOptions& plane) const {
 // Bounding box of the points that chief rays through the region meet; nothing if the ray of a
 // corner misses the plane.
 std::optional<SceneGeometry::BoxMm> SceneGeometry::BoxOf(const PlaneOptions& plane,
-                                                         const PictureRegion& region) const {
+                                                         const ImageRegion& region) const {
   BoxMm box;
   box.first.setConstant(std::numeric_limits<double>::infinity());
   box.second = -box.first;
@@ -243,8 +244,8 @@ std::optional<SceneGeometry::BoxMm> SceneGeometry::OutlineBox(std::size_t index)
   const OutlineOptions& outline = layer.outline;
   if (outline.shape == OutlineOptions::Shape::kWhole) return std::nullopt;
   if (outline.shape == OutlineOptions::Shape::kMask) {
-    const PictureRegion met = ChiefRegion(layer.plane);  // an extent may be infinite
-    const PictureRegion& extent = masks_[index]->extent();
+    const ImageRegion met = ChiefRegion(layer.plane);  // an extent may be infinite
+    const ImageRegion& extent = masks_[index]->extent();
     return BoxOf(layer.plane,
                  {extent.low_px.cwiseMax(met.low_px), extent.high_px.cwiseMin(met.high_px)});
   }
@@ -260,11 +261,11 @@ TextureRequest SceneGeometry::RequestFor(std::size_t index) const {
   const SceneLayer& layer = layers_[index];
   TextureRequest request;
   if (layer.depth) {
-    const PictureRegion picture = WholePicture();
+    const ImageRegion image = WholeImage();
     request.pixel_mm = request.coarsest_pixel_mm = 1;
-    request.low_mm = picture.low_px;
-    request.high_mm = picture.high_px;
-    request.centre_mm = (picture.low_px + picture.high_px) / 2;
+    request.low_mm = image.low_px;
+    request.high_mm = image.high_px;
+    request.centre_mm = (image.low_px + image.high_px) / 2;
   } else {
     request.pixel_mm = layer.plane.depth_mm / scale_px_;
     request.coarsest_pixel_mm = CoarsestPixelMm(layer.plane);

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "model/simulate/scene/height_field.h"
-#include "model/simulate/scene/picture_region.h"
+#include "model/simulate/scene/image_region.h"
 #include "model/simulate/scene/scene_mask.h"
 #include "model/simulate/scene/scene_texture.h"
 #include "thicklens/model/scene_simulator.h"
@@ -89,8 +89,8 @@ class SceneGeometry {
 
   // Both functions consider the points of the layer that chief rays through the region meet. Covers
   // is true only if the outline contains all of them. MayTouch is false only if it contains none.
-  bool Covers(std::size_t layer, const PictureRegion& region) const;
-  bool MayTouch(std::size_t layer, const PictureRegion& region) const;
+  bool Covers(std::size_t layer, const ImageRegion& region) const;
+  bool MayTouch(std::size_t layer, const ImageRegion& region) const;
 
   // Throws Error unless every ray meets the plane beyond the front focal point.
   void CheckPlane(const std::string& place, const PlaneOptions& plane) const;
@@ -101,11 +101,11 @@ class SceneGeometry {
 
   void AddPixels(const Camera& camera, std::size_t layer, const LayerPixels& pixels);
   void Consider(const SceneRay& ray, std::size_t layer, SceneHit* nearest) const;
-  PictureRegion WholePicture() const;
-  PictureRegion ChiefRegion(const PlaneOptions& plane) const;
+  ImageRegion WholeImage() const;
+  ImageRegion ChiefRegion(const PlaneOptions& plane) const;
   std::vector<SceneRay> OutermostRays(double deviations) const;
   double CoarsestPixelMm(const PlaneOptions& plane) const;
-  std::optional<BoxMm> BoxOf(const PlaneOptions& plane, const PictureRegion& region) const;
+  std::optional<BoxMm> BoxOf(const PlaneOptions& plane, const ImageRegion& region) const;
   std::optional<BoxMm> OutlineBox(std::size_t layer) const;
 
   std::vector<SceneLayer> layers_;

@@ -13,18 +13,18 @@
 namespace thicklens::model {
 namespace {
 
-const LinearPicture& Checked(const LinearPicture& picture, int width_px, int height_px,
-                             const std::string& name) {
-  if (picture.width_px < 1 || picture.height_px < 1) throw Error(name + " is empty");
-  if (picture.channels != 1) {
+const LinearImage& Checked(const LinearImage& image, int width_px, int height_px,
+                           const std::string& name) {
+  if (image.width_px < 1 || image.height_px < 1) throw Error(name + " is empty");
+  if (image.channels != 1) {
     throw Error(
-        fmt::format("{} has {} channels: a mask is a grey picture of one", name, picture.channels));
+        fmt::format("{} has {} channels: a mask is a grey image of one", name, image.channels));
   }
-  if (picture.width_px != width_px || picture.height_px != height_px) {
-    throw Error(fmt::format("{} is {}x{} px, the scene's picture {}x{} px: the sizes must be equal",
-                            name, picture.width_px, picture.height_px, width_px, height_px));
+  if (image.width_px != width_px || image.height_px != height_px) {
+    throw Error(fmt::format("{} is {}x{} px, the scene's image {}x{} px: the sizes must be equal",
+                            name, image.width_px, image.height_px, width_px, height_px));
   }
-  return picture;
+  return image;
 }
 
 // Position at which a line from the first value to the second, one px away, has the value `level`.
@@ -34,11 +34,10 @@ double CrossingPx(double first, double second, double level) {
 
 }  // namespace
 
-SceneMask::SceneMask(const LinearPicture& picture, int width_px, int height_px,
-                     const std::string& name)
+SceneMask::SceneMask(const LinearImage& image, int width_px, int height_px, const std::string& name)
     : width_px_(width_px),
       height_px_(height_px),
-      values_(Checked(picture, width_px, height_px, name).values),
+      values_(Checked(image, width_px, height_px, name).values),
       bounds_(width_px, height_px, [this](int x, int y) { return At(x, y); }) {
   if (std::all_of(values_.begin(), values_.end(),
                   [](float value) { return static_cast<double>(value) < kHalf; })) {

@@ -42,7 +42,7 @@ std::string TextureComplaint(const TextureOptions& texture) {
 std::string OutlineComplaint(const OutlineOptions& outline) {
   using Shape = OutlineOptions::Shape;
   if (outline.shape == Shape::kMask && outline.unit != OutlineOptions::Unit::kPx) {
-    return "outline: a mask is given in mm: it is one of the picture, in px";
+    return "outline: a mask is given in mm: it is one of the image, in px";
   }
   if (!outline.centre.allFinite()) {
     return fmt::format("outline: its centre is [{}, {}]: it must be finite", outline.centre.x(),
@@ -126,13 +126,13 @@ std::string TextureKindName(TextureKind kind) {
       return "dead-leaves";
     case TextureKind::kNoise:
       return "noise";
-    case TextureKind::kPicture:
-      return "picture";
+    case TextureKind::kImage:
+      return "image";
   }
   throw Error("no such kind of texture");
 }
 
-EffectSet PictureEffects() {
+EffectSet ImageEffects() {
   return {Effect::kThickness, Effect::kDefocus,   Effect::kApertureShape, Effect::kFalloff,
           Effect::kOcclusion, Effect::kPixelBox,  Effect::kLensFloor,     Effect::kDiffraction,
           Effect::kShotNoise, Effect::kReadNoise, Effect::kQuantisation,  Effect::kTransferCurve};

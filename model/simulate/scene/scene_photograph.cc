@@ -13,7 +13,7 @@
 
 namespace thicklens::model {
 
-static_assert(kRaysAtOnce <= SceneTexture::kMostAtOnce);
+static_assert(kRaysAtOnce <= SceneTexture::kMaxAtOnce);
 
 RaySpread SpreadOf(const SceneSimulationOptions& options, const EffectSet& on) {
   const Camera& camera = options.camera;
@@ -53,7 +53,7 @@ ScenePhotograph::ScenePhotograph(const SceneSimulationOptions& options,
 // The survey ignores the choice of effects. Without occlusion the middle of the aperture determines
 // which layer is visible at the points where rays meet the surface that a pixel shows. The search
 // therefore covers all positions that these rays reach.
-std::vector<std::size_t> ScenePhotograph::LayersFor(const PictureRegion& region,
+std::vector<std::size_t> ScenePhotograph::LayersFor(const ImageRegion& region,
                                                     const RaySpread& spread) const {
   const double landing_px = FarthestLandingPx(spread), deviations = FarthestDeviations(spread);
   if (on_.Has(Effect::kOcclusion)) return MetLayers(geometry_, region, landing_px, deviations);
@@ -68,13 +68,13 @@ std::vector<std::size_t> ScenePhotograph::LayersFor(const PictureRegion& region,
 void ScenePhotograph::LookCloser(const RaySpread& spread) {
   for (SceneBlock& block : blocks_) {
     if (block.layers.size() == 1) continue;
-    const PictureRegion region{{block.x0 - 0.5, block.y0 - 0.5}, {block.x1 - 0.5, block.y1 - 0.5}};
+    const ImageRegion region{{block.x0 - 0.5, block.y0 - 0.5}, {block.x1 - 0.5, block.y1 - 0.5}};
     const std::vector<std::size_t> met = LayersFor(region, spread), surveyed = block.layers;
     block.layers.clear();
     std::set_intersection(surveyed.begin(), surveyed.end(), met.begin(), met.end(),
                           std::back_inserter(block.layers));
     if (block.layers.size() > 1 || block.has_folds) continue;
-    for (EffectPlace& place : block.places) place.jump = 0;
+    for (EffectSite& place : block.places) place.jump = 0;
   }
 }
 

@@ -27,7 +27,7 @@ class ScenePhotograph {
                   const EffectSet& on, const TransferCurve& stored);
 
   Eigen::Array3d PixelAt(int x, int y) const;
-  // Maximum rms error of the stored values over all blocks; 255 is full scale.
+  // Maximum rms error of the encoded values over all blocks; 255 is full scale.
   double sampling_error_grey_levels() const { return sampling_error_; }
   double mean_rays_per_pixel() const;
 
@@ -40,7 +40,7 @@ class ScenePhotograph {
   };
 
   // Returns the layers that rays of a region's pixels can show, in ascending order.
-  std::vector<std::size_t> LayersFor(const PictureRegion& region, const RaySpread& spread) const;
+  std::vector<std::size_t> LayersFor(const ImageRegion& region, const RaySpread& spread) const;
   // Removes from the blocks the layers that no ray meets with these effects.
   void LookCloser(const RaySpread& spread);
   void MakeSets(const SceneSimulationOptions& options, const TransferCurve& stored);

@@ -96,7 +96,7 @@ TextureKind ReadKind(const YamlNode& node) {
       node,
       {TextureKind::kUniform, TextureKind::kSine, TextureKind::kEdge, TextureKind::kCheckerboard,
        TextureKind::kSiemensStar, TextureKind::kDeadLeaves, TextureKind::kNoise,
-       TextureKind::kPicture},
+       TextureKind::kImage},
       TextureKindName);
 }
 
@@ -114,10 +114,10 @@ std::vector<std::string> TextureKeys(TextureKind kind) {
     case TextureKind::kDeadLeaves:
     case TextureKind::kNoise:
       return {"kind", "colour", "contrast", "saturation", "feature_size_px"};
-    case TextureKind::kPicture:
+    case TextureKind::kImage:
       break;
   }
-  return {"kind", "picture", "feature_size_px"};
+  return {"kind", "image", "feature_size_px"};
 }
 
 TextureOptions ReadTexture(const YamlNode& node) {
@@ -134,8 +134,8 @@ TextureOptions ReadTexture(const YamlNode& node) {
   ReadNumber(node, "saturation", &texture.saturation);
   ReadNumber(node, "feature_size_px", &texture.feature_size_px);
   ReadNumber(node, "angle_deg", &texture.angle_deg);
-  if (texture.kind == TextureKind::kPicture) {
-    texture.picture_path = node.ResolvePath(node.At("picture").Text());
+  if (texture.kind == TextureKind::kImage) {
+    texture.image_path = node.ResolvePath(node.At("image").Text());
   }
   return texture;
 }
@@ -183,7 +183,7 @@ SceneSimulationOptions ReadSceneSimulation(const std::string& path) {
   for (const YamlNode& layer : root.At("layers").Elements()) {
     options.layers.push_back(ReadLayer(layer));
   }
-  ReadEffectChoice(root, &options.effects);
+  ReadEffectSelectionOptions(root, &options.effects);
   if (const auto rays = root.Find("rays_per_pixel"))
     options.rays_per_pixel = rays->Integer(1, kAny);
   if (const auto wavelength = root.Find("wavelength_nm")) {

@@ -39,7 +39,7 @@ EffectConditions ConditionsOf(const SceneSimulationOptions& options) {
   conditions.camera = options.camera;
   conditions.wavelength_mm = options.wavelength_mm;
   conditions.bits = options.bits;
-  conditions.stored_noise_grey_levels = options.noise_sigma_grey_levels;
+  conditions.encoded_noise_grey_levels = options.noise_sigma_grey_levels;
   conditions.full_well_electrons = options.full_well_electrons;
   conditions.read_noise_electrons = options.read_noise_electrons;
   return conditions;
@@ -72,10 +72,10 @@ struct SceneSimulator::Impl {
   // Upper bound of the spread by box, floor and diffraction, before the effects are decided.
   double LandingPx() const {
     const double floor_px = geometry.floor_px();
-    const EffectChoice& choice = options.effects;
-    const bool without_floor =
-        choice.without.Has(Effect::kLensFloor) ||
-        (choice.base == EffectChoice::Base::kGiven && !choice.given.Has(Effect::kLensFloor));
+    const EffectSelectionOptions& choice = options.effects;
+    const bool without_floor = choice.without.Has(Effect::kLensFloor) ||
+                               (choice.base == EffectSelectionOptions::Base::kGiven &&
+                                !choice.given.Has(Effect::kLensFloor));
     const double airy_px = AiryRadiusPx(options.camera, options.wavelength_mm);
     RaySpread spread;
     if (floor_px > 0 && !without_floor) {
@@ -91,11 +91,11 @@ struct SceneSimulator::Impl {
   void Decide(int threads) {
     const double landing_px = LandingPx();
     survey.emplace(options.camera, geometry, textures, landing_px, threads);
-    EffectChoice choice = options.effects;
+    EffectSelectionOptions choice = options.effects;
     // These effects cost nothing and determine the format of the written file.
     choice.kept = choice.kept.With({Effect::kQuantisation, Effect::kTransferCurve});
     decision =
-        DecideEffects(choice, ConditionsOf(options), survey->Places(), PictureEffects(), threads);
+        SelectEffects(choice, ConditionsOf(options), survey->Places(), ImageEffects(), threads);
     camera = options.camera;
     if (!On(Effect::kTransferCurve)) camera.sensor.transfer = TransferCurve::Linear();
   }
@@ -105,7 +105,7 @@ struct SceneSimulator::Impl {
   // nothing.
   void MakeViewRays() {
     of_views = decision.on.Both(kOfViews);
-    if (options.effects.base == EffectChoice::Base::kAuto) {
+    if (options.effects.base == EffectSelectionOptions::Base::kAuto) {
       of_views = kOfViews.Without(options.effects.without);
     }
     const RaySpread spread = SpreadOf(options, of_views);
@@ -172,20 +172,20 @@ struct SceneSimulator::Impl {
 
   // Returns an image with the pixels light(x, y).
   template <typename Light>
-  LinearPicture Render(const SceneRun& run, const Light& light) const {
+  LinearImage Render(const SceneRun& run, const Light& light) const {
     const Sensor& sensor = geometry.sensor();
-    LinearPicture picture{sensor.width_px, sensor.height_px, 3, {}};
-    picture.values.resize(3 * static_cast<std::size_t>(sensor.width_px) *
-                          static_cast<std::size_t>(sensor.height_px));
+    LinearImage image{sensor.width_px, sensor.height_px, 3, {}};
+    image.values.resize(3 * static_cast<std::size_t>(sensor.width_px) *
+                        static_cast<std::size_t>(sensor.height_px));
     ForRows(sensor.height_px, run, [&](int y) {
-      float* value = picture.values.data() +
+      float* value = image.values.data() +
                      3 * static_cast<std::size_t>(y) * static_cast<std::size_t>(sensor.width_px);
       for (int x = 0; x < sensor.width_px; ++x) {
         const Eigen::Array3d rgb = light(x, y);
         for (int c = 0; c < 3; ++c) *value++ = static_cast<float>(rgb(c));
       }
     });
-    return picture;
+    return image;
   }
 
   void MakeTextures(const std::vector<LayerPixels>& pixels, int threads) {
@@ -216,7 +216,7 @@ struct SceneSimulator::Impl {
   const SceneGeometry geometry;
   std::vector<SceneTexture> textures;  // one per layer
   std::optional<SceneSurvey> survey;
-  EffectDecision decision;
+  EffectSelection decision;
   Camera camera;
   EffectSet of_views;
   std::vector<PixelRay> view_rays;
@@ -229,7 +229,7 @@ SceneSimulator::SceneSimulator(const SceneSimulationOptions& options,
 
 SceneSimulator::~SceneSimulator() = default;
 
-const EffectDecision& SceneSimulator::effects() const { return impl_->decision; }
+const EffectSelection& SceneSimulator::effects() const { return impl_->decision; }
 
 const EffectSet& SceneSimulator::effects_of_views() const { return impl_->of_views; }
 
@@ -243,16 +243,16 @@ double SceneSimulator::mean_rays_per_pixel() const {
 
 const Camera& SceneSimulator::camera() const { return impl_->camera; }
 
-LinearPicture SceneSimulator::RenderNoiseless(const SceneRun& run) const {
+LinearImage SceneSimulator::RenderNoiseless(const SceneRun& run) const {
   return impl_->Render(run, [this](int x, int y) { return impl_->photograph->PixelAt(x, y); });
 }
 
-StoredPicture SceneSimulator::Store(const LinearPicture& noiseless) const {
+EncodedImage SceneSimulator::Store(const LinearImage& noiseless) const {
   const SceneSimulationOptions& options = impl_->options;
-  LinearPicture exposed = noiseless;
+  LinearImage exposed = noiseless;
   AddSensorNoise({options.full_well_electrons, options.read_noise_electrons}, impl_->decision.on,
                  options.seed, 0, &exposed);
-  return ToStoredWithNoise(
+  return ToEncodedWithNoise(
       exposed, impl_->camera.sensor.transfer, impl_->On(Effect::kQuantisation) ? options.bits : 16,
       impl_->On(Effect::kReadNoise) ? options.noise_sigma_grey_levels / 255 : 0, options.seed);
 }
@@ -296,8 +296,8 @@ SceneTruth SceneSimulator::Truth(const RawDepthMap& depth) const {
   return truth;
 }
 
-LinearPicture SceneSimulator::RenderView(const Eigen::Vector2d& aperture_mm,
-                                         const SceneRun& run) const {
+LinearImage SceneSimulator::RenderView(const Eigen::Vector2d& aperture_mm,
+                                       const SceneRun& run) const {
   const double reach_mm = kFarthestDeviations * impl_->geometry.aperture_sigma_mm();
   if (!(aperture_mm.cwiseAbs().array() <= reach_mm).all()) {
     throw Error(fmt::format("aperture position [{}, {}] mm: both must be from {} to {}",

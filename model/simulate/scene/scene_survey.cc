@@ -18,12 +18,12 @@ constexpr double kReachDeviations = kGaussianDeviations;
 // Factor that widens a reach because the depth changes along the way.
 constexpr double kReachMargin = 1.1;
 // Maximum number of blocks around the image that are included because blur mixes in their light.
-constexpr int kMostMargin = 16;
+constexpr int kMaxMargin = 16;
 // Number of samples of a pixel on each axis, and factors that compensate for the missed maxima of
 // slope and bend between them.
 constexpr int kSamples = 2;
 constexpr float kMissedSlope = 1.35F;
-constexpr float kMissedBend = 1.5F;
+constexpr float kMissedNonlinearity = 1.5F;
 
 constexpr int kBlockSamples = SceneSurvey::kBlockPx * kSamples;
 
@@ -46,7 +46,7 @@ struct Detail {
 struct BlockGrid {
   int columns = 0, rows = 0, margin = 0;
 
-  PictureRegion RegionOf(int column, int row) const {
+  ImageRegion RegionOf(int column, int row) const {
     constexpr int kPx = SceneSurvey::kBlockPx;
     const Eigen::Vector2d low(column * kPx - 0.5, row * kPx - 0.5);
     return {low, low.array() + kPx};
@@ -79,7 +79,7 @@ class LayerDetail {
   // of the texture and the steepest surveyed slope are assumed.
   Detail Around(int column, int row, double distance_px) const {
     const int reach = static_cast<int>(std::ceil(distance_px / SceneSurvey::kBlockPx));
-    if (reach > kMostMargin) return anything_;
+    if (reach > kMaxMargin) return anything_;
     Detail found;
     for (int j = std::max(row - reach, -grid_.margin);
          j <= std::min(row + reach, grid_.rows + grid_.margin - 1); ++j) {
@@ -126,8 +126,8 @@ class LayerDetail {
         detail.dark = detail.bright = here[i];
         if ((right + left + down + up).isFinite().all()) {
           detail.slope = kMissedSlope * kSamples * (right.square() + down.square()).sqrt();
-          detail.bend =
-              kMissedBend * kSamples * kSamples * ((right - left).abs() + (down - up).abs());
+          detail.bend = kMissedNonlinearity * kSamples * kSamples *
+                        ((right - left).abs() + (down - up).abs());
         }
         details_[grid_.IndexOf(column, row)].Add(detail);
       }
@@ -146,7 +146,7 @@ class LayerDetail {
 
 // The minimum and maximum 1/z of the layer over the region. For a plane 1/z is linear there.
 std::pair<double, double> InverseDepths(const SceneGeometry& geometry, std::size_t layer,
-                                        const PictureRegion& region) {
+                                        const ImageRegion& region) {
   if (const HeightField* field = geometry.height_field(layer)) {
     const ValueRange shifts = field->ShiftsOver(region);
     return {1 / field->DepthMm(shifts.low), 1 / field->DepthMm(shifts.high)};
@@ -200,7 +200,7 @@ Detail GlossOf(const SceneLayer& layer) {
 // rays, but compressed. Derived here [D42]: x' = x + A V(x'), so that dx'/dx is at most m = 1/(1 -
 // a), a = |A| |grad V|, and its jumps from pixel to pixel are at most m^3 |A| jump(grad V). Returns
 // false if a is too large for these bounds; the rays may then meet the field more than once.
-bool Compress(const HeightField& field, const PictureRegion& region, double aperture_mm,
+bool Compress(const HeightField& field, const ImageRegion& region, double aperture_mm,
               Detail* detail) {
   constexpr double kSteepest = 0.3;
   const double steepness = aperture_mm * field.SteepestOver(region);
@@ -228,7 +228,7 @@ class BlurDepths {
   }
 
   double sigma_px() const { return geometry_.DefocusPx(1 / MostBlurred()); }
-  void Fill(EffectPlace* place) const {
+  void Fill(EffectSite* place) const {
     const double here = MostBlurred();
     place->depth_mm = 1 / here;
     place->sharpest_depth_mm = 1 / std::clamp(inverse_focus_, least_, most_);
@@ -272,7 +272,7 @@ Eigen::Array4f LayerLight(const SceneGeometry& geometry, const SceneTexture& tex
   return light;
 }
 
-double ReachPx(const SceneGeometry& geometry, std::size_t index, const PictureRegion& region,
+double ReachPx(const SceneGeometry& geometry, std::size_t index, const ImageRegion& region,
                double landing_px, double deviations) {
   const SceneLayer& layer = geometry.layers()[index];
   const PlaneOptions& plane = layer.plane;
@@ -284,7 +284,7 @@ double ReachPx(const SceneGeometry& geometry, std::size_t index, const PictureRe
     const double aperture_mm = deviations * geometry.aperture_sigma_mm();
     const ApertureBox aperture = {Eigen::Vector2d::Constant(-aperture_mm),
                                   Eigen::Vector2d::Constant(aperture_mm)};
-    const ValueRange met = field->MetFrom(region.Widened(landing_px), aperture);
+    const ValueRange met = field->IntersectionShiftBounds(region.Widened(landing_px), aperture);
     return landing_px + std::max(deviations * sigma_px,
                                  aperture_mm * std::max(std::abs(met.low), std::abs(met.high)));
   }
@@ -297,7 +297,7 @@ double ReachPx(const SceneGeometry& geometry, std::size_t index, const PictureRe
   return landing_px + kReachMargin * deviations * sigma_px;
 }
 
-std::vector<std::size_t> MetLayers(const SceneGeometry& geometry, const PictureRegion& region,
+std::vector<std::size_t> MetLayers(const SceneGeometry& geometry, const ImageRegion& region,
                                    double landing_px, double deviations) {
   struct Candidate {
     std::size_t layer;
@@ -306,7 +306,7 @@ std::vector<std::size_t> MetLayers(const SceneGeometry& geometry, const PictureR
   };
   std::vector<Candidate> candidates;
   for (std::size_t i = 0; i < geometry.layers().size(); ++i) {
-    const PictureRegion reached =
+    const ImageRegion reached =
         region.Widened(ReachPx(geometry, i, region, landing_px, deviations));
     if (!geometry.MayTouch(i, reached)) continue;
     const auto [least, most] = InverseDepths(geometry, i, reached);
@@ -339,7 +339,7 @@ SceneSurvey::SceneSurvey(const Camera& camera, const SceneGeometry& geometry,
       block.y0 = row * kBlockPx;
       block.x1 = std::min(block.x0 + kBlockPx, sensor.width_px);
       block.y1 = std::min(block.y0 + kBlockPx, sensor.height_px);
-      const PictureRegion region = grid.RegionOf(column, row);
+      const ImageRegion region = grid.RegionOf(column, row);
       block.layers = MetLayers(geometry, region, landing_px, kReachDeviations);
       for (const std::size_t layer : block.layers) {
         reaches.push_back(ReachPx(geometry, layer, region, landing_px, kReachDeviations));
@@ -349,8 +349,7 @@ SceneSurvey::SceneSurvey(const Camera& camera, const SceneGeometry& geometry,
   }
   if (!reaches.empty()) {
     const double farthest_px = *std::max_element(reaches.begin(), reaches.end());
-    grid.margin =
-        static_cast<int>(std::min<double>(std::ceil(farthest_px / kBlockPx), kMostMargin));
+    grid.margin = static_cast<int>(std::min<double>(std::ceil(farthest_px / kBlockPx), kMaxMargin));
   }
   std::vector<LayerDetail> details;
   for (std::size_t i = 0; i < textures.size(); ++i) {
@@ -370,7 +369,7 @@ SceneSurvey::SceneSurvey(const Camera& camera, const SceneGeometry& geometry,
         const double reach_px = *reach++;
         Detail around = details[i].Around(column, row, reach_px);
         if (const HeightField* field = geometry.height_field(i)) {
-          const PictureRegion reached = grid.RegionOf(column, row).Widened(reach_px);
+          const ImageRegion reached = grid.RegionOf(column, row).Widened(reach_px);
           const auto [least, most] = InverseDepths(geometry, i, reached);
           if (Compress(*field, reached, kReachDeviations * geometry.aperture_sigma_mm(), &around)) {
             depths.Add(least, most);
@@ -393,7 +392,7 @@ SceneSurvey::SceneSurvey(const Camera& camera, const SceneGeometry& geometry,
         gloss.bend += of_layer.bend;
       }
       block.sigma_px = depths.sigma_px();
-      EffectPlace place;
+      EffectSite place;
       place.position_px = FarthestPx(block, sensor.principal_point_px);
       depths.Fill(&place);
       // Fall-off can only make the light darker than the radiance.
@@ -410,8 +409,8 @@ SceneSurvey::SceneSurvey(const Camera& camera, const SceneGeometry& geometry,
   }
 }
 
-std::vector<EffectPlace> SceneSurvey::Places() const {
-  std::vector<EffectPlace> places;
+std::vector<EffectSite> SceneSurvey::Places() const {
+  std::vector<EffectSite> places;
   for (const SceneBlock& block : blocks_) {
     places.insert(places.end(), block.places.begin(), block.places.end());
   }

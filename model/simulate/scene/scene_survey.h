@@ -26,17 +26,17 @@ struct SceneBlock {
   // True if one of these is a height field so uneven that rays may meet it more than once.
   bool has_folds = false;
   // The content of the photograph there, one per channel.
-  std::array<EffectPlace, 3> places;
+  std::array<EffectSite, 3> places;
 };
 
 // Maximum distance, px, from a region of the image to the chief positions of the points that its
 // rays meet on a layer or in its gloss. The rays land up to `landing_px` from their nominal
 // positions and pass the aperture up to `deviations` of its standard deviations from its middle.
-double ReachPx(const SceneGeometry& geometry, std::size_t layer, const PictureRegion& region,
+double ReachPx(const SceneGeometry& geometry, std::size_t layer, const ImageRegion& region,
                double landing_px, double deviations);
 // Returns the layers that such rays can meet, in ascending order. Layers behind one that fills the
 // region in reach are left out.
-std::vector<std::size_t> MetLayers(const SceneGeometry& geometry, const PictureRegion& region,
+std::vector<std::size_t> MetLayers(const SceneGeometry& geometry, const ImageRegion& region,
                                    double landing_px, double deviations);
 
 // The content of a scene at each place, determined before any image is computed: one ray for each
@@ -55,7 +55,7 @@ class SceneSurvey {
     return static_cast<std::size_t>(y / kBlockPx) * static_cast<std::size_t>(columns_) +
            static_cast<std::size_t>(x / kBlockPx);
   }
-  std::vector<EffectPlace> Places() const;
+  std::vector<EffectSite> Places() const;
 
  private:
   int columns_ = 0, rows_ = 0;

@@ -48,7 +48,7 @@ FeatureRange FeatureRangeOf(TextureKind kind) {
       return {2, 0.5, 1000};
     case TextureKind::kNoise:
       return {4, 2, 1000};
-    case TextureKind::kPicture:
+    case TextureKind::kImage:
       return {0, 16, 10000};
   }
   throw Error("no such kind of texture");
@@ -240,12 +240,12 @@ TextureCanvas DrawSiemensStar(const TextureOptions& options, const TextureReques
 }
 
 // One channel of an image of 1 (grey), 3 (RGB) or 4 (RGBA) channels.
-cv::Mat ChannelOf(const LinearPicture& picture, int channel) {
-  cv::Mat values(picture.height_px, picture.width_px, CV_32F);
-  for (int y = 0; y < picture.height_px; ++y) {
+cv::Mat ChannelOf(const LinearImage& image, int channel) {
+  cv::Mat values(image.height_px, image.width_px, CV_32F);
+  for (int y = 0; y < image.height_px; ++y) {
     ThrowIfCancelled();
-    for (int x = 0; x < picture.width_px; ++x) {
-      values.at<float>(y, x) = picture.at(x, y, picture.channels < 3 ? 0 : channel);
+    for (int x = 0; x < image.width_px; ++x) {
+      values.at<float>(y, x) = image.at(x, y, image.channels < 3 ? 0 : channel);
     }
   }
   return values;
@@ -253,12 +253,12 @@ cv::Mat ChannelOf(const LinearPicture& picture, int channel) {
 
 // The user's image, upright and around the centre. It is mirrored beyond its sides, so that its
 // tile is twice as large.
-TextureCanvas DrawPicture(const TextureOptions& options, const TextureRequest& request,
-                          const LinearPicture& picture) {
-  if (picture.width_px < 1 || picture.height_px < 1) {
-    throw Error(fmt::format("texture.picture '{}' is empty", options.picture_path));
+TextureCanvas DrawImage(const TextureOptions& options, const TextureRequest& request,
+                        const LinearImage& image) {
+  if (image.width_px < 1 || image.height_px < 1) {
+    throw Error(fmt::format("texture.image '{}' is empty", options.image_path));
   }
-  const double shape = static_cast<double>(picture.height_px) / picture.width_px;
+  const double shape = static_cast<double>(image.height_px) / image.width_px;
   // The default width covers the whole visible part.
   const Eigen::Vector2d reach_mm =
       (request.high_mm - request.centre_mm).cwiseMax(request.centre_mm - request.low_mm);
@@ -282,8 +282,8 @@ TextureCanvas DrawPicture(const TextureOptions& options, const TextureRequest& r
   canvas.origin_mm = request.centre_mm - size_mm / 2 + canvas.spacing_mm / 2;
   for (int c = 0; c < 3; ++c) {
     cv::Mat resized;
-    cv::resize(ChannelOf(picture, c), resized, size, 0, 0,
-               size.width < picture.width_px ? cv::INTER_AREA : cv::INTER_CUBIC);
+    cv::resize(ChannelOf(image, c), resized, size, 0, 0,
+               size.width < image.width_px ? cv::INTER_AREA : cv::INTER_CUBIC);
     cv::copyMakeBorder(resized, canvas.light[static_cast<std::size_t>(c)], 0, size.height, 0,
                        size.width, cv::BORDER_REFLECT);
   }
@@ -291,7 +291,7 @@ TextureCanvas DrawPicture(const TextureOptions& options, const TextureRequest& r
 }
 
 TextureCanvas Draw(const TextureOptions& options, const TextureRequest& request,
-                   const LinearPicture& picture, RandomDraws* draws, int threads) {
+                   const LinearImage& image, RandomDraws* draws, int threads) {
   switch (options.kind) {
     case TextureKind::kCheckerboard:
       return DrawCheckerboard(options, request);
@@ -302,7 +302,7 @@ TextureCanvas Draw(const TextureOptions& options, const TextureRequest& request,
     case TextureKind::kNoise:
       return DrawNoise(options, request, draws, threads);
     default:
-      return DrawPicture(options, request, picture);
+      return DrawImage(options, request, image);
   }
 }
 
@@ -317,7 +317,7 @@ void Paint(const Eigen::Vector3d& colour, TextureCanvas* canvas) {
 }  // namespace
 
 SceneTexture::SceneTexture(const TextureOptions& options, const TextureRequest& request,
-                           const LinearPicture& picture, RandomDraws* draws, int threads) {
+                           const LinearImage& image, RandomDraws* draws, int threads) {
   FeaturePx(options);  // throws Error for a wrong size
   colour_.head<3>() = options.colour.cast<float>().array();
   if (options.kind == TextureKind::kUniform) return;
@@ -325,9 +325,9 @@ SceneTexture::SceneTexture(const TextureOptions& options, const TextureRequest& 
     SetWave(options, request);
     return;
   }
-  TextureCanvas canvas = Draw(options, request, picture, draws, threads);
+  TextureCanvas canvas = Draw(options, request, image, draws, threads);
   LimitBand(request.coarsest_pixel_mm, threads, &canvas);
-  if (options.kind != TextureKind::kPicture) Paint(options.colour, &canvas);
+  if (options.kind != TextureKind::kImage) Paint(options.colour, &canvas);
   columns_ = canvas.columns;
   rows_ = canvas.rows;
   origin_mm_ = canvas.origin_mm;
@@ -382,8 +382,8 @@ void SceneTexture::SetWave(const TextureOptions& options, const TextureRequest& 
 
 Eigen::Array4f SceneTexture::SumAround(const Eigen::Vector2d& centre_mm, const float* x_mm,
                                        const float* y_mm, const float* weight, int count) const {
-  using Numbers = Eigen::Array<float, Eigen::Dynamic, 1, Eigen::ColMajor, kMostAtOnce, 1>;
-  using Integers = Eigen::Array<int, Eigen::Dynamic, 1, Eigen::ColMajor, kMostAtOnce, 1>;
+  using Numbers = Eigen::Array<float, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxAtOnce, 1>;
+  using Integers = Eigen::Array<int, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxAtOnce, 1>;
   const Eigen::Map<const Eigen::ArrayXf> dx_mm(x_mm, count), dy_mm(y_mm, count);
   if (count < 1) return Eigen::Array4f::Zero();
   if (tile_.empty() && amplitude_ == 0) {

@@ -23,7 +23,7 @@ struct TextureRequest {
 };
 
 // The painted plane: RGB radiance at every position. Uniform, sine and edge have a closed form; the
-// other kinds are tiles. A tile repeats itself, an image (kPicture) after mirroring. A tile has
+// other kinds are tiles. A tile repeats itself, an image (kImage) after mirroring. A tile has
 // four samples per coarsest px and is linear between them. The samples are corrected so that
 // frequencies below half a cycle per px keep their full amplitude.
 class SceneTexture {
@@ -31,7 +31,7 @@ class SceneTexture {
   // Throws Error for a feature size that the layer cannot show, or an empty image. The result does
   // not depend on `threads` (0: one per core).
   SceneTexture(const TextureOptions& options, const TextureRequest& request,
-               const LinearPicture& picture, RandomDraws* draws, int threads = 1);
+               const LinearImage& image, RandomDraws* draws, int threads = 1);
 
   // Lower and upper bounds of R, G and B.
   Eigen::Array4f Darkest() const {
@@ -50,8 +50,8 @@ class SceneTexture {
                                                                    : std::cos(phase)));
   }
 
-  // Returns the sum of weight_i At(centre + (x_i, y_i)), i < count <= kMostAtOnce.
-  static constexpr int kMostAtOnce = 64;
+  // Returns the sum of weight_i At(centre + (x_i, y_i)), i < count <= kMaxAtOnce.
+  static constexpr int kMaxAtOnce = 64;
   Eigen::Array4f SumAround(const Eigen::Vector2d& centre_mm, const float* x_mm, const float* y_mm,
                            const float* weight, int count) const;
 

@@ -17,7 +17,7 @@ namespace thicklens::model {
 namespace {
 
 // Frames below that are held, larger sweeps are simulated again where they are looked at.
-constexpr double kMostHeldBytes = 1 << 30;
+constexpr double kMaxHeldBytes = 1 << 30;
 
 // What is made of each frame, held or made when it is asked for.
 template <typename Frame>
@@ -25,7 +25,7 @@ class Frames {
  public:
   Frames(int count, double bytes, int threads, std::function<Frame(int)> make)
       : make_(std::move(make)) {
-    if (count * bytes > kMostHeldBytes) return;
+    if (count * bytes > kMaxHeldBytes) return;
     held_.resize(static_cast<std::size_t>(count));
     ParallelFor(count, threads, [this](int i) { held_[static_cast<std::size_t>(i)] = make_(i); });
   }
@@ -39,11 +39,11 @@ class Frames {
 // One simulation of the sweep.
 class SweepWorld {
  public:
-  SweepWorld(const SweepSimulationOptions& options, const LinearPicture& target_picture,
+  SweepWorld(const SweepSimulationOptions& options, const LinearImage& target_image,
              const AblationRun& run, const std::function<void()>& tell)
       : start_(Clock::now()),
         options_(options),
-        simulator_(options, target_picture),
+        simulator_(options, target_image),
         tell_(tell),
         stored_(options.frame_count, Pixels() * 2, run.threads,
                 [this](int i) {
@@ -60,11 +60,11 @@ class SweepWorld {
   const SweepSimulator& simulator() const { return simulator_; }
   double seconds() const { return seconds_; }
 
-  StoredValues Values(int frame, bool with_noise) const {
+  EncodedValues Values(int frame, bool with_noise) const {
     tell_();
-    return with_noise ? StoredValuesOf(stored_.At(frame))
-                      : StoredValuesOf(simulator_.RenderNoiseless(frame),
-                                       simulator_.camera().sensor.transfer);
+    return with_noise ? EncodedValuesOf(stored_.At(frame))
+                      : EncodedValuesOf(simulator_.RenderNoiseless(frame),
+                                        simulator_.camera().sensor.transfer);
   }
 
   SweepCalibration Calibrated(const CalibrateSweep& calibrate) const {
@@ -76,34 +76,34 @@ class SweepWorld {
   SweepSimulationOptions options_;
   SweepSimulator simulator_;
   std::function<void()> tell_;
-  Frames<StoredPicture> stored_;
+  Frames<EncodedImage> stored_;
   double seconds_;
 };
 
 class SweepAblator {
  public:
-  SweepAblator(const SweepSimulationOptions& sweep, const LinearPicture& target_picture,
+  SweepAblator(const SweepSimulationOptions& sweep, const LinearImage& target_image,
                const CalibrateSweep& calibrate, const AblationRun& run)
-      : sweep_(sweep), target_picture_(target_picture), calibrate_(calibrate), run_(run) {}
+      : sweep_(sweep), target_image_(target_image), calibrate_(calibrate), run_(run) {}
 
   SweepAblation Run() {
     SweepSimulationOptions by_auto = sweep_;
-    by_auto.effects.base = EffectChoice::Base::kAuto;
-    const EffectSet kept = SweepSimulator(by_auto, target_picture_).effects().on;
+    by_auto.effects.base = EffectSelectionOptions::Base::kAuto;
+    const EffectSet kept = SweepSimulator(by_auto, target_image_).effects().on;
 
     sweep_.effects = AllInsteadOfAuto(sweep_.effects);
-    const SweepWorld base(sweep_, target_picture_, run_, [this] { Tell(); });
+    const SweepWorld base(sweep_, target_image_, run_, [this] { Tell(); });
     const SweepSimulator& simulator = base.simulator();
     result_.on = simulator.effects().on;
     total_ = static_cast<int>(result_.on.Effects().size()) + 1;
     result_.frames = sweep_.frame_count;
     result_.true_image_distance_mm = simulator.truth().image_distance_mm;
     result_.true_blur_ratio = simulator.truth().blur_ratio;
-    result_.picture_seconds = base.seconds();
+    result_.image_seconds = base.seconds();
     CalibrateBase(base);
-    const Frames<StoredValues> noiseless(sweep_.frame_count, base.Pixels() * 4, run_.threads,
-                                         [&](int i) { return base.Values(i, false); });
-    for (const EffectFinding& finding : simulator.effects().findings) {
+    const Frames<EncodedValues> noiseless(sweep_.frame_count, base.Pixels() * 4, run_.threads,
+                                          [&](int i) { return base.Values(i, false); });
+    for (const LargestEffectImpact& finding : simulator.effects().findings) {
       if (!result_.on.Has(finding.effect)) continue;
       ++done_;
       Tell();
@@ -133,14 +133,14 @@ class SweepAblator {
     result_.calibration_seconds = SecondsSince(start);
   }
 
-  void TakeAway(const SweepWorld& base, const Frames<StoredValues>& noiseless,
+  void TakeAway(const SweepWorld& base, const Frames<EncodedValues>& noiseless,
                 AblatedSweepEffect* row) const {
     SweepSimulationOptions options = sweep_;
     options.effects.without.Add(row->effect);
-    const SweepWorld world(options, target_picture_, run_, [this] { Tell(); });
-    row->picture_seconds = world.seconds();
+    const SweepWorld world(options, target_image_, run_, [this] { Tell(); });
+    row->image_seconds = world.seconds();
     Compare(base, noiseless, world, row);
-    row->absent = row->picture.nothing() && SameReadings(base, world);
+    row->absent = row->image.nothing() && SameReadings(base, world);
     if (row->absent) {
       row->calibration = result_.calibration;
       return;
@@ -160,23 +160,23 @@ class SweepAblator {
         [](const auto& one, const auto& other) { return one.reading_mm == other.reading_mm; });
   }
 
-  void Compare(const SweepWorld& base, const Frames<StoredValues>& noiseless,
+  void Compare(const SweepWorld& base, const Frames<EncodedValues>& noiseless,
                const SweepWorld& world, AblatedSweepEffect* row) const {
     const bool with_noise = IsOfStorage(row->effect);
     const auto with = [&](int i) { return with_noise ? base.Values(i, true) : noiseless.At(i); };
-    std::vector<PictureChangeMeter> meters(static_cast<std::size_t>(sweep_.frame_count));
+    std::vector<ImageChangeAccumulator> meters(static_cast<std::size_t>(sweep_.frame_count));
     std::vector<double> rms(meters.size());
     ParallelFor(sweep_.frame_count, run_.threads, [&](int i) {
       const auto at = static_cast<std::size_t>(i);
       rms[at] = meters[at].Add(with(i), world.Values(i, with_noise));
     });
-    PictureChangeMeter all;
-    for (const PictureChangeMeter& meter : meters) all.Add(meter);
-    row->picture = all.Result();
-    if (row->picture.nothing()) return;
+    ImageChangeAccumulator all;
+    for (const ImageChangeAccumulator& meter : meters) all.Add(meter);
+    row->image = all.Result();
+    if (row->image.nothing()) return;
     const auto most = std::max_element(rms.begin(), rms.end()) - rms.begin();
     const auto frame = static_cast<int>(most);
-    const StoredValues there = with(frame);
+    const EncodedValues there = with(frame);
     row->difference = {
         there.width_px, there.height_px,
         GreyLevelDifference(there, world.Values(frame, with_noise)),
@@ -185,7 +185,7 @@ class SweepAblator {
   }
 
   SweepSimulationOptions sweep_;
-  const LinearPicture& target_picture_;
+  const LinearImage& target_image_;
   const CalibrateSweep& calibrate_;
   const AblationRun& run_;
   int done_ = 0, total_ = 1;
@@ -194,9 +194,9 @@ class SweepAblator {
 
 }  // namespace
 
-SweepAblation AblateSweep(const SweepSimulationOptions& sweep, const LinearPicture& target_picture,
+SweepAblation AblateSweep(const SweepSimulationOptions& sweep, const LinearImage& target_image,
                           const CalibrateSweep& calibrate, const AblationRun& run) {
-  return SweepAblator(sweep, target_picture, calibrate, run).Run();
+  return SweepAblator(sweep, target_image, calibrate, run).Run();
 }
 
 }  // namespace thicklens::model

@@ -42,15 +42,15 @@ bool IsValidTarget(const TargetOptions& target, std::string* why) {
 }
 
 // Every ray must meet the target, and not too far away.
-bool IsSeenWhole(const Camera& camera, double tilt_deg, std::string* why) {
-  constexpr double kLeastNearness = 0.2;
+bool IsWhollyVisible(const Camera& camera, double tilt_deg, std::string* why) {
+  constexpr double kMinNearness = 0.2;
   const Sensor& sensor = camera.sensor;
   const double axis_px = sensor.principal_point_px.x();
   const TiltedTarget target(tilt_deg * kPi / 180, 1, camera.focal_scale_px());
   const double least =
       std::min(target.Nearness(-0.5 - axis_px), target.Nearness(sensor.width_px - 0.5 - axis_px));
-  if (least >= kLeastNearness) return true;
-  return Fail(why, fmt::format("target.tilt_deg is {}: a side of the picture would look past the "
+  if (least >= kMinNearness) return true;
+  return Fail(why, fmt::format("target.tilt_deg is {}: a side of the image would look past the "
                                "target, or at more than five times its depth",
                                tilt_deg));
 }
@@ -69,8 +69,8 @@ std::string TargetKindName(TargetKind kind) {
       return "checkerboard";
     case TargetKind::kSiemensStar:
       return "siemens-star";
-    case TargetKind::kPicture:
-      return "picture";
+    case TargetKind::kImage:
+      return "image";
     case TargetKind::kPrintedEdge:
       return "printed-edge";
     case TargetKind::kKnifeEdge:
@@ -95,7 +95,7 @@ bool SweepSimulationOptions::IsValid(std::string* why) const {
                                  "the truth",
                                  camera.name));
   }
-  if (!IsSeenWhole(camera, target.tilt_deg, why)) return false;
+  if (!IsWhollyVisible(camera, target.tilt_deg, why)) return false;
   if (!(frame_count >= 1 && frame_count <= 100000)) {
     return Fail(why, fmt::format("bench.frames is {}: it must be from 1 to 100000", frame_count));
   }

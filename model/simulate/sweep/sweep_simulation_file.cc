@@ -32,14 +32,14 @@ TargetKind ReadKind(const YamlNode& node) {
   return ReadNamed<TargetKind>(
       node,
       {TargetKind::kDeadLeaves, TargetKind::kPinkNoise, TargetKind::kWhiteNoise,
-       TargetKind::kCheckerboard, TargetKind::kSiemensStar, TargetKind::kPicture,
+       TargetKind::kCheckerboard, TargetKind::kSiemensStar, TargetKind::kImage,
        TargetKind::kPrintedEdge, TargetKind::kKnifeEdge},
       TargetKindName);
 }
 
 TargetOptions ReadTarget(const YamlNode& node) {
   node.RequireKeys({"kind", "contrast", "feature_size_mm", "edge_angle_deg", "ink_sigma_mm",
-                    "tilt_deg", "picture"});
+                    "tilt_deg", "image"});
   TargetOptions target;
   const YamlNode kind = node.At("kind");
   target.kind = ReadKind(kind);
@@ -48,14 +48,14 @@ TargetOptions ReadTarget(const YamlNode& node) {
   ReadNumber(node, "edge_angle_deg", &target.edge_angle_deg);
   ReadNumber(node, "ink_sigma_mm", &target.ink_sigma_mm);
   ReadNumber(node, "tilt_deg", &target.tilt_deg);
-  if (const auto picture = node.Find("picture")) {
-    if (target.kind != TargetKind::kPicture) {
-      throw picture->ErrorHere("only a target of the kind 'picture' has one, found kind '" +
-                               TargetKindName(target.kind) + "'");
+  if (const auto image = node.Find("image")) {
+    if (target.kind != TargetKind::kImage) {
+      throw image->ErrorHere("only a target of the kind 'image' has one, found kind '" +
+                             TargetKindName(target.kind) + "'");
     }
-    target.picture_path = node.ResolvePath(picture->Text());
-  } else if (target.kind == TargetKind::kPicture) {
-    throw kind.ErrorHere("the kind 'picture' needs the picture's path in target.picture");
+    target.image_path = node.ResolvePath(image->Text());
+  } else if (target.kind == TargetKind::kImage) {
+    throw kind.ErrorHere("the kind 'image' needs the image's path in target.image");
   }
   return target;
 }
@@ -107,7 +107,7 @@ SweepSimulationOptions ReadSweepSimulation(const std::string& path) {
   if (const auto law = root.Find("pupil_law")) {
     options.pupil_law = ReadNamed(*law, AllPupilLaws(), PupilLawName);
   }
-  ReadEffectChoice(root, &options.effects);
+  ReadEffectSelectionOptions(root, &options.effects);
   if (const auto seed = root.Find("seed")) {
     options.seed = static_cast<std::uint64_t>(seed->Integer(0, std::numeric_limits<int>::max()));
   }

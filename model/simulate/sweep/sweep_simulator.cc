@@ -13,7 +13,7 @@
 #include "model/effects/aperture_irradiance.h"
 #include "model/simulate/sensor_noise.h"
 #include "model/simulate/sweep/edge_spread.h"
-#include "model/simulate/sweep/periodic_picture.h"
+#include "model/simulate/sweep/periodic_image.h"
 #include "model/simulate/sweep/sweep_target.h"
 #include "model/simulate/sweep/tilted_target.h"
 #include "thicklens/base/cancel.h"
@@ -24,7 +24,7 @@ namespace thicklens::model {
 namespace {
 
 // Minimum nearness of a drawn part of a tilted target: its depth is five times that of the middle.
-constexpr double kLeastNearness = 0.2;
+constexpr double kMinNearness = 0.2;
 // Sigma, px, above which a profile's transfer function is not tabulated up to one cycle per px. A
 // disc's transfer function is then below 1e-3 there and is summed directly.
 constexpr double kSharpestTail = 12;
@@ -46,7 +46,7 @@ struct FrameState {
 }  // namespace
 
 struct SweepSimulator::Impl {
-  Impl(const SweepSimulationOptions& given, const LinearPicture& picture) : options(given) {
+  Impl(const SweepSimulationOptions& given, const LinearImage& image) : options(given) {
     std::string why;
     if (!options.IsValid(&why)) throw Error(why);
     Decide();
@@ -54,7 +54,7 @@ struct SweepSimulator::Impl {
     MakePupil();
     MakeTruth();
     MakeFalloff();
-    if (!IsEdge(options.target.kind)) MakeTile(picture);
+    if (!IsEdge(options.target.kind)) MakeTile(image);
   }
 
   EffectConditions Conditions() const {
@@ -70,7 +70,7 @@ struct SweepSimulator::Impl {
   }
 
   void Decide() {
-    EffectChoice choice = options.effects;
+    EffectSelectionOptions choice = options.effects;
     // All effects together cost nothing because frames are sums of waves.
     choice.kept = choice.kept.With(SweepEffects());
     const double last_depth_mm =
@@ -78,7 +78,7 @@ struct SweepSimulator::Impl {
     const auto [near, far] = std::minmax(options.first_depth_mm, last_depth_mm);
     // The sides of a tilted target are nearer and farther than its middle.
     const auto [least, most] = Nearnesses(options.target.tilt_deg * kPi / 180);
-    decision = DecideEffects(choice, Conditions(),
+    decision = SelectEffects(choice, Conditions(),
                              PlacesBetween(options.camera, near / std::max(1.0, most),
                                            far / std::min(1.0, least), false),
                              SweepEffects());
@@ -263,7 +263,7 @@ struct SweepSimulator::Impl {
   // cycle per px in the nearest frame. The pixel box removes higher frequencies because its first
   // zero is there. Frequencies between half of that and that are the aliasing of a real sensor.
   // Effects that are left out do not change the content of the target.
-  void MakeTile(const LinearPicture& picture) {
+  void MakeTile(const LinearImage& image) {
     const Sensor& sensor = options.camera.sensor;
     const EffectSet all = SweepEffects();
     const std::vector<FrameState> with_all = FramesWith(all);
@@ -281,7 +281,7 @@ struct SweepSimulator::Impl {
       const TiltedTarget target = TargetOf(frame.depth_mm, frame.pixel_mm, all);
       for (double x_px : {-0.5 - margin_px, sensor.width_px - 0.5 + margin_px}) {
         // Beyond a side that is so far away, the target repeats itself.
-        if (target.Nearness(x_px - axis_px.x()) < kLeastNearness) {
+        if (target.Nearness(x_px - axis_px.x()) < kMinNearness) {
           x_px = std::clamp(x_px, -0.5, sensor.width_px - 0.5);
         }
         nearest_pixel_mm = std::min({nearest_pixel_mm, target.PixelAcrossMm(x_px - axis_px.x()),
@@ -297,21 +297,21 @@ struct SweepSimulator::Impl {
     }
     request.spacing_mm = nearest_pixel_mm / 2;
     RandomDraws draws(options.seed, RandomDraws::Purpose::kTexture, 0);
-    TargetTile tile = DrawTargetTile(options.target, request, picture, &draws);
+    TargetTile tile = DrawTargetTile(options.target, request, image, &draws);
     tile_texture.emplace(tile.samples);
     tile.samples.release();
     tile_frame = tile;
   }
 
-  LinearPicture Render(int frame_index) const {
+  LinearImage Render(int frame_index) const {
     if (!(frame_index >= 0 && frame_index < options.frame_count)) {
       throw Error(fmt::format("frame {} does not exist: the sweep has {}", frame_index,
                               options.frame_count));
     }
     const FrameState& frame = frames[static_cast<std::size_t>(frame_index)];
-    LinearPicture picture = tile_texture ? RenderTile(frame) : RenderEdge(frame);
-    for (std::size_t i = 0; i < light_of_pixel.size(); ++i) picture.values[i] *= light_of_pixel[i];
-    return picture;
+    LinearImage image = tile_texture ? RenderTile(frame) : RenderEdge(frame);
+    for (std::size_t i = 0; i < light_of_pixel.size(); ++i) image.values[i] *= light_of_pixel[i];
+    return image;
   }
 
   // [D44] Maximum change of the blur, or of the position that the outermost rows show, from one
@@ -365,17 +365,16 @@ struct SweepSimulator::Impl {
                                    profile ? &*profile : nullptr});
   }
 
-  LinearPicture RenderTile(const FrameState& frame) const {
+  LinearImage RenderTile(const FrameState& frame) const {
     const Sensor& sensor = options.camera.sensor;
-    LinearPicture picture{sensor.width_px, sensor.height_px, 1, {}};
-    picture.values.resize(static_cast<std::size_t>(sensor.width_px) *
-                          static_cast<std::size_t>(sensor.height_px));
+    LinearImage image{sensor.width_px, sensor.height_px, 1, {}};
+    image.values.resize(static_cast<std::size_t>(sensor.width_px) *
+                        static_cast<std::size_t>(sensor.height_px));
     const auto add = [&](const cv::Mat& light, int first, const auto& factor) {
       for (int i = 0; i < light.rows; ++i) {
         ThrowIfCancelled();
         const double* row = light.ptr<double>(i);
-        float* to =
-            picture.values.data() + static_cast<std::ptrdiff_t>(i) * sensor.width_px + first;
+        float* to = image.values.data() + static_cast<std::ptrdiff_t>(i) * sensor.width_px + first;
         for (int j = 0; j < light.cols; ++j)
           to[j] += static_cast<float>(factor(first + j) * row[j]);
       }
@@ -383,7 +382,7 @@ struct SweepSimulator::Impl {
     if (!IsTilted()) {
       add(TileColumns(frame, 0, sensor.width_px - 1, sensor.principal_point_px.x()), 0,
           [&](int) { return frame.lamp; });
-      return picture;
+      return image;
     }
     const std::vector<int> nodes = NodesOf(sensor.width_px, ChangePerColumnPx(frame));
     for (std::size_t n = 0; n < nodes.size(); ++n) {
@@ -397,27 +396,27 @@ struct SweepSimulator::Impl {
         return share * LampAt(frame, SeenTarget(frame, x_px).DepthMm(x_px));
       });
     }
-    return picture;
+    return image;
   }
 
   // An edge through the target's centre, dark on the left and bright on the right. A positive angle
   // leans its upper end to the right.
-  LinearPicture RenderEdge(const FrameState& frame) const {
+  LinearImage RenderEdge(const FrameState& frame) const {
     const Sensor& sensor = options.camera.sensor;
-    LinearPicture picture{sensor.width_px, sensor.height_px, 1, {}};
-    picture.values.resize(static_cast<std::size_t>(sensor.width_px) *
-                          static_cast<std::size_t>(sensor.height_px));
+    LinearImage image{sensor.width_px, sensor.height_px, 1, {}};
+    image.values.resize(static_cast<std::size_t>(sensor.width_px) *
+                        static_cast<std::size_t>(sensor.height_px));
     for (const ColumnStrip& strip : StripsOf(sensor.width_px, ChangePerColumnPx(frame))) {
       ThrowIfCancelled();
-      RenderEdge(frame, strip, &picture);
+      RenderEdge(frame, strip, &image);
     }
-    return picture;
+    return image;
   }
 
   // An edge on the target is a line g = 0, where g is the distance on the target in mm. The
   // gradient of g in the image converts it to the distance of a pixel from the line, in px, and
   // gives its direction.
-  void RenderEdge(const FrameState& frame, const ColumnStrip& strip, LinearPicture* picture) const {
+  void RenderEdge(const FrameState& frame, const ColumnStrip& strip, LinearImage* image) const {
     const Sensor& sensor = options.camera.sensor;
     const TargetOptions& options_of = options.target;
     const Eigen::Vector2d& axis_px = sensor.principal_point_px;
@@ -460,14 +459,14 @@ struct SweepSimulator::Impl {
       ThrowIfCancelled();
       for (int x = strip.first; x < strip.first + strip.count; ++x) {
         const double distance_px = distance_mm(Eigen::Vector2d(x, y) - axis_px) / pixel_mm;
-        picture->values[static_cast<std::size_t>(y * sensor.width_px + x)] =
+        image->values[static_cast<std::size_t>(y * sensor.width_px + x)] =
             static_cast<float>(dark + step * edge.At(distance_px));
       }
     }
   }
 
   SweepSimulationOptions options;
-  EffectDecision decision;
+  EffectSelection decision;
   Camera stored_camera;
   double floor_px = 0;
   PupilLaw law = PupilLaw::kUniform;
@@ -476,32 +475,32 @@ struct SweepSimulator::Impl {
   std::vector<float> light_of_pixel;  // empty without fall-off
   std::vector<FrameState> frames;
   SweepTruth truth;
-  std::optional<PeriodicPicture> tile_texture;  // none for an edge
+  std::optional<PeriodicImage> tile_texture;  // none for an edge
   TargetTile tile_frame;  // position of the tile; the samples are in tile_texture
 };
 
 SweepSimulator::SweepSimulator(const SweepSimulationOptions& options,
-                               const LinearPicture& target_picture)
-    : impl_(std::make_unique<Impl>(options, target_picture)) {}
+                               const LinearImage& target_image)
+    : impl_(std::make_unique<Impl>(options, target_image)) {}
 
 SweepSimulator::~SweepSimulator() = default;
 
-LinearPicture SweepSimulator::RenderNoiseless(int frame_index) const {
+LinearImage SweepSimulator::RenderNoiseless(int frame_index) const {
   return impl_->Render(frame_index);
 }
 
-StoredPicture SweepSimulator::RenderFrame(int frame_index) const {
-  LinearPicture picture = impl_->Render(frame_index);
+EncodedImage SweepSimulator::RenderFrame(int frame_index) const {
+  LinearImage image = impl_->Render(frame_index);
   const SweepSimulationOptions& options = impl_->options;
   AddSensorNoise({options.full_well_electrons, options.read_noise_electrons}, impl_->decision.on,
-                 options.seed, static_cast<std::uint32_t>(frame_index), &picture);
-  return ToStored(picture, impl_->stored_camera.sensor.transfer,
-                  impl_->On(Effect::kQuantisation) ? options.bits : 16);
+                 options.seed, static_cast<std::uint32_t>(frame_index), &image);
+  return ToEncoded(image, impl_->stored_camera.sensor.transfer,
+                   impl_->On(Effect::kQuantisation) ? options.bits : 16);
 }
 
 const SweepTruth& SweepSimulator::truth() const { return impl_->truth; }
 
-const EffectDecision& SweepSimulator::effects() const { return impl_->decision; }
+const EffectSelection& SweepSimulator::effects() const { return impl_->decision; }
 
 const Camera& SweepSimulator::camera() const { return impl_->stored_camera; }
 

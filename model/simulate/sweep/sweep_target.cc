@@ -218,12 +218,12 @@ TargetTile DrawSiemensStar(const TargetOptions& options, const TileRequest& requ
 // The user's image, upright and centred, mirrored at its sides where the tile is larger. Its width
 // is the feature size or, by default, such that it covers all that the frames see. The contrast is
 // its own.
-TargetTile DrawPicture(const TargetOptions& options, const TileRequest& request,
-                       const LinearPicture& picture) {
-  if (picture.width_px < 1 || picture.height_px < 1) {
-    throw Error(fmt::format("target.picture '{}' is empty", options.picture_path));
+TargetTile DrawImage(const TargetOptions& options, const TileRequest& request,
+                     const LinearImage& image) {
+  if (image.width_px < 1 || image.height_px < 1) {
+    throw Error(fmt::format("target.image '{}' is empty", options.image_path));
   }
-  const LinearPicture grey = ToGrey(picture);
+  const LinearImage grey = ToGrey(image);
   cv::Mat source(grey.height_px, grey.width_px, CV_32F);
   std::copy(grey.values.begin(), grey.values.end(), source.ptr<float>());
 
@@ -251,7 +251,7 @@ TargetTile DrawPicture(const TargetOptions& options, const TileRequest& request,
   }
   if (!(cv::mean(samples)[0] > 0)) {
     throw Error(
-        fmt::format("target.picture '{}' is black: it must show something", options.picture_path));
+        fmt::format("target.image '{}' is black: it must show something", options.image_path));
   }
   return canvas.Finish();
 }
@@ -259,7 +259,7 @@ TargetTile DrawPicture(const TargetOptions& options, const TileRequest& request,
 }  // namespace
 
 TargetTile DrawTargetTile(const TargetOptions& options, const TileRequest& request,
-                          const LinearPicture& picture, RandomDraws* draws) {
+                          const LinearImage& image, RandomDraws* draws) {
   switch (options.kind) {
     case TargetKind::kDeadLeaves:
       return DrawDeadLeaves(options, request, draws);
@@ -270,8 +270,8 @@ TargetTile DrawTargetTile(const TargetOptions& options, const TileRequest& reque
       return DrawCheckerboard(options, request);
     case TargetKind::kSiemensStar:
       return DrawSiemensStar(options, request);
-    case TargetKind::kPicture:
-      return DrawPicture(options, request, picture);
+    case TargetKind::kImage:
+      return DrawImage(options, request, image);
     case TargetKind::kPrintedEdge:
     case TargetKind::kKnifeEdge:
       break;

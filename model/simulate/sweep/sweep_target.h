@@ -29,10 +29,10 @@ struct TargetTile {
   Eigen::Vector2d origin_mm{0, 0};  // position of the sample (0, 0)
 };
 
-// Draws every kind except the edges; only kPicture uses `picture`. Throws Error for a feature size
+// Draws every kind except the edges; only kImage uses `image`. Throws Error for a feature size
 // that the tile cannot show, and for an empty or black image.
 TargetTile DrawTargetTile(const TargetOptions& options, const TileRequest& request,
-                          const LinearPicture& picture, RandomDraws* draws);
+                          const LinearImage& image, RandomDraws* draws);
 
 }  // namespace thicklens::model
 

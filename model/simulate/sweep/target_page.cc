@@ -36,10 +36,10 @@ constexpr double kLongestPatch = 1.5;
 // Smaller features than these are lost in the pixels; with larger ones the texture gets scarce.
 constexpr double kFinestFeaturePx = 2;
 constexpr double kFeaturePx = 3;
-constexpr double kMostFeaturePx = 6;
+constexpr double kMaxFeaturePx = 6;
 constexpr double kFeaturesAcross = 360;
-constexpr double kFewestFeaturesAcross = 30;
-constexpr double kMostFeatures = 5e6;
+constexpr double kMinFeaturesAcross = 30;
+constexpr double kMaxFeatures = 5e6;
 constexpr double kRoundingSlack = 1e-9;
 
 double RoundToTwoDigits(double value) {
@@ -114,7 +114,7 @@ struct Feature {
 };
 
 std::string InPixels(double feature_mm, const CameraView& view) {
-  return fmt::format("{:.1f} px of the picture at {:g} mm", feature_mm / view.px_mm,
+  return fmt::format("{:.1f} px of the image at {:g} mm", feature_mm / view.px_mm,
                      view.distance_mm);
 }
 
@@ -130,7 +130,7 @@ Feature GivenFeature(double feature_mm, const TargetRequest& request) {
   const double feature_px = feature_mm / request.view->px_mm;
   std::string why = "as given, " + InPixels(feature_mm, *request.view);
   if (feature_px < kFinestFeaturePx) why += ", finer than the 2 to 6 px that are best";
-  if (feature_px > kMostFeaturePx) why += ", coarser than the 2 to 6 px that are best";
+  if (feature_px > kMaxFeaturePx) why += ", coarser than the 2 to 6 px that are best";
   return {feature_mm, why};
 }
 
@@ -140,19 +140,19 @@ Feature FeatureForCamera(const CameraView& view, double finest_mm) {
   if (best_mm >= finest_mm) {
     return {best_mm, InPixels(best_mm, view) + ", where 2 to 6 px are best"};
   }
-  if (finest_mm <= kMostFeaturePx * view.px_mm) {
+  if (finest_mm <= kMaxFeaturePx * view.px_mm) {
     return {finest_mm, InPixels(finest_mm, view) + ", the finest that is printed"};
   }
   // The distance from which the finest printed feature is at most six px of pitch p: in the plane
   // of focus m = f1/(zf - f1), from [S13], so that zf >= f1 (1 + feature/(6 p)) [D47], and with
   // px_mm = p/m at the distance asked for: zf - f1 grows as px_mm does.
   const double farther_mm = view.focal_length_mm + (view.distance_mm - view.focal_length_mm) *
-                                                       finest_mm / (kMostFeaturePx * view.px_mm);
+                                                       finest_mm / (kMaxFeaturePx * view.px_mm);
   throw Error(
       fmt::format("features of 2 to 6 px at {:g} mm measure {:.2g} to {:.2g} mm on the target, "
                   "below the {:g} mm that the print method resolves: take a larger distance "
                   "({:.0f} mm or more) or a finer print method (--finest-mm)",
-                  view.distance_mm, kFinestFeaturePx * view.px_mm, kMostFeaturePx * view.px_mm,
+                  view.distance_mm, kFinestFeaturePx * view.px_mm, kMaxFeaturePx * view.px_mm,
                   finest_mm, std::ceil(farther_mm)));
 }
 
@@ -169,17 +169,17 @@ Feature ChooseFeature(const TargetRequest& request, const SheetRectangle& patter
 
 void RequirePossibleTexture(const SheetRectangle& pattern, double feature_mm) {
   const double shorter_mm = std::min(pattern.width, pattern.height);
-  if (!(shorter_mm >= kFewestFeaturesAcross * feature_mm)) {
+  if (!(shorter_mm >= kMinFeaturesAcross * feature_mm)) {
     throw Error(
         fmt::format("a pattern of {:.1f} x {:.1f} mm has no room for a texture of features of {:g} "
                     "mm: at least {:g} of them must fit its shorter side",
-                    pattern.width, pattern.height, feature_mm, kFewestFeaturesAcross));
+                    pattern.width, pattern.height, feature_mm, kMinFeaturesAcross));
   }
-  if (!(pattern.width * pattern.height / (feature_mm * feature_mm) <= kMostFeatures)) {
+  if (!(pattern.width * pattern.height / (feature_mm * feature_mm) <= kMaxFeatures)) {
     throw Error(
         fmt::format("a pattern of {:.1f} x {:.1f} mm with features of {:g} mm would hold more than "
                     "{:g} million of them: take a larger --feature-mm or a smaller --size",
-                    pattern.width, pattern.height, feature_mm, kMostFeatures / 1e6));
+                    pattern.width, pattern.height, feature_mm, kMaxFeatures / 1e6));
   }
 }
 

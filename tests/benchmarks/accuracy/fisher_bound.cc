@@ -9,7 +9,7 @@ namespace {
 // Central differences use a relative step. The second number is the smallest standard deviation of
 // a variance, px^2, for frames in which the readings have no effect on the variance.
 constexpr double kRelativeStep = 1e-5;
-constexpr double kLeastErrorPx2 = 1e-6;
+constexpr double kMinErrorPx2 = 1e-6;
 
 // Blur variance that a texture of unknown sharpness shows in a frame at depth z: the variance on
 // the target in px^2 of the plane of reference, plus a constant c of the texture, V = S z^2/zref^2
@@ -72,7 +72,7 @@ FisherBounds BoundsOf(const model::SweepSimulationOptions& options, double floor
     const double dz = kRelativeStep * z;
     const double slope =
         (law.At(z + dz, truth, floor_px2) - law.At(z - dz, truth, floor_px2)) / (2 * dz);
-    error_px2(i) = std::hypot(slope * options.reading_sigma_mm, kLeastErrorPx2);
+    error_px2(i) = std::hypot(slope * options.reading_sigma_mm, kMinErrorPx2);
   }
 
   FisherBounds bounds;

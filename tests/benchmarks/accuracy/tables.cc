@@ -292,7 +292,7 @@ bool IsAperiodic(model::TargetKind target) {
     case model::TargetKind::kDeadLeaves:
     case model::TargetKind::kPinkNoise:
     case model::TargetKind::kWhiteNoise:
-    case model::TargetKind::kPicture:
+    case model::TargetKind::kImage:
       return true;
     default:
       return false;

@@ -81,7 +81,7 @@ model::SweepSimulationOptions Simulation(const TrialKey& key, const TrialSetting
 std::vector<Trial> RunTrials(const TrialKey& key, const TrialSettings& settings,
                              const std::vector<Floor>& floors) {
   const model::SweepSimulationOptions options = Simulation(key, settings);
-  SimulatedSweep simulated = testing::Simulate(options, settings.picture);
+  SimulatedSweep simulated = testing::Simulate(options, settings.image);
   if (key.target == model::TargetKind::kKnifeEdge)
     simulated.sweep.target = model::SweepTarget::kKnifeEdge;
   if (!settings.zero_is_known) simulated.sweep.offset_mm.reset();

@@ -27,7 +27,7 @@ struct TrialSettings {
   std::uint64_t first_seed = 1;
   bool map_field = false;
   int calibration_threads = 1;
-  model::LinearPicture picture;  // image for the target `picture`
+  model::LinearImage image;  // image for the target `image`
 };
 
 // One simulated sweep: a case of configs/sweeps, a target, and the number of the sweep among those

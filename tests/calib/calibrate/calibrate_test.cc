@@ -144,7 +144,7 @@ TEST(Calibrate, ADarkSweepIsNamedDark) {
 TEST(Calibrate, AFrameOfAnotherSizeIsAnErrorThatNamesIt) {
   SimulatedSweep s = Good();
   s.frame(7) = cv::Mat(kSizePx, kSizePx + 1, CV_8U, cv::Scalar(100));
-  EXPECT_THAT(ErrorOf([&] { Calibrated(s); }), HasSubstr("frame-7: the picture is 161 x 160 px"));
+  EXPECT_THAT(ErrorOf([&] { Calibrated(s); }), HasSubstr("frame-7: the image is 161 x 160 px"));
 }
 
 TEST(Calibrate, AReversedDirectionIsRefusedByItsName) {
@@ -167,7 +167,7 @@ TEST(Calibrate, AnUnknownBenchZeroIsFound) {
   EXPECT_GE(c.focus_depth_mm->sigma, 0.8 * c.bench_offset_mm->sigma);
 }
 
-TEST(Calibrate, OnePictureRepeatedIsRefused) {
+TEST(Calibrate, OneImageRepeatedIsRefused) {
   SimulatedSweep s = Good();
   for (cv::Mat& frame : *s.stored) frame = s.frame(16).clone();
   {

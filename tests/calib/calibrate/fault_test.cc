@@ -112,13 +112,13 @@ TEST(PlantedFaults, SlowAreNamedAndDoNoHarmAtASmallAperture) { ExpectRightInSpit
 
 class WrongSweep : public ::testing::TestWithParam<std::string> {};
 
-TEST_P(WrongSweep, TheSamePictureRepeatedIsRefusedForItsScale) {
+TEST_P(WrongSweep, TheSameImageRepeatedIsRefusedForItsScale) {
   SimulatedSweep s = DeepCopy(Clean(GetParam()));
   for (cv::Mat& frame : *s.stored) frame = s.frame(12).clone();
   ExpectRefused(CalibrateWithoutMap(s), "scale|repeated|does not change");
 }
 
-// Independent noise does not make pictures different.
+// Independent noise does not make images different.
 TEST_P(WrongSweep, TheSameSceneWithFreshNoiseIsRefusedForItsScale) {
   SimulatedSweep s = DeepCopy(Clean(GetParam()));
   cv::RNG random(3);

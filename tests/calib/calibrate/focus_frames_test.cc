@@ -29,17 +29,17 @@ FocusCase Texture(const BlurBench& bench = ExactBench()) {
 }
 
 // Removes one sample of the measurement.
-void Remove(std::size_t frame, BlurSamples* meter) {
+void Remove(std::size_t frame, BlurSamples* estimator) {
   std::vector<Eigen::Index> kept;
   std::vector<std::size_t> frames;
-  for (std::size_t i = 0; i < meter->frames.size(); ++i) {
-    if (meter->frames[i] == frame) continue;
+  for (std::size_t i = 0; i < estimator->frames.size(); ++i) {
+    if (estimator->frames[i] == frame) continue;
     kept.push_back(static_cast<Eigen::Index>(i));
-    frames.push_back(meter->frames[i]);
+    frames.push_back(estimator->frames[i]);
   }
-  meter->frames = frames;
-  meter->variances_px2 = Eigen::VectorXd(meter->variances_px2(kept));
-  meter->covariance = Eigen::MatrixXd(meter->covariance(kept, kept));
+  estimator->frames = frames;
+  estimator->variances_px2 = Eigen::VectorXd(estimator->variances_px2(kept));
+  estimator->covariance = Eigen::MatrixXd(estimator->covariance(kept, kept));
 }
 
 // ---- frames that do not follow the parabola ----
@@ -76,7 +76,7 @@ TEST(SolveFocus, AWrongReadingIsNamedWithWhatItIsOffBy) {
 // No reading within the sweep explains this blur.
 TEST(SolveFocus, ADamagedFrameIsNotReportedAsAWrongReading) {
   FocusCase c = Texture();
-  c.evidence.setup.meters[0].variances_px2[13] += 60;
+  c.evidence.setup.estimators[0].variances_px2[13] += 60;
   c.Solve();
   EXPECT_THAT(c.frame(13).rejection, StartsWith("frame damaged: its blur lies "));
   EXPECT_EQ(c.frame(13).reading_error_mm, 0);
@@ -88,32 +88,32 @@ TEST(SolveFocus, WhatIsRejectedIsNotInTheFit) {
   BlurBench bench;
   FocusCase with = FocusCase(bench).WithTexture(kErrorPx2).WithTrueFloor();
   FocusCase without = with;
-  with.evidence.setup.meters[0].variances_px2[20] += 8;
-  Remove(20, &without.evidence.setup.meters[0]);
+  with.evidence.setup.estimators[0].variances_px2[20] += 8;
+  Remove(20, &without.evidence.setup.estimators[0]);
   with.Solve();
   without.Solve();
   EXPECT_NE(with.frame(20).rejection, "");
   EXPECT_TRUE(with.fit.values == without.fit.values);
   EXPECT_TRUE(with.fit.covariance == without.fit.covariance);
-  EXPECT_EQ(with.evidence.setup.meters[0].frames.size(), 30U);
-  EXPECT_EQ(with.evidence.setup.meters[0].variances_px2.size(), 30);
-  EXPECT_EQ(with.evidence.setup.meters[0].covariance.rows(), 30);
+  EXPECT_EQ(with.evidence.setup.estimators[0].frames.size(), 30U);
+  EXPECT_EQ(with.evidence.setup.estimators[0].variances_px2.size(), 30);
+  EXPECT_EQ(with.evidence.setup.estimators[0].covariance.rows(), 30);
 }
 
 // A frame that is an outlier of one blur estimator is left out of the other one as well.
-TEST(SolveFocus, AFrameIsRejectedForBothMeters) {
-  for (const std::size_t meter : {0U, 1U}) {
+TEST(SolveFocus, AFrameIsRejectedForBothEstimators) {
+  for (const std::size_t estimator : {0U, 1U}) {
     FocusCase c = FocusCase().WithTexture(kErrorPx2).WithKnifeEdge(kErrorPx2);
-    c.evidence.setup.meters[meter].variances_px2[22] += 8;
+    c.evidence.setup.estimators[estimator].variances_px2[22] += 8;
     c.Solve();
     EXPECT_NE(c.frame(22).rejection, "");
-    for (const BlurSamples& left : c.evidence.setup.meters) {
+    for (const BlurSamples& left : c.evidence.setup.estimators) {
       EXPECT_EQ(left.frames.size(), 30U);
       EXPECT_THAT(left.frames, Not(Contains(22U)));
     }
     // Properties of the blur estimators stay unchanged.
-    EXPECT_FALSE(c.evidence.setup.meters[0].held_softness_px2);
-    EXPECT_TRUE(c.evidence.setup.meters[1].held_softness_px2);
+    EXPECT_FALSE(c.evidence.setup.estimators[0].held_softness_px2);
+    EXPECT_TRUE(c.evidence.setup.estimators[1].held_softness_px2);
   }
 }
 
@@ -128,7 +128,7 @@ TEST(SolveFocus, AFrameWhoseSpectrumScattersIsRejected) {
   EXPECT_THAT(c.frame(4).rejection,
               AllOf(HasSubstr("does not show what the others show"), HasSubstr("lies 6 times")));
   EXPECT_EQ(c.frame(5).rejection, "");
-  EXPECT_THAT(c.evidence.setup.meters[0].frames, Not(Contains(4U)));
+  EXPECT_THAT(c.evidence.setup.estimators[0].frames, Not(Contains(4U)));
   EXPECT_EQ(c.calibration.blur.frames_used, c.bench.count - 1);
 }
 
@@ -136,7 +136,7 @@ TEST(SolveFocus, TheFirstReasonStands) {
   FocusCase c = Texture();
   c.evidence.frame_noise_ratios.assign(static_cast<std::size_t>(c.bench.count), 1);
   c.evidence.frame_noise_ratios[6] = 100;
-  c.evidence.setup.meters[0].variances_px2[6] += 8;
+  c.evidence.setup.estimators[0].variances_px2[6] += 8;
   c.Solve();
   EXPECT_THAT(c.frame(6).rejection, HasSubstr("does not show"));
   EXPECT_EQ(c.frame(6).reading_error_mm, 0);
@@ -148,7 +148,7 @@ TEST(SolveFocus, RejectedFramesDoNotReachTheSweepsRange) {
   bench.last_mm = 402;
   bench.reference = 28;
   FocusCase c = Texture(bench);
-  c.evidence.setup.meters[0].variances_px2[30] += 40;  // the one frame beyond 400 mm
+  c.evidence.setup.estimators[0].variances_px2[30] += 40;  // the one frame beyond 400 mm
   c.Solve();
   EXPECT_NE(c.frame(30).rejection, "");
   EXPECT_THAT(c.calibration.warnings, Contains(HasSubstr("is extrapolated")));
@@ -160,7 +160,7 @@ TEST(SolveFocus, RejectedFramesDoNotReachTheSweepsRange) {
 // of the law for any lens.
 FocusCase WithLight(const std::vector<Eigen::Index>& frames) {
   FocusCase c = FocusCase().WithTexture(5e-4).WithTrueFloor();
-  for (const Eigen::Index i : frames) c.evidence.setup.meters[0].variances_px2[i] += 0.02;
+  for (const Eigen::Index i : frames) c.evidence.setup.estimators[0].variances_px2[i] += 0.02;
   c.Solve();
   return c;
 }
@@ -186,9 +186,9 @@ TEST(SolveFocus, ThreeLightFramesAreNamedAndTheOthersCounted) {
 }
 
 // Deviations of up to four standard errors cost no weight.
-TEST(SolveFocus, FramesWithinTheirErrorsWeighOne) {
+TEST(SolveFocus, FramesWithinTheirErrorsHaveWeightOne) {
   FocusCase c = FocusCase().WithTexture(5e-4).WithTrueFloor();
-  c.evidence.setup.meters[0].variances_px2[8] += 0.0015;
+  c.evidence.setup.estimators[0].variances_px2[8] += 0.0015;
   c.Solve();
   EXPECT_THAT(c.calibration.warnings, IsEmpty());
   EXPECT_EQ(c.frame(8).blur_fit_weight, 1);
@@ -235,7 +235,7 @@ TEST(SolveFocus, TheErrorOfNoBlurIsBounded) {
   bench.first_mm = 340;
   bench.last_mm = 460;  // frame 15 is in the plane of focus
   FocusCase c = FocusCase(bench).WithKnifeEdge(kErrorPx2);
-  c.evidence.setup.meters[0].variances_px2[15] -= 1e-3;
+  c.evidence.setup.estimators[0].variances_px2[15] -= 1e-3;
   c.Solve();
   EXPECT_EQ(c.frame(15).blur_sigma_px, 0);
   const double s2 = std::pow(c.bench.Scale(400), 2);
@@ -260,9 +260,9 @@ TEST(SolveFocus, ReadingErrorsAreReported) {
 
 TEST(SolveFocus, FramesThatNoMeterHasAreReportedAsUnused) {
   FocusCase c = Texture();
-  Remove(0, &c.evidence.setup.meters[0]);
-  Remove(1, &c.evidence.setup.meters[0]);
-  Remove(2, &c.evidence.setup.meters[0]);
+  Remove(0, &c.evidence.setup.estimators[0]);
+  Remove(1, &c.evidence.setup.estimators[0]);
+  Remove(2, &c.evidence.setup.estimators[0]);
   c.frame(1).image_scale.reset();
   c.frame(2).rejection = "blank";
   c.Solve();

@@ -45,7 +45,7 @@ double ErrorFor(const BlurBench& bench, BlurParameter parameter, double sigma) {
   return kTrialPx2 * sigma / std::sqrt(c.fit.covariance(parameter, parameter));
 }
 
-TEST(SolveFocus, WithoutAMeterTheMeasurementSaysWhy) {
+TEST(SolveFocus, WithoutAnEstimatorTheMeasurementSaysWhy) {
   FocusCase c;
   c.evidence.message = "neither edges nor texture";
   c.Solve();
@@ -76,7 +76,7 @@ TEST(SolveFocus, AFewEdgesBesideEnoughTextureDoNoHarm) {
     FocusCase c;
     if (!edges_first) c.WithTexture(0.01);
     c.WithKnifeEdge(0.01);
-    BlurSamples& edges = c.evidence.setup.meters[static_cast<std::size_t>(c.evidence.edges)];
+    BlurSamples& edges = c.evidence.setup.estimators[static_cast<std::size_t>(c.evidence.edges)];
     edges.frames = {12, 13, 14};
     edges.variances_px2 = Eigen::VectorXd(edges.variances_px2.segment(12, 3));
     edges.covariance = Eigen::MatrixXd(edges.covariance.block(12, 12, 3, 3));

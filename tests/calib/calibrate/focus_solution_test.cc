@@ -21,7 +21,7 @@ using ::testing::Not;
 using thicklens::testing::BlurBench;
 using thicklens::testing::ExactBench;
 using thicklens::testing::FocusCase;
-using thicklens::testing::LinearTwin;
+using thicklens::testing::LinearReference;
 
 constexpr double kErrorPx2 = 0.01;
 
@@ -48,11 +48,11 @@ void ExpectImageDistanceSigma(const FocusCase& c) {
 
 // The covariance is compared with linear error propagation, in the stated order of the rows of the
 // reference.
-void ExpectCovariance(const Calibration& c, const Eigen::Matrix4d& twin,
+void ExpectCovariance(const Calibration& c, const Eigen::Matrix4d& reference,
                       const std::vector<int>& rows) {
   ASSERT_EQ(c.covariance.rows(), static_cast<Eigen::Index>(rows.size()));
   ASSERT_EQ(c.covariance.cols(), c.covariance.rows());
-  const Eigen::MatrixXd expected = twin(rows, rows);
+  const Eigen::MatrixXd expected = reference(rows, rows);
   for (Eigen::Index a = 0; a < expected.rows(); ++a) {
     for (Eigen::Index b = 0; b < expected.cols(); ++b) {
       EXPECT_NEAR(c.covariance(a, b), expected(a, b),
@@ -84,8 +84,8 @@ TEST(SolveFocus, AGivenFloorIsWrittenWithItsError) {
   EXPECT_FALSE(c.calibration.blur_floor_px->systematic);
   EXPECT_THAT(c.calibration.covariance_order,
               ElementsAre("image_distance_mm", "blur_ratio", "blur_floor_px", "bench_offset_mm"));
-  LinearTwin twin{kErrorPx2, true, 0.03};
-  ExpectCovariance(c.calibration, twin.Covariance(c.bench), {0, 1, 2, 3});
+  LinearReference reference{kErrorPx2, true, 0.03};
+  ExpectCovariance(c.calibration, reference.Covariance(c.bench), {0, 1, 2, 3});
   // The floor has no interval, and therefore no systematic part.
   EXPECT_EQ(c.Part("lens floor"), nullptr);
 }
@@ -106,8 +106,8 @@ TEST(SolveFocus, AFloorWithoutErrorStaysWhatItIs) {
   ASSERT_TRUE(c.calibration.blur_floor_px);
   EXPECT_NEAR(c.calibration.blur_floor_px->value, 0.5, 1e-12);
   EXPECT_EQ(c.calibration.blur_floor_px->sigma, 0);
-  LinearTwin twin{kErrorPx2, true, 0, true};
-  ExpectCovariance(c.calibration, twin.Covariance(c.bench), {0, 1, 2, 3});
+  LinearReference reference{kErrorPx2, true, 0, true};
+  ExpectCovariance(c.calibration, reference.Covariance(c.bench), {0, 1, 2, 3});
 }
 
 TEST(SolveFocus, APerfectLensMayBeStated) {
@@ -132,13 +132,13 @@ TEST(SolveFocus, AKnifeEdgeMeasuresTheFloor) {
   ExpectImageDistanceSigma(c);
   ASSERT_TRUE(c.calibration.blur_floor_px);
   EXPECT_NEAR(c.calibration.blur_floor_px->value, 0.5, 1e-4);
-  const Eigen::Matrix4d twin = LinearTwin{kErrorPx2}.Covariance(c.bench);
-  EXPECT_NEAR(c.calibration.blur_floor_px->sigma, std::sqrt(twin(2, 2)),
-              1e-3 * std::sqrt(twin(2, 2)));
+  const Eigen::Matrix4d reference = LinearReference{kErrorPx2}.Covariance(c.bench);
+  EXPECT_NEAR(c.calibration.blur_floor_px->sigma, std::sqrt(reference(2, 2)),
+              1e-3 * std::sqrt(reference(2, 2)));
   EXPECT_THAT(c.calibration.covariance_order,
               ElementsAre("image_distance_mm", "blur_ratio", "blur_floor_px", "bench_offset_mm"));
-  ExpectCovariance(c.calibration, twin, {0, 1, 2, 3});
-  EXPECT_EQ(c.calibration.blur.meter, "edges");
+  ExpectCovariance(c.calibration, reference, {0, 1, 2, 3});
+  EXPECT_EQ(c.calibration.blur.estimator, "edges");
   EXPECT_EQ(c.Part("lens floor"), nullptr);
 }
 
@@ -148,7 +148,7 @@ TEST(SolveFocus, AKnifeEdgeBesideATextureFixesTheTexturesFloorToo) {
   EXPECT_EQ(c.calibration.outcome, Outcome::kOk);
   ExpectTrueFocus(c, 1e-3);
   EXPECT_NEAR(c.calibration.blur_floor_px->value, 0.5, 1e-4);
-  EXPECT_EQ(c.calibration.blur.meter, "edges and relative spectrum");
+  EXPECT_EQ(c.calibration.blur.estimator, "edges and relative spectrum");
   // Frames are counted, not samples.
   EXPECT_EQ(c.calibration.blur.frames_used, c.bench.count);
 }
@@ -222,7 +222,7 @@ TEST(SolveFocus, AnIntervalIsAnIntervalOfTheFocus) {
   assumed.floor_px2 = middle_px2;
   assumed.focus_mm = c.calibration.focus_depth_mm->value;
   assumed.ratio = c.calibration.blur_ratio->value;
-  ExpectCovariance(c.calibration, LinearTwin{kErrorPx2, true, 0, true}.Covariance(assumed),
+  ExpectCovariance(c.calibration, LinearReference{kErrorPx2, true, 0, true}.Covariance(assumed),
                    {0, 1, 3});
 }
 
@@ -264,7 +264,7 @@ TEST(SolveFocus, EdgesOfATextureBoundTheFloor) {
   c.Solve();
   ExpectInterval(c, 0, 0.8, 0.02);
   EXPECT_THAT(c.calibration.warnings, ElementsAre(HasSubstr("px soft at focus")));
-  EXPECT_EQ(c.calibration.blur.meter, "relative spectrum");
+  EXPECT_EQ(c.calibration.blur.estimator, "relative spectrum");
 }
 
 // Frames off focus, whose scale differs from that of the reference, give the same bound, although a
@@ -304,9 +304,9 @@ TEST(SolveFocus, TheBenchZerosErrorIsInTheCovariance) {
   c.Solve();
   ASSERT_EQ(c.calibration.covariance.rows(), 4);
   EXPECT_NEAR(c.calibration.covariance(3, 3), kZeroSigmaMm * kZeroSigmaMm, 1e-9);
-  LinearTwin twin{kErrorPx2, true, 0.03};
-  twin.offset_sigma_mm = kZeroSigmaMm;
-  ExpectCovariance(c.calibration, twin.Covariance(c.bench), {0, 1, 2, 3});
+  LinearReference reference{kErrorPx2, true, 0.03};
+  reference.offset_sigma_mm = kZeroSigmaMm;
+  ExpectCovariance(c.calibration, reference.Covariance(c.bench), {0, 1, 2, 3});
   // If the zero is too large, zf is too large and d1 too small.
   EXPECT_LT(c.calibration.covariance(0, 3), 0);
   EXPECT_GT(c.calibration.focus_depth_mm->sigma, 0.9 * kZeroSigmaMm);
@@ -321,7 +321,7 @@ TEST(SolveFocus, MessagesOfTheMetersAreKept) {
   c.evidence.examples.resize(3);
   c.Solve();
   EXPECT_TRUE(c.calibration.blur.done);
-  EXPECT_EQ(c.calibration.blur.meter, "relative spectrum");
+  EXPECT_EQ(c.calibration.blur.estimator, "relative spectrum");
   EXPECT_EQ(c.calibration.blur.message, "converged");
   EXPECT_EQ(c.calibration.blur.gaussian_misfit, 1.2);
   EXPECT_EQ(c.calibration.blur.disc_misfit, 1.3);
@@ -353,7 +353,7 @@ TEST(SolveFocus, AnotherShapeIsWarnedOfWhereItFitsClearlyBetter) {
     c.sweep.camera.psf = k.stated;
     c.evidence.gaussian_misfit = k.gaussian;
     c.evidence.disc_misfit = k.disc;
-    c.evidence.other_psf = c.evidence.setup.meters[0];
+    c.evidence.other_psf = c.evidence.setup.estimators[0];
     c.evidence.better_psf = k.gaussian <= k.disc ? model::Psf::kGaussian : model::Psf::kDisc;
     c.Solve();
     if (k.warning != nullptr) {

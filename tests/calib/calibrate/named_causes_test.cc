@@ -79,31 +79,31 @@ TEST(Reason, AlignedFramesAreNotCalledDistorted) {
 
 // The target of the sweeps below has blots of all sizes, so that every frame contains the same
 // ones.
-model::LinearPicture Blots() {
+model::LinearImage Blots() {
   constexpr int kSide = 900;
-  cv::Mat picture(kSide, kSide, CV_32F, cv::Scalar(0.5));
+  cv::Mat image(kSide, kSide, CV_32F, cv::Scalar(0.5));
   std::mt19937 engine(4);
   const auto uniform = [&engine] { return static_cast<double>(engine()) / 4294967296.0; };
   for (int i = 0; i < 6000; ++i) {
     const double radius = std::min(60.0, 3 / std::sqrt(0.002 + uniform()));
-    cv::circle(picture, {static_cast<int>(kSide * uniform()), static_cast<int>(kSide * uniform())},
+    cv::circle(image, {static_cast<int>(kSide * uniform()), static_cast<int>(kSide * uniform())},
                static_cast<int>(radius), cv::Scalar(0.2 + 0.5 * uniform()), -1);
   }
-  model::LinearPicture result;
+  model::LinearImage result;
   result.width_px = result.height_px = kSide;
   result.channels = 1;
-  result.values.assign(picture.begin<float>(), picture.end<float>());
+  result.values.assign(image.begin<float>(), image.end<float>());
   return result;
 }
 
 // The target is at 300 mm, and the sensor moves by +-0.6 mm, about 60 mm behind the lens.
 SimulatedSweep FocusRing() {
-  const model::LinearPicture target = Blots();
+  const model::LinearImage target = Blots();
   SimulatedSweep sweep;
   sweep.stored = std::make_shared<std::vector<cv::Mat>>();
   for (int k = -12; k <= 12; ++k) {
     model::SweepSimulationOptions options = SweepCase("ii", kSizePx, 1);
-    options.target.kind = model::TargetKind::kPicture;
+    options.target.kind = model::TargetKind::kImage;
     options.target.feature_size_mm = 14;
     options.first_depth_mm = 300;
     options.frame_count = 1;

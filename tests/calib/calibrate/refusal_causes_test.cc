@@ -56,10 +56,10 @@ TEST(Exposure, AnOverExposedSweepGetsTheAdviceToLowerIt) {
       if (!zero_is_known) s.sweep.offset_mm.reset();
       Expose(&s, 6, 0, last);
       const Calibration c = CalibrateWithoutMap(s);
-      const std::string told =
+      const std::string reported =
           c.outcome == Outcome::kRefused || c.warnings.empty() ? c.reason : c.warnings.front();
-      EXPECT_THAT(told, AllOf(HasSubstr("of 41 frames are over-exposed: lower the exposure"),
-                              Not(StartsWith("offset_mm"))));
+      EXPECT_THAT(reported, AllOf(HasSubstr("of 41 frames are over-exposed: lower the exposure"),
+                                  Not(StartsWith("offset_mm"))));
     }
   }
 }
@@ -118,7 +118,7 @@ TEST(Region, TooSmallForAnythingIsRefusedBeforeItIsMeasured) {
   const Calibration c = CalibrateWithoutMap(s);
   EXPECT_EQ(c.outcome, Outcome::kRefused);
   EXPECT_THAT(c.reason, StartsWith("the region of interest (roi_px) is 80 x 23 px"));
-  EXPECT_EQ(c.frames[0].statistics.mean_stored, 0);
+  EXPECT_EQ(c.frames[0].statistics.mean_encoded, 0);
 }
 
 TEST(Region, TooSmallForATextureIsNamedAsTheCause) {

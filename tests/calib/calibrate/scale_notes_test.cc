@@ -74,9 +74,9 @@ TEST(LoneEdge, OfAnUnstatedTargetItsSoftnessIsOpen) {
   EXPECT_THAT(c.warnings, Contains(HasSubstr("photograph a knife edge")));
 }
 
-class StraightLaw : public ::testing::TestWithParam<const char*> {};
+class StraightModel : public ::testing::TestWithParam<const char*> {};
 
-TEST_P(StraightLaw, SlowAStraightLawHasNoNoteOfABend) {
+TEST_P(StraightModel, SlowAStraightLawHasNoNoteOfABend) {
   for (const std::uint64_t seed : {1U, 2U}) {
     SimulatedSweep s = SweepWithFloor(GetParam(), 256, seed);
     const Calibration c = CalibrateWithoutMap(s);
@@ -84,10 +84,10 @@ TEST_P(StraightLaw, SlowAStraightLawHasNoNoteOfABend) {
     EXPECT_THAT(c.warnings, Not(Contains(HasSubstr("bend")))) << seed;
   }
 }
-INSTANTIATE_TEST_SUITE_P(Cases, StraightLaw, ::testing::Values("i", "ii", "iii", "iv", "v"));
+INSTANTIATE_TEST_SUITE_P(Cases, StraightModel, ::testing::Values("i", "ii", "iii", "iv", "v"));
 
 // The readings are from a rail with an uneven screw: +0.8 mm at both ends relative to the middle.
-TEST(BentLaw, IsWarnedOfWithItsSize) {
+TEST(BentModel, IsWarnedOfWithItsSize) {
   SimulatedSweep s = Good();
   for (model::SweepFrame& frame : s.sweep.frames) {
     const double u = (frame.reading_mm - 400) / 80;

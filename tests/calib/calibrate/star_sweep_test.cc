@@ -42,7 +42,7 @@ TEST(StarSweep, CalibratesWithinItsErrors) {
   const Calibration c = CalibrateWithoutMap(iii);
   EXPECT_EQ(c.outcome, Outcome::kOk) << c.reason;
   ExpectRight(c, iii.truth, 4);
-  EXPECT_EQ(c.blur.meter, "relative spectrum");
+  EXPECT_EQ(c.blur.estimator, "relative spectrum");
   EXPECT_FALSE(c.scale.done);
   EXPECT_THAT(c.warnings, Contains(HasSubstr("the given offset_mm could not be checked: the target "
                                              "looks the same at every scale")));

@@ -192,14 +192,14 @@ TEST(VerifyCalibration, WhatWouldNotShowAChangeCannotTell) {
   // For this lens the change is kappa r (1 - f1/zf)/(f2 p) px per mm of d1.
   const Verification coarse = VerifyCalibration(StoredCamera(0.001, 0.001), {},
                                                 FoundCalibration(kD1Mm, 0.05, kRatio, 0.001), {});
-  EXPECT_EQ(coarse.verdict, Verdict::kCannotTell);
+  EXPECT_EQ(coarse.verdict, Verdict::kUndetermined);
   const double px_per_mm = kRatio * (50 / 5.6) * (1 - 50.0 / 300) / (50 * 0.0045);
   const double detectable = Named(coarse, "image_distance_mm").smallest_detectable;
   EXPECT_NEAR(coarse.detectable_blur_px, px_per_mm * detectable, 1e-6);
   EXPECT_THAT(coarse.reason, HasSubstr("0.5 px are needed"));
   const Verification ratio = VerifyCalibration(StoredCamera(0.001, 0.001), {},
                                                FoundCalibration(kD1Mm, 0.001, kRatio, 0.05), {});
-  EXPECT_EQ(ratio.verdict, Verdict::kCannotTell);
+  EXPECT_EQ(ratio.verdict, Verdict::kUndetermined);
   EXPECT_THAT(ratio.reason, HasSubstr("blur_ratio"));
 }
 
@@ -212,7 +212,7 @@ TEST(VerifyCalibration, ASweepIsComparedInWhatItDetermines) {
   found.outcome = Outcome::kRefused;
   found.reason = "too few frames";
   const Verification refused = VerifyCalibration(StoredCamera(0.001, 0.001), {}, found, {});
-  EXPECT_EQ(refused.verdict, Verdict::kCannotTell);
+  EXPECT_EQ(refused.verdict, Verdict::kUndetermined);
   EXPECT_THAT(refused.reason, HasSubstr("too few frames"));
   EXPECT_THAT(refused.parameters, IsEmpty());
 }

@@ -393,14 +393,14 @@ TEST(FitEdgeSpread, FollowsAnEdgeThatDistortionBendsAndRefusesACurve) {
 cv::Mat PatchInTexture(double sigma_px, double patch_px) {
   model::SweepSimulationOptions options = thicklens::testing::SweepCase("i", 192, 21);
   const model::SweepSimulator simulator(options, {});
-  const model::LinearPicture picture = simulator.RenderNoiseless(options.frame_count / 2);
+  const model::LinearImage image = simulator.RenderNoiseless(options.frame_count / 2);
   const auto scene = [&](double x, double y) {
     if (std::abs(x - 96) < patch_px / 2 && std::abs(y - 90) < patch_px / 2) {
       return (x - 96) * Cosine(5) + (y - 90) * Sine(5) > 0 ? 0.8 : 0.2;
     }
     const int column = std::clamp(static_cast<int>(std::lround(x)), 0, 191);
     const int row = std::clamp(static_cast<int>(std::lround(y)), 0, 191);
-    return static_cast<double>(picture.values[static_cast<std::size_t>(row * 192 + column)]);
+    return static_cast<double>(image.values[static_cast<std::size_t>(row * 192 + column)]);
   };
   return DrawnScene(192, {sigma_px, sigma_px, 0}, scene);
 }
@@ -428,7 +428,8 @@ TEST(MeasureEdgeSpread, TakesNoTextureForEdges) {
       const model::SweepSimulator simulator(options, {});
       for (int i = 0; i < options.frame_count; i += options.frame_count / 3) {
         cv::Mat frame;
-        thicklens::testing::StoredMat(simulator.RenderFrame(i)).convertTo(frame, CV_32F, 1.0 / 255);
+        thicklens::testing::EncodedMat(simulator.RenderFrame(i))
+            .convertTo(frame, CV_32F, 1.0 / 255);
         const auto spread =
             MeasureEdgeSpread(frame, options.camera.psf, simulator.truth().blur_floor_px);
         ++frames;
@@ -562,7 +563,7 @@ TEST(FindEdges, GivesTheStrongestFirstAndNoMoreThanAsked) {
   EXPECT_TRUE(FindEdges(frame, 0).empty());
 }
 
-TEST(MeasureEdgeSpread, WeighsAStrongEdgeMore) {
+TEST(MeasureEdgeSpread, GivesAStrongEdgeMoreWeight) {
   const auto scene = [](double x, double y) {
     return 0.2 + (x - 40 > 0.1 * (y - 64) ? 0.5 : 0) + (x - 95 > 0.1 * (y - 64) ? 0.06 : 0);
   };

@@ -50,7 +50,7 @@ void ExpectCovers(const BlurBench& bench, const Draw& draw, int parameters, int 
 constexpr int kRuns = 300;
 
 TEST(FitBlurCovariance, IsTheScatterOfAKnifeEdge) {
-  for (const BlurLaw law : {BlurLaw::kPerspective, BlurLaw::kTelecentric}) {
+  for (const BlurModel law : {BlurModel::kPerspective, BlurModel::kTelecentric}) {
     BlurBench bench;
     bench.law = law;
     ExpectCovers(
@@ -105,16 +105,16 @@ TEST(FitBlurCovariance, HoldsWithScalesThatTellTheReadings) {
   }
 }
 
-TEST(FitBlurCovariance, HoldsForTwoMeters) {
+TEST(FitBlurCovariance, HoldsForTwoEstimators) {
   BlurBench bench;
   bench.reading_sigma_mm = 0.07;
   ExpectCovers(
       bench,
       [&](std::mt19937* random) {
         BlurFitSetup setup = bench.Setup(random);
-        setup.meters = {bench.Absolute(0.05, 0, random),
-                        bench.Relative(0.01, kReferencePx2, random)};
-        setup.meters[0].held_softness_px2 = 0;
+        setup.estimators = {bench.Absolute(0.05, 0, random),
+                            bench.Relative(0.01, kReferencePx2, random)};
+        setup.estimators[0].held_softness_px2 = 0;
         return setup;
       },
       3, kRuns);

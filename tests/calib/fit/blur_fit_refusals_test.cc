@@ -35,7 +35,7 @@ TEST(FitBlur, TwoDepthsDoNotFixThreeParameters) {
     const double depth_mm = i % 2 == 0 ? 350 : 450;
     setup.frames[i].reading_mm = depth_mm - bench.offset_mm;
     setup.frames[i].scale = bench.Scale(depth_mm);
-    setup.meters[0].variances_px2[static_cast<Eigen::Index>(i)] = bench.OnTarget(depth_mm);
+    setup.estimators[0].variances_px2[static_cast<Eigen::Index>(i)] = bench.OnTarget(depth_mm);
   }
   EXPECT_FALSE(FitBlur(setup).done);
   BlurFitResult start;
@@ -73,7 +73,7 @@ TEST(FitBlur, BlurWithoutAMinimumIsRefused) {
   const BlurBench bench = ExactBench();
   std::mt19937 random(1);
   BlurFitSetup setup = WithTexture(bench, 0.02, 0, &random);
-  setup.meters[0].variances_px2 *= -1;
+  setup.estimators[0].variances_px2 *= -1;
   const BlurFitResult fit = FitBlur(setup);
   EXPECT_FALSE(fit.done);
   EXPECT_THAT(fit.message, HasSubstr("no minimum in depth"));

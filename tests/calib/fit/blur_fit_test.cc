@@ -39,8 +39,8 @@ TEST(DefocusVariance, IsTheLensOwnBlurRadius) {
   }
 }
 
-TEST(FitBlur, ExactAbsoluteSamplesGiveTheTruthByBothLawsInBothDirections) {
-  for (const BlurLaw law : {BlurLaw::kPerspective, BlurLaw::kTelecentric}) {
+TEST(FitBlur, ExactAbsoluteSamplesGiveTheTruthByBothModelsInBothDirections) {
+  for (const BlurModel law : {BlurModel::kPerspective, BlurModel::kTelecentric}) {
     for (const BenchDirection direction : {BenchDirection::kAway, BenchDirection::kToward}) {
       BlurBench bench = ExactBench();
       bench.law = law;
@@ -55,7 +55,7 @@ TEST(FitBlur, ExactAbsoluteSamplesGiveTheTruthByBothLawsInBothDirections) {
 }
 
 TEST(FitBlur, ExactRelativeSamplesGiveTheTruthAndTheirNuisance) {
-  for (const BlurLaw law : {BlurLaw::kPerspective, BlurLaw::kTelecentric}) {
+  for (const BlurModel law : {BlurModel::kPerspective, BlurModel::kTelecentric}) {
     BlurBench bench = ExactBench();
     bench.law = law;
     std::mt19937 random(1);
@@ -105,7 +105,7 @@ TEST(FitBlur, AWrongFloorMovesFocusAndRatioAsDerived) {
 
 TEST(FitBlur, OfATelecentricLensAWrongFloorIsANuisanceAlone) {
   BlurBench bench = ExactBench();
-  bench.law = BlurLaw::kTelecentric;
+  bench.law = BlurModel::kTelecentric;
   std::mt19937 random(1);
   BlurFitSetup setup = WithTexture(bench, 0.02, 0, &random);
   setup.floor_variance_px2->value += 1;
@@ -160,15 +160,15 @@ TEST(FitBlur, EdgesAndTextureTogetherAreBetterThanEither) {
   BlurSamples edge = bench.Absolute(0.2, 0, &random);
   edge.held_softness_px2 = 0;
   const BlurSamples texture = bench.Relative(0.004, kReferencePx2, &random);
-  both.meters = {edge, texture};
+  both.estimators = {edge, texture};
   const BlurFitResult fit = FitBlur(both);
   ExpectTruth(fit, bench);
   EXPECT_EQ(fit.softness_px2.at(0), 0);
   EXPECT_NEAR(fit.softness_px2.at(1), kReferencePx2 - bench.OnTarget(bench.Depth(bench.reference)),
               1e-4);
   BlurFitSetup edge_alone = both, texture_alone = both;
-  edge_alone.meters = {edge};
-  texture_alone.meters = {texture};
+  edge_alone.estimators = {edge};
+  texture_alone.estimators = {texture};
   const BlurFitResult by_edge = FitBlur(edge_alone);
   ASSERT_TRUE(by_edge.done);
   EXPECT_LT(fit.covariance(kFocusDepth, kFocusDepth),
@@ -188,8 +188,8 @@ TEST(FitBlur, PreciseScalesTellTheReadingsErrors) {
       std::mt19937 random(100 + seed);
       std::vector<double> errors_mm;
       BlurFitSetup setup = bench.Setup(&random, &errors_mm);
-      setup.meters = {bench.Absolute(0.05, 0, &random)};
-      setup.meters[0].held_softness_px2 = 0;
+      setup.estimators = {bench.Absolute(0.05, 0, &random)};
+      setup.estimators[0].held_softness_px2 = 0;
       const BlurFitResult fit = FitBlur(setup);
       ASSERT_TRUE(fit.done) << fit.message;
       for (std::size_t i = 0; i < errors_mm.size(); ++i) {
@@ -212,8 +212,8 @@ TEST(FitBlur, AReadingFarOffIsFoundAndDoesNoHarm) {
   std::mt19937 random(3);
   std::vector<double> errors_mm;
   BlurFitSetup setup = bench.Setup(&random, &errors_mm);
-  setup.meters = {bench.Absolute(0.02, 0, &random)};
-  setup.meters[0].held_softness_px2 = 0;
+  setup.estimators = {bench.Absolute(0.02, 0, &random)};
+  setup.estimators[0].held_softness_px2 = 0;
   const BlurFitResult clean = FitBlur(setup);
   setup.frames[5].reading_mm += 2;
   const BlurFitResult fit = FitBlur(setup);
@@ -261,9 +261,9 @@ TEST(FitBlur, WeightIsLostBeyondFourStandardDeviationsOnly) {
   constexpr double kErrorPx2 = 0.02;
   std::mt19937 random(1);
   BlurFitSetup setup = WithEdge(bench, kErrorPx2, &random);
-  setup.meters[0].variances_px2[8] += 3.5 * kErrorPx2;
+  setup.estimators[0].variances_px2[8] += 3.5 * kErrorPx2;
   EXPECT_EQ(FitBlur(setup).weights.minCoeff(), 1);
-  setup.meters[0].variances_px2[20] += 16 * kErrorPx2;
+  setup.estimators[0].variances_px2[20] += 16 * kErrorPx2;
   const BlurFitResult fit = FitBlur(setup);
   ASSERT_TRUE(fit.done);
   // 4/16, the fit's own part in the frame aside.
@@ -277,8 +277,8 @@ TEST(FitBlur, OutliersDoLittleHarm) {
   std::mt19937 random(3);
   BlurFitSetup setup = WithEdge(bench, 0.02, &random);
   const BlurFitResult clean = FitBlur(setup);
-  setup.meters[0].variances_px2[4] += 3;
-  setup.meters[0].variances_px2[20] -= 2;
+  setup.estimators[0].variances_px2[4] += 3;
+  setup.estimators[0].variances_px2[20] -= 2;
   const BlurFitResult fit = FitBlur(setup);
   ASSERT_TRUE(clean.done && fit.done);
   for (const int i : {4, 20}) EXPECT_LT(fit.weights[i], 0.1) << i;
@@ -293,7 +293,8 @@ TEST(FitBlur, LostWeightCountsInTheDegreesOfFreedom) {
   BlurBench bench;
   std::mt19937 random(3);
   BlurFitSetup setup = WithEdge(bench, 0.02, &random);
-  for (const int i : {4, 9, 14, 20, 25}) setup.meters[0].variances_px2[i] += i % 2 == 0 ? 0.8 : -1;
+  for (const int i : {4, 9, 14, 20, 25})
+    setup.estimators[0].variances_px2[i] += i % 2 == 0 ? 0.8 : -1;
   const BlurFitResult fit = FitBlur(setup);
   ASSERT_TRUE(fit.done);
   const double chi2 = (fit.weights.array() * fit.residuals.array().square()).sum();
@@ -344,7 +345,7 @@ TEST(FitBlur, ErrorsAreWidenedOnlyWhereChanceDoesNotExplainChiSquared) {
   const BlurFitResult widened_fit = FitBlur(setup);
   ASSERT_TRUE(widened_fit.done);
   EXPECT_NEAR(widened_fit.error_factor, 2.5, 0.6);
-  setup.meters[0].covariance *= widened_fit.error_factor * widened_fit.error_factor;
+  setup.estimators[0].covariance *= widened_fit.error_factor * widened_fit.error_factor;
   const BlurFitResult as_stated = FitBlur(setup);
   EXPECT_EQ(as_stated.error_factor, 1);
   EXPECT_NEAR(as_stated.covariance(0, 0) / widened_fit.covariance(0, 0), 1, 0.05);

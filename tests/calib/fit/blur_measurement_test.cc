@@ -20,7 +20,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using namespace thicklens::testing;
 
-// ---- the spectral meter ----
+// ---- the spectral estimator ----
 
 TEST(MeasureBlur, ATexturesBlurIsThatOfTheLens) {
   MeasuredSweep m = Measured(Leaves());
@@ -29,7 +29,7 @@ TEST(MeasureBlur, ATexturesBlurIsThatOfTheLens) {
   const BlurEvidence evidence = m.Measure();
   EXPECT_EQ(evidence.spectrum, 0);
   EXPECT_EQ(evidence.edges, -1);
-  ASSERT_EQ(evidence.setup.meters.size(), 1U);
+  ASSERT_EQ(evidence.setup.estimators.size(), 1U);
   EXPECT_EQ(evidence.message, "");
   EXPECT_EQ(ticks, kFrames);  // what was expected was right: one pass
   EXPECT_EQ(Spectrum(evidence).frames.size(), static_cast<std::size_t>(kFrames));
@@ -51,7 +51,7 @@ TEST(MeasureBlur, AWrongStartIsFoundOutAndRightedInASecondPass) {
     const BlurEvidence evidence = m.Measure();
     EXPECT_EQ(ticks, 2 * kFrames);
     ASSERT_EQ(evidence.spectrum, 0);
-    for (const MeterFrame& frame : evidence.spectral.frames) {
+    for (const EstimatorFrame& frame : evidence.spectral.frames) {
       EXPECT_NEAR(frame.expected_variance_px2 * frame.place.scale * frame.place.scale /
                       m.TrueVariance(frame.frame),
                   1, 0.05);
@@ -72,7 +72,7 @@ TEST(MeasureBlur, AWrongApertureIsFoundOutToo) {
     const BlurEvidence evidence = m.Measure();
     EXPECT_EQ(ticks, 2 * kFrames);
     ASSERT_EQ(evidence.spectrum, 0);
-    for (const MeterFrame& frame : evidence.spectral.frames) {
+    for (const EstimatorFrame& frame : evidence.spectral.frames) {
       EXPECT_NEAR(frame.expected_variance_px2 * frame.place.scale * frame.place.scale /
                       m.TrueVariance(frame.frame),
                   1, 0.05);
@@ -139,7 +139,7 @@ TEST(MeasureBlur, AKnifeEdgeIsMeasuredThroughoutAndHasNoSoftness) {
   MeasuredSweep m = Measured(Edge(), SweepTarget::kKnifeEdge);
   const BlurEvidence evidence = m.Measure();
   ASSERT_GE(evidence.edges, 0);
-  const BlurSamples& edges = evidence.setup.meters[static_cast<std::size_t>(evidence.edges)];
+  const BlurSamples& edges = evidence.setup.estimators[static_cast<std::size_t>(evidence.edges)];
   EXPECT_EQ(edges.held_softness_px2, 0.0);
   EXPECT_EQ(edges.frames.size(), static_cast<std::size_t>(kFrames));
   ExpectTrueVariances(m, evidence, edges, 0.02);
@@ -163,7 +163,7 @@ TEST(MeasureBlur, EdgesThatServeAsABoundAreMeasuredAboutFocusAndKeptApart) {
     const BlurEvidence evidence = m.Measure();
     EXPECT_EQ(ticks, kFrames + 9);
     EXPECT_EQ(evidence.edges, -1);
-    EXPECT_EQ(evidence.setup.meters.size(), 1U);
+    EXPECT_EQ(evidence.setup.estimators.size(), 1U);
     ASSERT_TRUE(evidence.unstated_edges);
     EXPECT_EQ(evidence.unstated_edges->frames, Sharpest(m, 9));
     EXPECT_FALSE(evidence.unstated_edges->held_softness_px2);
@@ -188,23 +188,23 @@ TEST(MeasureBlur, EdgesStandInWhereNothingRegisters) {
     const BlurEvidence evidence = m.Measure();
     EXPECT_EQ(evidence.spectrum, -1);
     ASSERT_EQ(evidence.edges, 0);
-    ASSERT_EQ(evidence.setup.meters.size(), 1U);
+    ASSERT_EQ(evidence.setup.estimators.size(), 1U);
     EXPECT_FALSE(evidence.unstated_edges);
-    EXPECT_EQ(evidence.setup.meters[0].held_softness_px2.has_value(),
+    EXPECT_EQ(evidence.setup.estimators[0].held_softness_px2.has_value(),
               target == SweepTarget::kKnifeEdge);
-    EXPECT_EQ(evidence.setup.meters[0].frames.size(), static_cast<std::size_t>(kFrames));
-    ExpectTrueVariances(m, evidence, evidence.setup.meters[0], 0.02);
+    EXPECT_EQ(evidence.setup.estimators[0].frames.size(), static_cast<std::size_t>(kFrames));
+    ExpectTrueVariances(m, evidence, evidence.setup.estimators[0], 0.02);
   }
 }
 
-// Four frames with an edge are no meter.
-TEST(MeasureBlur, TooFewFramesWithAnEdgeAreNoMeter) {
+// Four frames with an edge are no estimator.
+TEST(MeasureBlur, TooFewFramesWithAnEdgeAreNoEstimator) {
   for (const std::size_t count : {4U, 5U}) {
     MeasuredSweep m = Measured(Edge(), SweepTarget::kKnifeEdge);
     m.task->scales.clear();
     m.task->frames = Sharpest(m, count);
     const BlurEvidence evidence = m.Measure();
-    EXPECT_EQ(evidence.setup.meters.size(), count < 5 ? 0U : 1U);
+    EXPECT_EQ(evidence.setup.estimators.size(), count < 5 ? 0U : 1U);
     EXPECT_THAT(evidence.message, HasSubstr("too few frames"));
   }
 }
@@ -215,7 +215,7 @@ TEST(MeasureBlur, FewerThanFiveRegisteredFramesAreReported) {
   MeasuredSweep m = Measured(Leaves(), SweepTarget::kTexture);
   m.task->scales = {m.task->scales.begin() + 6, m.task->scales.begin() + 10};
   const BlurEvidence evidence = m.Measure();
-  EXPECT_THAT(evidence.setup.meters, IsEmpty());
+  EXPECT_THAT(evidence.setup.estimators, IsEmpty());
   EXPECT_EQ(evidence.spectrum, -1);
   EXPECT_THAT(evidence.message, HasSubstr("too few frames see enough of the same target"));
 }
@@ -225,7 +225,7 @@ TEST(MeasureBlur, FramesThatDoNotOverlapAreReported) {
   for (std::size_t i = 0; i < m.task->scales.size(); ++i)
     m.task->scales[i].registration.shift_px.x() = 90.0 * static_cast<double>(i);
   const BlurEvidence evidence = m.Measure();
-  EXPECT_THAT(evidence.setup.meters, IsEmpty());
+  EXPECT_THAT(evidence.setup.estimators, IsEmpty());
   EXPECT_THAT(evidence.message, HasSubstr("too few frames see enough of the same target"));
 }
 
@@ -238,20 +238,20 @@ TEST(MeasureBlur, ABlurredReferenceIsNoReference) {
     sample.scale =
         m.simulated.truth.frames[0].depth_mm / m.simulated.truth.frames[sample.frame].depth_mm;
   const BlurEvidence evidence = m.Measure();
-  EXPECT_THAT(evidence.setup.meters, IsEmpty());
+  EXPECT_THAT(evidence.setup.estimators, IsEmpty());
   EXPECT_THAT(evidence.message, HasSubstr("too few frames see enough of the same target"));
 }
 
 TEST(MeasureBlur, ABlankTargetShowsTooLittleTexture) {
   MeasuredSweep m = Measured(Leaves());
   m.simulated.sweep.read_frame = [](std::size_t i) {
-    cv::Mat picture(kFieldPx, kFieldPx, CV_8U);
+    cv::Mat image(kFieldPx, kFieldPx, CV_8U);
     cv::RNG random(40 + i);
-    random.fill(picture, cv::RNG::NORMAL, 100, 2);
-    return picture;
+    random.fill(image, cv::RNG::NORMAL, 100, 2);
+    return image;
   };
   const BlurEvidence evidence = m.Measure();
-  EXPECT_THAT(evidence.setup.meters, IsEmpty());
+  EXPECT_THAT(evidence.setup.estimators, IsEmpty());
   EXPECT_THAT(evidence.message, HasSubstr("too little texture above the noise"));
 }
 

@@ -22,8 +22,8 @@ struct Drawn {
 };
 
 // V(z) = a (z - v)^2 + c with its errors.
-constexpr double kVertexMm = 395, kCurve = 0.004, kLeastPx2 = -0.3;
-double Law(double z_mm) { return kCurve * (z_mm - kVertexMm) * (z_mm - kVertexMm) + kLeastPx2; }
+constexpr double kVertexMm = 395, kCurve = 0.004, kMinPx2 = -0.3;
+double Law(double z_mm) { return kCurve * (z_mm - kVertexMm) * (z_mm - kVertexMm) + kMinPx2; }
 
 Drawn Draw(int count, double error_px2, double noise, unsigned seed) {
   std::mt19937 random(seed);
@@ -49,7 +49,7 @@ TEST(FitParabola, ExactSamplesGiveTheParabola) {
     EXPECT_NEAR(depths_mm[0], z_mm, 1e-6);
     EXPECT_NEAR(depths_mm[1], 2 * kVertexMm - z_mm, 1e-6);
   }
-  EXPECT_TRUE(parabola.DepthsOf(kLeastPx2 - 0.01, kVertexMm).empty());
+  EXPECT_TRUE(parabola.DepthsOf(kMinPx2 - 0.01, kVertexMm).empty());
   for (const bool follows : parabola.follows) EXPECT_TRUE(follows);
   EXPECT_LT(parabola.residuals_px2.cwiseAbs().maxCoeff(), 1e-9);
 }
@@ -102,7 +102,7 @@ TEST(FitParabola, ReadingsErrorsCountBySlope) {
 }
 
 // No lens follows the law better than to 0.002 of the blur's range.
-TEST(FitParabola, AllowsForWhatTheLawItselfIsGoodFor) {
+TEST(FitParabola, AllowsForTheErrorOfTheModelItself) {
   Drawn drawn = Draw(31, 1e-4, 0, 1);
   const double range = drawn.variances_px2.maxCoeff() - drawn.variances_px2.minCoeff();
   EXPECT_NEAR(drawn.Fit().sigmas_px2[9], 0.002 * range, 1e-3 * range * 0.002);
@@ -126,8 +126,8 @@ TEST(FitParabola, GivesTheSameEveryTime) {
 }
 
 // Any c leaves vertex and curve alone, so a texture starts the fit as well as an edge.
-TEST(FromParabola, GivesFocusAndRatioByBothLawsWhateverTheSoftness) {
-  for (const BlurLaw law : {BlurLaw::kPerspective, BlurLaw::kTelecentric}) {
+TEST(FromParabola, GivesFocusAndRatioByBothModelsWhateverTheSoftness) {
+  for (const BlurModel law : {BlurModel::kPerspective, BlurModel::kTelecentric}) {
     for (const double softness_px2 : {0.0, 2.0, -0.9}) {
       BlurBench bench;
       bench.noise = 0;
@@ -159,7 +159,7 @@ TEST(FromParabola, SaysNothingWhereTheBlurHasNoMinimumAboveTheFloor) {
   EXPECT_FALSE(FromParabola(drawn.Fit(), setup, 400, 0.25));
   EXPECT_FALSE(FromParabola({}, setup, 400, 0.25));
   BlurFitSetup telecentric = setup;
-  telecentric.law = BlurLaw::kTelecentric;
+  telecentric.law = BlurModel::kTelecentric;
   EXPECT_FALSE(FromParabola(drawn.Fit(), telecentric, 400, 0.25));
 }
 

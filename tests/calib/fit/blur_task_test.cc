@@ -94,10 +94,10 @@ TEST(MeasureBlur, ScalesThatFollowTheReadingsKeepTheirErrors) {
 
 TEST(MeasureBlur, ATelecentricLensHasOneScale) {
   Unread u(6);
-  u.task.law = BlurLaw::kTelecentric;
+  u.task.law = BlurModel::kTelecentric;
   u.Register(5, 1.001);
   const BlurFitSetup setup = MeasureBlur(u.task).setup;
-  EXPECT_EQ(setup.law, BlurLaw::kTelecentric);
+  EXPECT_EQ(setup.law, BlurModel::kTelecentric);
   EXPECT_EQ(setup.frames[0].scale, 1);
   EXPECT_EQ(setup.frames[5].scale, 1.001);
 }
@@ -112,7 +112,7 @@ TEST(MeasureBlur, TheFloorThatIsAssumedIsTheOneThatIsKnown) {
   EXPECT_NEAR(MeasureBlur(u.task).assumed_floor_px2, 0.49, 1e-12);
 }
 
-// What the spectral meter is told of every frame, by hand.
+// What the spectral estimator is told of every frame, by hand.
 TEST(MeasureBlur, TheSpectralMeterGetsTheExpectedBlur) {
   Unread u(4);  // too few to be measured
   u.sweep.roi = {100, 80, 320, 200};
@@ -122,23 +122,23 @@ TEST(MeasureBlur, TheSpectralMeterGetsTheExpectedBlur) {
   u.task.scales[0].registration.shift_px = {1, 2};
   u.task.scales[0].registration.rotation_rad = 0.01;
   const BlurEvidence evidence = MeasureBlur(u.task);
-  const SpectralMeterSetup& meter = evidence.spectral;
-  EXPECT_EQ(meter.origin_px, Eigen::Vector2d(210, 170));
-  EXPECT_EQ(meter.size_px, Eigen::Vector2d(320, 200));
-  ASSERT_EQ(meter.frames.size(), 2U);
-  EXPECT_EQ(meter.reference, 1U);
-  EXPECT_EQ(meter.frames[0].frame, 1U);
+  const SpectralEstimatorSetup& estimator = evidence.spectral;
+  EXPECT_EQ(estimator.origin_px, Eigen::Vector2d(210, 170));
+  EXPECT_EQ(estimator.size_px, Eigen::Vector2d(320, 200));
+  ASSERT_EQ(estimator.frames.size(), 2U);
+  EXPECT_EQ(estimator.reference, 1U);
+  EXPECT_EQ(estimator.frames[0].frame, 1U);
   EXPECT_THAT(evidence.fit_index, ElementsAre(1U, 3U));
-  EXPECT_EQ(meter.frames[0].place.shift_px, Eigen::Vector2d(1, 2));
-  EXPECT_EQ(meter.frames[0].rotation_rad, 0.01);
-  EXPECT_EQ(meter.frames[0].pixel_noise, 0.004);
+  EXPECT_EQ(estimator.frames[0].place.shift_px, Eigen::Vector2d(1, 2));
+  EXPECT_EQ(estimator.frames[0].rotation_rad, 0.01);
+  EXPECT_EQ(estimator.frames[0].pixel_noise, 0.004);
   // (S0 + (kappa r_defocus/p)^2)/scale^2 with kappa .45, at 350 mm, in focus at 380.
   const double radius_mm = model::BlurRadiusMm(
       u.sweep.camera.lens, model::ImageDistanceMm(u.sweep.camera.lens, 380), 350);
   const double scale = 370.0 / 350;
-  EXPECT_NEAR(meter.frames[0].expected_variance_px2,
+  EXPECT_NEAR(estimator.frames[0].expected_variance_px2,
               (0.36 + std::pow(0.45 * radius_mm / 0.006, 2)) / (scale * scale), 1e-9);
-  EXPECT_EQ(meter.modes_per_ring, 200);
+  EXPECT_EQ(estimator.modes_per_ring, 200);
   EXPECT_EQ(MeasureBlur(Unread(400).task).spectral.modes_per_ring, 75);
   EXPECT_EQ(MeasureBlur(Unread(2000).task).spectral.modes_per_ring, 24);
 }

@@ -49,7 +49,7 @@ TEST(FrameStructure, ACleanSweepHasNone) {
   EXPECT_FALSE(found.HasFixedStructure());
   EXPECT_EQ(StructureInWords(found), "");
   ASSERT_TRUE(found.vignetting && found.bands && found.fixed_structure) << "and it was looked for";
-  // A small picture cannot exclude a weak one, and says so.
+  // A small image cannot exclude a weak one, and says so.
   EXPECT_LT(found.vignetting->sigma, 0.3);
   EXPECT_FALSE(VignettingIsExcluded(found));
 }

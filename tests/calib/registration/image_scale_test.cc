@@ -36,10 +36,11 @@ std::vector<ScaleSample> Samples(double offset_mm, BenchDirection direction, int
   return samples;
 }
 
-TEST(FitScaleLaw, IsExactOnExactSamplesInBothDirections) {
+TEST(FitScaleModel, IsExactOnExactSamplesInBothDirections) {
   for (const BenchDirection direction : {BenchDirection::kAway, BenchDirection::kToward}) {
     for (const double offset_mm : {-37.5, 0.0, 106.5}) {
-      const ScaleLaw law = FitScaleLaw(Samples(offset_mm, direction, 21, 0, 1), 10, 0, direction);
+      const ScaleModel law =
+          FitScaleModel(Samples(offset_mm, direction, 21, 0, 1), 10, 0, direction);
       ASSERT_TRUE(law.done) << law.message;
       EXPECT_EQ(law.kind, ScaleKind::kInverseDepth);
       EXPECT_NEAR(law.offset_mm.value, offset_mm, 1e-9);
@@ -50,13 +51,13 @@ TEST(FitScaleLaw, IsExactOnExactSamplesInBothDirections) {
   }
 }
 
-TEST(FitScaleLaw, SigmaCoversTheScatter) {
+TEST(FitScaleModel, SigmaCoversTheScatter) {
   constexpr int kRuns = 200;
   double sum = 0, squares = 0, stated = 0;
   for (int run = 0; run < kRuns; ++run) {
-    const ScaleLaw law =
-        FitScaleLaw(Samples(20, BenchDirection::kAway, 31, 0.07, 50U + static_cast<unsigned>(run)),
-                    15, 0.07, BenchDirection::kAway);
+    const ScaleModel law = FitScaleModel(
+        Samples(20, BenchDirection::kAway, 31, 0.07, 50U + static_cast<unsigned>(run)), 15, 0.07,
+        BenchDirection::kAway);
     ASSERT_TRUE(law.done);
     sum += (law.offset_mm.value - 20) / kRuns;
     squares += std::pow(law.offset_mm.value - 20, 2) / kRuns;
@@ -69,13 +70,13 @@ TEST(FitScaleLaw, SigmaCoversTheScatter) {
   EXPECT_LT(stated, 5 * scatter_mm);
 }
 
-TEST(FitScaleLaw, AFewWrongReadingsDoNotMoveIt) {
+TEST(FitScaleModel, AFewWrongReadingsDoNotMoveIt) {
   auto samples = Samples(20, BenchDirection::kAway, 31, 0.05, 9);
-  const ScaleLaw clean = FitScaleLaw(samples, 15, 0.05, BenchDirection::kAway);
+  const ScaleModel clean = FitScaleModel(samples, 15, 0.05, BenchDirection::kAway);
   samples[3].reading_mm += 10;
   samples[27].reading_mm -= 15;
   std::swap(samples[10].reading_mm, samples[14].reading_mm);
-  const ScaleLaw law = FitScaleLaw(samples, 15, 0.05, BenchDirection::kAway);
+  const ScaleModel law = FitScaleModel(samples, 15, 0.05, BenchDirection::kAway);
   ASSERT_TRUE(law.done);
   EXPECT_NEAR(law.offset_mm.value, clean.offset_mm.value, clean.offset_mm.sigma);
   EXPECT_EQ(law.frames_used, 27);
@@ -92,10 +93,10 @@ void AddScaleErrors(double sigma, unsigned seed, std::vector<ScaleSample>* sampl
   }
 }
 
-TEST(FitScaleLaw, ScalesWeighByTheirOwnErrors) {
+TEST(FitScaleModel, ScalesAreWeightedByTheirOwnErrors) {
   // Every other scale is bad and says so.
   constexpr int kRuns = 60;
-  double told = 0, untold = 0;
+  double reported = 0, untold = 0;
   for (unsigned run = 0; run < kRuns; ++run) {
     auto samples = Samples(20, BenchDirection::kAway, 31, 0.02, 200 + run);
     std::mt19937 random(run);
@@ -105,23 +106,23 @@ TEST(FitScaleLaw, ScalesWeighByTheirOwnErrors) {
       samples[i].scale *= 1 + sigma * noise(random);
       samples[i].registration.scale_sigma = sigma * samples[i].scale;
     }
-    const ScaleLaw law = FitScaleLaw(samples, 15, 0.02, BenchDirection::kAway);
+    const ScaleModel law = FitScaleModel(samples, 15, 0.02, BenchDirection::kAway);
     ASSERT_TRUE(law.done) << law.message;
-    told += std::pow(law.offset_mm.value - 20, 2);
+    reported += std::pow(law.offset_mm.value - 20, 2);
     for (ScaleSample& s : samples) s.registration.scale_sigma = 0;
     untold +=
-        std::pow(FitScaleLaw(samples, 15, 0.02, BenchDirection::kAway).offset_mm.value - 20, 2);
+        std::pow(FitScaleModel(samples, 15, 0.02, BenchDirection::kAway).offset_mm.value - 20, 2);
   }
-  EXPECT_LT(told, 0.3 * untold);
+  EXPECT_LT(reported, 0.3 * untold);
 }
 
-TEST(FitScaleLaw, SigmaCoversTheErrorsOfTheScales) {
+TEST(FitScaleModel, SigmaCoversTheErrorsOfTheScales) {
   double squares = 0;
   constexpr int kRuns = 100;
   for (unsigned run = 0; run < kRuns; ++run) {
     auto samples = Samples(20, BenchDirection::kAway, 31, 0.01, 300 + run);
     AddScaleErrors(3e-4, 400 + run, &samples);
-    const ScaleLaw law = FitScaleLaw(samples, 15, 0.01, BenchDirection::kAway);
+    const ScaleModel law = FitScaleModel(samples, 15, 0.01, BenchDirection::kAway);
     ASSERT_TRUE(law.done) << law.message;
     squares += std::pow((law.offset_mm.value - 20) / law.offset_mm.sigma, 2) / kRuns;
   }
@@ -129,14 +130,14 @@ TEST(FitScaleLaw, SigmaCoversTheErrorsOfTheScales) {
   EXPECT_LT(std::sqrt(squares), 1.2);
 }
 
-TEST(FitScaleLaw, OneReadingMayBeWrongByAnyAmount) {
+TEST(FitScaleModel, OneReadingMayBeWrongByAnyAmount) {
   const auto right = Samples(20, BenchDirection::kAway, 21, 0.05, 11);
-  const ScaleLaw clean = FitScaleLaw(right, 10, 0.05, BenchDirection::kAway);
+  const ScaleModel clean = FitScaleModel(right, 10, 0.05, BenchDirection::kAway);
   for (const double error_mm : {-1e6, -300.0, -1.0, 3.0, 50.0, 1e4}) {
     for (const std::size_t frame : {std::size_t{0}, std::size_t{10}, std::size_t{20}}) {
       auto samples = right;
       samples[frame].reading_mm += error_mm;
-      const ScaleLaw law = FitScaleLaw(samples, 10, 0.05, BenchDirection::kAway);
+      const ScaleModel law = FitScaleModel(samples, 10, 0.05, BenchDirection::kAway);
       ASSERT_TRUE(law.done) << error_mm << ": " << law.message;
       EXPECT_NEAR(law.offset_mm.value, clean.offset_mm.value, 1.5 * clean.offset_mm.sigma);
       EXPECT_EQ(law.frames_used, 20) << error_mm;
@@ -145,17 +146,17 @@ TEST(FitScaleLaw, OneReadingMayBeWrongByAnyAmount) {
   }
 }
 
-TEST(FitScaleLaw, AFifthOfTheFramesMayBeWrong) {
+TEST(FitScaleModel, AFifthOfTheFramesMayBeWrong) {
   for (unsigned seed = 0; seed < 10; ++seed) {
     auto samples = Samples(20, BenchDirection::kAway, 30, 0.05, 30 + seed);
-    const ScaleLaw clean = FitScaleLaw(samples, 15, 0.05, BenchDirection::kAway);
+    const ScaleModel clean = FitScaleModel(samples, 15, 0.05, BenchDirection::kAway);
     std::mt19937 random(seed);
     std::vector<std::size_t> order(samples.size());
     for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
     std::shuffle(order.begin(), order.end(), random);
     std::uniform_real_distribution<double> wrong(5, 80);
     for (std::size_t i = 0; i < 6; ++i) samples[order[i]].reading_mm += wrong(random);
-    const ScaleLaw law = FitScaleLaw(samples, 15, 0.05, BenchDirection::kAway);
+    const ScaleModel law = FitScaleModel(samples, 15, 0.05, BenchDirection::kAway);
     ASSERT_TRUE(law.done) << law.message;
     EXPECT_NEAR(law.offset_mm.value, clean.offset_mm.value, 3 * law.offset_mm.sigma);
     EXPECT_EQ(law.frames_used, 24);
@@ -163,7 +164,7 @@ TEST(FitScaleLaw, AFifthOfTheFramesMayBeWrong) {
 }
 
 // The readings of a bench, in any other order than the frames'.
-TEST(FitScaleLaw, ReadingsInARandomOrderFollowNoLaw) {
+TEST(FitScaleModel, ReadingsInARandomOrderFollowNoModel) {
   for (const int count : {7, 15, 41, 131}) {
     for (unsigned seed = 1; seed <= 20; ++seed) {
       auto samples = Samples(20, BenchDirection::kAway, count, 0.05, seed);
@@ -173,7 +174,7 @@ TEST(FitScaleLaw, ReadingsInARandomOrderFollowNoLaw) {
       std::mt19937 random(seed);
       std::shuffle(readings.begin(), readings.end(), random);
       for (std::size_t i = 0; i < samples.size(); ++i) samples[i].reading_mm = readings[i];
-      const ScaleLaw law = FitScaleLaw(samples, 0, 0.05, BenchDirection::kAway);
+      const ScaleModel law = FitScaleModel(samples, 0, 0.05, BenchDirection::kAway);
       EXPECT_FALSE(law.done);
       EXPECT_EQ(law.kind, ScaleKind::kUnknown) << count << " frames, seed " << seed;
       EXPECT_THAT(law.message, HasSubstr("does not follow the readings"));
@@ -185,7 +186,7 @@ TEST(FitScaleLaw, ReadingsInARandomOrderFollowNoLaw) {
 
 // Frames taken at even steps of 1/z, whose table is sorted the wrong way round or in no way at all:
 // the readings are those of the sweep. Mirrored, such readings lie on no line.
-TEST(FitScaleLaw, ReadingsOfTheSweepBesideOtherFramesAreRecognised) {
+TEST(FitScaleModel, ReadingsOfTheSweepBesideOtherFramesAreRecognised) {
   for (const BenchDirection direction : {BenchDirection::kAway, BenchDirection::kToward}) {
     for (unsigned seed = 1; seed <= 20; ++seed) {
       const double sign = model::DirectionSign(direction);
@@ -201,7 +202,7 @@ TEST(FitScaleLaw, ReadingsOfTheSweepBesideOtherFramesAreRecognised) {
       std::mt19937 random(seed);
       std::shuffle(readings.begin(), readings.end(), random);
       for (std::size_t i = 0; i < samples.size(); ++i) samples[i].reading_mm = readings[i];
-      const ScaleLaw law = FitScaleLaw(samples, 0, 0.05, direction);
+      const ScaleModel law = FitScaleModel(samples, 0, 0.05, direction);
       EXPECT_FALSE(law.done);
       EXPECT_THAT(law.message, HasSubstr("in another order all of them would"))
           << model::BenchDirectionName(direction) << ", seed " << seed;
@@ -211,49 +212,49 @@ TEST(FitScaleLaw, ReadingsOfTheSweepBesideOtherFramesAreRecognised) {
       };
       std::min_element(samples.begin(), samples.end(), by_reading)->reading_mm -= 40;
       std::max_element(samples.begin(), samples.end(), by_reading)->reading_mm += 40;
-      const ScaleLaw most = FitScaleLaw(samples, 0, 0.05, direction);
+      const ScaleModel most = FitScaleModel(samples, 0, 0.05, direction);
       EXPECT_THAT(most.message, HasSubstr("in another order 29 of them would"));
     }
   }
 }
 
-// Readings on a line but for errors that nobody stated. What is told is about their size, and where
-// it is stated the law holds.
-TEST(FitScaleLaw, CoarseReadingsGetTheAdviceToStateTheirError) {
+// Readings on a line but for errors that nobody stated. What is reported is about their size, and
+// where it is stated the law holds.
+TEST(FitScaleModel, CoarseReadingsGetTheAdviceToStateTheirError) {
   constexpr double kSigmaMm = 3;
-  int told = 0;
+  int reported = 0;
   for (unsigned seed = 1; seed <= 20; ++seed) {
     const auto samples = Samples(20, BenchDirection::kAway, 31, kSigmaMm, seed);
-    const ScaleLaw law = FitScaleLaw(samples, 15, 0, BenchDirection::kAway);
+    const ScaleModel law = FitScaleModel(samples, 15, 0, BenchDirection::kAway);
     const std::string before = "if the readings are only good to about ";
     const auto at = law.message.find(before);
     if (at == std::string::npos) continue;
-    ++told;
+    ++reported;
     EXPECT_FALSE(law.done);
     EXPECT_THAT(law.message, EndsWith("mm, state reading_sigma_mm"));
-    const double told_mm = std::stod(law.message.substr(at + before.size()));
-    EXPECT_NEAR(told_mm, kSigmaMm, 0.5 * kSigmaMm);
-    EXPECT_TRUE(FitScaleLaw(samples, 15, told_mm, BenchDirection::kAway).done) << seed;
+    const double reported_mm = std::stod(law.message.substr(at + before.size()));
+    EXPECT_NEAR(reported_mm, kSigmaMm, 0.5 * kSigmaMm);
+    EXPECT_TRUE(FitScaleModel(samples, 15, reported_mm, BenchDirection::kAway).done) << seed;
   }
-  EXPECT_GT(told, 5);
+  EXPECT_GT(reported, 5);
 }
 
 // A third of the readings far off is no coarse scale.
-TEST(FitScaleLaw, ManyWrongReadingsAreNotReportedAsCoarse) {
+TEST(FitScaleModel, ManyWrongReadingsAreNotReportedAsCoarse) {
   auto samples = Samples(20, BenchDirection::kAway, 30, 0.05, 3);
   for (std::size_t i = 0; i < samples.size(); i += 3) samples[i].reading_mm += 25 + 2.0 * double(i);
-  const ScaleLaw law = FitScaleLaw(samples, 15, 0, BenchDirection::kAway);
+  const ScaleModel law = FitScaleModel(samples, 15, 0, BenchDirection::kAway);
   EXPECT_FALSE(law.done);
   EXPECT_THAT(law.message, EndsWith("Check that every frame has its own reading"));
 }
 
-TEST(FitScaleLaw, RefusesAConstantScale) {
+TEST(FitScaleModel, RefusesAConstantScale) {
   for (const double sigma : {0.0, 2e-5, 1e-4}) {
     auto samples = Samples(0, BenchDirection::kAway, 21, 0, 1);
     for (ScaleSample& s : samples) s.scale = 1;
     AddScaleErrors(sigma, 2, &samples);
     samples[5].scale = 1.3;  // a registration that failed
-    const ScaleLaw law = FitScaleLaw(samples, 10, 0.05, BenchDirection::kAway);
+    const ScaleModel law = FitScaleModel(samples, 10, 0.05, BenchDirection::kAway);
     EXPECT_FALSE(law.done);
     EXPECT_EQ(law.kind, ScaleKind::kConstant) << law.message;
     EXPECT_THAT(law.message, HasSubstr("does not change with the reading"));
@@ -262,7 +263,7 @@ TEST(FitScaleLaw, RefusesAConstantScale) {
 }
 
 // Half a millimetre at 2 m changes the scale by 2.5e-4, which errors of 3e-4 hide.
-TEST(FitScaleLaw, TooShortARangeTellsNothing) {
+TEST(FitScaleModel, TooShortARangeDeterminesNothing) {
   std::vector<ScaleSample> samples;
   for (std::size_t i = 0; i < 9; ++i) {
     ScaleSample sample;
@@ -272,7 +273,7 @@ TEST(FitScaleLaw, TooShortARangeTellsNothing) {
     samples.push_back(sample);
   }
   AddScaleErrors(3e-4, 4, &samples);
-  const ScaleLaw law = FitScaleLaw(samples, 4, 0.001, BenchDirection::kAway);
+  const ScaleModel law = FitScaleModel(samples, 4, 0.001, BenchDirection::kAway);
   EXPECT_FALSE(law.done);
   EXPECT_EQ(law.kind, ScaleKind::kUnknown);
   EXPECT_THAT(law.message, HasSubstr("too little to tell"));
@@ -282,20 +283,20 @@ TEST(FitScaleLaw, TooShortARangeTellsNothing) {
     s.scale = 2000.25 / s.reading_mm;
     s.registration.scale_sigma = 1e-6;
   }
-  const ScaleLaw clear = FitScaleLaw(samples, 4, 0.0001, BenchDirection::kAway);
+  const ScaleModel clear = FitScaleModel(samples, 4, 0.0001, BenchDirection::kAway);
   EXPECT_EQ(clear.kind, ScaleKind::kInverseDepth);
   EXPECT_GT(clear.offset_mm.sigma, 50);
 }
 
-TEST(FitScaleLaw, RefusesAReversedScaleAndNamesTheDirection) {
-  const ScaleLaw away = FitScaleLaw(Samples(700, BenchDirection::kToward, 21, 0.05, 1), 10, 0.05,
-                                    BenchDirection::kAway);
+TEST(FitScaleModel, RefusesAReversedScaleAndNamesTheDirection) {
+  const ScaleModel away = FitScaleModel(Samples(700, BenchDirection::kToward, 21, 0.05, 1), 10,
+                                        0.05, BenchDirection::kAway);
   EXPECT_FALSE(away.done);
   EXPECT_EQ(away.kind, ScaleKind::kReversed);
   EXPECT_THAT(away.message,
               HasSubstr("larger at larger readings, so direction must be 'toward', not"));
-  const ScaleLaw toward = FitScaleLaw(Samples(0, BenchDirection::kAway, 21, 0.05, 1), 10, 0.05,
-                                      BenchDirection::kToward);
+  const ScaleModel toward = FitScaleModel(Samples(0, BenchDirection::kAway, 21, 0.05, 1), 10, 0.05,
+                                          BenchDirection::kToward);
   EXPECT_FALSE(toward.done);
   EXPECT_EQ(toward.kind, ScaleKind::kReversed);
   EXPECT_THAT(toward.message,
@@ -303,7 +304,7 @@ TEST(FitScaleLaw, RefusesAReversedScaleAndNamesTheDirection) {
 }
 
 // Registrations on a lone edge can give any scale along it.
-TEST(FitScaleLaw, RefusesScalesThatScatterWithoutALaw) {
+TEST(FitScaleModel, RefusesScalesThatScatterWithoutAModel) {
   std::mt19937_64 random(5);
   std::normal_distribution<double> wrong(0, 0.15);
   std::vector<ScaleSample> samples;
@@ -315,31 +316,32 @@ TEST(FitScaleLaw, RefusesScalesThatScatterWithoutALaw) {
     sample.scale = 400 / reading_mm * std::exp(wrong(random));
     samples.push_back(sample);
   }
-  const ScaleLaw law = FitScaleLaw(samples, 20, 0.07, model::BenchDirection::kAway);
+  const ScaleModel law = FitScaleModel(samples, 20, 0.07, model::BenchDirection::kAway);
   EXPECT_FALSE(law.done);
   EXPECT_EQ(law.kind, ScaleKind::kUnknown);
   EXPECT_THAT(law.message, HasSubstr("does not follow the readings"));
 }
 
-TEST(FitScaleLaw, RefusesFewerThanFive) {
-  const ScaleLaw law =
-      FitScaleLaw(Samples(0, BenchDirection::kAway, 4, 0, 1), 2, 0.05, BenchDirection::kAway);
+TEST(FitScaleModel, RefusesFewerThanFive) {
+  const ScaleModel law =
+      FitScaleModel(Samples(0, BenchDirection::kAway, 4, 0, 1), 2, 0.05, BenchDirection::kAway);
   EXPECT_FALSE(law.done);
   EXPECT_THAT(law.message, HasSubstr("measured on 4 frames, 5 are needed"));
   EXPECT_TRUE(
-      FitScaleLaw(Samples(0, BenchDirection::kAway, 5, 0, 1), 2, 0.05, BenchDirection::kAway).done);
+      FitScaleModel(Samples(0, BenchDirection::kAway, 5, 0, 1), 2, 0.05, BenchDirection::kAway)
+          .done);
 }
 
-TEST(FitScaleLaw, RefusesFewerThanFiveDifferentReadings) {
+TEST(FitScaleModel, RefusesFewerThanFiveDifferentReadings) {
   auto samples = Samples(0, BenchDirection::kAway, 12, 0, 1);
   for (std::size_t i = 0; i < samples.size(); ++i) samples[i].reading_mm = 100 + double(i % 4);
-  const ScaleLaw law = FitScaleLaw(samples, 2, 0.05, BenchDirection::kAway);
+  const ScaleModel law = FitScaleModel(samples, 2, 0.05, BenchDirection::kAway);
   EXPECT_FALSE(law.done);
   EXPECT_THAT(law.message, HasSubstr("5 are needed at different readings"));
 }
 
 // Cubic terms by the closed form k (1 - 1/s^2), with errors and wrong ones among them.
-TEST(FitScaleLaw, ReportsTheDistortionOfTheCorner) {
+TEST(FitScaleModel, ReportsTheDistortionOfTheCorner) {
   constexpr double kCornerPx = 360, kDistortion = -0.012;
   const double k = kDistortion / (kCornerPx * kCornerPx);
   double squares = 0;
@@ -353,21 +355,21 @@ TEST(FitScaleLaw, ReportsTheDistortionOfTheCorner) {
       s.registration.cubic = k * (1 - 1 / (s.scale * s.scale)) + 0.05 * std::abs(k) * noise(random);
     }
     samples[3].registration.cubic *= -20;
-    const ScaleLaw law = FitScaleLaw(samples, 15, 0.05, BenchDirection::kAway, kCornerPx);
+    const ScaleModel law = FitScaleModel(samples, 15, 0.05, BenchDirection::kAway, kCornerPx);
     ASSERT_TRUE(law.done && law.distortion_at_corner) << law.message;
     EXPECT_NEAR(law.distortion_at_corner->value, kDistortion, 0.25 * std::abs(kDistortion));
     squares +=
         std::pow((law.distortion_at_corner->value - kDistortion) / law.distortion_at_corner->sigma,
                  2) /
         kRuns;
-    EXPECT_FALSE(FitScaleLaw(samples, 15, 0.05, BenchDirection::kAway).distortion_at_corner);
+    EXPECT_FALSE(FitScaleModel(samples, 15, 0.05, BenchDirection::kAway).distortion_at_corner);
   }
   EXPECT_GT(std::sqrt(squares), 0.5);
   EXPECT_LT(std::sqrt(squares), 1.3);
 }
 
 // Strong distortion is known badly where the registrations are bad; that it is there is clear.
-TEST(FitScaleLaw, StrongDistortionIsReportedHoweverUncertain) {
+TEST(FitScaleModel, StrongDistortionIsReportedHoweverUncertain) {
   constexpr double kCornerPx = 360, kPerSquare = 1 / (kCornerPx * kCornerPx);
   auto samples = Samples(20, BenchDirection::kAway, 31, 0.05, 9);
   const auto at_corner = [&](double distortion) {
@@ -378,7 +380,7 @@ TEST(FitScaleLaw, StrongDistortionIsReportedHoweverUncertain) {
       s.registration.cubic =
           kPerSquare * (distortion * (1 - 1 / (s.scale * s.scale)) + 0.02 * noise(random));
     }
-    return FitScaleLaw(samples, 15, 0.05, BenchDirection::kAway, kCornerPx).distortion_at_corner;
+    return FitScaleModel(samples, 15, 0.05, BenchDirection::kAway, kCornerPx).distortion_at_corner;
   };
   for (const double distortion : {-0.3, 0.3}) {
     const auto found = at_corner(distortion);
@@ -390,12 +392,12 @@ TEST(FitScaleLaw, StrongDistortionIsReportedHoweverUncertain) {
 }
 
 // What is not known of the distortion is not known of the offset either.
-TEST(FitScaleLaw, UncertainDistortionWidensTheOffset) {
+TEST(FitScaleModel, UncertainDistortionWidensTheOffset) {
   auto samples = Samples(20, BenchDirection::kAway, 31, 0.05, 9);
   double narrow_mm = 0;
   for (const double corner_sigma : {1e-5, 3e-2}) {
     for (ScaleSample& s : samples) s.registration.cubic_sigma = corner_sigma / (360 * 360);
-    const ScaleLaw law = FitScaleLaw(samples, 15, 0.05, BenchDirection::kAway, 360);
+    const ScaleModel law = FitScaleModel(samples, 15, 0.05, BenchDirection::kAway, 360);
     ASSERT_TRUE(law.done);
     if (corner_sigma < 1e-3) {
       narrow_mm = law.offset_mm.sigma;

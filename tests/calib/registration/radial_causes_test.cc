@@ -90,18 +90,19 @@ TEST(CheckDistortion, WhatIsSeenInTheFramesIsNamedFirst) {
               AllOf(HasSubstr("the corners are 50 % darker"), HasSubstr("evenly lit white sheet")));
 }
 
-TEST(Bend, NamesWhatTheFramesShow) {
-  const Bend bend{{0.18, 0.03}, -7.1};
+TEST(ScaleNonlinearity, NamesWhatTheFramesShow) {
+  const ScaleNonlinearity nonlinearity{{0.18, 0.03}, -7.1};
   Calibration c;
   c.structure = Distorted(0, 1).structure;
-  EXPECT_THAT(BendInWords(bend, c), AllOf(HasSubstr("The rail's scale is not linear"),
-                                          HasSubstr("look alike"), HasSubstr("micrometer screw")));
-  EXPECT_THAT(BendRemedy(c.structure), HasSubstr("check the rail's scale"));
+  EXPECT_THAT(NonlinearityText(nonlinearity, c),
+              AllOf(HasSubstr("The rail's scale is not linear"), HasSubstr("look alike"),
+                    HasSubstr("micrometer screw")));
+  EXPECT_THAT(NonlinearityRemedy(c.structure), HasSubstr("check the rail's scale"));
   c.structure.vignetting = model::Estimate{std::log(0.5), 0.02};
-  EXPECT_THAT(BendInWords(bend, c),
+  EXPECT_THAT(NonlinearityText(nonlinearity, c),
               AllOf(HasSubstr("+0.18 +- 0.03 mm"), HasSubstr("the corners are 50 % darker"),
                     HasSubstr("If it is not the cause, the rail's scale is not linear")));
-  EXPECT_THAT(BendRemedy(c.structure),
+  EXPECT_THAT(NonlinearityRemedy(c.structure),
               AllOf(HasSubstr("measure offset_mm"), Not(HasSubstr("rail"))));
 }
 

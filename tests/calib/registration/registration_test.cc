@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/calib/registration/wave_picture.h"
+#include "tests/calib/registration/wave_image.h"
 #include "tests/calib/simulated_sweep.h"
 #include "thicklens/calib/image_scale.h"
 
@@ -17,14 +17,14 @@ namespace {
 
 using thicklens::testing::SweepCase;
 using thicklens::testing::View;
-using thicklens::testing::WavePicture;
+using thicklens::testing::WaveImage;
 
 constexpr int kSizePx = 256;
 constexpr double kMiddlePx = 0.5 * (kSizePx - 1);
 const cv::Point2d kCentre(kMiddlePx, kMiddlePx);
 
 TEST(Register, FindsScaleRotationAndShiftOfAHandHeldRail) {
-  const WavePicture texture(1);
+  const WaveImage texture(1);
   const cv::Mat reference = texture.Render(kSizePx, {});
   for (const double sign : {-1.0, 1.0}) {
     for (const double scale : {0.8, 0.97, 1.0, 1.04, 1.25}) {
@@ -47,7 +47,7 @@ TEST(Register, FindsScaleRotationAndShiftOfAHandHeldRail) {
 
 // The centre is the caller's: shift and scale about another pixel describe the same map.
 TEST(Register, ShiftIsAboutTheGivenCentre) {
-  const WavePicture texture(2);
+  const WaveImage texture(2);
   View view;
   view.scale = 1.1;
   view.shift_x = 3;
@@ -60,7 +60,7 @@ TEST(Register, ShiftIsAboutTheGivenCentre) {
 }
 
 TEST(Register, SymmetricBlurDoesNotBias) {
-  const WavePicture texture(3);
+  const WaveImage texture(3);
   for (const double blur_px : {1.0, 3.0, 6.0}) {
     View sharp, soft;
     soft.blur_px = blur_px;
@@ -77,7 +77,7 @@ TEST(Register, SymmetricBlurDoesNotBias) {
 
 // A disc turns the sign of what lies beyond its first zero, here at 0.12 cycles per px.
 TEST(Register, ADiscsTurnedSignsDoNotBias) {
-  const WavePicture texture(9);
+  const WaveImage texture(9);
   View disc;
   disc.disc_px = 5;
   disc.scale = 0.94;
@@ -89,7 +89,7 @@ TEST(Register, ADiscsTurnedSignsDoNotBias) {
 }
 
 TEST(Register, GainOffsetAndSlopeOfTheLightDoNotBias) {
-  const WavePicture texture(4);
+  const WaveImage texture(4);
   View view;
   view.scale = 0.95;
   const cv::Mat reference = texture.Render(kSizePx, {});
@@ -104,9 +104,9 @@ TEST(Register, GainOffsetAndSlopeOfTheLightDoNotBias) {
   EXPECT_NEAR(uneven->shift_px.x(), even->shift_px.x(), 0.02);
 }
 
-// Both pictures distorted by x' = X (1 + k X^2): the closed form says k (1 - 1/s^2) is left over.
+// Both images distorted by x' = X (1 + k X^2): the closed form says k (1 - 1/s^2) is left over.
 TEST(Register, FindsRadialDistortionAsACubicTerm) {
-  const WavePicture texture(5);
+  const WaveImage texture(5);
   const double k = 0.02 / (2 * kMiddlePx * kMiddlePx);  // 2 % at the corner
   for (const double scale : {0.8, 1.25}) {
     View reference, frame;
@@ -122,7 +122,7 @@ TEST(Register, FindsRadialDistortionAsACubicTerm) {
 }
 
 TEST(Register, WithoutDistortionTheCubicTermIsNothing) {
-  const WavePicture texture(6);
+  const WaveImage texture(6);
   View view;
   view.scale = 1.2;
   view.noise = 0.005;
@@ -136,7 +136,7 @@ TEST(Register, WithoutDistortionTheCubicTermIsNothing) {
 
 // A known cubic term instead of a free one: less scatter, and the answer of the affine map.
 TEST(FreeRegistration, AKnownCubicTermMakesTheScaleSurer) {
-  const WavePicture texture(7);
+  const WaveImage texture(7);
   View view;
   view.scale = 1.1;
   view.noise = 0.01;
@@ -151,27 +151,26 @@ TEST(FreeRegistration, AKnownCubicTermMakesTheScaleSurer) {
   EXPECT_NEAR(same.scale_sigma / found->free.scale_sigma, 1, 1e-6);
 }
 
-TEST(Register, ThePictureItselfHasScaleOne) {
-  const cv::Mat picture = WavePicture(8).Render(kSizePx, {});
-  const auto found = Register(picture, picture, 1, kCentre);
+TEST(Register, TheImageItselfHasScaleOne) {
+  const cv::Mat image = WaveImage(8).Render(kSizePx, {});
+  const auto found = Register(image, image, 1, kCentre);
   ASSERT_TRUE(found);
   EXPECT_NEAR(found->scale, 1, 2e-5);
   EXPECT_NEAR(found->shift_px.norm(), 0, 1e-3);
 }
 
-TEST(Register, RejectsUnrelatedPictures) {
-  std::vector<cv::Mat> pictures;
-  for (unsigned seed = 10; seed < 14; ++seed)
-    pictures.push_back(WavePicture(seed).Render(kSizePx, {}));
-  for (std::size_t i = 0; i < pictures.size(); ++i) {
-    for (std::size_t j = 0; j < pictures.size(); ++j) {
-      EXPECT_EQ(Register(pictures[i], pictures[j], 1, kCentre).has_value(), i == j);
+TEST(Register, RejectsUnrelatedImages) {
+  std::vector<cv::Mat> images;
+  for (unsigned seed = 10; seed < 14; ++seed) images.push_back(WaveImage(seed).Render(kSizePx, {}));
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    for (std::size_t j = 0; j < images.size(); ++j) {
+      EXPECT_EQ(Register(images[i], images[j], 1, kCentre).has_value(), i == j);
     }
   }
 }
 
-TEST(Register, RejectsAPictureStretchedOneWay) {
-  const WavePicture texture(14);
+TEST(Register, RejectsAnImageStretchedOneWay) {
+  const WaveImage texture(14);
   View view;
   view.scale = 0.99;
   view.stretch_x = 1.025;
@@ -184,12 +183,12 @@ TEST(Register, RejectsAPictureStretchedOneWay) {
   EXPECT_NEAR(found->scale, 0.99 * std::sqrt(1.005), 1e-4);
 }
 
-TEST(Register, RejectsBlankAndTinyPictures) {
-  const cv::Mat picture = WavePicture(15).Render(kSizePx, {});
-  EXPECT_FALSE(Register(picture, cv::Mat(kSizePx, kSizePx, CV_32F, cv::Scalar(0.5)), 1, kCentre));
-  const cv::Mat tiny = picture(cv::Rect(0, 0, 40, 40)).clone();
+TEST(Register, RejectsBlankAndTinyImages) {
+  const cv::Mat image = WaveImage(15).Render(kSizePx, {});
+  EXPECT_FALSE(Register(image, cv::Mat(kSizePx, kSizePx, CV_32F, cv::Scalar(0.5)), 1, kCentre));
+  const cv::Mat tiny = image(cv::Rect(0, 0, 40, 40)).clone();
   EXPECT_FALSE(Register(tiny, tiny, 1, {19.5, 19.5}));
-  EXPECT_FALSE(Register(picture, picture, 9, kCentre));  // 28 px of the reference would be left
+  EXPECT_FALSE(Register(image, image, 9, kCentre));  // 28 px of the reference would be left
 }
 
 // Frames of a simulated sweep, their true scales to the middle one.

@@ -126,8 +126,8 @@ TEST(BlurSlope, IsNothingWhereTheBlurDoesNotGrow) {
   EXPECT_FALSE(FindBlurSlope(samples));
 }
 
-ScaleLaw LawOf(const std::vector<ScaleSample>& samples, const FocusSweep& sweep) {
-  return FitScaleLaw(samples, 15, sweep.reading_sigma_mm, sweep.direction);
+ScaleModel LawOf(const std::vector<ScaleSample>& samples, const FocusSweep& sweep) {
+  return FitScaleModel(samples, 15, sweep.reading_sigma_mm, sweep.direction);
 }
 
 std::string ReasonOf(const std::vector<ScaleSample>& samples, const FocusSweep& sweep) {
@@ -225,7 +225,7 @@ TEST(UnitAdvice, DoesNotDoubtAMagnificationAboveOneThatTheBlurShows) {
   sweep.camera.lens = testing::ThinLens(45, 4.6);
   sweep.camera.sensor.pixel_pitch_mm = 0.00345;
   const auto samples = MovingTarget(&sweep, 56.25, 0.45, [](double z) { return z - 40; });
-  const ScaleLaw law = LawOf(samples, sweep);
+  const ScaleModel law = LawOf(samples, sweep);
   ASSERT_TRUE(law.done) << law.message;
   std::vector<FrameMeasurement> frames(samples.size());
   for (const ScaleSample& sample : samples) frames[sample.frame].image_scale = sample.scale;
@@ -235,7 +235,7 @@ TEST(UnitAdvice, DoesNotDoubtAMagnificationAboveOneThatTheBlurShows) {
 TEST(UnitAdvice, PutsTheQuestionWithTheUnitThatFits) {
   FocusSweep sweep = Bench();
   const auto samples = MovingTarget(&sweep, 300, 15, [](double z) { return (z - 190) / 25.4; });
-  const ScaleLaw law = LawOf(samples, sweep);
+  const ScaleModel law = LawOf(samples, sweep);
   std::vector<FrameMeasurement> frames(samples.size());
   for (const ScaleSample& sample : samples) frames[sample.frame].image_scale = sample.scale;
   EXPECT_THAT(

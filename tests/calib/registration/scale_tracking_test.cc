@@ -11,7 +11,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <random>
 
-#include "tests/calib/registration/wave_picture.h"
+#include "tests/calib/registration/wave_image.h"
 #include "tests/calib/simulated_sweep.h"
 
 namespace thicklens::calib {
@@ -22,7 +22,7 @@ using ::testing::Not;
 using thicklens::testing::SimulatedSweep;
 using thicklens::testing::SweepCase;
 using thicklens::testing::View;
-using thicklens::testing::WavePicture;
+using thicklens::testing::WaveImage;
 
 using GreyReader = std::function<cv::Mat(std::size_t)>;
 
@@ -39,9 +39,9 @@ std::vector<ScaleSample> Track(const FocusSweep& sweep, const GreyReader& read, 
                     [] {});
 }
 
-ScaleLaw Fit(const FocusSweep& sweep, const std::vector<ScaleSample>& samples) {
-  return FitScaleLaw(samples, static_cast<int>(sweep.frames.size() / 2), sweep.reading_sigma_mm,
-                     sweep.direction, RegionCornerRadiusPx(sweep));
+ScaleModel Fit(const FocusSweep& sweep, const std::vector<ScaleSample>& samples) {
+  return FitScaleModel(samples, static_cast<int>(sweep.frames.size() / 2), sweep.reading_sigma_mm,
+                       sweep.direction, RegionCornerRadiusPx(sweep));
 }
 
 SimulatedSweep Sweep(const std::string& name, model::TargetKind kind, int frames,
@@ -76,7 +76,7 @@ TEST(TrackScale, FindsTheScalesWithAndWithoutAnOffset) {
     s.sweep.offset_mm.reset();
     const auto samples = Track(s.sweep, Reader(s));
     ExpectTrueScales(s, samples);
-    const ScaleLaw law = Fit(s.sweep, samples);
+    const ScaleModel law = Fit(s.sweep, samples);
     ASSERT_TRUE(law.done) << law.message;
     EXPECT_NEAR(law.offset_mm.value, -s.centre_mm, 3 * law.offset_mm.sigma);
     EXPECT_LT(law.offset_mm.sigma, 2);
@@ -103,7 +103,7 @@ TEST(TrackScale, TakesAStarsScalesFromTheReadings) {
   ASSERT_EQ(one.size(), samples.size());
   for (std::size_t i = 0; i < one.size(); ++i)
     EXPECT_EQ(one[i].registration.shift_px, samples[i].registration.shift_px);
-  const ScaleLaw law = Fit(s.sweep, samples);
+  const ScaleModel law = Fit(s.sweep, samples);
   EXPECT_FALSE(law.done || law.contradicts_readings);
   EXPECT_EQ(law.kind, ScaleKind::kUnknown);
   EXPECT_THAT(law.message, HasSubstr("looks the same at every scale"));
@@ -116,7 +116,7 @@ TEST(TrackScale, AStarWithoutAnOffsetLeavesTheReferenceAlone) {
   const auto samples = Track(s.sweep, Reader(s));
   ASSERT_EQ(samples.size(), 1U);
   EXPECT_EQ(samples[0].frame, 3U);
-  const ScaleLaw law = Fit(s.sweep, samples);
+  const ScaleModel law = Fit(s.sweep, samples);
   EXPECT_THAT(law.message, HasSubstr("looks the same at every scale"));
   EXPECT_TRUE(law.shows_no_scale);
 }
@@ -129,7 +129,7 @@ TEST(TrackScale, AStarsFramesAtNoDepthAreLeftOut) {
   EXPECT_EQ(Track(s.sweep, Reader(s)).size(), 5U);
 }
 
-// Whose edge the meter of edges measures: there is nothing to be gained by a shift.
+// Whose edge the estimator of edges measures: there is nothing to be gained by a shift.
 TEST(TrackScale, AKnifeEdgeIsNotGivenAScale) {
   SimulatedSweep s = Sweep("iii", model::TargetKind::kSiemensStar, 7, 8);
   s.sweep.target = model::SweepTarget::kKnifeEdge;
@@ -170,7 +170,7 @@ TEST(TrackScale, AFrameWithAWrongReadingIsRegistered) {
     s.sweep.frames[wrong].reading_mm += 150;
     const auto samples = Track(s.sweep, Reader(s));
     ASSERT_EQ(samples.size(), 15U);
-    const ScaleLaw law = Fit(s.sweep, samples);
+    const ScaleModel law = Fit(s.sweep, samples);
     ASSERT_TRUE(law.done) << law.message;
     EXPECT_EQ(law.frames_used, 14);
     EXPECT_NEAR(law.offset_mm.value, -s.centre_mm, 3 * law.offset_mm.sigma);
@@ -187,17 +187,17 @@ TEST(TrackScale, ReadingsInARandomOrderAreNamed) {
   for (std::size_t i = 0; i < readings.size(); ++i) s.sweep.frames[i].reading_mm = readings[i];
   const auto samples = Track(s.sweep, Reader(s));
   EXPECT_GT(samples.size(), 12U);
-  const ScaleLaw law = Fit(s.sweep, samples);
+  const ScaleModel law = Fit(s.sweep, samples);
   EXPECT_FALSE(law.done);
   EXPECT_EQ(law.kind, ScaleKind::kUnknown);
   EXPECT_THAT(law.message, HasSubstr("does not follow the readings"));
 }
 
-TEST(TrackScale, OnePictureRepeatedIsConstant) {
+TEST(TrackScale, OneImageRepeatedIsConstant) {
   SimulatedSweep s = Sweep("iii", model::TargetKind::kDeadLeaves, 9, 6);
   s.sweep.offset_mm.reset();
   const GreyReader same = [&s](std::size_t) { return LinearGrey((*s.stored)[4], s.sweep, 4); };
-  const ScaleLaw law = Fit(s.sweep, Track(s.sweep, same));
+  const ScaleModel law = Fit(s.sweep, Track(s.sweep, same));
   EXPECT_EQ(law.kind, ScaleKind::kConstant) << law.message;
 }
 
@@ -205,7 +205,7 @@ TEST(TrackScale, TheWrongDirectionIsReversed) {
   SimulatedSweep s = Sweep("iii", model::TargetKind::kDeadLeaves, 9, 7);
   s.sweep.offset_mm.reset();
   s.sweep.direction = model::BenchDirection::kToward;
-  const ScaleLaw law = Fit(s.sweep, Track(s.sweep, Reader(s)));
+  const ScaleModel law = Fit(s.sweep, Track(s.sweep, Reader(s)));
   EXPECT_EQ(law.kind, ScaleKind::kReversed) << law.message;
 }
 
@@ -218,9 +218,9 @@ TEST(TrackScale, DistortionIsFoundAndTakenOut) {
   sweep.camera.sensor.principal_point_px.setConstant(0.5 * (kSizePx - 1));
   const double corner_px = 0.5 * (kSizePx - 1) * std::sqrt(2);
   EXPECT_NEAR(RegionCornerRadiusPx(sweep), corner_px, 1e-9);
-  const WavePicture texture(3);
+  const WaveImage texture(3);
   for (const double distortion : {-0.01, 0.01}) {
-    std::vector<cv::Mat> pictures;
+    std::vector<cv::Mat> images;
     sweep.frames.clear();
     for (int i = 0; i < 11; ++i) {
       const double depth_mm = 320 + 16 * i;  // 400 mm in the middle
@@ -229,15 +229,15 @@ TEST(TrackScale, DistortionIsFoundAndTakenOut) {
       view.scale = 400 / depth_mm;
       view.distortion = distortion / (corner_px * corner_px);
       view.noise = 0.003;
-      pictures.push_back(texture.Render(kSizePx, view, static_cast<unsigned>(i)));
+      images.push_back(texture.Render(kSizePx, view, static_cast<unsigned>(i)));
     }
-    const auto samples = Track(sweep, [&](std::size_t i) { return pictures[i]; });
+    const auto samples = Track(sweep, [&](std::size_t i) { return images[i]; });
     ASSERT_EQ(samples.size(), 11U);
     for (const ScaleSample& s : samples) {
       const double scale = 400 / (sweep.frames[s.frame].reading_mm + 30);
       EXPECT_NEAR(s.scale / scale, 1, 3e-4) << scale;
     }
-    const ScaleLaw law = Fit(sweep, samples);
+    const ScaleModel law = Fit(sweep, samples);
     ASSERT_TRUE(law.done && law.distortion_at_corner) << law.message;
     EXPECT_NEAR(law.distortion_at_corner->value, distortion, 1e-3);
     EXPECT_NEAR(law.offset_mm.value, 30, 0.3);
@@ -287,8 +287,8 @@ TEST(TrackScale, SlowTheRealSweepFollowsInverseDepth) {
   std::size_t between = 0;
   for (const ScaleSample& s : samples) between += s.reading_mm >= -90 ? 1U : 0U;
   EXPECT_EQ(between, 111U);
-  const ScaleLaw law = FitScaleLaw(samples, static_cast<int>(reference), 0, sweep.direction,
-                                   RegionCornerRadiusPx(sweep));
+  const ScaleModel law = FitScaleModel(samples, static_cast<int>(reference), 0, sweep.direction,
+                                       RegionCornerRadiusPx(sweep));
   ASSERT_TRUE(law.done) << law.message;
   EXPECT_EQ(law.kind, ScaleKind::kInverseDepth);
   EXPECT_NEAR(law.offset_mm.value, 106.5, 1);

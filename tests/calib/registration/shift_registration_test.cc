@@ -7,16 +7,16 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 
-#include "tests/calib/registration/star_picture.h"
-#include "tests/calib/registration/wave_picture.h"
+#include "tests/calib/registration/star_image.h"
+#include "tests/calib/registration/wave_image.h"
 
 namespace thicklens::calib {
 namespace {
 
-using thicklens::testing::StarPicture;
+using thicklens::testing::StarImage;
 using thicklens::testing::StarView;
 using thicklens::testing::View;
-using thicklens::testing::WavePicture;
+using thicklens::testing::WaveImage;
 
 constexpr int kSizePx = 192;
 constexpr double kMiddlePx = 0.5 * (kSizePx - 1);
@@ -24,59 +24,59 @@ const cv::Point2d kCentre(kMiddlePx, kMiddlePx);
 
 // Dark where u v < 0, u and v the distances from two lines through the middle.
 cv::Mat Corner(double first_rad, double second_rad) {
-  cv::Mat picture(kSizePx, kSizePx, CV_32F);
+  cv::Mat image(kSizePx, kSizePx, CV_32F);
   for (int y = 0; y < kSizePx; ++y) {
     for (int x = 0; x < kSizePx; ++x) {
       const double dx = x - kMiddlePx, dy = y - kMiddlePx;
       const double u = std::tanh(dx * std::cos(first_rad) + dy * std::sin(first_rad));
       const double v = std::tanh(dx * std::cos(second_rad) + dy * std::sin(second_rad));
-      picture.at<float>(y, x) = static_cast<float>(0.5 + 0.3 * u * v);
+      image.at<float>(y, x) = static_cast<float>(0.5 + 0.3 * u * v);
     }
   }
-  return picture;
+  return image;
 }
 
-cv::Mat WithNoise(const cv::Mat& picture, double sigma) {
+cv::Mat WithNoise(const cv::Mat& image, double sigma) {
   std::mt19937 random(3);
   std::normal_distribution<double> noise(0, sigma);
-  cv::Mat noisy = picture.clone();
+  cv::Mat noisy = image.clone();
   for (int y = 0; y < noisy.rows; ++y) {
     for (int x = 0; x < noisy.cols; ++x) noisy.at<float>(y, x) += static_cast<float>(noise(random));
   }
   return noisy;
 }
 
-TEST(ShowsShiftAlone, HoldsForStarsAndLoneCorners) {
+TEST(IsScaleInvariant, HoldsForStarsAndLoneCorners) {
   for (const int spokes : {8, 36}) {
     StarView view;
-    EXPECT_TRUE(ShowsShiftAlone(StarPicture(spokes).Render(kSizePx, view)));
+    EXPECT_TRUE(IsScaleInvariant(StarImage(spokes).Render(kSizePx, view)));
     view.shift_x = 21;
     view.shift_y = -30;
     view.noise = 0.01;
-    EXPECT_TRUE(ShowsShiftAlone(StarPicture(spokes).Render(kSizePx, view)));
+    EXPECT_TRUE(IsScaleInvariant(StarImage(spokes).Render(kSizePx, view)));
   }
-  EXPECT_TRUE(ShowsShiftAlone(Corner(0.1, 1.6)));
+  EXPECT_TRUE(IsScaleInvariant(Corner(0.1, 1.6)));
 }
 
-TEST(ShowsShiftAlone, DoesNotHoldForTexturesEdgesAndNothing) {
-  EXPECT_FALSE(ShowsShiftAlone(WavePicture(1).Render(kSizePx, {})));
+TEST(IsScaleInvariant, DoesNotHoldForTexturesEdgesAndNothing) {
+  EXPECT_FALSE(IsScaleInvariant(WaveImage(1).Render(kSizePx, {})));
   cv::Mat edge(kSizePx, kSizePx, CV_32F);
   for (int y = 0; y < kSizePx; ++y) {
     for (int x = 0; x < kSizePx; ++x)
       edge.at<float>(y, x) = static_cast<float>(0.5 + 0.3 * std::tanh(x - 0.1 * y - 80));
   }
-  EXPECT_FALSE(ShowsShiftAlone(edge));
-  EXPECT_FALSE(ShowsShiftAlone(WithNoise(edge, 0.005)));
-  EXPECT_FALSE(ShowsShiftAlone(cv::Mat(kSizePx, kSizePx, CV_32F, cv::Scalar(0.5))));
+  EXPECT_FALSE(IsScaleInvariant(edge));
+  EXPECT_FALSE(IsScaleInvariant(WithNoise(edge, 0.005)));
+  EXPECT_FALSE(IsScaleInvariant(cv::Mat(kSizePx, kSizePx, CV_32F, cv::Scalar(0.5))));
   // Rings about the star's middle tell its scale.
-  cv::Mat ringed = StarPicture(36).Render(kSizePx, {});
+  cv::Mat ringed = StarImage(36).Render(kSizePx, {});
   for (int radius = 20; radius < 90; radius += 12)
     cv::circle(ringed, {kSizePx / 2, kSizePx / 2}, radius, cv::Scalar(0.1), 2, cv::LINE_AA);
-  EXPECT_FALSE(ShowsShiftAlone(ringed));
+  EXPECT_FALSE(IsScaleInvariant(ringed));
 }
 
 TEST(RegisterShift, FindsSubPixelShiftsWhateverTheBlur) {
-  const StarPicture star(36);
+  const StarImage star(36);
   for (const double reference_blur_px : {0.6, 1.5}) {
     StarView sharp;
     sharp.blur_px = reference_blur_px;
@@ -101,7 +101,7 @@ TEST(RegisterShift, FindsSubPixelShiftsWhateverTheBlur) {
 
 // What was not measured is not given out as measured.
 TEST(RegisterShift, TakesTheScaleAsItIs) {
-  const StarPicture star(24);
+  const StarImage star(24);
   const cv::Mat reference = star.Render(kSizePx, {});
   for (const double scale : {0.8, 1.0, 1.07}) {
     const auto found = RegisterShift(reference, reference, scale, kCentre);
@@ -117,7 +117,7 @@ TEST(RegisterShift, TakesTheScaleAsItIs) {
 
 // A star not in the middle: where it lies in a frame depends on the scale about the given centre.
 TEST(RegisterShift, ShiftIsAboutTheGivenCentre) {
-  const StarPicture star(36);
+  const StarImage star(36);
   StarView aside;
   aside.shift_x = 12;
   aside.shift_y = -9;
@@ -137,7 +137,7 @@ TEST(RegisterShift, ShiftIsAboutTheGivenCentre) {
 }
 
 TEST(RegisterShift, FindsASmallTurnBesides) {
-  const StarPicture star(36);
+  const StarImage star(36);
   const cv::Mat reference = star.Render(kSizePx, {});
   for (const double turn_rad : {-0.012, 0.004, 0.02}) {
     StarView view;
@@ -154,7 +154,7 @@ TEST(RegisterShift, FindsASmallTurnBesides) {
 }
 
 TEST(RegisterShift, GainOffsetSlopeAndNoiseDoNotBias) {
-  const StarPicture star(36);
+  const StarImage star(36);
   const cv::Mat reference = star.Render(kSizePx, {});
   StarView view;
   view.shift_x = -1.3;
@@ -171,10 +171,10 @@ TEST(RegisterShift, GainOffsetSlopeAndNoiseDoNotBias) {
 }
 
 TEST(RegisterShift, RejectsWhatDoesNotShowTheTarget) {
-  const cv::Mat reference = StarPicture(36).Render(kSizePx, {});
-  EXPECT_FALSE(RegisterShift(reference, WavePicture(2).Render(kSizePx, {}), 1, kCentre));
+  const cv::Mat reference = StarImage(36).Render(kSizePx, {});
+  EXPECT_FALSE(RegisterShift(reference, WaveImage(2).Render(kSizePx, {}), 1, kCentre));
   for (const int spokes : {23, 35})
-    EXPECT_FALSE(RegisterShift(reference, StarPicture(spokes).Render(kSizePx, {}), 1, kCentre));
+    EXPECT_FALSE(RegisterShift(reference, StarImage(spokes).Render(kSizePx, {}), 1, kCentre));
   const cv::Mat blank = WithNoise(cv::Mat(kSizePx, kSizePx, CV_32F, cv::Scalar(0.5)), 0.01);
   EXPECT_FALSE(RegisterShift(reference, blank, 1, kCentre));
   const cv::Mat tiny = reference(cv::Rect(60, 60, 40, 40)).clone();

@@ -95,7 +95,7 @@ TEST(MeasureSpectrum, IsTheFourierSumOverTheFramesOwnPixels) {
   }
 }
 
-TEST(MeasureSpectrum, ReadsAPartOfALargerPicture) {
+TEST(MeasureSpectrum, ReadsAPartOfALargerImage) {
   const cv::Mat whole = WhiteNoise(120, 110, 0.4, 0.1, 9);
   const cv::Mat part = whole(cv::Rect(17, 11, 71, 67));
   const TargetWindow window{{0, 0}, {60, 60}};

@@ -123,9 +123,8 @@ TEST(WindowLeakage, IsWhatTheWindowsEdgeDoes) {
 TEST(WindowLeakage, TakenOutItNoLongerBiasesTheBlur) {
   TextureScene scene = TextureSweep();
   scene.seed = 3;  // of some textures little leaks
-  const std::vector<cv::Mat> pictures = scene.Render();
-  const RelativeBlur with = FitScene(scene, pictures, 1),
-                     without = FitScene(scene, pictures, 1, false);
+  const std::vector<cv::Mat> images = scene.Render();
+  const RelativeBlur with = FitScene(scene, images, 1), without = FitScene(scene, images, 1, false);
   ASSERT_TRUE(with.done && without.done);
   double left = 0, bias = 0;
   for (const int i : {0, 1, 5, 6}) {
@@ -138,11 +137,11 @@ TEST(WindowLeakage, TakenOutItNoLongerBiasesTheBlur) {
 
 TEST(WindowLeakage, DoesNotDependOnThreads) {
   const TextureScene scene = TextureSweep();
-  const cv::Mat picture = scene.Render()[3];
+  const cv::Mat image = scene.Render()[3];
   const std::vector<Mode> modes = scene.Modes();
-  const SpectrumSample sample = scene.Sample(3, picture, modes);
+  const SpectrumSample sample = scene.Sample(3, image, modes);
   const auto table = [&](int threads) {
-    return WindowLeakage(picture, scene.origin, scene.window, modes, sample.spectrum, scene.psf, 3,
+    return WindowLeakage(image, scene.origin, scene.window, modes, sample.spectrum, scene.psf, 3,
                          threads)
         .At(2.3, modes.size());
   };
@@ -154,12 +153,12 @@ TEST(WindowLeakage, DoesNotDependOnThreads) {
 TEST(MeasuredTransfer, IsTheBlursOwn) {
   TextureScene scene = TextureSweep();
   scene.frames[5].left_over_px = {1.1, -0.8};  // the fit's own shift is taken out
-  std::vector<cv::Mat> pictures = scene.Render();
-  for (std::size_t i = 0; i < pictures.size(); ++i)
-    pictures[i] = WithWhiteNoise(pictures[i], scene.pixel_noise, 30 + static_cast<unsigned>(i));
+  std::vector<cv::Mat> images = scene.Render();
+  for (std::size_t i = 0; i < images.size(); ++i)
+    images[i] = WithWhiteNoise(images[i], scene.pixel_noise, 30 + static_cast<unsigned>(i));
   const std::vector<Mode> modes = scene.Modes();
-  const auto samples = scene.Samples(pictures, modes);
-  const WindowLeakage leakage = scene.Leakage(pictures[3], samples[3], modes, 3.8);
+  const auto samples = scene.Samples(images, modes);
+  const WindowLeakage leakage = scene.Leakage(images[3], samples[3], modes, 3.8);
   const RelativeBlur fit =
       FitRelativeBlur(samples, 3, scene.window, modes, leakage, scene.Options());
   ASSERT_TRUE(fit.done);

@@ -48,10 +48,10 @@ void ExpectRecovered(const TextureScene& scene, const RelativeBlur& fit, double 
 
 TEST(FitRelativeBlur, RecoversGaussianBlurGainAndShift) {
   const TextureScene scene = TextureSweep();
-  const std::vector<cv::Mat> pictures = scene.Render();
+  const std::vector<cv::Mat> images = scene.Render();
   for (const double start_factor : {1.0, 0.6, 1.6}) {
     SCOPED_TRACE(start_factor);
-    ExpectRecovered(scene, FitScene(scene, pictures, start_factor), 0.003, 0.004);
+    ExpectRecovered(scene, FitScene(scene, images, start_factor), 0.003, 0.004);
   }
 }
 
@@ -60,9 +60,9 @@ TEST(FitRelativeBlur, RecoversDiscs) {
   scene.psf = model::Psf::kDisc;
   // The reference's own disc is small: v = 0.1 px^2; one frame's is nearly nothing.
   scene.frames[4].variance_px2 = scene.floor_px2 / std::pow(scene.frames[4].view.scale, 2) + 0.002;
-  const std::vector<cv::Mat> pictures = scene.Render();
+  const std::vector<cv::Mat> images = scene.Render();
   for (const double start_factor : {1.0, 1.3})
-    ExpectRecovered(scene, FitScene(scene, pictures, start_factor), 0.003, 0.01);
+    ExpectRecovered(scene, FitScene(scene, images, start_factor), 0.003, 0.01);
 }
 
 // Gaussian blur fitted as a disc, and the other way round, lies farther off.
@@ -70,17 +70,17 @@ TEST(FitRelativeBlur, MisfitTellsTheShape) {
   for (const model::Psf psf : {model::Psf::kGaussian, model::Psf::kDisc}) {
     TextureScene scene = TextureSweep();
     scene.psf = psf;
-    std::vector<cv::Mat> pictures = scene.Render();
-    for (std::size_t i = 0; i < pictures.size(); ++i)
-      pictures[i] = WithWhiteNoise(pictures[i], scene.pixel_noise, 10 + static_cast<unsigned>(i));
+    std::vector<cv::Mat> images = scene.Render();
+    for (std::size_t i = 0; i < images.size(); ++i)
+      images[i] = WithWhiteNoise(images[i], scene.pixel_noise, 10 + static_cast<unsigned>(i));
     const auto misfit = [&](model::Psf fitted) {
       scene.psf = fitted;
       const std::vector<Mode> modes = scene.Modes();
-      const auto samples = scene.Samples(pictures, modes);
+      const auto samples = scene.Samples(images, modes);
       RelativeBlurOptions options = scene.Options();
       options.band = 1;
       return FitRelativeBlur(samples, scene.reference, scene.window, modes,
-                             scene.Leakage(pictures[3], samples[3], modes, 3.8), options)
+                             scene.Leakage(images[3], samples[3], modes, 3.8), options)
           .chi2_per_dof;
     };
     const double gaussian = misfit(model::Psf::kGaussian), disc = misfit(model::Psf::kDisc);
@@ -106,36 +106,35 @@ TEST(FitRelativeBlur, ALoneEdgeIsTextureEnough) {
   TextureScene scene;
   scene.origin = {79.5, 79.5};
   scene.window = {{0, 0}, {140, 140}};
-  std::vector<cv::Mat> pictures;
+  std::vector<cv::Mat> images;
   for (const double sigma_px : {2.4, 1.6, 0.9, 0.5, 0.8, 1.7, 2.2}) {
     TextureFrame frame;
     frame.variance_px2 = sigma_px * sigma_px;
     scene.frames.push_back(frame);
-    pictures.push_back(thicklens::testing::DrawnEdge(TextureScene::kSizePx, 7, sigma_px, 0.2, 0.8));
+    images.push_back(thicklens::testing::DrawnEdge(TextureScene::kSizePx, 7, sigma_px, 0.2, 0.8));
   }
   scene.reference = 3;
   const std::vector<Mode> all = scene.Modes();
-  const SpectrumSample reference = scene.Sample(3, pictures[3], all);
+  const SpectrumSample reference = scene.Sample(3, images[3], all);
   const std::vector<Mode> modes =
       StrongestModes(all, reference.spectrum.values.abs2(), scene.window, 1e-8, 200);
-  const auto samples = scene.Samples(pictures, modes);
+  const auto samples = scene.Samples(images, modes);
   const RelativeBlur fit =
       FitRelativeBlur(samples, 3, scene.window, modes,
-                      scene.Leakage(pictures[3], samples[3], modes, 3.8), scene.Options());
+                      scene.Leakage(images[3], samples[3], modes, 3.8), scene.Options());
   ExpectRecovered(scene, fit, 0.005, 0.02);
 }
 
 TEST(FitRelativeBlur, UsesNoModeBeyondItsBand) {
   TextureScene scene = TextureSweep();
-  const std::vector<cv::Mat> pictures = scene.Render();
+  const std::vector<cv::Mat> images = scene.Render();
   const std::vector<Mode> modes = scene.Modes();
-  const auto samples = scene.Samples(pictures, modes);
+  const auto samples = scene.Samples(images, modes);
   for (const double band : {0.7, 2.0}) {
     RelativeBlurOptions options = scene.Options();
     options.band = band;
-    const RelativeBlur fit =
-        FitRelativeBlur(samples, 3, scene.window, modes,
-                        scene.Leakage(pictures[3], samples[3], modes, 3.8), options);
+    const RelativeBlur fit = FitRelativeBlur(
+        samples, 3, scene.window, modes, scene.Leakage(images[3], samples[3], modes, 3.8), options);
     ASSERT_TRUE(fit.done);
     for (std::size_t i = 0; i < samples.size(); ++i) {
       const double added = fit.variances_px2[static_cast<Eigen::Index>(i)] - 0.35;
@@ -226,13 +225,12 @@ TEST(FitRelativeBlur, CovarianceIsThatOfTheWholeProblem) {
     scene.psf = psf;
     scene.window.size_px = {60, 58};
     const std::vector<cv::Mat> clean = scene.Render();
-    std::vector<cv::Mat> pictures;
+    std::vector<cv::Mat> images;
     for (std::size_t i = 0; i < clean.size(); ++i) {
-      pictures.push_back(
-          WithWhiteNoise(clean[i], scene.pixel_noise, 70 + static_cast<unsigned>(i)));
+      images.push_back(WithWhiteNoise(clean[i], scene.pixel_noise, 70 + static_cast<unsigned>(i)));
     }
     const std::vector<Mode> modes = ModesBetween(scene.window, 2.5 / 58, 0.25);
-    const auto samples = scene.Samples(pictures, modes);
+    const auto samples = scene.Samples(images, modes);
     const RelativeBlur fit =
         FitRelativeBlur(samples, 3, scene.window, modes,
                         scene.Leakage(clean[3], samples[3], modes, 3.8), scene.Options());
@@ -305,12 +303,12 @@ TEST(FitRelativeBlur, CovarianceIsTheScatterOverNoise) {
 
 TEST(FitRelativeBlur, SaysWhichFrameScattersMore) {
   TextureScene scene = TextureSweep();
-  std::vector<cv::Mat> pictures = scene.Render();
-  for (std::size_t i = 0; i < pictures.size(); ++i) {
-    pictures[i] = WithWhiteNoise(pictures[i], (i == 4 ? 5 : 1) * scene.pixel_noise,
-                                 10 + static_cast<unsigned>(i));
+  std::vector<cv::Mat> images = scene.Render();
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    images[i] = WithWhiteNoise(images[i], (i == 4 ? 5 : 1) * scene.pixel_noise,
+                               10 + static_cast<unsigned>(i));
   }
-  const RelativeBlur fit = FitScene(scene, pictures, 1);
+  const RelativeBlur fit = FitScene(scene, images, 1);
   ASSERT_TRUE(fit.done);
   for (Eigen::Index i = 0; i < fit.noise_ratio.size(); ++i) {
     if (i == 4) {

@@ -44,39 +44,38 @@ struct TextureScene {
   }
   std::vector<cv::Mat> Render() const {
     const KnownTexture texture(seed);
-    std::vector<cv::Mat> pictures;
+    std::vector<cv::Mat> images;
     for (const TextureFrame& frame : frames) {
       TextureView view = frame.view;
       view.shift_px += view.scale * frame.left_over_px;
-      pictures.push_back(texture.Render(kSizePx, kSizePx, origin, view, TransferOf(frame)));
+      images.push_back(texture.Render(kSizePx, kSizePx, origin, view, TransferOf(frame)));
     }
-    return pictures;
+    return images;
   }
   std::vector<calib::Mode> Modes() const { return calib::ModesBetween(window, 2.5 / 124, 0.33); }
-  calib::SpectrumSample Sample(std::size_t i, const cv::Mat& picture,
+  calib::SpectrumSample Sample(std::size_t i, const cv::Mat& image,
                                const std::vector<calib::Mode>& modes) const {
     const TextureFrame& frame = frames[i];
     calib::SpectrumSample sample;
     sample.scale = frame.view.scale;
     sample.pixel_noise = pixel_noise;
     sample.start_variance_px2 = frame.variance_px2;
-    auto spectrum = calib::MeasureSpectrum(picture, origin, {frame.view.scale, frame.view.shift_px},
+    auto spectrum = calib::MeasureSpectrum(image, origin, {frame.view.scale, frame.view.shift_px},
                                            window, modes, modes.size());
     EXPECT_TRUE(spectrum) << i;
     if (spectrum) sample.spectrum = *spectrum;
     return sample;
   }
-  std::vector<calib::SpectrumSample> Samples(const std::vector<cv::Mat>& pictures,
+  std::vector<calib::SpectrumSample> Samples(const std::vector<cv::Mat>& images,
                                              const std::vector<calib::Mode>& modes) const {
     std::vector<calib::SpectrumSample> samples;
-    for (std::size_t i = 0; i < frames.size(); ++i)
-      samples.push_back(Sample(i, pictures[i], modes));
+    for (std::size_t i = 0; i < frames.size(); ++i) samples.push_back(Sample(i, images[i], modes));
     return samples;
   }
-  calib::WindowLeakage Leakage(const cv::Mat& picture, const calib::SpectrumSample& sample,
+  calib::WindowLeakage Leakage(const cv::Mat& image, const calib::SpectrumSample& sample,
                                const std::vector<calib::Mode>& modes,
                                double largest_sigma_px) const {
-    return {picture, origin, window, modes, sample.spectrum, psf, largest_sigma_px, 1};
+    return {image, origin, window, modes, sample.spectrum, psf, largest_sigma_px, 1};
   }
   calib::RelativeBlurOptions Options() const {
     calib::RelativeBlurOptions options;
@@ -108,10 +107,10 @@ inline TextureScene TextureSweep() {
   return scene;
 }
 
-inline calib::RelativeBlur FitScene(const TextureScene& scene, const std::vector<cv::Mat>& pictures,
+inline calib::RelativeBlur FitScene(const TextureScene& scene, const std::vector<cv::Mat>& images,
                                     double start_factor, bool takes_leakage_out = true) {
   const std::vector<calib::Mode> modes = scene.Modes();
-  std::vector<calib::SpectrumSample> samples = scene.Samples(pictures, modes);
+  std::vector<calib::SpectrumSample> samples = scene.Samples(images, modes);
   double largest = 0;
   const double base = scene.frames[scene.reference].variance_px2;
   for (std::size_t i = 0; i < samples.size(); ++i) {
@@ -121,7 +120,7 @@ inline calib::RelativeBlur FitScene(const TextureScene& scene, const std::vector
   }
   calib::WindowLeakage leakage;
   if (takes_leakage_out) {
-    leakage = scene.Leakage(pictures[scene.reference], samples[scene.reference], modes,
+    leakage = scene.Leakage(images[scene.reference], samples[scene.reference], modes,
                             1.4 * std::sqrt(largest) + 0.5);
   }
   return calib::FitRelativeBlur(samples, scene.reference, scene.window, modes, leakage,

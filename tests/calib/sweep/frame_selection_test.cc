@@ -17,7 +17,7 @@ using ::testing::StartsWith;
 
 FrameStatistics GoodStatistics() {
   FrameStatistics s;
-  s.mean_stored = 0.4;
+  s.mean_encoded = 0.4;
   s.mean_linear = 0.2;
   s.contrast = 0.3;
   s.noise_sigma = 0.01;
@@ -26,7 +26,7 @@ FrameStatistics GoodStatistics() {
   return s;
 }
 
-// `count` frames that pass every gate, at every fifth millimetre.
+// `count` frames that pass every quality check, at every fifth millimetre.
 std::vector<FrameMeasurement> GoodFrames(int count) {
   std::vector<FrameMeasurement> frames;
   for (int i = 0; i < count; ++i) {
@@ -43,13 +43,13 @@ std::vector<FrameMeasurement> GoodFrames(int count) {
 
 std::string KindOf(const FrameStatistics& statistics) {
   const auto reason = RejectionReason(statistics, 0.3, {});
-  return reason ? RejectionKind(*reason) : "none";
+  return reason ? FailedCheck(*reason) : "none";
 }
 
-TEST(RejectionKind, IsWordsAPersonUnderstandsForEveryGate) {
+TEST(FailedCheck, IsReadableTextForEveryCheck) {
   EXPECT_EQ(KindOf(GoodStatistics()), "none");
   FrameStatistics s = GoodStatistics();
-  s.mean_stored = 0.001;
+  s.mean_encoded = 0.001;
   EXPECT_EQ(KindOf(s), "dark");
   s = GoodStatistics();
   s.is_mosaic = true;
@@ -68,24 +68,23 @@ TEST(RejectionKind, IsWordsAPersonUnderstandsForEveryGate) {
   EXPECT_EQ(KindOf(s), "blank");
 }
 
-TEST(RejectionKind, KeepsTheAmountsAndNamesOfTheSingleFrameOut) {
-  EXPECT_EQ(RejectionKind("reading off by 15.1 mm, or frame damaged: its image scale is that of"),
+TEST(FailedCheck, KeepsTheAmountsAndNamesOfTheSingleFrameOut) {
+  EXPECT_EQ(FailedCheck("reading off by 15.1 mm, or frame damaged: its image scale is that of"),
             "reading off");
-  EXPECT_EQ(RejectionKind("reading off by -0.7 mm, or frame damaged: its blur lies 9 standard"),
+  EXPECT_EQ(FailedCheck("reading off by -0.7 mm, or frame damaged: its blur lies 9 standard"),
             "reading off");
-  EXPECT_EQ(RejectionKind("repeated picture: the same as frame-3.png at reading 300 mm"),
-            "repeated picture");
-  EXPECT_EQ(RejectionKind("frame damaged: its blur lies 9 standard deviations off"),
-            "frame damaged");
-  EXPECT_EQ(RejectionKind("does not show what the others show: its spectrum lies 6 times"),
+  EXPECT_EQ(FailedCheck("repeated image: the same as frame-3.png at reading 300 mm"),
+            "repeated image");
+  EXPECT_EQ(FailedCheck("frame damaged: its blur lies 9 standard deviations off"), "frame damaged");
+  EXPECT_EQ(FailedCheck("does not show what the others show: its spectrum lies 6 times"),
             "does not show what the others show");
-  EXPECT_EQ(RejectionKind("blank"), "blank");
-  EXPECT_EQ(RejectionKind(""), "");
+  EXPECT_EQ(FailedCheck("blank"), "blank");
+  EXPECT_EQ(FailedCheck(""), "");
 }
 
 TEST(FrameSelection, ThrowsOutWhatFailsAndKeepsTheRest) {
   auto frames = GoodFrames(9);
-  frames[2].statistics.mean_stored = 0.001;
+  frames[2].statistics.mean_encoded = 0.001;
   frames[5].statistics.saturated_fraction = 0.5;
   frames[7].statistics.contrast = 0.05;  // a sixth of the median
   FrameSelection selection(&frames);
@@ -112,7 +111,7 @@ TEST(FrameSelection, WithoutEdgesContrastAndTextureTheTargetIsNotToBeSeen) {
   FrameSelection selection(&frames);
   EXPECT_FALSE(selection.KeepThoseWithEdges());
   EXPECT_EQ(selection.used(), (std::vector<std::size_t>{0, 1, 2, 3, 5, 6, 7, 8}));
-  EXPECT_EQ(RejectionKind(frames[4].rejection), "no edges");
+  EXPECT_EQ(FailedCheck(frames[4].rejection), "no edges");
 }
 
 TEST(FrameSelection, NoImageFormsNearerThanTheFrontFocalPoint) {
@@ -122,7 +121,7 @@ TEST(FrameSelection, NoImageFormsNearerThanTheFrontFocalPoint) {
   FrameSelection selection(&frames);
   EXPECT_FALSE(selection.KeepPossibleDepths(-287.5, 12.5));
   EXPECT_EQ(selection.used().front(), 1u);
-  EXPECT_EQ(RejectionKind(frames[0].rejection), "impossible depth");
+  EXPECT_EQ(FailedCheck(frames[0].rejection), "impossible depth");
   EXPECT_THAT(frames[0].rejection, AllOf(HasSubstr("12.500 mm"), HasSubstr("-287.500 mm"),
                                          HasSubstr("check offset_mm")));
 }
@@ -164,17 +163,17 @@ TEST(ExposureAdvice, SpeaksWhenMostFramesAreBadlyExposed) {
   bool is_16_bit = false;
   const auto advice = [&] { return ExposureAdvice(frames, [&] { return is_16_bit; }); };
   EXPECT_EQ(advice(), "");
-  reject(0, 5, "saturated: 80 % of the pixels pile up at 255");
+  reject(0, 5, "saturated: 80 % of the pixels are clipped at 255");
   EXPECT_EQ(advice(), "") << "half of them may have another cause";
-  reject(5, 6, "saturated: 80 % of the pixels pile up at 255");
+  reject(5, 6, "saturated: 80 % of the pixels are clipped at 255");
   EXPECT_THAT(advice(),
               AllOf(StartsWith("6 of 10 frames are over-exposed: lower"), Not(HasSubstr("under"))));
   reject(0, 3, "dark: mean 0.003 of full scale");
-  reject(3, 6, "black: 60 % of the pixels pile up at 0");
+  reject(3, 6, "black: 60 % of the pixels are clipped at 0");
   EXPECT_THAT(advice(), StartsWith("6 of 10 frames are under-exposed: raise"));
   // Dark to the file and clear to the eye: the light need not be at fault where 16 bits are stored.
   for (FrameMeasurement& frame : frames) {
-    frame.statistics.mean_stored = 400.0 / 65535;
+    frame.statistics.mean_encoded = 400.0 / 65535;
     frame.statistics.noise_sigma = 4.0 / 65535;
     frame.statistics.top_gradient = 100.0 / 65535;
   }
@@ -201,7 +200,7 @@ TEST(RegionAdvice, NamesTheSizeAndWhatIsNeeded) {
   EXPECT_EQ(RegionAdvice(sweep), "");
   sweep.roi = {};
   sweep.camera.sensor.width_px = 40;
-  EXPECT_THAT(RegionAdvice(sweep), StartsWith("the picture is 40 x 480 px"));
+  EXPECT_THAT(RegionAdvice(sweep), StartsWith("the image is 40 x 480 px"));
 }
 
 }  // namespace

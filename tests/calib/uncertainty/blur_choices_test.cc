@@ -75,7 +75,7 @@ TEST(CompareChoices, WhatWasThrownOutHasNoSayInTheRest) {
   MeasuredSweep with = Measured(damaged);
   BlurEvidence evidence = with.Measure();
   ASSERT_EQ(evidence.spectrum, 0) << evidence.message;
-  BlurSamples& samples = evidence.setup.meters[0];
+  BlurSamples& samples = evidence.setup.estimators[0];
   ASSERT_EQ(samples.frames[9], 9U);
   std::vector<Eigen::Index> kept;
   for (Eigen::Index i = 0; i < kFrames; ++i) {
@@ -110,7 +110,7 @@ TEST(CompareChoices, WhatWasThrownOutHasNoSayInTheRest) {
 TEST(CompareChoices, WithoutItsReferenceNothingIsCompared) {
   MeasuredSweep m = Measured(Leaves());
   BlurEvidence evidence = m.Measure();
-  BlurSamples& samples = evidence.setup.meters[0];
+  BlurSamples& samples = evidence.setup.estimators[0];
   std::vector<Eigen::Index> kept;
   for (Eigen::Index i = 0; i < kFrames; ++i) {
     if (i != static_cast<Eigen::Index>(m.task->reference)) kept.push_back(i);
@@ -123,7 +123,7 @@ TEST(CompareChoices, WithoutItsReferenceNothingIsCompared) {
   EXPECT_EQ(Spectrum(evidence).frames.size(), static_cast<std::size_t>(kFrames - 1));
 }
 
-TEST(CompareChoices, WithoutASpectralMeterThereIsNothingToCompare) {
+TEST(CompareChoices, WithoutASpectralEstimatorThereIsNothingToCompare) {
   BlurEvidence evidence;
   CompareChoices(model::Psf::kGaussian, &evidence);
   EXPECT_FALSE(evidence.narrow_band || evidence.other_psf || evidence.gaussian_misfit);
@@ -136,7 +136,7 @@ TEST(CompareChoices, ExamplesAreTheNearestTheSharpestAndTheFarthest) {
   for (const auto direction : {model::BenchDirection::kAway, model::BenchDirection::kToward}) {
     SimulatedSweep simulated = Leaves();
     if (direction == model::BenchDirection::kToward) {
-      // The same pictures in another order, the scale running the other way.
+      // The same images in another order, the scale running the other way.
       simulated.sweep.direction = direction;
       std::reverse(simulated.truth.frames.begin(), simulated.truth.frames.end());
       for (std::size_t i = 0; i < kFrames; ++i)

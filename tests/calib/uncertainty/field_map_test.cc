@@ -152,9 +152,9 @@ TEST(FieldMap, EachColourHasItsOwnFocus) {
   for (std::size_t i = 0; i < s.stored->size(); ++i) {
     const std::vector<cv::Mat> channels = {(*colours[0].stored)[i], (*colours[1].stored)[i],
                                            (*colours[2].stored)[i]};
-    cv::Mat picture;
-    cv::merge(channels, picture);
-    (*s.stored)[i] = picture;
+    cv::Mat image;
+    cv::merge(channels, image);
+    (*s.stored)[i] = image;
   }
   const Calibration c = Calibrate(s.sweep, {});
   ASSERT_EQ(c.channels.size(), 3U) << c.reason;

@@ -18,11 +18,11 @@ using ::testing::HasSubstr;
 constexpr int kSize = 160;
 constexpr double kNoise = 5e-5;
 
-// A meter of one frame, which shows a texture whose power falls with frequency through a Gaussian
-// of `blur_px`.
+// An estimator of one frame, which shows a texture whose power falls with frequency through a
+// Gaussian of `blur_px`.
 struct OneFrame {
-  SpectralMeterSetup meter;
-  MeterRegion region;
+  SpectralEstimatorSetup estimator;
+  EstimatorRegion region;
 };
 
 OneFrame Photograph(double blur_px, double highest = 0.4, unsigned seed = 5) {
@@ -31,18 +31,18 @@ OneFrame Photograph(double blur_px, double highest = 0.4, unsigned seed = 5) {
   const cv::Mat grey = testing::WithWhiteNoise(
       texture.Render(kSize, kSize, middle, {}, testing::GaussianOf(blur_px * blur_px)), kNoise, 8);
   OneFrame one;
-  one.meter.origin_px = middle;
-  one.meter.size_px.setConstant(kSize);
-  one.meter.frames.resize(1);
-  one.meter.frames[0].pixel_noise = kNoise;
-  one.meter.read_grey = [grey](std::size_t) { return grey; };
+  one.estimator.origin_px = middle;
+  one.estimator.size_px.setConstant(kSize);
+  one.estimator.frames.resize(1);
+  one.estimator.frames[0].pixel_noise = kNoise;
+  one.estimator.read_grey = [grey](std::size_t) { return grey; };
   one.region.window.size_px.setConstant(0.98 * (kSize - 1));
   one.region.samples.resize(1);
   return one;
 }
 
 double BoundPx(const OneFrame& one) {
-  return std::sqrt(LargestBlurVariance(one.meter, one.region).value());
+  return std::sqrt(LargestBlurVariance(one.estimator, one.region).value());
 }
 
 TEST(LargestBlurVariance, IsNotBelowTheBlurOfATextureWhosePowerFalls) {
@@ -55,7 +55,8 @@ TEST(LargestBlurVariance, IsNotBelowTheBlurOfATextureWhosePowerFalls) {
 
 TEST(LargestBlurVariance, IsLargeWhereTheTextureHasNoFineDetail) {
   // Nothing above .06 cycles/px: a lens far softer than any could have taken it.
-  const auto bound = LargestBlurVariance(Photograph(0.4, 0.06).meter, Photograph(0.4, 0.06).region);
+  const auto bound =
+      LargestBlurVariance(Photograph(0.4, 0.06).estimator, Photograph(0.4, 0.06).region);
   ASSERT_TRUE(bound);
   EXPECT_GT(std::sqrt(*bound), 1.3);
 }
@@ -64,10 +65,10 @@ TEST(LargestBlurVariance, SaysNothingOfNoiseAlone) {
   OneFrame one = Photograph(1);
   const cv::Mat flat =
       testing::WithWhiteNoise(cv::Mat(kSize, kSize, CV_32F, cv::Scalar(0.4)), kNoise, 3);
-  one.meter.read_grey = [flat](std::size_t) { return flat; };
-  EXPECT_FALSE(LargestBlurVariance(one.meter, one.region));
-  one.meter.read_grey = nullptr;
-  EXPECT_FALSE(LargestBlurVariance(one.meter, one.region));
+  one.estimator.read_grey = [flat](std::size_t) { return flat; };
+  EXPECT_FALSE(LargestBlurVariance(one.estimator, one.region));
+  one.estimator.read_grey = nullptr;
+  EXPECT_FALSE(LargestBlurVariance(one.estimator, one.region));
 }
 
 TEST(ChooseFloor, TakesWhatIsStated) {

@@ -20,7 +20,7 @@ using ::testing::HasSubstr;
 using ::testing::StartsWith;
 using thicklens::testing::BlurBench;
 
-// A bench, what its meters said and the fit to it, as the pipeline has them at this step.
+// A bench, what its estimators said and the fit to it, as the pipeline has them at this step.
 struct Solved {
   BlurBench bench;
   FocusSweep sweep;
@@ -58,7 +58,7 @@ Solved Texture(double noise, double error_px2 = 0.01, unsigned seed = 1,
   s.bench.noise = noise;
   std::mt19937 random(seed);
   s.evidence.setup = s.bench.Setup(&random);
-  s.evidence.setup.meters = {s.bench.Relative(error_px2, 1.2, &random)};
+  s.evidence.setup.estimators = {s.bench.Relative(error_px2, 1.2, &random)};
   s.evidence.setup.floor_variance_px2 = model::Estimate{s.bench.floor_px2, 0};
   s.evidence.spectrum = 0;
   for (std::size_t i = 0; i < s.evidence.setup.frames.size(); ++i) s.evidence.frames.push_back(i);
@@ -101,7 +101,7 @@ TEST(AddSystematicParts, WithoutAnIntervalTheFloorIsNoPart) {
   Solved s = Texture(0);
   s.Add();
   EXPECT_FALSE(s.Part("lens floor"));
-  // What the meter itself is good for concerns kappa alone.
+  // What the estimator itself is good for concerns kappa alone.
   ASSERT_TRUE(s.calibration.focus_depth_mm->systematic);
   EXPECT_NEAR((*s.calibration.focus_depth_mm->systematic)[0], s.bench.focus_mm, 1e-3);
   EXPECT_NEAR((*s.calibration.focus_depth_mm->systematic)[1], s.bench.focus_mm, 1e-3);
@@ -244,14 +244,14 @@ TEST(AddSystematicParts, FramesThatWereThrownOutStayOut) {
   std::mt19937 random(1);
   s.evidence.narrow_band = other.Relative(0.01, 1.2, &random);
   s.evidence.narrow_band->variances_px2[4] += 40;  // damaged, and no longer in the fit
-  BlurSamples& meter = s.evidence.setup.meters[0];
+  BlurSamples& estimator = s.evidence.setup.estimators[0];
   std::vector<Eigen::Index> kept;
   for (Eigen::Index i = 0; i < s.bench.count; ++i) {
     if (i != 4) kept.push_back(i);
   }
-  meter.frames.erase(meter.frames.begin() + 4);
-  meter.variances_px2 = Eigen::VectorXd(meter.variances_px2(kept));
-  meter.covariance = Eigen::MatrixXd(meter.covariance(kept, kept));
+  estimator.frames.erase(estimator.frames.begin() + 4);
+  estimator.variances_px2 = Eigen::VectorXd(estimator.variances_px2(kept));
+  estimator.covariance = Eigen::MatrixXd(estimator.covariance(kept, kept));
   s.Fit();
   s.Add();
   EXPECT_NEAR(s.Part("frequency band")->focus_depth_mm[1], 0.8, 0.01);
@@ -264,7 +264,7 @@ TEST(AddSystematicParts, TwoMetersThatDisagreeAreDistinguished) {
   std::mt19937 random(1);
   BlurSamples edge = in_front.Absolute(0.01, 0, &random);
   edge.held_softness_px2 = 0;
-  s.evidence.setup.meters.push_back(edge);
+  s.evidence.setup.estimators.push_back(edge);
   s.evidence.edges = 1;
   s.Fit();
   const double joint_mm = s.fit.values[kFocusDepth];
@@ -353,17 +353,17 @@ TEST(FitSides, DifferOnCleanDataByNoMoreThanChance) {
 }
 
 // Spherical aberration: the slope of the blur is another on each side.
-TEST(FitSides, DisagreeWhereTwoLawsWereMixed) {
+TEST(FitSides, DisagreeWhereTwoModelsWereMixed) {
   Solved s = Texture(1, 0.02);
   BlurBench steeper = s.bench;
   steeper.ratio *= 1.1;
   steeper.noise = 0;
   std::mt19937 random(1);
-  BlurSamples& meter = s.evidence.setup.meters[0];
+  BlurSamples& estimator = s.evidence.setup.estimators[0];
   const BlurSamples other = steeper.Relative(0.02, 1.2, &random);
-  for (Eigen::Index i = 0; i < meter.variances_px2.size(); ++i) {
+  for (Eigen::Index i = 0; i < estimator.variances_px2.size(); ++i) {
     const double depth_mm = s.bench.Depth(static_cast<std::size_t>(i));
-    if (depth_mm < s.bench.focus_mm) meter.variances_px2[i] = other.variances_px2[i];
+    if (depth_mm < s.bench.focus_mm) estimator.variances_px2[i] = other.variances_px2[i];
   }
   s.Fit();
   FitSides(s.evidence, s.fit, &s.calibration);
@@ -395,8 +395,8 @@ TEST(FitSides, SixFramesAreNeededOnASide) {
 TEST(FitSides, AKnifeEdgesSidesAgree) {
   Solved s = Texture(0);
   std::mt19937 random(1);
-  s.evidence.setup.meters = {s.bench.Absolute(0.01, 0, &random)};
-  s.evidence.setup.meters[0].held_softness_px2 = 0;
+  s.evidence.setup.estimators = {s.bench.Absolute(0.01, 0, &random)};
+  s.evidence.setup.estimators[0].held_softness_px2 = 0;
   s.evidence.setup.floor_variance_px2.reset();
   s.evidence.spectrum = -1;
   s.evidence.edges = 0;

@@ -17,7 +17,7 @@ using ::testing::IsEmpty;
 using thicklens::testing::BlurBench;
 using thicklens::testing::ExactBench;
 using thicklens::testing::FocusCase;
-using thicklens::testing::LinearTwin;
+using thicklens::testing::LinearReference;
 
 constexpr double kErrorPx2 = 0.01;
 
@@ -25,11 +25,11 @@ constexpr double kErrorPx2 = 0.01;
 
 // The standard deviations of (zf, kappa) of one side, floor and softness held.
 Eigen::Vector2d SideSigmas(const BlurBench& bench, bool nearer) {
-  LinearTwin twin{kErrorPx2, false, 0, true};
+  LinearReference reference{kErrorPx2, false, 0, true};
   for (std::size_t i = 0; i < static_cast<std::size_t>(bench.count); ++i) {
-    if ((bench.Depth(i) < bench.focus_mm) == nearer) twin.frames.push_back(i);
+    if ((bench.Depth(i) < bench.focus_mm) == nearer) reference.frames.push_back(i);
   }
-  const Eigen::Matrix4d covariance = twin.Covariance(bench);
+  const Eigen::Matrix4d covariance = reference.Covariance(bench);
   const double slope = std::abs(model::ImageDistanceSlope(bench.lens, bench.focus_mm));
   return {std::sqrt(covariance(0, 0)) / slope, std::sqrt(covariance(1, 1))};
 }
@@ -60,8 +60,8 @@ TEST(FitSides, AKnifeEdgesFloorIsHeldAtTheWholeSweeps) {
 // The same of a texture's unknown constant.
 TEST(FitSides, ATexturesConstantIsHeldAtTheWholeSweeps) {
   FocusCase c = FocusCase(Asymmetric()).WithTexture(kErrorPx2).WithTrueFloor();
-  // Independent errors, so that the twin's are the same.
-  c.evidence.setup.meters[0].covariance =
+  // Independent errors, so that the reference's are the same.
+  c.evidence.setup.estimators[0].covariance =
       Eigen::VectorXd::Constant(c.bench.count, kErrorPx2 * kErrorPx2).asDiagonal();
   c.Solve();
   for (const bool nearer : {true, false}) {
@@ -101,9 +101,9 @@ TEST(FitSides, TheBenchZerosErrorIsNoDifferenceOfTheSides) {
 }
 
 // Edges that were measured on one side alone say nothing of the other.
-TEST(FitSides, AMeterThatHasOneSideAloneIsLeftOutOnTheOther) {
+TEST(FitSides, AnEstimatorThatHasOneSideAloneIsLeftOutOnTheOther) {
   FocusCase c = FocusCase(Asymmetric()).WithKnifeEdge(kErrorPx2).WithTexture(kErrorPx2);
-  BlurSamples& edges = c.evidence.setup.meters[0];
+  BlurSamples& edges = c.evidence.setup.estimators[0];
   edges.frames.resize(12);
   edges.variances_px2.conservativeResize(12);
   edges.covariance.conservativeResize(12, 12);
@@ -115,10 +115,10 @@ TEST(FitSides, AMeterThatHasOneSideAloneIsLeftOutOnTheOther) {
   EXPECT_NEAR(c.calibration.farther.focus_depth_mm.value, c.bench.focus_mm, 0.01);
 }
 
-// Frames are counted once, by the meter that has most of them.
-TEST(FitSides, TheLargerMeterCountsTheFrames) {
+// Frames are counted once, by the estimator that has most of them.
+TEST(FitSides, TheLargerEstimatorCountsTheFrames) {
   FocusCase c = FocusCase(Asymmetric()).WithTexture(kErrorPx2).WithKnifeEdge(kErrorPx2);
-  BlurSamples& edges = c.evidence.setup.meters[1];
+  BlurSamples& edges = c.evidence.setup.estimators[1];
   edges.frames.resize(20);
   edges.variances_px2.conservativeResize(20);
   edges.covariance.conservativeResize(20, 20);

@@ -116,7 +116,7 @@ TEST(AddSystematicParts, TheFloorsEndsAreTwoMoreCalibrations) {
               low.calibration.image_distance_mm->value, 1e-6);
 }
 
-// Each meter alone has to be told the floor that the other measured.
+// Each estimator alone has to be reported the floor that the other measured.
 TEST(AddSystematicParts, ATextureAloneKeepsTheKnifeEdgesFloor) {
   BlurBench bench = Asymmetric();
   FocusCase c = FocusCase(bench).WithTexture(kErrorPx2);
@@ -125,7 +125,7 @@ TEST(AddSystematicParts, ATextureAloneKeepsTheKnifeEdgesFloor) {
   BlurSamples edges = behind.Absolute(kErrorPx2, 0, &c.random);
   edges.held_softness_px2 = 0;
   c.evidence.edges = 1;
-  c.evidence.setup.meters.push_back(edges);
+  c.evidence.setup.estimators.push_back(edges);
   c.Solve();
   const SystematicPart* part = c.Part("edges against texture");
   ASSERT_NE(part, nullptr);
@@ -136,12 +136,12 @@ TEST(AddSystematicParts, ATextureAloneKeepsTheKnifeEdgesFloor) {
 
 // ---- how parts add up ----
 
-// The meters' own part of kappa, with the pitch's, in quadrature, each way.
-TEST(AddSystematicParts, TheMetersOwnErrorIsInKappa) {
+// The estimators' own part of kappa, with the pitch's, in quadrature, each way.
+TEST(AddSystematicParts, TheEstimatorsOwnErrorIsInKappa) {
   FocusCase c = FocusCase().WithTexture(kErrorPx2).WithTrueFloor();
   c.sweep.camera.statements["sensor.pixel_pitch_mm"] = {0.004 * c.bench.pitch_mm, false};
   c.Solve();
-  const SystematicPart* own = c.Part("blur meter");
+  const SystematicPart* own = c.Part("blur estimator");
   ASSERT_NE(own, nullptr);
   EXPECT_NEAR(own->blur_ratio.y(), 0.003 * 0.45, 1e-6);
   EXPECT_NEAR(own->blur_ratio.x(), -0.003 * 0.45, 1e-6);
@@ -187,7 +187,7 @@ TEST(AddSystematicParts, TheShapesRemedyIsToStateTheBetterOne) {
   for (const model::Psf better : {model::Psf::kGaussian, model::Psf::kDisc}) {
     FocusCase c = FocusCase().WithTexture(kErrorPx2).WithTrueFloor();
     c.evidence.better_psf = better;
-    c.evidence.other_psf = c.evidence.setup.meters[0];
+    c.evidence.other_psf = c.evidence.setup.estimators[0];
     c.Solve();
     const SystematicPart* part = c.Part("shape of the blur");
     ASSERT_NE(part, nullptr);

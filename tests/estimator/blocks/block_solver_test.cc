@@ -36,7 +36,7 @@ using testing::NoiseInput;
 using testing::WithSolverCamera;
 using thicklens::testing::ErrorOf;
 
-std::shared_ptr<kernels::Backend> Twin() {
+std::shared_ptr<kernels::Backend> NewReferenceBackend() {
   return kernels::OpenBackend(kernels::ParseDeviceRequest("cpu"), nullptr);
 }
 
@@ -68,21 +68,21 @@ EstimateInput MakeCameraInput(const MadeUp& made_up, const model::LightFieldPlan
                           [=](int x) { return depth_mm + slope_mm_per_px * x; });
 }
 
-// H and D, dense, for one block that is the whole picture.
+// H and D, dense, for one block that is the whole image.
 struct Dense {
   Eigen::MatrixXd h, d;
 };
 
 int RayOf(const EstimateInput& input, int i, int j, int k, int l) {
-  return ((l * static_cast<int>(input.weights.cols()) + k) * input.picture.height_px + j) *
-             input.picture.width_px +
+  return ((l * static_cast<int>(input.weights.cols()) + k) * input.image.height_px + j) *
+             input.image.width_px +
          i;
 }
 
-// The point where ray (i, j, k, l) lands, from [S16] and the orientation of the picture.
+// The point where ray (i, j, k, l) lands, from [S16] and the orientation of the image.
 Eigen::Vector2d LandingPx(const EstimateInput& input, int i, int j, int k, int l) {
   if (!input.grid) return {i, j};
-  return model::PicturePositionPx(
+  return model::ImagePositionPx(
       input.camera->sensor,
       model::LandingPointMm(input.camera->lens, input.camera->image_distance_mm(),
                             input.grid->planes, input.grid->RayAt(i, j, k, l)));
@@ -91,8 +91,8 @@ Eigen::Vector2d LandingPx(const EstimateInput& input, int i, int j, int k, int l
 double HatPx(double distance_px) { return std::max(0.0, 1 - std::abs(distance_px)); }
 
 Dense DenseOf(const EstimateInput& input, bool falloff) {
-  const int width = input.picture.width_px;
-  const int height = input.picture.height_px;
+  const int width = input.image.width_px;
+  const int height = input.image.height_px;
   const int u_count = static_cast<int>(input.weights.cols());
   const int v_count = static_cast<int>(input.weights.rows());
   const int rays = width * height * u_count * v_count;
@@ -125,7 +125,7 @@ Dense DenseOf(const EstimateInput& input, bool falloff) {
                   input.weights(l, k) * HatPx(x - at.x()) * HatPx(y - at.y());
             }
           }
-          // Rays that land nearest to no pixel of the picture are not of the block.
+          // Rays that land nearest to no pixel of the image are not of the block.
           const bool inside = std::floor(at.x() + 0.5) >= 0 && std::floor(at.x() + 0.5) < width &&
                               std::floor(at.y() + 0.5) >= 0 && std::floor(at.y() + 0.5) < height;
           if (!inside) dense.h.col(ray).setZero();
@@ -212,12 +212,12 @@ void ExpectDenseSolution(const EstimateInput& input, BlockOptions options) {
                                  mu * Eigen::MatrixXd::Identity(dense.h.cols(), dense.h.cols());
   const model::LightField prior = WarpedLightField(input, options.falloff, 1);
   const Eigen::VectorXd right =
-      dense.h.transpose() * ChannelOf(input.picture.values, 0, input.picture.channels) +
+      dense.h.transpose() * ChannelOf(input.image.values, 0, input.image.channels) +
       mu * AllOfIt(prior.values);
   const Eigen::VectorXd expected = normal.ldlt().solve(right);
 
-  EstimateSummary summary;
-  const auto backend = Twin();
+  BlockSummary summary;
+  const auto backend = NewReferenceBackend();
   const model::LightField found = EstimateByBlocks(input, options, backend.get(), &summary);
   EXPECT_LT((AllOfIt(found.values) - expected).lpNorm<Eigen::Infinity>(), 2e-6);
   EXPECT_LT(summary.relative_residual, 1e-12);
@@ -257,19 +257,20 @@ TEST(BlockSolver, WithoutTheFallOffTheCameraHasNone) {
   ExpectDenseSolution(MakeCameraInput({}, {0, 800}, 700, 25), options);
 }
 
-TEST(BlockSolver, AConstantPictureHasAConstantLightField) {
+TEST(BlockSolver, AConstantImageHasAConstantLightField) {
   MadeUp made_up{21, 13, 3, 3, 3, 1.3, -0.9, 0.8, 1};
   EstimateInput input = MakeInput(made_up);
-  for (std::size_t i = 0; i < input.picture.values.size(); ++i) {
-    input.picture.values[i] = 0.2F * static_cast<float>(i % 3 + 1);
+  for (std::size_t i = 0; i < input.image.values.size(); ++i) {
+    input.image.values[i] = 0.2F * static_cast<float>(i % 3 + 1);
   }
   for (const Stencil stencil : {Stencil::kWarp, Stencil::kSource}) {
     if (stencil == Stencil::kSource && !IsBuiltIn(BlockSolver::kUmfpack)) continue;
     BlockOptions options;
     options.stencil = stencil;
     options.block_px = 8;
-    EstimateSummary summary;
-    const model::LightField found = EstimateByBlocks(input, options, Twin().get(), &summary);
+    BlockSummary summary;
+    const model::LightField found =
+        EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary);
     for (int channel = 0; channel < 3; ++channel) {
       const std::size_t begin = found.ViewStart(channel, 0, 0);
       for (std::size_t i = 0; i < 9 * found.view_size(); ++i) {
@@ -285,8 +286,9 @@ TEST(BlockSolver, OneThreadAndTwoGiveTheSameBits) {
   for (const int threads : {1, 2, 3}) {
     BlockOptions options;
     options.threads = threads;
-    EstimateSummary summary;
-    const model::LightField found = EstimateByBlocks(input, options, Twin().get(), &summary);
+    BlockSummary summary;
+    const model::LightField found =
+        EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary);
     EXPECT_EQ(summary.blocks.size(), 9u);  // 3 x 3 blocks of 16 px, those at the border smaller
     if (first.empty()) first = found.values;
     EXPECT_EQ(found.values, first);
@@ -295,16 +297,16 @@ TEST(BlockSolver, OneThreadAndTwoGiveTheSameBits) {
 
 TEST(BlockSolver, AFactorServesAllChannels) {
   const EstimateInput colour = MakeInput({20, 18, 3, 3, 3, 1.1, -0.7, 0, 4});
-  EstimateSummary summary;
-  const model::LightField all = EstimateByBlocks(colour, {}, Twin().get(), &summary);
+  BlockSummary summary;
+  const model::LightField all = EstimateByBlocks(colour, {}, NewReferenceBackend().get(), &summary);
   for (int channel = 0; channel < 3; ++channel) {
     EstimateInput grey = colour;
-    grey.picture.channels = 1;
-    grey.picture.values.clear();
-    for (std::size_t i = Index(channel); i < colour.picture.values.size(); i += 3) {
-      grey.picture.values.push_back(colour.picture.values[i]);
+    grey.image.channels = 1;
+    grey.image.values.clear();
+    for (std::size_t i = Index(channel); i < colour.image.values.size(); i += 3) {
+      grey.image.values.push_back(colour.image.values[i]);
     }
-    const model::LightField one = EstimateByBlocks(grey, {}, Twin().get(), &summary);
+    const model::LightField one = EstimateByBlocks(grey, {}, NewReferenceBackend().get(), &summary);
     const auto begin =
         all.values.begin() + static_cast<std::ptrdiff_t>(all.ViewStart(channel, 0, 0));
     EXPECT_TRUE(std::equal(one.values.begin(), one.values.end(), begin)) << channel;
@@ -320,8 +322,8 @@ TEST(BlockSolver, SolversAgree) {
     options.solver = solver;
     options.tolerance = 1e-12;
     options.max_iterations = 5000;
-    EstimateSummary summary;
-    found.push_back(EstimateByBlocks(input, options, Twin().get(), &summary));
+    BlockSummary summary;
+    found.push_back(EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary));
     EXPECT_EQ(found.back().origin.block_solver, BlockSolverName(solver));
     // Stored in float, 6e-8 for values below 1; the solutions themselves agree to 1e-8 and better.
     EXPECT_LT(LargestDifference(found.back().values, found.front().values), 1.3e-7);
@@ -340,8 +342,9 @@ TEST(BlockSolver, IterationsThatAreCutShortSaySo) {
     BlockOptions options;
     options.solver = solver;
     options.max_iterations = 3;
-    EstimateSummary summary;
-    const model::LightField found = EstimateByBlocks(input, options, Twin().get(), &summary);
+    BlockSummary summary;
+    const model::LightField found =
+        EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary);
     EXPECT_FALSE(summary.converged);
     EXPECT_GT(summary.relative_residual, options.tolerance);
     EXPECT_LE(summary.relative_residual, 1);
@@ -351,17 +354,18 @@ TEST(BlockSolver, IterationsThatAreCutShortSaySo) {
   }
 }
 
-TEST(BlockSolver, DeviceAndTwinAgree) {
+TEST(BlockSolver, DeviceAndReferenceAgree) {
   const EstimateInput input = MakeInput({33, 20, 3, 3, 5, 1.1, -0.7, 0.6, 4});
   const auto device = kernels::OpenBackend(kernels::ParseDeviceRequest("opencl"), nullptr);
   for (const Stencil stencil : {Stencil::kWarp, Stencil::kSource}) {
     BlockOptions options;
     options.stencil = stencil;
     options.rcond_min = 0;
-    EstimateSummary summary;
+    BlockSummary summary;
     const model::LightField there = EstimateByBlocks(input, options, device.get(), &summary);
     EXPECT_THAT(summary.device, HasSubstr("opencl"));
-    const model::LightField here = EstimateByBlocks(input, options, Twin().get(), &summary);
+    const model::LightField here =
+        EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary);
     EXPECT_LT(LargestDifference(there.values, here.values), 1.3e-7);
   }
 }
@@ -373,25 +377,28 @@ TEST(BlockSolver, WithoutARidgeTheResidualIsPerfectAndTheLightFieldIsNot) {
   EstimateInput input = MakeInput({16, 16, 1, 3, 3, 1.6, 1.6, 0, 2});
   BlockOptions options;
   options.solver = BlockSolver::kUmfpack;
-  EstimateSummary summary;
-  const model::LightField good = EstimateByBlocks(input, options, Twin().get(), &summary);
+  BlockSummary summary;
+  const model::LightField good =
+      EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary);
   const double good_range = AllOfIt(good.values).lpNorm<Eigen::Infinity>();
   EXPECT_LT(good_range, 6);
 
   options.ridge = 0;
-  EXPECT_THAT(ErrorOf([&] { EstimateByBlocks(input, options, Twin().get(), &summary); }),
-              AllOf(HasSubstr("block of 16x16 px at (0, 0)"), HasSubstr("rcond is"),
-                    HasSubstr("at least 1e-12"), HasSubstr("ridge")));
+  EXPECT_THAT(
+      ErrorOf([&] { EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary); }),
+      AllOf(HasSubstr("block of 16x16 px at (0, 0)"), HasSubstr("rcond is"),
+            HasSubstr("at least 1e-12"), HasSubstr("ridge")));
 
   options.rcond_min = 0;  // the guard is off
-  const model::LightField garbage = EstimateByBlocks(input, options, Twin().get(), &summary);
+  const model::LightField garbage =
+      EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary);
   EXPECT_LT(summary.rcond_min.value_or(1), 1e-12);
   EXPECT_LT(summary.relative_residual, 1e-8);
-  const auto kernels = Twin()->NewFloat();
-  const model::LinearPicture again =
+  const auto kernels = NewReferenceBackend()->NewFloat();
+  const model::LinearImage again =
       Photograph(garbage, input.weights, nullptr, nullptr, kernels.get(), 1);
   const double reprojection =
-      (AllOfIt(again.values) - AllOfIt(input.picture.values)).lpNorm<Eigen::Infinity>();
+      (AllOfIt(again.values) - AllOfIt(input.image.values)).lpNorm<Eigen::Infinity>();
   const double range = AllOfIt(garbage.values).lpNorm<Eigen::Infinity>();
   EXPECT_LT(reprojection, 1e-5 * range);
   EXPECT_GT(range, 100 * good_range) << "rcond " << *summary.rcond_min;
@@ -399,9 +406,10 @@ TEST(BlockSolver, WithoutARidgeTheResidualIsPerfectAndTheLightFieldIsNot) {
 
 TEST(BlockSolver, RefusesWhatCannotBeMeant) {
   const EstimateInput good = MakeInput({});
-  EstimateSummary summary;
+  BlockSummary summary;
   const auto message = [&](const EstimateInput& input, const BlockOptions& options) {
-    return ErrorOf([&] { EstimateByBlocks(input, options, Twin().get(), &summary); });
+    return ErrorOf(
+        [&] { EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary); });
   };
   BlockOptions options;
   options.gamma = 0;
@@ -428,7 +436,7 @@ TEST(BlockSolver, RefusesWhatCannotBeMeant) {
   input.disparity.disparity[3] = std::numeric_limits<float>::quiet_NaN();
   EXPECT_THAT(message(input, {}), HasSubstr("holes"));
   input = good;
-  input.picture.values[3] = std::numeric_limits<float>::infinity();
+  input.image.values[3] = std::numeric_limits<float>::infinity();
   EXPECT_THAT(message(input, {}), HasSubstr("not finite"));
   input = good;
   input.disparity.disparity[3] = 12.5F;
@@ -436,13 +444,13 @@ TEST(BlockSolver, RefusesWhatCannotBeMeant) {
   input = MakeCameraInput({}, {100, 500}, 700, 10);
   EXPECT_THAT(message(input, {}), AllOf(HasSubstr("UV plane"), HasSubstr("100 mm")));
   input = good;
-  input.picture.channels = 0;
+  input.image.channels = 0;
   EXPECT_THAT(message(input, {}), HasSubstr("0 channels"));
 }
 
-TEST(BlockSolver, BlocksLargerThanThePictureAreThePicture) {
-  EstimateSummary summary;
-  EstimateByBlocks(MakeInput({}), OneBlock(), Twin().get(), &summary);
+TEST(BlockSolver, BlocksLargerThanTheImageAreTheImage) {
+  BlockSummary summary;
+  EstimateByBlocks(MakeInput({}), OneBlock(), NewReferenceBackend().get(), &summary);
   EXPECT_EQ(summary.block_px, 12);
   ASSERT_EQ(summary.blocks.size(), 1u);
   EXPECT_EQ(summary.blocks[0].width_px, 12);
@@ -453,27 +461,29 @@ TEST(BlockSolver, TheMemoryLimitChoosesTheBlocks) {
   const EstimateInput input = MakeInput({64, 48, 1, 3, 3, 1.1, -0.7, 0, 4});
   BlockOptions options;
   options.memory_limit_mib = 1;
-  EstimateSummary summary;
-  EXPECT_THAT(ErrorOf([&] { EstimateByBlocks(input, options, Twin().get(), &summary); }),
-              AllOf(HasSubstr("memory limit 1 MiB"), HasSubstr("must be at least")));
+  BlockSummary summary;
+  EXPECT_THAT(
+      ErrorOf([&] { EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary); }),
+      AllOf(HasSubstr("memory limit 1 MiB"), HasSubstr("must be at least")));
   options.memory_limit_mib = 1e5;
-  EstimateByBlocks(input, options, Twin().get(), &summary);
+  EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary);
   EXPECT_EQ(summary.block_px, 64);
   const double all = summary.predicted_memory_mib;
   // Known to be too much from smaller blocks.
   options.block_px = 64;
   options.memory_limit_mib = 0.7 * all;
-  EXPECT_THAT(ErrorOf([&] { EstimateByBlocks(input, options, Twin().get(), &summary); }),
-              AllOf(HasSubstr("blocks of 64 px need"), HasSubstr("or the blocks smaller")));
+  EXPECT_THAT(
+      ErrorOf([&] { EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary); }),
+      AllOf(HasSubstr("blocks of 64 px need"), HasSubstr("or the blocks smaller")));
   options.memory_limit_mib.reset();
   options.block_px = 4;
-  EstimateByBlocks(input, options, Twin().get(), &summary);
+  EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary);
   EXPECT_EQ(summary.block_px, 4);
   EXPECT_LT(summary.predicted_memory_mib, all);
   options.block_px.reset();
   options.memory_limit_mib =
       summary.predicted_memory_mib + 0.5 * (all - summary.predicted_memory_mib);
-  EstimateByBlocks(input, options, Twin().get(), &summary);
+  EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary);
   EXPECT_GT(summary.block_px, 4);
   EXPECT_LT(summary.block_px, 64);
   EXPECT_LE(summary.predicted_memory_mib, *options.memory_limit_mib);
@@ -490,13 +500,14 @@ TEST(BlockSolver, ProgressCountsBlocksAndMayStop) {
     last = done;
     ++calls;
   };
-  EstimateSummary summary;
+  BlockSummary summary;
   EXPECT_EQ(summary.message, "not run");
-  EstimateByBlocks(input, options, Twin().get(), &summary);
+  EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary);
   EXPECT_EQ(calls, 9);
   EXPECT_THAT(summary.message, HasSubstr("9 blocks of 16 px"));
   options.progress = [](int, int) { throw Interrupted(); };
-  EXPECT_THROW(EstimateByBlocks(input, options, Twin().get(), &summary), Interrupted);
+  EXPECT_THROW(EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary),
+               Interrupted);
 }
 
 // Keeps blocks as floats, as a file does, and counts.
@@ -542,8 +553,9 @@ TEST(BlockSolver, GoesOnFromTheBlocksOfAStoreToTheSameBits) {
     options.solver = solver;
     options.block_px = 5;
     options.threads = 2;
-    EstimateSummary whole;
-    const model::LightField expected = EstimateByBlocks(input, options, Twin().get(), &whole);
+    BlockSummary whole;
+    const model::LightField expected =
+        EstimateByBlocks(input, options, NewReferenceBackend().get(), &whole);
     ASSERT_EQ(whole.blocks.size(), 8U);
     EXPECT_EQ(whole.blocks_from_store, 0);
 
@@ -552,15 +564,17 @@ TEST(BlockSolver, GoesOnFromTheBlocksOfAStoreToTheSameBits) {
     options.progress = [](int done, int) {
       if (done >= 3) throw std::runtime_error("stop");
     };
-    EstimateSummary cut;
-    EXPECT_THROW(EstimateByBlocks(input, options, Twin().get(), &cut), std::runtime_error);
+    BlockSummary cut;
+    EXPECT_THROW(EstimateByBlocks(input, options, NewReferenceBackend().get(), &cut),
+                 std::runtime_error);
     const int kept = store.kept;
     ASSERT_GE(kept, 3);
     ASSERT_LT(kept, 8);
 
     options.progress = {};
-    EstimateSummary resumed;
-    const model::LightField found = EstimateByBlocks(input, options, Twin().get(), &resumed);
+    BlockSummary resumed;
+    const model::LightField found =
+        EstimateByBlocks(input, options, NewReferenceBackend().get(), &resumed);
     EXPECT_EQ(found.values, expected.values);
     EXPECT_EQ(resumed.blocks_from_store, kept);
     EXPECT_EQ(store.kept, 8);
@@ -578,11 +592,12 @@ TEST(BlockSolver, BlocksOfAStoreThatCannotBeAreSolvedAgain) {
   const EstimateInput input = MakeInput({});
   BlockOptions options;
   options.block_px = 6;
-  EstimateSummary summary;
-  const model::LightField expected = EstimateByBlocks(input, options, Twin().get(), &summary);
+  BlockSummary summary;
+  const model::LightField expected =
+      EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary);
   StoreInMemory right;
   options.store = &right;
-  EstimateByBlocks(input, options, Twin().get(), &summary);
+  EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary);
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   const std::vector<std::function<void(SolvedBlock*)>> damages = {
       [](SolvedBlock* block) { block->report.x += 6; },
@@ -605,7 +620,8 @@ TEST(BlockSolver, BlocksOfAStoreThatCannotBeAreSolvedAgain) {
     store.blocks = right.blocks;
     damages[i](&store.blocks.at(1));
     options.store = &store;
-    const model::LightField found = EstimateByBlocks(input, options, Twin().get(), &summary);
+    const model::LightField found =
+        EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary);
     EXPECT_EQ(found.values, expected.values);
     EXPECT_EQ(store.kept, 1);
     EXPECT_EQ(summary.blocks_from_store, static_cast<int>(right.blocks.size()) - 1);
@@ -617,18 +633,18 @@ TEST(BlockSolver, AStoreGetsEverythingThatBlocksDependOn) {
   MadeUp made_up;
   made_up.width_px = made_up.height_px = 8;
   const model::LightFieldPlanes planes{0, 780};
-  const auto told = [](const EstimateInput& input, BlockOptions options) {
+  const auto reported = [](const EstimateInput& input, BlockOptions options) {
     StoreInMemory store;
     options.store = &store;
-    EstimateSummary summary;
-    EstimateByBlocks(input, options, Twin().get(), &summary);
+    BlockSummary summary;
+    EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary);
     return std::make_pair(store.settings, store.data_bytes);
   };
   const EstimateInput usual = MakeCameraInput(made_up, planes, 800, 1);
-  const auto of_usual = told(usual, {});
+  const auto of_usual = reported(usual, {});
   BlockOptions threads;
   threads.threads = 2;
-  EXPECT_EQ(told(usual, threads), of_usual) << "the result does not depend on them";
+  EXPECT_EQ(reported(usual, threads), of_usual) << "the result does not depend on them";
 
   const std::vector<std::function<void(BlockOptions*)>> settings = {
       [](BlockOptions* o) { o->gamma = 2; },
@@ -642,25 +658,25 @@ TEST(BlockSolver, AStoreGetsEverythingThatBlocksDependOn) {
   for (std::size_t i = 0; i < settings.size(); ++i) {
     BlockOptions options;
     settings[i](&options);
-    EXPECT_NE(told(usual, options), of_usual) << i;
+    EXPECT_NE(reported(usual, options), of_usual) << i;
   }
   BlockOptions iterative;
   iterative.solver = BlockSolver::kCg;
-  const auto of_iterative = told(usual, iterative);
+  const auto of_iterative = reported(usual, iterative);
   BlockOptions other = iterative;
   other.tolerance = 1e-5;
-  EXPECT_NE(told(usual, other), of_iterative);
+  EXPECT_NE(reported(usual, other), of_iterative);
   other = iterative;
   other.max_iterations = 999;
-  EXPECT_NE(told(usual, other), of_iterative);
+  EXPECT_NE(reported(usual, other), of_iterative);
   BlockOptions stencil;
   stencil.solver = BlockSolver::kEigen;
-  const auto of_warp = told(usual, stencil);
+  const auto of_warp = reported(usual, stencil);
   stencil.stencil = Stencil::kSource;
-  EXPECT_NE(told(usual, stencil), of_warp);
+  EXPECT_NE(reported(usual, stencil), of_warp);
 
   const std::vector<std::function<void(EstimateInput*)>> inputs = {
-      [](EstimateInput* input) { input->picture.values[5] += 1e-6F; },
+      [](EstimateInput* input) { input->image.values[5] += 1e-6F; },
       [](EstimateInput* input) { input->disparity.disparity[5] *= 1.000001F; },
       [](EstimateInput* input) { input->disparity.step.x() *= 1 + 1e-9; },
       [](EstimateInput* input) {
@@ -671,16 +687,17 @@ TEST(BlockSolver, AStoreGetsEverythingThatBlocksDependOn) {
   for (std::size_t i = 0; i < inputs.size(); ++i) {
     EstimateInput input = usual;
     inputs[i](&input);
-    EXPECT_NE(told(input, {}), of_usual) << i;
+    EXPECT_NE(reported(input, {}), of_usual) << i;
   }
-  EXPECT_NE(told(MakeCameraInput(made_up, {0, 781}, 800, 1), {}), of_usual);
+  EXPECT_NE(reported(MakeCameraInput(made_up, {0, 781}, 800, 1), {}), of_usual);
 }
 
-// Rays that land beside the picture are in no block.
-TEST(BlockSolver, RaysBesideThePictureKeepThePrior) {
+// Rays that land beside the image are in no block.
+TEST(BlockSolver, RaysBesideTheImageKeepThePrior) {
   const EstimateInput input = MakeCameraInput({}, {0, 500}, 700, 10);
-  EstimateSummary summary;
-  const model::LightField found = EstimateByBlocks(input, {}, Twin().get(), &summary);
+  BlockSummary summary;
+  const model::LightField found =
+      EstimateByBlocks(input, {}, NewReferenceBackend().get(), &summary);
   const model::LightField prior = WarpedLightField(input, true, 1);
   int beside = 0;
   for (int k = 0; k < 3; ++k) {
@@ -699,9 +716,9 @@ TEST(BlockSolver, TheLightFieldSaysHowItWasMade) {
   BlockOptions options;
   options.gamma = 2;
   options.ridge = 0.01;
-  EstimateSummary summary;
-  const model::LightField found =
-      EstimateByBlocks(MakeCameraInput({}, {0, 800}, 700, 25), options, Twin().get(), &summary);
+  BlockSummary summary;
+  const model::LightField found = EstimateByBlocks(MakeCameraInput({}, {0, 800}, 700, 25), options,
+                                                   NewReferenceBackend().get(), &summary);
   EXPECT_EQ(found.origin.method, "blocks");
   EXPECT_EQ(found.origin.gamma, 2);
   EXPECT_EQ(found.origin.ridge, 0.01);

@@ -21,11 +21,11 @@ std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 EstimateInput PatchBeforeASlant() {
   constexpr int kWidth = 23, kHeight = 19;
   EstimateInput input;
-  input.picture = {kWidth, kHeight, 3, {}};
+  input.image = {kWidth, kHeight, 3, {}};
   std::mt19937 engine(3);
   std::uniform_real_distribution<float> uniform(0, 1);
-  input.picture.values.resize(Index(kWidth * kHeight * 3));
-  for (float& value : input.picture.values) value = uniform(engine);
+  input.image.values.resize(Index(kWidth * kHeight * 3));
+  for (float& value : input.image.values) value = uniform(engine);
   input.disparity.width_px = kWidth;
   input.disparity.height_px = kHeight;
   for (int y = 0; y < kHeight; ++y) {
@@ -62,7 +62,7 @@ class BlockSystemTest : public ::testing::TestWithParam<Stencil> {
   const RayField rays_{input_, false, 1};
 };
 
-TEST_P(BlockSystemTest, DeviceAndTwinMakeTheSameSystem) {
+TEST_P(BlockSystemTest, DeviceAndReferenceMakeTheSameSystem) {
   const BlockSystem there = SystemOn(Open("opencl").get());
   const BlockSystem here = SystemOn(Open("cpu").get());
   EXPECT_EQ(there.matrix.column, here.matrix.column);

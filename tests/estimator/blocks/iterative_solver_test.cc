@@ -29,9 +29,9 @@ CsrMatrix<double> Diagonal(const std::vector<double>& values) {
 }
 
 // Returns what `answer` makes of the solution, and always claims to be done.
-class Believer : public IterativeMethod {
+class OverconfidentMethod : public IterativeMethod {
  public:
-  explicit Believer(std::function<double(double solution, double tolerance)> answer)
+  explicit OverconfidentMethod(std::function<double(double solution, double tolerance)> answer)
       : answer_(std::move(answer)) {}
   double BytesOf(const CsrMatrix<double>& /*matrix*/) const override { return 0; }
   void SetMatrix(const CsrMatrix<double>& matrix) override { diagonal_ = matrix.value; }
@@ -59,7 +59,7 @@ struct Answer {
 Answer Solved(std::function<double(double, double)> answer, const LinearSolverLimits& limits) {
   const CsrMatrix<double> matrix = Diagonal({2, 5, -3});
   const std::vector<double> b = {1, -2, 4};
-  IterativeSolver solver(std::make_unique<Believer>(std::move(answer)), limits);
+  IterativeSolver solver(std::make_unique<OverconfidentMethod>(std::move(answer)), limits);
   solver.Factorize(matrix);
   Answer result;
   result.x = solver.Solve(b);
@@ -136,7 +136,7 @@ TEST(IterativeSolverTest, StartsFromWhatIsNearAndNeverLeavesItForWorse) {
 }
 
 // An indefinite matrix on which BiCGSTAB breaks down: Eigen calls that success.
-TEST(IterativeSolverTest, DoesNotBelieveEigensSuccess) {
+TEST(IterativeSolverTest, DoesNotTrustEigensSuccess) {
   CsrMatrix<double> turn;  // (0 1; -1 0): r0 . A p = 0 at once
   turn.rows = turn.columns = 2;
   turn.row_start = {0, 1, 2};

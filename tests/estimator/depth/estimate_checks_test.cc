@@ -143,7 +143,7 @@ TEST(DepthNoise, OfSmallAndLargeMaps) {
 
 class ResidualPatchesTest : public ::testing::Test {
  protected:
-  ResidualPatchesTest() : hidden_share_(kPixels, 0.0F) {
+  ResidualPatchesTest() : occluded_fraction_(kPixels, 0.0F) {
     std::mt19937 engine(3);
     std::normal_distribution<float> noise(0, static_cast<float>(kNoise));
     for (std::size_t i = 0; i < kPixels; ++i) residual_.push_back(noise(engine));
@@ -154,13 +154,13 @@ class ResidualPatchesTest : public ::testing::Test {
     }
   }
   std::vector<ResidualPatch> Patches(double noise_sigma = kNoise) const {
-    return ResidualPatches(residual_, hidden_share_, kW, kH, noise_sigma);
+    return ResidualPatches(residual_, occluded_fraction_, kW, kH, noise_sigma);
   }
 
   static constexpr int kW = 200, kH = 100;
   static constexpr std::size_t kPixels = 20000;
   static constexpr double kNoise = 0.004;
-  std::vector<float> residual_, hidden_share_;
+  std::vector<float> residual_, occluded_fraction_;
 };
 
 TEST_F(ResidualPatchesTest, NoiseIsNone) {
@@ -193,52 +193,52 @@ TEST_F(ResidualPatchesTest, MustBeFarAboveTheNoiseAndTheMedianBlock) {
   EXPECT_THAT(Patches(0), IsEmpty());  // 3.9 times the median block
 }
 
-TEST_F(ResidualPatchesTest, DoNotCountWhatIsHidden) {
+TEST_F(ResidualPatchesTest, DoNotCountWhatIsOccluded) {
   Fill(&residual_, 64, 32, 32, 32, 0.05F);
-  Fill(&hidden_share_, 64, 32, 32, 16, 0.5F);
+  Fill(&occluded_fraction_, 64, 32, 32, 16, 0.5F);
   EXPECT_THAT(Patches(), SizeIs(1));
-  Fill(&hidden_share_, 64, 32, 32, 26, 0.5F);  // less than a quarter is left
+  Fill(&occluded_fraction_, 64, 32, 32, 26, 0.5F);  // less than a quarter is left
   EXPECT_THAT(Patches(), IsEmpty());
   // Large along an edge, and usual beside it.
   Fill(&residual_, 128, 0, 4, 32, 0.3F);
-  Fill(&hidden_share_, 128, 0, 4, 32, 0.02F);
+  Fill(&occluded_fraction_, 128, 0, 4, 32, 0.02F);
   EXPECT_THAT(Patches(), IsEmpty());
-  hidden_share_.assign(kPixels, 1.0F);
+  occluded_fraction_.assign(kPixels, 1.0F);
   EXPECT_THAT(Patches(), IsEmpty());
 }
 
 TEST_F(ResidualPatchesTest, UnexplainedShareCountsBlocksAboveTheNoise) {
   // 7 x 4 blocks, one of them at the right border and four at the lower one.
-  EXPECT_EQ(UnexplainedShare(residual_, hidden_share_, kW, kH, kNoise), 0);
+  EXPECT_EQ(UnexplainedShare(residual_, occluded_fraction_, kW, kH, kNoise), 0);
   // If every block has the residual, it is not a patch, but it is unexplained.
   for (float& value : residual_) value *= 2.5F;
-  EXPECT_EQ(UnexplainedShare(residual_, hidden_share_, kW, kH, kNoise), 1);
+  EXPECT_EQ(UnexplainedShare(residual_, occluded_fraction_, kW, kH, kNoise), 1);
   EXPECT_THAT(Patches(), IsEmpty());
   for (float& value : residual_) value /= 2.5F;
   Fill(&residual_, 32, 0, 64, 96, 0.0061F);  // 6 blocks of 28
-  EXPECT_DOUBLE_EQ(*UnexplainedShare(residual_, hidden_share_, kW, kH, kNoise), 6.0 / 28);
-  EXPECT_EQ(UnexplainedShare(residual_, hidden_share_, kW, kH, 1.1 * kNoise), 0);
+  EXPECT_DOUBLE_EQ(*UnexplainedShare(residual_, occluded_fraction_, kW, kH, kNoise), 6.0 / 28);
+  EXPECT_EQ(UnexplainedShare(residual_, occluded_fraction_, kW, kH, 1.1 * kNoise), 0);
 }
 
-TEST_F(ResidualPatchesTest, UnexplainedShareLeavesOutWhatIsHidden) {
+TEST_F(ResidualPatchesTest, UnexplainedShareLeavesOutWhatIsOccluded) {
   Fill(&residual_, 32, 0, 64, 96, 0.0061F);
-  Fill(&hidden_share_, 32, 0, 32, 96, 0.5F);  // 3 of the 6
-  EXPECT_DOUBLE_EQ(*UnexplainedShare(residual_, hidden_share_, kW, kH, kNoise), 3.0 / 25);
-  hidden_share_.assign(kPixels, 1.0F);
-  EXPECT_FALSE(UnexplainedShare(residual_, hidden_share_, kW, kH, kNoise).has_value());
+  Fill(&occluded_fraction_, 32, 0, 32, 96, 0.5F);  // 3 of the 6
+  EXPECT_DOUBLE_EQ(*UnexplainedShare(residual_, occluded_fraction_, kW, kH, kNoise), 3.0 / 25);
+  occluded_fraction_.assign(kPixels, 1.0F);
+  EXPECT_FALSE(UnexplainedShare(residual_, occluded_fraction_, kW, kH, kNoise).has_value());
   // A tenth of the 28 pixels would be three, so two say nothing about the whole.
-  Fill(&hidden_share_, 0, 0, 64, 32, 0);
-  EXPECT_FALSE(UnexplainedShare(residual_, hidden_share_, kW, kH, kNoise).has_value());
-  Fill(&hidden_share_, 64, 0, 32, 32, 0);
-  EXPECT_TRUE(UnexplainedShare(residual_, hidden_share_, kW, kH, kNoise).has_value());
+  Fill(&occluded_fraction_, 0, 0, 64, 32, 0);
+  EXPECT_FALSE(UnexplainedShare(residual_, occluded_fraction_, kW, kH, kNoise).has_value());
+  Fill(&occluded_fraction_, 64, 0, 32, 32, 0);
+  EXPECT_TRUE(UnexplainedShare(residual_, occluded_fraction_, kW, kH, kNoise).has_value());
 }
 
 TEST_F(ResidualPatchesTest, SizesThatDoNotFitAreNamed) {
-  EXPECT_THAT(ErrorOf([&] { ResidualPatches(residual_, hidden_share_, kW, kH + 1, kNoise); }),
+  EXPECT_THAT(ErrorOf([&] { ResidualPatches(residual_, occluded_fraction_, kW, kH + 1, kNoise); }),
               AllOf(HasSubstr("20000"), HasSubstr("20200")));
-  hidden_share_.pop_back();
+  occluded_fraction_.pop_back();
   EXPECT_THAT(ErrorOf([&] { Patches(); }), HasSubstr("19999"));
-  EXPECT_THAT(ErrorOf([&] { UnexplainedShare(residual_, hidden_share_, kW, kH, kNoise); }),
+  EXPECT_THAT(ErrorOf([&] { UnexplainedShare(residual_, occluded_fraction_, kW, kH, kNoise); }),
               HasSubstr("19999"));
 }
 

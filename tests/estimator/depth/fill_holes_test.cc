@@ -31,7 +31,7 @@ struct Case {
   int width, height;
   Surface truth;
   Mask is_hole;
-  Surface light = [](int, int) { return 0.2; };  // of the picture
+  Surface light = [](int, int) { return 0.2; };  // of the image
 
   std::size_t At(int x, int y) const {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
@@ -44,12 +44,12 @@ struct Case {
     });
     return map;
   }
-  model::LinearPicture Picture() const {
-    model::LinearPicture picture{width, height, 1, {}};
-    ForAll([&](int x, int y) { picture.values.push_back(static_cast<float>(light(x, y))); });
-    return picture;
+  model::LinearImage Image() const {
+    model::LinearImage image{width, height, 1, {}};
+    ForAll([&](int x, int y) { image.values.push_back(static_cast<float>(light(x, y))); });
+    return image;
   }
-  DisparityMap Filled() const { return FillHoles(Map(), Picture(), nullptr); }
+  DisparityMap Filled() const { return FillHoles(Map(), Image(), nullptr); }
   void ForAll(const std::function<void(int, int)>& visit) const {
     for (int y = 0; y < height; ++y) {
       for (int x = 0; x < width; ++x) visit(x, y);
@@ -84,7 +84,7 @@ std::vector<HoleCase> HolesOfAPlane() {
 }
 class FillHolesOfAPlane : public ::testing::TestWithParam<HoleCase> {};
 
-// 1/z of a plane is linear in the picture, and so is its disparity.
+// 1/z of a plane is linear in the image, and so is its disparity.
 TEST_P(FillHolesOfAPlane, GivesItBack) {
   const Case plane{64, 48, Plane, GetParam().is_hole};
   const DisparityMap full = plane.Filled();
@@ -103,7 +103,7 @@ TEST(FillHoles, LeavesWhatIsKnownAndCountsTheRest) {
                    [&](int, int) { return is_hole(engine); }};
   const DisparityMap map = noise.Map();
   std::size_t filled = 0;
-  const DisparityMap full = FillHoles(map, noise.Picture(), &filled);
+  const DisparityMap full = FillHoles(map, noise.Image(), &filled);
   std::size_t holes = 0;
   for (std::size_t i = 0; i < map.disparity.size(); ++i) {
     if (std::isnan(map.disparity[i])) {
@@ -185,9 +185,9 @@ Sides SidesOf(const Case& step, const DisparityMap& full, const Surface& expecte
   return sides;
 }
 
-TEST(FillHoles, FollowsTheEdgeOfThePictureBetweenTwoSurfaces) {
+TEST(FillHoles, FollowsTheEdgeOfTheImageBetweenTwoSurfaces) {
   for (const int half_width : {1, 4, 15}) {
-    // The edge of the picture wanders through the strip, and off its middle.
+    // The edge of the image wanders through the strip, and off its middle.
     const auto edge = [half_width](int y) {
       return kEdge + static_cast<int>(std::lround(0.6 * half_width * std::sin(0.2 * y)));
     };
@@ -200,7 +200,7 @@ TEST(FillHoles, FollowsTheEdgeOfThePictureBetweenTwoSurfaces) {
   }
 }
 
-TEST(FillHoles, FollowsABlurredEdgeOfANoisyPicture) {
+TEST(FillHoles, FollowsABlurredEdgeOfANoisyImage) {
   std::mt19937 engine(5);
   std::normal_distribution<double> noise(0, 0.003);
   const Surface truth = [](int x, int y) { return Step(x, y, kEdge); };
@@ -214,7 +214,7 @@ TEST(FillHoles, FollowsABlurredEdgeOfANoisyPicture) {
 }
 
 // A sensor is blind beside near things, not on them.
-TEST(FillHoles, TakesTheFarSurfaceWhereThePictureTellsNothing) {
+TEST(FillHoles, TakesTheFarSurfaceWhereTheImageDeterminesNothing) {
   for (const int half_width : {1, 4, 15}) {
     Case step{80, 60, [](int x, int y) { return Step(x, y, kEdge); },
               [&](int x, int) { return std::abs(x - kEdge) <= half_width; }};
@@ -236,7 +236,7 @@ TEST(FillHoles, KeepsSpeckleOnItsSurfaceBesideAShadow) {
   EXPECT_EQ(sides.wrong, 0);
 }
 
-// The near surface lies between two parts of the far one, as the picture shows. A single wrong
+// The near surface lies between two parts of the far one, as the image shows. A single wrong
 // value beside the hole is ignored.
 TEST(FillHoles, KeepsAPoleAndIgnoresALoneValue) {
   const auto is_pole = [](int x) { return x >= 36 && x < 41; };
@@ -246,7 +246,7 @@ TEST(FillHoles, KeepsAPoleAndIgnoresALoneValue) {
   for (const float wrong : {9.0F, -9.0F}) {
     DisparityMap map = pole.Map();
     map.disparity[pole.At(60, 19)] = wrong;
-    const Sides sides = SidesOf(pole, FillHoles(map, pole.Picture(), nullptr), truth);
+    const Sides sides = SidesOf(pole, FillHoles(map, pole.Image(), nullptr), truth);
     EXPECT_EQ(sides.wrong, 1);  // the value itself
   }
 }
@@ -257,7 +257,7 @@ TEST(FillHoles, SpreadsTheOnlyValueThereIs) {
   const Case one{70, 50, [](int, int) { return 0.75; },
                  [](int x, int y) { return x != 2 || y != 1; }};
   std::size_t filled = 0;
-  for (const float value : FillHoles(one.Map(), one.Picture(), &filled).disparity) {
+  for (const float value : FillHoles(one.Map(), one.Image(), &filled).disparity) {
     EXPECT_FLOAT_EQ(value, 0.75F);
   }
   EXPECT_EQ(filled, 3499U);
@@ -265,17 +265,17 @@ TEST(FillHoles, SpreadsTheOnlyValueThereIs) {
 
 TEST(FillHoles, RefusesWhatItCannotFill) {
   const Case nothing{7, 5, [](int, int) { return 0.0; }, [](int, int) { return true; }};
-  EXPECT_THAT(ErrorOf([&] { FillHoles(nothing.Map(), nothing.Picture(), nullptr); }),
+  EXPECT_THAT(ErrorOf([&] { FillHoles(nothing.Map(), nothing.Image(), nullptr); }),
               AllOf(HasSubstr("35"), HasSubstr("holes")));
   const Case one{7, 5, Plane, [](int x, int y) { return x == y; }};
-  model::LinearPicture narrow = one.Picture();
+  model::LinearImage narrow = one.Image();
   narrow.width_px = 5;
   narrow.height_px = 7;
   EXPECT_THAT(ErrorOf([&] { FillHoles(one.Map(), narrow, nullptr); }),
               AllOf(HasSubstr("7x5"), HasSubstr("5x7")));
   DisparityMap map = one.Map();
   map.disparity.pop_back();
-  EXPECT_THAT(ErrorOf([&] { FillHoles(map, one.Picture(), nullptr); }), HasSubstr("34 values"));
+  EXPECT_THAT(ErrorOf([&] { FillHoles(map, one.Image(), nullptr); }), HasSubstr("34 values"));
 }
 
 // Jumps are those of px per view step, whatever the map's unit is.
@@ -286,7 +286,7 @@ TEST(FillHoles, DoesNotDependOnTheUnit) {
   DisparityMap in_mm = step.Map();
   for (float& value : in_mm.disparity) value *= 64;
   in_mm.step = {1.0 / 64, -1.0 / 128};
-  in_mm = FillHoles(in_mm, step.Picture(), nullptr);
+  in_mm = FillHoles(in_mm, step.Image(), nullptr);
   for (std::size_t i = 0; i < full.disparity.size(); ++i) {
     EXPECT_NEAR(in_mm.disparity[i] / 64, full.disparity[i], 1e-5);
   }
@@ -312,7 +312,7 @@ TEST(FillHoles, NothingIsBeyondInfinity) {
   constexpr double kAtInfinity = -0.3;
   const auto floor = [](int, int y) { return kAtInfinity + 0.02 * (y - 14); };
   const Case c{40, 40, floor, [](int, int y) { return y < 16; }};
-  const DisparityMap full = FillHoles(c.Map(), c.Picture(), nullptr, kAtInfinity);
+  const DisparityMap full = FillHoles(c.Map(), c.Image(), nullptr, kAtInfinity);
   c.ForAll([&](int x, int y) {
     EXPECT_NEAR(full.disparity[c.At(x, y)], std::max(kAtInfinity, floor(x, y)), 0.02)
         << x << " " << y;
@@ -322,11 +322,11 @@ TEST(FillHoles, NothingIsBeyondInfinity) {
   EXPECT_LT(c.Filled().disparity[c.At(20, 0)], kAtInfinity - 0.1);
 }
 
-TEST(FillHoles, APictureThatIsNotFiniteIsRefusedByItsPixel) {
+TEST(FillHoles, AnImageThatIsNotFiniteIsRefusedByItsPixel) {
   const Case c{8, 6, Plane, [](int x, int y) { return x == 3 && y == 3; }};
-  model::LinearPicture picture = c.Picture();
-  picture.values[c.At(5, 2)] = kNan;
-  EXPECT_THAT(ErrorOf([&] { FillHoles(c.Map(), picture, nullptr); }),
+  model::LinearImage image = c.Image();
+  image.values[c.At(5, 2)] = kNan;
+  EXPECT_THAT(ErrorOf([&] { FillHoles(c.Map(), image, nullptr); }),
               AllOf(HasSubstr("pixel (5, 2) is nan"), HasSubstr("finite")));
 }
 

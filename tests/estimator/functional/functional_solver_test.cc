@@ -49,10 +49,10 @@ EstimateInput MakeCameraInput(int width, int height) {
                           [](int x) { return 600 + 30 * x; });
 }
 
-Eigen::VectorXd ChannelOf(const model::LinearPicture& picture, int channel) {
-  Eigen::VectorXd values(picture.width_px * picture.height_px);
+Eigen::VectorXd ChannelOf(const model::LinearImage& image, int channel) {
+  Eigen::VectorXd values(image.width_px * image.height_px);
   for (Eigen::Index i = 0; i < values.size(); ++i) {
-    values[i] = picture.values[Index(i * picture.channels + channel)];
+    values[i] = image.values[Index(i * image.channels + channel)];
   }
   return values;
 }
@@ -85,7 +85,7 @@ FunctionalOptions Precise() {
 // `photograph_disparity` is the disparity of the rays that meet on the photograph's pixels;
 // `radiance` is their mean.
 void ExpectDenseSolution(const EstimateInput& input, const DisparityMap& photograph_disparity,
-                         const model::LinearPicture& radiance, const FunctionalOptions& options,
+                         const model::LinearImage& radiance, const FunctionalOptions& options,
                          double accuracy = 2e-4) {
   const auto u_count = static_cast<int>(input.weights.cols());
   const auto v_count = static_cast<int>(input.weights.rows());
@@ -100,7 +100,7 @@ void ExpectDenseSolution(const EstimateInput& input, const DisparityMap& photogr
 
   const Eigen::MatrixXd h = PhotographMatrix(photograph_disparity, input.weights);
   const Eigen::Index pixels = h.rows();
-  for (int channel = 0; channel < input.picture.channels; ++channel) {
+  for (int channel = 0; channel < input.image.channels; ++channel) {
     const Eigen::VectorXd rays =
         DenseRays(h, ChannelOf(radiance, channel), u_count, v_count, options.gamma, mu);
     for (int l = 0; l < v_count; ++l) {
@@ -108,7 +108,7 @@ void ExpectDenseSolution(const EstimateInput& input, const DisparityMap& photogr
         const Eigen::VectorXd expected =
             ViewMatrix(input.disparity, found.u_offset(k), found.v_offset(l)) *
             rays.segment((l * u_count + k) * pixels, pixels);
-        const model::LinearPicture view = model::ViewPicture(found, k, l);
+        const model::LinearImage view = model::ViewImage(found, k, l);
         EXPECT_LT((ChannelOf(view, channel) - expected).lpNorm<Eigen::Infinity>(), accuracy)
             << "view " << k << ", " << l << ", channel " << channel;
       }
@@ -118,7 +118,7 @@ void ExpectDenseSolution(const EstimateInput& input, const DisparityMap& photogr
 
 TEST(FunctionalSolver, MinimisesTheFunctional) {
   const EstimateInput input = MakeInput(8, 7, 1, GaussianWeights(3, 3));
-  ExpectDenseSolution(input, input.disparity, input.picture, Precise());
+  ExpectDenseSolution(input, input.disparity, input.image, Precise());
 }
 
 // The result is exact to the rounding of a light field, which is stored in float.
@@ -127,7 +127,7 @@ TEST(FunctionalSolver, MinimisesItInDouble) {
   options.double_precision = true;
   options.tolerance = 1e-12;
   const EstimateInput input = MakeInput(8, 7, 3, GaussianWeights(3, 3));
-  ExpectDenseSolution(input, input.disparity, input.picture, options, 2e-7);
+  ExpectDenseSolution(input, input.disparity, input.image, options, 2e-7);
 }
 
 TEST(FunctionalSolver, MinimisesItForOtherStrengths) {
@@ -135,12 +135,12 @@ TEST(FunctionalSolver, MinimisesItForOtherStrengths) {
   FunctionalOptions options = Precise();
   options.gamma = 0.02;
   options.ridge = 0.004;
-  ExpectDenseSolution(input, input.disparity, input.picture, options);
+  ExpectDenseSolution(input, input.disparity, input.image, options);
 }
 
 TEST(FunctionalSolver, MinimisesItInColourForUnequalCounts) {
   const EstimateInput input = MakeInput(10, 4, 3, GaussianWeights(4, 2));
-  ExpectDenseSolution(input, input.disparity, input.picture, Precise());
+  ExpectDenseSolution(input, input.disparity, input.image, Precise());
 }
 
 TEST(FunctionalSolver, MinimisesItWhereViewsHaveNoWeight) {
@@ -149,7 +149,7 @@ TEST(FunctionalSolver, MinimisesItWhereViewsHaveNoWeight) {
   weights(2, 1) = 0;
   weights /= weights.sum();
   const EstimateInput input = MakeInput(8, 6, 1, weights);
-  ExpectDenseSolution(input, input.disparity, input.picture, Precise());
+  ExpectDenseSolution(input, input.disparity, input.image, Precise());
 }
 
 TEST(FunctionalSolver, MinimisesItOnPlanesWhereRaysLandBetweenPixels) {
@@ -160,12 +160,12 @@ TEST(FunctionalSolver, MinimisesItOnPlanesWhereRaysLandBetweenPixels) {
   for (float& d : photograph_disparity.disparity) {
     d -= static_cast<float>(landing_px.x() / input.disparity.step.x());
   }
-  const model::LinearPicture radiance =
-      WithoutFalloff(input.picture, *input.grid, *input.camera, input.weights, 1);
+  const model::LinearImage radiance =
+      WithoutFalloff(input.image, *input.grid, *input.camera, input.weights, 1);
   ExpectDenseSolution(input, photograph_disparity, radiance, Precise());
   FunctionalOptions options = Precise();
   options.falloff = false;
-  ExpectDenseSolution(input, photograph_disparity, input.picture, options);
+  ExpectDenseSolution(input, photograph_disparity, input.image, options);
 }
 
 // Strong smoothness leaves one radiance r for all rays of a point: |H r - I|^2 + U V mu |r - I|^2.
@@ -183,23 +183,22 @@ TEST(FunctionalSolver, TendsToAnEvenRadianceWithARidge) {
   for (int k = 0; k < 9; ++k) h += rays.middleCols(k * pixels, pixels);
   Eigen::MatrixXd normal = h.transpose() * h;
   normal.diagonal().array() += 0.02;
-  const Eigen::VectorXd photograph = ChannelOf(input.picture, 0);
+  const Eigen::VectorXd photograph = ChannelOf(input.image, 0);
   const Eigen::VectorXd radiance =
       normal.ldlt().solve(h.transpose() * photograph + 0.02 * photograph);
   for (int l = 0; l < 3; ++l) {
     for (int k = 0; k < 3; ++k) {
       const Eigen::VectorXd expected = ViewMatrix(input.disparity, k - 1, l - 1) * radiance;
-      EXPECT_LT(
-          (ChannelOf(model::ViewPicture(found, k, l), 0) - expected).lpNorm<Eigen::Infinity>(),
-          2e-4);
+      EXPECT_LT((ChannelOf(model::ViewImage(found, k, l), 0) - expected).lpNorm<Eigen::Infinity>(),
+                2e-4);
     }
   }
 }
 
-TEST(FunctionalSolver, AConstantPictureHasAConstantLightField) {
+TEST(FunctionalSolver, AConstantImageHasAConstantLightField) {
   EstimateInput input = MakeInput(21, 13, 3, GaussianWeights(3, 3));
-  for (std::size_t i = 0; i < input.picture.values.size(); ++i) {
-    input.picture.values[i] = 0.2F * static_cast<float>(i % 3);
+  for (std::size_t i = 0; i < input.image.values.size(); ++i) {
+    input.image.values[i] = 0.2F * static_cast<float>(i % 3);
   }
   FunctionalSummary summary;
   const model::LightField found = EstimateFunctional(input, Precise(), &summary);
@@ -241,7 +240,7 @@ TEST(FunctionalSolver, IsNearerToTheTruthThanTheWarpedPhotograph) {
         sum += fine(l, k) * view((k - 12) * scale, (l - 12) * scale, i);
       }
     }
-    input.picture.values[Index(i)] = static_cast<float>(sum);
+    input.image.values[Index(i)] = static_cast<float>(sum);
     input.disparity.disparity[Index(i)] = static_cast<float>(kDisparity);
   }
   FunctionalSummary summary;

@@ -1,5 +1,5 @@
 // The functional on the grid: H and D against the matrices of the kernels, the solver against one
-// block as large as the picture, and against a dense solution that is written down from the
+// block as large as the image, and against a dense solution that is written down from the
 // formulas.
 #include "thicklens/estimator/grid_solver.h"
 
@@ -45,7 +45,7 @@ EstimateInput Occluded(int width, int height, int channels, const Eigen::ArrayXX
   });
 }
 
-// ST elsewhere than in the plane of focus: rays land beside the pixels, some beside the picture.
+// ST elsewhere than in the plane of focus: rays land beside the pixels, some beside the image.
 EstimateInput WithCamera(int width, int height, double st_depth_mm) {
   return WithSolverCamera(Occluded(width, height, 1, GaussianWeights(3, 3)), {0, st_depth_mm},
                           [](int x) { return 600 + 30 * x; });
@@ -89,7 +89,7 @@ class Operators {
  public:
   explicit Operators(const EstimateInput& input, int threads = 1)
       : field_(input, true, 1),
-        block_(field_.Block(0, 0, input.picture.width_px, input.picture.height_px)) {
+        block_(field_.Block(0, 0, input.image.width_px, input.image.height_px)) {
     light_field_ = WarpToAllViews(input, true, 1, &disparity_);
     std::vector<std::vector<float>> irradiance;
     const std::vector<double> of_block = field_.IrradianceOf(block_);
@@ -105,7 +105,7 @@ class Operators {
     const auto kernels = kernels::NewReference<double>();
     const auto splat = kernels::Splat::kBilinear;
     h = kernels::Compress(
-        kernels->WeighRays(block_, splat, kernels->FindRays(block_, splat), of_block));
+        kernels->WeightRays(block_, splat, kernels->FindRays(block_, splat), of_block));
     const RayField::Slopes slopes = field_.SlopesOf(block_, true);
     d = kernels::Compress(kernels->WarpDifferences(block_, slopes.u, slopes.v));
   }
@@ -194,7 +194,7 @@ TEST(GridLinks, AreTheDifferencesOfTheKernels) {
         operators.d, kernels->Multiply(operators.d, operators.ToBlock(rays))));
     for (std::size_t i = 0; i < found.size(); ++i) {
       ASSERT_NEAR(found[i], 0.7 * expected[i] + 0.2 * rays[i], 1e-12)
-          << input.picture.width_px << "x" << input.picture.height_px << ", ray " << i;
+          << input.image.width_px << "x" << input.image.height_px << ", ray " << i;
     }
   }
 }
@@ -227,8 +227,8 @@ model::LightField OneBlock(const EstimateInput& input, const FunctionalOptions& 
   blocks.ridge = options.ridge;
   blocks.falloff = options.falloff;
   blocks.threads = 1;
-  blocks.block_px = std::max(input.picture.width_px, input.picture.height_px);
-  EstimateSummary summary;
+  blocks.block_px = std::max(input.image.width_px, input.image.height_px);
+  BlockSummary summary;
   const auto backend = kernels::OpenBackend(kernels::ParseDeviceRequest("cpu"), nullptr);
   return EstimateByBlocks(input, blocks, backend.get(), &summary);
 }
@@ -242,13 +242,13 @@ void ExpectOneBlock(const EstimateInput& input, const FunctionalOptions& options
   ASSERT_EQ(found.values.size(), expected.values.size());
   for (std::size_t i = 0; i < found.values.size(); ++i) {
     ASSERT_NEAR(found.values[i], expected.values[i], accuracy)
-        << input.picture.width_px << "x" << input.picture.height_px << ", " << i;
+        << input.image.width_px << "x" << input.image.height_px << ", " << i;
   }
 }
 
-TEST(GridSolver, IsOneBlockAsLargeAsThePicture) {
+TEST(GridSolver, IsOneBlockAsLargeAsTheImage) {
   for (const EstimateInput& input : Inputs()) {
-    if (input.picture.width_px < 100) ExpectOneBlock(input, Precise());
+    if (input.image.width_px < 100) ExpectOneBlock(input, Precise());
   }
 }
 
@@ -307,7 +307,7 @@ TEST(GridSolver, MinimisesTheFunctional) {
   const model::LightField prior = WarpedLightField(input, true, 1);
   const Eigen::VectorXd right =
       h.transpose() *
-          Eigen::Map<const Eigen::VectorXf>(input.picture.values.data(), kPixels).cast<double>() +
+          Eigen::Map<const Eigen::VectorXf>(input.image.values.data(), kPixels).cast<double>() +
       kRidge * Eigen::Map<const Eigen::VectorXf>(prior.values.data(), kRays).cast<double>();
   const Eigen::VectorXd expected = normal.ldlt().solve(right);
 
@@ -331,7 +331,7 @@ TEST(GridSolver, MinimisesTheFunctional) {
   EXPECT_THAT(summary.message, HasSubstr("above the tolerance"));
 }
 
-// Rays that land beside the picture are no unknowns.
+// Rays that land beside the image are no unknowns.
 TEST(GridSolver, TheReportedResidualIsThatOfTheBlocksSystem) {
   const EstimateInput input = WithCamera(17, 12, 250);
   FunctionalOptions options = Precise();
@@ -354,10 +354,10 @@ TEST(GridSolver, TheReportedResidualIsThatOfTheBlocksSystem) {
 }
 
 // A flat scene of one radiance is its own light field; where there is a camera, radiance.
-TEST(GridSolver, AConstantPictureHasAConstantLightField) {
+TEST(GridSolver, AConstantImageHasAConstantLightField) {
   EstimateInput input = Occluded(31, 22, 3, GaussianWeights(3, 3));
-  for (std::size_t i = 0; i < input.picture.values.size(); ++i) {
-    input.picture.values[i] = 0.2F * static_cast<float>(i % 3 + 1);
+  for (std::size_t i = 0; i < input.image.values.size(); ++i) {
+    input.image.values[i] = 0.2F * static_cast<float>(i % 3 + 1);
   }
   FunctionalOptions options;
   options.tolerance = 1e-5;

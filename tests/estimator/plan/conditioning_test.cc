@@ -15,7 +15,7 @@ namespace {
 
 EstimateInput Plane(int size_px, int views, double disparity_px, double slope = 0) {
   EstimateInput input;
-  input.picture = model::LinearPicture{
+  input.image = model::LinearImage{
       size_px, size_px, 1, std::vector<float>(static_cast<std::size_t>(size_px * size_px), 0.5F)};
   input.disparity.width_px = input.disparity.height_px = size_px;
   for (int i = 0; i < size_px * size_px; ++i) {
@@ -69,7 +69,7 @@ TEST(Conditioning, OfAPlaneInFocusIsThatOfOnePixel) {
 
 // 1 <= eigenvalues <= 1 + 1/mu' with mu' = K mu, whatever blur and depth: never singular. Rows of
 // H1 sum to 1, and of a plane its columns to 1 at most but at the border, where rays that would
-// leave the picture stay in it.
+// leave the image stay in it.
 TEST(Conditioning, OfSceneRaysIsBoundedByTheRidgeAlone) {
   constexpr double kBorder = 1.3;
   for (const double disparity_px : {0.0, 0.4, 1.0, 2.0}) {

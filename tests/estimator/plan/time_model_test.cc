@@ -200,10 +200,10 @@ TEST(TimeModel, RefusesWhatNoModelCanBeMadeFrom) {
       [](TimedWorkload* timed) { timed->parts.files = timed->parts.setup = 0.6 * timed->seconds; });
 }
 
-// A picture of which each point is seen at the same disparity.
+// An image of which each point is seen at the same disparity.
 EstimateInput Flat(int u_count, int v_count, float disparity) {
   EstimateInput input;
-  input.picture = model::LinearPicture{40, 30, 3, std::vector<float>(40 * 30 * 3, 0.5F)};
+  input.image = model::LinearImage{40, 30, 3, std::vector<float>(40 * 30 * 3, 0.5F)};
   input.disparity.width_px = 40;
   input.disparity.height_px = 30;
   input.disparity.disparity.assign(40 * 30, disparity);

@@ -18,7 +18,7 @@ namespace {
 
 std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
-// A picture of width x height px from views of s x t samples, by (shift, fraction) of each column
+// An image of width x height px from views of s x t samples, by (shift, fraction) of each column
 // and row of them.
 struct Landing {
   int shift;
@@ -36,30 +36,30 @@ std::ostream& operator<<(std::ostream& out, const Case& of) {
 
 // One of the views has no weight.
 kernels::BlockGeometry GeometryOf(const Case& of) {
-  kernels::BlockGeometry picture;
-  picture.width_px = of.width;
-  picture.height_px = of.height;
-  picture.s_count = of.s_count;
-  picture.t_count = of.t_count;
-  picture.u_count = static_cast<int>(of.columns.size());
-  picture.v_count = static_cast<int>(of.rows.size());
+  kernels::BlockGeometry image;
+  image.width_px = of.width;
+  image.height_px = of.height;
+  image.s_count = of.s_count;
+  image.t_count = of.t_count;
+  image.u_count = static_cast<int>(of.columns.size());
+  image.v_count = static_cast<int>(of.rows.size());
   for (const Landing& column : of.columns) {
-    picture.s_shift.push_back(column.shift);
-    picture.s_fraction.push_back(column.fraction);
+    image.s_shift.push_back(column.shift);
+    image.s_fraction.push_back(column.fraction);
   }
   for (const Landing& row : of.rows) {
-    picture.t_shift.push_back(row.shift);
-    picture.t_fraction.push_back(row.fraction);
+    image.t_shift.push_back(row.shift);
+    image.t_fraction.push_back(row.fraction);
   }
-  for (int view = 0; view < picture.views(); ++view) {
-    picture.view_weight.push_back(view == 1 ? 0 : 0.2 + 0.05 * view);
+  for (int view = 0; view < image.views(); ++view) {
+    image.view_weight.push_back(view == 1 ? 0 : 0.2 + 0.05 * view);
   }
-  return picture;
+  return image;
 }
 
 const std::vector<Landing> kOnPixels{{0, 0}, {0, 0}, {0, 0}};
 const std::vector<Landing> kToBothSides{{-1, 0.3}, {0, -0.35}, {0, 0}, {0, 0.35}, {1, -0.3}};
-// Some land beside the picture, the last ones all.
+// Some land beside the image, the last ones all.
 const std::vector<Landing> kFar{{-9, 0.49}, {-2, -0.5}, {3, 0}, {12, 0.2}, {400, -0.1}};
 
 std::vector<Case> Cases() {
@@ -72,7 +72,7 @@ std::vector<Case> Cases() {
     }
     cases.push_back({width, 4, width, 4, kToBothSides, kOnPixels, true});
   }
-  // Several bands; views that are larger or smaller than the picture.
+  // Several bands; views that are larger or smaller than the image.
   cases.push_back({70, 301, 70, 301, kToBothSides, kFar, true});
   cases.push_back({70, 40, 90, 33, kFar, kToBothSides, true});
   cases.push_back({90, 33, 70, 40, kToBothSides, kFar});
@@ -92,51 +92,50 @@ template <typename Real>
 class GridPhotographTest : public ::testing::Test {
  protected:
   struct Problem {
-    kernels::BlockGeometry picture;
+    kernels::BlockGeometry image;
     std::vector<std::vector<float>> irradiance;
     std::vector<Real> rays, photograph;
   };
   static Problem ProblemOf(const Case& of) {
     Problem problem;
-    problem.picture = GeometryOf(of);
+    problem.image = GeometryOf(of);
     const std::size_t view_size = Index(of.s_count) * Index(of.t_count);
-    const std::size_t views = Index(problem.picture.views());
+    const std::size_t views = Index(problem.image.views());
     for (unsigned view = 0; of.has_irradiance && view < views; ++view) {
       // The irradiance of a view without weight is not computed.
       problem.irradiance.push_back(view == 1 ? std::vector<float>()
                                              : RandomNumbers<float>(view_size, 0.2, view));
     }
     problem.rays = RandomNumbers<Real>(views * view_size, -1, 99);
-    problem.photograph = RandomNumbers<Real>(Index(problem.picture.pixels()), -1, 98);
+    problem.photograph = RandomNumbers<Real>(Index(problem.image.pixels()), -1, 98);
     return problem;
   }
 
-  // Calls visit(ray, x, y, w g, E) for each ray that lands nearest to a pixel of the picture and
-  // each pixel (x, y) of it, for all of the picture's within 1 px of where it lands.
+  // Calls visit(ray, x, y, w g, E) for each ray that lands nearest to a pixel of the image and
+  // each pixel (x, y) of it, for all of the image's within 1 px of where it lands.
   template <typename Visit>
   static void ForRays(const Problem& problem, const Visit& visit) {
-    const kernels::BlockGeometry& picture = problem.picture;
+    const kernels::BlockGeometry& image = problem.image;
     std::size_t ray = 0;
-    for (int view = 0; view < picture.views(); ++view) {
-      const int k = view % picture.u_count, l = view / picture.u_count;
-      for (int t = 0; t < picture.t_count; ++t) {
-        for (int s = 0; s < picture.s_count; ++s, ++ray) {
-          const int near_x = s + picture.s_shift[Index(k)], near_y = t + picture.t_shift[Index(l)];
-          if (near_x < 0 || near_x >= picture.width_px || near_y < 0 ||
-              near_y >= picture.height_px) {
+    for (int view = 0; view < image.views(); ++view) {
+      const int k = view % image.u_count, l = view / image.u_count;
+      for (int t = 0; t < image.t_count; ++t) {
+        for (int s = 0; s < image.s_count; ++s, ++ray) {
+          const int near_x = s + image.s_shift[Index(k)], near_y = t + image.t_shift[Index(l)];
+          if (near_x < 0 || near_x >= image.width_px || near_y < 0 || near_y >= image.height_px) {
             continue;
           }
-          const double landing_x = near_x + picture.s_fraction[Index(k)];
-          const double landing_y = near_y + picture.t_fraction[Index(l)];
+          const double landing_x = near_x + image.s_fraction[Index(k)];
+          const double landing_y = near_y + image.t_fraction[Index(l)];
           const double irradiance =
               problem.irradiance.empty() || problem.irradiance[Index(view)].empty()
                   ? 1
-                  : problem.irradiance[Index(view)][Index(t * picture.s_count + s)];
-          for (int y = std::max(0, near_y - 1); y < std::min(picture.height_px, near_y + 2); ++y) {
-            for (int x = std::max(0, near_x - 1); x < std::min(picture.width_px, near_x + 2); ++x) {
+                  : problem.irradiance[Index(view)][Index(t * image.s_count + s)];
+          for (int y = std::max(0, near_y - 1); y < std::min(image.height_px, near_y + 2); ++y) {
+            for (int x = std::max(0, near_x - 1); x < std::min(image.width_px, near_x + 2); ++x) {
               const double share = std::max(0.0, 1 - std::abs(landing_x - x)) *
                                    std::max(0.0, 1 - std::abs(landing_y - y));
-              visit(ray, Index(y * picture.width_px + x), picture.view_weight[Index(view)] * share,
+              visit(ray, Index(y * image.width_px + x), image.view_weight[Index(view)] * share,
                     irradiance);
             }
           }
@@ -166,7 +165,7 @@ TYPED_TEST(GridPhotographTest, IsTheSumOverRays) {
       expected[pixel] += e * weight * problem.rays[ray];
     });
     for (const int threads : {1, 3}) {
-      const GridPhotograph<TypeParam> photograph(problem.picture, problem.irradiance, threads);
+      const GridPhotograph<TypeParam> photograph(problem.image, problem.irradiance, threads);
       // Whatever was there before.
       std::vector<TypeParam> found(weights.size(), std::numeric_limits<TypeParam>::quiet_NaN());
       photograph.Apply(problem.rays.data(), found.data());
@@ -178,7 +177,7 @@ TYPED_TEST(GridPhotographTest, IsTheSumOverRays) {
   }
 }
 
-// Values that land outside the picture stay the same to the last bit.
+// Values that land outside the image stay the same to the last bit.
 TYPED_TEST(GridPhotographTest, AddsToTheRaysOfEachPixel) {
   for (const Case& of : Cases()) {
     const auto problem = this->ProblemOf(of);
@@ -191,7 +190,7 @@ TYPED_TEST(GridPhotographTest, AddsToTheRaysOfEachPixel) {
       is_reached[ray] = true;
     });
     for (const int threads : {1, 3}) {
-      const GridPhotograph<TypeParam> photograph(problem.picture, problem.irradiance, threads);
+      const GridPhotograph<TypeParam> photograph(problem.image, problem.irradiance, threads);
       std::vector<TypeParam> found = problem.rays;
       photograph.AddTransposed(problem.photograph.data(), found.data());
       for (std::size_t i = 0; i < found.size(); ++i) {
@@ -209,7 +208,7 @@ TYPED_TEST(GridPhotographTest, HasTheSameBitsForAnyNumberOfThreads) {
   for (const Case& of : cases) {
     const auto problem = this->ProblemOf(of);
     const auto both_ways = [&](int threads) {
-      const GridPhotograph<TypeParam> photograph(problem.picture, problem.irradiance, threads);
+      const GridPhotograph<TypeParam> photograph(problem.image, problem.irradiance, threads);
       std::vector<TypeParam> numbers(problem.photograph.size()), rays = problem.rays;
       photograph.Apply(problem.rays.data(), numbers.data());
       photograph.AddTransposed(problem.photograph.data(), rays.data());
@@ -224,7 +223,7 @@ TYPED_TEST(GridPhotographTest, HasTheSameBitsForAnyNumberOfThreads) {
 TYPED_TEST(GridPhotographTest, PassesTheDotProductTest) {
   for (const Case& of : Cases()) {
     const auto problem = this->ProblemOf(of);
-    const GridPhotograph<TypeParam> photograph(problem.picture, problem.irradiance, 3);
+    const GridPhotograph<TypeParam> photograph(problem.image, problem.irradiance, 3);
     std::vector<TypeParam> forward(problem.photograph.size()), back(problem.rays.size());
     photograph.Apply(problem.rays.data(), forward.data());
     photograph.AddTransposed(problem.photograph.data(), back.data());

@@ -45,22 +45,22 @@ DisparityMap Occluded() {
   });
 }
 
-std::vector<double> RandomPicture(std::size_t count, unsigned seed) {
+std::vector<double> RandomImage(std::size_t count, unsigned seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> value(0, 1);
-  std::vector<double> picture(count);
-  for (double& v : picture) v = value(random);
-  return picture;
+  std::vector<double> image(count);
+  for (double& v : image) v = value(random);
+  return image;
 }
 
 template <typename Real>
 SceneProjection<Real> Make(const DisparityMap& map, const Eigen::ArrayXXd& weights,
                            double tolerance_px = 0.2, int threads = 2,
-                           Between between = Between::kCubic) {
+                           Interpolation interpolation = Interpolation::kCubic) {
   ProjectionOptions options;
   options.tolerance_px = tolerance_px;
   options.threads = threads;
-  options.between = between;
+  options.interpolation = interpolation;
   return MakeSceneProjection<Real>(map, weights, options);
 }
 
@@ -77,7 +77,7 @@ struct Read {
   double value = 0;
   bool is_cubic = false;
 };
-Read ReadAt(const DisparityMap& map, std::size_t i, const kernels::HiddenSample& from, bool cubic,
+Read ReadAt(const DisparityMap& map, std::size_t i, const kernels::OccludedSample& from, bool cubic,
             const std::vector<double>& x) {
   const double tolerance = 0.3 / map.step.cwiseAbs().maxCoeff();
   const double px = std::clamp<double>(static_cast<double>(i % Index(map.width_px)) + from.source_x,
@@ -117,16 +117,16 @@ Read ReadAt(const DisparityMap& map, std::size_t i, const kernels::HiddenSample&
 }
 
 struct Gathered {
-  std::vector<double> picture;
+  std::vector<double> image;
   std::vector<bool> is_cubic;  // all rays of the pixel
 };
 
 // The photograph pixel by pixel and ray by ray, from the rendered views alone.
 Gathered PlainGather(const DisparityMap& map, const Eigen::ArrayXXd& weights,
-                     const std::vector<double>& x, Between between) {
+                     const std::vector<double>& x, Interpolation interpolation) {
   Gathered gathered{std::vector<double>(map.disparity.size(), 0.0),
                     std::vector<bool>(map.disparity.size(), true)};
-  std::vector<double>& y = gathered.picture;
+  std::vector<double>& y = gathered.image;
   for (int l = 0; l < weights.rows(); ++l) {
     for (int k = 0; k < weights.cols(); ++k) {
       if (weights(l, k) == 0) continue;
@@ -134,16 +134,16 @@ Gathered PlainGather(const DisparityMap& map, const Eigen::ArrayXXd& weights,
           RenderDisparity(map, k - (static_cast<double>(weights.cols()) - 1) / 2,
                           l - (static_cast<double>(weights.rows()) - 1) / 2);
       for (std::size_t i = 0; i < y.size(); ++i) {
-        const auto mixed = std::find_if(view.mixed.begin(), view.mixed.end(), [&](const auto& one) {
-          return static_cast<std::size_t>(one.index) == i;
-        });
-        const double share = mixed != view.mixed.end() ? double{mixed->share} : 0;
-        const bool cubic = between == Between::kCubic && share == 0;
+        const auto boundary =
+            std::find_if(view.boundary.begin(), view.boundary.end(),
+                         [&](const auto& one) { return static_cast<std::size_t>(one.index) == i; });
+        const double share = boundary != view.boundary.end() ? double{boundary->share} : 0;
+        const bool cubic = interpolation == Interpolation::kCubic && share == 0;
         Read read =
             ReadAt(map, i, {0, view.source_x[i], view.source_y[i], view.disparity[i]}, cubic, x);
         if (!read.is_cubic) gathered.is_cubic[i] = false;
         if (share > 0) {
-          read.value += share * (ReadAt(map, i, mixed->other, false, x).value - read.value);
+          read.value += share * (ReadAt(map, i, boundary->other, false, x).value - read.value);
         }
         y[i] += weights(l, k) * read.value;
       }
@@ -153,22 +153,23 @@ Gathered PlainGather(const DisparityMap& map, const Eigen::ArrayXXd& weights,
 }
 
 // The transfer of a wave by interpolation at `shift` from a sample.
-std::complex<double> Transfer(double shift, double frequency, Between between) {
+std::complex<double> Transfer(double shift, double frequency, Interpolation interpolation) {
   std::complex<double> sum = 0;
   for (int n = static_cast<int>(std::floor(shift)) - 1; n <= std::floor(shift) + 2; ++n) {
-    const double weight =
-        between == Between::kCubic ? Cubic(shift - n) : std::max(0.0, 1 - std::abs(shift - n));
+    const double weight = interpolation == Interpolation::kCubic
+                              ? Cubic(shift - n)
+                              : std::max(0.0, 1 - std::abs(shift - n));
     sum += weight * std::exp(std::complex<double>(0, 2 * kPi * frequency * n));
   }
   return sum;
 }
 
-class SceneProjectionBetween : public ::testing::TestWithParam<Between> {};
+class SceneProjectionBetween : public ::testing::TestWithParam<Interpolation> {};
 
 INSTANTIATE_TEST_SUITE_P(Interpolations, SceneProjectionBetween,
-                         ::testing::Values(Between::kLinear, Between::kCubic),
-                         [](const ::testing::TestParamInfo<Between>& which) {
-                           return which.param == Between::kCubic ? "Cubic" : "Linear";
+                         ::testing::Values(Interpolation::kLinear, Interpolation::kCubic),
+                         [](const ::testing::TestParamInfo<Interpolation>& which) {
+                           return which.param == Interpolation::kCubic ? "Cubic" : "Linear";
                          });
 
 // A wave stays a wave: H multiplies it by sum_k w_k times the transfer of the interpolation at the
@@ -203,22 +204,22 @@ TEST_P(SceneProjectionBetween, OfConstantDepthIsAProductInTheFourierDomain) {
 }
 
 // If rays are placed to a tolerance, the sums differ by the tolerance times the slope of the
-// picture. With a tolerance near 0 all surfaces except flat ones get rows of their own. Rows are
+// image. With a tolerance near 0 all surfaces except flat ones get rows of their own. Rows are
 // linear; a product beside an edge may be cubic along one axis only.
 TEST_P(SceneProjectionBetween, EqualsTheRaysOneByOne) {
-  const Between between = GetParam();
+  const Interpolation interpolation = GetParam();
   const DisparityMap map = Occluded();
-  const std::vector<double> x = RandomPicture(map.disparity.size(), 3);
+  const std::vector<double> x = RandomImage(map.disparity.size(), 3);
   for (const auto shape : {model::ApertureShape::kUniform, model::ApertureShape::kGaussian,
                            model::ApertureShape::kDisc}) {
     for (const auto& [u, v] : {std::pair{5, 5}, std::pair{4, 3}, std::pair{1, 3}}) {
       const Eigen::ArrayXXd weights = Weights(shape, u, v);
-      const Gathered linear = PlainGather(map, weights, x, Between::kLinear);
-      const Gathered cubic = PlainGather(map, weights, x, Between::kCubic);
+      const Gathered linear = PlainGather(map, weights, x, Interpolation::kLinear);
+      const Gathered cubic = PlainGather(map, weights, x, Interpolation::kCubic);
       // Compares the pixels at which the rays give the right value, and returns the number of these
       // pixels.
       const auto compare = [&](const SceneProjection<double>& projection, double tolerance) {
-        std::vector<bool> is_linear(x.size(), between == Between::kLinear);
+        std::vector<bool> is_linear(x.size(), interpolation == Interpolation::kLinear);
         for (const std::int32_t pixel : projection.rows.pixel) is_linear[Index(pixel)] = true;
         std::vector<double> y(x.size());
         projection.Apply(x.data(), 1, y.data());
@@ -226,14 +227,14 @@ TEST_P(SceneProjectionBetween, EqualsTheRaysOneByOne) {
         for (std::size_t i = 0; i < y.size(); ++i) {
           if (!is_linear[i] && !cubic.is_cubic[i]) continue;
           ++compared;
-          EXPECT_NEAR(y[i], is_linear[i] ? linear.picture[i] : cubic.picture[i], tolerance)
+          EXPECT_NEAR(y[i], is_linear[i] ? linear.image[i] : cubic.image[i], tolerance)
               << weights.cols() << "x" << weights.rows() << " at " << i;
         }
         return compared;
       };
-      const auto strict = Make<double>(map, weights, 1e-9, 2, between);
+      const auto strict = Make<double>(map, weights, 1e-9, 2, interpolation);
       EXPECT_GT(compare(strict, 1e-6), 0.85 * static_cast<double>(x.size()));
-      const auto usual = Make<double>(map, weights, 0.2, 2, between);
+      const auto usual = Make<double>(map, weights, 0.2, 2, interpolation);
       EXPECT_LE(usual.row_share(), strict.row_share());
       compare(usual, 0.1);
     }
@@ -253,7 +254,7 @@ TEST(SceneProjection, FlatSurfacesNeedNoRowsButAtBordersAndEdges) {
   EXPECT_TRUE(sharp.rows.pixel.empty());
 }
 
-TEST(SceneProjection, KeepsAUniformPicture) {
+TEST(SceneProjection, KeepsAUniformImage) {
   const auto projection = Make<double>(Occluded(), Weights(model::ApertureShape::kDisc, 7, 7));
   const std::vector<double> ones(projection.pixels(), 1.0);
   std::vector<double> y(projection.pixels());
@@ -265,7 +266,7 @@ template <typename Real>
 double AdjointError(const DisparityMap& map, const Eigen::ArrayXXd& weights) {
   const auto projection = Make<Real>(map, weights);
   const std::size_t size = 3 * projection.pixels();
-  const std::vector<double> a = RandomPicture(size, 5), b = RandomPicture(size, 6);
+  const std::vector<double> a = RandomImage(size, 5), b = RandomImage(size, 6);
   const std::vector<Real> x(a.begin(), a.end()), y(b.begin(), b.end());
   std::vector<Real> forward(size), back(size);
   projection.Apply(x.data(), 3, forward.data());
@@ -296,8 +297,8 @@ TEST(SceneProjection, PassesTheDotProductTest) {
 TEST(SceneProjection, SameBitsOnAnyNumberOfThreads) {
   const Eigen::ArrayXXd weights = Weights(model::ApertureShape::kGaussian, 5, 5);
   const auto one = Make<float>(Occluded(), weights, 0.2, 1);
-  const std::vector<double> picture = RandomPicture(one.pixels(), 7);
-  const std::vector<float> x(picture.begin(), picture.end());
+  const std::vector<double> image = RandomImage(one.pixels(), 7);
+  const std::vector<float> x(image.begin(), image.end());
   std::vector<float> expected(x.size()), y(x.size());
   one.Apply(x.data(), 1, expected.data());
   std::vector<float> expected_back(x.size());
@@ -316,30 +317,30 @@ TEST(SceneProjection, SamplesHiddenFromTheCentreViewAreMarked) {
   const DisparityMap map = MapOf(60, 20, [](int x, int) { return x >= 20 && x < 40 ? 2 : 0; });
   const auto projection = Make<float>(map, weights);
   // Beside the near strip the background has disparity 0; views move the strip by 2 px a step.
-  EXPECT_EQ(projection.hidden_share[Index(10 * 60 + 10)], 0);
-  EXPECT_EQ(projection.hidden_share[Index(10 * 60 + 30)], 0);
+  EXPECT_EQ(projection.occluded_fraction[Index(10 * 60 + 10)], 0);
+  EXPECT_EQ(projection.occluded_fraction[Index(10 * 60 + 30)], 0);
   // x = 20 is uncovered by the two views in which the strip has gone right.
-  EXPECT_NEAR(projection.hidden_share[Index(10 * 60 + 20)], 0.4, 1e-6);
+  EXPECT_NEAR(projection.occluded_fraction[Index(10 * 60 + 20)], 0.4, 1e-6);
 }
 
-// Half a pixel of a hidden sample may be in front of what is hidden, and half a pixel of a visible
-// one may be behind.
-TEST(SceneProjection, CountsWhatIsHiddenByTheShareOfItsPixel) {
+// Half a pixel of an occluded sample may be in front of what is hidden, and half a pixel of a
+// visible one may be behind.
+TEST(SceneProjection, CountsWhatIsOccludedByTheShareOfItsPixel) {
   const Eigen::ArrayXXd weights = Weights(model::ApertureShape::kUniform, 3, 1);
   const DisparityMap map = MapOf(60, 20, [](int x, int) { return x >= 20 && x < 40 ? 2.75 : 0; });
   const auto projection = Make<float>(map, weights);
   // In the view where the strip moves 2.75 px to the right, it begins at 22.25, so that three
-  // quarters of the sample at 22 are hidden background. The other two views show nothing hidden
+  // quarters of the sample at 22 are occluded background. The other two views show nothing hidden
   // there.
-  const auto hidden = [&](int x) { return projection.hidden_share[Index(10 * 60 + x)]; };
-  EXPECT_NEAR(hidden(20), 1.0 / 3, 1e-6);
-  EXPECT_NEAR(hidden(21), 1.0 / 3, 1e-6);
-  EXPECT_NEAR(hidden(22), 0.75 / 3, 1e-6);
-  EXPECT_NEAR(hidden(23), 0, 1e-6);
+  const auto occluded = [&](int x) { return projection.occluded_fraction[Index(10 * 60 + x)]; };
+  EXPECT_NEAR(occluded(20), 1.0 / 3, 1e-6);
+  EXPECT_NEAR(occluded(21), 1.0 / 3, 1e-6);
+  EXPECT_NEAR(occluded(22), 0.75 / 3, 1e-6);
+  EXPECT_NEAR(occluded(23), 0, 1e-6);
   // On the other side by the other view: 39.5 - 2.75 = 36.75.
-  EXPECT_NEAR(hidden(36), 0, 1e-6);
-  EXPECT_NEAR(hidden(37), 0.75 / 3, 1e-6);
-  EXPECT_NEAR(hidden(38), 1.0 / 3, 1e-6);
+  EXPECT_NEAR(occluded(36), 0, 1e-6);
+  EXPECT_NEAR(occluded(37), 0.75 / 3, 1e-6);
+  EXPECT_NEAR(occluded(38), 1.0 / 3, 1e-6);
 }
 
 // A near object is photographed before a wall, each of one radiance. The near object's share of a

@@ -81,9 +81,8 @@ Eigen::VectorXd Dense(const SceneRays<float>& rays, const std::vector<float>& pl
   }
   return dense;
 }
-Eigen::VectorXd Dense(const std::vector<float>& picture) {
-  return Eigen::Map<const Eigen::VectorXf>(picture.data(),
-                                           static_cast<Eigen::Index>(picture.size()))
+Eigen::VectorXd Dense(const std::vector<float>& image) {
+  return Eigen::Map<const Eigen::VectorXf>(image.data(), static_cast<Eigen::Index>(image.size()))
       .cast<double>();
 }
 
@@ -153,24 +152,24 @@ TEST(SceneRays, OfALambertianSceneAreItsProjection) {
   const Case made = Cases()[1];
   ProjectionOptions options;
   options.tolerance_px = 1e-9;
-  options.between = Between::kLinear;
+  options.interpolation = Interpolation::kLinear;
   const auto projection = MakeSceneProjection<float>(made.map, made.weights, options);
   SceneRays<float> rays = Make(made);
-  std::vector<float> picture = RandomNumbers(rays.plane_stride(), 5);
+  std::vector<float> image = RandomNumbers(rays.plane_stride(), 5);
   std::vector<float> expected(rays.pixels()), found(rays.pixels());
-  projection.Apply(picture.data(), 1, expected.data());
-  rays.Apply(picture.data(), 0, found.data());
+  projection.Apply(image.data(), 1, expected.data());
+  rays.Apply(image.data(), 0, found.data());
   for (std::size_t i = 0; i < found.size(); ++i) ASSERT_NEAR(found[i], expected[i], 2e-6);
 }
 
 TEST(SceneRays, ShowWhatAViewSees) {
   const Case made = Cases()[0];
   const SceneRays<float> rays = Make(made);
-  std::vector<float> picture = RandomNumbers(rays.plane_stride(), 6);
+  std::vector<float> image = RandomNumbers(rays.plane_stride(), 6);
   std::vector<float> shown(rays.pixels());
-  rays.Show(3 * 4 + 2, picture.data(), shown.data());
-  picture.resize(rays.pixels());
-  const Eigen::VectorXd expected = testing::ViewMatrix(made.map, 1, 2) * Dense(picture);
+  rays.Show(3 * 4 + 2, image.data(), shown.data());
+  image.resize(rays.pixels());
+  const Eigen::VectorXd expected = testing::ViewMatrix(made.map, 1, 2) * Dense(image);
   EXPECT_LT((Dense(shown) - expected).lpNorm<Eigen::Infinity>(), 1e-5);
 }
 

@@ -21,36 +21,35 @@ using thicklens::testing::ErrorOf;
 
 constexpr double kPi = 3.14159265358979323846;
 
-model::StoredValues Noise(int width_px, int height_px, int channels, unsigned seed) {
+model::EncodedValues Noise(int width_px, int height_px, int channels, unsigned seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<float> uniform(0, 1);
-  model::StoredValues picture{width_px, height_px, channels, {}};
-  for (int i = 0; i < width_px * height_px * channels; ++i)
-    picture.values.push_back(uniform(random));
-  return picture;
+  model::EncodedValues image{width_px, height_px, channels, {}};
+  for (int i = 0; i < width_px * height_px * channels; ++i) image.values.push_back(uniform(random));
+  return image;
 }
 
 template <typename ValueAt>
-model::StoredValues Drawn(int width_px, int height_px, const ValueAt& value_at) {
-  model::StoredValues picture{width_px, height_px, 1, {}};
+model::EncodedValues Drawn(int width_px, int height_px, const ValueAt& value_at) {
+  model::EncodedValues image{width_px, height_px, 1, {}};
   for (int y = 0; y < height_px; ++y) {
-    for (int x = 0; x < width_px; ++x) picture.values.push_back(static_cast<float>(value_at(x, y)));
+    for (int x = 0; x < width_px; ++x) image.values.push_back(static_cast<float>(value_at(x, y)));
   }
-  return picture;
+  return image;
 }
 
-model::StoredValues Flat(int width_px, int height_px, double value) {
+model::EncodedValues Flat(int width_px, int height_px, double value) {
   return Drawn(width_px, height_px, [value](int, int) { return value; });
 }
 
-double GreyAt(const model::StoredValues& picture, int x, int y) {
-  const float* value = picture.values.data() + (y * picture.width_px + x) * picture.channels;
-  if (picture.channels == 1) return value[0];
+double GreyAt(const model::EncodedValues& image, int x, int y) {
+  const float* value = image.values.data() + (y * image.width_px + x) * image.channels;
+  if (image.channels == 1) return value[0];
   return 0.2126 * value[0] + 0.7152 * value[1] + 0.0722 * value[2];
 }
 
 // SSIM as its paper defines it: window by window, with weighted moments about the weighted means.
-double SlowSsim(const model::StoredValues& a, const model::StoredValues& b, int border_px) {
+double SlowSsim(const model::EncodedValues& a, const model::EncodedValues& b, int border_px) {
   const int margin = std::max(border_px, 5);
   double sum = 0;
   int windows = 0;
@@ -87,64 +86,64 @@ double SlowSsim(const model::StoredValues& a, const model::StoredValues& b, int 
 }
 
 TEST(Psnr, IsThatOfAConstantDifference) {
-  const PictureScores scores = ComparePictures(Flat(20, 14, 0.5), Flat(20, 14, 0.25), 0);
+  const ImageScores scores = CompareImages(Flat(20, 14, 0.5), Flat(20, 14, 0.25), 0);
   EXPECT_NEAR(scores.psnr_db, -20 * std::log10(0.25), 1e-12);
 }
 
 TEST(Psnr, PoolsTheChannels) {
-  model::StoredValues reference = Noise(16, 12, 3, 1);
+  model::EncodedValues reference = Noise(16, 12, 3, 1);
   for (float& value : reference.values) value *= 0.5F;
-  model::StoredValues other = reference;
+  model::EncodedValues other = reference;
   for (std::size_t i = 1; i < other.values.size(); i += 3) other.values[i] += 0.125F;
-  EXPECT_NEAR(ComparePictures(reference, other, 2).psnr_db, -10 * std::log10(1.0 / 64 / 3), 1e-6);
+  EXPECT_NEAR(CompareImages(reference, other, 2).psnr_db, -10 * std::log10(1.0 / 64 / 3), 1e-6);
 }
 
-TEST(Psnr, IsInfiniteForEqualPicturesAndWhatLiesInTheBorderDoesNotCount) {
-  const model::StoredValues reference = Noise(20, 17, 1, 2);
-  EXPECT_EQ(ComparePictures(reference, reference, 0).psnr_db,
+TEST(Psnr, IsInfiniteForEqualImagesAndWhatLiesInTheBorderDoesNotCount) {
+  const model::EncodedValues reference = Noise(20, 17, 1, 2);
+  EXPECT_EQ(CompareImages(reference, reference, 0).psnr_db,
             std::numeric_limits<double>::infinity());
-  model::StoredValues other = reference;
+  model::EncodedValues other = reference;
   other.values[3 * 20 + 9] += 0.5F;       // y = 3
   other.values[8 * 20 + 20 - 4] += 0.5F;  // x = 16
-  EXPECT_EQ(ComparePictures(reference, other, 4).psnr_db, std::numeric_limits<double>::infinity());
+  EXPECT_EQ(CompareImages(reference, other, 4).psnr_db, std::numeric_limits<double>::infinity());
   const double one_of_14x11 = -10 * std::log10(0.25 / (14 * 11));
   const double two_of_14x11 = -10 * std::log10(0.50 / (14 * 11));
-  EXPECT_NEAR(ComparePictures(reference, other, 3).psnr_db, two_of_14x11, 1e-5);
+  EXPECT_NEAR(CompareImages(reference, other, 3).psnr_db, two_of_14x11, 1e-5);
   other.values[8 * 20 + 20 - 4] = reference.values[8 * 20 + 20 - 4];
-  EXPECT_NEAR(ComparePictures(reference, other, 3).psnr_db, one_of_14x11, 1e-5);
+  EXPECT_NEAR(CompareImages(reference, other, 3).psnr_db, one_of_14x11, 1e-5);
 }
 
 TEST(Ssim, IsThatOfTheDirectSum) {
   for (const int channels : {1, 3}) {
-    const model::StoredValues a = Noise(31, 26, channels, 3);
-    model::StoredValues b = Noise(31, 26, channels, 4);
+    const model::EncodedValues a = Noise(31, 26, channels, 3);
+    model::EncodedValues b = Noise(31, 26, channels, 4);
     for (std::size_t i = 0; i < b.values.size(); ++i)
       b.values[i] = 0.7F * a.values[i] + 0.3F * b.values[i];
     for (const int border_px : {0, 5, 8}) {
-      EXPECT_NEAR(ComparePictures(a, b, border_px).ssim, SlowSsim(a, b, border_px), 1e-10)
+      EXPECT_NEAR(CompareImages(a, b, border_px).ssim, SlowSsim(a, b, border_px), 1e-10)
           << channels << " channels, border " << border_px;
     }
   }
 }
 
-TEST(Ssim, IsSymmetricAndOneForEqualPictures) {
-  const model::StoredValues a = Noise(40, 30, 1, 5);
-  const model::StoredValues b = Noise(40, 30, 1, 6);
-  EXPECT_NEAR(ComparePictures(a, a, 0).ssim, 1, 1e-12);
-  EXPECT_NEAR(ComparePictures(a, b, 0).ssim, ComparePictures(b, a, 0).ssim, 1e-12);
-  EXPECT_LT(ComparePictures(a, b, 0).ssim, 0.2);
+TEST(Ssim, IsSymmetricAndOneForEqualImages) {
+  const model::EncodedValues a = Noise(40, 30, 1, 5);
+  const model::EncodedValues b = Noise(40, 30, 1, 6);
+  EXPECT_NEAR(CompareImages(a, a, 0).ssim, 1, 1e-12);
+  EXPECT_NEAR(CompareImages(a, b, 0).ssim, CompareImages(b, a, 0).ssim, 1e-12);
+  EXPECT_LT(CompareImages(a, b, 0).ssim, 0.2);
 }
 
-TEST(Ssim, OfFlatPicturesIsThatOfTheirMeans) {
+TEST(Ssim, OfFlatImagesIsThatOfTheirMeans) {
   const double expected = (2 * 0.25 * 0.75 + 1e-4) / (0.0625 + 0.5625 + 1e-4);
-  EXPECT_NEAR(ComparePictures(Flat(15, 15, 0.25), Flat(15, 15, 0.75), 0).ssim, expected, 1e-9);
+  EXPECT_NEAR(CompareImages(Flat(15, 15, 0.25), Flat(15, 15, 0.75), 0).ssim, expected, 1e-9);
 }
 
 TEST(Ssim, IsNotDefinedWhereNoWindowFits) {
-  const model::StoredValues narrow = Noise(10, 30, 1, 7);
-  EXPECT_TRUE(std::isnan(ComparePictures(narrow, narrow, 0).ssim));
-  const model::StoredValues just_fits = Noise(11, 11, 1, 7);
-  EXPECT_NEAR(ComparePictures(just_fits, just_fits, 0).ssim, 1, 1e-12);
+  const model::EncodedValues narrow = Noise(10, 30, 1, 7);
+  EXPECT_TRUE(std::isnan(CompareImages(narrow, narrow, 0).ssim));
+  const model::EncodedValues just_fits = Noise(11, 11, 1, 7);
+  EXPECT_NEAR(CompareImages(just_fits, just_fits, 0).ssim, 1, 1e-12);
 }
 
 TEST(DeltaE94, AgreesWithPublishedPairs) {
@@ -155,7 +154,7 @@ TEST(DeltaE94, AgreesWithPublishedPairs) {
   EXPECT_NEAR(DeltaE94({0.9, 16.3, -2.22}, {0.7, 14.2, -1.80}), 1.249, 5e-4);
 }
 
-TEST(DeltaE94, WeighsLightnessChromaAndHueApart) {
+TEST(DeltaE94, WeightsLightnessChromaAndHueSeparately) {
   EXPECT_DOUBLE_EQ(DeltaE94({40, 30, 40}, {47, 30, 40}), 7);
   // Chroma from 50 to 55: the weight is 1 + 0.045 * 50, and in the other direction 1 + 0.045 * 55.
   EXPECT_NEAR(DeltaE94({40, 30, 40}, {40, 33, 44}), 5 / 3.25, 1e-12);
@@ -184,31 +183,31 @@ TEST(LabOf, KnowsPrimariesAndGreys) {
 }
 
 TEST(MeanDeltaE94, AveragesInsideTheBorderAndTakesGreyAsRgb) {
-  model::StoredValues reference = Flat(12, 12, 0.5);
-  model::StoredValues other = reference;
+  model::EncodedValues reference = Flat(12, 12, 0.5);
+  model::EncodedValues other = reference;
   other.values[6 * 12 + 6] = 0.75F;
   other.values[0] = 0;
   const double one = DeltaE94(LabOf({0.5, 0.5, 0.5}), LabOf({0.75, 0.75, 0.75}));
-  EXPECT_NEAR(ComparePictures(reference, other, 1).delta_e94_mean, one / 100, 1e-9);
+  EXPECT_NEAR(CompareImages(reference, other, 1).delta_e94_mean, one / 100, 1e-9);
   // Red against green, half and half.
-  model::StoredValues red{12, 12, 3, {}}, mixed{12, 12, 3, {}};
+  model::EncodedValues red{12, 12, 3, {}}, mixed{12, 12, 3, {}};
   for (int i = 0; i < 144; ++i) {
     red.values.insert(red.values.end(), {1, 0, 0});
     if (i % 2 == 0) mixed.values.insert(mixed.values.end(), {1, 0, 0});
     if (i % 2 == 1) mixed.values.insert(mixed.values.end(), {0, 1, 0});
   }
-  EXPECT_NEAR(ComparePictures(red, mixed, 0).delta_e94_mean,
+  EXPECT_NEAR(CompareImages(red, mixed, 0).delta_e94_mean,
               DeltaE94({53.24, 80.09, 67.20}, {87.73, -86.18, 83.18}) / 2, 0.01);
 }
 
 TEST(MacadeStandin, IsOneForEqualOrientation) {
-  const model::StoredValues reference = Noise(60, 50, 1, 8);
-  model::StoredValues weaker = reference;
-  model::StoredValues inverted = reference;
+  const model::EncodedValues reference = Noise(60, 50, 1, 8);
+  model::EncodedValues weaker = reference;
+  model::EncodedValues inverted = reference;
   for (float& value : weaker.values) value = 0.25F + 0.5F * value;
   for (float& value : inverted.values) value = 1 - value;
-  for (const model::StoredValues& other : {reference, weaker, inverted}) {
-    const auto standin = ComparePictures(reference, other, 0).macade_standin;
+  for (const model::EncodedValues& other : {reference, weaker, inverted}) {
+    const auto standin = CompareImages(reference, other, 0).macade_standin;
     ASSERT_TRUE(standin);
     EXPECT_NEAR(*standin, 1, 1e-6);
   }
@@ -216,7 +215,7 @@ TEST(MacadeStandin, IsOneForEqualOrientation) {
 
 TEST(MacadeStandin, IsTwoOverPiForRandomOrientation) {
   const auto standin =
-      ComparePictures(Noise(300, 300, 1, 9), Noise(300, 300, 1, 10), 0).macade_standin;
+      CompareImages(Noise(300, 300, 1, 9), Noise(300, 300, 1, 10), 0).macade_standin;
   ASSERT_TRUE(standin);
   // Some 30 000 edge pixels have a standard deviation of 0.308 each; neighbours are correlated.
   EXPECT_NEAR(*standin, 2 / kPi, 0.01);
@@ -229,33 +228,33 @@ TEST(MacadeStandin, IsTheCosineBetweenTwoRamps) {
     });
   };
   for (const double angle : {0.0, 0.3, kPi / 4, 1.2, 2.5}) {
-    const auto standin = ComparePictures(ramp(0.1), ramp(0.1 + angle), 0).macade_standin;
+    const auto standin = CompareImages(ramp(0.1), ramp(0.1 + angle), 0).macade_standin;
     ASSERT_TRUE(standin);
     EXPECT_NEAR(*standin, std::abs(std::cos(angle)), 1e-4) << angle;
   }
-  EXPECT_NEAR(*ComparePictures(ramp(0), ramp(kPi / 2), 0).macade_standin, 0, 1e-4);
+  EXPECT_NEAR(*CompareImages(ramp(0), ramp(kPi / 2), 0).macade_standin, 0, 1e-4);
 }
 
 TEST(MacadeStandin, CountsAnEdgeThatWasLostAsNothing) {
-  const model::StoredValues ramp = Drawn(20, 20, [](int x, int) { return 0.02 * x; });
-  const model::StoredValues half =
+  const model::EncodedValues ramp = Drawn(20, 20, [](int x, int) { return 0.02 * x; });
+  const model::EncodedValues half =
       Drawn(20, 20, [](int x, int y) { return y < 10 ? 0.02 * x : 0.5; });
-  ASSERT_TRUE(ComparePictures(ramp, Flat(20, 20, 0.5), 0).macade_standin);
-  EXPECT_EQ(*ComparePictures(ramp, Flat(20, 20, 0.5), 0).macade_standin, 0);
+  ASSERT_TRUE(CompareImages(ramp, Flat(20, 20, 0.5), 0).macade_standin);
+  EXPECT_EQ(*CompareImages(ramp, Flat(20, 20, 0.5), 0).macade_standin, 0);
   // Rows 10 to 18 of 1 to 18: without any gradient from 11 on, an oblique one in rows 9 and 10.
-  const double standin = *ComparePictures(ramp, half, 0).macade_standin;
+  const double standin = *CompareImages(ramp, half, 0).macade_standin;
   EXPECT_GT(standin, 8.0 / 18);
   EXPECT_LT(standin, 10.0 / 18);
 }
 
 TEST(MacadeStandin, LooksAtEdgesOfTheReferenceOnly) {
-  EXPECT_FALSE(ComparePictures(Flat(20, 20, 0.5), Noise(20, 20, 1, 11), 0).macade_standin);
+  EXPECT_FALSE(CompareImages(Flat(20, 20, 0.5), Noise(20, 20, 1, 11), 0).macade_standin);
   // A gradient of less than 2/255 per px is taken for noise.
   const auto ramp = [](double slope) {
     return Drawn(20, 20, [slope](int x, int) { return slope * x; });
   };
-  EXPECT_FALSE(ComparePictures(ramp(1.9 / 255), ramp(0.02), 0).macade_standin);
-  EXPECT_TRUE(ComparePictures(ramp(2.1 / 255), ramp(0.02), 0).macade_standin);
+  EXPECT_FALSE(CompareImages(ramp(1.9 / 255), ramp(0.02), 0).macade_standin);
+  EXPECT_TRUE(CompareImages(ramp(2.1 / 255), ramp(0.02), 0).macade_standin);
   // A step of 0.8 in the middle (gradient 0.4 per px), and away from it a ramp of 0.1 per px, less
   // than half of that, which is turned by a quarter. Only the step counts.
   const auto step = [](bool turned) {
@@ -266,22 +265,22 @@ TEST(MacadeStandin, LooksAtEdgesOfTheReferenceOnly) {
       return level + 0.1 * (x < 30 ? along : -along);
     });
   };
-  const auto standin = ComparePictures(step(false), step(true), 0).macade_standin;
+  const auto standin = CompareImages(step(false), step(true), 0).macade_standin;
   ASSERT_TRUE(standin);
   EXPECT_NEAR(*standin, 1, 1e-9);
 }
 
-TEST(ComparePictures, RefusesWhatDoesNotFit) {
-  const model::StoredValues picture = Noise(20, 12, 1, 12);
-  const auto message = [&](const model::StoredValues& other, int border_px) {
-    return ErrorOf([&] { ComparePictures(picture, other, border_px); });
+TEST(CompareImages, RefusesWhatDoesNotFit) {
+  const model::EncodedValues image = Noise(20, 12, 1, 12);
+  const auto message = [&](const model::EncodedValues& other, int border_px) {
+    return ErrorOf([&] { CompareImages(image, other, border_px); });
   };
   EXPECT_THAT(message(Noise(21, 12, 1, 1), 0), AllOf(HasSubstr("20x12"), HasSubstr("21x12")));
   EXPECT_THAT(message(Noise(20, 12, 3, 1), 0), HasSubstr("3 channel"));
-  EXPECT_THAT(message(picture, 6), AllOf(HasSubstr("border of 6 px"), HasSubstr("0 to 5")));
-  EXPECT_THAT(message(picture, -1), HasSubstr("border of -1 px"));
-  EXPECT_EQ(message(picture, 5), "(no error)");
-  EXPECT_THAT(message(model::StoredValues{20, 12, 1, {0.5F}}, 0), HasSubstr("1 values"));
+  EXPECT_THAT(message(image, 6), AllOf(HasSubstr("border of 6 px"), HasSubstr("0 to 5")));
+  EXPECT_THAT(message(image, -1), HasSubstr("border of -1 px"));
+  EXPECT_EQ(message(image, 5), "(no error)");
+  EXPECT_THAT(message(model::EncodedValues{20, 12, 1, {0.5F}}, 0), HasSubstr("1 values"));
 }
 
 // Views of a texture that differ from it by `difference(k, l)`, stored as they are.
@@ -291,7 +290,7 @@ model::LightField LightFieldOf(int u_count, int v_count, const Difference& diffe
   light_field.transfer = model::TransferCurve::Linear();
   for (int l = 0; l < v_count; ++l) {
     for (int k = 0; k < u_count; ++k) {
-      model::StoredValues texture = Noise(24, 20, 1, 77);
+      model::EncodedValues texture = Noise(24, 20, 1, 77);
       for (float& value : texture.values)
         value = static_cast<float>(0.25 + 0.25 * value + difference(k, l));
       model::SetView(&light_field, k, l, {24, 20, 1, texture.values});
@@ -335,19 +334,19 @@ TEST(CompareLightFields, AveragesTheMiddleViewsOfEvenCounts) {
 }
 
 TEST(CompareLightFields, MeansOfScoresAreMeans) {
-  // With only the centre view, all three scores are equal to those of ComparePictures.
+  // With only the centre view, all three scores are equal to those of CompareImages.
   model::LightField reference = model::MakeLightField(24, 20, 1, 1, 3);
   model::LightField other = reference;
-  const model::StoredValues a = Noise(24, 20, 3, 5);
-  const model::StoredValues b = Noise(24, 20, 3, 6);
+  const model::EncodedValues a = Noise(24, 20, 3, 5);
+  const model::EncodedValues b = Noise(24, 20, 3, 6);
   model::SetView(&reference, 0, 0, {24, 20, 3, a.values});
   model::SetView(&other, 0, 0, {24, 20, 3, b.values});
   other.transfer = model::TransferCurve::Linear();  // for storing it; the reference's counts
-  const PictureScores expected = ComparePictures(
-      model::StoredValuesOf(model::ViewPicture(reference, 0, 0), reference.transfer),
-      model::StoredValuesOf(model::ViewPicture(other, 0, 0), reference.transfer), 3);
+  const ImageScores expected =
+      CompareImages(model::EncodedValuesOf(model::ViewImage(reference, 0, 0), reference.transfer),
+                    model::EncodedValuesOf(model::ViewImage(other, 0, 0), reference.transfer), 3);
   const LightFieldScores scores = CompareLightFields(reference, other, 3, std::nullopt, 1);
-  for (const PictureScores& mean : {scores.mean, scores.centre, scores.corner}) {
+  for (const ImageScores& mean : {scores.mean, scores.centre, scores.corner}) {
     EXPECT_EQ(mean.psnr_db, expected.psnr_db);
     EXPECT_EQ(mean.ssim, expected.ssim);
     EXPECT_EQ(mean.delta_e94_mean, expected.delta_e94_mean);
@@ -389,11 +388,11 @@ constexpr int kWide = 40;
 constexpr int kHigh = 32;
 
 // The point at x in the centre view is at x - a d, y - b d in the view (a, b).
-model::LightField ShiftedTexture(const model::StoredValues& texture, int disparity_px) {
+model::LightField ShiftedTexture(const model::EncodedValues& texture, int disparity_px) {
   model::LightField light_field = model::MakeLightField(kWide, kHigh, 3, 3, 1);
   for (int l = 0; l < 3; ++l) {
     for (int k = 0; k < 3; ++k) {
-      model::LinearPicture view{kWide, kHigh, 1, {}};
+      model::LinearImage view{kWide, kHigh, 1, {}};
       for (int y = 0; y < kHigh; ++y) {
         for (int x = 0; x < kWide; ++x) {
           const int from_x = std::clamp(x + (k - 1) * disparity_px, 0, kWide - 1);
@@ -407,7 +406,7 @@ model::LightField ShiftedTexture(const model::StoredValues& texture, int dispari
   return light_field;
 }
 
-DibrInput DibrOf(const model::StoredValues& texture, float disparity_px) {
+DibrInput DibrOf(const model::EncodedValues& texture, float disparity_px) {
   DibrInput dibr;
   dibr.photograph = {kWide, kHigh, 1, texture.values};
   dibr.disparity.width_px = kWide;
@@ -417,7 +416,7 @@ DibrInput DibrOf(const model::StoredValues& texture, float disparity_px) {
 }
 
 TEST(CompareLightFields, WarpsThePhotographIntoEachView) {
-  const model::StoredValues texture = Noise(kWide, kHigh, 1, 13);
+  const model::EncodedValues texture = Noise(kWide, kHigh, 1, 13);
   const model::LightField truth = ShiftedTexture(texture, 2);
   const model::LightField still = ShiftedTexture(texture, 0);
   const LightFieldScores right = CompareLightFields(truth, still, 6, DibrOf(texture, 2), 1);
@@ -433,11 +432,11 @@ TEST(CompareLightFields, WarpsThePhotographIntoEachView) {
 // Two means that are printed together are over the same views, although each has another view
 // without a difference.
 TEST(CompareLightFields, MeansOfEstimateAndBaselineAreOverTheSameViews) {
-  const model::StoredValues texture = Noise(kWide, kHigh, 1, 15);
+  const model::EncodedValues texture = Noise(kWide, kHigh, 1, 15);
   const model::LightField truth = ShiftedTexture(texture, 2);
   model::LightField other = ShiftedTexture(texture, 1);
-  model::SetView(&other, 0, 0, model::ViewPicture(truth, 0, 0));
-  model::SetView(&other, 1, 1, model::ViewPicture(other, 0, 0));
+  model::SetView(&other, 0, 0, model::ViewImage(truth, 0, 0));
+  model::SetView(&other, 1, 1, model::ViewImage(other, 0, 0));
   // With a disparity of 1 px instead of 2, warping has no error in the middle only.
   const LightFieldScores scores = CompareLightFields(truth, other, 6, DibrOf(texture, 1), 1);
   double own = 0, warped = 0;
@@ -456,7 +455,7 @@ TEST(CompareLightFields, MeansOfEstimateAndBaselineAreOverTheSameViews) {
 }
 
 TEST(CompareLightFields, GivesTheSameOnAnyNumberOfThreads) {
-  const model::StoredValues texture = Noise(kWide, kHigh, 1, 14);
+  const model::EncodedValues texture = Noise(kWide, kHigh, 1, 14);
   const model::LightField truth = ShiftedTexture(texture, 1);
   const model::LightField still = ShiftedTexture(texture, 0);
   const LightFieldScores one = CompareLightFields(truth, still, 3, DibrOf(texture, 0.7F), 1);
@@ -486,7 +485,7 @@ TEST(CompareLightFields, RefusesWhatDoesNotFit) {
               HasSubstr("3 channel"));
   EXPECT_THAT(message(reference, 10, std::nullopt), HasSubstr("border of 10 px"));
   DibrInput dibr;
-  dibr.photograph = model::ViewPicture(reference, 1, 1);
+  dibr.photograph = model::ViewImage(reference, 1, 1);
   dibr.disparity.width_px = 24;
   dibr.disparity.height_px = 19;
   dibr.disparity.disparity.assign(24 * 19, 0.0F);

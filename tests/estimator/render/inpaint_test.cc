@@ -46,8 +46,8 @@ struct Scene {
   bool ShowsCard(double a, double b, int x, int y) const {
     return IsCard(x + a * card_px, y + b * card_px);
   }
-  // True for a point that is not visible from the centre although it is inside of its picture.
-  bool IsHidden(double a, double b, int x, int y) const {
+  // True for a point that is not visible from the centre although it is inside of its image.
+  bool IsOccluded(double a, double b, int x, int y) const {
     return !ShowsCard(a, b, x, y) && IsCard(x + a * background_px, y + b * background_px);
   }
   double Truth(double a, double b, int x, int y, int channel) const {
@@ -79,7 +79,7 @@ model::LightField FieldOf(const Scene& scene, int channels, const IsGarbage& is_
 }
 model::LightField WithGarbage(const Scene& scene, int channels) {
   return FieldOf(scene, channels,
-                 [&](double a, double b, int x, int y) { return scene.IsHidden(a, b, x, y); });
+                 [&](double a, double b, int x, int y) { return scene.IsOccluded(a, b, x, y); });
 }
 
 class InpaintTest : public ::testing::TestWithParam<double> {};
@@ -90,18 +90,18 @@ TEST_P(InpaintTest, FillsWhatTheCardHides) {
   model::LightField field = WithGarbage(scene, 3);
   const model::LightField before = field;
   InpaintSummary summary;
-  InpaintHiddenRays(scene.Map(), {}, &field, &summary);
-  std::size_t hidden = 0;
+  InpaintOccludedRays(scene.Map(), {}, &field, &summary);
+  std::size_t occluded = 0;
   for (int l = 0; l < kViews; ++l) {
     for (int k = 0; k < kViews; ++k) {
       const double a = field.u_offset(k), b = field.v_offset(l);
       for (int y = 0; y < kHeight; ++y) {
         for (int x = 0; x < kWidth; ++x) {
-          if (scene.IsHidden(a, b, x, y)) ++hidden;
+          if (scene.IsOccluded(a, b, x, y)) ++occluded;
           for (int channel = 0; channel < 3; ++channel) {
             const std::size_t i =
                 field.ViewStart(channel, k, l) + static_cast<std::size_t>(y * kWidth + x);
-            if (scene.IsHidden(a, b, x, y)) {
+            if (scene.IsOccluded(a, b, x, y)) {
               // Between the background and the card that it is next to.
               EXPECT_GT(field.values[i], 0.25F);
               EXPECT_LT(field.values[i], 0.95F);
@@ -113,9 +113,9 @@ TEST_P(InpaintTest, FillsWhatTheCardHides) {
       }
     }
   }
-  EXPECT_EQ(summary.holes, hidden);
-  EXPECT_EQ(summary.filled + summary.carried, hidden);
-  EXPECT_GT(summary.carried, hidden / 2);  // views on one side show the same strip
+  EXPECT_EQ(summary.holes, occluded);
+  EXPECT_EQ(summary.filled + summary.carried, occluded);
+  EXPECT_GT(summary.carried, occluded / 2);  // views on one side show the same strip
   EXPECT_GT(summary.views_visited, 3);
   EXPECT_GE(summary.seconds, 0);
   EXPECT_THAT(summary.message, HasSubstr("Telea"));
@@ -126,7 +126,7 @@ TEST_P(InpaintTest, CarriesARadianceToAllThatShowThePoint) {
   const Scene scene{GetParam(), GetParam() + 2};
   model::LightField field = WithGarbage(scene, 1);
   InpaintSummary summary;
-  InpaintHiddenRays(scene.Map(), {}, &field, &summary);
+  InpaintOccludedRays(scene.Map(), {}, &field, &summary);
   // The row in the middle of the card: the strip that is revealed at its right in the view a = 1,
   // b = 0 is revealed in a = 2 as well.
   const auto at = [&](int k, int x) {
@@ -135,14 +135,14 @@ TEST_P(InpaintTest, CarriesARadianceToAllThatShowThePoint) {
   const int shift = static_cast<int>(scene.background_px);
   int compared = 0;
   for (int x = 0; x < kWidth; ++x) {
-    if (!scene.IsHidden(1, 0, x, 11)) continue;
+    if (!scene.IsOccluded(1, 0, x, 11)) continue;
     EXPECT_EQ(at(3, x), at(4, x - shift)) << x;
     ++compared;
   }
   EXPECT_EQ(compared, 2);
 }
 
-// Garbage that is beyond the border of the centre picture is not replaced.
+// Garbage that is beyond the border of the centre image is not replaced.
 TEST(Inpaint, LeavesWhatIsBeyondTheBorder) {
   const Scene scene{2, 4};
   const auto is_beyond = [](double a, double b, int x, int y) {
@@ -151,7 +151,7 @@ TEST(Inpaint, LeavesWhatIsBeyondTheBorder) {
   };
   model::LightField field = FieldOf(scene, 1, is_beyond);
   InpaintSummary summary;
-  InpaintHiddenRays(scene.Map(), {}, &field, &summary);
+  InpaintOccludedRays(scene.Map(), {}, &field, &summary);
   int garbage = 0;
   for (int l = 0; l < kViews; ++l) {
     for (int k = 0; k < kViews; ++k) {
@@ -187,7 +187,7 @@ TEST(Inpaint, ContinuesASmoothBackground) {
     }
   }
   InpaintSummary summary;
-  InpaintHiddenRays(scene.Map(), {}, &field, &summary);
+  InpaintOccludedRays(scene.Map(), {}, &field, &summary);
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 0; x < kWidth; ++x) {
       EXPECT_NEAR(field.values[field.ViewStart(0, 4, 2) + static_cast<std::size_t>(y * kWidth + x)],
@@ -197,16 +197,16 @@ TEST(Inpaint, ContinuesASmoothBackground) {
   }
 }
 
-// A hole that reaches the border of the picture: nothing beyond may leak in.
+// A hole that reaches the border of the image: nothing beyond may leak in.
 TEST(Inpaint, FillsHolesAtTheBorder) {
   const Scene scene{0, 2, -100, 100};  // from top to bottom
   // This holds in the middle row of views only. In the rows above and below, the way to the
-  // background leaves the picture.
+  // background leaves the image.
   model::LightField field = FieldOf(scene, 1, [&](double a, double b, int x, int y) {
-    return b == 0 && scene.IsHidden(a, b, x, y);
+    return b == 0 && scene.IsOccluded(a, b, x, y);
   });
   InpaintSummary summary;
-  InpaintHiddenRays(scene.Map(), {}, &field, &summary);
+  InpaintOccludedRays(scene.Map(), {}, &field, &summary);
   EXPECT_GT(summary.holes, 0U);
   for (const float value : field.values) {
     EXPECT_GT(value, 0.25F);
@@ -222,7 +222,7 @@ TEST(Inpaint, ThreadsMakeNoDifference) {
     InpaintOptions options;
     options.threads = threads;
     InpaintSummary summary;
-    InpaintHiddenRays(scene.Map(), options, &field, &summary);
+    InpaintOccludedRays(scene.Map(), options, &field, &summary);
     if (first.empty()) first = field.values;
     EXPECT_EQ(field.values, first);
   }
@@ -235,18 +235,18 @@ TEST(Inpaint, ViewsThatAreMissingAreLeftOut) {
   field.present[2 * kViews + 4] = false;
   const model::LightField before = field;
   InpaintSummary summary;
-  InpaintHiddenRays(scene.Map(), {}, &field, &summary);
+  InpaintOccludedRays(scene.Map(), {}, &field, &summary);
   const auto begin = field.values.begin() + static_cast<std::ptrdiff_t>(field.ViewStart(0, 4, 2));
   EXPECT_TRUE(
       std::equal(begin, begin + kWidth * kHeight,
                  before.values.begin() + static_cast<std::ptrdiff_t>(before.ViewStart(0, 4, 2))));
 }
 
-TEST(Inpaint, NothingHiddenNothingDone) {
+TEST(Inpaint, NothingOccludedNothingDone) {
   DisparityMap flat{kWidth, kHeight, std::vector<float>(kWidth * kHeight, 0.0F), {1, 1}};
   model::LightField field = model::MakeLightField(kWidth, kHeight, 3, 3, 1);
   InpaintSummary summary;
-  InpaintHiddenRays(flat, {}, &field, &summary);
+  InpaintOccludedRays(flat, {}, &field, &summary);
   EXPECT_EQ(summary.holes, 0U);
   EXPECT_EQ(summary.views_visited, 0);
 }
@@ -255,16 +255,16 @@ TEST(Inpaint, RefusesWhatDoesNotFit) {
   const Scene scene;
   model::LightField field = model::MakeLightField(8, 8, 3, 3, 1);
   InpaintSummary summary;
-  EXPECT_THAT(ErrorOf([&] { InpaintHiddenRays(scene.Map(), {}, &field, &summary); }),
+  EXPECT_THAT(ErrorOf([&] { InpaintOccludedRays(scene.Map(), {}, &field, &summary); }),
               AllOf(HasSubstr("40x24"), HasSubstr("8x8")));
   InpaintOptions options;
   options.radius_px = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_THAT(ErrorOf([&] { InpaintHiddenRays(scene.Map(), options, &field, &summary); }),
+  EXPECT_THAT(ErrorOf([&] { InpaintOccludedRays(scene.Map(), options, &field, &summary); }),
               HasSubstr("radius_px"));
   options = {};
   options.progress = [](int, int) { throw Interrupted(); };
   field = WithGarbage(scene, 1);
-  EXPECT_THROW(InpaintHiddenRays(scene.Map(), options, &field, &summary), Interrupted);
+  EXPECT_THROW(InpaintOccludedRays(scene.Map(), options, &field, &summary), Interrupted);
 }
 
 }  // namespace

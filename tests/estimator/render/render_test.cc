@@ -91,15 +91,15 @@ double IrradianceAt(const model::LightField& field, const model::Ray& ray) {
                                    field.grid->planes, ray);
 }
 
-model::LinearPicture TakePhotograph(const model::LightField& field, const Eigen::ArrayXXd& weights,
-                                    bool falloff, int threads = 1) {
+model::LinearImage TakePhotograph(const model::LightField& field, const Eigen::ArrayXXd& weights,
+                                  bool falloff, int threads = 1) {
   const model::Camera* camera = falloff && field.camera ? &*field.camera : nullptr;
-  const auto twin = kernels::NewReference<float>();
-  model::LinearPicture photograph =
-      Photograph(field, weights, camera, nullptr, twin.get(), threads);
-  const model::LinearPicture native = Photograph(field, weights, camera, nullptr, nullptr, threads);
+  const auto reference = kernels::NewReference<float>();
+  model::LinearImage photograph =
+      Photograph(field, weights, camera, nullptr, reference.get(), threads);
+  const model::LinearImage cpu = Photograph(field, weights, camera, nullptr, nullptr, threads);
   for (std::size_t i = 0; i < photograph.values.size(); ++i) {
-    EXPECT_NEAR(native.values[i], photograph.values[i], 2e-6) << i;
+    EXPECT_NEAR(cpu.values[i], photograph.values[i], 2e-6) << i;
   }
   return photograph;
 }
@@ -111,7 +111,7 @@ TEST(Photograph, IsTheWeightedMeanOfTheViews) {
   const Eigen::ArrayXXd weights = 3 * RandomWeights(3, 5, 2);
   field.present.assign(15, true);
   field.present[1 * 3 + 2] = field.present[4 * 3] = false;
-  const model::LinearPicture picture = TakePhotograph(field, weights, true);
+  const model::LinearImage image = TakePhotograph(field, weights, true);
   for (int y = 0; y < 7; ++y) {
     for (int x = 0; x < 9; ++x) {
       for (int c = 0; c < 3; ++c) {
@@ -120,24 +120,24 @@ TEST(Photograph, IsTheWeightedMeanOfTheViews) {
         for (int l = 0; l < 5; ++l) {
           for (int k = 0; k < 3; ++k) {
             if ((k == 2 && l == 1) || (k == 0 && l == 4)) continue;
-            sum += weights(l, k) * model::ViewPicture(field, k, l).at(x, y, c);
+            sum += weights(l, k) * model::ViewImage(field, k, l).at(x, y, c);
             weight += weights(l, k);
           }
         }
-        EXPECT_NEAR(picture.at(x, y, c), sum / weight, 1e-6);
+        EXPECT_NEAR(image.at(x, y, c), sum / weight, 1e-6);
       }
     }
   }
 }
 
 // Each ray shares its light between the pixels around its landing point, and a pixel is the mean of
-// the light that reaches it. Rays that land nearest to a pixel outside of the picture are not
+// the light that reaches it. Rays that land nearest to a pixel outside of the image are not
 // counted.
 TEST(Photograph, PutsEachRayWhereItLands) {
   model::LightField field = RandomField(15, 11, 5, 3, 1, 3);
   field.landing_step_px = {0.7, -1.35};
   const Eigen::ArrayXXd weights = RandomWeights(5, 3, 4);
-  const model::LinearPicture picture = TakePhotograph(field, weights, false);
+  const model::LinearImage image = TakePhotograph(field, weights, false);
   std::vector<double> sum(15 * 11, 0.0);
   std::vector<double> weight(15 * 11, 0.0);
   for (int l = 0; l < 3; ++l) {
@@ -165,7 +165,7 @@ TEST(Photograph, PutsEachRayWhereItLands) {
     }
   }
   for (std::size_t i = 0; i < sum.size(); ++i) {
-    EXPECT_NEAR(picture.values[i], sum[i] / weight[i], 1e-5);
+    EXPECT_NEAR(image.values[i], sum[i] / weight[i], 1e-5);
   }
 }
 
@@ -186,15 +186,15 @@ TEST(Photograph, WeakensRaysByTheirIrradiance) {
   field.present.assign(9, true);
   field.present[5] = false;
   const Eigen::ArrayXXd weights = RandomWeights(3, 3, 7);
-  const model::LinearPicture picture = TakePhotograph(field, weights, true);
+  const model::LinearImage image = TakePhotograph(field, weights, true);
   double weight = 0;
-  std::vector<double> sum(picture.values.size(), 0.0);
+  std::vector<double> sum(image.values.size(), 0.0);
   for (int l = 0; l < 3; ++l) {
     for (int k = 0; k < 3; ++k) {
       if (k == 2 && l == 1) continue;
       const double on_axis = IrradianceAt(field, field.grid->RayAt(6, 4, k, l));
       weight += weights(l, k);
-      const model::LinearPicture view = model::ViewPicture(field, k, l);
+      const model::LinearImage view = model::ViewImage(field, k, l);
       for (int y = 0; y < 11; ++y) {
         for (int x = 0; x < 15; ++x) {
           for (int c = 0; c < 3; ++c) {
@@ -208,7 +208,7 @@ TEST(Photograph, WeakensRaysByTheirIrradiance) {
   }
   double weakest = 1;
   for (std::size_t i = 0; i < sum.size(); ++i) {
-    EXPECT_NEAR(picture.values[i], sum[i] / weight, 2e-6);
+    EXPECT_NEAR(image.values[i], sum[i] / weight, 2e-6);
     weakest = std::min(weakest, sum[i] / weight);
   }
   EXPECT_LT(weakest, 0.3);  // otherwise the effect would be invisible
@@ -221,12 +221,12 @@ TEST(Photograph, OfAUniformRadianceIsOneAtThePrincipalPointAndFallsOffAroundIt) 
     // Fine pixels where rays land between them, so that the mean over a pixel is that of its
     // middle.
     AddCamera(&field, planes, model::Psf::kGaussian, planes.uv_depth_mm > 0 ? 0.05 : 0.9);
-    const model::LinearPicture picture =
+    const model::LinearImage image =
         TakePhotograph(field, model::ApertureWeights(model::ApertureShape::kGaussian, 5, 5), true);
-    EXPECT_NEAR(picture.at(6, 4, 0), 1, planes.uv_depth_mm > 0 ? 1e-4 : 1e-6);
-    EXPECT_LT(picture.at(14, 4, 0), picture.at(10, 4, 0));
-    EXPECT_LT(picture.at(10, 4, 0), picture.at(6, 4, 0));
-    EXPECT_LT(picture.at(6, 10, 0), picture.at(6, 7, 0));
+    EXPECT_NEAR(image.at(6, 4, 0), 1, planes.uv_depth_mm > 0 ? 1e-4 : 1e-6);
+    EXPECT_LT(image.at(14, 4, 0), image.at(10, 4, 0));
+    EXPECT_LT(image.at(10, 4, 0), image.at(6, 4, 0));
+    EXPECT_LT(image.at(6, 10, 0), image.at(6, 7, 0));
   }
 }
 
@@ -259,7 +259,7 @@ TEST(Photograph, PutsWholeRaysToTheNearestPixelWhereTheEstimateDid) {
   field.landing_step_px = {0.7, -1.35};
   field.origin.splat = "nearest";
   const Eigen::ArrayXXd weights = RandomWeights(5, 3, 34);
-  const model::LinearPicture picture = TakePhotograph(field, weights, false);
+  const model::LinearImage image = TakePhotograph(field, weights, false);
   std::vector<double> sum(15 * 11, 0.0);
   std::vector<double> weight(15 * 11, 0.0);
   for (int l = 0; l < 3; ++l) {
@@ -270,7 +270,7 @@ TEST(Photograph, PutsWholeRaysToTheNearestPixelWhereTheEstimateDid) {
           const double y = std::floor(t - 1.35 * (l - 1) + 0.5);
           if (!(x >= 0 && x < 15 && y >= 0 && y < 11)) continue;
           const auto i = static_cast<std::size_t>(y * 15 + x);
-          sum[i] += weights(l, k) * model::ViewPicture(field, k, l).at(s, t, 0);
+          sum[i] += weights(l, k) * model::ViewImage(field, k, l).at(s, t, 0);
           weight[i] += weights(l, k);
         }
       }
@@ -278,7 +278,7 @@ TEST(Photograph, PutsWholeRaysToTheNearestPixelWhereTheEstimateDid) {
   }
   for (std::size_t i = 0; i < sum.size(); ++i) {
     ASSERT_GT(weight[i], 0);
-    EXPECT_NEAR(picture.values[i], sum[i] / weight[i], 1e-6) << i;
+    EXPECT_NEAR(image.values[i], sum[i] / weight[i], 1e-6) << i;
   }
 }
 
@@ -313,7 +313,7 @@ TEST(RelativeFalloff, IsTheIrradianceOverThatAtThePrincipalPoint) {
 }
 
 // H with the nearest pixel for g, applied to a uniform radiance.
-TEST(FalloffOfPicture, IsTheMeanOfTheRaysNearestToAPixel) {
+TEST(FalloffOfImage, IsTheMeanOfTheRaysNearestToAPixel) {
   for (const model::LightFieldPlanes& planes : {kInFocus, kOffFocus}) {
     model::LightField field = RandomField(15, 11, 3, 5, 1, 13);
     AddCamera(&field, planes, model::Psf::kGaussian, 0.15);
@@ -326,7 +326,7 @@ TEST(FalloffOfPicture, IsTheMeanOfTheRaysNearestToAPixel) {
             RelativeFalloff(*field.grid, *field.camera, weights, k, l);
         for (int t = 0; t < 11; ++t) {
           for (int s = 0; s < 15; ++s) {
-            const Eigen::Vector2d landing = model::PicturePositionPx(
+            const Eigen::Vector2d landing = model::ImagePositionPx(
                 field.camera->sensor,
                 model::LandingPointMm(field.camera->lens, field.camera->image_distance_mm(), planes,
                                       field.grid->RayAt(s, t, k, l)));
@@ -340,9 +340,8 @@ TEST(FalloffOfPicture, IsTheMeanOfTheRaysNearestToAPixel) {
         }
       }
     }
-    const std::vector<float> falloff =
-        FalloffOfPicture(*field.grid, *field.camera, weights, 15, 11);
-    EXPECT_EQ(falloff, FalloffOfPicture(*field.grid, *field.camera, weights, 15, 11, 3));
+    const std::vector<float> falloff = FalloffOfImage(*field.grid, *field.camera, weights, 15, 11);
+    EXPECT_EQ(falloff, FalloffOfImage(*field.grid, *field.camera, weights, 15, 11, 3));
     int shifted = 0;
     for (std::size_t i = 0; i < sum.size(); ++i) {
       shifted += weight[i] < weights.sum() - 1e-9 ? 1 : 0;
@@ -364,7 +363,7 @@ TEST(RelativeFalloff, RefusesWeightsThatDoNotFit) {
               }),
               HasSubstr("5x3"));
   EXPECT_THAT(ErrorOf([&] {
-                FalloffOfPicture(*field.grid, *field.camera, Eigen::ArrayXXd::Zero(5, 3), 4, 3);
+                FalloffOfImage(*field.grid, *field.camera, Eigen::ArrayXXd::Zero(5, 3), 4, 3);
               }),
               HasSubstr("sum is 0"));
 }
@@ -476,7 +475,7 @@ TEST(WeightsForRadius, RefusesWhatIsNoRadius) {
 
 // --- Refocusing.
 
-// Views of a texture parallel to the picture: the point at x in the centre view is at x - a d.
+// Views of a texture parallel to the image: the point at x in the centre view is at x - a d.
 model::LightField LayerField(int u_count, int v_count, double u_px, double v_px,
                              const std::function<double(double, double)>& texture) {
   return FieldOf(32, 26, u_count, v_count, 1, [&](int s, int t, int k, int l, int) {
@@ -492,8 +491,7 @@ TEST(Refocus, BringsBackTheCentreViewOfALayer) {
   for (const auto& [u_px, v_px] : {std::pair{1.0, 1.0}, {0.63, -0.41}, {-1.0, 2.0}}) {
     for (const int u_count : {5, 4}) {
       const model::LightField field = LayerField(u_count, 3, u_px, v_px, Waves);
-      const model::LinearPicture picture =
-          Refocus(field, u_px, v_px, RandomWeights(u_count, 3, 24), 1);
+      const model::LinearImage image = Refocus(field, u_px, v_px, RandomWeights(u_count, 3, 24), 1);
       const bool whole = u_px == std::round(u_px) && u_count == 5;
       for (int y = 0; y < 26; ++y) {
         for (int x = 0; x < 32; ++x) {
@@ -501,7 +499,7 @@ TEST(Refocus, BringsBackTheCentreViewOfALayer) {
           // cubic convolution are repeated there.
           const bool inside = x >= 4 && x < 28 && y >= 4 && y < 22;
           if (!whole && !inside) continue;
-          EXPECT_NEAR(picture.at(x, y, 0), Waves(x, y), whole ? 1e-6 : 4e-3) << x << ", " << y;
+          EXPECT_NEAR(image.at(x, y, 0), Waves(x, y), whole ? 1e-6 : 4e-3) << x << ", " << y;
         }
       }
     }
@@ -514,16 +512,16 @@ TEST(Refocus, IsExactForAQuadraticTexture) {
     return 0.01 * x * x - 0.02 * x * y + 0.005 * y * y;
   };
   const model::LightField field = LayerField(3, 3, 0.37, -1.61, texture);
-  const model::LinearPicture picture = Refocus(field, 0.37, -1.61, RandomWeights(3, 3, 25), 1);
+  const model::LinearImage image = Refocus(field, 0.37, -1.61, RandomWeights(3, 3, 25), 1);
   for (int y = 3; y < 23; ++y) {
-    for (int x = 3; x < 29; ++x) EXPECT_NEAR(picture.at(x, y, 0), texture(x, y), 2e-5);
+    for (int x = 3; x < 29; ++x) EXPECT_NEAR(image.at(x, y, 0), texture(x, y), 2e-5);
   }
 }
 
 TEST(Refocus, AveragesTheViewsThatAreInside) {
   const model::LightField field = RandomField(12, 9, 3, 1, 3, 26);
   const Eigen::ArrayXXd weights = RandomWeights(3, 1, 27);
-  const model::LinearPicture picture = Refocus(field, 4, 0, weights, 1);
+  const model::LinearImage image = Refocus(field, 4, 0, weights, 1);
   for (int x = 0; x < 12; ++x) {
     for (int c = 0; c < 3; ++c) {
       double sum = 0;
@@ -531,10 +529,10 @@ TEST(Refocus, AveragesTheViewsThatAreInside) {
       for (int k = 0; k < 3; ++k) {
         const int s = x - (k - 1) * 4;
         if (s < 0 || s >= 12) continue;
-        sum += weights(0, k) * model::ViewPicture(field, k, 0).at(s, 5, c);
+        sum += weights(0, k) * model::ViewImage(field, k, 0).at(s, 5, c);
         weight += weights(0, k);
       }
-      EXPECT_NEAR(picture.at(x, 5, c), sum / weight, 1e-6) << x;
+      EXPECT_NEAR(image.at(x, 5, c), sum / weight, 1e-6) << x;
     }
   }
 }
@@ -543,16 +541,16 @@ TEST(Refocus, IsBlackWhereNoViewIs) {
   model::LightField field = FieldOf(12, 9, 3, 1, 1, [](int, int, int, int, int) { return 1.0; });
   field.present = {true, false, false};
   const Eigen::ArrayXXd weights = Eigen::ArrayXXd::Ones(1, 3);
-  const model::LinearPicture picture = Refocus(field, 5, 0, weights, 1);  // x + 5 of the first view
-  for (int x = 0; x < 12; ++x) EXPECT_EQ(picture.at(x, 4, 0), x <= 6 ? 1 : 0) << x;
+  const model::LinearImage image = Refocus(field, 5, 0, weights, 1);  // x + 5 of the first view
+  for (int x = 0; x < 12; ++x) EXPECT_EQ(image.at(x, 4, 0), x <= 6 ? 1 : 0) << x;
   for (const float value : Refocus(field, 1e12, 0, weights, 1).values) EXPECT_EQ(value, 0);
 }
 
 TEST(Refocus, AtZeroIsThePhotographWithoutFalloff) {
   const model::LightField field = RandomField(15, 11, 3, 5, 3, 28);
   const Eigen::ArrayXXd weights = RandomWeights(3, 5, 29);
-  const model::LinearPicture refocused = Refocus(field, 0, 0, weights, 1);
-  const model::LinearPicture photograph = TakePhotograph(field, weights, false);
+  const model::LinearImage refocused = Refocus(field, 0, 0, weights, 1);
+  const model::LinearImage photograph = TakePhotograph(field, weights, false);
   for (std::size_t i = 0; i < photograph.values.size(); ++i) {
     EXPECT_NEAR(refocused.values[i], photograph.values[i], 1e-6);
   }
@@ -590,7 +588,7 @@ double Label(int s, int t, int k, int l, int c) {
 
 TEST(Mosaic, HasTheViewsSideBySide) {
   const model::LightField field = FieldOf(4, 3, 2, 3, 3, Label);
-  const model::LinearPicture mosaic = Mosaic(field, 2);
+  const model::LinearImage mosaic = Mosaic(field, 2);
   ASSERT_EQ(mosaic.width_px, 4 + 2 + 4);
   ASSERT_EQ(mosaic.height_px, 3 + 2 + 3 + 2 + 3);
   ASSERT_EQ(mosaic.channels, 3);
@@ -606,12 +604,12 @@ TEST(Mosaic, HasTheViewsSideBySide) {
 
 TEST(Epipolar, StacksARowOrAColumnOfAllViews) {
   const model::LightField field = FieldOf(4, 3, 2, 3, 3, Label);
-  const model::LinearPicture row = EpipolarRow(field, 1, 2, 2);
+  const model::LinearImage row = EpipolarRow(field, 1, 2, 2);
   ASSERT_EQ(row.width_px, 4);
   ASSERT_EQ(row.height_px, 2 * 2);
   EXPECT_EQ(row.at(3, 1, 0), Label(3, 1, 0, 2, 0));
   EXPECT_EQ(row.at(2, 2, 2), Label(2, 1, 1, 2, 2));
-  const model::LinearPicture column = EpipolarColumn(field, 3, 1, 4);
+  const model::LinearImage column = EpipolarColumn(field, 3, 1, 4);
   ASSERT_EQ(column.width_px, 3 * 4);
   ASSERT_EQ(column.height_px, 3);
   EXPECT_EQ(column.at(3, 0, 0), Label(3, 0, 1, 0, 0));

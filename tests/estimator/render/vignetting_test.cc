@@ -13,8 +13,8 @@
 #include "support/error_message.h"
 #include "support/test_cameras.h"
 #include "thicklens/estimator/render.h"
-#include "thicklens/model/effect_choice.h"
 #include "thicklens/model/effect_impact.h"
+#include "thicklens/model/effect_selection.h"
 #include "thicklens/model/scene_simulator.h"
 
 namespace thicklens::estimator {
@@ -39,7 +39,7 @@ model::Camera BenchCamera(model::Psf psf) {
   return WithMethod(camera);
 }
 
-// An upright sine of that period, in px of the picture, nearer than the plane of focus.
+// An upright sine of that period, in px of the image, nearer than the plane of focus.
 model::SceneSimulationOptions SineScene(model::Psf psf, double depth_mm, double period_px) {
   model::SceneSimulationOptions options;
   options.camera = BenchCamera(psf);
@@ -49,7 +49,7 @@ model::SceneSimulationOptions SineScene(model::Psf psf, double depth_mm, double 
   wall.texture.feature_size_px = period_px;
   wall.texture.contrast = 0.8;
   options.layers = {wall};
-  options.effects.base = model::EffectChoice::Base::kGiven;
+  options.effects.base = model::EffectSelectionOptions::Base::kGiven;
   options.effects.given = {model::Effect::kDefocus, model::Effect::kApertureShape};
   options.sampling_error_grey_levels = 0;
   options.rays_per_pixel = 4000;
@@ -57,20 +57,19 @@ model::SceneSimulationOptions SineScene(model::Psf psf, double depth_mm, double 
   return options;
 }
 
-model::LinearPicture PhotographOf(const model::LightField& field, const Vignetting* vignetting,
-                                  const model::Camera* falloff = nullptr) {
-  const auto twin = kernels::NewReference<float>();
-  model::LinearPicture photograph =
-      Photograph(field, field.weights, falloff, vignetting, twin.get(), 1);
-  const model::LinearPicture native =
-      Photograph(field, field.weights, falloff, vignetting, nullptr, 1);
+model::LinearImage PhotographOf(const model::LightField& field, const Vignetting* vignetting,
+                                const model::Camera* falloff = nullptr) {
+  const auto reference = kernels::NewReference<float>();
+  model::LinearImage photograph =
+      Photograph(field, field.weights, falloff, vignetting, reference.get(), 1);
+  const model::LinearImage cpu = Photograph(field, field.weights, falloff, vignetting, nullptr, 1);
   for (std::size_t i = 0; i < photograph.values.size(); ++i) {
-    EXPECT_NEAR(native.values[i], photograph.values[i], 2e-6) << i;
+    EXPECT_NEAR(cpu.values[i], photograph.values[i], 2e-6) << i;
   }
   return photograph;
 }
 
-double RmsDifference(const model::LinearPicture& a, const model::LinearPicture& b) {
+double RmsDifference(const model::LinearImage& a, const model::LinearImage& b) {
   double sum = 0;
   for (std::size_t i = 0; i < a.values.size(); ++i) {
     const double difference = static_cast<double>(a.values[i]) - static_cast<double>(b.values[i]);
@@ -85,7 +84,7 @@ double RmsDifference(const model::LinearPicture& a, const model::LinearPicture& 
 TEST(Vignetting, MakesThePhotographThatOfTheScene) {
   for (const model::Psf psf : {model::Psf::kGaussian, model::Psf::kDisc}) {
     model::SceneSimulationOptions options = SineScene(psf, 600, 14);
-    const model::LinearPicture truth = model::SceneSimulator(options, {}).RenderNoiseless({1, {}});
+    const model::LinearImage truth = model::SceneSimulator(options, {}).RenderNoiseless({1, {}});
     const auto photograph_error = [&](double uv_depth_mm, bool is_on) {
       options.uv_depth_mm = uv_depth_mm;
       const model::LightField field =
@@ -113,7 +112,7 @@ TEST(Vignetting, IsTheSumOverTheRaysOfEachPixel) {
   const model::LightField field =
       model::SceneSimulator(options, {}).RenderLightField(7, 7, {1, {}});
   const Vignetting vignetting{model::ApertureShape::kGaussian, {}};
-  const model::LinearPicture found = PhotographOf(field, &vignetting);
+  const model::LinearImage found = PhotographOf(field, &vignetting);
   const double scale_px = options.camera.focal_scale_px();
   double moment = 0, sum_of_weights = 0;
   for (int k = -3; k <= 3; ++k) {
@@ -129,7 +128,7 @@ TEST(Vignetting, IsTheSumOverTheRaysOfEachPixel) {
     for (int k = -3; k <= 3; ++k) {
       const double a_mm = k * step_mm + wander_mm;
       const double weight = std::exp(-std::pow(4 * a_mm / step_mm / 7, 2) / 2);
-      // The ray is at x + c a in the picture of the middle of the aperture.
+      // The ray is at x + c a in the image of the middle of the aperture.
       const double at_px = x - 47.5 + scale_px * a_mm * (1 / depth_mm - 1 / kFocusMm);
       weights += weight;
       light += weight * 0.5 * (1 + 0.8 * std::cos(2 * kPi * at_px / period_px));
@@ -138,7 +137,7 @@ TEST(Vignetting, IsTheSumOverTheRaysOfEachPixel) {
   }
 }
 
-// Down the picture, too, and with other counts there.
+// Down the image, too, and with other counts there.
 TEST(Vignetting, IsTheSameAlongBothAxes) {
   model::SceneSimulationOptions options = SineScene(model::Psf::kGaussian, 600, 14);
   options.uv_depth_mm = 60;
@@ -148,11 +147,11 @@ TEST(Vignetting, IsTheSameAlongBothAxes) {
         model::SceneSimulator(options, {}).RenderLightField(u_count, v_count, {1, {}}),
         &vignetting);
   };
-  const model::LinearPicture across = photograph(8, 3);
+  const model::LinearImage across = photograph(8, 3);
   std::swap(options.camera.sensor.width_px, options.camera.sensor.height_px);
   options.camera.sensor.principal_point_px.reverseInPlace();
   options.layers[0].texture.angle_deg = 90;
-  const model::LinearPicture down = photograph(3, 8);
+  const model::LinearImage down = photograph(3, 8);
   for (int y = 0; y < 8; ++y) {
     for (int x = 0; x < 96; ++x) {
       EXPECT_NEAR(across.at(x, y, 0), down.at(y, x, 0), 1e-5);
@@ -167,13 +166,13 @@ TEST(Vignetting, TakesFewViewsAsTheyAre) {
   const model::SceneSimulator simulator(options, {});
   const model::LightField one = simulator.RenderLightField(1, 1, {1, {}});
   const Vignetting small{model::ApertureShape::kDisc, 0.1};
-  EXPECT_EQ(PhotographOf(one, &small).values, model::ViewPicture(one, 0, 0).values);
+  EXPECT_EQ(PhotographOf(one, &small).values, model::ViewImage(one, 0, 0).values);
 
   model::LightField field = simulator.RenderLightField(5, 1, {1, {}});
   const Vignetting vignetting{model::ApertureShape::kGaussian, {}};
   field.present.assign(5, true);
   field.present[0] = field.present[4] = false;
-  const model::LinearPicture found = PhotographOf(field, &vignetting);
+  const model::LinearImage found = PhotographOf(field, &vignetting);
   const double wander = -60 / (kFocusMm - 60) * field.grid->s_step_mm /
                         model::ApertureStepsMm(*field.grid, *field.camera).x();
   for (int x = 0; x < 96; x += 7) {
@@ -181,7 +180,7 @@ TEST(Vignetting, TakesFewViewsAsTheyAre) {
     for (int k = 1; k <= 3; ++k) {
       const double steps = k - 2 + wander * (x - 47.5);
       const double weight = std::exp(-std::pow(4 * steps / 5, 2) / 2);
-      light += weight * static_cast<double>(model::ViewPicture(field, k, 0).at(x, 3, 0));
+      light += weight * static_cast<double>(model::ViewImage(field, k, 0).at(x, 3, 0));
       weights += weight;
     }
     EXPECT_NEAR(found.at(x, 3, 0), light / weights, 1e-5);
@@ -213,7 +212,7 @@ TEST(Vignetting, IsNothingOnTheAperture) {
 }
 
 // The result is compared with a sum over every ray of a uniform field.
-TEST(Vignetting, WeighsTheFallOffOfEachRay) {
+TEST(Vignetting, WeightsEachRayByItsFallOff) {
   model::Camera camera = BenchCamera(model::Psf::kDisc);
   camera.sensor.pixel_pitch_mm = 0.1;
   model::LightField field = model::MakeLightField(96, 8, 9, 9, 1);
@@ -223,7 +222,7 @@ TEST(Vignetting, WeighsTheFallOffOfEachRay) {
   const double uv_depth_mm = 5;
   field.grid = model::GridOnPlanes(camera, {uv_depth_mm, kFocusMm - uv_depth_mm}, 9, 9);
   const Vignetting vignetting{model::ApertureShape::kDisc, {}};
-  const model::LinearPicture found = PhotographOf(field, &vignetting, &camera);
+  const model::LinearImage found = PhotographOf(field, &vignetting, &camera);
   const double edge_mm = 4.5 * model::ApertureStepsMm(*field.grid, camera).x();
   const auto irradiance = [&](int i, int j) {
     double sum = 0, count = 0;
@@ -263,11 +262,11 @@ TEST(Vignetting, ChangesNoMoreThanItsBound) {
     model::EffectConditions conditions;
     conditions.camera = options.camera;
     conditions.planes = {uv_depth_mm, kFocusMm - uv_depth_mm};
-    const model::EffectDecision decision = model::DecideEffects(
+    const model::EffectSelection decision = model::SelectEffects(
         {}, conditions, model::PlacesBetween(options.camera, 450, kFocusMm, false), of_model);
-    const auto finding =
-        std::find_if(decision.findings.begin(), decision.findings.end(),
-                     [&](const model::EffectFinding& each) { return each.effect == kVignetting; });
+    const auto finding = std::find_if(
+        decision.findings.begin(), decision.findings.end(),
+        [&](const model::LargestEffectImpact& each) { return each.effect == kVignetting; });
     ASSERT_NE(finding, decision.findings.end());
     double largest = 0;
     // The edge, in the middle of what is visible
@@ -276,8 +275,8 @@ TEST(Vignetting, ChangesNoMoreThanItsBound) {
       const model::LightField field =
           model::SceneSimulator(options, {}).RenderLightField(7, 7, {1, {}});
       const Vignetting vignetting{model::ApertureShape::kGaussian, {}};
-      const model::LinearPicture with = PhotographOf(field, &vignetting);
-      const model::LinearPicture without = PhotographOf(field, nullptr);
+      const model::LinearImage with = PhotographOf(field, &vignetting);
+      const model::LinearImage without = PhotographOf(field, nullptr);
       for (std::size_t i = 0; i < with.values.size(); ++i) {
         largest = std::max(largest, 255 * std::abs(static_cast<double>(with.values[i]) -
                                                    static_cast<double>(without.values[i])));

@@ -63,7 +63,7 @@ EstimateInput PlaneInput() {
   const double step = std::sqrt((kViews * kViews - 1.0) / (kFine * kFine - 1.0));
   const Texture texture;
   EstimateInput input;
-  input.picture = {kW, kH, 1, {}};
+  input.image = {kW, kH, 1, {}};
   input.disparity = {kW, kH, {}, {1, 1}};
   input.weights = model::ApertureWeights(model::ApertureShape::kUniform, kViews, kViews);
   input.transfer = model::TransferCurve::Linear();
@@ -81,7 +81,7 @@ EstimateInput PlaneInput() {
         }
       }
       const double stored = sum / (kFine * kFine) + noise(engine);
-      input.picture.values.push_back(static_cast<float>(std::round(255 * stored) / 255));
+      input.image.values.push_back(static_cast<float>(std::round(255 * stored) / 255));
       input.disparity.disparity.push_back(static_cast<float>(DisparityAt(x)));
     }
   }
@@ -163,14 +163,14 @@ TEST(BlurCheck, DoesNotDependOnTheNumberOfThreads) {
   }
 }
 
-// Four of each pixel: half the size is the same picture with half the disparity in px.
+// Four of each pixel: half the size is the same image with half the disparity in px.
 EstimateInput Doubled(const EstimateInput& small) {
   EstimateInput large = small;
-  large.picture = {2 * kW, 2 * kH, 1, {}};
+  large.image = {2 * kW, 2 * kH, 1, {}};
   large.disparity = {2 * kW, 2 * kH, {}, {2, 2}};
   for (int y = 0; y < 2 * kH; ++y) {
     for (int x = 0; x < 2 * kW; ++x) {
-      large.picture.values.push_back(small.picture.at(x / 2, y / 2, 0));
+      large.image.values.push_back(small.image.at(x / 2, y / 2, 0));
       large.disparity.disparity.push_back(
           small.disparity.disparity[static_cast<std::size_t>(y / 2 * kW + x / 2)]);
     }
@@ -178,7 +178,7 @@ EstimateInput Doubled(const EstimateInput& small) {
   return large;
 }
 
-TEST(BlurCheck, LargePicturesAreLookedAtAtHalfTheirSize) {
+TEST(BlurCheck, LargeImagesAreLookedAtAtHalfTheirSize) {
   const BlurCheck small = CheckBlur(PlaneWith(1, 0.5), {});
   const BlurCheck large = CheckBlur(Doubled(PlaneWith(1, 0.5)), {});
   EXPECT_EQ(small.halvings, 0);
@@ -199,7 +199,7 @@ TEST(BlurCheck, AnInputInFocusOrWithoutTextureIsReported) {
   EXPECT_EQ(in_focus.blocks, 0);
   EXPECT_FALSE(in_focus.narrower_blur);
   EXPECT_THAT(in_focus.message, HasSubstr("no block tells"));
-  std::fill(input.picture.values.begin(), input.picture.values.end(), 1.0F);
+  std::fill(input.image.values.begin(), input.image.values.end(), 1.0F);
   const BlurCheck white = CheckBlur(input, {});
   EXPECT_THAT(white.trials, SizeIs(0));
   EXPECT_THAT(white.message, HasSubstr("noise"));

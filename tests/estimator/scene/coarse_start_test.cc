@@ -13,15 +13,15 @@
 namespace thicklens::estimator {
 namespace {
 
-model::LinearPicture Numbers(int width_px, int height_px, int channels) {
-  model::LinearPicture picture{width_px, height_px, channels, {}};
+model::LinearImage Numbers(int width_px, int height_px, int channels) {
+  model::LinearImage image{width_px, height_px, channels, {}};
   for (int i = 0; i < width_px * height_px * channels; ++i)
-    picture.values.push_back(static_cast<float>(i));
-  return picture;
+    image.values.push_back(static_cast<float>(i));
+  return image;
 }
 
 TEST(CoarseStart, PixelsAreMeansOfFour) {
-  const model::LinearPicture half = HalfSize(Numbers(3, 3, 2));
+  const model::LinearImage half = HalfSize(Numbers(3, 3, 2));
   ASSERT_EQ(half.width_px, 2);
   ASSERT_EQ(half.height_px, 2);
   // Pixel (x, y) of channel c holds 2 (3 y + x) + c.
@@ -39,11 +39,11 @@ TEST(CoarseStart, DisparityStaysOnItsSurfaceAtHalfTheStep) {
   EXPECT_EQ(half.step, Eigen::Vector2d(0.5, 0.25));
 }
 
-// A smooth difference comes through, in place, whatever the picture has itself.
+// A smooth difference comes through, in place, whatever the image has itself.
 TEST(CoarseStart, DetailIsAddedWhereItBelongs) {
-  const model::LinearPicture picture = Numbers(41, 31, 3);
-  const model::LinearPicture blurred = HalfSize(picture);
-  model::LinearPicture sharp = blurred;
+  const model::LinearImage image = Numbers(41, 31, 3);
+  const model::LinearImage blurred = HalfSize(image);
+  model::LinearImage sharp = blurred;
   const auto detail = [](double x, double y, int c) {
     return std::sin(0.3 * x + c) * std::cos(0.2 * y);
   };
@@ -55,11 +55,11 @@ TEST(CoarseStart, DetailIsAddedWhereItBelongs) {
       }
     }
   }
-  const model::LinearPicture full = WithDetail(picture, blurred, sharp);
+  const model::LinearImage full = WithDetail(image, blurred, sharp);
   for (int y = 4; y < 27; ++y) {
     for (int x = 4; x < 37; ++x) {
       for (int c = 0; c < 3; ++c)
-        ASSERT_NEAR(full.at(x, y, c) - picture.at(x, y, c), detail(x, y, c), 0.05) << x << "," << y;
+        ASSERT_NEAR(full.at(x, y, c) - image.at(x, y, c), detail(x, y, c), 0.05) << x << "," << y;
     }
   }
 }
@@ -83,7 +83,7 @@ Strips BlurredStrips(int size_px) {
   input.weights = model::ApertureWeights(model::ApertureShape::kUniform, 5, 5);
   input.disparity = {
       size_px, size_px, std::vector<float>(line.size() * line.size(), kDisparityPx), {1, 1}};
-  input.picture = {size_px, size_px, 1, {}};
+  input.image = {size_px, size_px, 1, {}};
   const auto at = [&](int x) {
     return line[static_cast<std::size_t>(std::clamp(x, 0, size_px - 1))];
   };
@@ -97,13 +97,13 @@ Strips BlurredStrips(int size_px) {
         sum += 0.2F * ((1 - share) * at(below) + share * at(below + 1));
       }
       const float noise = static_cast<float>(random() % 1000) / 1000 - 0.5F;
-      input.picture.values.push_back(sum + 0.006F * noise);
+      input.image.values.push_back(sum + 0.006F * noise);
     }
   }
   return strips;
 }
 
-double RmsError(const model::LinearPicture& radiance, const std::vector<float>& truth) {
+double RmsError(const model::LinearImage& radiance, const std::vector<float>& truth) {
   constexpr int kBorderPx = 20;
   double sum = 0;
   int count = 0;
@@ -116,7 +116,7 @@ double RmsError(const model::LinearPicture& radiance, const std::vector<float>& 
   return std::sqrt(sum / count);
 }
 
-// With the same few steps, a picture just large enough for a start at half its size comes closer to
+// With the same few steps, an image just large enough for a start at half its size comes closer to
 // the scene than one just too small. With many steps, both end at the same solution.
 TEST(CoarseStart, SavesIterations) {
   SceneOptions options;

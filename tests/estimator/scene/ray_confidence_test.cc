@@ -28,7 +28,7 @@ EstimateInput Scene(float disparity) {
   EstimateInput input;
   input.weights = model::ApertureWeights(model::ApertureShape::kGaussian, 3, 3);
   input.disparity = {kW, kH, std::vector<float>(kW * kH, disparity), {1, 1}};
-  input.picture = {kW, kH, 1, std::vector<float>(kW * kH, 0.5F)};
+  input.image = {kW, kH, 1, std::vector<float>(kW * kH, 0.5F)};
   return input;
 }
 
@@ -52,8 +52,8 @@ TEST(ConfidenceBytes, SayWhatTheyWereMadeOf) {
     const Confidence blurred = ConfidenceOfPoint(share, kUnresolvedBlurSigmaPx + 0.01);
     EXPECT_TRUE(IsResolved(sharp));
     EXPECT_FALSE(IsResolved(blurred));
-    EXPECT_NEAR(SeenShareOf(sharp), share, 0.5 / 126 + 1e-9);
-    EXPECT_EQ(SeenShareOf(blurred), SeenShareOf(sharp));
+    EXPECT_NEAR(VisibleFractionOf(sharp), share, 0.5 / 126 + 1e-9);
+    EXPECT_EQ(VisibleFractionOf(blurred), VisibleFractionOf(sharp));
     EXPECT_NE(blurred, kFilledIn);
   }
   EXPECT_EQ(ConfidenceOfPoint(1, 0), 255);
@@ -61,7 +61,7 @@ TEST(ConfidenceBytes, SayWhatTheyWereMadeOf) {
   EXPECT_EQ(ConfidenceOfPoint(1, 9), 127);
   EXPECT_EQ(ConfidenceOfPoint(0, 9), 1);
   EXPECT_EQ(ConfidenceOfPoint(1 + 1e-6, 0), 255);
-  EXPECT_EQ(SeenShareOf(kFilledIn), 0);
+  EXPECT_EQ(VisibleFractionOf(kFilledIn), 0);
   EXPECT_FALSE(IsResolved(kFilledIn));
 }
 
@@ -72,14 +72,14 @@ TEST(PointConfidence, IsTheShareOfTheApertureThatACardLeaves) {
   int partly = 0;
   for (int y = 2; y < kH - 2; ++y) {
     for (int x = 2; x < kW - 2; ++x) {
-      double seen = 1;  // of the card, all
+      double visible = 1;  // of the card, all
       for (int b = -1; b <= 1 && !IsCard(x, y); ++b) {
         for (int a = -1; a <= 1; ++a) {
-          if (IsCard(x + a, y + b)) seen -= input.weights(b + 1, a + 1);
+          if (IsCard(x + a, y + b)) visible -= input.weights(b + 1, a + 1);
         }
       }
-      ASSERT_EQ(confidence[At(x, y)], ConfidenceOfPoint(seen, 0)) << x << ", " << y;
-      partly += seen < 1 ? 1 : 0;
+      ASSERT_EQ(confidence[At(x, y)], ConfidenceOfPoint(visible, 0)) << x << ", " << y;
+      partly += visible < 1 ? 1 : 0;
     }
   }
   EXPECT_EQ(partly, 2 * (8 + 6) + 4);
@@ -90,9 +90,9 @@ TEST(PointConfidence, EndsAtTheBorderOfThePhotograph) {
   const std::vector<Confidence> confidence = PointConfidence(input, 1);
   const Eigen::ArrayXd across = input.weights.colwise().sum().transpose();
   for (int x = 0; x < kW; ++x) {
-    double seen = 0;
-    for (int a = -1; a <= 1; ++a) seen += x - 2 * a >= 0 && x - 2 * a < kW ? across[a + 1] : 0;
-    EXPECT_EQ(confidence[At(x, kH / 2)], ConfidenceOfPoint(seen, 0)) << x;
+    double visible = 0;
+    for (int a = -1; a <= 1; ++a) visible += x - 2 * a >= 0 && x - 2 * a < kW ? across[a + 1] : 0;
+    EXPECT_EQ(confidence[At(x, kH / 2)], ConfidenceOfPoint(visible, 0)) << x;
   }
 }
 
@@ -121,8 +121,8 @@ TEST(PointConfidence, TooStrongABlurLowersTheConfidence) {
 
 TEST(PointConfidence, RefusesWhatNoEstimateStartsFrom) {
   EstimateInput input = Scene(0);
-  input.picture.values.pop_back();
-  EXPECT_THAT(ErrorOf([&] { PointConfidence(input, 1); }), HasSubstr("picture"));
+  input.image.values.pop_back();
+  EXPECT_THAT(ErrorOf([&] { PointConfidence(input, 1); }), HasSubstr("image"));
 }
 
 TEST(RayConfidence, IsThatOfThePointAndNothingWhereThereIsNone) {

@@ -1,4 +1,4 @@
-// A picture solved in bands against the same picture solved as a whole; views one by one.
+// An image solved in bands against the same image solved as a whole; views one by one.
 #include "estimator/scene/scene_bands.h"
 
 #include <gmock/gmock.h>
@@ -33,7 +33,7 @@ EstimateInput CardBeforeWall(int width, int height, int channels) {
   input.disparity = {width, height, {}, {1, 1}};
   std::mt19937 engine(4);
   std::normal_distribution<float> normal(0, 1);
-  model::LinearPicture scene{width, height, channels, {}};
+  model::LinearImage scene{width, height, channels, {}};
   const double row = 2 * 3.14159 / height;
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
@@ -46,17 +46,17 @@ EstimateInput CardBeforeWall(int width, int height, int channels) {
       }
     }
   }
-  input.picture = {width, height, channels, std::vector<float>(scene.values.size(), 0.0F)};
+  input.image = {width, height, channels, std::vector<float>(scene.values.size(), 0.0F)};
   for (int l = 0; l < 3; ++l) {
     for (int k = 0; k < 3; ++k) {
-      const model::LinearPicture view =
-          WarpPicture(scene, input.disparity, RenderDisparity(input.disparity, k - 1.0, l - 1.0));
+      const model::LinearImage view =
+          WarpImage(scene, input.disparity, RenderDisparity(input.disparity, k - 1.0, l - 1.0));
       for (std::size_t i = 0; i < view.values.size(); ++i) {
-        input.picture.values[i] += view.values[i] / 9;
+        input.image.values[i] += view.values[i] / 9;
       }
     }
   }
-  for (float& value : input.picture.values) value += 0.002F * normal(engine);
+  for (float& value : input.image.values) value += 0.002F * normal(engine);
   return input;
 }
 
@@ -73,7 +73,7 @@ Solved SolvedIn(const EstimateInput& input, SceneOptions options, int bands) {
   return run;
 }
 
-// The largest difference of stored values, in levels of 8 bits.
+// The largest difference of encoded values, in levels of 8 bits.
 double LargestLevels(const model::LightField& a, const model::LightField& b) {
   double largest = 0;
   for (std::size_t i = 0; i < a.values.size(); ++i) {
@@ -93,7 +93,7 @@ void ExpectSame(const Solved& bands, const Solved& whole, int count) {
   EXPECT_LT(LargestLevels(bands.light_field, whole.light_field), 0.5);
   EXPECT_EQ(bands.summary.noise_sigma, whole.summary.noise_sigma);
   EXPECT_NEAR(bands.summary.strength, whole.summary.strength, 1e-3 * whole.summary.strength);
-  EXPECT_NEAR(bands.summary.hidden_share, whole.summary.hidden_share, 1e-6);
+  EXPECT_NEAR(bands.summary.occluded_fraction, whole.summary.occluded_fraction, 1e-6);
   EXPECT_NEAR(bands.summary.row_share, whole.summary.row_share, 1e-6);
   EXPECT_NEAR(bands.summary.residual_rms, whole.summary.residual_rms,
               1e-3 * whole.summary.residual_rms);
@@ -103,16 +103,16 @@ void ExpectSame(const Solved& bands, const Solved& whole, int count) {
   EXPECT_FALSE(whole.maps.confidence.empty());
   EXPECT_EQ(bands.maps.confidence, whole.maps.confidence);
   ASSERT_EQ(bands.maps.residual.size(), whole.maps.residual.size());
-  ASSERT_EQ(bands.maps.hidden_share.size(), whole.maps.hidden_share.size());
+  ASSERT_EQ(bands.maps.occluded_fraction.size(), whole.maps.occluded_fraction.size());
   ASSERT_EQ(bands.maps.radiance.values.size(), whole.maps.radiance.values.size());
   EXPECT_EQ(bands.maps.radiance.height_px, whole.maps.radiance.height_px);
   for (std::size_t i = 0; i < whole.maps.residual.size(); ++i) {
-    ASSERT_NEAR(bands.maps.hidden_share[i], whole.maps.hidden_share[i], 1e-6) << i;
+    ASSERT_NEAR(bands.maps.occluded_fraction[i], whole.maps.occluded_fraction[i], 1e-6) << i;
     ASSERT_NEAR(bands.maps.residual[i], whole.maps.residual[i], 0.5 / 255) << i;
   }
 }
 
-TEST(SceneBands, AreTheWholePictureForEveryPrior) {
+TEST(SceneBands, AreTheWholeImageForEveryPrior) {
   for (const int channels : {1, 3}) {
     const EstimateInput input = CardBeforeWall(48, 160, channels);
     for (const Prior prior :
@@ -128,11 +128,11 @@ TEST(SceneBands, AreTheWholePictureForEveryPrior) {
   }
 }
 
-TEST(SceneBands, KnowTheSlopeOfTheWholePicture) {
+TEST(SceneBands, KnowTheSlopeOfTheWholeImage) {
   EstimateInput input = CardBeforeWall(48, 200, 1);
-  for (std::size_t i = 0; i < input.picture.values.size(); ++i) {  // dark above, bright below
-    input.picture.values[i] *=
-        0.2F + 1.2F * static_cast<float>(i) / static_cast<float>(input.picture.values.size());
+  for (std::size_t i = 0; i < input.image.values.size(); ++i) {  // dark above, bright below
+    input.image.values[i] *=
+        0.2F + 1.2F * static_cast<float>(i) / static_cast<float>(input.image.values.size());
   }
   SceneOptions options;
   options.slope_weights = false;
@@ -206,7 +206,7 @@ TEST(SceneBands, AreAsManyAsTheMemoryAsksFor) {
   options.threads = 1;
   std::vector<float> middle;
   SceneViewSink sink;
-  sink.take = [&](int k, int l, const model::LinearPicture& view, const std::vector<Confidence>&) {
+  sink.take = [&](int k, int l, const model::LinearImage& view, const std::vector<Confidence>&) {
     if (k == 1 && l == 1) middle = view.values;
   };
   SceneSummary whole, bands;
@@ -235,9 +235,9 @@ TEST(SceneViews, ComeOneByOneAndAreTheLightField) {
   SceneMaps maps;
   const model::LightField all = EstimateScene(input, options, &of_all, &maps);
   std::mutex mutex;
-  std::map<std::pair<int, int>, std::vector<model::LinearPicture>> views;
+  std::map<std::pair<int, int>, std::vector<model::LinearImage>> views;
   SceneViewSink sink;
-  sink.take = [&](int k, int l, const model::LinearPicture& view,
+  sink.take = [&](int k, int l, const model::LinearImage& view,
                   const std::vector<Confidence>& confidence) {
     const std::lock_guard<std::mutex> lock(mutex);
     views[{k, l}].push_back(view);
@@ -257,9 +257,9 @@ TEST(SceneViews, ComeOneByOneAndAreTheLightField) {
   ASSERT_EQ(views.size(), 9u);
   for (const auto& [place, taken] : views) {
     ASSERT_EQ(taken.size(), 1u);
-    EXPECT_EQ(taken[0].values, model::ViewPicture(all, place.first, place.second).values);
+    EXPECT_EQ(taken[0].values, model::ViewImage(all, place.first, place.second).values);
   }
-  sink.take = [](int, int, const model::LinearPicture&, const std::vector<Confidence>&) {
+  sink.take = [](int, int, const model::LinearImage&, const std::vector<Confidence>&) {
     throw Interrupted();
   };
   EXPECT_THROW(EstimateSceneViews(input, options, sink, &summary, nullptr), Interrupted);

@@ -8,31 +8,31 @@
 #include <vector>
 
 #include "estimator/projection/scene_projection.h"
+#include "estimator/scene/encoding_slope.h"
 #include "estimator/scene/scene_priors.h"
-#include "estimator/scene/stored_slope.h"
 #include "thicklens/model/light_field_grid.h"
 
 namespace thicklens::estimator {
 namespace {
 
 TEST(SceneData, PlanesAndPixelsHoldTheSameNumbers) {
-  const model::LinearPicture picture{2, 2, 3, {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12}};
-  const std::vector<float> planes = Planar<float>(picture);
+  const model::LinearImage image{2, 2, 3, {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12}};
+  const std::vector<float> planes = Planar<float>(image);
   EXPECT_EQ(planes, (std::vector<float>{1, 4, 7, 10, 2, 5, 8, 11, 3, 6, 9, 12}));
-  EXPECT_EQ(Interleaved(planes, 2, 2, 3).values, picture.values);
+  EXPECT_EQ(Interleaved(planes, 2, 2, 3).values, image.values);
 }
 
-TEST(SceneData, HiddenPixelsWeighLess) {
+TEST(SceneData, OccludedPixelsHaveLessWeight) {
   const std::vector<double> squares{4, 4, 9};
-  const std::vector<float> hidden{0, 0.05F, 1};
-  const std::vector<double> weights = DataWeights(squares, hidden, true);
+  const std::vector<float> occluded{0, 0.05F, 1};
+  const std::vector<double> weights = DataWeights(squares, occluded, true);
   EXPECT_NEAR(weights[0], 4, 1e-12);
   EXPECT_NEAR(weights[1], 2, 1e-6);
   EXPECT_NEAR(weights[2], 9.0 / 401, 1e-9);
-  EXPECT_EQ(DataWeights(squares, hidden, false), squares);
+  EXPECT_EQ(DataWeights(squares, occluded, false), squares);
 }
 
-// The rows are compared with the operator itself, in the middle of a picture with one depth.
+// The rows are compared with the operator itself, in the middle of an image with one depth.
 TEST(SceneData, SquaredRowsAreThoseOfTheProjection) {
   for (const float disparity_px : {0.0F, 0.7F, -1.5F}) {
     const DisparityMap map{25, 25, std::vector<float>(625, disparity_px), {1, 0.8}};
@@ -63,26 +63,26 @@ TEST(SceneData, BlurIsThatOfThePlacesOfTheAperture) {
   EXPECT_NEAR(sigma_px[1], 0.5 * std::sqrt(2.0), 1e-5);
 }
 
-TEST(StoredSlope, IsTheDerivativeOfTheCurve) {
+TEST(EncodingSlope, IsTheDerivativeOfTheCurve) {
   for (const double light : {0.01, 0.1, 0.5, 0.9}) {
-    const model::LinearPicture picture{3, 3, 1, std::vector<float>(9, static_cast<float>(light))};
-    EXPECT_NEAR(StoredSlopes(picture, model::TransferCurve::Srgb(), 2)[4],
+    const model::LinearImage image{3, 3, 1, std::vector<float>(9, static_cast<float>(light))};
+    EXPECT_NEAR(EncodingSlopes(image, model::TransferCurve::Srgb(), 2)[4],
                 1.055 / 2.4 * std::pow(light, 1 / 2.4 - 1), 2e-3 * std::pow(light, 1 / 2.4 - 1));
-    EXPECT_NEAR(StoredSlopes(picture, model::TransferCurve::Gamma(2.2), 2)[4],
+    EXPECT_NEAR(EncodingSlopes(image, model::TransferCurve::Gamma(2.2), 2)[4],
                 std::pow(light, 1 / 2.2 - 1) / 2.2, 2e-3 * std::pow(light, 1 / 2.2 - 1));
-    EXPECT_NEAR(StoredSlopes(picture, model::TransferCurve::Linear(), 2)[4], 1, 1e-6);
+    EXPECT_NEAR(EncodingSlopes(image, model::TransferCurve::Linear(), 2)[4], 1, 1e-6);
   }
   // Black has that of the darkest light that counts.
-  const model::LinearPicture black{1, 1, 1, {-0.01F}};
+  const model::LinearImage black{1, 1, 1, {-0.01F}};
   const double darkest = std::pow(kDarkest, 2.2);
-  EXPECT_NEAR(StoredSlopes(black, model::TransferCurve::Gamma(2.2), 0)[0],
+  EXPECT_NEAR(EncodingSlopes(black, model::TransferCurve::Gamma(2.2), 0)[0],
               std::pow(darkest, 1 / 2.2 - 1) / 2.2, 0.02);
 }
 
-TEST(StoredSlope, TheTableIsTheCurve) {
+TEST(EncodingSlope, TheTableIsTheCurve) {
   for (const auto& transfer : {model::TransferCurve::Srgb(), model::TransferCurve::Gamma(2.2),
                                model::TransferCurve::Linear()}) {
-    const StoredValueTable table(transfer);
+    const EncodedValueTable table(transfer);
     for (double light = -0.2; light < 1.3; light += 0.00137) {
       EXPECT_NEAR(static_cast<double>(table.Encode(static_cast<float>(light))),
                   transfer.Encode(light), 2e-5)

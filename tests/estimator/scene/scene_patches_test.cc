@@ -36,7 +36,7 @@ DataTerm<Real> SharpPhotograph(double noise_sigma, int threads) {
     data.photograph.push_back(static_cast<Real>(0.5 + wave + noise_sigma * noise(engine)));
   }
   data.weight.assign(kPixels, Real{1});
-  data.squared_row.assign(kPixels, Real{1});
+  data.row_norm2.assign(kPixels, Real{1});
   return data;
 }
 
@@ -97,7 +97,7 @@ TEST(ScenePatches, StopAtTheLimitOfIterations) {
 }
 
 // A relief whose normals are not done within the limit is left alone, and takes no iterations from
-// the picture's.
+// the image's.
 TEST(ScenePatches, LeaveTheReliefAtTheLimitOfIterations) {
   DataTerm<double> data = SharpPhotograph<double>(0.02, 1);
   // H takes the mean of a pixel and its right neighbour: no system is done in few iterations.

@@ -57,7 +57,7 @@ Simulated Simulate(bool falloff) {
   card.texture.colour = {0.6, 0.4, 0.3};
   wall.texture.feature_size_px = card.texture.feature_size_px = 4;
   options.layers = {wall, card};
-  options.effects.base = model::EffectChoice::Base::kAll;
+  options.effects.base = model::EffectSelectionOptions::Base::kAll;
   options.effects.without = {model::Effect::kDiffraction};
   if (!falloff) options.effects.without.Add(model::Effect::kFalloff);
   options.sampling_error_grey_levels = 0;
@@ -67,9 +67,9 @@ Simulated Simulate(bool falloff) {
   Simulated simulated;
   simulated.truth = simulator.RenderLightField(5, 5, {});
   const model::RawDepthMap depth = simulator.RenderDepth();
-  const model::StoredPicture photograph = simulator.Store(simulator.RenderNoiseless({}));
+  const model::EncodedImage photograph = simulator.Store(simulator.RenderNoiseless({}));
   EstimateInput& input = simulated.input;
-  input.picture = model::ToLinear(photograph, options.camera.sensor.transfer);
+  input.image = model::ToLinear(photograph, options.camera.sensor.transfer);
   input.transfer = options.camera.sensor.transfer;
   input.weights = simulated.truth.weights;
   input.grid = simulated.truth.grid;
@@ -95,9 +95,9 @@ EstimateInput MadeUp(float disparity_px, int channels = 3) {
   std::mt19937 engine(4);
   std::uniform_real_distribution<float> uniform(0.2F, 0.7F);
   EstimateInput input;
-  input.picture = {40, 36, channels, {}};
-  input.picture.values.resize(40 * 36 * Index(channels));
-  for (float& value : input.picture.values) value = uniform(engine);
+  input.image = {40, 36, channels, {}};
+  input.image.values.resize(40 * 36 * Index(channels));
+  for (float& value : input.image.values) value = uniform(engine);
   input.disparity = {40, 36, std::vector<float>(40 * 36, disparity_px), {1, 1}};
   input.weights = model::ApertureWeights(model::ApertureShape::kUniform, 3, 3);
   return input;
@@ -141,7 +141,7 @@ TEST(SceneSolver, BeatsWarpingOnASimulatedScene) {
   EXPECT_GT(best, dibr + 3);
 }
 
-// A sensor's shadow to the right of the card and speckle, a twentieth of the picture.
+// A sensor's shadow to the right of the card and speckle, a twentieth of the image.
 TEST(SceneSolver, LosesLittleByHolesInTheDepth) {
   EstimateInput input = SimulatedScene().input;
   const DisparityMap truth = input.disparity;
@@ -156,7 +156,7 @@ TEST(SceneSolver, LosesLittleByHolesInTheDepth) {
     }
   }
   std::size_t filled = 0;
-  input.disparity = FillHoles(input.disparity, input.picture, &filled);
+  input.disparity = FillHoles(input.disparity, input.image, &filled);
   EXPECT_GT(filled, truth.disparity.size() / 20);
   SceneSummary summary;
   const auto psnr = [&] {
@@ -186,8 +186,8 @@ TEST(SceneSolver, ADeviceGivesTheSameLightField) {
       options.prior = prior;
       options.double_precision = double_precision;
       options.tolerance = 1e-5;
-      SceneSummary native, device;
-      const model::LightField expected = EstimateScene(simulated.input, options, &native, nullptr);
+      SceneSummary cpu, device;
+      const model::LightField expected = EstimateScene(simulated.input, options, &cpu, nullptr);
       const model::LightField found =
           EstimateScene(simulated.input, options, &device, nullptr, OpenClBackend());
       double largest = 0, squares = 0;
@@ -204,7 +204,7 @@ TEST(SceneSolver, ADeviceGivesTheSameLightField) {
       EXPECT_TRUE(device.converged);
       EXPECT_EQ(device.device, OpenClBackend()->name());
       EXPECT_EQ(found.origin.device, OpenClBackend()->name());
-      EXPECT_EQ(native.device, "cpu");
+      EXPECT_EQ(cpu.device, "cpu");
       EXPECT_EQ(expected.origin.device, "cpu");
     }
   }
@@ -215,10 +215,10 @@ TEST(SceneSolver, ADeviceFindsTheSameStrength) {
   SceneOptions options;
   options.prior = Prior::kGradient;
   options.strength_rule = StrengthRule::kGcv;
-  SceneSummary native, device;
-  EstimateScene(simulated.input, options, &native, nullptr);
+  SceneSummary cpu, device;
+  EstimateScene(simulated.input, options, &cpu, nullptr);
   EstimateScene(simulated.input, options, &device, nullptr, OpenClBackend());
-  EXPECT_NEAR(device.strength, native.strength, 0.02 * native.strength);
+  EXPECT_NEAR(device.strength, cpu.strength, 0.02 * cpu.strength);
 }
 
 // A device that can do nothing except report that.
@@ -232,13 +232,13 @@ class FloatOnly : public kernels::Backend {
   std::unique_ptr<kernels::Kernels<double>> NewDouble() override { return nullptr; }
   std::unique_ptr<kernels::RadianceSteps<float>> NewSteps(
       const kernels::DataTerm<float>& data) override {
-    return kernels::NewNativeSteps(data);
+    return kernels::NewCpuRadianceSteps(data);
   }
   std::unique_ptr<kernels::RadianceSteps<double>> NewSteps(
       const kernels::DataTerm<double>& data) override {
-    return kernels::NewNativeSteps(data);
+    return kernels::NewCpuRadianceSteps(data);
   }
-  std::unique_ptr<kernels::ViewWarp> NewWarp(const kernels::SurfacePicture&) override {
+  std::unique_ptr<kernels::ViewWarp> NewWarp(const kernels::SurfaceImage&) override {
     return nullptr;
   }
 };
@@ -281,7 +281,7 @@ TEST(SceneSolver, FloatIsAsGoodAsDouble) {
               single, 0.02);
 }
 
-TEST(SceneSolver, APictureWithoutBlurComesBack) {
+TEST(SceneSolver, AnImageWithoutBlurComesBack) {
   const EstimateInput input = MadeUp(0);
   for (const Prior prior : {Prior::kRidge, Prior::kTotalVariation}) {
     SceneOptions options;
@@ -293,16 +293,16 @@ TEST(SceneSolver, APictureWithoutBlurComesBack) {
     EXPECT_EQ(summary.strength, 1e-6);
     // The start of total variation is not taken for its answer, however close it is.
     EXPECT_EQ(summary.reweightings > 0, prior == Prior::kTotalVariation);
-    const model::LinearPicture view = model::ViewPicture(found, 2, 0);
+    const model::LinearImage view = model::ViewImage(found, 2, 0);
     for (std::size_t i = 0; i < view.values.size(); ++i) {
-      ASSERT_NEAR(view.values[i], input.picture.values[i], 2e-4);
+      ASSERT_NEAR(view.values[i], input.image.values[i], 2e-4);
     }
   }
 }
 
-TEST(SceneSolver, AConstantPictureHasAConstantLightField) {
+TEST(SceneSolver, AConstantImageHasAConstantLightField) {
   EstimateInput input = MadeUp(1.3F, 1);
-  for (float& value : input.picture.values) value = 0.4F;
+  for (float& value : input.image.values) value = 0.4F;
   for (const Prior prior : {Prior::kTotalVariation, Prior::kPatches}) {
     SceneOptions options;
     options.prior = prior;
@@ -341,14 +341,14 @@ TEST(SceneSolver, SaysThatItDidNotConverge) {
 
 TEST(SceneSolver, SaysWhenItAssumesTheNoise) {
   EstimateInput input = MadeUp(0.4F, 1);
-  for (float& value : input.picture.values) value = 0.0005F;
+  for (float& value : input.image.values) value = 0.0005F;
   SceneSummary summary;
   EstimateScene(input, {}, &summary, nullptr);
   EXPECT_THAT(summary.message, HasSubstr("1/255 is assumed"));
   EXPECT_NEAR(summary.noise_sigma, 1.0 / 255, 1e-12);
 }
 
-TEST(SceneSolver, MapsTellBlurAndWhatIsHidden) {
+TEST(SceneSolver, MapsShowBlurAndWhatIsOccluded) {
   const EstimateInput input = MadeUp(1.5F, 1);
   SceneSummary summary;
   SceneMaps maps;
@@ -356,9 +356,9 @@ TEST(SceneSolver, MapsTellBlurAndWhatIsHidden) {
   // Three places a step of 1.5 px apart: variance 2/3 of its square.
   for (const float sigma : maps.blur_sigma_px) EXPECT_NEAR(sigma, 1.5 * std::sqrt(2.0 / 3), 1e-5);
   ASSERT_EQ(maps.residual.size(), 40 * 36u);
-  ASSERT_EQ(maps.hidden_share.size(), 40 * 36u);
-  EXPECT_EQ(maps.hidden_share[20 * 40 + 20], 0);
-  EXPECT_EQ(maps.radiance.values, model::ViewPicture(found, 1, 1).values);
+  ASSERT_EQ(maps.occluded_fraction.size(), 40 * 36u);
+  EXPECT_EQ(maps.occluded_fraction[20 * 40 + 20], 0);
+  EXPECT_EQ(maps.radiance.values, model::ViewImage(found, 1, 1).values);
   double squares = 0;
   for (const float value : maps.residual) squares += static_cast<double>(value) * value;
   EXPECT_NEAR(std::sqrt(squares / (40 * 36)), summary.residual_rms, 1e-6);
@@ -378,10 +378,10 @@ TEST(SceneSolver, ViewsAreTheRadianceWarped) {
     SceneMaps maps;
     const model::LightField found = EstimateScene(input, {}, &summary, &maps);
     for (const auto& [k, l] : {std::pair{0, 0}, {2, 2}, {4, 1}, {1, 3}}) {
-      EXPECT_EQ(model::ViewPicture(found, k, l).values,
-                WarpPicture(maps.radiance, input.disparity,
-                            RenderDisparity(input.disparity, k - 2, l - 2))
-                    .values)
+      EXPECT_EQ(
+          model::ViewImage(found, k, l).values,
+          WarpImage(maps.radiance, input.disparity, RenderDisparity(input.disparity, k - 2, l - 2))
+              .values)
           << k << ", " << l;
     }
   }
@@ -394,7 +394,7 @@ TEST(SceneSolver, GivesConfidenceToASinkThatWantsIt) {
     sink.wants_confidence = wanted;
     std::mutex mutex;
     int views = 0;
-    sink.take = [&](int, int, const model::LinearPicture& view,
+    sink.take = [&](int, int, const model::LinearImage& view,
                     const std::vector<Confidence>& confidence) {
       const std::lock_guard<std::mutex> lock(mutex);
       EXPECT_EQ(view.values.size(), 40 * 36u);
@@ -431,8 +431,8 @@ TEST(SceneSolver, RefusesWhatItCannotUse) {
   };
   const EstimateInput good = MadeUp(0.5F);
   EstimateInput input = good;
-  input.picture.values[3 * (5 * 40 + 7)] = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_THAT(message(input, {}), AllOf(HasSubstr("picture"), HasSubstr("nan at (7, 5)")));
+  input.image.values[3 * (5 * 40 + 7)] = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_THAT(message(input, {}), AllOf(HasSubstr("image"), HasSubstr("nan at (7, 5)")));
   input = good;
   input.weights(1, 2) = std::numeric_limits<double>::infinity();
   EXPECT_THAT(message(input, {}), HasSubstr("the weight of the view (2, 1) is inf"));

@@ -23,7 +23,7 @@ using Eigen::VectorXd;
 std::size_t Index(Eigen::Index i) { return static_cast<std::size_t>(i); }
 
 template <typename Real>
-PictureMap<Real> MapOf(const MatrixXd& matrix) {
+ImageMap<Real> MapOf(const MatrixXd& matrix) {
   const auto multiply = [](const MatrixXd& m, const Real* x, int channels, Real* y) {
     for (int channel = 0; channel < channels; ++channel) {
       for (Eigen::Index row = 0; row < m.rows(); ++row) {
@@ -67,7 +67,7 @@ struct Made {
   MatrixXd photograph;  // a column a channel
 };
 
-// By default the picture has more rows than a band.
+// By default the image has more rows than a band.
 Made MakeCase(int width = 7, int height = 20) {
   Made made;
   made.width = width;
@@ -101,11 +101,11 @@ DataTerm<Real> DataOf(const Made& made, int threads = 1) {
   data.projection = MapOf<Real>(made.blur);
   data.photograph = Values<Real>(made.photograph);
   data.weight = Values<Real>(made.weight);
-  data.squared_row = Values<Real>(made.blur.rowwise().squaredNorm());
+  data.row_norm2 = Values<Real>(made.blur.rowwise().squaredNorm());
   return data;
 }
 
-// Forward differences of all pixels, across then down; those that leave the picture are 0.
+// Forward differences of all pixels, across then down; those that leave the image are 0.
 MatrixXd Differences(const Made& made) {
   const int pixels = made.width * made.height;
   MatrixXd differences = MatrixXd::Zero(2 * pixels, pixels);
@@ -125,10 +125,10 @@ MatrixXd Differences(const Made& made) {
   return differences;
 }
 
-MatrixXd GradientMatrix(const Made& made, const VectorXd& smoothness) {
+MatrixXd GradientMatrix(const Made& made, const VectorXd& gradient_weight) {
   const MatrixXd differences = Differences(made);
-  VectorXd twice(2 * smoothness.size());
-  twice << smoothness, smoothness;
+  VectorXd twice(2 * gradient_weight.size());
+  twice << gradient_weight, gradient_weight;
   return differences.transpose() * twice.asDiagonal() * differences;
 }
 
@@ -154,12 +154,12 @@ double LargestError(const std::vector<double>& found, const MatrixXd& expected) 
 TEST(SceneSystem, SolvesTheRidge) {
   const Made made = MakeCase();
   constexpr double kMu = 0.02;
-  const MatrixXd pull = (kMu * made.slope_squared).asDiagonal();
+  const MatrixXd tikhonov_weight = (kMu * made.slope_squared).asDiagonal();
   const MatrixXd expected =
-      (DataMatrix(made) + pull)
+      (DataMatrix(made) + tikhonov_weight)
           .ldlt()
           .solve(made.blur.transpose() * made.weight.asDiagonal() * made.photograph +
-                 pull * made.photograph);
+                 tikhonov_weight * made.photograph);
   const DataTerm<double> data = DataOf<double>(made);
   const std::vector<double> slope_squared = Values<double>(made.slope_squared);
   SceneSystem<double> system(data);
@@ -223,10 +223,10 @@ MatrixXd MatrixOf(const Made& made, const std::vector<double>& values) {
 }
 
 // The minimum of the quadratic that touches the total variation at x.
-void SolveTouched(const CgLimits& limits, SceneSystem<double>* system, std::vector<double>* x) {
+void SolveReweighted(const CgLimits& limits, SceneSystem<double>* system, std::vector<double>* x) {
   bool touched = false;
   const auto renew = [&] {
-    if (!touched) system->TouchVariation();
+    if (!touched) system->ReweightVariation();
     touched = true;
     return true;
   };
@@ -249,7 +249,7 @@ TEST(SceneSystem, ReweightingsLowerTheTotalVariationFunctionalToItsMinimum) {
   double before = Functional(made, kLambda, MatrixOf(made, radiance));
   const double first = before;
   for (int n = 0; n < 100; ++n) {
-    SolveTouched(limits, &system, &radiance);
+    SolveReweighted(limits, &system, &radiance);
     const double now = Functional(made, kLambda, MatrixOf(made, radiance));
     ASSERT_LE(now, before * (1 + 1e-9)) << n;
     before = now;
@@ -290,7 +290,7 @@ TEST(SceneSystem, SolvesTotalVariationByAFewReweightings) {
   CgLimits accurate;
   accurate.tolerance = 1e-10;
   for (int n = 0; n < 60; ++n) {
-    SolveTouched(accurate, &system, &best);
+    SolveReweighted(accurate, &system, &best);
   }
   const double least = Functional(made, kLambda, MatrixOf(made, best));
   const double start = Functional(made, kLambda, made.photograph);

@@ -1,4 +1,4 @@
-// The renderer and the warper, which are made for speed, against plain twins.
+// The renderer and the warper, which are made for speed, against plain references.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -25,7 +25,7 @@ using ::thicklens::testing::ErrorOf;
 
 using Shape = std::function<double(int x, int y, double noise)>;
 
-struct TwinCase {
+struct ReferenceCase {
   const char* name;
   int width, height;
   Eigen::Vector2d step;
@@ -34,13 +34,13 @@ struct TwinCase {
   std::vector<std::pair<double, double>> views;
 };
 
-DisparityMap MapOf(const TwinCase& twin) {
+DisparityMap MapOf(const ReferenceCase& reference) {
   std::mt19937 engine(7);
-  std::uniform_real_distribution<double> uniform(-twin.noise, twin.noise);
-  DisparityMap map{twin.width, twin.height, {}, twin.step};
-  for (int y = 0; y < twin.height; ++y) {
-    for (int x = 0; x < twin.width; ++x) {
-      map.disparity.push_back(static_cast<float>(twin.disparity(x, y, uniform(engine))));
+  std::uniform_real_distribution<double> uniform(-reference.noise, reference.noise);
+  DisparityMap map{reference.width, reference.height, {}, reference.step};
+  for (int y = 0; y < reference.height; ++y) {
+    for (int x = 0; x < reference.width; ++x) {
+      map.disparity.push_back(static_cast<float>(reference.disparity(x, y, uniform(engine))));
     }
   }
   return map;
@@ -62,33 +62,36 @@ void ExpectNear(const char* what, const std::vector<float>& found,
 }
 
 // Warps with the reference implementation that devices are compared with.
-std::vector<float> DeviceTwinWarp(const model::LinearPicture& picture, const DisparityMap& map,
-                                  const CompactView& view) {
+std::vector<float> DeviceReferenceWarp(const model::LinearImage& image, const DisparityMap& map,
+                                       const CompactView& view) {
   std::vector<float> values;
-  kernels::NewReferenceWarp({picture.width_px, picture.height_px, picture.channels, &picture.values,
+  kernels::NewReferenceWarp({image.width_px, image.height_px, image.channels, &image.values,
                              &map.disparity, static_cast<float>(SurfaceTolerance(map))})
-      ->Warp({&view.disparity, view.shift.x(), view.shift.y(), &view.hidden, &view.mixed}, &values);
+      ->Warp({&view.disparity, view.shift.x(), view.shift.y(), &view.occluded, &view.boundary},
+             &values);
   return values;
 }
 
 // The fraction of a sample that belongs to another surface, and its disparity. A fraction of 0
 // means none.
-kernels::MixedSample MixedAt(const ViewDisparity& view, std::size_t i) {
-  for (const kernels::MixedSample& mixed : view.mixed) {
-    if (static_cast<std::size_t>(mixed.index) == i) return mixed;
+kernels::BoundarySample BoundarySampleAt(const ViewDisparity& view, std::size_t i) {
+  for (const kernels::BoundarySample& boundary : view.boundary) {
+    if (static_cast<std::size_t>(boundary.index) == i) return boundary;
   }
   return {};
 }
 
 // Fractions just below the smallest one that counts are treated like those just above it, and so
 // are two surfaces of the same fraction.
-void ExpectMixedAlike(const ViewDisparity& view, const ViewDisparity& plain, double tolerance) {
-  constexpr double kRounding = 2e-5, kLeastShare = 0.01;
+void ExpectBoundarySamplesAlike(const ViewDisparity& view, const ViewDisparity& plain,
+                                double tolerance) {
+  constexpr double kRounding = 2e-5, kMinShare = 0.01;
   int alike = 0;
-  for (std::size_t i = 0; i < view.seen.size(); ++i) {
-    const kernels::MixedSample found = MixedAt(view, i), expected = MixedAt(plain, i);
+  for (std::size_t i = 0; i < view.visibility.size(); ++i) {
+    const kernels::BoundarySample found = BoundarySampleAt(view, i),
+                                  expected = BoundarySampleAt(plain, i);
     if (found.share == 0 || expected.share == 0) {
-      ASSERT_LT(found.share + expected.share, kLeastShare + kRounding) << "sample " << i;
+      ASSERT_LT(found.share + expected.share, kMinShare + kRounding) << "sample " << i;
       continue;
     }
     ASSERT_NEAR(found.share, expected.share, kRounding) << "sample " << i;
@@ -98,7 +101,7 @@ void ExpectMixedAlike(const ViewDisparity& view, const ViewDisparity& plain, dou
     EXPECT_NEAR(found.other.source_x, expected.other.source_x, tolerance + 1e-5);
     EXPECT_NEAR(found.other.source_y, expected.other.source_y, tolerance + 1e-5);
   }
-  EXPECT_GE(alike, 0.95 * static_cast<double>(plain.mixed.size()));
+  EXPECT_GE(alike, 0.95 * static_cast<double>(plain.boundary.size()));
 }
 
 // The same sources as a list of all samples.
@@ -108,7 +111,7 @@ CompactView ListOf(const ViewDisparity& view) {
   list.height_px = view.height_px;
   list.disparity.assign(view.disparity.size(), std::nanf(""));
   for (std::size_t i = 0; i < view.disparity.size(); ++i) {
-    list.hidden.push_back(
+    list.occluded.push_back(
         {static_cast<std::int32_t>(i), view.source_x[i], view.source_y[i], view.disparity[i]});
   }
   return list;
@@ -134,8 +137,8 @@ const std::vector<std::pair<double, double>>& AllKinds() {
   return views;
 }
 
-const std::vector<TwinCase>& TwinCases() {
-  static const std::vector<TwinCase> cases = {
+const std::vector<ReferenceCase>& ReferenceCases() {
+  static const std::vector<ReferenceCase> cases = {
       {"Smooth", 53, 37, {1, 1}, 0, Waves, AllKinds()},
       {"SlightlyRough", 53, 37, {1, 1}, 0.05, Waves, AllKinds()},
       {"Rough", 37, 29, {1, 1}, 0.15, Waves, AllKinds()},
@@ -204,9 +207,9 @@ const std::vector<TwinCase>& TwinCases() {
   return cases;
 }
 
-class TwinTest : public ::testing::TestWithParam<TwinCase> {};
+class ReferenceComparisonTest : public ::testing::TestWithParam<ReferenceCase> {};
 
-TEST_P(TwinTest, RendersWhatThePlainTwinDoes) {
+TEST_P(ReferenceComparisonTest, RendersWhatThePlainReferenceDoes) {
   const DisparityMap map = MapOf(GetParam());
   const DisparityRenderer renderer(map);
   for (const auto& [a, b] : GetParam().views) {
@@ -214,8 +217,8 @@ TEST_P(TwinTest, RendersWhatThePlainTwinDoes) {
     const ViewDisparity view = renderer.Render(a, b);
     const ViewDisparity plain = PlainView(map, a, b);
     const int width = map.width_px;
-    for (std::size_t i = 0; i < view.seen.size(); ++i) {
-      ASSERT_EQ(view.seen[i], plain.seen[i])
+    for (std::size_t i = 0; i < view.visibility.size(); ++i) {
+      ASSERT_EQ(view.visibility[i], plain.visibility[i])
           << i % static_cast<std::size_t>(width) << ", " << i / static_cast<std::size_t>(width);
     }
     // The positions are in float, so that they are rounded.
@@ -225,46 +228,46 @@ TEST_P(TwinTest, RendersWhatThePlainTwinDoes) {
     const double px_per_unit = std::max(std::abs(a * map.step.x()), std::abs(b * map.step.y()));
     ExpectNear("x", view.source_x, plain.source_x, width, tolerance * px_per_unit + 1e-6);
     ExpectNear("y", view.source_y, plain.source_y, width, tolerance * px_per_unit + 1e-6);
-    ExpectMixedAlike(view, plain, tolerance);
+    ExpectBoundarySamplesAlike(view, plain, tolerance);
   }
 }
 
-TEST_P(TwinTest, WarpsAsThePlainTwinDoes) {
+TEST_P(ReferenceComparisonTest, WarpsAsThePlainReferenceDoes) {
   const DisparityMap map = MapOf(GetParam());
   std::mt19937 engine(3);
   std::uniform_real_distribution<float> uniform(0, 1);
   for (const int channels : {1, 2, 3, 4, 5}) {
-    model::LinearPicture picture{map.width_px, map.height_px, channels, {}};
-    picture.values.resize(map.disparity.size() * static_cast<std::size_t>(channels));
-    for (float& value : picture.values) value = uniform(engine);
-    const PictureWarper warper(picture, map);
+    model::LinearImage image{map.width_px, map.height_px, channels, {}};
+    image.values.resize(map.disparity.size() * static_cast<std::size_t>(channels));
+    for (float& value : image.values) value = uniform(engine);
+    const ImageWarper warper(image, map);
     for (const auto& [a, b] : GetParam().views) {
       SCOPED_TRACE(::testing::Message() << "view " << a << ", " << b);
       const ViewDisparity view = PlainView(map, a, b);
-      const model::LinearPicture warped = warper.Warp(view);
+      const model::LinearImage warped = warper.Warp(view);
       EXPECT_EQ(warped.channels, channels);
-      model::LinearPicture of_compact{1, 1, 1, {0}};  // of another size before
+      model::LinearImage of_compact{1, 1, 1, {0}};  // of another size before
       const CompactView compact = DisparityRenderer(map).RenderCompact(a, b);
       warper.Warp(compact, &of_compact);
       EXPECT_EQ(of_compact.values, warper.Warp(RenderDisparity(map, a, b)).values);
-      ExpectNear("value", warped.values, PlainWarp(picture, map, view).values,
+      ExpectNear("value", warped.values, PlainWarp(image, map, view).values,
                  map.width_px * channels, 2e-6);
-      ExpectNear("value of the device's twin", DeviceTwinWarp(picture, map, compact),
+      ExpectNear("value of the device's reference", DeviceReferenceWarp(image, map, compact),
                  of_compact.values, map.width_px * channels, 1e-5);
     }
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Maps, TwinTest, ::testing::ValuesIn(TwinCases()),
+INSTANTIATE_TEST_SUITE_P(Maps, ReferenceComparisonTest, ::testing::ValuesIn(ReferenceCases()),
                          [](const auto& tested) { return tested.param.name; });
 
-// Sources far beyond the picture, on its rim, on pixels and a hair beside them.
-TEST(PictureWarper, CutsSourcesAsThePlainTwinDoes) {
+// Sources far beyond the image, on its rim, on pixels and a hair beside them.
+TEST(ImageWarper, CutsSourcesAsThePlainReferenceDoes) {
   DisparityMap map{9, 7, std::vector<float>(63, 0), {1, 1}};
-  model::LinearPicture picture{9, 7, 3, {}};
+  model::LinearImage image{9, 7, 3, {}};
   std::mt19937 engine(5);
   std::uniform_real_distribution<float> uniform(0, 1);
-  for (int i = 0; i < 189; ++i) picture.values.push_back(uniform(engine));
+  for (int i = 0; i < 189; ++i) image.values.push_back(uniform(engine));
   for (int i = 0; i < 63; i += 5) map.disparity[static_cast<std::size_t>(i)] = 0.5F;
   ViewDisparity view = RenderDisparity(map, 0, 0);
   const std::vector<float> sources = {0,     -0.0F,  1e-9F, -1e-6F, 0.25F, -0.75F, 3,     -3,
@@ -275,10 +278,10 @@ TEST(PictureWarper, CutsSourcesAsThePlainTwinDoes) {
       view.source_x[i] = sources[(i + shift) % sources.size()];
       view.source_y[i] = sources[(5 * i + 7 * shift) % sources.size()];
     }
-    ExpectNear("value", PictureWarper(picture, map).Warp(view).values,
-               PlainWarp(picture, map, view).values, 27, 2e-6);
-    ExpectNear("value of the device's twin", DeviceTwinWarp(picture, map, ListOf(view)),
-               PlainWarp(picture, map, view).values, 27, 1e-5);
+    ExpectNear("value", ImageWarper(image, map).Warp(view).values,
+               PlainWarp(image, map, view).values, 27, 2e-6);
+    ExpectNear("value of the device's reference", DeviceReferenceWarp(image, map, ListOf(view)),
+               PlainWarp(image, map, view).values, 27, 1e-5);
   }
 }
 
@@ -290,13 +293,13 @@ TEST(DisparityRenderer, DoesNotLoseTheBorderToRounding) {
     for (const double sense : {1.0, -1.0}) {
       const ViewDisparity view = renderer.Render(sense, sense);
       const long moved = std::lround(disparity);
-      EXPECT_EQ(std::count(view.seen.begin(), view.seen.end(), Seen::kSeen),
+      EXPECT_EQ(std::count(view.visibility.begin(), view.visibility.end(), Visibility::kVisible),
                 (11 - moved) * (9 - moved));
     }
     // A hundred times the tolerance is beside it.
     const DisparityMap beside{11, 9, std::vector<float>(99, disparity + 1e-3F), {1, 1}};
     const ViewDisparity view = RenderDisparity(beside, 1, 0);
-    EXPECT_EQ(std::count(view.seen.begin(), view.seen.end(), Seen::kSeen),
+    EXPECT_EQ(std::count(view.visibility.begin(), view.visibility.end(), Visibility::kVisible),
               (10 - std::lround(disparity)) * 9);
   }
 }
@@ -304,10 +307,11 @@ TEST(DisparityRenderer, DoesNotLoseTheBorderToRounding) {
 TEST(DisparityRenderer, TakesAnyFiniteView) {
   DisparityMap map{9, 7, std::vector<float>(63, 0), {1, 1}};
   // A plane in focus does not move.
-  EXPECT_EQ(DisparityRenderer(map).Render(1e300, -1e300).seen, std::vector<Seen>(63, Seen::kSeen));
+  EXPECT_EQ(DisparityRenderer(map).Render(1e300, -1e300).visibility,
+            std::vector<Visibility>(63, Visibility::kVisible));
   map.disparity.assign(63, -1e-3F);
   const ViewDisparity view = DisparityRenderer(map).Render(1e300, 1e300);
-  EXPECT_EQ(view.seen, std::vector<Seen>(63, Seen::kHidden));
+  EXPECT_EQ(view.visibility, std::vector<Visibility>(63, Visibility::kOccluded));
   EXPECT_EQ(view.disparity, map.disparity);
 }
 
@@ -319,16 +323,16 @@ TEST(DisparityRenderer, RefusesWhatRenderDisparityRefuses) {
   EXPECT_THAT(ErrorOf([&] { DisparityRenderer refused(map); }), ::testing::HasSubstr("holes"));
 }
 
-TEST(PictureWarper, RefusesWhatWarpPictureRefuses) {
+TEST(ImageWarper, RefusesWhatWarpImageRefuses) {
   const DisparityMap map{3, 2, std::vector<float>(6, 0), {1, 1}};
   const DisparityMap other{2, 2, std::vector<float>(4, 0), {1, 1}};
-  const model::LinearPicture picture{3, 2, 1, std::vector<float>(6, 0)};
-  const PictureWarper warper(picture, map);
+  const model::LinearImage image{3, 2, 1, std::vector<float>(6, 0)};
+  const ImageWarper warper(image, map);
   EXPECT_THAT(ErrorOf([&] { warper.Warp(RenderDisparity(other, 0, 0)); }),
               ::testing::HasSubstr("2x2"));
-  EXPECT_THAT(ErrorOf([&] { PictureWarper refused(picture, other); }), ::testing::HasSubstr("3x2"));
-  const model::LinearPicture cut{3, 2, 1, std::vector<float>(5, 0)};
-  EXPECT_THAT(ErrorOf([&] { PictureWarper refused(cut, map); }), ::testing::HasSubstr("5 values"));
+  EXPECT_THAT(ErrorOf([&] { ImageWarper refused(image, other); }), ::testing::HasSubstr("3x2"));
+  const model::LinearImage cut{3, 2, 1, std::vector<float>(5, 0)};
+  EXPECT_THAT(ErrorOf([&] { ImageWarper refused(cut, map); }), ::testing::HasSubstr("5 values"));
 }
 
 }  // namespace

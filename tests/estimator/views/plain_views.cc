@@ -223,8 +223,8 @@ Behind Background(const DisparityMap& map, const Canvas& canvas, const Eigen::Ve
 }
 
 // The fraction of a sample's square that the squares of a surface's pixels cover at the positions
-// that its disparity gives them. The border of the picture is repeated.
-double CoveredShare(const DisparityMap& map, int x, int y, const kernels::HiddenSample& from) {
+// that its disparity gives them. The border of the image is repeated.
+double CoveredShare(const DisparityMap& map, int x, int y, const kernels::OccludedSample& from) {
   const double tolerance = static_cast<float>(0.3 / map.step.cwiseAbs().maxCoeff());
   const double at_x = x + double{from.source_x}, at_y = y + double{from.source_y};
   double covered = 0;
@@ -240,7 +240,8 @@ double CoveredShare(const DisparityMap& map, int x, int y, const kernels::Hidden
   return covered;
 }
 
-kernels::HiddenSample OnSurface(const Eigen::Vector2d& shift, std::int32_t index, float disparity) {
+kernels::OccludedSample OnSurface(const Eigen::Vector2d& shift, std::int32_t index,
+                                  float disparity) {
   return {index, static_cast<float>(shift.x() * disparity),
           static_cast<float>(shift.y() * disparity), disparity};
 }
@@ -249,19 +250,21 @@ kernels::HiddenSample OnSurface(const Eigen::Vector2d& shift, std::int32_t index
 // diagonal ones. A visible surface that the centre view shows at this sample as well is preferred,
 // then a visible one as shown at the neighbour, then a hidden one.
 bool FindBehind(const DisparityMap& map, const Eigen::Vector2d& shift, const ViewDisparity& view,
-                int x, int y, float disparity, kernels::HiddenSample* behind) {
+                int x, int y, float disparity, kernels::OccludedSample* behind) {
   const double tolerance = static_cast<float>(0.3 / map.step.cwiseAbs().maxCoeff());
   const auto index = static_cast<std::int32_t>(At(x, y, view.width_px));
-  for (const auto& [kind, is_shown_here] :
-       {std::pair{Seen::kSeen, true}, {Seen::kSeen, false}, {Seen::kHidden, false}}) {
+  for (const auto& [kind, is_shown_here] : {std::pair{Visibility::kVisible, true},
+                                            {Visibility::kVisible, false},
+                                            {Visibility::kOccluded, false}}) {
     for (const auto& [dx, dy] :
          {std::pair{-1, 0}, {1, 0}, {0, -1}, {0, 1}, {-1, -1}, {1, -1}, {-1, 1}, {1, 1}}) {
       const int xx = x + dx, yy = y + dy;
       if (xx < 0 || yy < 0 || xx >= view.width_px || yy >= view.height_px) continue;
       const std::size_t there = At(xx, yy, view.width_px);
-      if (view.seen[there] != kind || !(view.disparity[there] < disparity - tolerance)) continue;
+      if (view.visibility[there] != kind || !(view.disparity[there] < disparity - tolerance))
+        continue;
       *behind = OnSurface(shift, index, view.disparity[there]);
-      if (kind == Seen::kHidden) {
+      if (kind == Visibility::kOccluded) {
         *behind = {static_cast<std::int32_t>(there), view.source_x[there], view.source_y[there],
                    view.disparity[there]};
       }
@@ -277,16 +280,16 @@ bool FindBehind(const DisparityMap& map, const Eigen::Vector2d& shift, const Vie
 
 // Surfaces that could share the pixel of a sample.
 struct Sharers {
-  std::vector<kernels::MixedSample> of_others;
-  // Parts of the surface of a hidden sample that are visible nevertheless.
-  std::vector<kernels::MixedSample> of_its_own;
+  std::vector<kernels::BoundarySample> of_others;
+  // Parts of the surface of an occluded sample that are visible nevertheless.
+  std::vector<kernels::BoundarySample> of_its_own;
 };
 Sharers SharersOf(const DisparityMap& map, const Eigen::Vector2d& shift, const ViewDisparity& view,
                   const std::vector<bool>& at_jump, int x, int y) {
   const double tolerance = static_cast<float>(0.3 / map.step.cwiseAbs().maxCoeff());
   const std::size_t i = At(x, y, map.width_px);
   const auto index = static_cast<std::int32_t>(i);
-  const bool is_hidden = view.seen[i] == Seen::kHidden;
+  const bool is_occluded = view.visibility[i] == Visibility::kOccluded;
   Sharers sharers;
   for (std::size_t p = 0; p < at_jump.size(); ++p) {
     if (!at_jump[p]) continue;
@@ -299,14 +302,14 @@ Sharers SharersOf(const DisparityMap& map, const Eigen::Vector2d& shift, const V
     const auto disparity = static_cast<float>(lands.disparity);
     const bool is_nearer = disparity > view.disparity[i] + tolerance;
     if (disparity < view.disparity[i] - tolerance) continue;
-    kernels::HiddenSample other = OnSurface(shift, index, disparity);
+    kernels::OccludedSample other = OnSurface(shift, index, disparity);
     double share = CoveredShare(map, x, y, other);
-    if (!is_nearer && !is_hidden) {
+    if (!is_nearer && !is_occluded) {
       if (!FindBehind(map, shift, view, x, y, view.disparity[i], &other)) continue;
       share = 1 - CoveredShare(map, x, y, OnSurface(shift, index, view.disparity[i]));
     }
     if (share < 0.01) continue;
-    (is_nearer || !is_hidden ? sharers.of_others : sharers.of_its_own)
+    (is_nearer || !is_occluded ? sharers.of_others : sharers.of_its_own)
         .push_back({index, other, static_cast<float>(share)});
   }
   return sharers;
@@ -324,7 +327,7 @@ ViewDisparity PlainView(const DisparityMap& map, double a, double b) {
   const Eigen::Vector2d shift(a * map.step.x(), b * map.step.y());
   const std::vector<float> zero(map.disparity.size(), 0);
   ViewDisparity view{width, map.height_px, map.disparity, {}, zero, zero, {}};
-  view.seen.assign(map.disparity.size(), Seen::kSeen);
+  view.visibility.assign(map.disparity.size(), Visibility::kVisible);
   if (shift == Eigen::Vector2d::Zero()) return view;
   Canvas canvas(width, map.height_px);
   const std::vector<bool> at_jump = Draw(map, shift, &canvas);
@@ -336,7 +339,7 @@ ViewDisparity PlainView(const DisparityMap& map, double a, double b) {
       const double drawn = canvas.disparity[i];
       Behind shown{x + shift.x() * drawn, y + shift.y() * drawn, drawn};
       if (!canvas.IsCovered(x, y)) {
-        view.seen[i] = Seen::kHidden;
+        view.visibility[i] = Visibility::kOccluded;
         if (nothing_covered) continue;
         shown = Background(map, canvas, shift, closest, x, y);
       }
@@ -348,15 +351,15 @@ ViewDisparity PlainView(const DisparityMap& map, double a, double b) {
   for (int y = 0; y < map.height_px; ++y) {
     for (int x = 0; x < width; ++x) {
       const Sharers sharers = SharersOf(map, shift, view, at_jump, x, y);
-      const std::vector<kernels::MixedSample>& likely =
+      const std::vector<kernels::BoundarySample>& likely =
           sharers.of_others.empty() ? sharers.of_its_own : sharers.of_others;
-      const auto most =
-          std::max_element(likely.begin(), likely.end(),
-                           [](const kernels::MixedSample& one, const kernels::MixedSample& other) {
-                             return std::pair(one.share, one.other.disparity) <
-                                    std::pair(other.share, other.other.disparity);
-                           });
-      if (most != likely.end()) view.mixed.push_back(*most);
+      const auto most = std::max_element(
+          likely.begin(), likely.end(),
+          [](const kernels::BoundarySample& one, const kernels::BoundarySample& other) {
+            return std::pair(one.share, one.other.disparity) <
+                   std::pair(other.share, other.other.disparity);
+          });
+      if (most != likely.end()) view.boundary.push_back(*most);
     }
   }
   return view;
@@ -364,14 +367,14 @@ ViewDisparity PlainView(const DisparityMap& map, double a, double b) {
 
 namespace {
 
-// Between the pixels of a surface.
-enum class Between { kLinear, kCubicWhereItCan };
+// Interpolation the pixels of a surface.
+enum class Interpolation { kLinear, kCubicWhereItCan };
 
-// A channel of the picture at the way to a source from (x, y).
-double Read(const model::LinearPicture& picture, const DisparityMap& map, int x, int y,
-            const kernels::HiddenSample& from, Between between, int channel) {
-  const int width = picture.width_px;
-  const int height = picture.height_px;
+// A channel of the image at the way to a source from (x, y).
+double Read(const model::LinearImage& image, const DisparityMap& map, int x, int y,
+            const kernels::OccludedSample& from, Interpolation interpolation, int channel) {
+  const int width = image.width_px;
+  const int height = image.height_px;
   const double tolerance = 0.3 / map.step.cwiseAbs().maxCoeff();
   const double source_x = std::clamp(x + double{from.source_x}, 0.0, width - 1.0);
   const double source_y = std::clamp(y + double{from.source_y}, 0.0, height - 1.0);
@@ -382,7 +385,7 @@ double Read(const model::LinearPicture& picture, const DisparityMap& map, int x,
     return std::abs(double{map.disparity[At(at(xx, width), at(yy, height), width)]} -
                     from.disparity);
   };
-  bool bicubic = between == Between::kCubicWhereItCan;
+  bool bicubic = interpolation == Interpolation::kCubicWhereItCan;
   for (int n = 0; n < 16; ++n) {
     bicubic = bicubic && difference(x0 - 1 + n % 4, y0 - 1 + n / 4) <= tolerance;
   }
@@ -399,7 +402,7 @@ double Read(const model::LinearPicture& picture, const DisparityMap& map, int x,
     const auto k = static_cast<std::size_t>(n % 4);
     const int xx = x0 - 1 + n % 4;
     const int yy = y0 - 1 + n / 4;
-    const double value = picture.at(at(xx, width), at(yy, height), channel);
+    const double value = image.at(at(xx, width), at(yy, height), channel);
     const double weight = bicubic ? cubic_x[k] * cubic_y[j] : linear_x[k] * linear_y[j];
     if (weight != 0 && difference(xx, yy) < closest) {
       closest = difference(xx, yy);
@@ -414,27 +417,26 @@ double Read(const model::LinearPicture& picture, const DisparityMap& map, int x,
 
 }  // namespace
 
-model::LinearPicture PlainWarp(const model::LinearPicture& picture, const DisparityMap& map,
-                               const ViewDisparity& view) {
-  model::LinearPicture warped = picture;
-  for (int y = 0; y < picture.height_px; ++y) {
-    for (int x = 0; x < picture.width_px; ++x) {
-      const std::size_t i = At(x, y, picture.width_px);
-      const auto mixed =
-          std::find_if(view.mixed.begin(), view.mixed.end(), [&](const kernels::MixedSample& one) {
-            return static_cast<std::size_t>(one.index) == i;
-          });
-      for (int c = 0; c < picture.channels; ++c) {
+model::LinearImage PlainWarp(const model::LinearImage& image, const DisparityMap& map,
+                             const ViewDisparity& view) {
+  model::LinearImage warped = image;
+  for (int y = 0; y < image.height_px; ++y) {
+    for (int x = 0; x < image.width_px; ++x) {
+      const std::size_t i = At(x, y, image.width_px);
+      const auto boundary = std::find_if(view.boundary.begin(), view.boundary.end(),
+                                         [&](const kernels::BoundarySample& one) {
+                                           return static_cast<std::size_t>(one.index) == i;
+                                         });
+      for (int c = 0; c < image.channels; ++c) {
         double value =
-            Read(picture, map, x, y, {0, view.source_x[i], view.source_y[i], view.disparity[i]},
-                 Between::kCubicWhereItCan, c);
-        if (mixed != view.mixed.end()) {
-          value =
-              (1 - double{mixed->share}) * value +
-              double{mixed->share} * Read(picture, map, x, y, mixed->other, Between::kLinear, c);
+            Read(image, map, x, y, {0, view.source_x[i], view.source_y[i], view.disparity[i]},
+                 Interpolation::kCubicWhereItCan, c);
+        if (boundary != view.boundary.end()) {
+          value = (1 - double{boundary->share}) * value +
+                  double{boundary->share} *
+                      Read(image, map, x, y, boundary->other, Interpolation::kLinear, c);
         }
-        warped
-            .values[i * static_cast<std::size_t>(picture.channels) + static_cast<std::size_t>(c)] =
+        warped.values[i * static_cast<std::size_t>(image.channels) + static_cast<std::size_t>(c)] =
             static_cast<float>(value);
       }
     }

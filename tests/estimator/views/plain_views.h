@@ -5,11 +5,11 @@
 
 namespace thicklens::estimator::testing {
 
-// RenderDisparity and WarpPicture as one would write them down, in double and one sample after the
+// RenderDisparity and WarpImage as one would write them down, in double and one sample after the
 // other.
 ViewDisparity PlainView(const DisparityMap& map, double a, double b);
-model::LinearPicture PlainWarp(const model::LinearPicture& picture, const DisparityMap& map,
-                               const ViewDisparity& view);
+model::LinearImage PlainWarp(const model::LinearImage& image, const DisparityMap& map,
+                             const ViewDisparity& view);
 
 }  // namespace thicklens::estimator::testing
 

@@ -45,17 +45,17 @@ DisparityMap MapOf(int width, int height, const std::function<double(int, int)>&
   return map;
 }
 
-model::LinearPicture PictureOf(int width, int height, int channels,
-                               const std::function<double(int, int, int)>& value) {
-  model::LinearPicture picture{width, height, channels, {}};
+model::LinearImage ImageFrom(int width, int height, int channels,
+                             const std::function<double(int, int, int)>& value) {
+  model::LinearImage image{width, height, channels, {}};
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       for (int c = 0; c < channels; ++c) {
-        picture.values.push_back(static_cast<float>(value(x, y, c)));
+        image.values.push_back(static_cast<float>(value(x, y, c)));
       }
     }
   }
-  return picture;
+  return image;
 }
 
 // Position of a sample's source in the centre view.
@@ -174,7 +174,7 @@ TEST(RenderDisparity, GivesTheMapItselfWhereNothingMoves) {
     EXPECT_EQ(view.disparity, shown->disparity);
     EXPECT_EQ(view.source_x, std::vector<float>(54, 0));
     EXPECT_EQ(view.source_y, std::vector<float>(54, 0));
-    EXPECT_EQ(std::count(view.seen.begin(), view.seen.end(), Seen::kSeen), 54);
+    EXPECT_EQ(std::count(view.visibility.begin(), view.visibility.end(), Visibility::kVisible), 54);
   }
 }
 
@@ -202,19 +202,20 @@ TEST_P(SlantedPlaneTest, HasItsClosedForm) {
   const ViewDisparity view = RenderDisparity(map, plane.a, plane.b);
   const Eigen::Matrix2d inverse =
       (Eigen::Matrix2d::Identity() - shift * gradient.transpose()).inverse();
-  int seen = 0;
+  int visibility = 0;
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       const std::size_t i = At(x, y, width);
       const Eigen::Vector2d source = inverse * (Eigen::Vector2d(x, y) + shift * plane.at_origin);
-      // Distance from the border of the centre picture, positive inside.
+      // Distance from the border of the centre image, positive inside.
       const double inside =
           std::min({source.x(), width - 1 - source.x(), source.y(), height - 1 - source.y()});
       if (std::abs(inside) < 1e-3) continue;  // on its rim
-      ASSERT_EQ(view.seen[i], inside > 0 ? Seen::kSeen : Seen::kHidden) << x << ", " << y;
+      ASSERT_EQ(view.visibility[i], inside > 0 ? Visibility::kVisible : Visibility::kOccluded)
+          << x << ", " << y;
       const Eigen::Vector2d found = SourceOf(view, x, y);
       if (inside > 0) {
-        ++seen;
+        ++visibility;
         EXPECT_NEAR(view.disparity[i], plane.at_origin + gradient.dot(source), 3e-5);
         EXPECT_NEAR((found - source).norm(), 0, 1e-4);
       } else {
@@ -225,7 +226,7 @@ TEST_P(SlantedPlaneTest, HasItsClosedForm) {
       }
     }
   }
-  EXPECT_GT(seen, 100);
+  EXPECT_GT(visibility, 100);
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -242,7 +243,7 @@ INSTANTIATE_TEST_SUITE_P(
                       PlaneCase{"TurnedOver", -3.5, 0.18, 0, 9, 0, {1, 1}}),
     [](const auto& tested) { return tested.param.name; });
 
-// A rectangle before a wall, both parallel to the picture.
+// A rectangle before a wall, both parallel to the image.
 struct TwoLayers {
   static constexpr int kWidth = 48, kHeight = 36;
   int left = 17, right = 26, top = 12, bottom = 20;  // pixels of the rectangle, inclusive
@@ -277,18 +278,18 @@ TEST(RenderDisparity, SeesTwoLayersInTheirClosedForm) {
                              {1.5, -2.2}}) {
     const ViewDisparity view = RenderDisparity(scene.Map(), a, b);
     int near = 0;
-    int hidden = 0;
+    int occluded = 0;
     for (int y = 0; y < TwoLayers::kHeight; ++y) {
       for (int x = 0; x < TwoLayers::kWidth; ++x) {
         const std::size_t i = At(x, y, TwoLayers::kWidth);
         const bool is_near = scene.NearCovers(x, y, a, b);
-        const bool is_seen = is_near || scene.FarCovers(x, y, a, b);
-        ASSERT_EQ(view.seen[i], is_seen ? Seen::kSeen : Seen::kHidden)
+        const bool is_visible = is_near || scene.FarCovers(x, y, a, b);
+        ASSERT_EQ(view.visibility[i], is_visible ? Visibility::kVisible : Visibility::kOccluded)
             << x << ", " << y << " of view " << a << ", " << b;
-        // Hidden samples show the background, also at the border of the picture.
+        // Hidden samples show the background, also at the border of the image.
         const double disparity = is_near ? scene.near_px : scene.far_px;
         ASSERT_NEAR(view.disparity[i], disparity, 1e-6) << x << ", " << y;
-        if (is_seen) {
+        if (is_visible) {
           EXPECT_NEAR(view.source_x[i], a * disparity, 1e-5);
           EXPECT_NEAR(view.source_y[i], b * disparity, 1e-5);
         } else {
@@ -296,11 +297,11 @@ TEST(RenderDisparity, SeesTwoLayersInTheirClosedForm) {
           EXPECT_FALSE(scene.IsNear(source.x(), source.y()));
         }
         near += is_near ? 1 : 0;
-        hidden += is_seen ? 0 : 1;
+        occluded += is_visible ? 0 : 1;
       }
     }
     EXPECT_GT(near, 70);
-    EXPECT_GT(hidden, 20);
+    EXPECT_GT(occluded, 20);
   }
 }
 
@@ -312,17 +313,17 @@ TEST(RenderDisparity, FillsFromTheBackgroundSide) {
   for (const int a : {3, -3}) {
     const ViewDisparity view = RenderDisparity(scene.Map(), a, 0);
     for (int y = scene.top; y <= scene.bottom; ++y) {
-      int hidden = 0;
+      int occluded = 0;
       for (int x = 4; x < TwoLayers::kWidth - 4; ++x) {
         const std::size_t i = At(x, y, TwoLayers::kWidth);
-        if (view.seen[i] == Seen::kSeen) continue;
-        ++hidden;
+        if (view.visibility[i] == Visibility::kVisible) continue;
+        ++occluded;
         int background = x;
         while (!scene.FarCovers(background, y, a, 0)) background += a > 0 ? 1 : -1;
         EXPECT_NEAR(view.source_x[i], background - x + a * scene.far_px, 1e-5) << x;
         EXPECT_EQ(view.source_y[i], 0);
       }
-      EXPECT_GE(hidden, 6);  // (near - far) * |a| = 7.5 px
+      EXPECT_GE(occluded, 6);  // (near - far) * |a| = 7.5 px
     }
   }
 }
@@ -332,9 +333,9 @@ TEST(RenderDisparity, FillsBordersFromTheOneSideAndCornersFromWhatIsClosest) {
   const int height = 16;
   const DisparityMap map = MapOf(width, height, [](int, int) { return 1.5; });
   const ViewDisparity right = RenderDisparity(map, 2, 0);  // all moves 3 px to the left
-  EXPECT_EQ(right.seen[At(16, 5, width)], Seen::kSeen);
+  EXPECT_EQ(right.visibility[At(16, 5, width)], Visibility::kVisible);
   for (int x = 17; x < width; ++x) {
-    EXPECT_EQ(right.seen[At(x, 5, width)], Seen::kHidden);
+    EXPECT_EQ(right.visibility[At(x, 5, width)], Visibility::kOccluded);
     EXPECT_EQ(right.source_x[At(x, 5, width)], 16 - x + 3);
     EXPECT_EQ(right.source_y[At(x, 5, width)], 0);
   }
@@ -355,7 +356,7 @@ TEST(RenderDisparity, FillsFromTheCloserOfTwoEquallyFarSides) {
   const DisparityMap map = MapOf(40, 3, [](int x, int) { return x >= 20 && x <= 22 ? 2.0 : 0.0; });
   const ViewDisparity view = RenderDisparity(map, 3, 0);
   for (const auto& [x, source] : {std::pair{20, 19}, {21, 23}, {22, 23}}) {
-    EXPECT_EQ(view.seen[At(x, 1, 40)], Seen::kHidden);
+    EXPECT_EQ(view.visibility[At(x, 1, 40)], Visibility::kOccluded);
     EXPECT_EQ(SourceOf(view, x, 1).x(), source) << x;
   }
 }
@@ -365,8 +366,8 @@ TEST(RenderDisparity, DoesNotLoseTheBorderToRounding) {
   const DisparityMap map = MapOf(10, 8, [](int, int) { return 0.1; }, {10, 10});
   ASSERT_GT(10 * double{map.disparity[0]}, 1);
   const ViewDisparity view = RenderDisparity(map, 1, 1);
-  EXPECT_EQ(view.seen[At(8, 6, 10)], Seen::kSeen);
-  EXPECT_EQ(view.seen[At(9, 6, 10)], Seen::kHidden);
+  EXPECT_EQ(view.visibility[At(8, 6, 10)], Visibility::kVisible);
+  EXPECT_EQ(view.visibility[At(9, 6, 10)], Visibility::kOccluded);
 }
 
 TEST(RenderDisparity, TakesTheCentreViewWhereNothingAtAllIsCovered) {
@@ -374,7 +375,7 @@ TEST(RenderDisparity, TakesTheCentreViewWhereNothingAtAllIsCovered) {
   const ViewDisparity view = RenderDisparity(map, 3, 1);
   EXPECT_EQ(view.disparity, map.disparity);
   EXPECT_EQ(view.source_x, std::vector<float>(30, 0));
-  EXPECT_EQ(std::count(view.seen.begin(), view.seen.end(), Seen::kHidden), 30);
+  EXPECT_EQ(std::count(view.visibility.begin(), view.visibility.end(), Visibility::kOccluded), 30);
 }
 
 // Two surfaces separate, while one surface is stretched. The limit is 0.2 px per view step, for the
@@ -386,8 +387,9 @@ TEST(RenderDisparity, JoinsNeighboursOfOneSurfaceOnly) {
           30, 4, [&](int x, int) { return x < 15 ? 0.0 : -jump_px / step; }, {step, step / 3});
       const ViewDisparity view = RenderDisparity(map, 20, 0);  // 3.8 or 4.2 px apart
       const bool one_surface = jump_px < 0.2;
-      EXPECT_EQ(view.seen[At(16, 1, 30)], one_surface ? Seen::kSeen : Seen::kHidden);
-      EXPECT_EQ(view.seen[At(14, 1, 30)], Seen::kSeen);
+      EXPECT_EQ(view.visibility[At(16, 1, 30)],
+                one_surface ? Visibility::kVisible : Visibility::kOccluded);
+      EXPECT_EQ(view.visibility[At(14, 1, 30)], Visibility::kVisible);
     }
   }
 }
@@ -402,10 +404,10 @@ TEST(RenderDisparity, KeepsWhatIsOnePixelWide) {
     EXPECT_NEAR(view.disparity[At(x, 3, 25)], 1.3, 1e-6) << x;
   }
   const DisparityMap row = MapOf(9, 1, [](int, int) { return 1.0; });
-  EXPECT_EQ(RenderDisparity(row, 1, 0).seen[3], Seen::kSeen);
+  EXPECT_EQ(RenderDisparity(row, 1, 0).visibility[3], Visibility::kVisible);
 }
 
-// --- A slow twin: every sample asks every triangle and square by itself.
+// --- A slow reference: every sample asks every triangle and square by itself.
 
 struct Point {
   Eigen::Vector2d position;
@@ -454,7 +456,7 @@ double SlowDisparity(const DisparityMap& map, double a, double b, int x, int y) 
   return nearest;
 }
 
-TEST(RenderDisparity, AgreesWithASlowTwin) {
+TEST(RenderDisparity, AgreesWithASlowReference) {
   std::mt19937 engine(11);
   std::uniform_real_distribution<double> uniform(-0.08, 0.08);
   const int width = 27;
@@ -470,23 +472,23 @@ TEST(RenderDisparity, AgreesWithASlowTwin) {
         step);
     for (const auto& [a, b] : {std::pair{1.37, -2.21}, {-3.13, 0.59}, {4.71, 3.83}}) {
       const ViewDisparity view = RenderDisparity(map, a, b);
-      int hidden = 0;
+      int occluded = 0;
       for (int y = 0; y < height; ++y) {
         for (int x = 0; x < width; ++x) {
           const std::size_t i = At(x, y, width);
           const double expected = SlowDisparity(map, a, b, x, y);
-          const bool seen = std::isfinite(expected);
-          ASSERT_EQ(view.seen[i] == Seen::kSeen, seen) << x << ", " << y;
-          if (seen) {
+          const bool visibility = std::isfinite(expected);
+          ASSERT_EQ(view.visibility[i] == Visibility::kVisible, visibility) << x << ", " << y;
+          if (visibility) {
             EXPECT_NEAR(view.disparity[i], expected, 1e-5) << x << ", " << y;
             EXPECT_NEAR(view.source_x[i], a * step.x() * expected, 1e-4);
             EXPECT_NEAR(view.source_y[i], b * step.y() * expected, 1e-4);
           } else {
-            ++hidden;
+            ++occluded;
           }
         }
       }
-      EXPECT_GT(hidden, 10);
+      EXPECT_GT(occluded, 10);
     }
   }
 }
@@ -506,7 +508,8 @@ TEST(RenderDisparity, SeesTheWallBehindASlitThatIsNarrowerThanTheHole) {
         const int x = upright ? along : 2, y = upright ? 2 : along;
         const std::size_t i = At(x, y, map.width_px);
         const bool in_slit = along >= kFirst - 2 * a && along <= kLast - 2 * a;
-        ASSERT_EQ(view.seen[i], in_slit ? Seen::kHidden : Seen::kSeen) << along;
+        ASSERT_EQ(view.visibility[i], in_slit ? Visibility::kOccluded : Visibility::kVisible)
+            << along;
         EXPECT_FLOAT_EQ(view.disparity[i], in_slit ? -0.5F : 2.0F) << along;
         if (!in_slit) continue;
         const Eigen::Vector2d source = SourceOf(view, x, y);
@@ -529,7 +532,8 @@ TEST(RenderDisparity, IsNotLedByASinglePixelThatIsFarTooFar) {
   int compared = 0;
   for (int x = 2; x < map.width_px - 2; ++x) {
     const std::size_t i = At(x, 4, map.width_px);
-    if (clean.seen[i] == Seen::kSeen || view.seen[i] == Seen::kSeen) continue;
+    if (clean.visibility[i] == Visibility::kVisible || view.visibility[i] == Visibility::kVisible)
+      continue;
     ++compared;
     EXPECT_EQ(view.disparity[i], clean.disparity[i]) << x;
   }
@@ -548,10 +552,10 @@ bool HasTwoOfItsSurface(const DisparityMap& map, int x, int y) {
   return found >= 2;
 }
 
-// For any map, the ray of a hidden sample crosses the centre view: at n px along the displacement
-// its disparity is n over the px per unit. The last pixel before which it passes gives the surface
-// behind whose edge it disappears.
-TEST(RenderDisparity, ShowsTheSurfaceThatTheHiddenRayPassedLast) {
+// For any map, the ray of an occluded sample crosses the centre view: at n px along the
+// displacement its disparity is n over the px per unit. The last pixel before which it passes gives
+// the surface behind whose edge it disappears.
+TEST(RenderDisparity, ShowsTheSurfaceThatTheOccludedRayPassedLast) {
   std::mt19937 engine(12);
   std::uniform_real_distribution<double> uniform(-1.5, 1.5);
   const int width = 31;
@@ -562,7 +566,7 @@ TEST(RenderDisparity, ShowsTheSurfaceThatTheHiddenRayPassedLast) {
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       const std::size_t i = At(x, y, width);
-      if (view.seen[i] == Seen::kSeen) continue;
+      if (view.visibility[i] == Visibility::kVisible) continue;
       for (int n = -4; n <= width; ++n) {
         const int xx = x + n;
         const int yy = static_cast<int>(std::floor(y + 0.5 * n + 0.5));
@@ -591,21 +595,21 @@ TEST(RenderDisparity, RefusesHolesAndWrongSizes) {
   EXPECT_THAT(ErrorOf([&] { RenderDisparity(map, 1, 0); }), HasSubstr("5 values"));
 }
 
-// --- Pictures.
+// --- Images.
 
 // Catmull-Rom is exact for polynomials of the second degree.
-TEST(WarpPicture, IsExactForAQuadraticTexture) {
+TEST(WarpImage, IsExactForAQuadraticTexture) {
   const int width = 30;
   const int height = 24;
   const auto texture = [](double x, double y, int c) {
     return 0.3 + 0.01 * x - 0.02 * y + 0.001 * (c + 1) * x * x + 0.0007 * x * y - 0.0004 * y * y;
   };
-  const model::LinearPicture picture = PictureOf(width, height, 3, texture);
+  const model::LinearImage image = ImageFrom(width, height, 3, texture);
   const double per_x = 0.04;
   const DisparityMap map =
       MapOf(width, height, [&](int x, int) { return -0.5 + per_x * x; }, {1, 0.8});
   for (const auto& [a, b] : {std::pair{2.0, 0.0}, {-2.0, 1.0}, {0.0, 3.0}, {0.5, -0.5}}) {
-    const model::LinearPicture warped = WarpPicture(picture, map, RenderDisparity(map, a, b));
+    const model::LinearImage warped = WarpImage(image, map, RenderDisparity(map, a, b));
     int compared = 0;
     for (int y = 0; y < height; ++y) {
       for (int x = 0; x < width; ++x) {
@@ -624,13 +628,13 @@ TEST(WarpPicture, IsExactForAQuadraticTexture) {
   }
 }
 
-TEST(WarpPicture, FollowsASineTexture) {
+TEST(WarpImage, FollowsASineTexture) {
   const int width = 64;
   const auto texture = [](double x) { return 0.5 + 0.4 * std::sin(2 * std::acos(-1.0) * x / 12); };
-  const model::LinearPicture picture =
-      PictureOf(width, 5, 1, [&](int x, int, int) { return texture(x); });
+  const model::LinearImage image =
+      ImageFrom(width, 5, 1, [&](int x, int, int) { return texture(x); });
   const DisparityMap map = MapOf(width, 5, [](int x, int) { return 0.9 - 0.03 * x; });
-  const model::LinearPicture warped = WarpPicture(picture, map, RenderDisparity(map, 3, 0));
+  const model::LinearImage warped = WarpImage(image, map, RenderDisparity(map, 3, 0));
   for (int x = 4; x < width - 4; ++x) {
     const double source = (x + 3 * 0.9) / (1 + 3 * 0.03);
     if (source < 1 || source > width - 2) continue;
@@ -641,23 +645,23 @@ TEST(WarpPicture, FollowsASineTexture) {
 }
 
 // A sample is a square; so much of it as the rectangle covers is the rectangle's.
-TEST(WarpPicture, MixesSurfacesByTheAreaThatEachCovers) {
+TEST(WarpImage, MixesSurfacesByTheAreaThatEachCovers) {
   const TwoLayers scene;
   const DisparityMap map = scene.Map();
-  const model::LinearPicture picture = PictureOf(
+  const model::LinearImage image = ImageFrom(
       TwoLayers::kWidth, TwoLayers::kHeight, 3,
       [&](int x, int y, int c) { return scene.IsNear(x, y) ? 0.9 - 0.1 * c : 0.1 + 0.05 * c; });
   const auto overlap = [](double at, double first, double last) {
     return std::max(0.0, std::min(at + 0.5, last + 0.5) - std::max(at - 0.5, first - 0.5));
   };
-  int mixed = 0;
+  int boundary = 0;
   for (const auto& [a, b] : {std::pair{2.0, 0.0}, {-1.0, 3.0}, {1.5, -2.2}, {-0.3, 0.4}}) {
-    const model::LinearPicture warped = WarpPicture(picture, map, RenderDisparity(map, a, b));
+    const model::LinearImage warped = WarpImage(image, map, RenderDisparity(map, a, b));
     for (int y = 0; y < TwoLayers::kHeight; ++y) {
       for (int x = 0; x < TwoLayers::kWidth; ++x) {
         const double near = overlap(x + a * scene.near_px, scene.left, scene.right) *
                             overlap(y + b * scene.near_px, scene.top, scene.bottom);
-        if (near > 0.01 && near < 0.99) ++mixed;
+        if (near > 0.01 && near < 0.99) ++boundary;
         // Less than a hundredth is left out.
         const double tolerance =
             near == 0 || near > 0.9999 || (near > 0.0101 && near < 0.9899) ? 1e-5 : 0.01;
@@ -669,38 +673,38 @@ TEST(WarpPicture, MixesSurfacesByTheAreaThatEachCovers) {
       }
     }
   }
-  EXPECT_GT(mixed, 100);
+  EXPECT_GT(boundary, 100);
 }
 
-// The surface behind may be a hole. Its hidden background is used then.
-TEST(RenderDisparity, MixesInTheHiddenBackgroundWhereNothingElseIsBehind) {
+// The surface behind may be a hole. Its occluded background is used then.
+TEST(RenderDisparity, MixesInTheOccludedBackgroundWhereNothingElseIsBehind) {
   const TwoLayers scene;
   // The near surface moves 4.18 px to the left, the far one 1.32 px to the right
   const double a = 2.2;
   const ViewDisparity view = RenderDisparity(scene.Map(), a, 0);
   int found = 0;
-  for (const kernels::MixedSample& mixed : view.mixed) {
-    const auto i = static_cast<std::size_t>(mixed.index);
-    const int x = mixed.index % TwoLayers::kWidth;
+  for (const kernels::BoundarySample& boundary : view.boundary) {
+    const auto i = static_cast<std::size_t>(boundary.index);
+    const int x = boundary.index % TwoLayers::kWidth;
     if (x < 20) continue;  // the left edge, before visible background
-    if (mixed.index / TwoLayers::kWidth != 15) continue;
+    if (boundary.index / TwoLayers::kWidth != 15) continue;
     ++found;
     // 26.5 - 4.18 = 22.32: the sample at 22 is covered except for 0.18 px.
     EXPECT_EQ(x, 22);
-    EXPECT_NEAR(mixed.share, 0.18, 1e-5);
+    EXPECT_NEAR(boundary.share, 0.18, 1e-5);
     EXPECT_NEAR(view.disparity[i], scene.near_px, 1e-6);
-    EXPECT_EQ(view.seen[i + 1], Seen::kHidden);
-    EXPECT_EQ(mixed.other.index, mixed.index + 1);
+    EXPECT_EQ(view.visibility[i + 1], Visibility::kOccluded);
+    EXPECT_EQ(boundary.other.index, boundary.index + 1);
     // The centre view shows the rectangle there, so the position of the neighbour is read.
-    EXPECT_EQ(mixed.other.source_x, view.source_x[i + 1] + 1);
-    EXPECT_EQ(mixed.other.disparity, view.disparity[i + 1]);
+    EXPECT_EQ(boundary.other.source_x, view.source_x[i + 1] + 1);
+    EXPECT_EQ(boundary.other.disparity, view.disparity[i + 1]);
   }
   EXPECT_EQ(found, 1);
 }
 
 double SharedAt(const ViewDisparity& view, std::size_t i) {
-  for (const kernels::MixedSample& mixed : view.mixed) {
-    if (static_cast<std::size_t>(mixed.index) == i) return double{mixed.share};
+  for (const kernels::BoundarySample& boundary : view.boundary) {
+    if (static_cast<std::size_t>(boundary.index) == i) return double{boundary.share};
   }
   return 0;
 }
@@ -708,24 +712,24 @@ double SharedAt(const ViewDisparity& view, std::size_t i) {
 // The texture of the wall is linear, so taps of the wall on both sides give it exactly. If the
 // other tap shows the rectangle, the remaining one replaces it. Hidden samples show their
 // background.
-TEST(WarpPicture, UsesTheTapsOfTheSurfaceAlone) {
+TEST(WarpImage, UsesTheTapsOfTheSurfaceAlone) {
   const TwoLayers scene;
   const DisparityMap map = scene.Map();
   const auto wall = [](double x) { return 0.1 + 0.01 * x; };
-  const model::LinearPicture picture =
-      PictureOf(TwoLayers::kWidth, TwoLayers::kHeight, 1,
+  const model::LinearImage image =
+      ImageFrom(TwoLayers::kWidth, TwoLayers::kHeight, 1,
                 [&](int x, int y, int) { return scene.IsNear(x, y) ? 5.0 : wall(x); });
   const double a = 2;  // wall: source x - 1.2
   const ViewDisparity view = RenderDisparity(map, a, 0);
-  const model::LinearPicture warped = WarpPicture(picture, map, view);
+  const model::LinearImage warped = WarpImage(image, map, view);
   const int y = 15;
   int cut = 0;
-  int hidden = 0;
+  int occluded = 0;
   for (int x = 3; x < TwoLayers::kWidth - 3; ++x) {
     if (scene.NearCovers(x, y, a, 0)) continue;
     double source = x + a * scene.far_px;
-    if (view.seen[At(x, y, TwoLayers::kWidth)] == Seen::kHidden) {
-      ++hidden;
+    if (view.visibility[At(x, y, TwoLayers::kWidth)] == Visibility::kOccluded) {
+      ++occluded;
       source = SourceOf(view, x, y).x();
     }
     const bool right_is_near = scene.IsNear(std::ceil(source), y);
@@ -738,20 +742,20 @@ TEST(WarpPicture, UsesTheTapsOfTheSurfaceAlone) {
     EXPECT_NEAR(warped.at(x, y, 0), (1 - near) * of_wall + near * 5, 1e-6) << x;
   }
   EXPECT_GT(cut, 0);
-  EXPECT_GT(hidden, 3);
+  EXPECT_GT(occluded, 3);
 }
 
 // The limit between one surface and two is 0.3 px per view step, for the larger of the steps.
-TEST(WarpPicture, SurfacesAreSeparatedByTheLargerStep) {
+TEST(WarpImage, SurfacesAreSeparatedByTheLargerStep) {
   for (const double difference_px : {0.28, 0.32}) {
     const double step = 0.25;
     const DisparityMap map = MapOf(
         12, 6, [&](int x, int) { return x < 6 ? 0.0 : difference_px / step; }, {step, step / 9});
-    const model::LinearPicture picture =
-        PictureOf(12, 6, 1, [](int x, int, int) { return x < 6 ? 0.0 : 1.0; });
+    const model::LinearImage image =
+        ImageFrom(12, 6, 1, [](int x, int, int) { return x < 6 ? 0.0 : 1.0; });
     ViewDisparity view = RenderDisparity(map, 0, 0);
     view.source_x[At(5, 3, 12)] = 0.5F;  // half way to the other part
-    const float value = WarpPicture(picture, map, view).at(5, 3, 0);
+    const float value = WarpImage(image, map, view).at(5, 3, 0);
     if (difference_px < 0.3) {
       EXPECT_NEAR(value, 0.5, 1e-6);
     } else {
@@ -760,26 +764,25 @@ TEST(WarpPicture, SurfacesAreSeparatedByTheLargerStep) {
   }
 }
 
-TEST(WarpPicture, RepeatsTheBorder) {
+TEST(WarpImage, RepeatsTheBorder) {
   const DisparityMap map = MapOf(5, 4, [](int, int) { return 0.0; });
-  const model::LinearPicture picture =
-      PictureOf(5, 4, 1, [](int x, int y, int) { return x + 10 * y; });
+  const model::LinearImage image = ImageFrom(5, 4, 1, [](int x, int y, int) { return x + 10 * y; });
   ViewDisparity view = RenderDisparity(map, 0, 0);
-  EXPECT_EQ(WarpPicture(picture, map, view).values, picture.values);
+  EXPECT_EQ(WarpImage(image, map, view).values, image.values);
   std::fill(view.source_x.begin(), view.source_x.end(), -100.0F);
   std::fill(view.source_y.begin(), view.source_y.end(), 100.0F);
-  for (const float value : WarpPicture(picture, map, view).values) EXPECT_EQ(value, 30);
+  for (const float value : WarpImage(image, map, view).values) EXPECT_EQ(value, 30);
 }
 
-TEST(WarpPicture, RefusesSizesThatDiffer) {
+TEST(WarpImage, RefusesSizesThatDiffer) {
   const DisparityMap map = MapOf(5, 4, [](int, int) { return 0.0; });
   const ViewDisparity view = RenderDisparity(map, 0, 0);
   const auto flat = [](int, int, int) { return 0.5; };
-  EXPECT_THAT(ErrorOf([&] { WarpPicture(PictureOf(4, 5, 1, flat), map, view); }),
+  EXPECT_THAT(ErrorOf([&] { WarpImage(ImageFrom(4, 5, 1, flat), map, view); }),
               AllOf(HasSubstr("4x5"), HasSubstr("5x4")));
   const DisparityMap other = MapOf(4, 4, [](int, int) { return 0.0; });
   EXPECT_THAT(
-      ErrorOf([&] { WarpPicture(PictureOf(5, 4, 1, flat), map, RenderDisparity(other, 0, 0)); }),
+      ErrorOf([&] { WarpImage(ImageFrom(5, 4, 1, flat), map, RenderDisparity(other, 0, 0)); }),
       HasSubstr("4x4"));
 }
 

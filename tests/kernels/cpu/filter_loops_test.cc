@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "kernels/cpu/processor.h"
-#include "support/picture_planes.h"
+#include "support/image_planes.h"
 
 namespace thicklens::kernels {
 namespace {

@@ -34,9 +34,9 @@ double Cosine(int k, int j) {
 }
 
 // Filters patch by patch with the sums that define the filter.
-std::vector<double> FilterPlane(int width, int height, const std::vector<double>& picture,
+std::vector<double> FilterPlane(int width, int height, const std::vector<double>& image,
                                 double threshold) {
-  std::vector<double> sum(picture.size()), weights(picture.size());
+  std::vector<double> sum(image.size()), weights(image.size());
   for (int y = 0; y + kEdge <= height; ++y) {
     for (int x = 0; x + kEdge <= width; ++x) {
       double waves[kEdge][kEdge];
@@ -46,7 +46,7 @@ std::vector<double> FilterPlane(int width, int height, const std::vector<double>
           double wave = 0;
           for (int j = 0; j < kEdge; ++j) {
             for (int i = 0; i < kEdge; ++i) {
-              wave += Cosine(k, j) * Cosine(l, i) * picture[Index((y + j) * width + x + i)];
+              wave += Cosine(k, j) * Cosine(l, i) * image[Index((y + j) * width + x + i)];
             }
           }
           const bool keep = (k == 0 && l == 0) || std::abs(wave) > threshold;
@@ -75,16 +75,16 @@ template <typename Real>
 std::vector<Real> Sample(int width, int height, int channels, double sigma, unsigned seed) {
   std::mt19937 engine(seed);
   std::normal_distribution<double> noise(0, sigma);
-  std::vector<Real> picture;
+  std::vector<Real> image;
   for (int channel = 0; channel < channels; ++channel) {
     for (int y = 0; y < height; ++y) {
       for (int x = 0; x < width; ++x) {
         const double scene = 0.3 + 0.1 * channel + (2 * x > width + y ? 0.2 : 0.0) + 0.001 * y;
-        picture.push_back(static_cast<Real>(scene + noise(engine)));
+        image.push_back(static_cast<Real>(scene + noise(engine)));
       }
     }
   }
-  return picture;
+  return image;
 }
 
 template <typename Real>
@@ -100,12 +100,12 @@ TYPED_TEST(PatchFilterTest, DoesWhatDefinesIt) {
     int width, height;
   };
   for (const Size size : {Size{8, 8}, Size{9, 20}, Size{71, 9}, Size{64, 12}, Size{130, 75}}) {
-    const auto picture = Sample<TypeParam>(size.width, size.height, 2, 0.02, 1);
-    const auto found = FilterPatches(size.width, size.height, 2, picture, 0.05, 2);
+    const auto image = Sample<TypeParam>(size.width, size.height, 2, 0.02, 1);
+    const auto found = FilterPatches(size.width, size.height, 2, image, 0.05, 2);
     const std::size_t pixels = Index(size.width * size.height);
     for (const std::size_t plane : {std::size_t{0}, pixels}) {
-      const std::vector<double> from(picture.begin() + static_cast<std::ptrdiff_t>(plane),
-                                     picture.begin() + static_cast<std::ptrdiff_t>(plane + pixels));
+      const std::vector<double> from(image.begin() + static_cast<std::ptrdiff_t>(plane),
+                                     image.begin() + static_cast<std::ptrdiff_t>(plane + pixels));
       const std::vector<double> right = FilterPlane(size.width, size.height, from, 0.05);
       double squares = 0;
       for (std::size_t i = 0; i < pixels; ++i) {
@@ -124,22 +124,22 @@ TYPED_TEST(PatchFilterTest, DoesWhatDefinesIt) {
 TYPED_TEST(PatchFilterTest, FiltersColoursAsASumAndDifferences) {
   constexpr int kWidth = 40, kHeight = 33;
   constexpr std::size_t kPixels = kWidth * kHeight;
-  const auto picture = Sample<TypeParam>(kWidth, kHeight, 3, 0.02, 2);
+  const auto image = Sample<TypeParam>(kWidth, kHeight, 3, 0.02, 2);
   const double rows[3][3] = {{1, 1, 1}, {1, 0, -1}, {1, -2, 1}};
   const double squares[3] = {3, 2, 6};
-  std::vector<double> right(picture.size());
+  std::vector<double> right(image.size());
   for (std::size_t row = 0; row < 3; ++row) {
     std::vector<double> mixed(kPixels);
-    for (std::size_t i = 0; i < picture.size(); ++i) {
+    for (std::size_t i = 0; i < image.size(); ++i) {
       mixed[i % kPixels] +=
-          rows[row][i / kPixels] / std::sqrt(squares[row]) * static_cast<double>(picture[i]);
+          rows[row][i / kPixels] / std::sqrt(squares[row]) * static_cast<double>(image[i]);
     }
     mixed = FilterPlane(kWidth, kHeight, mixed, 0.05);
-    for (std::size_t i = 0; i < picture.size(); ++i) {
+    for (std::size_t i = 0; i < image.size(); ++i) {
       right[i] += rows[row][i / kPixels] / std::sqrt(squares[row]) * mixed[i % kPixels];
     }
   }
-  const auto found = FilterPatches(kWidth, kHeight, 3, picture, 0.05, 1);
+  const auto found = FilterPatches(kWidth, kHeight, 3, image, 0.05, 1);
   for (std::size_t i = 0; i < right.size(); ++i) {
     ASSERT_NEAR(found[i], right[i], sizeof(TypeParam) == sizeof(float) ? 2e-3 : 1e-12) << i;
   }
@@ -183,26 +183,26 @@ TYPED_TEST(PatchFilterTest, TakesNoiseOut) {
   EXPECT_NEAR(rms(FilterPatches(kWidth, kHeight, 3, noise, 0.0, 1)), rms(noise), 1e-6);
 }
 
-TYPED_TEST(PatchFilterTest, LeavesPicturesSmallerThanAPatch) {
+TYPED_TEST(PatchFilterTest, LeavesImagesSmallerThanAPatch) {
   for (const int width : {7, 100}) {
-    const auto picture = Sample<TypeParam>(width, 107 - width, 3, 0.02, 4);
-    EXPECT_EQ(FilterPatches(width, 107 - width, 3, picture, 0.05, 2), picture);
+    const auto image = Sample<TypeParam>(width, 107 - width, 3, 0.02, 4);
+    EXPECT_EQ(FilterPatches(width, 107 - width, 3, image, 0.05, 2), image);
   }
 }
 
 TYPED_TEST(PatchFilterTest, DoesNotDependOnThreads) {
-  const auto picture = Sample<TypeParam>(90, 200, 3, 0.02, 5);
-  const auto one = FilterPatches(90, 200, 3, picture, 0.05, 1);
+  const auto image = Sample<TypeParam>(90, 200, 3, 0.02, 5);
+  const auto one = FilterPatches(90, 200, 3, image, 0.05, 1);
   for (const int threads : {2, 3, 8}) {
-    EXPECT_EQ(FilterPatches(90, 200, 3, picture, 0.05, threads), one) << threads;
+    EXPECT_EQ(FilterPatches(90, 200, 3, image, 0.05, threads), one) << threads;
   }
 }
 
-// Rows farther than 7 px have no influence, so that bands of a picture fit together.
+// Rows farther than 7 px have no influence, so that bands of an image fit together.
 TYPED_TEST(PatchFilterTest, LooksNoFartherThanAPatch) {
-  const auto picture = Sample<TypeParam>(40, 60, 1, 0.02, 6);
-  const std::vector<TypeParam> part(picture.begin() + 40 * 20, picture.end());
-  const auto whole = FilterPatches(40, 60, 1, picture, 0.05, 1);
+  const auto image = Sample<TypeParam>(40, 60, 1, 0.02, 6);
+  const std::vector<TypeParam> part(image.begin() + 40 * 20, image.end());
+  const auto whole = FilterPatches(40, 60, 1, image, 0.05, 1);
   const auto of_part = FilterPatches(40, 40, 1, part, 0.05, 1);
   EXPECT_TRUE(std::equal(of_part.begin() + 40 * 7, of_part.end(), whole.begin() + 40 * 27));
   EXPECT_FALSE(std::equal(of_part.begin(), of_part.end(), whole.begin() + 40 * 20));
@@ -213,9 +213,9 @@ TYPED_TEST(PatchFilterTest, LoopsForAllProcessorsAgree) {
   if (!HasAvx2AndFma()) GTEST_SKIP() << "this processor has one kind of loops";
   constexpr int kWidth = 70, kStride = 2 * kPatchChunkPx + 16;
   std::vector<TypeParam> from(kPatchPx * kStride);
-  const auto picture = Sample<TypeParam>(kWidth, kPatchPx, 1, 0.02, 7);
+  const auto image = Sample<TypeParam>(kWidth, kPatchPx, 1, 0.02, 7);
   for (int y = 0; y < kPatchPx; ++y) {
-    std::copy_n(picture.begin() + y * kWidth, kWidth, from.begin() + y * kStride);
+    std::copy_n(image.begin() + y * kWidth, kWidth, from.begin() + y * kStride);
   }
   std::vector<TypeParam> columns(from.size());
   // The threshold is 0, because rounding could otherwise decide whether a wave is kept.

@@ -1,4 +1,4 @@
-// The device's steps are compared with the native ones, which get the dense matrix of the
+// The device's steps are compared with those of the CPU, which get the dense matrix of the
 // projection.
 #include "thicklens/kernels/radiance_steps.h"
 
@@ -94,28 +94,28 @@ class RadianceStepsTest : public ::testing::Test {
   }
 
   // Compares the steps of both. Before each step, the device gets the numbers of the native one.
-  static void ExpectSameSteps(int count, RadianceSteps<Number>* device,
-                              RadianceSteps<Number>* native, bool touch) {
-    ExpectAlike(device->SquaredRightSide(), native->SquaredRightSide());
+  static void ExpectSameSteps(int count, RadianceSteps<Number>* device, RadianceSteps<Number>* cpu,
+                              bool touch) {
+    ExpectAlike(device->SquaredRightSide(), cpu->SquaredRightSide());
     double before = 0;
     for (int n = 0; n < count; ++n) {
-      if (touch) device->TouchVariation();
-      if (touch) native->TouchVariation();
+      if (touch) device->ReweightVariation();
+      if (touch) cpu->ReweightVariation();
       const ResidualSums found = device->UpdateResidual();
-      const ResidualSums right = native->UpdateResidual();
+      const ResidualSums right = cpu->UpdateResidual();
       ExpectAlike(found.squared, right.squared);
       ExpectAlike(found.preconditioned, right.preconditioned);
-      EXPECT_NEAR(found.with_former, right.with_former,
+      EXPECT_NEAR(found.with_previous, right.with_previous,
                   10 * kTolerance * (right.preconditioned + before));
       const double beta = before > 0 ? 0.5 * right.preconditioned / before : 0;
       before = right.preconditioned;
-      const double steepness = native->Turn(beta);
-      ExpectAlike(device->Turn(beta), steepness);
-      const double curvature = native->Curvature();
-      ExpectAlike(device->Curvature(), curvature);
-      native->Advance(steepness / curvature);
-      device->Advance(steepness / curvature);
-      EXPECT_LE(RelativeError(device->Radiance(), native->Radiance()), kTolerance) << n;
+      const double steepness = cpu->UpdateDirection(beta);
+      ExpectAlike(device->UpdateDirection(beta), steepness);
+      const double curvature = cpu->ApplyNormalOperator();
+      ExpectAlike(device->ApplyNormalOperator(), curvature);
+      cpu->UpdateSolution(steepness / curvature);
+      device->UpdateSolution(steepness / curvature);
+      EXPECT_LE(RelativeError(device->Radiance(), cpu->Radiance()), kTolerance) << n;
     }
   }
 };
@@ -178,46 +178,46 @@ TYPED_TEST(RadianceStepsTest, StepsAreTheNativeOnes) {
     const SampleProjection<Real> projection(c.width, c.height, c.products, c.every, ++seed);
     const DataTerm<Real> data = projection.Data(c.channels, ++seed);
     const auto device = this->OnDevice(data);
-    const auto native = NewNativeSteps(data);
+    const auto cpu = NewCpuRadianceSteps(data);
     const auto plane = SampleProjection<Real>::Numbers(data.pixels(), ++seed);
     std::vector<Real> start = data.photograph;
     std::reverse(start.begin(), start.end());
 
     QuadraticPrior<Real> ridge;
-    ridge.pull = plane;
+    ridge.tikhonov_weight = plane;
     ridge.target_is_photograph = true;
     QuadraticPrior<Real> gradient;
-    gradient.smoothness = plane;
-    gradient.pull.assign(data.pixels(), static_cast<Real>(0.01));
+    gradient.gradient_weight = plane;
+    gradient.tikhonov_weight.assign(data.pixels(), static_cast<Real>(0.01));
     QuadraticPrior<Real> near_another = gradient;
-    near_another.pull = plane;
+    near_another.tikhonov_weight = plane;
     near_another.target = start;
     for (const auto* prior : {&ridge, &near_another, &gradient}) {
       SCOPED_TRACE(prior == &ridge ? "ridge" : prior == &gradient ? "gradient" : "target");
-      for (auto* steps : {device.get(), native.get()}) {
+      for (auto* steps : {device.get(), cpu.get()}) {
         steps->SetPrior(*prior);
         steps->Start(start);
       }
-      this->ExpectSameSteps(3, device.get(), native.get(), false);
+      this->ExpectSameSteps(3, device.get(), cpu.get(), false);
     }
     SCOPED_TRACE("total variation");
     TotalVariation<Real> variation;
     variation.slope_squared = &plane;
     variation.strength = 0.1;
     variation.eps = 0.05;
-    variation.pull = 0.02;
-    for (auto* steps : {device.get(), native.get()}) {
+    variation.tikhonov_weight = 0.02;
+    for (auto* steps : {device.get(), cpu.get()}) {
       steps->SetVariation(variation);
       steps->Start(start);
     }
-    this->ExpectSameSteps(3, device.get(), native.get(), true);
+    this->ExpectSameSteps(3, device.get(), cpu.get(), true);
     SCOPED_TRACE("then one plane");
     // The steps for one plane use the quadratic that was set last.
     const std::vector<Real> other = SampleProjection<Real>::Numbers(data.pixels(), ++seed);
-    for (auto* steps : {device.get(), native.get()}) {
+    for (auto* steps : {device.get(), cpu.get()}) {
       steps->StartFor(other, std::vector<Real>(data.pixels(), Real{0}));
     }
-    this->ExpectSameSteps(3, device.get(), native.get(), false);
+    this->ExpectSameSteps(3, device.get(), cpu.get(), false);
   }
 }
 
@@ -227,8 +227,8 @@ TYPED_TEST(RadianceStepsTest, RunsGiveTheSameBits) {
   const DataTerm<Real> data = projection.Data(3, 31);
   const auto plane = SampleProjection<Real>::Numbers(data.pixels(), 32);
   QuadraticPrior<Real> gradient;
-  gradient.smoothness = plane;
-  gradient.pull = plane;
+  gradient.gradient_weight = plane;
+  gradient.tikhonov_weight = plane;
   std::vector<Real> first;
   for (int run = 0; run < 3; ++run) {
     const auto steps = this->OnDevice(data);
@@ -236,7 +236,7 @@ TYPED_TEST(RadianceStepsTest, RunsGiveTheSameBits) {
     steps->Start(data.photograph);
     for (int n = 0; n < 4; ++n) {
       const double squared = steps->UpdateResidual().squared;
-      steps->Advance(steps->Turn(0.3) / (steps->Curvature() + squared));
+      steps->UpdateSolution(steps->UpdateDirection(0.3) / (steps->ApplyNormalOperator() + squared));
     }
     if (run == 0) first = steps->Radiance();
     EXPECT_EQ(steps->Radiance(), first);

@@ -19,7 +19,7 @@
 
 #include "kernels/opencl/device_choice.h"
 #include "kernels/opencl/device_survey.h"
-#include "kernels/opencl/guarded_child.h"
+#include "kernels/opencl/isolated_subprocess.h"
 #include "kernels/opencl/opencl_program.h"
 #include "kernels/opencl/opencl_use.h"
 #include "support/error_message.h"
@@ -133,33 +133,33 @@ TEST(OneLine, HasNoControlCharacters) {
   EXPECT_EQ(OneLine("\xc3\xa9"), "\xc3\xa9");
 }
 
-TEST(RunInChild, TheReportOfTheChildArrives) {
-  const ChildOutcome outcome = RunInChild(
-      [](const Tell& tell) {
-        tell("one\n");
+TEST(RunInSubprocess, TheReportOfTheChildArrives) {
+  const SubprocessOutcome outcome = RunInSubprocess(
+      [](const SubprocessReport& report) {
+        report("one\n");
         std::puts("chatter");
-        tell(std::string(300000, 'x'));
+        report(std::string(300000, 'x'));
       },
       kLongS);
   EXPECT_EQ(outcome.failure, "");
-  EXPECT_EQ(outcome.told, "one\n" + std::string(300000, 'x'));
+  EXPECT_EQ(outcome.reported, "one\n" + std::string(300000, 'x'));
 }
 
-TEST(RunInChild, LeavesThisProcessAlone) {
+TEST(RunInSubprocess, LeavesThisProcessAlone) {
   int here = 1;
-  RunInChild([&here](const Tell&) { here = 2; }, kLongS);
+  RunInSubprocess([&here](const SubprocessReport&) { here = 2; }, kLongS);
   EXPECT_EQ(here, 1);
 }
 
-TEST(RunInChild, SurvivesWhateverTheChildDoes) {
+TEST(RunInSubprocess, SurvivesWhateverTheChildDoes) {
   const auto failure = [](const std::function<void()>& work, double limit_s = kLongS) {
-    const ChildOutcome outcome = RunInChild(
-        [&work](const Tell& tell) {
-          tell("before");
+    const SubprocessOutcome outcome = RunInSubprocess(
+        [&work](const SubprocessReport& report) {
+          report("before");
           work();
         },
         limit_s);
-    EXPECT_EQ(outcome.told, "before");
+    EXPECT_EQ(outcome.reported, "before");
     return outcome.failure;
   };
   EXPECT_THAT(failure([] { ::raise(SIGKILL); }), HasSubstr("crashed (signal 9"));
@@ -175,11 +175,11 @@ TEST(RunInChild, SurvivesWhateverTheChildDoes) {
               HasSubstr("did not end within 0.2 s"));
 }
 
-TEST(RunInChild, CatchesWhatIsPrintedAndTellsItsLastLine) {
+TEST(RunInSubprocess, CatchesWhatIsPrintedAndTellsItsLastLine) {
   ::testing::internal::CaptureStdout();
   ::testing::internal::CaptureStderr();
-  const ChildOutcome outcome = RunInChild(
-      [](const Tell&) {
+  const SubprocessOutcome outcome = RunInSubprocess(
+      [](const SubprocessReport&) {
         std::fputs("first\n", stdout);
         std::fflush(stdout);
         std::fputs("second:\tcause\n\n", stderr);
@@ -192,24 +192,25 @@ TEST(RunInChild, CatchesWhatIsPrintedAndTellsItsLastLine) {
 }
 
 // A grandchild that outlives the child must not block the parent.
-TEST(RunInChild, DoesNotWaitForGrandchildren) {
-  const ChildOutcome outcome = RunInChild(
-      [](const Tell& tell) {
+TEST(RunInSubprocess, DoesNotWaitForGrandchildren) {
+  const SubprocessOutcome outcome = RunInSubprocess(
+      [](const SubprocessReport& report) {
         const pid_t grandchild = ::fork();
         if (grandchild == 0) {
           ::sleep(30);
           ::_exit(0);
         }
-        tell(std::to_string(grandchild));
+        report(std::to_string(grandchild));
       },
       kLongS);
   EXPECT_EQ(outcome.failure, "");
-  EXPECT_EQ(::kill(std::stoi(outcome.told), SIGKILL), 0);
+  EXPECT_EQ(::kill(std::stoi(outcome.reported), SIGKILL), 0);
 }
 
-TEST(RunInChild, DoesNotInheritSignalHandlersOrBlockedSignals) {
+TEST(RunInSubprocess, DoesNotInheritSignalHandlersOrBlockedSignals) {
   const auto before = std::signal(SIGALRM, SIG_IGN);
-  const ChildOutcome outcome = RunInChild([](const Tell&) { ::raise(SIGALRM); }, kLongS);
+  const SubprocessOutcome outcome =
+      RunInSubprocess([](const SubprocessReport&) { ::raise(SIGALRM); }, kLongS);
   std::signal(SIGALRM, before);
   EXPECT_THAT(outcome.failure, HasSubstr("crashed (signal 14"));
 }
@@ -217,34 +218,34 @@ TEST(RunInChild, DoesNotInheritSignalHandlersOrBlockedSignals) {
 // Ctrl-C in a terminal and the stop of a service signal the whole group. The child sends the
 // signals itself, so that they arrive while it works, and it is in a group of its own, so that no
 // other process gets them.
-TEST(RunInChild, LeavesRequestsToStopToTheParent) {
-  const ChildOutcome tested = RunInChild(
-      [](const Tell& tell_test) {
+TEST(RunInSubprocess, LeavesRequestsToStopToTheParent) {
+  const SubprocessOutcome tested = RunInSubprocess(
+      [](const SubprocessReport& tell_test) {
         static std::atomic<int> heard{0};
         std::signal(SIGINT, [](int) { ++heard; });
         const pid_t parents_group = ::getpgrp();
-        const ChildOutcome outcome = RunInChild(
-            [parents_group](const Tell& tell) {
+        const SubprocessOutcome outcome = RunInSubprocess(
+            [parents_group](const SubprocessReport& report) {
               ::kill(-parents_group, SIGINT);
               ::raise(SIGINT);
               ::raise(SIGTERM);
               ::raise(SIGHUP);
-              tell(::getpgrp() == parents_group ? "in the parent's group" : "went on");
+              report(::getpgrp() == parents_group ? "in the parent's group" : "went on");
             },
             kLongS);
-        tell_test(outcome.told + ", parent heard " + std::to_string(heard) + outcome.failure);
+        tell_test(outcome.reported + ", parent heard " + std::to_string(heard) + outcome.failure);
       },
       kLongS);
-  EXPECT_EQ(tested.told, "went on, parent heard 1");
+  EXPECT_EQ(tested.reported, "went on, parent heard 1");
   EXPECT_EQ(tested.failure, "");
 }
 
-TEST(RunInChild, ARequestToStopEndsTheChildAndItsChildren) {
+TEST(RunInSubprocess, ARequestToStopEndsTheChildAndItsChildren) {
   int ends[2];
   ASSERT_EQ(::pipe(ends), 0);
   int calls = 0;
-  EXPECT_THROW(RunInChild(
-                   [&ends](const Tell&) {
+  EXPECT_THROW(RunInSubprocess(
+                   [&ends](const SubprocessReport&) {
                      ::fork();
                      while (::write(ends[1], "+", 1) == 1) ::pause();
                    },
@@ -270,17 +271,17 @@ TEST(RunInChild, ARequestToStopEndsTheChildAndItsChildren) {
 
 // The child must end however its parent ends. Here the parent ends at once, as after a second
 // signal.
-TEST(RunInChild, EndsWithTheProcessThatStartedIt) {
+TEST(RunInSubprocess, EndsWithTheProcessThatStartedIt) {
   int ends[2];
   ASSERT_EQ(::pipe(ends), 0);
-  const ChildOutcome outcome = RunInChild(
-      [&ends](const Tell&) {
+  const SubprocessOutcome outcome = RunInSubprocess(
+      [&ends](const SubprocessReport&) {
         std::thread([&ends] {
           char one = 0;
           if (::read(ends[0], &one, 1) == 1) ::_exit(3);
         }).detach();
-        RunInChild(
-            [&ends](const Tell&) {
+        RunInSubprocess(
+            [&ends](const SubprocessReport&) {
               while (::write(ends[1], "+", 1) == 1) ::pause();
             },
             kLongS);
@@ -294,25 +295,26 @@ TEST(RunInChild, EndsWithTheProcessThatStartedIt) {
   ::close(ends[0]);
 }
 
-TEST(RunInChild, IsStoppedByTheTokenToo) {
+TEST(RunInSubprocess, IsStoppedByTheTokenToo) {
   CancelToken token;
   const CancelScope scope(&token);
   std::thread other([&token] {
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
     token.Cancel();
   });
-  EXPECT_THROW(RunInChild([](const Tell&) { ::pause(); }, kLongS), Interrupted);
+  EXPECT_THROW(RunInSubprocess([](const SubprocessReport&) { ::pause(); }, kLongS), Interrupted);
   other.join();
 }
 
-TEST(RunInChild, NeverBlamesTheWorkForARequestToStop) {
+TEST(RunInSubprocess, NeverBlamesTheWorkForARequestToStop) {
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
-    const auto work = [signal](const Tell&) {
+    const auto work = [signal](const SubprocessReport&) {
       std::signal(signal, SIG_DFL);
       ::raise(signal);
     };
-    EXPECT_THROW(RunInChild(work, kLongS), Interrupted) << signal;
-    EXPECT_THROW(SurveyWith([&](int, const Tell& tell) { work(tell); }, kLongS), Interrupted);
+    EXPECT_THROW(RunInSubprocess(work, kLongS), Interrupted) << signal;
+    EXPECT_THROW(SurveyWith([&](int, const SubprocessReport& report) { work(report); }, kLongS),
+                 Interrupted);
   }
 }
 
@@ -328,7 +330,7 @@ TEST(Survey, EveryFieldOfADeviceIsReported) {
   device.local_memory_bytes = 65536;
   device.max_work_group = 1024;
   const DeviceSurvey survey =
-      SurveyWith([&](int, const Tell& tell) { tell(DeviceLine(device)); }, kLongS);
+      SurveyWith([&](int, const SubprocessReport& report) { report(DeviceLine(device)); }, kLongS);
   ASSERT_EQ(survey.devices.size(), 1U);
   const DeviceDescription& read = survey.devices[0];
   EXPECT_EQ(read.platform, 1);
@@ -351,11 +353,12 @@ TEST(Survey, EveryFieldOfADeviceIsReported) {
 // A driver that crashes does not hide the devices of the others.
 TEST(Survey, GoesOnAfterAPlatformThatCrashes) {
   const DeviceSurvey survey = SurveyWith(
-      [](int first_platform, const Tell& tell) {
+      [](int first_platform, const SubprocessReport& report) {
         for (int platform = first_platform; platform < 3; ++platform) {
-          tell(PlatformLine(platform, "platform " + std::to_string(platform)));
+          report(PlatformLine(platform, "platform " + std::to_string(platform)));
           if (platform == 1) std::abort();
-          tell(DeviceLine(Device(platform, 0, "device " + std::to_string(platform), "cpu", true)));
+          report(
+              DeviceLine(Device(platform, 0, "device " + std::to_string(platform), "cpu", true)));
         }
       },
       kLongS);
@@ -366,12 +369,13 @@ TEST(Survey, GoesOnAfterAPlatformThatCrashes) {
 }
 
 TEST(Survey, EndsIfTheDriversCannotEvenBeLoaded) {
-  const DeviceSurvey crashed = SurveyWith([](int, const Tell&) { std::abort(); }, kLongS);
+  const DeviceSurvey crashed =
+      SurveyWith([](int, const SubprocessReport&) { std::abort(); }, kLongS);
   ASSERT_EQ(crashed.problems.size(), 1U);
   EXPECT_THAT(crashed.problems[0],
               AllOf(HasSubstr("loading the drivers crashed"), HasSubstr("installed twice")));
   const DeviceSurvey hung = SurveyWith(
-      [](int, const Tell&) {
+      [](int, const SubprocessReport&) {
         while (true) ::pause();
       },
       0.2);
@@ -392,7 +396,7 @@ TEST(Survey, FindsADevice) {
   EXPECT_EQ(&SurveyDevices(), &SurveyDevices());
 }
 
-TEST(OpenBackend, CpuIsTheTwin) {
+TEST(OpenBackend, CpuIsTheReference) {
   std::string notice = "old";
   const auto backend = OpenBackend(ParseDeviceRequest("cpu"), &notice);
   EXPECT_FALSE(backend->is_opencl());

@@ -75,15 +75,15 @@ std::unique_ptr<Kernels<typename Setting::Real>> NewOnDevice() {
 
 // The largest difference, relative to the largest value of the reference.
 template <typename Real>
-double RelativeError(const std::vector<Real>& device, const std::vector<Real>& twin) {
-  EXPECT_EQ(device.size(), twin.size());
-  if (device.size() != twin.size()) return std::numeric_limits<double>::infinity();
+double RelativeError(const std::vector<Real>& device, const std::vector<Real>& reference) {
+  EXPECT_EQ(device.size(), reference.size());
+  if (device.size() != reference.size()) return std::numeric_limits<double>::infinity();
   double scale = 0;
   double error = 0;
-  for (std::size_t i = 0; i < twin.size(); ++i) {
-    scale = std::max(scale, std::abs(static_cast<double>(twin[i])));
+  for (std::size_t i = 0; i < reference.size(); ++i) {
+    scale = std::max(scale, std::abs(static_cast<double>(reference[i])));
     const double difference =
-        std::abs(static_cast<double>(device[i]) - static_cast<double>(twin[i]));
+        std::abs(static_cast<double>(device[i]) - static_cast<double>(reference[i]));
     if (!(difference <= error)) error = difference;  // also if it is NaN
   }
   return scale > 0 ? error / scale : error;
@@ -98,7 +98,7 @@ const std::vector<Case>& Cases() {
   static const std::vector<Case> cases = {{"inside", {5, 4, 17, 13, 41, 33, 3, 3}, 3},
                                           {"corner", {0, 0, 7, 5, 23, 9, 5, 3}, 4},
                                           {"far corner", {18, 5, 5, 4, 23, 9, 2, 5}, 4},
-                                          {"whole picture", {0, 0, 53, 11, 53, 11, 3, 2}, 5},
+                                          {"whole image", {0, 0, 53, 11, 53, 11, 3, 2}, 5},
                                           {"strips", {0, 0, 48, 3, 48, 3, 2, 2}, 1},
                                           {"beyond all sides", {-3, -2, 29, 13, 23, 9, 2, 2}, 2},
                                           {"one pixel", {3, 3, 1, 1, 8, 8, 3, 3}, 2},
@@ -113,20 +113,21 @@ class OpenClKernelsTest : public ::testing::Test {
  protected:
   using Number = typename Setting::Real;
 
-  void ExpectAgreement(const EllMatrix<Number>& device, const EllMatrix<Number>& twin) const {
-    EXPECT_EQ(device.rows, twin.rows);
-    EXPECT_EQ(device.columns, twin.columns);
-    EXPECT_EQ(device.slots, twin.slots);
-    EXPECT_EQ(device.column, twin.column);
-    EXPECT_LE(RelativeError(device.value, twin.value), kTolerance);
+  void ExpectAgreement(const EllMatrix<Number>& device, const EllMatrix<Number>& reference) const {
+    EXPECT_EQ(device.rows, reference.rows);
+    EXPECT_EQ(device.columns, reference.columns);
+    EXPECT_EQ(device.slots, reference.slots);
+    EXPECT_EQ(device.column, reference.column);
+    EXPECT_LE(RelativeError(device.value, reference.value), kTolerance);
   }
-  void ExpectAgreement(const std::vector<Number>& device, const std::vector<Number>& twin) const {
-    EXPECT_LE(RelativeError(device, twin), kTolerance);
+  void ExpectAgreement(const std::vector<Number>& device,
+                       const std::vector<Number>& reference) const {
+    EXPECT_LE(RelativeError(device, reference), kTolerance);
   }
 
   static constexpr double kTolerance = sizeof(Number) == sizeof(float) ? 1e-4 : 1e-10;
   const std::unique_ptr<Kernels<Number>> device_ = NewOnDevice<Setting>();
-  const std::unique_ptr<Kernels<Number>> twin_ = NewReference<Number>();
+  const std::unique_ptr<Kernels<Number>> reference_ = NewReference<Number>();
 };
 
 using Settings =
@@ -141,22 +142,22 @@ TYPED_TEST(OpenClKernelsTest, Projection) {
     for (const Splat splat : {Splat::kNearest, Splat::kBilinear}) {
       SCOPED_TRACE(c.name);
       BlockGeometry block = RandomBlock(c.size, c.largest_shift, ++seed);
-      const auto rays = this->twin_->FindRays(block, splat);
+      const auto rays = this->reference_->FindRays(block, splat);
       EXPECT_EQ(this->device_->FindRays(block, splat), rays);
       const auto irradiance = RandomReals<Real>(Index(block.rays()), 0.5, 2, seed);
-      this->ExpectAgreement(this->device_->WeighRays(block, splat, rays, irradiance),
-                            this->twin_->WeighRays(block, splat, rays, irradiance));
-      this->ExpectAgreement(this->device_->WeighRays(block, splat, rays, {}),
-                            this->twin_->WeighRays(block, splat, rays, {}));
+      this->ExpectAgreement(this->device_->WeightRays(block, splat, rays, irradiance),
+                            this->reference_->WeightRays(block, splat, rays, irradiance));
+      this->ExpectAgreement(this->device_->WeightRays(block, splat, rays, {}),
+                            this->reference_->WeightRays(block, splat, rays, {}));
       // First some views have no weight, then all, which leaves rows without a sum.
       for (std::size_t view = 0; view < block.view_weight.size(); view += 2) {
         block.view_weight[view] = 0;
       }
-      this->ExpectAgreement(this->device_->WeighRays(block, splat, rays, {}),
-                            this->twin_->WeighRays(block, splat, rays, {}));
+      this->ExpectAgreement(this->device_->WeightRays(block, splat, rays, {}),
+                            this->reference_->WeightRays(block, splat, rays, {}));
       std::fill(block.view_weight.begin(), block.view_weight.end(), 0);
-      this->ExpectAgreement(this->device_->WeighRays(block, splat, rays, irradiance),
-                            this->twin_->WeighRays(block, splat, rays, irradiance));
+      this->ExpectAgreement(this->device_->WeightRays(block, splat, rays, irradiance),
+                            this->reference_->WeightRays(block, splat, rays, irradiance));
     }
   }
 }
@@ -178,13 +179,13 @@ TYPED_TEST(OpenClKernelsTest, Masks) {
     for (std::size_t i = 0; i < slope_u.size(); i += 7) slope_u[i] = special[i / 7 % 6];
     for (std::size_t i = 5; i < slope_v.size(); i += 7) slope_v[i] = special[i / 7 % 6];
     this->ExpectAgreement(this->device_->WarpDifferences(block, slope_u, slope_v),
-                          this->twin_->WarpDifferences(block, slope_u, slope_v));
+                          this->reference_->WarpDifferences(block, slope_u, slope_v));
     // Without the squares of huge numbers: relative to them, any other difference would be
     // negligible.
     for (Real& slope : slope_u) slope = std::abs(slope) > 3 ? kNan : slope;
     for (Real& slope : slope_v) slope = std::abs(slope) > 3 ? kInfinity : slope;
     this->ExpectAgreement(this->device_->SixTermMasks(block, slope_u, slope_v),
-                          this->twin_->SixTermMasks(block, slope_u, slope_v));
+                          this->reference_->SixTermMasks(block, slope_u, slope_v));
   }
 }
 
@@ -198,9 +199,9 @@ TYPED_TEST(OpenClKernelsTest, SparseProducts) {
       const auto a = RandomCsr<Real>(rows, columns, density, ++seed);
       const auto x = RandomReals<Real>(Index(columns), -1, 1, seed);
       const auto y = RandomReals<Real>(Index(rows), -1, 1, seed);
-      this->ExpectAgreement(this->device_->Multiply(a, x), this->twin_->Multiply(a, x));
+      this->ExpectAgreement(this->device_->Multiply(a, x), this->reference_->Multiply(a, x));
       this->ExpectAgreement(this->device_->MultiplyTransposed(a, y),
-                            this->twin_->MultiplyTransposed(a, y));
+                            this->reference_->MultiplyTransposed(a, y));
       // The pattern has more entries than the product.
       const CsrPattern pattern =
           SumPattern(NormalPattern(a), PatternOf(RandomCsr<float>(columns, columns, 0.2, seed)));
@@ -208,7 +209,7 @@ TYPED_TEST(OpenClKernelsTest, SparseProducts) {
       auto expected = on_device;
       const auto scale = static_cast<Real>(0.7);
       this->device_->AddNormalProduct(a, scale, pattern, &on_device);
-      this->twin_->AddNormalProduct(a, scale, pattern, &expected);
+      this->reference_->AddNormalProduct(a, scale, pattern, &expected);
       this->ExpectAgreement(on_device, expected);
     }
   }
@@ -218,13 +219,13 @@ TYPED_TEST(OpenClKernelsTest, SystemOfABlock) {
   using Real = typename TypeParam::Real;
   const BlockGeometry block = RandomBlock({4, 3, 9, 7, 20, 20, 3, 3}, 2, 1);
   const auto slope = RandomReals<Real>(Index(block.rays()), -1, 1, 2);
-  const auto h = Compress(this->twin_->WeighRays(
-      block, Splat::kBilinear, this->twin_->FindRays(block, Splat::kBilinear), {}));
-  const auto d = Compress(this->twin_->WarpDifferences(block, slope, slope));
+  const auto h = Compress(this->reference_->WeightRays(
+      block, Splat::kBilinear, this->reference_->FindRays(block, Splat::kBilinear), {}));
+  const auto d = Compress(this->reference_->WarpDifferences(block, slope, slope));
   const CsrPattern pattern = SumPattern(NormalPattern(h), NormalPattern(d));
   std::vector<Real> on_device(pattern.column.size());
   std::vector<Real> expected(pattern.column.size());
-  for (Kernels<Real>* kernels : {this->device_.get(), this->twin_.get()}) {
+  for (Kernels<Real>* kernels : {this->device_.get(), this->reference_.get()}) {
     auto* values = kernels == this->device_.get() ? &on_device : &expected;
     kernels->AddNormalProduct(h, 1, pattern, values);
     kernels->AddNormalProduct(d, static_cast<Real>(0.5), pattern, values);
@@ -232,7 +233,7 @@ TYPED_TEST(OpenClKernelsTest, SystemOfABlock) {
   this->ExpectAgreement(on_device, expected);
 }
 
-TYPED_TEST(OpenClKernelsTest, Picture) {
+TYPED_TEST(OpenClKernelsTest, Image) {
   using Real = typename TypeParam::Real;
   std::uint32_t seed = 300;
   for (const Case& c : Cases()) {
@@ -241,13 +242,13 @@ TYPED_TEST(OpenClKernelsTest, Picture) {
       BlockGeometry block = RandomBlock(c.size, c.largest_shift, ++seed);
       const std::size_t view_samples = Index(block.s_count) * Index(block.t_count);
       auto views = RandomReals<Real>(view_samples * Index(block.views()), -1, 1, seed);
-      this->ExpectAgreement(this->device_->FormPicture(block, splat, views),
-                            this->twin_->FormPicture(block, splat, views));
+      this->ExpectAgreement(this->device_->FormImage(block, splat, views),
+                            this->reference_->FormImage(block, splat, views));
       // A view without weight is ignored.
       block.view_weight[0] = 0;
       std::fill_n(views.begin(), view_samples, std::numeric_limits<Real>::quiet_NaN());
-      this->ExpectAgreement(this->device_->FormPicture(block, splat, views),
-                            this->twin_->FormPicture(block, splat, views));
+      this->ExpectAgreement(this->device_->FormImage(block, splat, views),
+                            this->reference_->FormImage(block, splat, views));
     }
   }
 }
@@ -258,7 +259,7 @@ TYPED_TEST(OpenClKernelsTest, BlocksAddUp) {
   for (const Case& c : Cases()) {
     SCOPED_TRACE(c.name);
     const BlockGeometry block = RandomBlock(c.size, c.largest_shift, ++seed);
-    for (Kernels<Real>* kernels : {this->device_.get(), this->twin_.get()}) {
+    for (Kernels<Real>* kernels : {this->device_.get(), this->reference_.get()}) {
       kernels->StartWhole(block.s_count, block.t_count, block.u_count, block.v_count, 3);
     }
     for (const int channel : {0, 2, 2}) {
@@ -266,9 +267,9 @@ TYPED_TEST(OpenClKernelsTest, BlocksAddUp) {
       shifted.first_x += channel;
       const auto rays = RandomReals<Real>(Index(block.rays()), -1, 1, ++seed);
       this->device_->AddBlock(shifted, channel, rays);
-      this->twin_->AddBlock(shifted, channel, rays);
+      this->reference_->AddBlock(shifted, channel, rays);
     }
-    EXPECT_LE(RelativeError(this->device_->FinishWhole(), this->twin_->FinishWhole()), 1e-7);
+    EXPECT_LE(RelativeError(this->device_->FinishWhole(), this->reference_->FinishWhole()), 1e-7);
   }
 }
 
@@ -277,7 +278,7 @@ TYPED_TEST(OpenClKernelsTest, EmptyArgumentsHaveEmptyResults) {
   BlockGeometry block = RandomBlock({0, 0, 0, 5, 9, 9, 2, 2}, 0, 1);
   const auto& device = this->device_;
   EXPECT_TRUE(device->FindRays(block, Splat::kBilinear).empty());
-  EXPECT_TRUE(device->WeighRays(block, Splat::kBilinear, {}, {}).value.empty());
+  EXPECT_TRUE(device->WeightRays(block, Splat::kBilinear, {}, {}).value.empty());
   EXPECT_EQ(device->WarpDifferences(block, {}, {}).rows, 0);
   EXPECT_EQ(device->SixTermMasks(block, {}, {}).rows, 0);
   EXPECT_TRUE(device->Multiply({}, {}).empty());
@@ -285,8 +286,7 @@ TYPED_TEST(OpenClKernelsTest, EmptyArgumentsHaveEmptyResults) {
   EXPECT_EQ(device->MultiplyTransposed({0, 3, {0}, {}, {}}, {}), std::vector<Real>(3));
   std::vector<Real> nothing;
   device->AddNormalProduct({}, 1, {}, &nothing);
-  EXPECT_TRUE(
-      device->FormPicture(block, Splat::kNearest, std::vector<Real>(Index(4 * 81))).empty());
+  EXPECT_TRUE(device->FormImage(block, Splat::kNearest, std::vector<Real>(Index(4 * 81))).empty());
   device->StartWhole(9, 9, 2, 2, 1);
   device->AddBlock(block, 0, {});
   EXPECT_EQ(device->FinishWhole(), std::vector<float>(Index(4 * 81)));
@@ -294,23 +294,23 @@ TYPED_TEST(OpenClKernelsTest, EmptyArgumentsHaveEmptyResults) {
   // A block without a view, and a light field without samples.
   block = RandomBlock({0, 0, 3, 5, 9, 9, 0, 2}, 0, 1);
   EXPECT_TRUE(device->FindRays(block, Splat::kBilinear).empty());
-  EXPECT_EQ(device->FormPicture(block, Splat::kNearest, {}), std::vector<Real>(15));
+  EXPECT_EQ(device->FormImage(block, Splat::kNearest, {}), std::vector<Real>(15));
   block = RandomBlock({0, 0, 3, 5, 0, 9, 2, 1}, 0, 1);
   EXPECT_EQ(device->FindRays(block, Splat::kNearest), std::vector<std::int32_t>(30, -1));
-  EXPECT_EQ(device->FormPicture(block, Splat::kNearest, {}), std::vector<Real>(15));
+  EXPECT_EQ(device->FormImage(block, Splat::kNearest, {}), std::vector<Real>(15));
   device->StartWhole(0, 9, 2, 1, 3);
   device->AddBlock(block, 2, std::vector<Real>(30));
   EXPECT_TRUE(device->FinishWhole().empty());
 }
 
-TYPED_TEST(OpenClKernelsTest, WrongArgumentsAreRefusedAsByTheTwin) {
+TYPED_TEST(OpenClKernelsTest, WrongArgumentsAreRefusedAsByTheReference) {
   using Real = typename TypeParam::Real;
   const BlockGeometry block = RandomBlock({0, 0, 3, 2, 9, 9, 2, 1}, 0, 1);
   const std::vector<Real> short_one(11);
   const auto a = RandomCsr<Real>(3, 4, 0.5, 1);
   std::vector<Real> values;
   const auto both = [&](const auto& call) {
-    const std::string said = ErrorOf([&] { call(this->twin_.get()); });
+    const std::string said = ErrorOf([&] { call(this->reference_.get()); });
     EXPECT_NE(said, "(no error)");
     EXPECT_EQ(ErrorOf([&] { call(this->device_.get()); }), said);
   };
@@ -318,16 +318,16 @@ TYPED_TEST(OpenClKernelsTest, WrongArgumentsAreRefusedAsByTheTwin) {
   BlockGeometry bad = block;
   bad.s_shift.clear();
   both([&](K* k) { k->FindRays(bad, Splat::kNearest); });
-  both([&](K* k) { k->WeighRays(block, Splat::kNearest, {1}, {}); });
+  both([&](K* k) { k->WeightRays(block, Splat::kNearest, {1}, {}); });
   both([&](K* k) {
-    k->WeighRays(block, Splat::kNearest, std::vector<std::int32_t>(12), short_one);
+    k->WeightRays(block, Splat::kNearest, std::vector<std::int32_t>(12), short_one);
   });
   both([&](K* k) { k->WarpDifferences(block, short_one, short_one); });
   both([&](K* k) { k->SixTermMasks(block, short_one, short_one); });
   both([&](K* k) { k->Multiply(a, short_one); });
   both([&](K* k) { k->MultiplyTransposed(a, short_one); });
   both([&](K* k) { k->AddNormalProduct(a, 1, NormalPattern(a), &values); });
-  both([&](K* k) { k->FormPicture(block, Splat::kNearest, short_one); });
+  both([&](K* k) { k->FormImage(block, Splat::kNearest, short_one); });
   both([&](K* k) { k->StartWhole(9, 9, -1, 1, 1); });
   both([&](K* k) { k->AddBlock(block, 0, std::vector<Real>(12)); });
 }
@@ -352,18 +352,18 @@ TYPED_TEST(OpenClKernelsTest, ClonesWorkAtTheSameTime) {
   for (int i = 0; i < kThreads; ++i) {
     threads.emplace_back([&, i] {
       Kernels<Real>& device = *clones[Index(i)];
-      const auto twin = NewReference<Real>();
+      const auto reference = NewReference<Real>();
       for (std::uint32_t round = 0; round < 20 && failures[Index(i)].empty(); ++round) {
         const std::uint32_t seed = round + static_cast<std::uint32_t>(1000 * i);
         const BlockGeometry block = RandomBlock({4, 3, 9 + i, 7, 20, 20, 3, 3}, 2, seed);
         const auto rays = device.FindRays(block, Splat::kBilinear);
-        const auto h = device.WeighRays(block, Splat::kBilinear, rays, {});
+        const auto h = device.WeightRays(block, Splat::kBilinear, rays, {});
         const auto x = RandomReals<Real>(Index(block.rays()), -1, 1, seed);
         const auto product = device.Multiply(Compress(h), x);
-        const auto true_rays = twin->FindRays(block, Splat::kBilinear);
-        const auto true_h = twin->WeighRays(block, Splat::kBilinear, true_rays, {});
+        const auto true_rays = reference->FindRays(block, Splat::kBilinear);
+        const auto true_h = reference->WeightRays(block, Splat::kBilinear, true_rays, {});
         if (rays != true_rays) failures[Index(i)] = "rays";
-        if (RelativeError(product, twin->Multiply(Compress(true_h), x)) > this->kTolerance) {
+        if (RelativeError(product, reference->Multiply(Compress(true_h), x)) > this->kTolerance) {
           failures[Index(i)] += " product";
         }
       }
@@ -377,9 +377,9 @@ TYPED_TEST(OpenClKernelsTest, TheSameBitsEveryTime) {
   using Real = typename TypeParam::Real;
   const BlockGeometry block = RandomBlock({0, 0, 53, 11, 53, 11, 3, 2}, 3, 1);
   const auto views = RandomReals<Real>(53 * 11 * 6, -1, 1, 2);
-  const auto once = this->device_->FormPicture(block, Splat::kBilinear, views);
-  EXPECT_EQ(this->device_->FormPicture(block, Splat::kBilinear, views), once);
-  EXPECT_EQ(this->device_->Clone()->FormPicture(block, Splat::kBilinear, views), once);
+  const auto once = this->device_->FormImage(block, Splat::kBilinear, views);
+  EXPECT_EQ(this->device_->FormImage(block, Splat::kBilinear, views), once);
+  EXPECT_EQ(this->device_->Clone()->FormImage(block, Splat::kBilinear, views), once);
 }
 
 // Memory that is lent to the device is freed when an error or a request to stop unwinds its owner.

@@ -19,7 +19,7 @@ using ::thicklens::testing::SampleRows;
 
 std::size_t Index(std::int64_t i) { return static_cast<std::size_t>(i); }
 
-// The matrix that a packed filter represents, on the picture without the padding.
+// The matrix that a packed filter represents, on the image without the padding.
 Eigen::MatrixXd DenseOf(const PackedFilter<double>& packed, const PackedPlane& plane, Axis axis,
                         int tile) {
   const int pixels = plane.width_px * plane.height_px;
@@ -76,7 +76,7 @@ TEST(PackedMap, FiltersAndTheirTransposedKeepEveryCoefficient) {
 }
 
 TEST(PackedMap, OnlyTermsAreKeptThatATileHas) {
-  PixelFilter<double> filter{Axis::kAcross, 64, 1, {3}, {0, 7 * 64}, {}};
+  VaryingFilter<double> filter{Axis::kAcross, 64, 1, {3}, {0, 7 * 64}, {}};
   filter.coefficients.assign(7 * 64, 0.0);
   filter.coefficients[4 * 64 + 20] = 0.5;  // c_1(20)
   filter.coefficients[6 * 64 + 21] = 0.5;  // c_3(21)

@@ -109,10 +109,10 @@ class ReferenceTest : public ::testing::Test {
  protected:
   EllMatrix<double> Projection(const BlockGeometry& block, Splat splat,
                                const std::vector<double>& irradiance = {}) {
-    return twin_->WeighRays(block, splat, twin_->FindRays(block, splat), irradiance);
+    return reference_->WeightRays(block, splat, reference_->FindRays(block, splat), irradiance);
   }
 
-  const std::unique_ptr<Kernels<double>> twin_ = NewReference<double>();
+  const std::unique_ptr<Kernels<double>> reference_ = NewReference<double>();
 };
 
 TEST_F(ReferenceTest, ProjectionByHand) {
@@ -131,13 +131,13 @@ TEST_F(ReferenceTest, ProjectionByHand) {
   block.t_fraction = {0};
   block.view_weight = {2, 1};
 
-  const std::vector<std::int32_t> rays = twin_->FindRays(block, Splat::kBilinear);
+  const std::vector<std::int32_t> rays = reference_->FindRays(block, Splat::kBilinear);
   // The slots are those of view 0, (y0 x0), (y0 x1), (y1 x0), (y1 x1), then those of view 1, whose
   // sample 3 does not exist.
   const std::vector<std::int32_t> expected = {0, 1, 2,  -1, 0,  1,  -1, -1, -1, -1, -1, -1,
                                               3, 4, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1};
   EXPECT_EQ(rays, expected);
-  EXPECT_EQ(twin_->FindRays(block, Splat::kNearest),
+  EXPECT_EQ(reference_->FindRays(block, Splat::kNearest),
             (std::vector<std::int32_t>{0, 1, 2, 3, 4, -1}));
 
   Matrix h(3, 6);
@@ -178,7 +178,7 @@ TEST_F(ReferenceTest, NearestPutsEveryRayOnOnePixel) {
   const BlockGeometry block = RandomBlock({-1, 2, 8, 6, 9, 9, 3, 3}, 3, 5);
   const std::map<Sample, int> samples = SamplesOf(block);
   std::vector<int> landings(Index(block.rays()), 0);
-  for (const std::int32_t ray : twin_->FindRays(block, Splat::kNearest)) {
+  for (const std::int32_t ray : reference_->FindRays(block, Splat::kNearest)) {
     if (ray >= 0) ++landings[Index(ray)];
   }
   std::vector<int> expected(Index(block.rays()), 0);
@@ -240,7 +240,7 @@ TEST_F(ReferenceTest, DifferencesAreTheNaiveOnes) {
     for (std::size_t i = 1; i < slope_v.size(); i += 3) slope_v[i] = std::round(slope_v[i]);
     for (std::size_t i = 0; i < slope_v.size(); i += 7) slope_v[i] = kNan;
     for (std::size_t i = 3; i < slope_u.size(); i += 7) slope_u[i] = kNan;
-    const Matrix d = DenseOf(twin_->WarpDifferences(block, slope_u, slope_v));
+    const Matrix d = DenseOf(reference_->WarpDifferences(block, slope_u, slope_v));
     const Matrix naive = NaiveDifferences(block, slope_u, slope_v);
     ASSERT_EQ(d.rows(), naive.rows());
     EXPECT_LE((d - naive).cwiseAbs().maxCoeff(), 1e-14) << "seed " << seed;
@@ -252,7 +252,7 @@ TEST_F(ReferenceTest, DifferencesReachPastTheShiftsOfTheViews) {
   const BlockGeometry block = RandomBlock({2, 2, 9, 8, 14, 14, 3, 3}, 2, 3);
   const std::vector<double> zero(Index(block.rays()), 0);
   const Vector l = RaysOf(block, [](int s, int t, int, int) { return 1 + s + 100 * t; });
-  const EllMatrix<double> d = twin_->WarpDifferences(block, zero, zero);
+  const EllMatrix<double> d = reference_->WarpDifferences(block, zero, zero);
   EXPECT_EQ((DenseOf(d) * l).cwiseAbs().maxCoeff(), 0);
   EXPECT_GT(Compress(d).entries(), 2 * 9 * 8);
 }
@@ -261,7 +261,7 @@ TEST_F(ReferenceTest, DifferencesOfAConstantAndAlongTheSlopeAreZero) {
   const BlockGeometry block = RandomBlock({1, 1, 12, 11, 16, 16, 3, 3}, 2, 4);
   const std::vector<double> slope_u(Index(block.rays()), 0.7);
   const std::vector<double> slope_v(Index(block.rays()), -1.3);
-  const Matrix d = DenseOf(twin_->WarpDifferences(block, slope_u, slope_v));
+  const Matrix d = DenseOf(reference_->WarpDifferences(block, slope_u, slope_v));
   const Vector ones = RaysOf(block, [](int, int, int, int) { return 1; });
   EXPECT_LE((d * ones).cwiseAbs().maxCoeff(), 1e-15);
   // This light field is constant along (m, 1) in (s, u) and (n, 1) in (t, v).
@@ -285,7 +285,7 @@ TEST_F(ReferenceTest, HugeSlopesHaveNoDifference) {
   for (const double slope :
        {1e300, -1e300, 4e9, 2147483648.0, std::numeric_limits<double>::infinity()}) {
     const std::vector<double> slopes(Index(block.rays()), slope);
-    EXPECT_EQ(Compress(twin_->WarpDifferences(block, slopes, slopes)).entries(), 0) << slope;
+    EXPECT_EQ(Compress(reference_->WarpDifferences(block, slopes, slopes)).entries(), 0) << slope;
   }
 }
 
@@ -308,7 +308,7 @@ TEST_F(ReferenceTest, SixTermsAreExactForQuadraticLightFields) {
   const BlockGeometry block = RandomBlock({2, 1, 10, 9, 16, 16, 4, 4}, 1, 6);
   const auto m = RandomReals<double>(Index(block.rays()), -2, 2, 1);
   const auto n = RandomReals<double>(Index(block.rays()), -2, 2, 2);
-  const EllMatrix<double> ell = twin_->SixTermMasks(block, m, n);
+  const EllMatrix<double> ell = reference_->SixTermMasks(block, m, n);
   EXPECT_EQ(ell.slots, 17);
   const Matrix g = DenseOf(ell);
   // L = 2 s^2 + 3 s k - k^2 + t^2/2 - 5 t l + 4 l^2 + linear terms.
@@ -333,7 +333,7 @@ TEST_F(ReferenceTest, SixTermsAnnihilateWhatIsConstantAlongTheSlope) {
   const BlockGeometry block = RandomBlock({2, 1, 10, 9, 16, 16, 3, 3}, 1, 8);
   const std::vector<double> m(Index(block.rays()), 1.5);
   const std::vector<double> n(Index(block.rays()), -0.25);
-  const Matrix g = DenseOf(twin_->SixTermMasks(block, m, n));
+  const Matrix g = DenseOf(reference_->SixTermMasks(block, m, n));
   const Vector l = RaysOf(block, [](int s, int t, int k, int v) {
     const double a = s - 1.5 * k;
     const double b = t + 0.25 * v;
@@ -356,7 +356,7 @@ TEST_F(ReferenceTest, SixTermsOfAConstantAreZeroEverywhere) {
     auto m = RandomReals<double>(Index(block.rays()), -2, 2, seed);
     auto n = RandomReals<double>(Index(block.rays()), -2, 2, seed + 100);
     for (std::size_t i = 0; i < m.size(); i += 5) (i % 2 == 0 ? m : n)[i] = kNan;
-    const Matrix g = DenseOf(twin_->SixTermMasks(block, m, n));
+    const Matrix g = DenseOf(reference_->SixTermMasks(block, m, n));
     EXPECT_LE((g * Vector::Ones(block.rays())).cwiseAbs().maxCoeff(), 1e-13);
     for (std::size_t i = 0; i < m.size(); i += 5) {
       EXPECT_TRUE(g.row(static_cast<int>(i)).isZero(0));
@@ -373,7 +373,8 @@ TEST_F(ReferenceTest, SixTermsAtABorder) {
   expected << -4, 4, 0,  //
       9, -18, 9,         //
       0, 25, -25;
-  EXPECT_LE((DenseOf(twin_->SixTermMasks(block, m, n)) - expected).cwiseAbs().maxCoeff(), 1e-12);
+  EXPECT_LE((DenseOf(reference_->SixTermMasks(block, m, n)) - expected).cwiseAbs().maxCoeff(),
+            1e-12);
 }
 
 TEST_F(ReferenceTest, ProductsAreTheDenseOnes) {
@@ -382,8 +383,8 @@ TEST_F(ReferenceTest, ProductsAreTheDenseOnes) {
     const auto x = RandomReals<double>(17, -1, 1, seed);
     const auto y = RandomReals<double>(13, -1, 1, seed + 50);
     const Matrix dense = DenseOf(a);
-    const Vector ax = DenseOf(twin_->Multiply(a, x));
-    const Vector aty = DenseOf(twin_->MultiplyTransposed(a, y));
+    const Vector ax = DenseOf(reference_->Multiply(a, x));
+    const Vector aty = DenseOf(reference_->MultiplyTransposed(a, y));
     EXPECT_LE((ax - dense * DenseOf(x)).norm(), 1e-14);
     EXPECT_LE((aty - dense.transpose() * DenseOf(y)).norm(), 1e-14);
     EXPECT_NEAR(ax.dot(DenseOf(y)), aty.dot(DenseOf(x)), 1e-14);
@@ -393,7 +394,7 @@ TEST_F(ReferenceTest, ProductsAreTheDenseOnes) {
     CsrMatrix<double> normal{17, 17, pattern.row_start, pattern.column,
                              RandomReals<double>(pattern.column.size(), -1, 1, seed)};
     const Matrix before = DenseOf(normal);
-    twin_->AddNormalProduct(a, -2.5, pattern, &normal.value);
+    reference_->AddNormalProduct(a, -2.5, pattern, &normal.value);
     EXPECT_LE((DenseOf(normal) - before + 2.5 * dense.transpose() * dense).norm(), 1e-13);
   }
 }
@@ -404,12 +405,12 @@ TEST_F(ReferenceTest, NormalProductIsSymmetricBitForBit) {
   const CsrPattern pattern = NormalPattern(h);
   CsrMatrix<double> normal{block.rays(), block.rays(), pattern.row_start, pattern.column,
                            std::vector<double>(pattern.column.size(), 0)};
-  twin_->AddNormalProduct(h, 0.3, pattern, &normal.value);
+  reference_->AddNormalProduct(h, 0.3, pattern, &normal.value);
   const Matrix dense = DenseOf(normal);
   EXPECT_EQ(dense, dense.transpose());
 }
 
-TEST_F(ReferenceTest, ThePictureIsTheProjectionOfTheViews) {
+TEST_F(ReferenceTest, TheImageIsTheProjectionOfTheViews) {
   std::uint32_t seed = 50;
   for (const BlockSize& size : BlockSizes()) {
     for (const Splat splat : {Splat::kNearest, Splat::kBilinear}) {
@@ -420,29 +421,29 @@ TEST_F(ReferenceTest, ThePictureIsTheProjectionOfTheViews) {
       const Vector rays = RaysOf(block, [&](int s, int t, int k, int l) {
         return views[Index(l * block.u_count + k) * view_samples + Index(t * block.s_count + s)];
       });
-      const Vector picture = DenseOf(twin_->FormPicture(block, splat, views));
-      EXPECT_LE((picture - NaiveProjection(block, splat, {}) * rays).cwiseAbs().maxCoeff(), 1e-14)
+      const Vector image = DenseOf(reference_->FormImage(block, splat, views));
+      EXPECT_LE((image - NaiveProjection(block, splat, {}) * rays).cwiseAbs().maxCoeff(), 1e-14)
           << "seed " << seed;
     }
   }
 }
 
-TEST_F(ReferenceTest, ThePictureDoesNotLookAtViewsWithoutWeight) {
+TEST_F(ReferenceTest, TheImageDoesNotLookAtViewsWithoutWeight) {
   BlockGeometry block = RandomBlock({0, 0, 5, 4, 5, 4, 2, 1}, 0, 3);
   block.view_weight = {0, 1};
   std::vector<double> views(40, kNan);
   std::fill(views.begin() + 20, views.end(), 3.0);
-  for (const double value : twin_->FormPicture(block, Splat::kBilinear, views)) {
+  for (const double value : reference_->FormImage(block, Splat::kBilinear, views)) {
     EXPECT_NEAR(value, 3, 1e-15);
   }
 }
 
-TEST_F(ReferenceTest, BlocksShareTheRaysOfAPicture) {
+TEST_F(ReferenceTest, BlocksShareTheRaysOfAnImage) {
   for (std::uint32_t seed = 0; seed < 5; ++seed) {
     // An image of 11 x 9 px in blocks of 4 x 5, in which every ray is 1 + its position in the light
     // field.
     const BlockGeometry whole = RandomBlock({0, 0, 11, 9, 11, 9, 3, 2}, 4, seed);
-    twin_->StartWhole(11, 9, 3, 2, 2);
+    reference_->StartWhole(11, 9, 3, 2, 2);
     for (int y = 0; y < 9; y += 5) {
       for (int x = 0; x < 11; x += 4) {
         BlockGeometry block = whole;
@@ -455,10 +456,10 @@ TEST_F(ReferenceTest, BlocksShareTheRaysOfAPicture) {
         std::vector<double> values(rays.begin(), rays.end());
         // Numbers without a ray are left out, whatever their value is.
         for (double& value : values) value = value == 0 ? kNan : value;
-        twin_->AddBlock(block, 1, values);
+        reference_->AddBlock(block, 1, values);
       }
     }
-    const std::vector<float> light_field = twin_->FinishWhole();
+    const std::vector<float> light_field = reference_->FinishWhole();
     const std::map<Sample, int> samples = SamplesOf(whole);
     ASSERT_EQ(light_field.size(), Index(2 * 6 * 99));
     for (int i = 0; i < 6 * 99; ++i) {
@@ -472,28 +473,28 @@ TEST_F(ReferenceTest, BlocksShareTheRaysOfAPicture) {
 
 TEST_F(ReferenceTest, AddingIsAdding) {
   BlockGeometry block = RandomBlock({1, 0, 2, 1, 4, 1, 1, 1}, 0, 1);
-  twin_->StartWhole(4, 1, 1, 1, 1);
-  twin_->AddBlock(block, 0, {1, 2});
-  twin_->AddBlock(block, 0, {10, 20});
-  EXPECT_EQ(twin_->FinishWhole(), (std::vector<float>{0, 11, 22, 0}));
-  twin_->StartWhole(4, 1, 1, 1, 1);
-  EXPECT_EQ(twin_->FinishWhole(), std::vector<float>(4, 0.0F)) << "anew";
+  reference_->StartWhole(4, 1, 1, 1, 1);
+  reference_->AddBlock(block, 0, {1, 2});
+  reference_->AddBlock(block, 0, {10, 20});
+  EXPECT_EQ(reference_->FinishWhole(), (std::vector<float>{0, 11, 22, 0}));
+  reference_->StartWhole(4, 1, 1, 1, 1);
+  EXPECT_EQ(reference_->FinishWhole(), std::vector<float>(4, 0.0F)) << "anew";
 }
 
 TEST_F(ReferenceTest, EmptyArgumentsHaveEmptyResults) {
   const BlockGeometry block = RandomBlock({0, 0, 0, 5, 9, 9, 2, 2}, 0, 1);
-  EXPECT_TRUE(twin_->FindRays(block, Splat::kBilinear).empty());
-  EXPECT_TRUE(twin_->WeighRays(block, Splat::kBilinear, {}, {}).value.empty());
-  EXPECT_EQ(twin_->WarpDifferences(block, {}, {}).rows, 0);
-  EXPECT_EQ(twin_->SixTermMasks(block, {}, {}).rows, 0);
-  EXPECT_TRUE(twin_->Multiply({}, {}).empty());
-  EXPECT_TRUE(twin_->MultiplyTransposed({}, {}).empty());
+  EXPECT_TRUE(reference_->FindRays(block, Splat::kBilinear).empty());
+  EXPECT_TRUE(reference_->WeightRays(block, Splat::kBilinear, {}, {}).value.empty());
+  EXPECT_EQ(reference_->WarpDifferences(block, {}, {}).rows, 0);
+  EXPECT_EQ(reference_->SixTermMasks(block, {}, {}).rows, 0);
+  EXPECT_TRUE(reference_->Multiply({}, {}).empty());
+  EXPECT_TRUE(reference_->MultiplyTransposed({}, {}).empty());
   std::vector<double> nothing;
-  twin_->AddNormalProduct({}, 1, {}, &nothing);
-  EXPECT_TRUE(twin_->FormPicture(block, Splat::kNearest, std::vector<double>(4 * 81)).empty());
-  twin_->StartWhole(9, 9, 2, 2, 1);
-  twin_->AddBlock(block, 0, {});
-  EXPECT_EQ(twin_->FinishWhole().size(), Index(4 * 81));
+  reference_->AddNormalProduct({}, 1, {}, &nothing);
+  EXPECT_TRUE(reference_->FormImage(block, Splat::kNearest, std::vector<double>(4 * 81)).empty());
+  reference_->StartWhole(9, 9, 2, 2, 1);
+  reference_->AddBlock(block, 0, {});
+  EXPECT_EQ(reference_->FinishWhole().size(), Index(4 * 81));
 }
 
 TEST_F(ReferenceTest, WrongArgumentsAreNamed) {
@@ -502,7 +503,7 @@ TEST_F(ReferenceTest, WrongArgumentsAreNamed) {
     return ErrorOf([&] {
       BlockGeometry changed = block;
       change(&changed);
-      twin_->FindRays(changed, Splat::kBilinear);
+      reference_->FindRays(changed, Splat::kBilinear);
     });
   };
   EXPECT_EQ(bad([](BlockGeometry* b) { b->width_px = -1; }),
@@ -516,39 +517,40 @@ TEST_F(ReferenceTest, WrongArgumentsAreNamed) {
   EXPECT_EQ(bad([](BlockGeometry* b) { b->width_px = 1 << 14, b->height_px = 1 << 15; }),
             "block: number of pixels is 536870912: it must be 0 to 268435455");
 
-  EXPECT_EQ(ErrorOf([&] { twin_->WeighRays(block, Splat::kNearest, {1}, {}); }),
+  EXPECT_EQ(ErrorOf([&] { reference_->WeightRays(block, Splat::kNearest, {1}, {}); }),
             "list of rays has 1 elements: it must have 12");
   EXPECT_EQ(ErrorOf([&] {
-              twin_->WeighRays(block, Splat::kNearest, std::vector<std::int32_t>(12, 12), {});
+              reference_->WeightRays(block, Splat::kNearest, std::vector<std::int32_t>(12, 12), {});
             }),
             "list of rays: 12 is none of the block's: it must be -1 to 11");
   EXPECT_EQ(ErrorOf([&] {
-              twin_->WeighRays(block, Splat::kNearest, std::vector<std::int32_t>(12, 0), {1});
+              reference_->WeightRays(block, Splat::kNearest, std::vector<std::int32_t>(12, 0), {1});
             }),
             "irradiance has 1 elements: it must have 12");
-  EXPECT_EQ(ErrorOf([&] { twin_->WarpDifferences(block, {}, std::vector<double>(12)); }),
+  EXPECT_EQ(ErrorOf([&] { reference_->WarpDifferences(block, {}, std::vector<double>(12)); }),
             "slope_u has 0 elements: it must have 12");
-  EXPECT_EQ(ErrorOf([&] { twin_->SixTermMasks(block, std::vector<double>(12), {}); }),
+  EXPECT_EQ(ErrorOf([&] { reference_->SixTermMasks(block, std::vector<double>(12), {}); }),
             "slope_v has 0 elements: it must have 12");
-  EXPECT_EQ(ErrorOf([&] { twin_->FormPicture(block, Splat::kNearest, {}); }),
-            "light field to form a picture of has 0 elements: it must have 162");
+  EXPECT_EQ(ErrorOf([&] { reference_->FormImage(block, Splat::kNearest, {}); }),
+            "light field to form an image of has 0 elements: it must have 162");
   const CsrMatrix<double> a = RandomCsr<double>(3, 4, 0.5, 1);
-  EXPECT_EQ(ErrorOf([&] { twin_->Multiply(a, std::vector<double>(3)); }),
+  EXPECT_EQ(ErrorOf([&] { reference_->Multiply(a, std::vector<double>(3)); }),
             "vector to be multiplied has 3 elements: it must have 4");
-  EXPECT_EQ(ErrorOf([&] { twin_->MultiplyTransposed(a, std::vector<double>(4)); }),
+  EXPECT_EQ(ErrorOf([&] { reference_->MultiplyTransposed(a, std::vector<double>(4)); }),
             "vector to be multiplied has 4 elements: it must have 3");
   std::vector<double> values;
-  EXPECT_EQ(ErrorOf([&] { twin_->AddNormalProduct(a, 1, PatternOf(a), &values); }),
+  EXPECT_EQ(ErrorOf([&] { reference_->AddNormalProduct(a, 1, PatternOf(a), &values); }),
             "pattern of a normal product has 3 x 4 entries: it must have 4 x 4");
   EXPECT_EQ(
-      ErrorOf([&] { twin_->AddNormalProduct(a, 1, NormalPattern(a), &values); }).substr(0, 35),
+      ErrorOf([&] { reference_->AddNormalProduct(a, 1, NormalPattern(a), &values); }).substr(0, 35),
       "values of a normal product has 0 el");
-  twin_->StartWhole(9, 9, 2, 1, 1);
-  EXPECT_EQ(ErrorOf([&] { twin_->AddBlock(block, 1, std::vector<double>(12)); }),
+  reference_->StartWhole(9, 9, 2, 1, 1);
+  EXPECT_EQ(ErrorOf([&] { reference_->AddBlock(block, 1, std::vector<double>(12)); }),
             "block is added to channel 1: it must be 0 to 0");
-  EXPECT_EQ(ErrorOf([&] { twin_->AddBlock(block, 0, std::vector<double>(11)); }),
+  EXPECT_EQ(ErrorOf([&] { reference_->AddBlock(block, 0, std::vector<double>(11)); }),
             "block's rays has 11 elements: it must have 12");
-  EXPECT_EQ(ErrorOf([&] { twin_->StartWhole(-1, 9, 2, 1, 1); }).substr(0, 13), "s_count is -1");
+  EXPECT_EQ(ErrorOf([&] { reference_->StartWhole(-1, 9, 2, 1, 1); }).substr(0, 13),
+            "s_count is -1");
 }
 
 }  // namespace

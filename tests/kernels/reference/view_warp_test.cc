@@ -38,10 +38,10 @@ std::size_t At(int x, int y) { return static_cast<std::size_t>(y * kW + x); }
 
 // The reference, a device as it is (a machine that runs the tests has one), or one with single
 // samples as its items.
-enum class Form { kTwin, kDevice, kSingleSamples };
+enum class Form { kReference, kDevice, kSingleSamples };
 
-std::unique_ptr<ViewWarp> NewWarp(Form form, const SurfacePicture& picture) {
-  if (form == Form::kTwin) return NewReferenceWarp(picture);
+std::unique_ptr<ViewWarp> NewWarp(Form form, const SurfaceImage& image) {
+  if (form == Form::kReference) return NewReferenceWarp(image);
   static const auto opened = [] {
     const DeviceRequest place =
         ParseDeviceRequest(OpenBackend(ParseDeviceRequest("opencl"), nullptr)->name());
@@ -51,29 +51,29 @@ std::unique_ptr<ViewWarp> NewWarp(Form form, const SurfacePicture& picture) {
   if (form == Form::kSingleSamples) device->is_cpu = false;
   static std::map<Form, cl::Program> programs;
   if (programs.count(form) == 0) programs[form] = BuildKernels(*device, "float");
-  return NewOpenClWarp(device, programs[form], picture);
+  return NewOpenClWarp(device, programs[form], image);
 }
 
 class ViewWarpTest : public ::testing::TestWithParam<Form> {
  protected:
   std::vector<float> Warp(int channels = 1) {
-    picture_ = {kW, kH, channels, &values_, &disparity_, 0.3F};
+    image_ = {kW, kH, channels, &values_, &disparity_, 0.3F};
     std::vector<float> values;
-    NewWarp(GetParam(), picture_)
-        ->Warp({&of_view_, shift_x_, shift_y_, &hidden_, &mixed_}, &values);
+    NewWarp(GetParam(), image_)
+        ->Warp({&of_view_, shift_x_, shift_y_, &occluded_, &boundary_}, &values);
     return values;
   }
   void Hide(std::size_t i, float source_x, float source_y) {
-    hidden_.push_back({static_cast<std::int32_t>(i), source_x, source_y, of_view_[i]});
+    occluded_.push_back({static_cast<std::int32_t>(i), source_x, source_y, of_view_[i]});
     of_view_[i] = kNone;
   }
   // Hides all samples, with that disparity.
   void HideAll(float source_x, float source_y, float disparity) {
-    hidden_.clear();
+    occluded_.clear();
     of_view_.assign(kPixels, disparity);
     for (std::size_t i = 0; i < kPixels; ++i) Hide(i, source_x, source_y);
   }
-  // Gives the picture and the view one disparity.
+  // Gives the image and the view one disparity.
   void Flatten(float disparity) {
     disparity_.assign(kPixels, disparity);
     of_view_.assign(kPixels, disparity);
@@ -92,15 +92,15 @@ class ViewWarpTest : public ::testing::TestWithParam<Form> {
   std::vector<float> disparity_ = std::vector<float>(kPixels, 0.0F);
   std::vector<float> of_view_ = std::vector<float>(kPixels, 0.0F);
   double shift_x_ = 0, shift_y_ = 0;
-  std::vector<HiddenSample> hidden_;
-  std::vector<MixedSample> mixed_;
-  SurfacePicture picture_;
+  std::vector<OccludedSample> occluded_;
+  std::vector<BoundarySample> boundary_;
+  SurfaceImage image_;
 };
-INSTANTIATE_TEST_SUITE_P(Twin, ViewWarpTest, ::testing::Values(Form::kTwin));
+INSTANTIATE_TEST_SUITE_P(Reference, ViewWarpTest, ::testing::Values(Form::kReference));
 INSTANTIATE_TEST_SUITE_P(Device, ViewWarpTest, ::testing::Values(Form::kDevice));
 INSTANTIATE_TEST_SUITE_P(SingleSamples, ViewWarpTest, ::testing::Values(Form::kSingleSamples));
 
-TEST_P(ViewWarpTest, IsThePictureWhereNothingMoves) {
+TEST_P(ViewWarpTest, IsTheImageWhereNothingMoves) {
   FillPolynomial();
   EXPECT_THAT(Warp(), ::testing::Pointwise(FloatNear(1e-6F), values_));
   shift_x_ = 2, shift_y_ = -3;  // px per unit of disparity
@@ -124,14 +124,14 @@ TEST_P(ViewWarpTest, IsExactForSquaresInsideOfASurface) {
   expect_squares(Warp());
 }
 
-TEST_P(ViewWarpTest, ReadsHiddenSamplesWhereTheyAre) {
+TEST_P(ViewWarpTest, ReadsOccludedSamplesWhereTheyAre) {
   for (std::size_t i = 0; i < kPixels; ++i) values_[i] = static_cast<float>(i);
   Flatten(2);
   disparity_[At(9, 6)] = 0;
   shift_x_ = 0.5;  // one pixel
   Hide(At(0, 0), 11, 8);
   Hide(At(4, 5), 5, 1);  // lands at (9, 6), which is of another surface
-  hidden_.back().disparity = 0;
+  occluded_.back().disparity = 0;
   Hide(At(11, 8), -11, 0);
   const std::vector<float> warped = Warp();
   EXPECT_EQ(warped[At(0, 0)], values_[At(11, 8)]);
@@ -148,20 +148,20 @@ TEST_P(ViewWarpTest, MixesWhatStandsAtAnotherPlaceIntoASample) {
   disparity_[At(9, 6)] = 0;
   shift_x_ = 0.5;  // one pixel
   Hide(At(4, 5), 5, 1);
-  hidden_.back().disparity = 0;
+  occluded_.back().disparity = 0;
   const auto mix = [&](std::size_t at, float source_x, float source_y, float disparity,
                        float share) {
-    mixed_.push_back({static_cast<std::int32_t>(at), {0, source_x, source_y, disparity}, share});
+    boundary_.push_back({static_cast<std::int32_t>(at), {0, source_x, source_y, disparity}, share});
   };
   mix(At(0, 0), 3.25F, 2.5F, 2, 0.25F);  // interpolated between four pixels
-  mix(At(2, 2), -400, 3, 2, 1);          // clamped to the picture
-  mix(At(4, 5), 1, 0, 2, 0.75F);         // into a hidden sample
+  mix(At(2, 2), -400, 3, 2, 1);          // clamped to the image
+  mix(At(4, 5), 1, 0, 2, 0.75F);         // into an occluded sample
   mix(At(8, 6), 0.5F, 0, 0, 0.5F);       // the pixel of the two that is of its surface
   mix(At(11, 8), 0.5F, 0.5F, 2, 0);      // a fraction of 0 has no effect
   const std::vector<float> plain = [&] {
-    const std::vector<MixedSample> mixed = std::exchange(mixed_, {});
+    const std::vector<BoundarySample> boundary = std::exchange(boundary_, {});
     std::vector<float> values = Warp();
-    mixed_ = mixed;
+    boundary_ = boundary;
     return values;
   }();
   std::vector<float> expected = plain;
@@ -208,7 +208,7 @@ TEST_P(ViewWarpTest, StaysOnItsSurface) {
   HideAll(0.5F, 0, 0.4F);
   EXPECT_NEAR(Warp()[At(5, 4)], 0.25, 1e-6);
   // Visible samples behave the same.
-  hidden_.clear();
+  occluded_.clear();
   of_view_.assign(kPixels, 0.625F);
   shift_x_ = 0.8;
   EXPECT_NEAR(Warp()[At(5, 4)], 1, 1e-6);
@@ -217,7 +217,7 @@ TEST_P(ViewWarpTest, StaysOnItsSurface) {
   EXPECT_NEAR(Warp()[At(5, 4)], 0.25, 1e-6);
 }
 
-TEST_P(ViewWarpTest, WeighsWhatIsLeftOfTheFourAround) {
+TEST_P(ViewWarpTest, WeightsTheRemainingOfTheFourNeighbours) {
   for (std::size_t i = 0; i < kPixels; ++i) values_[i] = static_cast<float>(i);
   disparity_[At(5, 5)] = 9;
   HideAll(0.25F, 0.5F, 0);
@@ -228,11 +228,11 @@ TEST_P(ViewWarpTest, WeighsWhatIsLeftOfTheFourAround) {
   EXPECT_NEAR(Warp()[At(4, 4)], expected, 1e-4);
 }
 
-TEST_P(ViewWarpTest, IsCutToThePicture) {
+TEST_P(ViewWarpTest, IsCutToTheImage) {
   FillPolynomial();
   HideAll(-1e30F, 1e30F, 0);
   EXPECT_THAT(Warp(), Each(FloatNear(values_[At(0, kH - 1)], 1e-5F)));
-  hidden_.clear();
+  occluded_.clear();
   Flatten(0.5F);
   for (const double far : {1e3, 1e30, 1e38}) {
     shift_x_ = -far, shift_y_ = far;
@@ -268,23 +268,23 @@ TEST_P(ViewWarpTest, RefusesWhatDoesNotFit) {
   EXPECT_THAT(ErrorOf([&] { Warp(); }), HasSubstr("disparity of a view: 107 numbers"));
   of_view_.push_back(0);
   for (const std::int32_t index : {-1, 108}) {
-    hidden_ = {{index, 0, 0, 0}};
+    occluded_ = {{index, 0, 0, 0}};
     EXPECT_THAT(ErrorOf([&] { Warp(); }),
                 HasSubstr(std::to_string(index) + ": it must be 0 to 107"));
   }
-  hidden_ = {{5, 0, 0, 0}};
-  EXPECT_THAT(ErrorOf([&] { Warp(); }), HasSubstr("hidden sample 5 of a view is of disparity 0"));
-  hidden_.clear();
+  occluded_ = {{5, 0, 0, 0}};
+  EXPECT_THAT(ErrorOf([&] { Warp(); }), HasSubstr("occluded sample 5 of a view is of disparity 0"));
+  occluded_.clear();
   for (const std::int32_t index : {-1, 7, 108}) {
-    mixed_ = {{7, {}, 0.5F}, {index, {}, 0.5F}};
+    boundary_ = {{7, {}, 0.5F}, {index, {}, 0.5F}};
     EXPECT_THAT(ErrorOf([&] { Warp(); }),
                 HasSubstr(std::to_string(index) + " after 7: indices must grow from 0 to 107"));
   }
   for (const float share : {-0.1F, 1.1F, kNone}) {
-    mixed_ = {{7, {}, share}};
-    EXPECT_THAT(ErrorOf([&] { Warp(); }), HasSubstr("mixed sample 7 of a view has the share"));
+    boundary_ = {{7, {}, share}};
+    EXPECT_THAT(ErrorOf([&] { Warp(); }), HasSubstr("boundary sample 7 of a view has the share"));
   }
-  mixed_.clear();
+  boundary_.clear();
   shift_y_ = kNone;
   EXPECT_THAT(ErrorOf([&] { Warp(); }), HasSubstr("shift of a view is nan"));
   shift_y_ = 0;
@@ -296,15 +296,15 @@ TEST_P(ViewWarpTest, IsUsedByManyThreads) {
   for (std::size_t i = 0; i < kPixels; ++i) values_[i] = static_cast<float>(i);
   Flatten(1);
   Hide(At(6, 4), 0, 0);
-  picture_ = {kW, kH, 1, &values_, &disparity_, 0.3F};
-  const std::unique_ptr<ViewWarp> warp = NewWarp(GetParam(), picture_);
+  image_ = {kW, kH, 1, &values_, &disparity_, 0.3F};
+  const std::unique_ptr<ViewWarp> warp = NewWarp(GetParam(), image_);
   constexpr std::size_t kThreads = 4;
   std::array<std::vector<float>, kThreads> warped;
   std::vector<std::thread> threads;
   for (std::size_t t = 0; t < kThreads; ++t) {
     threads.emplace_back([&, t] {  // each thread shifts by another number of pixels
       for (int i = 0; i < 20; ++i) {
-        warp->Warp({&of_view_, static_cast<double>(t), 0, &hidden_, nullptr}, &warped[t]);
+        warp->Warp({&of_view_, static_cast<double>(t), 0, &occluded_, nullptr}, &warped[t]);
       }
     });
   }
@@ -315,13 +315,13 @@ TEST_P(ViewWarpTest, IsUsedByManyThreads) {
   }
 }
 
-// The pictures have various sizes and numbers of channels, and surfaces that are flat, rough or
+// The images have various sizes and numbers of channels, and surfaces that are flat, rough or
 // steep.
 class DeviceWarpTest : public ::testing::TestWithParam<Form> {};
 INSTANTIATE_TEST_SUITE_P(Device, DeviceWarpTest, ::testing::Values(Form::kDevice));
 INSTANTIATE_TEST_SUITE_P(SingleSamples, DeviceWarpTest, ::testing::Values(Form::kSingleSamples));
 
-TEST_P(DeviceWarpTest, IsThatOfTheTwin) {
+TEST_P(DeviceWarpTest, IsThatOfTheReference) {
   struct Case {
     int width, height, channels;
   };
@@ -351,7 +351,7 @@ TEST_P(DeviceWarpTest, IsThatOfTheTwin) {
       if (3 * x > 2 * c.width) disparity[i] *= 5;
       if (3 * x < c.width) disparity[i] += 1;
     }
-    const SurfacePicture picture{c.width, c.height, c.channels, &values, &disparity, 0.3F};
+    const SurfaceImage image{c.width, c.height, c.channels, &values, &disparity, 0.3F};
     const auto of_view = numbers(pixels, -0.5F, 1.5F);
     const auto shares = numbers(pixels, 0, 1);
     for (const float reach : {0.0F, 3.0F, 300.0F}) {
@@ -362,21 +362,21 @@ TEST_P(DeviceWarpTest, IsThatOfTheTwin) {
         // No sample is hidden, then the first, every third, and all of them.
         for (const int every : {0, pixels, 3, 1}) {
           std::vector<float> seen = *surface;
-          std::vector<HiddenSample> hidden;
+          std::vector<OccludedSample> occluded;
           for (int i = 0; every > 0 && i < pixels; i += every) {
             const auto n = static_cast<std::size_t>(i);
-            hidden.push_back({i, source_x[n], source_y[n], seen[n]});
+            occluded.push_back({i, source_x[n], source_y[n], seen[n]});
             seen[n] = kNone;
           }
-          std::vector<MixedSample> mixed;
+          std::vector<BoundarySample> boundary;
           for (int i = every % 5; i < pixels; i += 2 + every % 3) {
             const std::size_t n = static_cast<std::size_t>(pixels - 1 - i);
-            mixed.push_back({i, {0, source_x[n], source_y[n], (*surface)[n]}, shares[n]});
+            boundary.push_back({i, {0, source_x[n], source_y[n], (*surface)[n]}, shares[n]});
           }
-          const ViewSources view{&seen, shift[0], shift[1], &hidden, &mixed};
+          const ViewSources view{&seen, shift[0], shift[1], &occluded, &boundary};
           std::vector<float> found, right;
-          NewWarp(GetParam(), picture)->Warp(view, &found);
-          NewWarp(Form::kTwin, picture)->Warp(view, &right);
+          NewWarp(GetParam(), image)->Warp(view, &found);
+          NewWarp(Form::kReference, image)->Warp(view, &right);
           EXPECT_THAT(found, ::testing::Pointwise(FloatNear(3e-6F), right))
               << c.width << "x" << c.height << ", " << c.channels << " channels, " << reach
               << " px, hidden every " << every;

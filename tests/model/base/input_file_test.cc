@@ -109,11 +109,11 @@ TEST(InputFile, WhatGrowsWhileItIsReadHasTheSameLimit) {
 class WatchedInputs : public ::testing::Test {
  protected:
   WatchedInputs() {
-    WatchInputs([this](const std::string& path) { told_.push_back(path); });
+    WatchInputs([this](const std::string& path) { reported_.push_back(path); });
   }
   ~WatchedInputs() override { WatchInputs({}); }
 
-  std::vector<std::string> told_;
+  std::vector<std::string> reported_;
   TemporaryFolder folder_;
 };
 
@@ -121,9 +121,9 @@ TEST_F(WatchedInputs, EveryFileThatIsReadIsReported) {
   const std::string path = folder_.Put("a", "x");
   ReadWholeFile(path);
   ReadTextFile(path);
-  EXPECT_EQ(told_, (std::vector<std::string>{path, path}));
+  EXPECT_EQ(reported_, (std::vector<std::string>{path, path}));
   ReadOwnFile(path);
-  EXPECT_EQ(told_.size(), 2U);
+  EXPECT_EQ(reported_.size(), 2U);
 }
 
 // Frames, camera, table and folder are known before the first frame is read.
@@ -137,7 +137,7 @@ TEST_F(WatchedInputs, FilesThatASweepNamesAreReported) {
   const std::string camera = fs::path(folder_.path()).parent_path() / "c.yaml";
   for (const std::string& path : {yaml, camera, folder_ / "t.csv", folder_ / "f/a.png",
                                   folder_ / "f/b.png", folder_ / "f/c.png"}) {
-    EXPECT_THAT(told_, Contains(path));
+    EXPECT_THAT(reported_, Contains(path));
   }
 }
 

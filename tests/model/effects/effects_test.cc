@@ -14,8 +14,8 @@
 #include "support/error_message.h"
 #include "support/test_cameras.h"
 #include "thicklens/model/blur_transfer.h"
-#include "thicklens/model/effect_choice.h"
 #include "thicklens/model/effect_impact.h"
+#include "thicklens/model/effect_selection.h"
 #include "thicklens/model/light_field_grid.h"
 
 namespace thicklens::model {
@@ -45,8 +45,8 @@ EffectConditions ConditionsOf(const Camera& camera) {
   return conditions;
 }
 
-EffectPlace PlaceAt(double x, double y, double depth_mm) {
-  EffectPlace place;
+EffectSite PlaceAt(double x, double y, double depth_mm) {
+  EffectSite place;
   place.position_px = {x, y};
   place.depth_mm = depth_mm;
   return place;
@@ -82,7 +82,7 @@ TEST(EffectsTest, ToleranceHasAUnit) {
 // lenses, [S16].
 TEST(EffectsTest, ThinLensOfTheSameFocusPutsRaysInTheSamePlace) {
   const Camera camera = TheCamera();
-  const ThickLens thin = ThinCounterpart(camera.lens);
+  const ThickLens thin = ThinLensEquivalent(camera.lens);
   const double thin_mm = ImageDistanceMm(thin, 300);
   EXPECT_NEAR(thin_mm, camera.focal_scale_px() * camera.sensor.pixel_pitch_mm, 1e-9);
   std::mt19937 engine(1);
@@ -171,7 +171,7 @@ TEST(EffectsTest, GaussianApertureDiffractsToAGaussian) {
 
 // A measured floor holds the diffraction; only without one does it matter.
 TEST(EffectsTest, DiffractionIsNotCountedTwice) {
-  const EffectPlace place = PlaceAt(300, 250, 300);
+  const EffectSite place = PlaceAt(300, 250, 300);
   for (const Psf psf : {Psf::kGaussian, Psf::kDisc}) {
     const EffectImpact measured =
         ImpactAt(Effect::kDiffraction, ConditionsOf(TheCamera(psf, 0.5)), place, EffectSet::All());
@@ -209,13 +209,13 @@ TEST(EffectsTest, DiscAndGaussianDifferAsStated) {
   EXPECT_NEAR(weighed, 0.587, 1e-3);
 }
 
-// Pictures in closed form, blurred in closed form: never beyond the bound, and near it.
+// Images in closed form, blurred in closed form: never beyond the bound, and near it.
 TEST(EffectsTest, BlurBoundHoldsForWavesAndEdges) {
   for (const double f : {0.02, 0.1, 0.3, 0.5}) {        // cycles per px along x
     for (const double sigma : {0.05, 0.2, 0.7, 2.0}) {  // added
       for (const double other : {0.0, 0.5, 2.0}) {
         const double w = 2 * kPi * f;
-        EffectPlace wave;  // 0.5 + 0.5 cos before any blur
+        EffectSite wave;  // 0.5 + 0.5 cos before any blur
         wave.jump = 0;
         wave.slope = 0.5 * w;
         wave.bend = 0.5 * w * w;
@@ -250,7 +250,7 @@ TEST(EffectsTest, BlurBoundHoldsForWavesAndEdges) {
       EffectOptics::Smoothing smoothing;
       smoothing.gaussian_px2 = other * other;
       smoothing.boxed = true;
-      const double bound = BlurChange(EffectPlace(), sigma * sigma, smoothing);
+      const double bound = BlurChange(EffectSite(), sigma * sigma, smoothing);
       EXPECT_GE(bound, change) << sigma << " " << other;
       EXPECT_LT(bound, 8 * change) << sigma << " " << other;
     }
@@ -259,7 +259,7 @@ TEST(EffectsTest, BlurBoundHoldsForWavesAndEdges) {
 
 TEST(EffectsTest, NothingWithoutACauseMatters) {
   // In the plane of focus, on the axis, of one brightness.
-  EffectPlace place = PlaceAt(300, 250, 300);
+  EffectSite place = PlaceAt(300, 250, 300);
   place.dark = place.bright = 0.4;
   place.jump = 0;
   EffectConditions conditions = ConditionsOf(TheCamera());
@@ -277,7 +277,7 @@ TEST(EffectsTest, NothingWithoutACauseMatters) {
 TEST(EffectsTest, BenchMovesLightAndScaleAsItsGeometrySays) {
   EffectConditions conditions = ConditionsOf(TheCamera());
   conditions.bench = BenchConditions{true, 0.01, 0.3, 0.05, 2};
-  const EffectPlace place = PlaceAt(0, 250, 330);
+  const EffectSite place = PlaceAt(0, 250, 330);
   const auto amount = [&](Effect effect) {
     return ImpactAt(effect, conditions, place, EffectSet::All()).amount;
   };
@@ -296,7 +296,7 @@ TEST(EffectsTest, BenchMovesLightAndScaleAsItsGeometrySays) {
 
 TEST(EffectsTest, VignettingNeedsUvOffTheAperture) {
   EffectConditions conditions = ConditionsOf(TheCamera());
-  const EffectPlace corner = PlaceAt(0, 0, 300);
+  const EffectSite corner = PlaceAt(0, 0, 300);
   EXPECT_EQ(ImpactAt(Effect::kVignetting, conditions, corner, EffectSet::All()).amount, 0);
   conditions.planes = LightFieldPlanes{0, 300};
   EXPECT_EQ(ImpactAt(Effect::kVignetting, conditions, corner, EffectSet::All()).amount, 0);
@@ -316,15 +316,15 @@ TEST(EffectsTest, VignettingNeedsUvOffTheAperture) {
 TEST(EffectsTest, WhatIsLeftOutStaysWithinTheToleranceAllTogether) {
   EffectConditions conditions = ConditionsOf(TheCamera());
   conditions.bits = 8;
-  conditions.stored_noise_grey_levels = 0.3;
-  std::vector<EffectPlace> places = PlacesBetween(conditions.camera, 299.9, 300.1, false);
-  for (EffectPlace& place : places) place.bright = 0.6;
+  conditions.encoded_noise_grey_levels = 0.3;
+  std::vector<EffectSite> places = PlacesBetween(conditions.camera, 299.9, 300.1, false);
+  for (EffectSite& place : places) place.bright = 0.6;
   const EffectSet all = EffectSet::All();
   EffectSet last = all;
   for (const double grey_levels : {0.01, 0.1, 0.5, 2.0, 20.0, 3000.0}) {
     EffectTolerance tolerance;
     tolerance.grey_levels = grey_levels;
-    const EffectSet chosen = ChooseEffects(conditions, places, all, tolerance);
+    const EffectSet chosen = RequiredEffects(conditions, places, all, tolerance);
     EXPECT_EQ(chosen.Without(last), EffectSet()) << grey_levels;  // never more for less accuracy
     last = chosen;
     // Both kinds of noise together, 0.42, or one of them, or none.
@@ -338,7 +338,7 @@ TEST(EffectsTest, WhatIsLeftOutStaysWithinTheToleranceAllTogether) {
     for (const Effect effect : all.Without(chosen).Effects()) {
       if (FactsOf(effect).random) continue;
       double most = 0;
-      for (const EffectPlace& place : places) {
+      for (const EffectSite& place : places) {
         most = std::max(most, ImpactAt(effect, conditions, place, all).grey_levels);
       }
       sum += most;
@@ -351,7 +351,7 @@ TEST(EffectsTest, WhatIsLeftOutStaysWithinTheToleranceAllTogether) {
 // Diffraction is there then with the floor as without it.
 TEST(EffectsTest, ALensFloorThatWasNotMeasuredIsNothing) {
   EffectConditions conditions = ConditionsOf(TheCamera());
-  const EffectPlace place = PlacesBetween(conditions.camera, 300, 300, false).front();
+  const EffectSite place = PlacesBetween(conditions.camera, 300, 300, false).front();
   const EffectSet others = EffectSet::All().Without({Effect::kLensFloor});
   EXPECT_GT(ImpactAt(Effect::kLensFloor, conditions, place, others).grey_levels, 0);
   conditions.camera.calibration->blur_floor_px.reset();
@@ -362,11 +362,11 @@ TEST(EffectsTest, ALensFloorThatWasNotMeasuredIsNothing) {
 TEST(EffectsTest, ToleranceInPxJudgesDisplacements) {
   const EffectConditions conditions = ConditionsOf(TheCamera());
   const double shift = 0.2 / (0.45 * 4.46 * conditions.camera.focal_scale_px());
-  const std::vector<EffectPlace> places =
+  const std::vector<EffectSite> places =
       PlacesBetween(conditions.camera, 300, 1 / (1 / 300.0 - shift), false);
   const EffectSet optics{Effect::kDefocus, Effect::kLensFloor};
-  EXPECT_EQ(ChooseEffects(conditions, places, optics, EffectToleranceFromText("0.19px")), optics);
-  EXPECT_EQ(ChooseEffects(conditions, places, optics, EffectToleranceFromText("0.21px")),
+  EXPECT_EQ(RequiredEffects(conditions, places, optics, EffectToleranceFromText("0.19px")), optics);
+  EXPECT_EQ(RequiredEffects(conditions, places, optics, EffectToleranceFromText("0.21px")),
             EffectSet({Effect::kLensFloor}));
   // What displaces nothing is judged by its grey levels.
   EffectConditions wide = conditions;
@@ -374,39 +374,41 @@ TEST(EffectsTest, ToleranceInPxJudgesDisplacements) {
   wide.camera.calibration->image_distance_mm = Estimate{ImageDistanceMm(wide.camera.lens, 300), 0};
   wide.camera.sensor.pixel_pitch_mm = 0.05;
   const EffectSet both{Effect::kThickness, Effect::kFalloff};
-  const std::vector<EffectPlace> at_focus = PlacesBetween(wide.camera, 300, 300, false);
+  const std::vector<EffectSite> at_focus = PlacesBetween(wide.camera, 300, 300, false);
   ASSERT_GT(ImpactAt(Effect::kThickness, wide, at_focus.back(), both).grey_levels, 0.5);
-  EXPECT_EQ(ChooseEffects(wide, at_focus, both, EffectToleranceFromText("5px")), both);
+  EXPECT_EQ(RequiredEffects(wide, at_focus, both, EffectToleranceFromText("5px")), both);
 }
 
 TEST(EffectsTest, ChoiceIsReadAndFollowed) {
-  const EffectChoice choice = EffectChoiceFromText("defocus,falloff", "falloff", "2gl");
+  const EffectSelectionOptions choice =
+      EffectSelectionOptionsFromText("defocus,falloff", "falloff", "2gl");
   EXPECT_EQ(choice.given, EffectSet({Effect::kDefocus, Effect::kFalloff}));
   EXPECT_EQ(choice.tolerance.grey_levels, 2);
   const EffectConditions conditions = ConditionsOf(TheCamera());
-  const std::vector<EffectPlace> places = PlacesBetween(conditions.camera, 250, 350, true);
+  const std::vector<EffectSite> places = PlacesBetween(conditions.camera, 250, 350, true);
   const EffectSet model = EffectSet::All().Without({Effect::kTilt, Effect::kVignetting});
-  const auto on = [&](EffectChoice wanted) {
-    return DecideEffects(wanted, conditions, places, model).on;
+  const auto on = [&](EffectSelectionOptions wanted) {
+    return SelectEffects(wanted, conditions, places, model).on;
   };
   EXPECT_EQ(on(choice), EffectSet({Effect::kDefocus}));
-  EXPECT_EQ(on(EffectChoiceFromText("none", "", "")), EffectSet());
-  EXPECT_EQ(on(EffectChoiceFromText("all", "drift", "")), model.Without({Effect::kDrift}));
-  EffectChoice automatic = EffectChoiceFromText("auto", "", "");
+  EXPECT_EQ(on(EffectSelectionOptionsFromText("none", "", "")), EffectSet());
+  EXPECT_EQ(on(EffectSelectionOptionsFromText("all", "drift", "")),
+            model.Without({Effect::kDrift}));
+  EffectSelectionOptions automatic = EffectSelectionOptionsFromText("auto", "", "");
   EXPECT_FALSE(on(automatic).Has(Effect::kQuantisation));
   EXPECT_TRUE(on(automatic).Has(Effect::kOcclusion));
   automatic.kept = {Effect::kQuantisation};
   EXPECT_TRUE(on(automatic).Has(Effect::kQuantisation));
   automatic.without = automatic.kept;
   EXPECT_FALSE(on(automatic).Has(Effect::kQuantisation));
-  EXPECT_EQ(DecideEffects(automatic, conditions, places, model).findings.size(), 17U);
-  EXPECT_THAT(ErrorOf([&] { on(EffectChoiceFromText("auto", "tilt,drift", "")); }),
-              HasSubstr("effect tilt is not one of this picture's: it has thickness"));
+  EXPECT_EQ(SelectEffects(automatic, conditions, places, model).findings.size(), 17U);
+  EXPECT_THAT(ErrorOf([&] { on(EffectSelectionOptionsFromText("auto", "tilt,drift", "")); }),
+              HasSubstr("effect tilt is not one of this image's: it has thickness"));
 }
 
 TEST(EffectsTest, SaysWhatIsWrong) {
   EffectConditions conditions = ConditionsOf(TheCamera());
-  const std::vector<EffectPlace> places = {PlaceAt(0, 0, 300)};
+  const std::vector<EffectSite> places = {PlaceAt(0, 0, 300)};
   const auto message = [&](const EffectConditions& wrong) {
     return ErrorOf([&] { FindImpacts(wrong, places, EffectSet::All()); });
   };
@@ -433,7 +435,7 @@ TEST(EffectsTest, SaysWhatIsWrong) {
               HasSubstr("depths from 0 to 1 mm"));
   EffectTolerance none;
   none.grey_levels = 0;
-  EXPECT_THAT(ErrorOf([&] { ChooseEffects(conditions, places, EffectSet::All(), none); }),
+  EXPECT_THAT(ErrorOf([&] { RequiredEffects(conditions, places, EffectSet::All(), none); }),
               HasSubstr("tolerance in grey_levels is 0"));
 }
 

@@ -158,7 +158,7 @@ TEST(LandingPoint, ScalingEveryLengthChangesNothingButTheUnit) {
       }
     }
   }
-  // The same camera in other units has the same picture: disparity and slope are in pixels.
+  // The same camera in other units has the same image: disparity and slope are in pixels.
   const Camera camera = BenchCamera();
   const LightFieldGrid grid = GridOnPlanes(camera, {100, 2000}, 7, 5);
   for (const double scale : {1e-3, 1e3}) {
@@ -186,17 +186,17 @@ TEST(LandingPoint, RefusesImpossiblePlanesAndNan) {
   EXPECT_THROW(PositionAtDepthMm({0, 640}, ray, kNan), Error);
 }
 
-TEST(Picture, IsTheScenesWayUp) {
+TEST(Image, IsTheScenesWayUp) {
   const Camera camera = BenchCamera();
   const double image_distance_mm = camera.image_distance_mm();
   const LightFieldPlanes planes{0, 640};
-  const auto picture_of = [&](const Ray& ray) {
-    return PicturePositionPx(camera.sensor,
-                             LandingPointMm(camera.lens, image_distance_mm, planes, ray));
+  const auto image_of = [&](const Ray& ray) {
+    return ImagePositionPx(camera.sensor,
+                           LandingPointMm(camera.lens, image_distance_mm, planes, ray));
   };
-  ExpectNear(picture_of({0, 0, 0, 0}), camera.sensor.principal_point_px);
+  ExpectNear(image_of({0, 0, 0, 0}), camera.sensor.principal_point_px);
   // A point of the scene to the right and below is seen to the right and below.
-  const Eigen::Vector2d right_below = picture_of({10, 4, 0, 0});
+  const Eigen::Vector2d right_below = image_of({10, 4, 0, 0});
   const double focal_scale_px = DefocusScaleMm(camera.lens, image_distance_mm) / 0.006;
   ExpectNear(right_below,
              camera.sensor.principal_point_px + focal_scale_px * Eigen::Vector2d(10, 4) / 640);
@@ -364,10 +364,10 @@ TEST(DefaultGrid, OneRayAPixelInEveryView) {
     for (const int i : {0, 111, 639}) {
       const int j = 479 - i / 2;
       const Ray ray = grid.RayAt(i, j, k, 4);
-      const Eigen::Vector2d picture_px = PicturePositionPx(
+      const Eigen::Vector2d image_px = ImagePositionPx(
           camera.sensor, LandingPointMm(camera.lens, camera.image_distance_mm(), grid.planes, ray));
-      EXPECT_NEAR(picture_px.x(), i, 1e-8);
-      EXPECT_NEAR(picture_px.y(), j, 1e-8);
+      EXPECT_NEAR(image_px.x(), i, 1e-8);
+      EXPECT_NEAR(image_px.y(), j, 1e-8);
     }
   }
 }
@@ -406,12 +406,12 @@ TEST(GridOnPlanes, ViewsCrossTheApertureInTheSamples) {
         EXPECT_NEAR(step_mm.y(), samples.v_step_mm, 1e-11);
       }
       // One s-step is one pixel.
-      const auto picture_of = [&](int i) {
-        return PicturePositionPx(camera.sensor,
-                                 LandingPointMm(camera.lens, camera.image_distance_mm(), planes,
-                                                grid.RayAt(i, 0, 2, 2)));
+      const auto image_of = [&](int i) {
+        return ImagePositionPx(camera.sensor,
+                               LandingPointMm(camera.lens, camera.image_distance_mm(), planes,
+                                              grid.RayAt(i, 0, 2, 2)));
       };
-      EXPECT_NEAR(std::abs(picture_of(41).x() - picture_of(40).x()), 1, 1e-10);
+      EXPECT_NEAR(std::abs(image_of(41).x() - image_of(40).x()), 1, 1e-10);
     }
   }
 }
@@ -472,12 +472,12 @@ TEST(Disparity, IsTheShiftBetweenViews) {
   for (const double depth_mm : {100.0, 400.0, 640.0, 3000.0}) {
     const double disparity_px = DisparityPx(camera, step_mm, depth_mm);
     for (const int a : {-3, 1, 2}) {
-      const auto picture_x = [&](double aperture_mm) {
+      const auto image_x = [&](double aperture_mm) {
         const double landing_mm =
             oracle.Landing(20, depth_mm, aperture_mm, camera.image_distance_mm());
-        return PicturePositionPx(camera.sensor, {landing_mm, 0}).x();
+        return ImagePositionPx(camera.sensor, {landing_mm, 0}).x();
       };
-      EXPECT_NEAR(picture_x(a * step_mm), picture_x(0) - a * disparity_px, 1e-8);
+      EXPECT_NEAR(image_x(a * step_mm), image_x(0) - a * disparity_px, 1e-8);
     }
   }
   EXPECT_GT(DisparityPx(camera, step_mm, 100), 0);

@@ -80,13 +80,13 @@ TEST(LightField, IsMadeEmptyWithUniformWeights) {
 }
 
 TEST(LightField, AViewHasItsChannelsInterleaved) {
-  const LinearPicture picture = ViewPicture(Numbered(3), 1, 4);
-  ASSERT_EQ(picture.width_px, kS);
-  ASSERT_EQ(picture.height_px, kT);
-  ASSERT_EQ(picture.channels, 3);
+  const LinearImage image = ViewImage(Numbered(3), 1, 4);
+  ASSERT_EQ(image.width_px, kS);
+  ASSERT_EQ(image.height_px, kT);
+  ASSERT_EQ(image.channels, 3);
   for (int t = 0; t < kT; ++t) {
     for (int s = 0; s < kS; ++s) {
-      for (int c = 0; c < 3; ++c) EXPECT_EQ(picture.at(s, t, c), Digits(c, 4, 1, t, s));
+      for (int c = 0; c < 3; ++c) EXPECT_EQ(image.at(s, t, c), Digits(c, 4, 1, t, s));
     }
   }
 }
@@ -99,7 +99,7 @@ TEST(LightField, SettingEveryViewGivesTheSameLightField) {
     for (int l = 0; l < kV; ++l) {
       for (int k = 0; k < kU; ++k) {
         EXPECT_FALSE(to.IsPresent(k, l));
-        SetView(&to, k, l, ViewPicture(from, k, l));
+        SetView(&to, k, l, ViewImage(from, k, l));
         EXPECT_TRUE(to.IsPresent(k, l));
       }
     }
@@ -109,18 +109,18 @@ TEST(LightField, SettingEveryViewGivesTheSameLightField) {
 
 TEST(LightField, AViewOutsideOrOfAnotherSizeIsRefused) {
   LightField light_field = Numbered(3);
-  EXPECT_THAT(ErrorOf([&] { ViewPicture(light_field, 3, 0); }),
+  EXPECT_THAT(ErrorOf([&] { ViewImage(light_field, 3, 0); }),
               AllOf(HasSubstr("(3, 0)"), HasSubstr("from 0 to 2"), HasSubstr("from 0 to 4")));
-  EXPECT_THAT(ErrorOf([&] { ViewPicture(light_field, 0, -1); }), HasSubstr("(0, -1)"));
-  EXPECT_THAT(ErrorOf([&] { ViewPicture(light_field, 0, 5); }), HasSubstr("(0, 5)"));
-  LinearPicture picture = ViewPicture(light_field, 0, 0);
-  EXPECT_THAT(ErrorOf([&] { SetView(&light_field, -1, 0, picture); }), HasSubstr("(-1, 0)"));
-  picture.width_px = 4;
-  EXPECT_THAT(ErrorOf([&] { SetView(&light_field, 2, 1, picture); }),
+  EXPECT_THAT(ErrorOf([&] { ViewImage(light_field, 0, -1); }), HasSubstr("(0, -1)"));
+  EXPECT_THAT(ErrorOf([&] { ViewImage(light_field, 0, 5); }), HasSubstr("(0, 5)"));
+  LinearImage image = ViewImage(light_field, 0, 0);
+  EXPECT_THAT(ErrorOf([&] { SetView(&light_field, -1, 0, image); }), HasSubstr("(-1, 0)"));
+  image.width_px = 4;
+  EXPECT_THAT(ErrorOf([&] { SetView(&light_field, 2, 1, image); }),
               AllOf(HasSubstr("view (2, 1)"), HasSubstr("4x4"), HasSubstr("5x4")));
-  picture = ViewPicture(light_field, 0, 0);
-  picture.values.pop_back();
-  EXPECT_THAT(ErrorOf([&] { SetView(&light_field, 2, 1, picture); }), HasSubstr("view (2, 1)"));
+  image = ViewImage(light_field, 0, 0);
+  image.values.pop_back();
+  EXPECT_THAT(ErrorOf([&] { SetView(&light_field, 2, 1, image); }), HasSubstr("view (2, 1)"));
 }
 
 TEST(InnerViews, AreThoseInTheMiddle) {
@@ -130,7 +130,7 @@ TEST(InnerViews, AreThoseInTheMiddle) {
   ASSERT_EQ(inner.u_count, 1);
   ASSERT_EQ(inner.v_count, 3);
   for (int l = 0; l < 3; ++l)
-    EXPECT_EQ(ViewPicture(inner, 0, l).values, ViewPicture(all, 1, l + 1).values);
+    EXPECT_EQ(ViewImage(inner, 0, l).values, ViewImage(all, 1, l + 1).values);
   // Their shares among themselves stay, and so do the places they were seen from.
   EXPECT_NEAR(inner.weights(0, 0) / inner.weights(1, 0), all.weights(1, 1) / all.weights(2, 1),
               1e-14);
@@ -173,7 +173,7 @@ TEST(CropViews, CutsEveryViewAndMovesTheAxis) {
   EXPECT_EQ(WhyInvalid(cropped), "(valid)");
   for (int l = 0; l < kV; ++l) {
     for (int k = 0; k < kU; ++k) {
-      const LinearPicture view = ViewPicture(cropped, k, l);
+      const LinearImage view = ViewImage(cropped, k, l);
       for (int t = 0; t < 2; ++t) {
         for (int s = 0; s < 3; ++s) {
           for (int c = 0; c < 3; ++c) EXPECT_EQ(view.at(s, t, c), Digits(c, l, k, t + 1, s + 2));
@@ -189,20 +189,20 @@ TEST(CropViews, CutsEveryViewAndMovesTheAxis) {
   EXPECT_EQ(CropViews(all, {0, 0, kS, kT}).values, all.values);
 }
 
-TEST(CropPicture, CutsPicturesAndDepthAlike) {
+TEST(CropImage, CutsImagesAndDepthAlike) {
   const PixelRect rect{1, 2, 2, 1};
-  const LinearPicture light{4, 3, 2, {0,  1,  2,  3,  4,  5,  6,  7,  8,  9,  10, 11,
-                                      12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23}};
-  EXPECT_THAT(CropPicture(light, rect).values, ElementsAre(18, 19, 20, 21));
-  StoredPicture stored{4, 3, 1, 16, {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11}};
-  EXPECT_THAT(CropPicture(stored, rect).values, ElementsAre(9, 10));
-  EXPECT_EQ(CropPicture(stored, rect).bits, 16);
+  const LinearImage light{4, 3, 2, {0,  1,  2,  3,  4,  5,  6,  7,  8,  9,  10, 11,
+                                    12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23}};
+  EXPECT_THAT(CropImage(light, rect).values, ElementsAre(18, 19, 20, 21));
+  EncodedImage stored{4, 3, 1, 16, {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11}};
+  EXPECT_THAT(CropImage(stored, rect).values, ElementsAre(9, 10));
+  EXPECT_EQ(CropImage(stored, rect).bits, 16);
   const RawDepthMap map{4, 3, {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11}, true};
   EXPECT_THAT(CropDepth(map, rect).values, ElementsAre(9, 10));
   EXPECT_TRUE(CropDepth(map, rect).integer);
 }
 
-TEST(CropPicture, ARectangleThatLeavesThePictureIsRefused) {
+TEST(CropImage, ARectangleThatLeavesTheImageIsRefused) {
   const RawDepthMap map{4, 3, std::vector<float>(12), false};
   constexpr int kHuge = std::numeric_limits<int>::max();
   for (const PixelRect& rect :

@@ -47,7 +47,7 @@ Camera BenchCamera(double focus_depth_mm = 640) {
   return CameraFor({12.5, 12.8, 3.0, 4.46}, focus_depth_mm);
 }
 
-LinearPicture GreyPicture(int width = kWidth, int height = kHeight) {
+LinearImage GreyImage(int width = kWidth, int height = kHeight) {
   return {
       width, height, 1,
       std::vector<float>(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), 0.5F)};
@@ -108,7 +108,7 @@ TEST(MakeScene, RangeIsTheLengthOfTheChiefRay) {
     }
     ASSERT_GT(largest_ratio, 1.02);
     const Scene scene =
-        MakeScene(camera, GreyPicture(), map, Convention(DepthKind::kRange, 1000), "range.pfm");
+        MakeScene(camera, GreyImage(), map, Convention(DepthKind::kRange, 1000), "range.pfm");
     for (std::size_t i = 0; i < kCount; ++i) {
       EXPECT_NEAR(scene.depth_mm[i], depth_mm[i], 1e-6 * depth_mm[i]);
     }
@@ -134,7 +134,7 @@ TEST(MakeScene, DisparityIsTheShiftBetweenTracedViews) {
         const double disparity_px = (right_mm - centre_mm) / camera.sensor.pixel_pitch_mm;
         map.values[i] = static_cast<float>((disparity_px - 0.125) / -2.5);
       }
-      const Scene scene = MakeScene(camera, GreyPicture(), map, convention, "disparity.pfm");
+      const Scene scene = MakeScene(camera, GreyImage(), map, convention, "disparity.pfm");
       // A float near .05 has steps of 4e-9, which is 1e-4 of the smallest disparity used.
       for (std::size_t i = 0; i < kCount; ++i) {
         EXPECT_NEAR(scene.depth_mm[i], depth_mm[i], 3e-4 * depth_mm[i]);
@@ -148,12 +148,12 @@ TEST(MakeScene, DisparityZeroIsThePlaneOfFocusInFloatMapsAndAHoleInIntegerOnes) 
   RawDepthMap map = MapOf(0);
   map.values[5] = 0.002F;
   const DepthConvention convention = Convention(DepthKind::kDisparity);
-  const Scene as_float = MakeScene(camera, GreyPicture(), map, convention, "d.pfm");
+  const Scene as_float = MakeScene(camera, GreyImage(), map, convention, "d.pfm");
   EXPECT_NEAR(as_float.depth_mm[0], 640, 1e-3);
   EXPECT_LT(as_float.depth_mm[5], 640);
   EXPECT_EQ(as_float.depth.holes, 0U);
   map.integer = true;
-  const Scene as_integer = MakeScene(camera, GreyPicture(), map, convention, "d.png");
+  const Scene as_integer = MakeScene(camera, GreyImage(), map, convention, "d.png");
   EXPECT_TRUE(std::isnan(as_integer.depth_mm[0]));
   EXPECT_EQ(as_integer.depth.valid, 1U);
   EXPECT_EQ(as_integer.depth_mm[5], as_float.depth_mm[5]);
@@ -169,7 +169,7 @@ TEST(MakeScene, DisparityAtOrBehindInfinityIsAHole) {
   map.values[0] = static_cast<float>(at_infinity_px * 1.001);
   map.values[1] = -3;
   map.values[2] = static_cast<float>(at_infinity_px * 0.99);
-  const Scene scene = MakeScene(camera, GreyPicture(), map, convention, "d.pfm");
+  const Scene scene = MakeScene(camera, GreyImage(), map, convention, "d.pfm");
   EXPECT_TRUE(std::isnan(scene.depth_mm[0]));
   EXPECT_TRUE(std::isnan(scene.depth_mm[1]));
   EXPECT_NEAR(scene.depth_mm[2], 64000, 100);
@@ -178,7 +178,7 @@ TEST(MakeScene, DisparityAtOrBehindInfinityIsAHole) {
   RawDepthMap near = MapOf(0.01F);
   near.values[0] = 0;
   const Scene far_focus = MakeScene(BenchCamera(std::numeric_limits<double>::infinity()),
-                                    GreyPicture(), near, convention, "d.pfm");
+                                    GreyImage(), near, convention, "d.pfm");
   EXPECT_TRUE(std::isnan(far_focus.depth_mm[0]));
   EXPECT_EQ(far_focus.depth.holes, 1U);
 }
@@ -194,7 +194,7 @@ TEST(MakeScene, HolesOfZAndRangeAndTheStatistics) {
       map.values[10] = 5000;
       map.values[20] = 2500;
       map.values[30] = 7500;
-      const Scene scene = MakeScene(BenchCamera(), GreyPicture(), map,
+      const Scene scene = MakeScene(BenchCamera(), GreyImage(), map,
                                     Convention(kind, DepthUnitMm("tum5000")), "depth.png");
       EXPECT_EQ(scene.depth.valid, 3U);
       EXPECT_EQ(scene.depth.holes, kCount - 3);
@@ -211,33 +211,32 @@ TEST(MakeScene, HolesOfZAndRangeAndTheStatistics) {
   }
 }
 
-TEST(MakeScene, KeepsThePicture) {
-  LinearPicture picture = GreyPicture();
-  picture.values[17] = 0.25F;
+TEST(MakeScene, KeepsTheImage) {
+  LinearImage image = GreyImage();
+  image.values[17] = 0.25F;
   const Scene scene =
-      MakeScene(BenchCamera(), picture, MapOf(600), Convention(DepthKind::kZ), "z.pfm");
-  EXPECT_EQ(scene.picture.values, picture.values);
-  EXPECT_EQ(scene.picture.at(8, 1, 0), 0.25F);
+      MakeScene(BenchCamera(), image, MapOf(600), Convention(DepthKind::kZ), "z.pfm");
+  EXPECT_EQ(scene.image.values, image.values);
+  EXPECT_EQ(scene.image.at(8, 1, 0), 0.25F);
 }
 
 TEST(MakeScene, ZNeedsNoCalibration) {
   Camera camera = BenchCamera();
   camera.calibration.reset();
-  EXPECT_NO_THROW(MakeScene(camera, GreyPicture(), MapOf(600), Convention(DepthKind::kZ), "z.pfm"));
-  EXPECT_THROW(MakeScene(camera, GreyPicture(), MapOf(600), Convention(DepthKind::kRange), "z.pfm"),
+  EXPECT_NO_THROW(MakeScene(camera, GreyImage(), MapOf(600), Convention(DepthKind::kZ), "z.pfm"));
+  EXPECT_THROW(MakeScene(camera, GreyImage(), MapOf(600), Convention(DepthKind::kRange), "z.pfm"),
                Error);
 }
 
 TEST(MakeScene, SizeMismatchNamesBothSizes) {
   const std::string message = MessageOf([] {
-    MakeScene(BenchCamera(), GreyPicture(8, 7), MapOf(600), Convention(DepthKind::kZ), "depth.png");
+    MakeScene(BenchCamera(), GreyImage(8, 7), MapOf(600), Convention(DepthKind::kZ), "depth.png");
   });
   ExpectSays(message, {"depth.png", "9x7", "8x7"});
   RawDepthMap broken = MapOf(600);
   broken.values.pop_back();
   EXPECT_THROW(
-      MakeScene(BenchCamera(), GreyPicture(), broken, Convention(DepthKind::kZ), "depth.png"),
-      Error);
+      MakeScene(BenchCamera(), GreyImage(), broken, Convention(DepthKind::kZ), "depth.png"), Error);
 }
 
 TEST(MakeScene, NegativeDepthNamesThePixel) {
@@ -245,7 +244,7 @@ TEST(MakeScene, NegativeDepthNamesThePixel) {
     RawDepthMap map = MapOf(600);
     map.values[IndexOf(4, 2)] = -3.5F;
     ExpectSays(MessageOf([&] {
-                 MakeScene(BenchCamera(), GreyPicture(), map, Convention(kind), "depth.pfm");
+                 MakeScene(BenchCamera(), GreyImage(), map, Convention(kind), "depth.pfm");
                }),
                {"depth.pfm", "(4, 2)", "-3.5"});
   }
@@ -254,7 +253,7 @@ TEST(MakeScene, NegativeDepthNamesThePixel) {
 TEST(MakeScene, AllHolesIsAnError) {
   for (const float value : {0.0F, kNan, kInfinity}) {
     ExpectSays(MessageOf([&] {
-                 MakeScene(BenchCamera(), GreyPicture(), MapOf(value), Convention(DepthKind::kZ),
+                 MakeScene(BenchCamera(), GreyImage(), MapOf(value), Convention(DepthKind::kZ),
                            "empty.png");
                }),
                {"empty.png", "holes"});
@@ -265,29 +264,29 @@ TEST(MakeScene, WrongUnitStopsWithTheNumbers) {
   RawDepthMap millimetres = MapOf(600);
   millimetres.values[0] = 400;
   millimetres.values[1] = 1500;
-  EXPECT_NO_THROW(MakeScene(BenchCamera(), GreyPicture(), millimetres,
+  EXPECT_NO_THROW(MakeScene(BenchCamera(), GreyImage(), millimetres,
                             Convention(DepthKind::kZ, DepthUnitMm("mm")), "z.png"));
   // Millimetres taken for metres.
   ExpectSays(MessageOf([&] {
-               MakeScene(BenchCamera(), GreyPicture(), millimetres,
+               MakeScene(BenchCamera(), GreyImage(), millimetres,
                          Convention(DepthKind::kZ, DepthUnitMm("m")), "z.png");
              }),
              {"z.png", "400000", "600000", "1.5e+06", "median", "mm", "unit"});
   RawDepthMap metres = MapOf(0.6F);
   metres.values[0] = 0.4F;
   metres.values[1] = 1.5F;
-  EXPECT_NO_THROW(MakeScene(BenchCamera(), GreyPicture(), metres,
+  EXPECT_NO_THROW(MakeScene(BenchCamera(), GreyImage(), metres,
                             Convention(DepthKind::kZ, DepthUnitMm("m")), "z.png"));
   // Metres taken for millimetres: nearer than the front focal point.
   ExpectSays(MessageOf([&] {
-               MakeScene(BenchCamera(), GreyPicture(), metres,
+               MakeScene(BenchCamera(), GreyImage(), metres,
                          Convention(DepthKind::kZ, DepthUnitMm("mm")), "z.png");
              }),
              {"z.png", "0.4 to 1.5 mm", "median 0.6 mm", "front focal point at 12.5 mm"});
   // The same with a room seen by a phone's lens, where the wrong depths are beyond f1 = 4 mm.
   const Camera phone = CameraFor({4, 4, 0, 1}, 3000);
   ExpectSays(MessageOf([&] {
-               MakeScene(phone, GreyPicture(), MapOf(4.5F),
+               MakeScene(phone, GreyImage(), MapOf(4.5F),
                          Convention(DepthKind::kZ, DepthUnitMm("mm")), "room.pfm");
              }),
              {"room.pfm", "4.5", "3000", "1000"});
@@ -299,19 +298,18 @@ TEST(MakeScene, FarAndNearScenesPass) {
   RawDepthMap landscape = MapOf(3e5F);
   landscape.values[7] = 5000;
   const DepthConvention z = Convention(DepthKind::kZ);
-  EXPECT_NO_THROW(MakeScene(BenchCamera(), GreyPicture(), landscape, z, "z.pfm"));
-  EXPECT_NO_THROW(MakeScene(BenchCamera(5000), GreyPicture(), MapOf(3e5F), z, "z.pfm"));
+  EXPECT_NO_THROW(MakeScene(BenchCamera(), GreyImage(), landscape, z, "z.pfm"));
+  EXPECT_NO_THROW(MakeScene(BenchCamera(5000), GreyImage(), MapOf(3e5F), z, "z.pfm"));
   const Camera at_infinity = BenchCamera(std::numeric_limits<double>::infinity());
-  EXPECT_NO_THROW(MakeScene(at_infinity, GreyPicture(), MapOf(100), z, "z.pfm"));
-  EXPECT_NO_THROW(MakeScene(at_infinity, GreyPicture(), MapOf(3e6F), z, "z.pfm"));
+  EXPECT_NO_THROW(MakeScene(at_infinity, GreyImage(), MapOf(100), z, "z.pfm"));
+  EXPECT_NO_THROW(MakeScene(at_infinity, GreyImage(), MapOf(3e6F), z, "z.pfm"));
 }
 
 TEST(MakeScene, RefusesImpossibleConventions) {
   const auto expect_refusal = [](const std::string& named, const DepthConvention& convention) {
-    ExpectSays(MessageOf([&] {
-                 MakeScene(BenchCamera(), GreyPicture(), MapOf(1), convention, "map.pfm");
-               }),
-               {"map.pfm", named});
+    ExpectSays(
+        MessageOf([&] { MakeScene(BenchCamera(), GreyImage(), MapOf(1), convention, "map.pfm"); }),
+        {"map.pfm", named});
   };
   expect_refusal("unit", Convention(DepthKind::kZ, 0));
   expect_refusal("unit", Convention(DepthKind::kRange, std::nan("")));
@@ -338,59 +336,59 @@ TEST(Depth, NamesAndUnits) {
   ExpectSays(MessageOf([] { DepthUnitMm("inch"); }), {"inch", "mm", "cm", "m", "tum5000"});
 }
 
-TEST(Picture, EveryStoredValueSurvivesLinearLightAndBack) {
+TEST(Image, EveryEncodedValueSurvivesLinearLightAndBack) {
   for (const TransferCurve& curve :
        {TransferCurve::Srgb(), TransferCurve::Gamma(2.2), TransferCurve::Linear()}) {
     SCOPED_TRACE(curve.Name());
     for (const int bits : {8, 16}) {
-      StoredPicture picture{256, bits == 8 ? 1 : 256, 1, bits, {}};
+      EncodedImage image{256, bits == 8 ? 1 : 256, 1, bits, {}};
       const int count = bits == 8 ? 256 : 65536;
       for (int value = 0; value < count; ++value) {
-        picture.values.push_back(static_cast<std::uint16_t>(value));
+        image.values.push_back(static_cast<std::uint16_t>(value));
       }
-      const LinearPicture linear = ToLinear(picture, curve);
+      const LinearImage linear = ToLinear(image, curve);
       EXPECT_EQ(linear.values.front(), 0);
       EXPECT_EQ(linear.values.back(), 1);
-      EXPECT_EQ(ToStored(linear, curve, bits).values, picture.values);
+      EXPECT_EQ(ToEncoded(linear, curve, bits).values, image.values);
     }
   }
 }
 
-TEST(Picture, StoringClipsAndRounds) {
-  const LinearPicture picture{6, 1, 1, {-0.2F, 1.7F, kNan, 0.5F / 255, 0.49F / 255, kInfinity}};
-  const StoredPicture stored = ToStored(picture, TransferCurve::Linear(), 8);
+TEST(Image, StoringClipsAndRounds) {
+  const LinearImage image{6, 1, 1, {-0.2F, 1.7F, kNan, 0.5F / 255, 0.49F / 255, kInfinity}};
+  const EncodedImage stored = ToEncoded(image, TransferCurve::Linear(), 8);
   EXPECT_EQ(stored.values, (std::vector<std::uint16_t>{0, 255, 0, 1, 0, 255}));
   EXPECT_EQ(stored.bits, 8);
-  EXPECT_THROW(ToStored(picture, TransferCurve::Linear(), 12), Error);
+  EXPECT_THROW(ToEncoded(image, TransferCurve::Linear(), 12), Error);
 }
 
-TEST(Picture, RefusesWrongSizesAndValues) {
-  StoredPicture picture{2, 1, 1, 8, {3, 256}};
-  EXPECT_THROW(ToLinear(picture, TransferCurve::Srgb()), Error);
-  picture.values = {3};
-  EXPECT_THROW(ToLinear(picture, TransferCurve::Srgb()), Error);
-  picture.values = {3, 4};
-  EXPECT_NO_THROW(ToLinear(picture, TransferCurve::Srgb()));
-  picture.bits = 10;
-  EXPECT_THROW(ToLinear(picture, TransferCurve::Srgb()), Error);
+TEST(Image, RefusesWrongSizesAndValues) {
+  EncodedImage image{2, 1, 1, 8, {3, 256}};
+  EXPECT_THROW(ToLinear(image, TransferCurve::Srgb()), Error);
+  image.values = {3};
+  EXPECT_THROW(ToLinear(image, TransferCurve::Srgb()), Error);
+  image.values = {3, 4};
+  EXPECT_NO_THROW(ToLinear(image, TransferCurve::Srgb()));
+  image.bits = 10;
+  EXPECT_THROW(ToLinear(image, TransferCurve::Srgb()), Error);
 }
 
-TEST(Picture, GreyIsTakenInLinearLight) {
-  const StoredPicture stored{1, 1, 3, 8, {255, 128, 0}};
-  const LinearPicture grey = ToGrey(ToLinear(stored, TransferCurve::Srgb()));
+TEST(Image, GreyIsTakenInLinearLight) {
+  const EncodedImage stored{1, 1, 3, 8, {255, 128, 0}};
+  const LinearImage grey = ToGrey(ToLinear(stored, TransferCurve::Srgb()));
   EXPECT_EQ(grey.channels, 1);
   EXPECT_EQ(grey.width_px, 1);
   ASSERT_EQ(grey.values.size(), 1U);
   EXPECT_NEAR(grey.values[0], 0.2126 + 0.7152 * 0.2158605, 1e-6);
 }
 
-TEST(Picture, GreyDropsAlpha) {
-  const LinearPicture rgba{2, 1, 4, {0.1F, 0.2F, 0.3F, 0.9F, 0.4F, 0.5F, 0.6F, 0.0F}};
-  const LinearPicture rgb{2, 1, 3, {0.1F, 0.2F, 0.3F, 0.4F, 0.5F, 0.6F}};
+TEST(Image, GreyDropsAlpha) {
+  const LinearImage rgba{2, 1, 4, {0.1F, 0.2F, 0.3F, 0.9F, 0.4F, 0.5F, 0.6F, 0.0F}};
+  const LinearImage rgb{2, 1, 3, {0.1F, 0.2F, 0.3F, 0.4F, 0.5F, 0.6F}};
   EXPECT_EQ(ToGrey(rgba).values, ToGrey(rgb).values);
-  const LinearPicture grey{2, 1, 1, {0.1F, 0.7F}};
+  const LinearImage grey{2, 1, 1, {0.1F, 0.7F}};
   EXPECT_EQ(ToGrey(grey).values, grey.values);
-  const LinearPicture two{1, 1, 2, {0.1F, 0.7F}};
+  const LinearImage two{1, 1, 2, {0.1F, 0.7F}};
   EXPECT_THROW(ToGrey(two), Error);
 }
 

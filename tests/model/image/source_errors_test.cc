@@ -22,12 +22,12 @@ using thicklens::testing::TestCameraFocusedAt;
 using thicklens::testing::TestSensor;
 using thicklens::testing::WideLens;
 
-constexpr int kPictureSide = 4;
+constexpr int kImageSide = 4;
 constexpr int kViewSide = 3;
 
 Camera SmallCamera() {
   return TestCameraFocusedAt(640, "", WideLens(),
-                             TestSensor(kPictureSide, kPictureSide, 0.006, {1.5, 1.5}));
+                             TestSensor(kImageSide, kImageSide, 0.006, {1.5, 1.5}));
 }
 
 // H, XY x STUV: each ray lands by [S16] and gives its weight to the nearest pixel (the unit
@@ -43,16 +43,16 @@ Eigen::MatrixXd ProjectionMatrix(const Camera& camera, const LightFieldGrid& gri
         for (int i = 0; i < grid.s_count; ++i, ++column) {
           const Ray ray = grid.RayAt(i, j, k, l);
           const double d1 = camera.image_distance_mm();
-          const Eigen::Vector2d picture_px =
-              PicturePositionPx(camera.sensor, LandingPointMm(camera.lens, d1, grid.planes, ray));
-          const double x = std::floor(picture_px.x() + 0.5);
-          const double y = std::floor(picture_px.y() + 0.5);
-          if (x < 0 || y < 0 || x >= kPictureSide || y >= kPictureSide) continue;
+          const Eigen::Vector2d image_px =
+              ImagePositionPx(camera.sensor, LandingPointMm(camera.lens, d1, grid.planes, ray));
+          const double x = std::floor(image_px.x() + 0.5);
+          const double y = std::floor(image_px.y() + 0.5);
+          if (x < 0 || y < 0 || x >= kImageSide || y >= kImageSide) continue;
           const double weight =
               RelativeIrradiance(camera.lens, d1, grid.planes, ray) *
               ApertureTransmission(camera.psf, camera.blur_ratio(), camera.lens.aperture_radius_mm,
                                    ApertureCrossingMm(grid.planes, ray));
-          h(static_cast<Eigen::Index>(y) * kPictureSide + static_cast<Eigen::Index>(x), column) =
+          h(static_cast<Eigen::Index>(y) * kImageSide + static_cast<Eigen::Index>(x), column) =
               weight;
         }
       }
@@ -75,7 +75,7 @@ TEST(SourceErrors, ProjectionMatrixHasDependentColumns) {
   const std::vector<Eigen::MatrixXd> matrices = ProjectionMatrices();
   ASSERT_FALSE(matrices[0].isApprox(matrices[1]));
   for (const Eigen::MatrixXd& h : matrices) {
-    const Eigen::Index pixels = Eigen::Index{kPictureSide} * kPictureSide;
+    const Eigen::Index pixels = Eigen::Index{kImageSide} * kImageSide;
     const Eigen::Index rays = pixels * kViewSide * kViewSide;
     ASSERT_EQ(h.rows(), pixels);
     ASSERT_EQ(h.cols(), rays);
@@ -85,7 +85,7 @@ TEST(SourceErrors, ProjectionMatrixHasDependentColumns) {
     const Eigen::MatrixXd normal = h.transpose() * h;
     EXPECT_LE(Eigen::FullPivLU<Eigen::MatrixXd>(normal).rank(), pixels);
 
-    // A light field that is not 0 and gives a black picture: two rays of one pixel against each
+    // A light field that is not 0 and gives a black image: two rays of one pixel against each
     // other.
     std::vector<Eigen::Index> struck;
     for (Eigen::Index column = 0; column < rays; ++column) {

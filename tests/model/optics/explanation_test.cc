@@ -123,7 +123,7 @@ TEST(ExplainCamera, SaysAtWhichDepthsThinIsAsGoodAsThick) {
   // With rho = K (1 - f2/f1) both lenses are the same but for that; 0.01 mm are more.
   camera.lens = {50, 50.01, 50000 / 950.0 * (1 - 50.01 / 50) + 0.01, 10};
   camera.calibration->image_distance_mm->value = ImageDistanceMm(camera.lens, 1000);
-  const ThickLens thin = ThinCounterpart(camera.lens);
+  const ThickLens thin = ThinLensEquivalent(camera.lens);
   const double d1_mm = camera.image_distance_mm();
   const auto apart_px = [&](double depth_mm) {
     return 10 / kPitchMm *

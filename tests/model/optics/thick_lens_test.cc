@@ -158,8 +158,8 @@ TEST(ThickLens, BecomesThinWithoutThicknessAndWithEqualFocalLengths) {
   EXPECT_EQ(RearNodalDistanceMm(thin), 0);
 }
 
-TEST(ThickLens, ThinCounterpartKeepsFrontFocalLengthAndAperture) {
-  const ThickLens thin = ThinCounterpart(BenchLens());
+TEST(ThickLens, ThinLensEquivalentKeepsFrontFocalLengthAndAperture) {
+  const ThickLens thin = ThinLensEquivalent(BenchLens());
   EXPECT_EQ(thin.front_focal_length_mm, 12.5);
   EXPECT_EQ(thin.rear_focal_length_mm, 12.5);
   EXPECT_EQ(thin.lens_thickness_mm, 0);

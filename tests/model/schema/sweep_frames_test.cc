@@ -1,4 +1,4 @@
-// The pictures of a sweep and their readings: tables, folders and lists.
+// The images of a sweep and their readings: tables, folders and lists.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -73,7 +73,7 @@ TEST_F(SweepFolder, TableErrorsNameTheLine) {
 TEST_F(SweepFolder, FilesWithoutARowAreNamed) {
   EXPECT_THAT(ErrorOfTable("b.png,1\n"),
               AllOf(HasSubstr("a.png"), HasSubstr("no row"), HasSubstr("2 such")));
-  // Neither hidden files nor files that are no pictures.
+  // Neither hidden files nor files that are no images.
   folder_.Put("._a.png");
   folder_.Put("notes.txt");
   ReadTable("a.png,1\nb.png,2\nc.png,3\n", "reading_sigma_mm: 0\n");

@@ -1,4 +1,4 @@
-// Noise of simulated pictures against its model, value by value: electrons of a Poisson
+// Noise of simulated images against its model, value by value: electrons of a Poisson
 // distribution, a Gaussian of the reading, the transfer curve, rounding.
 #include <gtest/gtest.h>
 
@@ -21,14 +21,14 @@ using thicklens::testing::MacroScene;
 
 struct Sensitivity {
   double full_well = 0, read_noise = 0;  // electrons; no full well: no noise of electrons
-  double stored_sigma = 0;               // of stored values, in full scales
+  double encoded_sigma = 0;              // of encoded values, in full scales
 };
 
-// Share of stored values below `value` + 1/2, of 255, for one linear light.
+// Share of encoded values below `value` + 1/2, of 255, for one linear light.
 double ShareUpTo(int value, double light, const Sensitivity& sensor, const TransferCurve& curve) {
   if (value >= 255) return 1;
-  if (sensor.stored_sigma > 0) {
-    return GaussianShare((value + 0.5) / 255 - curve.Encode(light), sensor.stored_sigma);
+  if (sensor.encoded_sigma > 0) {
+    return GaussianShare((value + 0.5) / 255 - curve.Encode(light), sensor.encoded_sigma);
   }
   const double limit = sensor.full_well * curve.Decode((value + 0.5) / 255);  // electrons
   const double mean = sensor.full_well * light;
@@ -42,7 +42,7 @@ double ShareUpTo(int value, double light, const Sensitivity& sensor, const Trans
   return share;
 }
 
-// Chi-square of stored values over the classes in which at least 20 are expected, the rest in one:
+// Chi-square of encoded values over the classes in which at least 20 are expected, the rest in one:
 // within 4.5 of its own standard deviations.
 void ExpectDistribution(const std::vector<std::uint16_t>& values, double light,
                         const Sensitivity& sensor, const TransferCurve& curve) {
@@ -68,10 +68,10 @@ void ExpectDistribution(const std::vector<std::uint16_t>& values, double light,
   EXPECT_GT(chi2, classes - 4.5 * std::sqrt(2.0 * classes) - 5) << classes << " classes";
 }
 
-// The first is prime: no number of electrons lies halfway between two stored values.
+// The first is prime: no number of electrons lies halfway between two encoded values.
 const std::vector<Sensitivity> kSensors = {{907, 0, 0}, {907, 7, 0}, {6000, 20, 0}, {0, 0, 0.012}};
 
-TEST(NoiseOraclesTest, StoredPicturesOfScenesFollowTheirDistribution) {
+TEST(NoiseOraclesTest, EncodedImagesOfScenesFollowTheirDistribution) {
   for (const TransferCurve& curve : {TransferCurve::Linear(), TransferCurve::Srgb()}) {
     for (const Sensitivity& sensor : kSensors) {
       for (const double light : {0.03, 0.4, 0.97}) {  // the last is cut off at full scale
@@ -84,9 +84,8 @@ TEST(NoiseOraclesTest, StoredPicturesOfScenesFollowTheirDistribution) {
         options.camera.sensor.transfer = curve;
         options.full_well_electrons = sensor.full_well;
         options.read_noise_electrons = sensor.read_noise;
-        options.noise_sigma_grey_levels = 255 * sensor.stored_sigma;
-        const LinearPicture flat{200, 200, 3,
-                                 std::vector<float>(120000, static_cast<float>(light))};
+        options.noise_sigma_grey_levels = 255 * sensor.encoded_sigma;
+        const LinearImage flat{200, 200, 3, std::vector<float>(120000, static_cast<float>(light))};
         ExpectDistribution(SceneSimulator(options, {}).Store(flat).values, light, sensor, curve);
       }
     }
@@ -97,7 +96,7 @@ TEST(NoiseOraclesTest, StoredPicturesOfScenesFollowTheirDistribution) {
 TEST(NoiseOraclesTest, FramesOfSweepsFollowTheirDistribution) {
   for (const TransferCurve& curve : {TransferCurve::Linear(), TransferCurve::Gamma(2.2)}) {
     for (const Sensitivity& sensor : kSensors) {
-      if (sensor.stored_sigma > 0) continue;  // sweeps have none
+      if (sensor.encoded_sigma > 0) continue;  // sweeps have none
       for (const double level : {0.05, 0.5}) {
         SCOPED_TRACE(curve.Name() + ", " + std::to_string(sensor.full_well) + " electrons, level " +
                      std::to_string(level));
@@ -115,7 +114,7 @@ TEST(NoiseOraclesTest, FramesOfSweepsFollowTheirDistribution) {
         options.effects.without = {Effect::kFalloff};
         const SweepSimulator simulator(options, {});
         EXPECT_NEAR(simulator.RenderNoiseless(0).at(204, 100, 0), 1.5 * level, 1e-6);
-        const StoredPicture frame = simulator.RenderFrame(0);
+        const EncodedImage frame = simulator.RenderFrame(0);
         std::vector<std::uint16_t> flat;
         for (std::size_t i = 0; i < frame.values.size(); ++i) {
           if (i % 400 > 203) flat.push_back(frame.values[i]);

@@ -186,9 +186,9 @@ void ExpectCountsThatAddUp(const json& rows) {
                 row["frames"].dump());
     EXPECT_EQ(row["sweeps"], 4);
     EXPECT_EQ(row["ok"].get<int>() + row["partial"].get<int>() + row["refused"].get<int>(), 4);
-    int told = 0;
-    for (const auto& [reason, count] : row["reasons"].items()) told += count.get<int>();
-    EXPECT_EQ(row["ok"].get<int>() + told, 4);
+    int reported = 0;
+    for (const auto& [reason, count] : row["reasons"].items()) reported += count.get<int>();
+    EXPECT_EQ(row["ok"].get<int>() + reported, 4);
     ASSERT_EQ(row["seconds_of_sweeps"].size(), 4U);
     EXPECT_LE(row["seconds_least"], row["seconds"]);
     EXPECT_LE(row["seconds"], row["seconds_most"]);
@@ -198,7 +198,7 @@ void ExpectCountsThatAddUp(const json& rows) {
 }
 
 // What no calibration is made from is a row that says so.
-void ExpectRefusalsToBeTold(const json& rows) {
+void ExpectRefusalsToBeReported(const json& rows) {
   for (const json& row : rows) {
     const bool has_few_frames = row["frames"] == 4;
     if (!has_few_frames && row["field_px"] != 16) continue;
@@ -313,7 +313,7 @@ TEST(BenchCalibration, MeasuresEveryMethodOnTheSameSweeps) {
   EXPECT_TRUE(summary["machine"].contains("processor"));
   const json& rows = summary["rows"];
   ExpectCountsThatAddUp(rows);
-  ExpectRefusalsToBeTold(rows);
+  ExpectRefusalsToBeReported(rows);
   ExpectASmallErrorOfTheFit(FirstRowOf(rows, "fit"), FirstRowOf(rows, "fit-no-field"));
   ExpectTheRecipeToBeCheapAndWrong(rows);
   ExpectNoMarkedRowToBeBettered(rows);

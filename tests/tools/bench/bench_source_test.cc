@@ -65,7 +65,7 @@ TEST_F(BenchSourceTest, MeasuresTheFourTables) {
     EXPECT_EQ(row["seconds_of_runs"].size(), 1U);
     EXPECT_GT(row["seconds"].get<double>(), 0);
     EXPECT_TRUE(row["extrapolated_from"].is_null());
-    EXPECT_TRUE(row["published_seconds"].is_null());  // not a picture of the source's size
+    EXPECT_TRUE(row["published_seconds"].is_null());  // not an image of the source's size
     if (row["table"] == 2) {
       EXPECT_GT(row["bandwidth_share"].get<double>(), 0);
       continue;
@@ -89,7 +89,7 @@ TEST_F(BenchSourceTest, MeasuresTheFourTables) {
                                  HasSubstr("Machines differ"), Not(HasSubstr("extrapolated"))));
 }
 
-TEST_F(BenchSourceTest, LargePicturesAreSampledAndSaySo) {
+TEST_F(BenchSourceTest, LargeImagesAreSampledAndSaySo) {
   const nlohmann::json rows =
       Rows({"source", "--size", "160x160", "--views", "2", "--table", "1", "--device", "cpu"});
   ASSERT_GE(rows.size(), 2U);
@@ -113,26 +113,26 @@ TEST_F(BenchSourceTest, LargePicturesAreSampledAndSaySo) {
   EXPECT_THAT(result_.err, HasSubstr("rows with OpenCL are left out"));
 }
 
-TEST_F(BenchSourceTest, TakesAPictureOfOnesOwn) {
+TEST_F(BenchSourceTest, TakesAnImageOfOnesOwn) {
   const BenchScene scene = MakeBenchScene(64, 64, 2, 2, 3, 2, {});
   const model::Camera camera_of_it = BenchCamera(64, 64);
-  model::StoredPicture stored{64, 64, 1, 8, {}};
-  for (const float value : scene.input.picture.values) {
+  model::EncodedImage stored{64, 64, 1, 8, {}};
+  for (const float value : scene.input.image.values) {
     stored.values.push_back(
         static_cast<std::uint16_t>(std::lround(255 * scene.input.transfer.Encode(value))));
   }
   const model::RawDepthMap depth{64, 64, std::vector<float>(64 * 64, 900), false};
-  const std::string picture = folder_.Put("mine.png", io::EncodePng(stored));
+  const std::string image = folder_.Put("mine.png", io::EncodePng(stored));
   const std::string map = folder_.Put("depth.pfm", io::EncodePfm(depth));
   const std::string camera = folder_.Put("camera.yaml", model::CameraToYaml(camera_of_it));
-  const Arguments given = {"source", "--image",      picture, "--depth",  map,    "--depth-kind",
-                           "z",      "--depth-unit", "mm",    "--camera", camera, "--views",
+  const Arguments given = {"source", "--image",      image, "--depth",  map,    "--depth-kind",
+                           "z",      "--depth-unit", "mm",  "--camera", camera, "--views",
                            "2"};
   const nlohmann::json rows = Rows(given);
   std::set<int> tables;
   for (const auto& row : rows) {
     tables.insert(row["table"].get<int>());
-    EXPECT_EQ(row["picture"], "mine");
+    EXPECT_EQ(row["image"], "mine");
     EXPECT_TRUE(row["psnr_true_views_db"].is_null());  // nobody knows its true views
   }
   EXPECT_EQ(tables, (std::set<int>{1, 2, 3, 4}));
@@ -160,44 +160,44 @@ TEST_F(BenchSourceTest, RefusesWhatCannotBeMeant) {
   EXPECT_THAT(refusal({"--depth-kind", "z"}), HasSubstr("--depth-kind"));
 }
 
-// What blocks take grows so fast with the views that fewer parts stand for the picture.
+// What blocks take grows so fast with the views that fewer parts stand for the image.
 TEST(BenchPartsTest, FewerPartsAreOfManyViewsAndStandForAsMuch) {
-  SourcePicture picture;
-  picture.whole = MakeBenchScene(160, 192, 2, 2, 1, 1, {});
+  SourceImage image;
+  image.whole = MakeBenchScene(160, 192, 2, 2, 1, 1, {});
   const auto parts_with = [&](int views, bool full) {
-    picture.rects.clear();
-    picture.parts.clear();
-    picture.sample.reset();
-    picture.views = views;  // of what is to be measured; the scene's own are enough for its parts
-    Cut(full, &picture);
+    image.rects.clear();
+    image.parts.clear();
+    image.sample.reset();
+    image.views = views;  // of what is to be measured; the scene's own are enough for its parts
+    Cut(full, &image);
     double pixels = 0;
-    for (const BenchScene& part : picture.parts) {
-      pixels += static_cast<double>(part.input.picture.values.size());
+    for (const BenchScene& part : image.parts) {
+      pixels += static_cast<double>(part.input.image.values.size());
     }
-    EXPECT_NEAR((full ? 1 : picture.pixels_per_part_pixel) * pixels, 160 * 192, 1e-6);
-    return picture.parts.size();
+    EXPECT_NEAR((full ? 1 : image.pixels_per_part_pixel) * pixels, 160 * 192, 1e-6);
+    return image.parts.size();
   };
   EXPECT_EQ(parts_with(3, false), 4U);
-  EXPECT_EQ(picture.sample->solved, 64);
+  EXPECT_EQ(image.sample->solved, 64);
   EXPECT_EQ(parts_with(5, false), 2U);
-  EXPECT_EQ(picture.sample->solved, 32);
+  EXPECT_EQ(image.sample->solved, 32);
   // Of opposite quarters: they share no row and no column.
-  EXPECT_LE(picture.rects[0].x + picture.rects[0].width, picture.rects[1].x);
-  EXPECT_LE(picture.rects[0].y + picture.rects[0].height, picture.rects[1].y);
+  EXPECT_LE(image.rects[0].x + image.rects[0].width, image.rects[1].x);
+  EXPECT_LE(image.rects[0].y + image.rects[0].height, image.rects[1].y);
   // What compares lenses cuts parts of its own, and as many.
   std::vector<SourceContender> lenses;
-  AddTable4(SourceBench(), picture, &lenses);
+  AddTable4(SourceBench(), image, &lenses);
   ASSERT_EQ(lenses.size(), 2U);
   EXPECT_EQ(lenses[1].row.extrapolated->solved, 32);
   EXPECT_EQ(parts_with(7, false), 1U);
-  EXPECT_EQ(picture.sample->solved, 16);
-  EXPECT_EQ(picture.sample->all, 120);
+  EXPECT_EQ(image.sample->solved, 16);
+  EXPECT_EQ(image.sample->all, 120);
   EXPECT_EQ(parts_with(7, true), 1U);
-  EXPECT_FALSE(picture.sample);
+  EXPECT_FALSE(image.sample);
 }
 
 // What table 4 takes for granted.
-TEST(BenchSceneTest, ThinTwinHasTheSameGridAndDisparities) {
+TEST(BenchSceneTest, ThinLensEquivalentHasTheSameGridAndDisparities) {
   model::Camera thick = BenchCamera(64, 64);
   const double focus_depth_mm = thick.focus_depth_mm();
   thick.lens.rear_focal_length_mm = 12.8;
@@ -205,7 +205,7 @@ TEST(BenchSceneTest, ThinTwinHasTheSameGridAndDisparities) {
   thick.calibration->image_distance_mm =
       model::Estimate{model::ImageDistanceMm(thick.lens, focus_depth_mm), 0};
   const model::LightFieldGrid a = model::DefaultGrid(thick, 5, 5);
-  const model::LightFieldGrid b = model::DefaultGrid(model::ThinTwin(thick), 5, 5);
+  const model::LightFieldGrid b = model::DefaultGrid(model::ThinLensEquivalent(thick), 5, 5);
   EXPECT_NEAR(a.u_step_mm, b.u_step_mm, 1e-12);
   for (const float depth_mm : {400.0F, 999.0F, 5000.0F}) {
     EXPECT_NEAR(estimator::DisparityOnGrid(a, {depth_mm}, 1, 1).disparity[0],
@@ -216,7 +216,7 @@ TEST(BenchSceneTest, ThinTwinHasTheSameGridAndDisparities) {
 TEST(SourceTableText, RowsThatCouldNotBeRunAreListed) {
   SourceRow row;
   row.table = 3;
-  row.picture = "L";
+  row.image = "L";
   row.views = 3;
   row.implementation = "viennacl";
   row.failure = "no device";
@@ -227,7 +227,7 @@ TEST(SourceTableText, RowsThatCouldNotBeRunAreListed) {
 TEST(SourceTableText, PutsThePublishedBesideTheMeasured) {
   SourceRow cpu;
   cpu.table = 2;
-  cpu.picture = "K";
+  cpu.image = "K";
   cpu.views = 7;
   cpu.implementation = "cpu";
   cpu.seconds = {3, 1, 2};
@@ -254,7 +254,7 @@ TEST(SourceTableText, PutsThePublishedBesideTheMeasured) {
   EXPECT_EQ(SourceRowJson(opencl, {cpu, opencl})["times_faster_unlike"], 4);
   EXPECT_EQ(json["times_faster_than"], "cpu");
   EXPECT_NEAR(json["published_seconds"].get<double>(), 0.3325, 1e-12);
-  EXPECT_EQ(json["published_seconds_of_pictures"].size(), 4U);
+  EXPECT_EQ(json["published_seconds_of_images"].size(), 4U);
   EXPECT_EQ(json["extrapolated_from"], nlohmann::json({{"blocks", 4}, {"of", 9}}));
 }
 

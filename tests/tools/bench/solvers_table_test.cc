@@ -95,23 +95,23 @@ TEST(WholeTime, IsMeasuredOrExtrapolatedAndNeverBoth) {
 
 // What is judged of a whole estimate is what stands there in it.
 TEST(ScoredArea, OfAPartIsThatPartOfTheWholeWithoutItsBorder) {
-  SampledPicture picture;
-  picture.whole = MakeBenchScene(160, 160, 3, 3, 4, 2, {});
-  CutParts(false, PartCount::kTwo, &picture);
-  const ScoredArea area = ScoredAreaOf(picture);
+  SampledImage image;
+  image.whole = MakeBenchScene(160, 160, 3, 3, 4, 2, {});
+  CutParts(false, PartCount::kTwo, &image);
+  const ScoredArea area = ScoredAreaOf(image);
   EXPECT_EQ(area.parts, 2);
   EXPECT_EQ(area.width_px, 32);
   EXPECT_EQ(ScoredAreaText(area), "2 areas of 32 x 32 px");
-  const model::LightField warped = estimator::WarpedLightField(picture.whole.input, true, 2);
+  const model::LightField warped = estimator::WarpedLightField(image.whole.input, true, 2);
   double mean_db = 0;
-  for (const model::PixelRect& rect : picture.rects) {
+  for (const model::PixelRect& rect : image.rects) {
     const model::PixelRect inner{rect.x + 16, rect.y + 16, 32, 32};
-    mean_db += estimator::CompareLightFields(model::CropViews(picture.whole.truth, inner),
+    mean_db += estimator::CompareLightFields(model::CropViews(image.whole.truth, inner),
                                              model::CropViews(warped, inner), 0, std::nullopt, 1)
                    .mean.psnr_db /
                2;
   }
-  EXPECT_NEAR(ScoresOfViews(picture, PartsOf(picture, warped), 1).psnr_mean_db, mean_db, 1e-9);
+  EXPECT_NEAR(ScoresOfViews(image, PartsOf(image, warped), 1).psnr_mean_db, mean_db, 1e-9);
 }
 
 }  // namespace

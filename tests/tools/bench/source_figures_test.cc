@@ -12,7 +12,7 @@ namespace {
 // The speed-up factors that the source prints below each pair of rows: 3, 5, 7 views.
 struct SpeedUps {
   char size;
-  std::size_t picture;
+  std::size_t image;
   double factor[3];
 };
 
@@ -21,12 +21,12 @@ void ExpectSpeedUps(int table, const std::vector<SpeedUps>& printed, double roun
   for (const SpeedUps& row : printed) {
     for (int i = 0; i < 3; ++i) {
       const int views = 3 + 2 * i;
-      SCOPED_TRACE(std::string(1, row.size) + std::to_string(row.picture + 1) + " of table " +
+      SCOPED_TRACE(std::string(1, row.size) + std::to_string(row.image + 1) + " of table " +
                    std::to_string(table) + ", views " + std::to_string(views));
       const auto opencl = PublishedSeconds(table, "opencl", row.size, views);
       const auto cpu = PublishedSeconds(table, "cpu", row.size, views);
       ASSERT_TRUE(opencl && cpu);
-      EXPECT_NEAR((*cpu)[row.picture] / (*opencl)[row.picture], row.factor[i], rounding + slack);
+      EXPECT_NEAR((*cpu)[row.image] / (*opencl)[row.image], row.factor[i], rounding + slack);
     }
   }
 }

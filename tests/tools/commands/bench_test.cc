@@ -1,4 +1,4 @@
-// thicklens bench: every solver on one simulated picture.
+// thicklens bench: every solver on one simulated image.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -23,7 +23,7 @@ using ::thicklens::testing::TemporaryFolder;
 
 TEST(BenchScene, BlursFromNothingToThreePixels) {
   const BenchScene scene = MakeBenchScene(128, 64, 5, 3, 1, 2, {});
-  EXPECT_EQ(scene.input.picture.channels, 1);
+  EXPECT_EQ(scene.input.image.channels, 1);
   EXPECT_EQ(scene.truth.u_count, 5);
   EXPECT_EQ(scene.truth.v_count, 3);
   // sigma per axis from the disparities: |d| times the weighted rms of the views' offsets.
@@ -39,12 +39,12 @@ TEST(BenchScene, BlursFromNothingToThreePixels) {
   EXPECT_NEAR(most, 3, 0.2);
 }
 
-TEST(BenchScene, ThePartInTheMiddleIsTheSamePicture) {
+TEST(BenchScene, ThePartInTheMiddleIsTheSameImage) {
   const BenchScene scene = MakeBenchScene(128, 96, 3, 3, 2, 2, {});
   const BenchScene middle = MiddleOf(scene, 64, 64);
   for (int y = 0; y < 64; ++y) {
     for (int x = 0; x < 64; ++x) {
-      ASSERT_EQ(middle.input.picture.at(x, y, 0), scene.input.picture.at(x + 32, y + 16, 0));
+      ASSERT_EQ(middle.input.image.at(x, y, 0), scene.input.image.at(x + 32, y + 16, 0));
       ASSERT_EQ(middle.input.disparity.disparity[static_cast<std::size_t>(y * 64 + x)],
                 scene.input.disparity.disparity[static_cast<std::size_t>((y + 16) * 128 + x + 32)]);
     }
@@ -78,7 +78,7 @@ TEST(Bench, MeasuresEverySolverOnTheSameScene) {
     EXPECT_EQ(row["views"], nlohmann::json({3, 3}));
     EXPECT_EQ(row["threads"], 1);
     // What is measured and what is extrapolated never has the same key, nor have PSNRs of the part
-    // that blocks solved and of the whole picture.
+    // that blocks solved and of the whole image.
     const bool is_sampled = row["solver"] == "blocks";
     const std::string time = is_sampled ? "extrapolated_seconds" : "seconds";
     EXPECT_GT(row[time].get<double>(), 0);

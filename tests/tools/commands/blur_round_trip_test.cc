@@ -44,11 +44,11 @@ model::LightField SpotAt(const model::Camera& camera, int views, double depth_mm
 }
 
 // The second moment along x about the centroid, px^2.
-double VarianceAlongX(const model::LinearPicture& picture) {
+double VarianceAlongX(const model::LinearImage& image) {
   double sum = 0, first = 0, second = 0;
-  for (int y = 0; y < picture.height_px; ++y) {
-    for (int x = 0; x < picture.width_px; ++x) {
-      const double value = picture.values[static_cast<std::size_t>(y * picture.width_px + x)];
+  for (int y = 0; y < image.height_px; ++y) {
+    for (int x = 0; x < image.width_px; ++x) {
+      const double value = image.values[static_cast<std::size_t>(y * image.width_px + x)];
       sum += value;
       first += value * x;
       second += value * x * x;
@@ -74,9 +74,9 @@ TEST(BlurRoundTrip, RendersTheSimulatedBlurUnderAnyPupilLaw) {
       for (const std::size_t frame : {std::size_t{0}, simulated.truth.frames.size() - 1}) {
         const model::SweepTruth::Frame& truth = simulated.truth.frames[frame];
         const model::LightField field = SpotAt(camera, 9, truth.depth_mm);
-        const model::LinearPicture picture = estimator::Photograph(
+        const model::LinearImage image = estimator::Photograph(
             field, field.weights, falloff ? &camera : nullptr, nullptr, nullptr, 1);
-        const double rendered_px = std::sqrt(VarianceAlongX(picture) - kSpotSigmaPx * kSpotSigmaPx);
+        const double rendered_px = std::sqrt(VarianceAlongX(image) - kSpotSigmaPx * kSpotSigmaPx);
         const double simulated_px =
             std::sqrt(truth.blur_sigma_px * truth.blur_sigma_px - floor2_px2);
         ASSERT_GT(simulated_px, 1.5);

@@ -89,7 +89,7 @@ TEST_F(CalibrateOutputs, FiguresLieBesideThePageAndAreReplaced) {
   EXPECT_FALSE(json.at("field").at("done").get<bool>());
 }
 
-// The field of so small a picture may have no map; what tells is whether one was tried.
+// The field of so small an image may have no map; what tells is whether one was tried.
 TEST_F(CalibrateOutputs, NoFieldLeavesTheMapOut) {
   fs::create_directories(folder_ / "out");
   std::string message[2];

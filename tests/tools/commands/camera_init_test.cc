@@ -36,9 +36,9 @@ CameraDescription DataSheet() {
 // A photograph of 32 x 24 px whose EXIF says what a test wants it to say.
 std::string WritePhoto(const std::string& name, const Exiv2::ExifData& exif) {
   const std::string path = ::testing::TempDir() + "/" + name;
-  model::StoredPicture picture{32, 24, 1, 8, {}};
-  picture.values.assign(32 * 24, 128);
-  WriteFileAtomically(path, io::EncodePng(picture));
+  model::EncodedImage image{32, 24, 1, 8, {}};
+  image.values.assign(32 * 24, 128);
+  WriteFileAtomically(path, io::EncodePng(image));
   const auto image = Exiv2::ImageFactory::open(path);
   image->setExifData(exif);
   image->writeMetadata();
@@ -138,8 +138,8 @@ TEST(ReadPhotoExif, TakesInchesWhereNoUnitIsGiven) {
   EXPECT_NEAR(*photo.pixel_pitch_mm, 25.4 / 2000, 1e-8);
 }
 
-// The resolution is that of the picture out of the camera; a smaller copy keeps the number.
-TEST(ReadPhotoExif, TakesNoPitchFromAScaledOrCutPicture) {
+// The resolution is that of the image out of the camera; a smaller copy keeps the number.
+TEST(ReadPhotoExif, TakesNoPitchFromAScaledOrCutImage) {
   Exiv2::ExifData exif = TypicalExif();
   exif["Exif.Photo.PixelXDimension"] = std::uint32_t{64};
   exif["Exif.Photo.PixelYDimension"] = std::uint32_t{48};
@@ -148,7 +148,7 @@ TEST(ReadPhotoExif, TakesNoPitchFromAScaledOrCutPicture) {
   EXPECT_THAT(photo.why_no_pitch, AllOf(HasSubstr("32 x 24"), HasSubstr("64 x 48")));
 }
 
-TEST(ReadPhotoExif, KnowsNothingOfAPictureWithoutExif) {
+TEST(ReadPhotoExif, KnowsNothingOfAnImageWithoutExif) {
   const io::PhotoExif photo = io::ReadPhotoExif(WritePhoto("bare.png", Exiv2::ExifData()), 32, 24);
   EXPECT_FALSE(photo.focal_length_mm || photo.f_number || photo.pixel_pitch_mm);
   EXPECT_THAT(photo.why_no_pitch, HasSubstr("FocalPlaneXResolution"));

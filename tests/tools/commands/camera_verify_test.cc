@@ -214,7 +214,7 @@ TEST_F(CameraVerifyTest, CasesWithoutAVerdictAreReported) {
   EXPECT_GT(json_["smallest_detectable_blur_px"].get<double>(), 0.0001);
 }
 
-// An unknown bench zero leaves zf open; that is told, with what closes it.
+// An unknown bench zero leaves zf open; that is reported, with what closes it.
 TEST_F(CameraVerifyTest, AnUnknownBenchZeroIsReported) {
   offset_mm_ = "unknown";
   const ProgramResult result = Verify(*shared_ / "camera.yaml", Sweep(2));

@@ -48,8 +48,8 @@ constexpr int kWide = 44, kHigh = 36, kDisparityPx = 1, kGrid = 7;
 
 // ---- Table and JSON.
 
-estimator::PictureScores Scores(double psnr_db, double ssim) {
-  estimator::PictureScores scores;
+estimator::ImageScores Scores(double psnr_db, double ssim) {
+  estimator::ImageScores scores;
   scores.psnr_db = psnr_db;
   scores.ssim = ssim;
   scores.delta_e94_mean = 1.25;
@@ -73,17 +73,17 @@ estimator::LightFieldScores TwoViews(bool with_dibr) {
 }
 
 TEST(CompareTable, SaysWhatHasNoNumber) {
-  estimator::PictureScores scores = Scores(kInfinity, std::nan(""));
+  estimator::ImageScores scores = Scores(kInfinity, std::nan(""));
   scores.macade_standin.reset();
-  const std::string text = PictureScoresText(scores, 3);
+  const std::string text = ImageScoresText(scores, 3);
   EXPECT_THAT(text, AllOf(HasSubstr("identical"), HasSubstr("border 3 px"), HasSubstr("1.250"),
                           Not(HasSubstr("inf")), Not(HasSubstr("nan"))));
-  const Json json = PictureScoresJson(scores);
+  const Json json = ImageScoresJson(scores);
   EXPECT_TRUE(json["psnr_db"].is_null() && json["ssim"].is_null());
   EXPECT_TRUE(json["macade_standin"].is_null());
   EXPECT_EQ(json["identical"], true);
   EXPECT_EQ(json["delta_e94_mean"], 1.25);
-  EXPECT_EQ(PictureScoresJson(Scores(30, 0.9))["identical"], false);
+  EXPECT_EQ(ImageScoresJson(Scores(30, 0.9))["identical"], false);
 }
 
 TEST(CompareTable, PutsDibrBesideEachMean) {
@@ -123,38 +123,38 @@ double Texture(double x, double y, int channel) {
 }
 
 // The view at (a, b) of the texture: what stands at x in the middle stands at x - a d in it.
-model::StoredPicture View(int a, int b, int channels = 3) {
-  model::StoredPicture picture{kWide, kHigh, channels, 8, {}};
+model::EncodedImage View(int a, int b, int channels = 3) {
+  model::EncodedImage image{kWide, kHigh, channels, 8, {}};
   for (int y = 0; y < kHigh; ++y) {
     for (int x = 0; x < kWide; ++x) {
       for (int channel = 0; channel < channels; ++channel) {
-        picture.values.push_back(static_cast<std::uint16_t>(
+        image.values.push_back(static_cast<std::uint16_t>(
             std::lround(Texture(x + a * kDisparityPx, y + b * kDisparityPx, channel))));
       }
     }
   }
-  return picture;
+  return image;
 }
 
-model::StoredPicture Noisy(model::StoredPicture picture, int amplitude, unsigned seed) {
+model::EncodedImage Noisy(model::EncodedImage image, int amplitude, unsigned seed) {
   std::mt19937 generator(seed);
   std::uniform_int_distribution<int> noise(-amplitude, amplitude);
-  for (std::uint16_t& value : picture.values)
+  for (std::uint16_t& value : image.values)
     value = static_cast<std::uint16_t>(std::clamp(value + noise(generator), 0, 255));
-  return picture;
+  return image;
 }
 
-// What the library says of two pictures; the protocol between file and score is the command's.
-estimator::PictureScores Direct(const model::StoredPicture& reference,
-                                const model::StoredPicture& other, int border_px) {
-  return estimator::ComparePictures(model::StoredValuesOf(reference), model::StoredValuesOf(other),
-                                    border_px);
+// What the library says of two images; the protocol between file and score is the command's.
+estimator::ImageScores Direct(const model::EncodedImage& reference,
+                              const model::EncodedImage& other, int border_px) {
+  return estimator::CompareImages(model::EncodedValuesOf(reference), model::EncodedValuesOf(other),
+                                  border_px);
 }
 
 class CompareProgram : public ::testing::Test {
  protected:
-  std::string PutPicture(const std::string& name, const model::StoredPicture& picture) const {
-    return folder_.Put(name, io::EncodePng(picture));
+  std::string PutImage(const std::string& name, const model::EncodedImage& image) const {
+    return folder_.Put(name, io::EncodePng(image));
   }
 
   // n x n views in the HCI layout, in the middle of a numbering of 7 in a row.
@@ -165,7 +165,7 @@ class CompareProgram : public ::testing::Test {
         char file[32];
         const int number = kGrid * (b + kGrid / 2) + a + kGrid / 2;
         std::snprintf(file, sizeof file, "/input_Cam%03d.png", number);
-        PutPicture(name + file, Noisy(View(a, b), noise, static_cast<unsigned>(number)));
+        PutImage(name + file, Noisy(View(a, b), noise, static_cast<unsigned>(number)));
       }
     }
     return folder_ / name;
@@ -214,13 +214,13 @@ class CompareProgram : public ::testing::Test {
   TemporaryFolder scratch_;
 };
 
-TEST_F(CompareProgram, ComparesTwoPictures) {
-  const model::StoredPicture truth = View(0, 0);
-  const model::StoredPicture noisy = Noisy(truth, 9, 1);
-  const std::string a = PutPicture("a.png", truth);
-  const std::string b = PutPicture("b.png", noisy);
+TEST_F(CompareProgram, ComparesTwoImages) {
+  const model::EncodedImage truth = View(0, 0);
+  const model::EncodedImage noisy = Noisy(truth, 9, 1);
+  const std::string a = PutImage("a.png", truth);
+  const std::string b = PutImage("b.png", noisy);
   const Json json = Summary({a, b, "--border", "4"});
-  const estimator::PictureScores expected = Direct(truth, noisy, 4);
+  const estimator::ImageScores expected = Direct(truth, noisy, 4);
   EXPECT_EQ(json["status"], "ok");
   EXPECT_EQ(json["reason"], "");
   EXPECT_EQ(json["psnr_db"], expected.psnr_db);
@@ -234,21 +234,21 @@ TEST_F(CompareProgram, ComparesTwoPictures) {
   EXPECT_THAT(Run({a, b, "--quiet"}).out, IsEmpty());
 }
 
-TEST_F(CompareProgram, SaysThatPicturesAreIdentical) {
-  const std::string a = PutPicture("a.png", View(0, 0));
+TEST_F(CompareProgram, SaysThatImagesAreIdentical) {
+  const std::string a = PutImage("a.png", View(0, 0));
   const Json json = Summary({a, a});
   EXPECT_TRUE(json["psnr_db"].is_null());
   EXPECT_EQ(json["identical"], true);
   EXPECT_THAT(Run({a, a}).out, HasSubstr("identical"));
 }
 
-TEST_F(CompareProgram, TheFirstPictureIsTheReference) {
-  model::StoredPicture red = View(0, 0);
+TEST_F(CompareProgram, TheFirstImageIsTheReference) {
+  model::EncodedImage red = View(0, 0);
   for (std::size_t i = 0; i < red.values.size(); ++i) {
     if (i % 3 != 0) red.values[i] /= 4;
   }
-  const std::string a = PutPicture("a.png", View(0, 0));
-  const std::string b = PutPicture("b.png", red);
+  const std::string a = PutImage("a.png", View(0, 0));
+  const std::string b = PutImage("b.png", red);
   const double one_way = Direct(View(0, 0), red, 0).delta_e94_mean;
   const double other_way = Direct(red, View(0, 0), 0).delta_e94_mean;
   ASSERT_GT(std::abs(one_way - other_way), 1);
@@ -256,19 +256,19 @@ TEST_F(CompareProgram, TheFirstPictureIsTheReference) {
   EXPECT_EQ(Summary({b, a})["delta_e94_mean"], other_way);
 }
 
-TEST_F(CompareProgram, CropsPicturesAlike) {
+TEST_F(CompareProgram, CropsImagesAlike) {
   const model::PixelRect rect{5, 3, 30, 25};
-  const model::StoredPicture truth = View(0, 0);
-  const model::StoredPicture noisy = Noisy(truth, 9, 2);
-  const std::string a = PutPicture("a.png", truth);
+  const model::EncodedImage truth = View(0, 0);
+  const model::EncodedImage noisy = Noisy(truth, 9, 2);
+  const std::string a = PutImage("a.png", truth);
   const double expected =
-      Direct(model::CropPicture(truth, rect), model::CropPicture(noisy, rect), 1).psnr_db;
+      Direct(model::CropImage(truth, rect), model::CropImage(noisy, rect), 1).psnr_db;
   const std::string crop = "5,3,30,25";
-  const Json both = Summary({a, PutPicture("b.png", noisy), "--crop", crop, "--border", "1"});
+  const Json both = Summary({a, PutImage("b.png", noisy), "--crop", crop, "--border", "1"});
   EXPECT_EQ(both["psnr_db"], expected);
   EXPECT_EQ(both["size"], Json({30, 25}));
   // What has the rectangle's size already is taken as it is.
-  const std::string cut = PutPicture("cut.png", model::CropPicture(noisy, rect));
+  const std::string cut = PutImage("cut.png", model::CropImage(noisy, rect));
   EXPECT_EQ(Summary({a, cut, "--crop", crop, "--border", "1"})["psnr_db"], expected);
   EXPECT_THAT(Failure({a, a, "--crop", "20,3,30,25"}),
               AllOf(HasSubstr("a.png"), HasSubstr("44x36")));
@@ -277,7 +277,7 @@ TEST_F(CompareProgram, CropsPicturesAlike) {
 TEST_F(CompareProgram, FollowsTheProtocolOfALightField) {
   const std::string truth = PutHci("truth", 3, 0);
   const std::string estimate = PutOwn("estimate", 3, 6);
-  const std::string photo = PutPicture("photo.png", Noisy(View(0, 0), 3, 99));
+  const std::string photo = PutImage("photo.png", Noisy(View(0, 0), 3, 99));
   const std::string depth = PutDepth("disparity.pfm", kDisparityPx);
   const Json json =
       Summary({truth, estimate, "--grid", "7", "--border", "6", "--dibr", photo, depth});
@@ -291,12 +291,12 @@ TEST_F(CompareProgram, FollowsTheProtocolOfALightField) {
     const int a = view["u"].get<int>() - 1;
     const int b = view["v"].get<int>() - 1;
     const auto seed = static_cast<unsigned>(kGrid * (b + 3) + a + 3);
-    const estimator::PictureScores expected = Direct(View(a, b), Noisy(View(a, b), 6, seed), 6);
+    const estimator::ImageScores expected = Direct(View(a, b), Noisy(View(a, b), 6, seed), 6);
     EXPECT_NEAR(view["psnr_db"].get<double>(), expected.psnr_db, 1e-3);  // 16-bit files between
     EXPECT_NEAR(view["ssim"].get<double>(), expected.ssim, 1e-4);
     sum += expected.psnr_db;
     if (a != 0 && b != 0) corner_sum += expected.psnr_db;
-    // The photograph's noise, shifted by whole pixels with the picture.
+    // The photograph's noise, shifted by whole pixels with the image.
     EXPECT_NEAR(view["dibr_psnr_db"].get<double>(),
                 Direct(View(0, 0), Noisy(View(0, 0), 3, 99), 6).psnr_db, 0.6);
   }
@@ -315,7 +315,7 @@ TEST_F(CompareProgram, FollowsTheProtocolOfALightField) {
 TEST_F(CompareProgram, CountsTheViewsAboveDibr) {
   const std::string truth = PutHci("truth", 3, 0);
   const std::string estimate = PutHci("estimate", 3, 1);
-  const std::string photo = PutPicture("photo.png", Noisy(View(0, 0), 9, 99));
+  const std::string photo = PutImage("photo.png", Noisy(View(0, 0), 9, 99));
   const Arguments arguments = {
       truth, estimate, "--grid", "7", "--dibr", photo, PutDepth("disparity.pfm", kDisparityPx)};
   EXPECT_EQ(Summary(arguments)["views_above_dibr"], 9);
@@ -329,7 +329,7 @@ TEST_F(CompareProgram, CountsTheViewsAboveDibr) {
 
 TEST_F(CompareProgram, SaysWhatTheDisparityMeansByItsOptions) {
   const std::string truth = PutHci("truth", 3, 0);
-  const std::string photo = PutPicture("photo.png", View(0, 0));
+  const std::string photo = PutImage("photo.png", View(0, 0));
   const std::string halves = PutDepth("halves.pfm", 2 * kDisparityPx + 6.0F);
   const Json json = Summary({truth, truth, "--grid", "7", "--border", "4", "--dibr", photo, halves,
                              "--depth-kind", "disparity", "--disparity-scale", "0.5",
@@ -355,7 +355,7 @@ TEST_F(CompareProgram, AsksWhatTheDepthMapOfACameraSays) {
   light_field.camera = camera;
   light_field.grid = model::DefaultGrid(camera, 3, 3);
   const std::string truth = Write("truth", light_field);
-  const std::string photo = PutPicture("photo.png", View(0, 0));
+  const std::string photo = PutImage("photo.png", View(0, 0));
   const Arguments arguments = {
       truth, truth, "--border", "4", "--dibr", photo, PutDepth("disparity.pfm", kDisparityPx)};
   EXPECT_THAT(Failure(arguments, 2), HasSubstr("--depth-kind"));
@@ -377,7 +377,7 @@ TEST_F(CompareProgram, TakesInnerViewsAndTellsSo) {
   EXPECT_THAT(result.err, AllOf(HasSubstr("inner 3x3"), HasSubstr("5x5"), HasSubstr("truth")));
   const Json inner = Summary({truth, estimate, "--grid", "7"});
   EXPECT_EQ(inner["views"], Json({3, 3}));
-  const estimator::PictureScores centre = Direct(View(0, 0), Noisy(View(0, 0), 4, 24), 0);
+  const estimator::ImageScores centre = Direct(View(0, 0), Noisy(View(0, 0), 4, 24), 0);
   EXPECT_NEAR(inner["centre"]["psnr_db"].get<double>(), centre.psnr_db, 1e-3);
   // The other way round, and asked for.
   EXPECT_EQ(Summary({estimate, truth, "--grid", "7"})["views"], Json({3, 3}));
@@ -390,7 +390,7 @@ TEST_F(CompareProgram, TakesInnerViewsAndTellsSo) {
   const model::LightField all = io::ReadLightField(estimate, reading);
   model::LightField even = model::MakeLightField(kWide, kHigh, 2, 2, 3);
   for (int i = 0; i < 4; ++i)
-    model::SetView(&even, i % 2, i / 2, model::ViewPicture(all, i % 2, i / 2));
+    model::SetView(&even, i % 2, i / 2, model::ViewImage(all, i % 2, i / 2));
   EXPECT_THAT(Failure({truth, Write("even", even), "--grid", "7"}),
               AllOf(HasSubstr("truth"), HasSubstr("odd")));
 }
@@ -398,33 +398,33 @@ TEST_F(CompareProgram, TakesInnerViewsAndTellsSo) {
 TEST_F(CompareProgram, CropsLightFieldsPhotographAndDepthAlike) {
   const std::string truth = PutHci("truth", 3, 0);
   const std::string estimate = PutHci("estimate", 3, 4);
-  const std::string photo = PutPicture("photo.png", Noisy(View(0, 0), 3, 5));
+  const std::string photo = PutImage("photo.png", Noisy(View(0, 0), 3, 5));
   const std::string depth = PutDepth("disparity.pfm", kDisparityPx);
-  const auto summary = [&](const std::string& other, const std::string& picture,
+  const auto summary = [&](const std::string& other, const std::string& image,
                            const std::string& map) {
     return Summary({truth, other, "--grid", "7", "--crop", "6,5,30,28", "--border", "2", "--dibr",
-                    picture, map});
+                    image, map});
   };
   const Json all = summary(estimate, photo, depth);
   EXPECT_EQ(all["size"], Json({30, 28}));
   const model::PixelRect rect{6, 5, 30, 28};
   EXPECT_NEAR(all["centre"]["psnr_db"].get<double>(),
-              Direct(model::CropPicture(View(0, 0), rect),
-                     model::CropPicture(Noisy(View(0, 0), 4, 24), rect), 2)
+              Direct(model::CropImage(View(0, 0), rect),
+                     model::CropImage(Noisy(View(0, 0), 4, 24), rect), 2)
                   .psnr_db,
               1e-3);
-  EXPECT_NEAR(all["dibr"]["centre"]["psnr_db"].get<double>(),
-              Direct(model::CropPicture(View(0, 0), rect),
-                     model::CropPicture(Noisy(View(0, 0), 3, 5), rect), 2)
-                  .psnr_db,
-              1e-3);
+  EXPECT_NEAR(
+      all["dibr"]["centre"]["psnr_db"].get<double>(),
+      Direct(model::CropImage(View(0, 0), rect), model::CropImage(Noisy(View(0, 0), 3, 5), rect), 2)
+          .psnr_db,
+      1e-3);
   // Cropped before, by whoever made them.
   io::LightFieldReading reading;
   reading.grid = kGrid;
   reading.crop = rect;
   const std::string cut = Write("cut", io::ReadLightField(estimate, reading));
   const std::string cut_photo =
-      PutPicture("cut.png", model::CropPicture(Noisy(View(0, 0), 3, 5), rect));
+      PutImage("cut.png", model::CropImage(Noisy(View(0, 0), 3, 5), rect));
   const Json before = summary(cut, cut_photo, PutDepth("cut.pfm", kDisparityPx, 30, 28));
   EXPECT_EQ(before["dibr"], all["dibr"]);
   EXPECT_NEAR(before["mean"]["psnr_db"].get<double>(), all["mean"]["psnr_db"].get<double>(), 1e-3);
@@ -447,59 +447,57 @@ TEST_F(CompareProgram, GivesTheSameOnAnyNumberOfThreads) {
 }
 
 TEST_F(CompareProgram, MismatchesAreReportedInOneLine) {
-  const std::string picture = PutPicture("a.png", View(0, 0));
-  const std::string grey = PutPicture("grey.png", View(0, 0, 1));
+  const std::string image = PutImage("a.png", View(0, 0));
+  const std::string grey = PutImage("grey.png", View(0, 0, 1));
   const std::string small =
-      PutPicture("small.png", model::CropPicture(View(0, 0), model::PixelRect{0, 0, 20, 20}));
+      PutImage("small.png", model::CropImage(View(0, 0), model::PixelRect{0, 0, 20, 20}));
   const std::string folder = PutHci("truth", 3, 0);
   const std::string depth = PutDepth("disparity.pfm", kDisparityPx);
   const std::string missing = folder_ / "missing.png";
-  EXPECT_THAT(Failure({picture, missing}), AllOf(HasSubstr("missing.png"), HasSubstr("no such")));
+  EXPECT_THAT(Failure({image, missing}), AllOf(HasSubstr("missing.png"), HasSubstr("no such")));
   EXPECT_THAT(Failure({missing, folder}), AllOf(HasSubstr("missing.png"), HasSubstr("no such")));
-  EXPECT_THAT(Failure({picture, folder}), AllOf(HasSubstr("a.png"), HasSubstr("truth")));
-  EXPECT_THAT(Failure({folder, picture}), AllOf(HasSubstr("a.png"), HasSubstr("truth")));
-  EXPECT_THAT(Failure({picture, small}), AllOf(HasSubstr("44x36"), HasSubstr("20x20")));
-  EXPECT_THAT(Failure({picture, grey}), HasSubstr("channel"));
-  EXPECT_THAT(Failure({picture, picture, "--border", "18"}), HasSubstr("0 to 17"));
-  EXPECT_THAT(Failure({picture, folder_.Put("text.png", "no picture")}), HasSubstr("text.png"));
-  EXPECT_THAT(Failure({picture, folder_.Put("half.png", ContentOf(picture).substr(0, 900))}),
+  EXPECT_THAT(Failure({image, folder}), AllOf(HasSubstr("a.png"), HasSubstr("truth")));
+  EXPECT_THAT(Failure({folder, image}), AllOf(HasSubstr("a.png"), HasSubstr("truth")));
+  EXPECT_THAT(Failure({image, small}), AllOf(HasSubstr("44x36"), HasSubstr("20x20")));
+  EXPECT_THAT(Failure({image, grey}), HasSubstr("channel"));
+  EXPECT_THAT(Failure({image, image, "--border", "18"}), HasSubstr("0 to 17"));
+  EXPECT_THAT(Failure({image, folder_.Put("text.png", "no image")}), HasSubstr("text.png"));
+  EXPECT_THAT(Failure({image, folder_.Put("half.png", ContentOf(image).substr(0, 900))}),
               HasSubstr("half.png"));
   const auto with_dibr = [&](const std::string& photo, const std::string& map) {
     return Failure({folder, folder, "--grid", "7", "--dibr", photo, map});
   };
   EXPECT_THAT(with_dibr(missing, depth), HasSubstr("missing.png"));
-  EXPECT_THAT(with_dibr(picture, missing), HasSubstr("missing.png"));
+  EXPECT_THAT(with_dibr(image, missing), HasSubstr("missing.png"));
   EXPECT_THAT(with_dibr(small, depth), AllOf(HasSubstr("small.png"), HasSubstr("44x36")));
   EXPECT_THAT(with_dibr(grey, depth), HasSubstr("grey.png"));
-  EXPECT_THAT(with_dibr(picture, PutDepth("small.pfm", 1, 20, 20)),
+  EXPECT_THAT(with_dibr(image, PutDepth("small.pfm", 1, 20, 20)),
               AllOf(HasSubstr("small.pfm"), HasSubstr("20x20")));
 }
 
 TEST_F(CompareProgram, RefusesWrongUsage) {
-  const std::string picture = PutPicture("a.png", View(0, 0));
+  const std::string image = PutImage("a.png", View(0, 0));
   const std::string folder = PutHci("truth", 3, 0);
-  const std::string before = ContentOf(picture);
-  Failure({picture}, 2);
-  Failure({picture, picture, "--border", "-1"}, 2);
-  Failure({picture, picture, "--crop", "1,2,3"}, 2);
+  const std::string before = ContentOf(image);
+  Failure({image}, 2);
+  Failure({image, image, "--border", "-1"}, 2);
+  Failure({image, image, "--crop", "1,2,3"}, 2);
   Failure({folder, folder, "--grid", "7", "--views", "3"}, 2);
-  Failure({folder, folder, "--grid", "7", "--dibr", picture}, 2);
+  Failure({folder, folder, "--grid", "7", "--dibr", image}, 2);
   EXPECT_THAT(Failure({folder, folder, "--grid", "7", "--depth-kind", "disparity"}, 2),
               HasSubstr("--dibr"));
-  EXPECT_THAT(Failure({picture, picture, "--dibr", picture, picture}, 2),
-              HasSubstr("for light fields"));
-  EXPECT_THAT(Failure({picture, picture, "--views", "3x3"}, 2), HasSubstr("for light fields"));
-  EXPECT_THAT(Failure({picture, picture, "--json", picture}, 2), HasSubstr("overwritten"));
-  EXPECT_THAT(
-      Failure({folder, folder, "--grid", "7", "--dibr", picture, picture, "--json", picture}, 2),
-      HasSubstr("overwritten"));
-  EXPECT_EQ(ContentOf(picture), before);
+  EXPECT_THAT(Failure({image, image, "--dibr", image, image}, 2), HasSubstr("for light fields"));
+  EXPECT_THAT(Failure({image, image, "--views", "3x3"}, 2), HasSubstr("for light fields"));
+  EXPECT_THAT(Failure({image, image, "--json", image}, 2), HasSubstr("overwritten"));
+  EXPECT_THAT(Failure({folder, folder, "--grid", "7", "--dibr", image, image, "--json", image}, 2),
+              HasSubstr("overwritten"));
+  EXPECT_EQ(ContentOf(image), before);
 }
 
 TEST_F(CompareProgram, WritesARefusalAsJson) {
-  const std::string picture = PutPicture("a.png", View(0, 0));
+  const std::string image = PutImage("a.png", View(0, 0));
   const std::string json = folder_ / "result.json";
-  Failure({picture, picture, "--border", "90", "--json", json});
+  Failure({image, image, "--border", "90", "--json", json});
   const Json summary = Json::parse(ContentOf(json));
   EXPECT_EQ(summary["status"], "refused");
   EXPECT_THAT(summary["reason"].get<std::string>(), HasSubstr("border of 90 px"));

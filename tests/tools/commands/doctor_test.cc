@@ -110,8 +110,8 @@ std::string PoclLibrary() {
   return "";
 }
 
-TEST_F(DoctorTest, SaysWhichPictureFilesAreRead) {
-  EXPECT_EQ(Json("cpu")["picture_files"], "PNG; JPEG, TIFF, EXR, BMP and PNM by OpenCV");
+TEST_F(DoctorTest, SaysWhichImageFilesAreRead) {
+  EXPECT_EQ(Json("cpu")["image_files"], "PNG; JPEG, TIFF, EXR, BMP and PNM by OpenCV");
 }
 
 TEST_F(DoctorTest, FindsThisMachineWell) {
@@ -123,8 +123,8 @@ TEST_F(DoctorTest, FindsThisMachineWell) {
   ASSERT_GE(json["opencl"]["devices"].size(), 1U);
   EXPECT_GT(json["opencl"]["devices"][0]["compute_units"], 0);
   EXPECT_GT(json["opencl"]["devices"][0]["global_memory_bytes"], 1 << 20);
-  EXPECT_TRUE(json["agreement"]["agrees"]);
-  EXPECT_LE(json["agreement"]["float_relative_error"], 1e-4);
+  EXPECT_TRUE(json["self_test"]["agrees"]);
+  EXPECT_LE(json["self_test"]["float_relative_error"], 1e-4);
   EXPECT_GT(json["cores"], 0);
   EXPECT_FALSE(json["blas"].get<std::string>().empty());
   EXPECT_THAT(json["block_solvers"], ::testing::Contains("eigen"));

@@ -1,4 +1,4 @@
-// thicklens estimate with less memory than the picture as a whole takes.
+// thicklens estimate with less memory than the image as a whole takes.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -37,7 +37,7 @@ constexpr int kW = 320, kH = 640;
 class EstimateBandsTest : public ::testing::Test {
  protected:
   EstimateBandsTest() {
-    model::StoredPicture picture{kW, kH, 3, 8, {}};
+    model::EncodedImage image{kW, kH, 3, 8, {}};
     model::RawDepthMap map{kW, kH, {}, false};
     std::mt19937 engine(7);
     std::normal_distribution<double> noise(0, 1);
@@ -46,11 +46,11 @@ class EstimateBandsTest : public ::testing::Test {
         map.values.push_back(static_cast<float>(0.002 * x - 0.001 * y));
         for (int c = 0; c < 3; ++c) {
           const double value = 120 + 50 * std::sin(0.7 * x + c) * std::sin(0.5 * y) + noise(engine);
-          picture.values.push_back(static_cast<std::uint16_t>(std::lround(value)));
+          image.values.push_back(static_cast<std::uint16_t>(std::lround(value)));
         }
       }
     }
-    usual_ = {folder_.Put("picture.png", io::EncodePng(picture)),
+    usual_ = {folder_.Put("picture.png", io::EncodePng(image)),
               folder_.Put("depth.pfm", io::EncodePfm(map)),
               "--depth-kind",
               "disparity",
@@ -112,11 +112,11 @@ TEST_F(EstimateBandsTest, GiveTheSameViewsInLessMemory) {
     ASSERT_NEAR(found.values[i], expected.values[i], 1e-3) << i;
 }
 
-// The relief of a picture takes three planes of the largest system, however few channels it has.
+// The relief of an image takes three planes of the largest system, however few channels it has.
 TEST_F(EstimateBandsTest, TheForecastHoldsForTheShadingOfARelief) {
   if (testing::kIsSanitized) GTEST_SKIP() << "a sanitizer holds back what was freed";
   constexpr int kSize = 500;
-  model::StoredPicture grey{kSize, kSize, 1, 8, {}};
+  model::EncodedImage grey{kSize, kSize, 1, 8, {}};
   model::RawDepthMap waves{kSize, kSize, {}, false};
   for (int i = 0; i < kSize * kSize; ++i) {
     const double wave = std::sin(0.5 * (i % kSize)) * std::sin(0.4 * (i / kSize));
@@ -140,7 +140,7 @@ TEST_F(EstimateBandsTest, TheForecastHoldsForTheShadingOfARelief) {
 TEST_F(EstimateBandsTest, TheForecastHoldsForRoughDepthAndManyViews) {
   if (testing::kIsSanitized) GTEST_SKIP() << "a sanitizer holds back what was freed";
   constexpr int kWidth = 160, kHeight = 400;
-  model::StoredPicture grey{kWidth, kHeight, 1, 8, {}};
+  model::EncodedImage grey{kWidth, kHeight, 1, 8, {}};
   for (int i = 0; i < kWidth * kHeight; ++i) {
     grey.values.push_back(static_cast<std::uint16_t>(100 + i % 97));
   }

@@ -43,17 +43,17 @@ using Arguments = std::vector<std::string>;
 constexpr int kWidthPx = 60, kHeightPx = 44;
 
 // Soft stripes, 1 grey level of noise.
-model::StoredPicture Stripes() {
-  model::StoredPicture picture{kWidthPx, kHeightPx, 3, 8, {}};
+model::EncodedImage Stripes() {
+  model::EncodedImage image{kWidthPx, kHeightPx, 3, 8, {}};
   std::mt19937 engine(7);
   std::normal_distribution<double> noise(0, 1);
   for (int i = 0; i < kWidthPx * kHeightPx * 3; ++i) {
     const double value = 120 + 40 * std::sin(0.35 * (i / 3 % kWidthPx) + i % 3) +
                          30 * std::sin(0.3 * (i / 3 / kWidthPx));
-    picture.values.push_back(
+    image.values.push_back(
         static_cast<std::uint16_t>(std::lround(std::clamp(value + noise(engine), 0.0, 255.0))));
   }
-  return picture;
+  return image;
 }
 
 // A large sensor behind a short lens: dark corners.
@@ -71,9 +71,9 @@ class EstimateFunctionalTest : public ::testing::TestWithParam<const char*>,
       map.values.push_back(static_cast<float>(value(i % kWidthPx)));
     return folder_.Put("depth.pfm", io::EncodePfm(map));
   }
-  std::string Picture() const { return folder_.Put("picture.png", io::EncodePng(Stripes())); }
+  std::string Image() const { return folder_.Put("picture.png", io::EncodePng(Stripes())); }
   Arguments Usual() const {
-    return {Picture(),      Depth([](int x) { return 0.02 * x - 0.5; }),
+    return {Image(),        Depth([](int x) { return 0.02 * x - 0.5; }),
             "--solver",     GetParam(),
             "--views",      "3x3",
             "--depth-kind", "disparity"};
@@ -106,8 +106,8 @@ TEST_P(EstimateFunctionalTest, SaysWhatItDid) {
   EXPECT_GT(summary["iterations"].get<int>(), 0);
   EXPECT_LE(summary["relative_residual"].get<double>(), 1e-3);
   EXPECT_GT(summary["predicted_memory_mib"].get<double>(), 1);
-  for (const char* of_others :
-       {"block_solver", "rcond_min", "noise_sigma", "row_share", "hidden_share", "residual_rms"}) {
+  for (const char* of_others : {"block_solver", "rcond_min", "noise_sigma", "row_share",
+                                "occluded_fraction", "residual_rms"}) {
     EXPECT_TRUE(summary.at(of_others).is_null()) << of_others;
   }
   EXPECT_THAT(summary["warnings"], IsEmpty());
@@ -137,7 +137,7 @@ TEST_P(EstimateFunctionalTest, TakesItsSettings) {
 }
 
 TEST_P(EstimateFunctionalTest, TheFallOffCanBeLeftOut) {
-  const Arguments with_camera = {Picture(),      Depth([](int x) { return 790.0 + x; }),
+  const Arguments with_camera = {Image(),        Depth([](int x) { return 790.0 + x; }),
                                  "--solver",     GetParam(),
                                  "--views",      "3x3",
                                  "--depth-kind", "z",
@@ -150,8 +150,8 @@ TEST_P(EstimateFunctionalTest, TheFallOffCanBeLeftOut) {
             is_grid ? "defocus, occlusion" : "defocus");
   EXPECT_EQ(fmt::format("{}", fmt::join(with.origin.effects, ", ")),
             is_grid ? "thickness, defocus, falloff, occlusion" : "thickness, defocus, falloff");
-  const model::LinearPicture bright = model::ViewPicture(with, 1, 1);
-  const model::LinearPicture dark = model::ViewPicture(without, 1, 1);
+  const model::LinearImage bright = model::ViewImage(with, 1, 1);
+  const model::LinearImage dark = model::ViewImage(without, 1, 1);
   EXPECT_GT(bright.at(2, 2, 0), 1.2F * dark.at(2, 2, 0));
   EXPECT_NEAR(bright.at(kWidthPx / 2, kHeightPx / 2, 0), dark.at(kWidthPx / 2, kHeightPx / 2, 0),
               0.01);

@@ -43,20 +43,20 @@ using Arguments = std::vector<std::string>;
 constexpr int kColumns = 96, kRows = 64;
 
 // Soft stripes, 1 grey level of noise.
-model::StoredPicture Stripes(int channels) {
-  model::StoredPicture picture{kColumns, kRows, channels, 8, {}};
+model::EncodedImage Stripes(int channels) {
+  model::EncodedImage image{kColumns, kRows, channels, 8, {}};
   std::mt19937 engine(7);
   std::normal_distribution<double> noise(0, 1);
   for (int y = 0; y < kRows; ++y) {
     for (int x = 0; x < kColumns; ++x) {
       for (int c = 0; c < channels; ++c) {
         const double value = 120 + 40 * std::sin(0.35 * x + 0.5 * c) + 30 * std::sin(0.3 * y);
-        picture.values.push_back(
+        image.values.push_back(
             static_cast<std::uint16_t>(std::lround(std::clamp(value + noise(engine), 0.0, 255.0))));
       }
     }
   }
-  return picture;
+  return image;
 }
 
 std::string CameraYaml(const model::TransferCurve& transfer) {
@@ -65,7 +65,7 @@ std::string CameraYaml(const model::TransferCurve& transfer) {
 
 class EstimateSceneTest : public ::testing::Test, protected EstimateCommand {
  protected:
-  std::string Picture(int channels = 3) const {
+  std::string Image(int channels = 3) const {
     return folder_.Put("picture.png", io::EncodePng(Stripes(channels)));
   }
   std::string Depth(const std::function<double(int x, int y)>& value) const {
@@ -81,7 +81,7 @@ class EstimateSceneTest : public ::testing::Test, protected EstimateCommand {
   std::string Report() const { return folder_ / "page"; }
 
   Arguments Usual() const {
-    return {Picture(), Slant(), "--depth-kind", "disparity", "--views", "3x3"};
+    return {Image(), Slant(), "--depth-kind", "disparity", "--views", "3x3"};
   }
   std::string Refusal(const Arguments& arguments, int exit_code) const {
     std::string message = EstimateCommand::Refusal(arguments, exit_code);
@@ -93,13 +93,13 @@ class EstimateSceneTest : public ::testing::Test, protected EstimateCommand {
 // A near strip before a far wall.
 double Strip(int x, int) { return x >= 40 && x < 60 ? 1 : -0.5; }
 
-model::StoredPicture ConfidenceFile(const std::string& folder, int k, int l) {
-  return io::ToStoredPicture(
-      io::ReadPictureFile(fmt::format("{}/confidence/view_{:02}_{:02}.png", folder, l, k)));
+model::EncodedImage ConfidenceFile(const std::string& folder, int k, int l) {
+  return io::ToEncodedImage(
+      io::ReadImageFile(fmt::format("{}/confidence/view_{:02}_{:02}.png", folder, l, k)));
 }
 
-TEST_F(EstimateSceneTest, HiddenRaysMayBeInpainted) {
-  const Arguments strip = {Picture(), Depth(Strip), "--depth-kind", "disparity",
+TEST_F(EstimateSceneTest, OccludedRaysMayBeInpainted) {
+  const Arguments strip = {Image(),   Depth(Strip), "--depth-kind", "disparity",
                            "--views", "3x3",        "--format",     "tiff"};
   EXPECT_TRUE(Summary(strip)["inpainting"].is_null());
   const model::LightField own = io::ReadLightField(Output(), {});
@@ -126,11 +126,11 @@ TEST_F(EstimateSceneTest, HiddenRaysMayBeInpainted) {
 
 TEST_F(EstimateSceneTest, WritesTheConfidenceOfEachRay) {
   const json summary = Summary(
-      {Picture(), Depth(Strip), "--depth-kind", "disparity", "--views", "3x3", "--threads", "2"});
+      {Image(), Depth(Strip), "--depth-kind", "disparity", "--views", "3x3", "--threads", "2"});
   std::size_t filled = 0, whole = 0;
   for (int l = 0; l < 3; ++l) {
     for (int k = 0; k < 3; ++k) {
-      const model::StoredPicture rays = ConfidenceFile(Output(), k, l);
+      const model::EncodedImage rays = ConfidenceFile(Output(), k, l);
       ASSERT_EQ(rays.channels, 1);
       ASSERT_EQ(rays.bits, 8);
       ASSERT_EQ(rays.width_px, kColumns);
@@ -142,9 +142,9 @@ TEST_F(EstimateSceneTest, WritesTheConfidenceOfEachRay) {
   EXPECT_GT(filled, 0u);
   constexpr double kRays = 9.0 * kColumns * kRows;
   EXPECT_NEAR(summary["rays"]["filled_in_share"], static_cast<double>(filled) / kRays, 1e-9);
-  EXPECT_NEAR(summary["rays"]["seen_share"], static_cast<double>(whole) / kRays, 1e-9);
+  EXPECT_NEAR(summary["rays"]["visible_fraction"], static_cast<double>(whole) / kRays, 1e-9);
   // One step to the right the strip stands one px to the left, the wall half a px to the right.
-  const model::StoredPicture right = ConfidenceFile(Output(), 2, 1);
+  const model::EncodedImage right = ConfidenceFile(Output(), 2, 1);
   const auto row = right.values.begin() + 32 * kColumns;
   EXPECT_EQ(row[50], 255);
   EXPECT_EQ(row[59], 0);
@@ -154,9 +154,9 @@ TEST_F(EstimateSceneTest, WritesTheConfidenceOfEachRay) {
 }
 
 TEST_F(EstimateSceneTest, WritesTheSameConfidenceWithAPageAndByOtherSolvers) {
-  const Arguments usual = {Picture(), Depth(Strip), "--depth-kind", "disparity", "--views", "3x3"};
+  const Arguments usual = {Image(), Depth(Strip), "--depth-kind", "disparity", "--views", "3x3"};
   Summary(usual);
-  const model::StoredPicture streamed = ConfidenceFile(Output(), 0, 2);
+  const model::EncodedImage streamed = ConfidenceFile(Output(), 0, 2);
   for (const Arguments& more : {Arguments{"--report", Report()},
                                 {"--solver", "blocks"},
                                 {"--solver", "functional"},
@@ -198,7 +198,7 @@ TEST_F(EstimateSceneTest, IsTheDefaultAndSaysWhatItDid) {
     of_rays += share.get<double>();
   }
   EXPECT_NEAR(of_rays, 1, 1e-9);
-  for (const char* share : {"row_share", "hidden_share", "clipped_fraction"}) {
+  for (const char* share : {"row_share", "occluded_fraction", "clipped_fraction"}) {
     EXPECT_GE(summary.at(share).get<double>(), 0) << share;
     EXPECT_LE(summary.at(share).get<double>(), 1) << share;
   }
@@ -292,14 +292,14 @@ TEST_F(EstimateSceneTest, SettingsThatCannotBe) {
 
 // Never linear by accident, and never silently.
 TEST_F(EstimateSceneTest, TheTransferCurve) {
-  const std::string assumed = "stored values are assumed to be sRGB (--transfer)";
+  const std::string assumed = "encoded values are assumed to be sRGB (--transfer)";
   ProgramResult result;
   json summary = Summary(Usual(), &result);
   EXPECT_THAT(result.err, HasSubstr(assumed));
   EXPECT_EQ(summary["transfer_from"], "assumed");
 
   summary = Summary(With(Usual(), {"--transfer", "linear"}), &result);
-  EXPECT_THAT(result.err, Not(HasSubstr("stored values")));
+  EXPECT_THAT(result.err, Not(HasSubstr("encoded values")));
   EXPECT_EQ(summary["transfer"], "linear");
   EXPECT_EQ(summary["transfer_from"], "option");
   EXPECT_EQ(io::ReadLightField(Output(), {}).transfer, model::TransferCurve::Linear());
@@ -308,7 +308,7 @@ TEST_F(EstimateSceneTest, TheTransferCurve) {
       folder_.Put("camera.yaml", CameraYaml(model::TransferCurve::Gamma(2.2)));
   const Arguments with_camera = With(Usual(), {"--camera", camera});
   summary = Summary(with_camera, &result);
-  EXPECT_THAT(result.err, Not(HasSubstr("stored values")));
+  EXPECT_THAT(result.err, Not(HasSubstr("encoded values")));
   EXPECT_EQ(summary["transfer"], "gamma-2.2");
   EXPECT_EQ(summary["transfer_from"], "camera");
   summary = Summary(With(with_camera, {"--transfer", "srgb"}));
@@ -324,7 +324,7 @@ TEST_F(EstimateSceneTest, WarnsOfStepsThatAreTooLarge) {
   const std::string depth = Depth([](int x, int) { return x == 20 ? 3.2 : 2.9; });
   ProgramResult result;
   const json summary =
-      Summary({Picture(), depth, "--depth-kind", "disparity", "--views", "3x3"}, &result);
+      Summary({Image(), depth, "--depth-kind", "disparity", "--views", "3x3"}, &result);
   ASSERT_EQ(summary["warnings"].size(), 1u) << summary["warnings"];
   EXPECT_THAT(
       summary["warnings"][0].get<std::string>(),
@@ -340,8 +340,8 @@ TEST_F(EstimateSceneTest, SmoothsANoisyDepthAndWarnsWhereItStaysNoisy) {
     return Depth([&](int x, int) { return 0.01 * x - 0.5 + sigma_px * noise(engine); });
   };
   const auto summary_of = [&](double sigma_px, const Arguments& more) {
-    return Summary(With(
-        {Picture(), with_noise(sigma_px), "--depth-kind", "disparity", "--views", "3x3"}, more));
+    return Summary(
+        With({Image(), with_noise(sigma_px), "--depth-kind", "disparity", "--views", "3x3"}, more));
   };
   const json smoothed = summary_of(0.1, {});
   EXPECT_NEAR(smoothed["disparity"]["noise_px"].get<double>(), 0.1, 0.01);
@@ -368,18 +368,18 @@ TEST_F(EstimateSceneTest, SaysWhenItHasNotConverged) {
 }
 
 // Sharp bars of many widths, all in focus, 1 grey level of noise.
-model::StoredPicture Bars(int width_px, int height_px) {
+model::EncodedImage Bars(int width_px, int height_px) {
   const std::bitset<64> is_dark(0x9d3a6c51b2e4f087ULL);
-  model::StoredPicture picture{width_px, height_px, 1, 8, {}};
+  model::EncodedImage image{width_px, height_px, 1, 8, {}};
   std::mt19937 engine(5);
   std::normal_distribution<double> noise(0, 1);
   for (int y = 0; y < height_px; ++y) {
     for (int x = 0; x < width_px; ++x) {
       const double value = (is_dark[static_cast<std::size_t>(x / 4)] ? 60 : 190) + noise(engine);
-      picture.values.push_back(static_cast<std::uint16_t>(std::lround(value)));
+      image.values.push_back(static_cast<std::uint16_t>(std::lround(value)));
     }
   }
-  return picture;
+  return image;
 }
 
 TEST_F(EstimateSceneTest, NamesAPatchWhoseDepthIsWrong) {
@@ -437,7 +437,7 @@ TEST_F(EstimateSceneTest, HolesAreReportedWithTheirShare) {
   });
   ProgramResult result;
   const json summary =
-      Summary({Picture(), depth, "--depth-kind", "disparity", "--views", "3x3"}, &result);
+      Summary({Image(), depth, "--depth-kind", "disparity", "--views", "3x3"}, &result);
   EXPECT_EQ(summary["holes_filled"], 320);
   EXPECT_NEAR(summary["holes_share"].get<double>(), 0.052, 5e-4);
   EXPECT_THAT(result.out, HasSubstr("320 px, filled along the surfaces around them (5.2 %)"));
@@ -446,7 +446,7 @@ TEST_F(EstimateSceneTest, HolesAreReportedWithTheirShare) {
   const std::string nearly_none = Depth([](int x, int y) {
     return x == 20 && y == 20 ? 0.4 : std::numeric_limits<double>::quiet_NaN();
   });
-  Summary({Picture(), nearly_none, "--depth-kind", "disparity", "--views", "3x3"}, &result);
+  Summary({Image(), nearly_none, "--depth-kind", "disparity", "--views", "3x3"}, &result);
   EXPECT_THAT(result.out, HasSubstr("(99.9 %)"));
   EXPECT_THAT(result.err, AllOf(HasSubstr("depth.pfm"), HasSubstr("are no depth")));
 }
@@ -457,22 +457,22 @@ TEST_F(EstimateSceneTest, TheReportShowsEachFigureOnce) {
     return x < 40 ? 1.5 : -0.01 * x;
   });
   const json summary = Summary(
-      {Picture(), depth, "--depth-kind", "disparity", "--views", "5x5", "--report", Report()});
+      {Image(), depth, "--depth-kind", "disparity", "--views", "5x5", "--report", Report()});
   EXPECT_THAT(folder_.Entries(), ::testing::Contains("page"));
   const std::string html = ContentOf(Report() + "/index.html");
   const XmlDocument document = ParseXml(html);
   ASSERT_EQ(document.error, "");
-  std::vector<std::string> pictures;
+  std::vector<std::string> images;
   for (const XmlElement& image : document.Named("img")) {
     EXPECT_THAT(image.Attribute("src"), ::testing::StartsWith("data:image/"));
-    pictures.push_back(image.Attribute("alt"));
+    images.push_back(image.Attribute("alt"));
   }
   EXPECT_THAT(
-      pictures,
+      images,
       ElementsAre("The photograph through the whole aperture", "Depth map in colours",
                   "Residual of the photograph", "Confidence of the estimate", "Mosaic of the views",
-                  "view, u 0, v 2", "view, u 2, v 2", "view, u 4, v 2", "Epipolar picture, row 16",
-                  "Epipolar picture, row 32", "Epipolar picture, row 48", "Refocused to +1.50 px",
+                  "view, u 0, v 2", "view, u 2, v 2", "view, u 4, v 2", "Epipolar image, row 16",
+                  "Epipolar image, row 32", "Epipolar image, row 48", "Refocused to +1.50 px",
                   "Refocused to +0.89 px", "Refocused to +0.28 px", "Refocused to −0.33 px",
                   "Refocused to −0.94 px"));
   for (const char* outside : {"http", "href=", "<script", "@import"})
@@ -503,14 +503,14 @@ TEST_F(EstimateSceneTest, OtherFilesBesideTheReportStay) {
 TEST_F(EstimateSceneTest, AnInterruptLeavesNothing) {
   // Large enough to be under way when the signal comes.
   constexpr int kSize = 700;
-  model::StoredPicture picture{kSize, kSize, 1, 8, {}};
+  model::EncodedImage image{kSize, kSize, 1, 8, {}};
   model::RawDepthMap map{kSize, kSize, {}, false};
   for (int i = 0; i < kSize * kSize; ++i) {
-    picture.values.push_back(static_cast<std::uint16_t>(i % 1009 * 7919 % 256));
+    image.values.push_back(static_cast<std::uint16_t>(i % 1009 * 7919 % 256));
     map.values.push_back(static_cast<float>(i % kSize) * 0.003F);
   }
   ChildProgram program(
-      {"estimate", folder_.Put("large.png", io::EncodePng(picture)),
+      {"estimate", folder_.Put("large.png", io::EncodePng(image)),
        folder_.Put("large.pfm", io::EncodePfm(map)), "--depth-kind", "disparity", "--tolerance",
        "1e-12", "--max-iterations", "100000", "-o", Output(), "--report", Report(), "--verbose"},
       scratch_.path(), 0);
@@ -536,7 +536,7 @@ TEST_F(EstimateSceneTest, ThreadsDoNotChangeTheViews) {
 // Waves of 6 px, of which five views 1.2 px apart show nothing in the mean, beside a flat part.
 TEST_F(EstimateSceneTest, ChecksTheBlurWhereItIsAskedTo) {
   constexpr int kWide = 192, kHigh = 128;
-  model::StoredPicture waves{kWide, kHigh, 1, 8, {}};
+  model::EncodedImage waves{kWide, kHigh, 1, 8, {}};
   model::RawDepthMap map{kWide, kHigh, std::vector<float>(kWide * kHigh, 1.2F), false};
   std::mt19937 engine(3);
   std::normal_distribution<double> noise(0, 1);

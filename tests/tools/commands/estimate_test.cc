@@ -44,14 +44,14 @@ using Arguments = std::vector<std::string>;
 constexpr int kWidth = 36;
 constexpr int kHeight = 28;
 
-model::StoredPicture RandomPicture(int channels, int bits) {
-  model::StoredPicture picture{kWidth, kHeight, channels, bits, {}};
+model::EncodedImage RandomImage(int channels, int bits) {
+  model::EncodedImage image{kWidth, kHeight, channels, bits, {}};
   std::mt19937 engine(7);
   std::uniform_int_distribution<int> any(0, bits == 8 ? 255 : 65535);
   for (int i = 0; i < kWidth * kHeight * channels; ++i) {
-    picture.values.push_back(static_cast<std::uint16_t>(any(engine)));
+    image.values.push_back(static_cast<std::uint16_t>(any(engine)));
   }
-  return picture;
+  return image;
 }
 
 model::RawDepthMap MapOf(const std::function<double(int x, int y)>& value) {
@@ -68,8 +68,8 @@ std::string CameraYaml(int width_px, int height_px) {
 
 class EstimateTest : public ::testing::Test {
  protected:
-  std::string Picture(int channels = 3, int bits = 8) const {
-    return folder_.Put("picture.png", io::EncodePng(RandomPicture(channels, bits)));
+  std::string Image(int channels = 3, int bits = 8) const {
+    return folder_.Put("picture.png", io::EncodePng(RandomImage(channels, bits)));
   }
   std::string Depth(const std::function<double(int x, int y)>& value) const {
     return folder_.Put("depth.pfm", io::EncodePfm(MapOf(value)));
@@ -111,8 +111,8 @@ class EstimateTest : public ::testing::Test {
     EXPECT_EQ(errors, 1) << result.err;
     return message;
   }
-  static Arguments AsDisparity(const std::string& picture, const std::string& depth) {
-    return {picture, depth, "--depth-kind", "disparity", "--views", "3x3", "--device", "cpu"};
+  static Arguments AsDisparity(const std::string& image, const std::string& depth) {
+    return {image, depth, "--depth-kind", "disparity", "--views", "3x3", "--device", "cpu"};
   }
   static Arguments With(Arguments arguments, const Arguments& more) {
     arguments.insert(arguments.end(), more.begin(), more.end());
@@ -126,7 +126,7 @@ class EstimateTest : public ::testing::Test {
 TEST_F(EstimateTest, WritesALightFieldThatSaysHowItWasMade) {
   const std::string json = folder_ / "estimate.json";
   const ProgramResult result =
-      Run(With(AsDisparity(Picture(), Disparity()), {"--json", json, "--threads", "2"}));
+      Run(With(AsDisparity(Image(), Disparity()), {"--json", json, "--threads", "2"}));
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, AllOf(HasSubstr("3 x 3 views of 36 x 28 px"), HasSubstr("6 blocks")));
 
@@ -143,7 +143,7 @@ TEST_F(EstimateTest, WritesALightFieldThatSaysHowItWasMade) {
   EXPECT_EQ(summary["prior"], "ridge");
   EXPECT_EQ(summary["strength"], summary["ridge"]);
   for (const char* of_scene :
-       {"noise_sigma", "iterations", "converged", "row_share", "hidden_share", "residual_rms"})
+       {"noise_sigma", "iterations", "converged", "row_share", "occluded_fraction", "residual_rms"})
     EXPECT_TRUE(summary.at(of_scene).is_null()) << of_scene;
   EXPECT_GT(summary["peak_rss_mib"].get<double>(), 10);
   EXPECT_GT(summary["seconds"]["total"].get<double>(), 0);
@@ -159,13 +159,13 @@ TEST_F(EstimateTest, WritesALightFieldThatSaysHowItWasMade) {
 }
 
 TEST_F(EstimateTest, DepthByItsUnitAndACamera) {
-  const std::string picture = Picture();
+  const std::string image = Image();
   const auto plane = [](int x, int) { return 700.0 + 4 * x; };
   const Arguments camera = {"--camera", Camera(), "--views", "3x3", "--device", "cpu"};
   const model::LightField in_mm =
-      Estimated(With({picture, Depth(plane), "--depth-kind", "z", "--depth-unit", "mm"}, camera));
+      Estimated(With({image, Depth(plane), "--depth-kind", "z", "--depth-unit", "mm"}, camera));
   const model::LightField in_m =
-      Estimated(With({picture, Depth([&](int x, int y) { return plane(x, y) / 1000; }),
+      Estimated(With({image, Depth([&](int x, int y) { return plane(x, y) / 1000; }),
                       "--depth-kind", "z", "--depth-unit", "m"},
                      camera));
   ASSERT_TRUE(in_mm.camera.has_value());
@@ -178,51 +178,50 @@ TEST_F(EstimateTest, DepthByItsUnitAndACamera) {
   EXPECT_LT(largest, 1e-3);  // depths differ by the rounding of float
 }
 
-TEST_F(EstimateTest, APictureOfAPartOfTheSensor) {
+TEST_F(EstimateTest, AnImageOfAPartOfTheSensor) {
   const std::string camera = folder_.Put("large.yaml", CameraYaml(kWidth + 20, kHeight + 8));
   const std::string depth = Depth([](int, int) { return 900; });
   const Arguments rest = {"--depth-kind", "z",    "--depth-unit", "mm",
                           "--camera",     camera, "--views",      "3x3"};
-  EXPECT_THAT(Refusal(With({Picture(), depth}, rest)),
+  EXPECT_THAT(Refusal(With({Image(), depth}, rest)),
               AllOf(HasSubstr("36x28"), HasSubstr("56x36"), HasSubstr("--sensor-origin")));
   const model::LightField found =
-      Estimated(With(With({Picture(), depth}, rest), {"--sensor-origin", "20,8"}));
+      Estimated(With(With({Image(), depth}, rest), {"--sensor-origin", "20,8"}));
   EXPECT_EQ(found.camera->sensor.width_px, kWidth);
   EXPECT_DOUBLE_EQ(found.camera->sensor.principal_point_px.x(), (kWidth + 19) / 2.0 - 20);
   fs::remove_all(Output());
   EXPECT_THAT(
-      Refusal(With(With({Picture(), depth}, rest), {"--sensor-origin", "21,8"})),
+      Refusal(With(With({Image(), depth}, rest), {"--sensor-origin", "21,8"})),
       AllOf(HasSubstr("--sensor-origin: "), HasSubstr("large.yaml: the rectangle 21,8,36,28"),
             HasSubstr("leaves the sensor of 56x36 px"),
             HasSubstr("x may be from 0 to 20, y to 8")));
-  EXPECT_THAT(
-      Refusal(With(AsDisparity(Picture(), Disparity()), {"--crop", "30,0,10,10"})),
-      AllOf(HasSubstr("--crop: "), HasSubstr("picture.png: the rectangle 30,0,10,10"),
-            HasSubstr("leaves the picture of 36x28 px"), HasSubstr("x may be from 0 to 26")));
+  EXPECT_THAT(Refusal(With(AsDisparity(Image(), Disparity()), {"--crop", "30,0,10,10"})),
+              AllOf(HasSubstr("--crop: "), HasSubstr("picture.png: the rectangle 30,0,10,10"),
+                    HasSubstr("leaves the image of 36x28 px"), HasSubstr("x may be from 0 to 26")));
 }
 
 TEST_F(EstimateTest, GreyAndSixteenBits) {
-  const model::LightField grey = Estimated(AsDisparity(Picture(1, 8), Disparity()));
+  const model::LightField grey = Estimated(AsDisparity(Image(1, 8), Disparity()));
   EXPECT_EQ(grey.channels, 1);
-  const model::LightField deep = Estimated(AsDisparity(Picture(3, 16), Disparity()));
+  const model::LightField deep = Estimated(AsDisparity(Image(3, 16), Disparity()));
   EXPECT_EQ(deep.channels, 3);
 }
 
 TEST_F(EstimateTest, OneViewAcrossIsReportedAndOneViewInAllIsRefused) {
-  const ProgramResult result = Run(
-      {Picture(), Disparity(), "--depth-kind", "disparity", "--views", "1x3", "--device", "cpu"});
+  const ProgramResult result =
+      Run({Image(), Disparity(), "--depth-kind", "disparity", "--views", "1x3", "--device", "cpu"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.err, HasSubstr("one view along u"));
   fs::remove_all(Output());
-  EXPECT_THAT(Refusal({Picture(), Disparity(), "--depth-kind", "disparity", "--views", "1x1"}),
+  EXPECT_THAT(Refusal({Image(), Disparity(), "--depth-kind", "disparity", "--views", "1x1"}),
               HasSubstr("1x1 is not a light field"));
 }
 
-TEST_F(EstimateTest, BlocksLargerThanThePictureAndTheSourcesStencil) {
+TEST_F(EstimateTest, BlocksLargerThanTheImageAndTheSourcesStencil) {
   const std::string json = folder_ / "estimate.json";
   const ProgramResult result =
-      Run(With(AsDisparity(Picture(), Disparity()), {"--block-px", "500", "--stencil", "source",
-                                                     "--block-solver", "eigen", "--json", json}));
+      Run(With(AsDisparity(Image(), Disparity()), {"--block-px", "500", "--stencil", "source",
+                                                   "--block-solver", "eigen", "--json", json}));
   EXPECT_EQ(result.exit_code, 0) << result.err;
   const nlohmann::json summary = nlohmann::json::parse(ContentOf(json));
   EXPECT_EQ(summary["block_px"], kWidth);
@@ -231,10 +230,10 @@ TEST_F(EstimateTest, BlocksLargerThanThePictureAndTheSourcesStencil) {
 }
 
 TEST_F(EstimateTest, DepthThatCannotBe) {
-  const std::string picture = Picture();
+  const std::string image = Image();
   const auto as_z = [&](const std::string& depth, const std::string& unit) {
-    return Arguments{picture, depth,      "--depth-kind", "z",       "--depth-unit",
-                     unit,    "--camera", Camera(),       "--views", "3x3"};
+    return Arguments{image, depth,      "--depth-kind", "z",       "--depth-unit",
+                     unit,  "--camera", Camera(),       "--views", "3x3"};
   };
   EXPECT_THAT(Refusal(as_z(Depth([](int, int) { return 0; }), "mm")),
               AllOf(HasSubstr("depth.pfm"), HasSubstr("all are holes")));
@@ -243,14 +242,14 @@ TEST_F(EstimateTest, DepthThatCannotBe) {
   EXPECT_THAT(Refusal(as_z(Depth([](int, int) { return 0.8; }), "mm")),
               AllOf(HasSubstr("depth.pfm"), HasSubstr("is the unit right")));
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_THAT(Refusal(AsDisparity(picture, Depth([](int, int) { return kNan; }))),
+  EXPECT_THAT(Refusal(AsDisparity(image, Depth([](int, int) { return kNan; }))),
               AllOf(HasSubstr("depth.pfm"), HasSubstr("holes")));
   const model::RawDepthMap small{8, 8, std::vector<float>(64, 1.0F), false};
-  EXPECT_THAT(Refusal(AsDisparity(picture, folder_.Put("small.pfm", io::EncodePfm(small)))),
+  EXPECT_THAT(Refusal(AsDisparity(image, folder_.Put("small.pfm", io::EncodePfm(small)))),
               AllOf(HasSubstr("small.pfm"), HasSubstr("8x8"), HasSubstr("36x28")));
-  EXPECT_THAT(Refusal({picture, Disparity(), "--depth-kind", "z", "--depth-unit", "mm"}, 2),
+  EXPECT_THAT(Refusal({image, Disparity(), "--depth-kind", "z", "--depth-unit", "mm"}, 2),
               HasSubstr("camera"));
-  EXPECT_THAT(Refusal({picture, Disparity()}, 2), HasSubstr("--depth-kind"));
+  EXPECT_THAT(Refusal({image, Disparity()}, 2), HasSubstr("--depth-kind"));
 }
 
 TEST_F(EstimateTest, HolesAreFilledAndCounted) {
@@ -258,14 +257,14 @@ TEST_F(EstimateTest, HolesAreFilledAndCounted) {
   const std::string depth = Depth([](int x, int y) {
     return x > 10 && x < 14 && y > 3 && y < 9 ? std::numeric_limits<double>::quiet_NaN() : 0.4;
   });
-  const ProgramResult result = Run(With(AsDisparity(Picture(), depth), {"--json", json}));
+  const ProgramResult result = Run(With(AsDisparity(Image(), depth), {"--json", json}));
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, HasSubstr("15 px, filled along the surfaces around them (1.5 %)"));
   EXPECT_EQ(nlohmann::json::parse(ContentOf(json))["holes_filled"], 15);
 }
 
 TEST_F(EstimateTest, SettingsThatCannotBe) {
-  const Arguments good = AsDisparity(Picture(), Disparity());
+  const Arguments good = AsDisparity(Image(), Disparity());
   EXPECT_THAT(Refusal(With(good, {"--gamma", "0"})),
               AllOf(HasSubstr("gamma is 0"), HasSubstr("geometry")));
   EXPECT_THAT(Refusal(With(good, {"--gamma", "-1"})), HasSubstr("gamma is -1"));
@@ -290,7 +289,7 @@ TEST_F(EstimateTest, SettingsThatCannotBe) {
 
 // What is given and not used would leave a person with a wrong idea of the result.
 TEST_F(EstimateTest, NothingThatIsGivenIsLeftOutWithoutAWord) {
-  const Arguments relative = AsDisparity(Picture(), Disparity());
+  const Arguments relative = AsDisparity(Image(), Disparity());
   EXPECT_THAT(Refusal(With(relative, {"--st-depth-mm", "700"}), 2), HasSubstr("--camera"));
   EXPECT_THAT(Refusal(With(relative, {"--block-solver", "viennacl"}), 2),
               HasSubstr("--device cpu cannot be used with"));
@@ -307,26 +306,26 @@ TEST_F(EstimateTest, NothingThatIsGivenIsLeftOutWithoutAWord) {
     EXPECT_THAT(Refusal(With(relative, iterative), 2),
                 HasSubstr(iterative.front() + " requires --solver scene, functional or grid"));
   }
-  EXPECT_THAT(Refusal({Picture(), Disparity(), "--depth-kind", "disparity", "--views", "100x3"}, 2),
+  EXPECT_THAT(Refusal({Image(), Disparity(), "--depth-kind", "disparity", "--views", "100x3"}, 2),
               HasSubstr("from 1 to 99"));
 }
 
 TEST_F(EstimateTest, DepthFarFromFocusIsReported) {
   const Arguments camera = {"--depth-kind", "z",       "--depth-unit", "mm",       "--camera",
                             Camera(),       "--views", "3x3",          "--device", "cpu"};
-  const ProgramResult far = Run(With({Picture(), Depth([](int, int) { return 4000; })}, camera));
+  const ProgramResult far = Run(With({Image(), Depth([](int, int) { return 4000; })}, camera));
   EXPECT_EQ(far.exit_code, 0) << far.err;
   EXPECT_THAT(far.err, AllOf(HasSubstr("4000 mm"), HasSubstr("800 mm"), HasSubstr("depth-unit")));
-  const ProgramResult near = Run(With({Picture(), Depth([](int, int) { return 900; })}, camera));
+  const ProgramResult near = Run(With({Image(), Depth([](int, int) { return 900; })}, camera));
   EXPECT_THAT(near.err, ::testing::Not(HasSubstr("depth-unit")));
 }
 
-TEST_F(EstimateTest, DisparityBeyondThePicture) {
-  EXPECT_THAT(Refusal(With(AsDisparity(Picture(), Disparity()), {"--disparity-scale", "1e6"})),
+TEST_F(EstimateTest, DisparityBeyondTheImage) {
+  EXPECT_THAT(Refusal(With(AsDisparity(Image(), Disparity()), {"--disparity-scale", "1e6"})),
               AllOf(HasSubstr("depth.pfm"), HasSubstr("px per view step"), HasSubstr("36 px"),
                     HasSubstr("--disparity-scale")));
   // By a camera it is a depth that none can be; the person gave none.
-  EXPECT_THAT(Refusal(With(AsDisparity(Picture(), Disparity()),
+  EXPECT_THAT(Refusal(With(AsDisparity(Image(), Disparity()),
                            {"--camera", Camera(), "--disparity-scale", "1e6"})),
               AllOf(HasSubstr("depth.pfm"), HasSubstr("scale and offset of the disparity"),
                     Not(HasSubstr("unit"))));
@@ -334,15 +333,15 @@ TEST_F(EstimateTest, DisparityBeyondThePicture) {
 
 TEST_F(EstimateTest, AFolderWithOtherThingsIsLeftAlone) {
   folder_.Put("lf/thesis.txt", "years of work");
-  const ProgramResult result = Run(AsDisparity(Picture(), Disparity()));
+  const ProgramResult result = Run(AsDisparity(Image(), Disparity()));
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_EQ(ContentOf(folder_ / "lf/thesis.txt"), "years of work");
 }
 
 TEST_F(EstimateTest, AFailingRunLeavesTheOlderLightField) {
-  Estimated(AsDisparity(Picture(), Disparity()));
+  Estimated(AsDisparity(Image(), Disparity()));
   const std::string before = ContentOf(Output() + "/lightfield.yaml");
-  EXPECT_EQ(Run(With(AsDisparity(Picture(), Disparity()), {"--ridge", "0"})).exit_code, 1);
+  EXPECT_EQ(Run(With(AsDisparity(Image(), Disparity()), {"--ridge", "0"})).exit_code, 1);
   EXPECT_EQ(ContentOf(Output() + "/lightfield.yaml"), before);
 }
 
@@ -351,14 +350,14 @@ TEST_F(EstimateTest, TheMemoryLimitHolds) {
   // The middle is flat and in focus: only the sides tell how much memory blocks need.
   constexpr int kWide = 144;
   constexpr int kHigh = 96;
-  model::StoredPicture picture{kWide, kHigh, 1, 8, {}};
+  model::EncodedImage image{kWide, kHigh, 1, 8, {}};
   model::RawDepthMap map{kWide, kHigh, {}, false};
   for (int i = 0; i < kWide * kHigh; ++i) {
-    picture.values.push_back(static_cast<std::uint16_t>(i * 7919 % 256));
+    image.values.push_back(static_cast<std::uint16_t>(i * 7919 % 256));
     const double beside = std::max(0.0, std::abs(i % kWide - kWide / 2) - 36.0);
     map.values.push_back(static_cast<float>(2.5 * beside / 36));
   }
-  const Arguments good = With(AsDisparity(folder_.Put("slanted.png", io::EncodePng(picture)),
+  const Arguments good = With(AsDisparity(folder_.Put("slanted.png", io::EncodePng(image)),
                                           folder_.Put("slanted.pfm", io::EncodePfm(map))),
                               {"--threads", "2"});
   const std::string json = folder_ / "estimate.json";
@@ -387,7 +386,7 @@ TEST_F(EstimateTest, TheMemoryLimitHolds) {
 }
 
 TEST_F(EstimateTest, IterationsOfTheBlocksAreReported) {
-  const Arguments good = With(AsDisparity(Picture(), Disparity()), {"--block-solver", "cg"});
+  const Arguments good = With(AsDisparity(Image(), Disparity()), {"--block-solver", "cg"});
   const std::string json = folder_ / "estimate.json";
   const ProgramResult done = Run(With(good, {"--json", json}));
   ASSERT_EQ(done.exit_code, 0) << done.err;
@@ -409,7 +408,7 @@ TEST_F(EstimateTest, IterationsOfTheBlocksAreReported) {
   EXPECT_THAT(cut.err, AllOf(HasSubstr("not converged"), HasSubstr("--max-iterations")));
   fs::remove_all(Output());
   // A direct solver has no iterations to limit.
-  EXPECT_THAT(Refusal(With(AsDisparity(Picture(), Disparity()),
+  EXPECT_THAT(Refusal(With(AsDisparity(Image(), Disparity()),
                            {"--block-solver", "eigen", "--tolerance", "1e-3"}),
                       2),
               HasSubstr("--tolerance requires --solver"));
@@ -418,14 +417,14 @@ TEST_F(EstimateTest, IterationsOfTheBlocksAreReported) {
 TEST_F(EstimateTest, AnInterruptLeavesNothing) {
   // Large enough to be under way when the signal comes.
   constexpr int kSize = 400;
-  model::StoredPicture picture{kSize, kSize, 1, 8, {}};
+  model::EncodedImage image{kSize, kSize, 1, 8, {}};
   model::RawDepthMap map{kSize, kSize, {}, false};
   for (int i = 0; i < kSize * kSize; ++i) {
-    picture.values.push_back(static_cast<std::uint16_t>(i * 7919 % 256));
+    image.values.push_back(static_cast<std::uint16_t>(i * 7919 % 256));
     map.values.push_back(static_cast<float>(i % kSize) * 0.005F);
   }
   Arguments arguments =
-      With({"estimate"}, AsDisparity(folder_.Put("large.png", io::EncodePng(picture)),
+      With({"estimate"}, AsDisparity(folder_.Put("large.png", io::EncodePng(image)),
                                      folder_.Put("large.pfm", io::EncodePfm(map))));
   arguments =
       With(arguments, {"--solver", "blocks", "-o", Output(), "--views", "7x7", "--verbose"});
@@ -487,7 +486,7 @@ TEST_F(EstimateTest, TheBaselineIsRadianceToo) {
   truth.grid = grid;
   truth.camera = camera;
   truth.weights = model::ApertureWeights(model::ApertureShape::kGaussian, 3, 3);
-  const model::LinearPicture view = model::ToLinear(RandomPicture(3, 8), truth.transfer);
+  const model::LinearImage view = model::ToLinear(RandomImage(3, 8), truth.transfer);
   for (int l = 0; l < 3; ++l) {
     for (int k = 0; k < 3; ++k) model::SetView(&truth, k, l, view);
   }

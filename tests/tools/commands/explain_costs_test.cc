@@ -47,16 +47,16 @@ class ExplainCostsTest : public ::testing::Test {
   TemporaryFolder folder_;
 };
 
-TEST_F(ExplainCostsTest, BlurIsWhatAPictureCosts) {
+TEST_F(ExplainCostsTest, BlurIsWhatAnImageCosts) {
   const ProgramResult result =
       Run({"--depth-range", "280:320", "--costs", "--json", folder_ / "e.json"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const nlohmann::json json = nlohmann::json::parse(ContentOf(folder_ / "e.json"));
-  EXPECT_GT(json.at("picture_seconds").get<double>(), 0);
+  EXPECT_GT(json.at("image_seconds").get<double>(), 0);
   for (const nlohmann::json& effect : json.at("effects")) {
     const std::string name = effect.at("name").get<std::string>();
     SCOPED_TRACE(name);
-    // Hundreds of rays instead of a few; of what a bench has there is nothing in a picture.
+    // Hundreds of rays instead of a few; of what a bench has there is nothing in an image.
     if (name == "defocus") {
       EXPECT_GT(effect.at("cost_seconds").get<double>(), 0);
     } else if (name == "shot-noise" || name == "thickness") {

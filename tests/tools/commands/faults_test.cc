@@ -109,7 +109,7 @@ class Faults : public ::testing::Test {
   }
 
   Job EstimateJob() {
-    Simulate("picture", "scene.yaml", "pic");
+    Simulate("image", "scene.yaml", "pic");
     const std::string output = folder_ / "lf";
     return {output,
             {Estimate({"--views", "3x3", "--prior", "ridge", "-o", output}),
@@ -251,7 +251,7 @@ TEST_F(Faults, TooLittleMemoryIsReportedAndRemovesNoFile) {
   ASSERT_EQ(Run(job.ways[0]).exit_code, 0);
   // From what does not even hold the libraries to what does; whether the program gets as far as its
   // own code is the system's.
-  bool was_told = false;
+  bool was_reported = false;
   for (int mebibytes = 80; mebibytes <= 520; mebibytes += 20) {
     SCOPED_TRACE(mebibytes);
     const Contents before = ContentsOf(job.output);
@@ -267,13 +267,13 @@ TEST_F(Faults, TooLittleMemoryIsReportedAndRemovesNoFile) {
     if (run.exit_code == 1) {
       // libgomp ends the program where there is none for its threads.
       EXPECT_THAT(run.err, AnyOf(HasSubstr("out of memory"), HasSubstr("Thread creation failed")));
-      was_told = true;
+      was_reported = true;
     }
     if (run.exit_code != 0) {
       EXPECT_EQ(ContentsOf(job.output), before);
     }
   }
-  EXPECT_TRUE(was_told);
+  EXPECT_TRUE(was_reported);
 }
 
 TEST_F(Faults, AFileThatEndsTooEarlyIsReported) {

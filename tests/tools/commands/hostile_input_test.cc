@@ -89,9 +89,9 @@ class Mutations {
 
 // The bytes as a C++ string, to be read by who has to find out.
 std::string Shown(const std::string& bytes) {
-  constexpr std::size_t kMost = 600;
-  return ::testing::PrintToString(bytes.substr(0, kMost)) +
-         (bytes.size() > kMost ? " and " + std::to_string(bytes.size() - kMost) + " more" : "");
+  constexpr std::size_t kMax = 600;
+  return ::testing::PrintToString(bytes.substr(0, kMax)) +
+         (bytes.size() > kMax ? " and " + std::to_string(bytes.size() - kMax) + " more" : "");
 }
 
 class HostileInput : public ::testing::TestWithParam<FuzzedReader> {

@@ -97,7 +97,7 @@ class InterruptMoments : public ::testing::Test {
 
   // What the commands read.
   void MakeInputs() const {
-    Succeed({"simulate", "picture", Config("scenes/demo.yaml"), "-o", inputs_ / "picture"});
+    Succeed({"simulate", "image", Config("scenes/demo.yaml"), "-o", inputs_ / "image"});
     Succeed({"simulate", "light-field", Config("scenes/demo.yaml"), "--views", "3x3", "-o",
              inputs_ / "truth"});
     Succeed({"simulate", "sweep", Config("sweeps/case-iv.yaml"), "-o", inputs_ / "sweep"});
@@ -105,14 +105,14 @@ class InterruptMoments : public ::testing::Test {
   }
   Arguments Estimate(const Arguments& more) const {
     Arguments all = {"estimate",
-                     inputs_ / "picture/picture.png",
-                     inputs_ / "picture/depth.pfm",
+                     inputs_ / "image/picture.png",
+                     inputs_ / "image/depth.pfm",
                      "--depth-kind",
                      "z",
                      "--depth-unit",
                      "mm",
                      "--camera",
-                     inputs_ / "picture/camera.yaml"};
+                     inputs_ / "image/camera.yaml"};
     all.insert(all.end(), more.begin(), more.end());
     return all;
   }
@@ -120,12 +120,12 @@ class InterruptMoments : public ::testing::Test {
   std::vector<StoppedCommand> Commands() const {
     const std::string out = outputs_ / "out", json = outputs_ / "out.json";
     return {
-        {"simulate picture",
-         {"simulate", "picture", Config("scenes/demo.yaml"), "--attribute", "-o", out}},
+        {"simulate image",
+         {"simulate", "image", Config("scenes/demo.yaml"), "--ablate", "-o", out}},
         {"simulate light-field",
          {"simulate", "light-field", Config("scenes/demo.yaml"), "-o", out}},
         {"simulate sweep",
-         {"simulate", "sweep", Config("sweeps/case-ii.yaml"), "--attribute", "-o", out}},
+         {"simulate", "sweep", Config("sweeps/case-ii.yaml"), "--ablate", "-o", out}},
         {"calibrate",
          {"calibrate", inputs_ / "sweep/sweep.yaml", "--floor-px", "0.5:0.05", "--report", out,
           "-o", outputs_ / "camera.yaml"}},
@@ -139,13 +139,13 @@ class InterruptMoments : public ::testing::Test {
         {"render", {"render", inputs_ / "truth", "--as-captured", "-o", outputs_ / "out.png"}},
         {"compare",
          {"compare", inputs_ / "truth", inputs_ / "estimate", "--dibr",
-          inputs_ / "picture/picture.png", inputs_ / "picture/depth.pfm", "--depth-kind", "z",
+          inputs_ / "image/picture.png", inputs_ / "image/depth.pfm", "--depth-kind", "z",
           "--depth-unit", "mm", "--json", json}},
         {"report",
          {"report", inputs_ / "estimate", "--truth", inputs_ / "truth", "--photo",
-          inputs_ / "picture/picture.png", "-o", outputs_ / "out.html"}},
+          inputs_ / "image/picture.png", "-o", outputs_ / "out.html"}},
         {"explain",
-         {"explain", inputs_ / "picture/camera.yaml", "--depth-range", "290:310", "--costs",
+         {"explain", inputs_ / "image/camera.yaml", "--depth-range", "290:310", "--costs",
           "--figure", outputs_ / "out.svg"}},
         {"bench calibration", {"bench", "calibration", "--sweeps", "2", "--report", out}},
         {"bench inpainting", {"bench", "inpainting", "--json", json}},
@@ -159,11 +159,11 @@ class InterruptMoments : public ::testing::Test {
 
   // How long it takes; of what takes longer than that, as long.
   void MeasureWhole(StoppedCommand* command) {
-    constexpr double kMost_s = 5;
+    constexpr double kMax_s = 5;
     const auto start = std::chrono::steady_clock::now();
     StoppedProgram program(command->arguments, Settings());
     const auto so_far_s = [&] { return SecondsBetween(start, std::chrono::steady_clock::now()); };
-    while (!program.HasEnded() && so_far_s() < kMost_s) {
+    while (!program.HasEnded() && so_far_s() < kMax_s) {
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
     }
     command->seconds = so_far_s();

@@ -77,9 +77,9 @@ std::string SweepConfig(int size_px, int frames) {
 }
 
 std::string GreyPng(int width_px, int height_px) {
-  model::StoredPicture picture{width_px, height_px, 1, 8, {}};
-  picture.values.assign(static_cast<std::size_t>(width_px * height_px), std::uint16_t{128});
-  return io::EncodePng(picture);
+  model::EncodedImage image{width_px, height_px, 1, 8, {}};
+  image.values.assign(static_cast<std::size_t>(width_px * height_px), std::uint16_t{128});
+  return io::EncodePng(image);
 }
 
 // A folder for the outputs of one test, and a simulated sweep that all tests share and copy.
@@ -236,7 +236,7 @@ TEST_F(ProgramTest, SimulatesASweepThatCanBeRead) {
   const model::Camera camera = model::ReadCamera(file.camera_path);
   EXPECT_FALSE(camera.calibration) << "a calibration would not have to find anything";
   EXPECT_EQ(camera.sensor.width_px, 160);
-  EXPECT_EQ(io::ReadPictureFile(file.frames[3].image).size(), cv::Size(160, 160));
+  EXPECT_EQ(io::ReadImageFile(file.frames[3].image).size(), cv::Size(160, 160));
 }
 
 TEST_F(ProgramTest, TheSeedAloneDecidesWhatIsSimulated) {
@@ -316,7 +316,7 @@ TEST_F(ProgramTest, ADryRunTellsWhatItUnderstoodAndWritesNothing) {
   for (int i = 1; i < kFrames; ++i)  // no more than the first frame is opened
     folder_.Put(
         "sweep/frames/frame_0" + std::string(i < 10 ? "0" : "") + std::to_string(i) + ".png",
-        "no picture");
+        "no image");
   const ProgramResult result = Run({"calibrate", sweep + "/sweep.yaml", "--dry-run", "-o",
                                     folder_ / "camera.yaml", "--report", folder_ / "report"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
@@ -344,11 +344,11 @@ TEST_F(ProgramTest, NamesAMissingFrame) {
   EXPECT_THAT(CalibrationFailure({sweep + "/sweep.yaml"}), HasSubstr("frame_003.png"));
 }
 
-TEST_F(ProgramTest, NamesAFrameThatIsNoPicture) {
+TEST_F(ProgramTest, NamesAFrameThatIsNoImage) {
   const std::string sweep = CopySweep();
   folder_.Put("sweep/frames/frame_004.png", "this is a text\n");
   EXPECT_THAT(CalibrationFailure({sweep + "/sweep.yaml"}),
-              AllOf(HasSubstr("frame_004.png"), HasSubstr("cannot be decoded as a picture")));
+              AllOf(HasSubstr("frame_004.png"), HasSubstr("cannot be decoded as an image")));
 }
 
 TEST_F(ProgramTest, NamesAFrameOfAnotherSize) {
@@ -418,7 +418,7 @@ TEST_F(ProgramTest, AnErrorIsWrittenToTheSummaryToo) {
 
 TEST_F(ProgramTest, NamesWhatIsWrongInACameraFileWithItsPlace) {
   const struct {
-    const char *right, *wrong, *told;
+    const char *right, *wrong, *reported;
   } cases[] = {
       {"aperture_radius_mm: 8.9286", "aperture_radius_mm: -8.9286", "aperture_radius_mm"},
       {"psf: gaussian", "psf: gaussian\ncolour: red", "unknown key 'colour'"},
@@ -438,7 +438,7 @@ TEST_F(ProgramTest, NamesWhatIsWrongInACameraFileWithItsPlace) {
     std::ofstream(camera, std::ios::binary) << whole;
     ReplaceInFile(camera, wrong.right, wrong.wrong);
     const std::string message = CalibrationFailure({sweep + "/sweep.yaml"});
-    EXPECT_THAT(message, AllOf(HasSubstr("camera.yaml:"), HasSubstr(wrong.told)));
+    EXPECT_THAT(message, AllOf(HasSubstr("camera.yaml:"), HasSubstr(wrong.reported)));
     EXPECT_EQ(Failure({"explain", camera, "--depth-range", "250:350"}), message);
   }
 }

@@ -20,9 +20,9 @@
 #include "support/temporary_folder.h"
 #include "support/test_cameras.h"
 #include "thicklens/base/output_file.h"
+#include "thicklens/io/image_description.h"
 #include "thicklens/io/image_io.h"
 #include "thicklens/io/light_field_io.h"
-#include "thicklens/io/picture_description.h"
 #include "thicklens/model/light_field.h"
 #include "tools/support/child_process.h"
 
@@ -72,14 +72,14 @@ class RenderTest : public ::testing::Test {
     arguments.insert(arguments.begin(), "render");
     return ChildProgram(arguments, scratch_.path(), max_file_bytes).Wait();
   }
-  // Renders with the C++ twin, whose results are the same everywhere.
-  model::StoredPicture Rendered(Arguments arguments) const {
+  // Renders with the C++ reference, whose results are the same everywhere.
+  model::EncodedImage Rendered(Arguments arguments) const {
     const std::string out = folder_ / "rendered.png";
     arguments.insert(arguments.end(), {"--device", "cpu", "-o", out});
     const ProgramResult result = Run(arguments);
     EXPECT_EQ(result.exit_code, 0) << result.err;
-    return result.exit_code == 0 ? io::ToStoredPicture(io::ReadPictureFile(out))
-                                 : model::StoredPicture{};
+    return result.exit_code == 0 ? io::ToEncodedImage(io::ReadImageFile(out))
+                                 : model::EncodedImage{};
   }
   // The line of what must fail, with nothing written.
   std::string Failure(Arguments arguments, int exit_code = 1) const {
@@ -101,9 +101,9 @@ class RenderTest : public ::testing::Test {
 };
 
 // The plain formula: the weighted mean of the views in linear light, stored and rounded.
-model::StoredPicture MeanOfViews(const model::LightField& light_field,
-                                 const Eigen::ArrayXXd& weights, int bits) {
-  model::StoredPicture stored{kRenderedS, kRenderedT, 3, bits, {}};
+model::EncodedImage MeanOfViews(const model::LightField& light_field,
+                                const Eigen::ArrayXXd& weights, int bits) {
+  model::EncodedImage stored{kRenderedS, kRenderedT, 3, bits, {}};
   for (std::size_t pixel = 0; pixel < light_field.view_size(); ++pixel) {
     for (int channel = 0; channel < 3; ++channel) {
       double light = 0;
@@ -118,7 +118,7 @@ model::StoredPicture MeanOfViews(const model::LightField& light_field,
   return stored;
 }
 
-int LargestDifference(const model::StoredPicture& a, const model::StoredPicture& b) {
+int LargestDifference(const model::EncodedImage& a, const model::EncodedImage& b) {
   EXPECT_EQ(a.values.size(), b.values.size());
   EXPECT_EQ(a.width_px, b.width_px);
   EXPECT_EQ(a.bits, b.bits);
@@ -187,8 +187,8 @@ TEST_F(RenderTest, TheProtocolsCommandWorksAsWritten) {
   arguments.insert(arguments.end(), command.begin(), command.end());
   const ProgramResult result = Run(arguments);
   ASSERT_EQ(result.exit_code, 0) << result.err;
-  const model::StoredPicture photo = io::ToStoredPicture(io::ReadPictureFile(out));
-  const model::StoredPicture clean =
+  const model::EncodedImage photo = io::ToEncodedImage(io::ReadImageFile(out));
+  const model::EncodedImage clean =
       MeanOfViews(light_field, model::ApertureWeights(model::ApertureShape::kUniform, 7, 7), 8);
   double squares = 0;
   ASSERT_EQ(photo.values.size(), clean.values.size());
@@ -231,7 +231,7 @@ TEST_F(RenderTest, AViewIsThatView) {
   const model::LightField light_field = AtRandom(3, 5, 4);
   const std::string folder = Write("lf", light_field);
   const auto stored = [&](int k, int l) {
-    return model::ToStored(model::ViewPicture(light_field, k, l), light_field.transfer, 16).values;
+    return model::ToEncoded(model::ViewImage(light_field, k, l), light_field.transfer, 16).values;
   };
   EXPECT_EQ(Rendered({folder, "--view", "2,4", "--bits", "16"}).values, stored(2, 4));
   EXPECT_EQ(Rendered({folder, "--view", "centre", "--bits", "16"}).values, stored(1, 2));
@@ -265,7 +265,7 @@ model::LightField FlatScene(int disparity_px) {
   return light_field;
 }
 
-double RmsInside(const model::StoredPicture& a, const model::StoredPicture& b) {
+double RmsInside(const model::EncodedImage& a, const model::EncodedImage& b) {
   double squares = 0;
   int count = 0;
   for (int y = 6; y < kRenderedT - 6; ++y) {
@@ -280,7 +280,7 @@ double RmsInside(const model::StoredPicture& a, const model::StoredPicture& b) {
 
 TEST_F(RenderTest, FocusAtADisparityMakesItSharp) {
   const std::string folder = Write("lf", FlatScene(2));
-  const model::StoredPicture centre = Rendered({folder, "--view", "centre"});
+  const model::EncodedImage centre = Rendered({folder, "--view", "centre"});
   EXPECT_LT(RmsInside(Rendered({folder, "--focus-disparity", "2"}), centre), 1);
   EXPECT_GT(RmsInside(Rendered({folder, "--focus-disparity", "-2"}), centre), 20);
   EXPECT_GT(RmsInside(Rendered({folder, "--as-captured"}), centre), 20);
@@ -301,7 +301,7 @@ TEST_F(RenderTest, FocusInMillimetresIsFocusAtItsDisparity) {
     (is_nearer ? near_mm : far_mm) = middle_mm;
   }
   const std::string folder = Write("lf", light_field);
-  const model::StoredPicture centre = Rendered({folder, "--view", "centre"});
+  const model::EncodedImage centre = Rendered({folder, "--view", "centre"});
   EXPECT_LT(RmsInside(Rendered({folder, "--focus", std::to_string(near_mm)}), centre), 1);
   EXPECT_LT(RmsInside(Rendered({folder, "--focus-disparity", "1"}), centre), 1);
   EXPECT_GT(RmsInside(Rendered({folder, "--focus", std::to_string(far_mm * 2)}), centre), 10);
@@ -376,9 +376,9 @@ TEST_F(RenderTest, VignettingIsOnWithUvOffTheAperture) {
   EXPECT_EQ(description(), "view (1, 1)");
 }
 
-TEST_F(RenderTest, TheMosaicAndTheEpipolarPicturesHaveTheirSizes) {
+TEST_F(RenderTest, TheMosaicAndTheEpipolarImagesHaveTheirSizes) {
   const std::string folder = Write("lf", AtRandom(3, 5, 6));
-  const model::StoredPicture mosaic = Rendered({folder, "--mosaic"});
+  const model::EncodedImage mosaic = Rendered({folder, "--mosaic"});
   EXPECT_GE(mosaic.width_px, 3 * kRenderedS);
   EXPECT_LT(mosaic.width_px, 4 * kRenderedS);
   EXPECT_GE(mosaic.height_px, 5 * kRenderedT);
@@ -553,9 +553,9 @@ TEST_F(RenderTest, AnInterruptedRunLeavesTheOlderOutput) {
 TEST_F(RenderTest, AFullDiskLeavesTheOlderOutput) {
   const std::string folder = Write("lf", AtRandom(3, 3, 11));
   const std::string out = folder_.Put("out/picture.png", "older");
-  const ProgramResult picture = Run({folder, "--mosaic", "-o", out}, 2000);
-  EXPECT_EQ(picture.exit_code, 1);
-  EXPECT_THAT(picture.err, HasSubstr("cannot be written"));
+  const ProgramResult image = Run({folder, "--mosaic", "-o", out}, 2000);
+  EXPECT_EQ(image.exit_code, 1);
+  EXPECT_THAT(image.err, HasSubstr("cannot be written"));
   EXPECT_EQ(ContentOf(out), "older");
   const ProgramResult converted =
       Run({folder, "--convert", "thicklens", "-o", folder_ / "out/lf"}, 2000);

@@ -1,4 +1,4 @@
-// thicklens simulate picture and simulate light-field as a person meets them.
+// thicklens simulate image and simulate light-field as a person meets them.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -73,20 +73,19 @@ class SimulateSceneTest : public ::testing::Test {
   TemporaryFolder folder_, scratch_;
 };
 
-TEST_F(SimulateSceneTest, PictureFolderHoldsWhatTheSimulatorMakes) {
+TEST_F(SimulateSceneTest, ImageFolderHoldsWhatTheSimulatorMakes) {
   const std::string config = folder_.Put("scene.yaml", SceneConfig("noise_sigma_grey_levels: 1\n"));
   const std::string out = folder_ / "out";
-  const ProgramResult result = Run({"picture", config, "-o", out, "--json", folder_ / "a.json"});
+  const ProgramResult result = Run({"image", config, "-o", out, "--json", folder_ / "a.json"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, AllOf(HasSubstr("40 x 30 px"), HasSubstr(out)));
 
   const model::SceneSimulationOptions options = model::ReadSceneSimulation(config);
   const model::SceneSimulator simulator(options, {});
-  const model::StoredPicture picture =
-      io::ToStoredPicture(io::ReadPictureFile(out + "/picture.png"));
-  EXPECT_EQ(picture.bits, 8);
-  EXPECT_EQ(picture.channels, 3);
-  EXPECT_EQ(picture.values, simulator.Store(simulator.RenderNoiseless({})).values);
+  const model::EncodedImage image = io::ToEncodedImage(io::ReadImageFile(out + "/picture.png"));
+  EXPECT_EQ(image.bits, 8);
+  EXPECT_EQ(image.channels, 3);
+  EXPECT_EQ(image.values, simulator.Store(simulator.RenderNoiseless({})).values);
   const model::RawDepthMap depth = io::ReadDepthMap(out + "/depth.pfm");
   EXPECT_EQ(depth.width_px, 40);
   EXPECT_EQ(depth.values, simulator.RenderDepth().values);
@@ -116,7 +115,7 @@ TEST_F(SimulateSceneTest, PictureFolderHoldsWhatTheSimulatorMakes) {
 
 TEST_F(SimulateSceneTest, EffectsAreChosenAndReported) {
   const std::string config = folder_.Put("scene.yaml", SceneConfig("without: [falloff]\n"));
-  Succeed({"picture", config, "-o", folder_ / "auto", "--json", folder_ / "auto.json"});
+  Succeed({"image", config, "-o", folder_ / "auto", "--json", folder_ / "auto.json"});
   const nlohmann::json automatic = JsonOf("auto.json")["effects"];
   ASSERT_EQ(automatic.size(), 12U);
   EXPECT_EQ(automatic[1]["name"], "defocus");
@@ -129,7 +128,7 @@ TEST_F(SimulateSceneTest, EffectsAreChosenAndReported) {
 
   // The command line goes before the file.
   const ProgramResult given =
-      Run({"picture", config, "-o", folder_ / "given", "--effects", "defocus,falloff", "--without",
+      Run({"image", config, "-o", folder_ / "given", "--effects", "defocus,falloff", "--without",
            "defocus", "--json", folder_ / "given.json"});
   EXPECT_THAT(given.out, HasSubstr("effects: falloff; left out"));
   EXPECT_EQ(JsonOf("given.json")["bits"], 16);
@@ -138,11 +137,11 @@ TEST_F(SimulateSceneTest, EffectsAreChosenAndReported) {
   EXPECT_EQ(truth.At("effects").Elements()[0].Text(), "falloff");
   EXPECT_EQ(model::ReadCamera(folder_ / "given" + "/camera.yaml").sensor.transfer.Name(), "linear");
 
-  const ProgramResult foreign = Run({"picture", config, "-o", folder_ / "c", "--effects", "tilt"});
+  const ProgramResult foreign = Run({"image", config, "-o", folder_ / "c", "--effects", "tilt"});
   EXPECT_EQ(foreign.exit_code, 2);
   EXPECT_THAT(foreign.err, HasSubstr("--effects: effect tilt is not available here"));
-  EXPECT_EQ(Run({"picture", config, "-o", folder_ / "c", "--without", "bokeh"}).exit_code, 2);
-  EXPECT_EQ(Run({"picture", config, "-o", folder_ / "c", "--tolerance", "1"}).exit_code, 2);
+  EXPECT_EQ(Run({"image", config, "-o", folder_ / "c", "--without", "bokeh"}).exit_code, 2);
+  EXPECT_EQ(Run({"image", config, "-o", folder_ / "c", "--tolerance", "1"}).exit_code, 2);
 }
 
 TEST_F(SimulateSceneTest, LightFieldFolderHoldsTheTrueViews) {
@@ -188,20 +187,20 @@ TEST_F(SimulateSceneTest, TheUvPlaneMayLieOffTheAperture) {
 TEST_F(SimulateSceneTest, SeedDecidesAndThreadsDoNot) {
   const std::string config = folder_.Put(
       "scene.yaml", SceneConfig("noise_sigma_grey_levels: 1\nrays_per_pixel: 50\nseed: 2\n"));
-  const auto picture = [&](const Arguments& more) {
-    Arguments arguments = {"picture", config, "-o", folder_ / "out", "--quiet"};
+  const auto image = [&](const Arguments& more) {
+    Arguments arguments = {"image", config, "-o", folder_ / "out", "--quiet"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     Succeed(arguments);  // replaces its own older folder
     return ContentOf(folder_ / "out/picture.png");
   };
-  const std::string first = picture({"--threads", "1"});
-  EXPECT_EQ(picture({"--threads", "3"}), first);
-  EXPECT_EQ(picture({"--seed", "2"}), first);
-  EXPECT_NE(picture({"--seed", "3"}), first);
+  const std::string first = image({"--threads", "1"});
+  EXPECT_EQ(image({"--threads", "3"}), first);
+  EXPECT_EQ(image({"--seed", "2"}), first);
+  EXPECT_NE(image({"--seed", "3"}), first);
 }
 
-TEST_F(SimulateSceneTest, TextureMayBeAPictureFile) {
-  model::StoredPicture texture{32, 32, 3, 8, {}};
+TEST_F(SimulateSceneTest, TextureMayBeAnImageFile) {
+  model::EncodedImage texture{32, 32, 3, 8, {}};
   for (int i = 0; i < 32 * 32; ++i) {
     for (const int level : {188, 0, 255}) {
       texture.values.push_back(static_cast<std::uint16_t>(level));
@@ -211,22 +210,22 @@ TEST_F(SimulateSceneTest, TextureMayBeAPictureFile) {
   const std::string config =
       folder_.Put("scene.yaml", SceneConfig("without: [falloff]\n")
                                     .replace(SceneConfig("").find("{kind: dead-leaves}"), 19,
-                                             "{kind: picture, picture: purple.png}"));
-  Succeed({"picture", config, "-o", folder_ / "out", "--quiet"});
-  const model::StoredPicture picture =
-      io::ToStoredPicture(io::ReadPictureFile(folder_ / "out/picture.png"));
+                                             "{kind: image, image: purple.png}"));
+  Succeed({"image", config, "-o", folder_ / "out", "--quiet"});
+  const model::EncodedImage image =
+      io::ToEncodedImage(io::ReadImageFile(folder_ / "out/picture.png"));
   // The file is sRGB, the camera linear: 188 of 255 is half the light.
-  EXPECT_NEAR(picture.values[0], 128, 1);
-  EXPECT_EQ(picture.values[1], 0);
-  EXPECT_EQ(picture.values[2], 255);
+  EXPECT_NEAR(image.values[0], 128, 1);
+  EXPECT_EQ(image.values[1], 0);
+  EXPECT_EQ(image.values[2], 255);
 
   fs::remove(folder_ / "purple.png");
-  EXPECT_THAT(Failure({"picture", config, "-o", folder_ / "other"}), HasSubstr("purple.png"));
+  EXPECT_THAT(Failure({"image", config, "-o", folder_ / "other"}), HasSubstr("purple.png"));
   EXPECT_FALSE(fs::exists(folder_ / "other"));
 }
 
 TEST_F(SimulateSceneTest, OutlineMayBeAMaskFile) {
-  model::StoredPicture mask{40, 30, 1, 8, std::vector<std::uint16_t>(40 * 30, 0)};
+  model::EncodedImage mask{40, 30, 1, 8, std::vector<std::uint16_t>(40 * 30, 0)};
   for (int y = 10; y < 20; ++y) std::fill_n(mask.values.begin() + 40 * y + 5, 10, 128);
   const std::string outline = "{centre_px: [20, 15], size_px: [15, 11]}";
   const std::string text = SceneConfig("");
@@ -234,7 +233,7 @@ TEST_F(SimulateSceneTest, OutlineMayBeAMaskFile) {
       "scene.yaml",
       std::string(text).replace(text.find(outline), outline.size(), "{mask: masks/card.png}"));
   folder_.Put("masks/card.png", io::EncodePng(mask));
-  Succeed({"picture", config, "-o", folder_ / "out", "--quiet"});
+  Succeed({"image", config, "-o", folder_ / "out", "--quiet"});
   const model::RawDepthMap depth = io::ReadDepthMap(folder_ / "out/depth.pfm");
   for (int y = 0; y < 30; ++y) {
     for (int x = 0; x < 40; ++x) {
@@ -246,21 +245,21 @@ TEST_F(SimulateSceneTest, OutlineMayBeAMaskFile) {
   mask.width_px = 20;
   mask.height_px = 60;
   folder_.Put("masks/card.png", io::EncodePng(mask));
-  EXPECT_THAT(Failure({"picture", config, "-o", folder_ / "other"}),
+  EXPECT_THAT(Failure({"image", config, "-o", folder_ / "other"}),
               AllOf(HasSubstr("layers[1]: outline.mask"), HasSubstr("card.png"),
-                    HasSubstr("is 20x60 px, the scene's picture 40x30 px")));
+                    HasSubstr("is 20x60 px, the scene's image 40x30 px")));
   folder_.Put("masks/card.png", "none");
   EXPECT_THAT(Failure({"light-field", config, "-o", folder_ / "other"}), HasSubstr("card.png"));
   EXPECT_FALSE(fs::exists(folder_ / "other"));
 }
 
-TEST_F(SimulateSceneTest, LayerMayBeAPictureWithItsDepthMap) {
+TEST_F(SimulateSceneTest, LayerMayBeAnImageWithItsDepthMap) {
   model::RawDepthMap map{40, 30, {}, false};
   for (int i = 0; i < 40 * 30; ++i) {
     map.values.push_back(i % 40 < 20 ? 0.298F : 0.302F + 1e-5F * static_cast<float>(i / 40));
   }
   folder_.Put("map.pfm", io::EncodePfm(map));
-  model::StoredPicture texture{40, 30, 3, 8, {}};
+  model::EncodedImage texture{40, 30, 3, 8, {}};
   for (int i = 0; i < 40 * 30; ++i) {
     for (int c = 0; c < 3; ++c) {
       texture.values.push_back(static_cast<std::uint16_t>(i % 40 < 20 ? 188 : 0));
@@ -272,31 +271,31 @@ TEST_F(SimulateSceneTest, LayerMayBeAPictureWithItsDepthMap) {
   const std::string config =
       folder_.Put("scene.yaml", text.substr(0, layer) +
                                     "- {depth: {map: map.pfm, kind: z, unit: m},\n"
-                                    "   texture: {kind: picture, picture: texture.png}}\n" +
+                                    "   texture: {kind: image, image: texture.png}}\n" +
                                     text.substr(text.find("without")));
-  Succeed({"picture", config, "-o", folder_ / "out", "--quiet"});
+  Succeed({"image", config, "-o", folder_ / "out", "--quiet"});
   const model::RawDepthMap depth = io::ReadDepthMap(folder_ / "out/depth.pfm");
   ASSERT_EQ(depth.values.size(), map.values.size());
   for (std::size_t i = 0; i < map.values.size(); ++i) {
     EXPECT_NEAR(depth.values[i], 1000 * map.values[i], 1e-4F);
   }
-  const model::StoredPicture picture =
-      io::ToStoredPicture(io::ReadPictureFile(folder_ / "out/picture.png"));
-  EXPECT_NEAR(picture.values[3 * (40 * 15 + 2)], 128, 3);
-  EXPECT_NEAR(picture.values[3 * (40 * 15 + 37)], 0, 3);
+  const model::EncodedImage image =
+      io::ToEncodedImage(io::ReadImageFile(folder_ / "out/picture.png"));
+  EXPECT_NEAR(image.values[3 * (40 * 15 + 2)], 128, 3);
+  EXPECT_NEAR(image.values[3 * (40 * 15 + 37)], 0, 3);
 
   map.values[5] = 0;
   folder_.Put("map.pfm", io::EncodePfm(map));
   EXPECT_THAT(
-      Failure({"picture", config, "-o", folder_ / "other"}),
+      Failure({"image", config, "-o", folder_ / "other"}),
       AllOf(HasSubstr("layers[0]: depth.map"), HasSubstr("1 of its 1200 values are holes")));
   fs::remove(folder_ / "map.pfm");
-  EXPECT_THAT(Failure({"picture", config, "-o", folder_ / "other"}), HasSubstr("map.pfm"));
+  EXPECT_THAT(Failure({"image", config, "-o", folder_ / "other"}), HasSubstr("map.pfm"));
 }
 
 TEST_F(SimulateSceneTest, RefusesInOneLineAndWritesNothing) {
   const std::string config = folder_.Put("scene.yaml", SceneConfig("viewss: [3, 3]\n"));
-  for (const char* command : {"picture", "light-field"}) {
+  for (const char* command : {"image", "light-field"}) {
     EXPECT_THAT(Failure({command, config, "-o", folder_ / "out", "--json", folder_ / "a.json"}),
                 HasSubstr("unknown key 'viewss'; did you mean 'views'"));
     EXPECT_EQ(JsonOf("a.json")["status"], "refused");
@@ -308,20 +307,20 @@ TEST_F(SimulateSceneTest, RefusesInOneLineAndWritesNothing) {
   folder_.Put("mine/letter.txt", "dear");
   Succeed({"light-field", good, "-o", folder_ / "views", "--views", "1x1", "--quiet"});
   for (const char* name : {"mine", "views"}) {
-    EXPECT_THAT(Failure({"picture", good, "-o", folder_ / name}), HasSubstr(name));
+    EXPECT_THAT(Failure({"image", good, "-o", folder_ / name}), HasSubstr(name));
   }
   EXPECT_THAT(folder_.Entries(), ElementsAre("a.json", "good.yaml", "mine", "scene.yaml", "views"));
 
   EXPECT_EQ(Run({"light-field", good, "-o", folder_ / "out", "--views", "3"}).exit_code, 2);
   EXPECT_EQ(Run({"light-field", good, "-o", folder_ / "out", "--format", "jpg"}).exit_code, 2);
-  EXPECT_EQ(Run({"picture", good}).exit_code, 2);
+  EXPECT_EQ(Run({"image", good}).exit_code, 2);
 }
 
 TEST_F(SimulateSceneTest, AnInterruptLeavesNothingHalfWritten) {
   std::string text = SceneConfig("rays_per_pixel: 2000\n");
   text.replace(text.find("[40, 30]"), 8, "[512, 512]");
   const std::string config = folder_.Put("scene.yaml", text);
-  ChildProgram child({"simulate", "picture", config, "-o", folder_ / "out"}, scratch_.path(), 0);
+  ChildProgram child({"simulate", "image", config, "-o", folder_ / "out"}, scratch_.path(), 0);
   while (child.Running() && thicklens::testing::PartOf(folder_.path(), "out").empty())
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
   child.Interrupt();

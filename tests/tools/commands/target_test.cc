@@ -63,12 +63,12 @@ std::vector<std::int64_t> StatedResolution(const std::string& png) {
 struct Drawn {
   model::TargetPage page;
   std::vector<model::TargetLeaf> leaves;
-  cv::Mat picture;  // CV_8U
+  cv::Mat image;  // CV_8U
   double px_per_mm = 0;
 
   int Px(double mm) const { return static_cast<int>(std::lround(mm * px_per_mm)); }
   cv::Mat Part(const model::SheetRectangle& area) const {
-    return picture(cv::Rect(Px(area.x), Px(area.y), Px(area.width), Px(area.height)));
+    return image(cv::Rect(Px(area.x), Px(area.y), Px(area.width), Px(area.height)));
   }
 };
 
@@ -77,7 +77,7 @@ Drawn Draw(const model::TargetRequest& request, double dpi) {
   drawn.page = model::LayOutTarget(request);
   drawn.leaves = model::DeadLeaves(drawn.page);
   const std::string png = TargetPng(drawn.page, drawn.leaves, TargetPngSize(drawn.page, dpi));
-  drawn.picture = io::DecodePicture(png, "target.png");
+  drawn.image = io::DecodeImage(png, "target.png");
   drawn.px_per_mm = static_cast<double>(StatedResolution(png)[0]) / 1000;
   return drawn;
 }
@@ -98,7 +98,7 @@ EdgeLine FitEdge(const Drawn& drawn) {
   for (int row = drawn.Px(patch.y) + 3; row < drawn.Px(patch.y + patch.height) - 3; ++row) {
     double dark_px = 0;
     for (int column = left_px; column < right_px; ++column)
-      dark_px += 1 - drawn.picture.at<std::uint8_t>(row, column) / 255.0;
+      dark_px += 1 - drawn.image.at<std::uint8_t>(row, column) / 255.0;
     points.emplace_back(row - centre_y_px, dark_px + left_px - patch.x * drawn.px_per_mm);
   }
   double y = 0, x = 0, yy = 0, xy = 0;
@@ -119,7 +119,8 @@ EdgeLine FitEdge(const Drawn& drawn) {
   return line;
 }
 
-// A slow twin: at each point the last leaf that holds it. Points on a leaf's border are left out.
+// A slow reference: at each point the last leaf that holds it. Points on a leaf's border are left
+// out.
 TEST(TargetPng, ShowsAtEachPointTheForemostLeaf) {
   const Drawn drawn = Draw(SmallRequest(), 300);
   const model::SheetRectangle& pattern = drawn.page.pattern;
@@ -141,7 +142,7 @@ TEST(TargetPng, ShowsAtEachPointTheForemostLeaf) {
       if (!plain) continue;
       ++compared;
       if (!covered) ++background;
-      if (std::abs(drawn.picture.at<std::uint8_t>(row, column) - grey) > 1) ++wrong;
+      if (std::abs(drawn.image.at<std::uint8_t>(row, column) - grey) > 1) ++wrong;
     }
   }
   EXPECT_GT(compared, 1500);
@@ -154,12 +155,12 @@ TEST(TargetPng, HasTrueScaleAndSaysSo) {
   const std::string png = TargetPng(page, model::DeadLeaves(page), TargetPngSize(page, 300));
   io::RequireWholePng(png, "target.png");
   EXPECT_THAT(StatedResolution(png), ElementsAre(11811, 11811, 1));  // 300/0.0254
-  const cv::Mat picture = io::DecodePicture(png, "target.png");
-  EXPECT_EQ(picture.cols, std::lround(148 / kMmPerInch * 300));
-  EXPECT_EQ(picture.rows, std::lround(120 / kMmPerInch * 300));
+  const cv::Mat image = io::DecodeImage(png, "target.png");
+  EXPECT_EQ(image.cols, std::lround(148 / kMmPerInch * 300));
+  EXPECT_EQ(image.rows, std::lround(120 / kMmPerInch * 300));
   // The bar, the only dark thing in its rows.
   const cv::Mat row =
-      picture.row(static_cast<int>((page.bar.y + page.bar.height / 2) / kMmPerInch * 300));
+      image.row(static_cast<int>((page.bar.y + page.bar.height / 2) / kMmPerInch * 300));
   double dark_px = 0;
   for (int x = 0; x < row.cols; ++x) dark_px += 1 - row.at<std::uint8_t>(0, x) / 255.0;
   EXPECT_NEAR(dark_px * kMmPerInch / 300, page.bar.width, 0.01);
@@ -233,17 +234,17 @@ TEST(TargetPng, TwoTonesAreTwo) {
   model::TargetRequest request = SmallRequest();
   request.two_tone = true;
   const Drawn drawn = Draw(request, 300);
-  EXPECT_EQ(cv::countNonZero(drawn.picture == 0) + cv::countNonZero(drawn.picture == 255),
-            static_cast<int>(drawn.picture.total()));
+  EXPECT_EQ(cv::countNonZero(drawn.image == 0) + cv::countNonZero(drawn.image == 255),
+            static_cast<int>(drawn.image.total()));
   EXPECT_NEAR(cv::mean(drawn.Part(drawn.page.pattern))[0], 127.5, 20);
   EXPECT_NEAR(FitEdge(drawn).angle_deg, 5, 0.1);
 }
 
 // Autocorrelation of a plane of numbers by the Fourier transform, padded so that nothing wraps
 // around, each lag over what overlaps; 1 at lag 0, which is at (0, 0).
-cv::Mat Autocorrelation(const cv::Mat& picture) {
+cv::Mat Autocorrelation(const cv::Mat& image) {
   cv::Mat grey;
-  picture.convertTo(grey, CV_64F);
+  image.convertTo(grey, CV_64F);
   grey -= cv::mean(grey)[0];
   const auto correlate = [&](const cv::Mat& values) {
     cv::Mat padded, spectrum, power, correlation;
@@ -261,7 +262,7 @@ cv::Mat Autocorrelation(const cv::Mat& picture) {
   return correlation / correlation.at<double>(0, 0);
 }
 
-// The highest correlation at lags from `from_px` to a third of the picture, and the highest of them
+// The highest correlation at lags from `from_px` to a third of the image, and the highest of them
 // that stands above all around it within `reach_px`.
 struct Peaks {
   double highest = 0;
@@ -298,7 +299,7 @@ TEST(TargetPng, RepeatsNothing) {
   const Peaks found = PeaksBeyond(Autocorrelation(drawn.Part(above)), 10, 5);
   EXPECT_LT(found.second_peak, 0.2) << found.highest;
 
-  // What it would find if a quarter of the picture were there three times.
+  // What it would find if a quarter of the image were there three times.
   cv::Mat repeated = drawn.Part(above).clone();
   const cv::Rect quarter(0, 0, repeated.cols / 4, repeated.rows);
   repeated(quarter).copyTo(repeated(quarter + cv::Point(quarter.width, 0)));

@@ -35,10 +35,10 @@ class TrueLightFieldTest : public ::testing::TestWithParam<model::ApertureShape>
             {1, 1}};
   }
 
-  // Of stored values, without the border of which H has to guess what lies beyond.
-  double PsnrOf(const model::LinearPicture& picture, const model::LinearPicture& reference) const {
-    return estimator::ComparePictures(model::StoredValuesOf(reference, views_.transfer),
-                                      model::StoredValuesOf(picture, views_.transfer), 20)
+  // Of encoded values, without the border of which H has to guess what lies beyond.
+  double PsnrOf(const model::LinearImage& image, const model::LinearImage& reference) const {
+    return estimator::CompareImages(model::EncodedValuesOf(reference, views_.transfer),
+                                    model::EncodedValuesOf(image, views_.transfer), 20)
         .psnr_db;
   }
 
@@ -48,13 +48,13 @@ class TrueLightFieldTest : public ::testing::TestWithParam<model::ApertureShape>
 };
 
 TEST_P(TrueLightFieldTest, ThroughHIsThePhotograph) {
-  const model::LinearPicture centre =
-      model::ViewPicture(views_, views_.u_count / 2, views_.v_count / 2);
-  model::LinearPicture photograph = centre;
+  const model::LinearImage centre =
+      model::ViewImage(views_, views_.u_count / 2, views_.v_count / 2);
+  model::LinearImage photograph = centre;
   for (std::size_t i = 0; i < photograph.values.size(); ++i) photograph.values[i] = 0;
   for (int l = 0; l < views_.v_count; ++l) {
     for (int k = 0; k < views_.u_count; ++k) {
-      const model::LinearPicture view = model::ViewPicture(views_, k, l);
+      const model::LinearImage view = model::ViewImage(views_, k, l);
       const auto weight = static_cast<float>(weights_(l, k));
       for (std::size_t i = 0; i < view.values.size(); ++i) {
         photograph.values[i] += weight * view.values[i];
@@ -64,7 +64,7 @@ TEST_P(TrueLightFieldTest, ThroughHIsThePhotograph) {
   estimator::ProjectionOptions options;
   options.threads = 2;
   const auto projection = estimator::MakeSceneProjection<float>(map_, weights_, options);
-  // H has one plane after the other, a picture its channels beside each other.
+  // H has one plane after the other, an image its channels beside each other.
   const std::size_t pixels = projection.pixels(), channels = 3;
   ASSERT_EQ(centre.values.size(), channels * pixels);
   std::vector<float> planes(channels * pixels), shown(channels * pixels);
@@ -72,7 +72,7 @@ TEST_P(TrueLightFieldTest, ThroughHIsThePhotograph) {
     planes[i] = centre.values[i % pixels * channels + i / pixels];
   }
   projection.Apply(planes.data(), static_cast<int>(channels), shown.data());
-  model::LinearPicture through = centre;
+  model::LinearImage through = centre;
   for (std::size_t i = 0; i < shown.size(); ++i) {
     through.values[i % pixels * channels + i / pixels] = shown[i];
   }

@@ -67,7 +67,7 @@ cl_int clEnqueueNDRangeKernel(cl_command_queue queue, cl_kernel kernel, cl_uint 
                                                           local, wait_count, wait, event);
 }
 
-// A device that is lost works no more: this one must not either when its loss is told.
+// A device that is lost works no more: this one must not either when its loss is reported.
 cl_int clFinish(cl_command_queue queue) {
   const cl_int result = Real<decltype(clFinish)>(__func__)(queue);
   if (const cl_int error = FaultOf(__func__)) return error;

@@ -37,11 +37,11 @@ using Arguments = std::vector<std::string>;
 
 constexpr char kVersion[] = "a version";
 
-estimator::BlockRun SomeRun(const std::string& gamma, const std::vector<float>& picture) {
+estimator::BlockRun SomeRun(const std::string& gamma, const std::vector<float>& image) {
   estimator::BlockRun run;
   run.settings = {{"block_px", "24"}, {"gamma", gamma}};
-  run.data = {{"picture",
-               {{reinterpret_cast<const char*>(picture.data()), picture.size() * sizeof(float)}}}};
+  run.data = {
+      {"image", {{reinterpret_cast<const char*>(image.data()), image.size() * sizeof(float)}}}};
   run.blocks = 3;
   return run;
 }
@@ -57,7 +57,7 @@ class BlockCheckpointTest : public ::testing::Test {
  protected:
   std::string Path() const { return folder_ / "blocks"; }
   TemporaryFolder folder_;
-  const std::vector<float> picture_ = {1, 2, 3};
+  const std::vector<float> image_ = {1, 2, 3};
 };
 
 TEST_F(BlockCheckpointTest, ABlockComesBackAsTheLightFieldHoldsIt) {
@@ -66,14 +66,14 @@ TEST_F(BlockCheckpointTest, ABlockComesBackAsTheLightFieldHoldsIt) {
   {
     BlockCheckpoint checkpoint(Path(), kVersion);
     EXPECT_FALSE(checkpoint.block_px());
-    checkpoint.Begin(SomeRun("1", picture_));
+    checkpoint.Begin(SomeRun("1", image_));
     checkpoint.Keep(2, SomeBlock());
     checkpoint.Keep(0, iterated);
     EXPECT_EQ(checkpoint.kept(), 2);
   }
   BlockCheckpoint checkpoint(Path(), kVersion);
   EXPECT_EQ(checkpoint.block_px(), 24);
-  checkpoint.Begin(SomeRun("1", picture_));
+  checkpoint.Begin(SomeRun("1", image_));
   EXPECT_EQ(checkpoint.kept(), 2);
   EXPECT_FALSE(checkpoint.Find(1));
   const auto found = checkpoint.Find(2);
@@ -98,7 +98,7 @@ TEST_F(BlockCheckpointTest, ABlockComesBackAsTheLightFieldHoldsIt) {
 TEST_F(BlockCheckpointTest, AnotherEstimateIsRecognisedByItsDifferences) {
   {
     BlockCheckpoint checkpoint(Path(), kVersion);
-    checkpoint.Begin(SomeRun("1", picture_));
+    checkpoint.Begin(SomeRun("1", image_));
     checkpoint.Keep(0, SomeBlock());
   }
   const std::string before = ContentOf(Path());
@@ -109,12 +109,12 @@ TEST_F(BlockCheckpointTest, AnotherEstimateIsRecognisedByItsDifferences) {
     EXPECT_THAT(message, HasSubstr(Path() + ": holds blocks of another estimate"));
     return message;
   };
-  EXPECT_THAT(refusal(SomeRun("2", picture_)), HasSubstr("gamma is 1 there and 2 here"));
-  EXPECT_THAT(refusal(SomeRun("1", {1, 2, 3.0000002F})), HasSubstr("the picture is another"));
-  estimator::BlockRun more = SomeRun("1", picture_);
+  EXPECT_THAT(refusal(SomeRun("2", image_)), HasSubstr("gamma is 1 there and 2 here"));
+  EXPECT_THAT(refusal(SomeRun("1", {1, 2, 3.0000002F})), HasSubstr("the image is another"));
+  estimator::BlockRun more = SomeRun("1", image_);
   more.settings.insert(more.settings.begin() + 1, {"ridge", "3"});
   EXPECT_THAT(refusal(more), HasSubstr("it does not state 'ridge'"));
-  more = SomeRun("1", picture_);
+  more = SomeRun("1", image_);
   more.blocks = 4;
   EXPECT_THAT(refusal(more), HasSubstr("blocks is 3 there and 4 here"));
   EXPECT_EQ(ContentOf(Path()), before);
@@ -122,16 +122,16 @@ TEST_F(BlockCheckpointTest, AnotherEstimateIsRecognisedByItsDifferences) {
 
 // A run that ended before its first block was there leaves nothing that binds the next one.
 TEST_F(BlockCheckpointTest, WithoutABlockItHoldsNothing) {
-  { BlockCheckpoint(Path(), kVersion).Begin(SomeRun("1", picture_)); }
+  { BlockCheckpoint(Path(), kVersion).Begin(SomeRun("1", image_)); }
   EXPECT_FALSE(fs::exists(Path()));
   { JournalFile(Path(), "thicklens-blocks/1").Append({"[[\"gamma\",\"1\"]]"}); }
   {
     BlockCheckpoint checkpoint(Path(), kVersion);
-    checkpoint.Begin(SomeRun("2", picture_));
+    checkpoint.Begin(SomeRun("2", image_));
     checkpoint.Keep(0, SomeBlock());
   }
   BlockCheckpoint checkpoint(Path(), kVersion);
-  checkpoint.Begin(SomeRun("2", picture_));
+  checkpoint.Begin(SomeRun("2", image_));
   EXPECT_EQ(checkpoint.kept(), 1);
 }
 
@@ -139,7 +139,7 @@ TEST_F(BlockCheckpointTest, WithoutABlockItHoldsNothing) {
 TEST_F(BlockCheckpointTest, RecordsThatAreNoBlocksAreNotFound) {
   {
     BlockCheckpoint checkpoint(Path(), kVersion);
-    checkpoint.Begin(SomeRun("1", picture_));
+    checkpoint.Begin(SomeRun("1", image_));
     checkpoint.Keep(1, SomeBlock());
   }
   const std::string whole = ContentOf(Path());
@@ -155,7 +155,7 @@ TEST_F(BlockCheckpointTest, RecordsThatAreNoBlocksAreNotFound) {
     folder_.Put("blocks", whole);
     { JournalFile(Path(), "thicklens-blocks/1").Append({wrong[i]}); }
     BlockCheckpoint checkpoint(Path(), kVersion);
-    checkpoint.Begin(SomeRun("1", picture_));
+    checkpoint.Begin(SomeRun("1", image_));
     const bool has_its_number = i >= 1 && i <= 5 && wrong[i].size() >= 64;
     EXPECT_EQ(checkpoint.Find(1).has_value(), !has_its_number);
     EXPECT_FALSE(checkpoint.Find(0));
@@ -172,8 +172,7 @@ TEST_F(BlockCheckpointTest, RecordsThatAreNoBlocksAreNotFound) {
     BlockCheckpoint other(folder_ / "other", kVersion);
     EXPECT_FALSE(other.block_px());
     EXPECT_FALSE(other.device());
-    EXPECT_THAT(ErrorOf([&] { other.Begin(SomeRun("1", picture_)); }),
-                HasSubstr("another estimate"));
+    EXPECT_THAT(ErrorOf([&] { other.Begin(SomeRun("1", image_)); }), HasSubstr("another estimate"));
   }
 }
 
@@ -184,7 +183,7 @@ TEST_F(BlockCheckpointTest, TheDeviceToAskForIsThatOfTheRun) {
       {"opencl:0:1, opencl (a GPU)", "opencl:0:1"},
       {"cpu (opencl:0:0 has no double)", "none"}};
   for (const auto& [device, expected] : cases) {
-    estimator::BlockRun run = SomeRun("1", picture_);
+    estimator::BlockRun run = SomeRun("1", image_);
     run.settings.emplace_back("device", device);
     folder_.Put("blocks", "");
     {
@@ -204,15 +203,15 @@ class ResumedEstimate : public ::testing::Test {
   static constexpr int kHeight = 96;
 
   ResumedEstimate() {
-    model::StoredPicture picture{kWidth, kHeight, 3, 8, {}};
+    model::EncodedImage image{kWidth, kHeight, 3, 8, {}};
     model::RawDepthMap depth{kWidth, kHeight, {}, false};
     for (int i = 0; i < kWidth * kHeight; ++i) {
       for (int c = 0; c < 3; ++c) {
-        picture.values.push_back(static_cast<std::uint16_t>((i * 37 + i / kWidth * 11 + c) % 251));
+        image.values.push_back(static_cast<std::uint16_t>((i * 37 + i / kWidth * 11 + c) % 251));
       }
       depth.values.push_back(static_cast<float>(i % kWidth) * 0.01F - 0.5F);
     }
-    folder_.Put("picture.png", EncodePng(picture));
+    folder_.Put("picture.png", EncodePng(image));
     folder_.Put("depth.pfm", EncodePfm(depth));
   }
 
@@ -355,8 +354,8 @@ TEST_F(ResumedEstimate, RefusesWhatIsOfAnotherEstimateAndLeavesItAlone) {
   const ProgramResult inside = Run(Estimate("lf", {"--checkpoint", folder_ / "lf/blocks"}));
   EXPECT_EQ(inside.exit_code, 2);
   EXPECT_THAT(inside.err, HasSubstr("lies in the light field's folder"));
-  const ProgramResult picture = Run(Estimate("lf", {"--checkpoint", folder_ / "picture.png"}));
-  EXPECT_EQ(picture.exit_code, 2) << picture.err;
+  const ProgramResult image = Run(Estimate("lf", {"--checkpoint", folder_ / "picture.png"}));
+  EXPECT_EQ(image.exit_code, 2) << image.err;
 }
 
 }  // namespace

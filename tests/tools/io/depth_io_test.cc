@@ -16,7 +16,7 @@
 #include "support/temporary_folder.h"
 #include "thicklens/base/error.h"
 #include "tools/io/png_check.h"
-#include "tools/support/encoded_picture.h"
+#include "tools/support/image_file_bytes.h"
 
 namespace thicklens::io {
 namespace {
@@ -109,7 +109,7 @@ TEST_F(DepthFile, ABrokenPfmIsRefused) {
   EXPECT_THAT(Refusal("Pf"), HasSubstr("broken PFM"));
 }
 
-TEST_F(DepthFile, IntegerPicturesAreReadAsTheyAre) {
+TEST_F(DepthFile, IntegerImagesAreReadAsTheyAre) {
   const cv::Mat shallow = (cv::Mat_<unsigned char>(2, 2) << 0, 1, 200, 255);
   const cv::Mat deep = (cv::Mat_<unsigned short>(1, 3) << 0, 5000, 65535);
   const model::RawDepthMap from_shallow = Read(Encoded(shallow, ".png"));
@@ -124,7 +124,7 @@ TEST_F(DepthFile, IntegerPicturesAreReadAsTheyAre) {
   }
 }
 
-TEST_F(DepthFile, FloatPicturesAreReadAsTheyAre) {
+TEST_F(DepthFile, FloatImagesAreReadAsTheyAre) {
   const cv::Mat depth = (cv::Mat_<float>(2, 2) << 0.1F, -3.0F, 1e-30F, 1e30F);
   for (const char* format : {".tiff", ".exr"}) {
     const std::string bytes =
@@ -161,7 +161,7 @@ TEST_F(DepthFile, APngWhoseNumbersWouldBeChangedIsRefused) {
               HasSubstr("1 bits in the file"));
 }
 
-TEST_F(DepthFile, ABrokenPictureIsRefused) {
+TEST_F(DepthFile, ABrokenImageIsRefused) {
   cv::Mat depth(40, 40, CV_16U);
   cv::randu(depth, 0, 65535);
   const std::string png = Encoded(depth, ".png");

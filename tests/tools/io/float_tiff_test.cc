@@ -17,12 +17,12 @@ namespace {
 
 using testing::TemporaryFolder;
 
-model::LinearPicture Noise(int width, int height, int channels) {
-  model::LinearPicture picture{width, height, channels, {}};
+model::LinearImage Noise(int width, int height, int channels) {
+  model::LinearImage image{width, height, channels, {}};
   std::mt19937 engine(2);
   std::uniform_real_distribution<float> uniform(-0.5F, 3.0F);
-  for (int i = 0; i < width * height * channels; ++i) picture.values.push_back(uniform(engine));
-  return picture;
+  for (int i = 0; i < width * height * channels; ++i) image.values.push_back(uniform(engine));
+  return image;
 }
 
 // By another library. Sizes of one pixel, one row, several strips, and strips that do not divide
@@ -33,9 +33,9 @@ TEST(FloatTiff, IsReadBackBitForBit) {
     for (const auto& [width, height] :
          std::vector<std::pair<int, int>>{{1, 1}, {5, 3}, {1, 70000}, {70000, 2}, {301, 407}}) {
       SCOPED_TRACE(std::to_string(width) + "x" + std::to_string(height));
-      const model::LinearPicture picture = Noise(width, height, channels);
+      const model::LinearImage image = Noise(width, height, channels);
       const std::string path = folder.Put("view.tiff");
-      WriteFloatTiff(picture, path, "view.tiff");
+      WriteFloatTiff(image, path, "view.tiff");
       const cv::Mat read = cv::imread(path, cv::IMREAD_UNCHANGED);
       ASSERT_EQ(read.type(), CV_32FC(channels));
       ASSERT_EQ(read.cols, width);
@@ -43,7 +43,7 @@ TEST(FloatTiff, IsReadBackBitForBit) {
       for (int y = 0; y < height; ++y) {
         for (int x = 0; x < width; ++x) {
           for (int c = 0; c < channels; ++c) {  // blue comes first there
-            ASSERT_EQ(read.ptr<float>(y)[channels * x + channels - 1 - c], picture.at(x, y, c));
+            ASSERT_EQ(read.ptr<float>(y)[channels * x + channels - 1 - c], image.at(x, y, c));
           }
         }
       }

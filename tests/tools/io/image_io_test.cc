@@ -14,7 +14,7 @@
 #include "thicklens/base/output_file.h"
 #include "thicklens/io/data_hash.h"
 #include "thicklens/io/frame_files.h"
-#include "tools/support/encoded_picture.h"
+#include "tools/support/image_file_bytes.h"
 
 namespace thicklens::io {
 namespace {
@@ -26,7 +26,7 @@ using tools::Encoded;
 
 std::string MessageOf(const std::string& bytes) {
   try {
-    DecodePicture(bytes, "some/frame.png");
+    DecodeImage(bytes, "some/frame.png");
   } catch (const Error& error) {
     return error.what();
   }
@@ -37,17 +37,17 @@ class PngRoundTrip : public ::testing::TestWithParam<std::array<int, 2>> {};
 
 TEST_P(PngRoundTrip, KeepsEveryValue) {
   const auto [channels, bits] = GetParam();
-  model::StoredPicture picture{7, 5, channels, bits, {}};
+  model::EncodedImage image{7, 5, channels, bits, {}};
   std::mt19937 generator(3);
   std::uniform_int_distribution<int> any(0, bits == 8 ? 255 : 65535);
   for (int i = 0; i < 7 * 5 * channels; ++i)
-    picture.values.push_back(static_cast<std::uint16_t>(any(generator)));
-  const model::StoredPicture back = ToStoredPicture(DecodePicture(EncodePng(picture), "memory"));
+    image.values.push_back(static_cast<std::uint16_t>(any(generator)));
+  const model::EncodedImage back = ToEncodedImage(DecodeImage(EncodePng(image), "memory"));
   EXPECT_EQ(back.width_px, 7);
   EXPECT_EQ(back.height_px, 5);
   EXPECT_EQ(back.channels, channels);
   EXPECT_EQ(back.bits, bits);
-  EXPECT_EQ(back.values, picture.values);
+  EXPECT_EQ(back.values, image.values);
 }
 
 INSTANTIATE_TEST_SUITE_P(ChannelsAndBits, PngRoundTrip,
@@ -56,17 +56,17 @@ INSTANTIATE_TEST_SUITE_P(ChannelsAndBits, PngRoundTrip,
                                            std::array<int, 2>{4, 8}, std::array<int, 2>{4, 16}));
 
 // A round trip alone would not see red and blue exchanged twice: OpenCV's own order is BGR.
-TEST(DecodePicture, GivesRedFirst) {
+TEST(DecodeImage, GivesRedFirst) {
   const cv::Mat bgr(2, 2, CV_8UC3, cv::Scalar(10, 20, 30));
-  const cv::Mat rgb = DecodePicture(Encoded(bgr, ".png"), "memory");
+  const cv::Mat rgb = DecodeImage(Encoded(bgr, ".png"), "memory");
   EXPECT_EQ(rgb.at<cv::Vec3b>(1, 1), cv::Vec3b(30, 20, 10));
   const cv::Mat bgra(2, 2, CV_16UC4, cv::Scalar(1000, 2000, 3000, 4000));
-  const cv::Mat rgba = DecodePicture(Encoded(bgra, ".png"), "memory");
+  const cv::Mat rgba = DecodeImage(Encoded(bgra, ".png"), "memory");
   EXPECT_EQ(rgba.at<cv::Vec4w>(0, 1), cv::Vec4w(3000, 2000, 1000, 4000));
 }
 
 // A JPEG with an EXIF orientation of 6 (to be turned by 90 degrees when shown).
-TEST(DecodePicture, DoesNotTurnByExifOrientation) {
+TEST(DecodeImage, DoesNotTurnByExifOrientation) {
   std::string jpeg = Encoded(cv::Mat(8, 24, CV_8U, cv::Scalar(100)), ".jpg");
   const std::string tiff("II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0\x06\0\0\0\0\0\0\0", 26);
   std::string segment("Exif\0\0", 6);
@@ -76,41 +76,41 @@ TEST(DecodePicture, DoesNotTurnByExifOrientation) {
   ASSERT_EQ(
       cv::imdecode(std::vector<unsigned char>(jpeg.begin(), jpeg.end()), cv::IMREAD_COLOR).size(),
       cv::Size(8, 24))
-      << "the picture must be one that OpenCV would turn";
-  EXPECT_EQ(DecodePicture(jpeg, "memory").size(), cv::Size(24, 8));
+      << "the image must be one that OpenCV would turn";
+  EXPECT_EQ(DecodeImage(jpeg, "memory").size(), cv::Size(24, 8));
 }
 
-TEST(DecodePicture, NamesTheFileThatIsNoPicture) {
+TEST(DecodeImage, NamesTheFileThatIsNoImage) {
   for (const std::string& bytes : {std::string(), std::string("hello"), std::string(4096, 'x')}) {
-    EXPECT_THAT(MessageOf(bytes), StartsWith("some/frame.png: cannot be decoded as a picture"));
+    EXPECT_THAT(MessageOf(bytes), StartsWith("some/frame.png: cannot be decoded as an image"));
   }
 }
 
-TEST(DecodePicture, RefusesATruncatedPng) {
+TEST(DecodeImage, RefusesATruncatedPng) {
   cv::Mat noise(64, 64, CV_8U);
   cv::RNG(1).fill(noise, cv::RNG::UNIFORM, 0, 256);
   const std::string whole = Encoded(noise, ".png");
   EXPECT_THAT(MessageOf(whole.substr(0, whole.size() / 2)), HasSubstr("broken PNG: it ends after"));
 }
 
-TEST(DecodePicture, RefusesFloats) {
+TEST(DecodeImage, RefusesFloats) {
   EXPECT_THAT(MessageOf(Encoded(cv::Mat(4, 4, CV_32F, cv::Scalar(0.5)), ".tiff")),
               AllOf(HasSubstr("8 or 16 bits"), HasSubstr("32 bits, float")));
 }
 
 // Not in the words of what fails inside.
-TEST(DecodePicture, SaysWhatIsExpectedOfABrokenFile) {
+TEST(DecodeImage, SaysWhatIsExpectedOfABrokenFile) {
   for (const std::string extension : {".ppm", ".bmp"}) {
     std::string bytes = Encoded(cv::Mat(40, 40, CV_8UC3, cv::Scalar(1, 2, 3)), extension);
     bytes.resize(bytes.size() / 2);
-    EXPECT_THAT(MessageOf(bytes), HasSubstr("cannot be decoded as a picture")) << extension;
+    EXPECT_THAT(MessageOf(bytes), HasSubstr("cannot be decoded as an image")) << extension;
     EXPECT_THAT(MessageOf(bytes), HasSubstr("is expected")) << extension;
   }
 }
 
-TEST(ReadPictureFile, NamesTheMissingFile) {
+TEST(ReadImageFile, NamesTheMissingFile) {
   try {
-    ReadPictureFile("/nowhere/frame.png");
+    ReadImageFile("/nowhere/frame.png");
     FAIL();
   } catch (const Error& error) {
     EXPECT_THAT(error.what(), StartsWith("/nowhere/frame.png: cannot be read"));

@@ -41,7 +41,7 @@ class InputKinds : public ::testing::Test {
     fs::copy_file(configs + "cameras/case-ii.yaml", *made_ / "case.yaml");
     fs::copy_file(configs + "cameras/macro-bench.yaml", *made_ / "calibrated.yaml");
     const std::string scene = configs + "scenes/in-focus.yaml";
-    MakeWithProgram({"simulate", "picture", scene, "-o", *made_ / "pic"});
+    MakeWithProgram({"simulate", "image", scene, "-o", *made_ / "pic"});
     MakeWithProgram({"simulate", "light-field", scene, "--views", "2x2", "-o", *made_ / "lf"});
     MakeWithProgram({"render", *made_ / "lf", "--convert", "hci", "-o", *made_ / "hci"});
     made_->Put("frames/a.png", ReadWholeFile(*made_ / "pic/picture.png"));
@@ -110,7 +110,7 @@ TEST_F(InputKinds, SimulateRefusesPipesAndDevices) {
   for (const char* input : {"sw.yaml", "case.yaml", "frames/a.png"})
     ExpectRefused(input, {"simulate", "sweep", (*this)("sw.yaml"), "-o", out});
   for (const char* input : {"scene.yaml", "case.yaml", "frames/a.png"})
-    ExpectRefused(input, {"simulate", "picture", (*this)("scene.yaml"), "-o", out});
+    ExpectRefused(input, {"simulate", "image", (*this)("scene.yaml"), "-o", out});
   EXPECT_FALSE(fs::exists(out));
 }
 
@@ -153,10 +153,10 @@ TEST_F(InputKinds, CommandsOfLightFieldsRefusePipesAndDevices) {
 }
 
 TEST_F(InputKinds, OtherCommandsRefusePipesAndDevices) {
-  const std::string picture = (*this)("pic/picture.png");
+  const std::string image = (*this)("pic/picture.png");
   ExpectRefused("calibrated.yaml",
                 {"explain", (*this)("calibrated.yaml"), "--depth-range", "280:320"});
-  ExpectRefused("frames/a.png", {"compare", (*this)("frames/a.png"), picture, "--border", "0"});
+  ExpectRefused("frames/a.png", {"compare", (*this)("frames/a.png"), image, "--border", "0"});
   ExpectRefused("frames/a.png", {"camera", "init", "--from-exif", (*this)("frames/a.png")});
   ExpectRefused("case.yaml", {"target", "--camera", (*this)("case.yaml"), "--distance-mm", "300",
                               "-o", work_ / "new.pdf"});

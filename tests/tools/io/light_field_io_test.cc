@@ -113,9 +113,9 @@ class LightFieldFolder : public ::testing::Test {
   TemporaryFolder folder_;
 };
 
-// The stored level of what a view shows.
+// The encoded level of what a view shows.
 int LevelOf(const model::LightField& light_field, int k, int l) {
-  const double light = model::ViewPicture(light_field, k, l).values.front();
+  const double light = model::ViewImage(light_field, k, l).values.front();
   return static_cast<int>(std::lround(255 * light_field.transfer.Encode(light)));
 }
 
@@ -175,10 +175,10 @@ TEST_F(LightFieldFolder, PngIsWithinHalfALevel) {
     const double stored = light_field.transfer.Encode(light_field.values[i]);
     EXPECT_NEAR(light_field.transfer.Encode(back.values[i]), stored, 0.501 / 65535);
   }
-  EXPECT_EQ(ReadPictureFile(folder + "/views/view_01_02.png").type(), CV_16UC3);
+  EXPECT_EQ(ReadImageFile(folder + "/views/view_01_02.png").type(), CV_16UC3);
 }
 
-TEST_F(LightFieldFolder, PngTellsWhatItClips) {
+TEST_F(LightFieldFolder, PngReportsWhatItClips) {
   model::LightField light_field = Relative(2, 1, 1);
   light_field.values[0] = 1.5F;
   light_field.values[1] = -0.01F;
@@ -261,7 +261,7 @@ TEST_F(LightFieldFolder, NamesTheViewThatIsGoneOrBroken) {
       return message;
     };
     message_with(whole.substr(0, whole.size() / 2));
-    message_with("no picture");
+    message_with("no image");
     EXPECT_THAT(message_with(""), HasSubstr("cannot be decoded"));
     fs::remove(view);
     EXPECT_THAT(Refusal(folder), AllOf(HasSubstr("view (1, 2)"), HasSubstr("No such file")));
@@ -272,10 +272,10 @@ TEST_F(LightFieldFolder, NamesTheViewOfAnotherSizeOrKind) {
   const std::string folder = Write(Relative(3, 3, 3), ViewFormat::kPng);
   const std::string other = folder_ / "other";
   const auto message_with = [&](int width_px, int height_px, int channels) {
-    const model::StoredPicture picture{
+    const model::EncodedImage image{
         width_px, height_px, channels, 16,
         std::vector<std::uint16_t>(static_cast<std::size_t>(width_px * height_px * channels))};
-    std::ofstream(folder + "/views/view_00_02.png", std::ios::binary) << EncodePng(picture);
+    std::ofstream(folder + "/views/view_00_02.png", std::ios::binary) << EncodePng(image);
     return Refusal(folder);
   };
   EXPECT_THAT(message_with(5, 6, 3),
@@ -450,8 +450,8 @@ TEST_F(LightFieldFolder, TheBenchmarksOwnFoldersAreNotReplaced) {
 void ExpectDisparitySign(const model::LightField& light_field, const model::RawDepthMap& map) {
   const int centre = light_field.u_count / 2;
   const auto difference = [&](int a, int b, double sign) {
-    const model::LinearPicture middle = model::ViewPicture(light_field, centre, centre);
-    const model::LinearPicture view = model::ViewPicture(light_field, centre + a, centre + b);
+    const model::LinearImage middle = model::ViewImage(light_field, centre, centre);
+    const model::LinearImage view = model::ViewImage(light_field, centre + a, centre + b);
     double sum = 0;
     int count = 0;
     for (int y = 20; y < 492; ++y) {
@@ -480,9 +480,8 @@ TEST(LightFieldData, ReadsAntinous) {
   EXPECT_EQ(light_field.v_count, 7);
   EXPECT_EQ(light_field.s_count, 512);
   EXPECT_EQ(light_field.channels, 3);
-  const model::StoredPicture centre =
-      ToStoredPicture(ReadPictureFile(folder + "/input_Cam040.png"));
-  EXPECT_EQ(model::ToStored(model::ViewPicture(light_field, 3, 3), light_field.transfer, 8).values,
+  const model::EncodedImage centre = ToEncodedImage(ReadImageFile(folder + "/input_Cam040.png"));
+  EXPECT_EQ(model::ToEncoded(model::ViewImage(light_field, 3, 3), light_field.transfer, 8).values,
             centre.values);
   ExpectDisparitySign(light_field, ReadDepthMap(folder + "/gt_disp_lowres.pfm"));
 }
@@ -495,9 +494,9 @@ TEST(LightFieldData, ReadsBackgammonByItsParameters) {
   const model::LightField light_field = ReadLightField(folder, reading);
   EXPECT_EQ(light_field.u_count, 5);
   EXPECT_EQ(light_field.v_count, 5);
-  const model::StoredPicture view = model::CropPicture(
-      ToStoredPicture(ReadPictureFile(folder + "/input_Cam033.png")), *reading.crop);
-  EXPECT_EQ(model::ToStored(model::ViewPicture(light_field, 4, 1), light_field.transfer, 8).values,
+  const model::EncodedImage view =
+      model::CropImage(ToEncodedImage(ReadImageFile(folder + "/input_Cam033.png")), *reading.crop);
+  EXPECT_EQ(model::ToEncoded(model::ViewImage(light_field, 4, 1), light_field.transfer, 8).values,
             view.values);
 }
 

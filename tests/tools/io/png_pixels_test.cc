@@ -103,11 +103,11 @@ std::string RandomFile(const PngKind& kind, unsigned seed) {
 
 // By libpng, as OpenCV has it.
 cv::Mat ByOpenCv(const std::string& bytes) {
-  cv::Mat picture =
+  cv::Mat image =
       cv::imdecode(std::vector<unsigned char>(bytes.begin(), bytes.end()), cv::IMREAD_UNCHANGED);
-  if (picture.channels() == 3) cv::cvtColor(picture, picture, cv::COLOR_BGR2RGB);
-  if (picture.channels() == 4) cv::cvtColor(picture, picture, cv::COLOR_BGRA2RGBA);
-  return picture;
+  if (image.channels() == 3) cv::cvtColor(image, image, cv::COLOR_BGR2RGB);
+  if (image.channels() == 4) cv::cvtColor(image, image, cv::COLOR_BGRA2RGBA);
+  return image;
 }
 
 bool AreEqual(const cv::Mat& a, const cv::Mat& b) {
@@ -119,21 +119,21 @@ TEST(PngPixels, AreThoseThatOpenCvReads) {
     SCOPED_TRACE(NameOf(kind));
     const std::string bytes = RandomFile(kind, 11);
     std::string why;
-    const cv::Mat picture = DecodePngPixels(bytes, &why);
+    const cv::Mat image = DecodePngPixels(bytes, &why);
     EXPECT_EQ(why, "");
-    ASSERT_FALSE(picture.empty());
+    ASSERT_FALSE(image.empty());
     const cv::Mat expected = ByOpenCv(bytes);
-    EXPECT_TRUE(AreEqual(picture, expected))
-        << picture.channels() << " channels, type " << picture.type()
+    EXPECT_TRUE(AreEqual(image, expected))
+        << image.channels() << " channels, type " << image.type()
         << "; OpenCV: " << expected.channels() << " channels, type " << expected.type();
   }
 }
 
-cv::Mat RandomPicture(cv::Size size, int type, std::uint64_t seed) {
-  cv::Mat picture(size, type);
+cv::Mat RandomImage(cv::Size size, int type, std::uint64_t seed) {
+  cv::Mat image(size, type);
   cv::RNG random(seed);
-  random.fill(picture, cv::RNG::UNIFORM, 0, picture.depth() == CV_16U ? 65536 : 256);
-  return picture;
+  random.fill(image, cv::RNG::UNIFORM, 0, image.depth() == CV_16U ? 65536 : 256);
+  return image;
 }
 
 TEST(PngPixels, WrittenAreReadByOpenCv) {
@@ -142,18 +142,18 @@ TEST(PngPixels, WrittenAreReadByOpenCv) {
          {PngPacking::kFast, PngPacking::kRepetitions, PngPacking::kSmall}) {
       SCOPED_TRACE(type);
       for (const cv::Size size : {cv::Size(1, 1), cv::Size(1, 9), cv::Size(37, 20)}) {
-        const cv::Mat picture = RandomPicture(size, type, 3);
-        const std::string bytes = EncodePngPixels(picture, packing);
-        EXPECT_TRUE(AreEqual(ByOpenCv(bytes), picture));
+        const cv::Mat image = RandomImage(size, type, 3);
+        const std::string bytes = EncodePngPixels(image, packing);
+        EXPECT_TRUE(AreEqual(ByOpenCv(bytes), image));
         std::string why;
-        EXPECT_TRUE(AreEqual(DecodePngPixels(bytes, &why), picture)) << why;
+        EXPECT_TRUE(AreEqual(DecodePngPixels(bytes, &why), image)) << why;
       }
     }
   }
 }
 
-TEST(PngPixels, OfAPartOfAPicture) {
-  const cv::Mat whole = RandomPicture({20, 10}, CV_8UC3, 4);
+TEST(PngPixels, OfAPartOfAnImage) {
+  const cv::Mat whole = RandomImage({20, 10}, CV_8UC3, 4);
   const cv::Mat part = whole(cv::Rect(3, 2, 11, 5));
   EXPECT_TRUE(AreEqual(ByOpenCv(EncodePngPixels(part, PngPacking::kFast)), part));
 }
@@ -172,7 +172,7 @@ TEST(PngPixels, PackedSmallerWhereItIsTried) {
 
 // The file's frame may be whole and its pixels not.
 TEST(PngPixels, TellWhatIsWrong) {
-  std::string bytes = EncodePngPixels(RandomPicture({30, 30}, CV_16UC3, 5), PngPacking::kFast);
+  std::string bytes = EncodePngPixels(RandomImage({30, 30}, CV_16UC3, 5), PngPacking::kFast);
   bytes.resize(bytes.size() / 2);
   std::string why;
   EXPECT_TRUE(DecodePngPixels(bytes, &why).empty());
@@ -194,8 +194,8 @@ std::string Chunk(const std::string& type, const std::string& content) {
 
 constexpr std::size_t kAfterHeader = 33;
 
-TEST(PngPixels, RefusesSidesThatNoPictureHas) {
-  const std::string bytes = EncodePngPixels(RandomPicture({8, 8}, CV_8UC1, 6), PngPacking::kFast);
+TEST(PngPixels, RefusesSidesThatNoImageHas) {
+  const std::string bytes = EncodePngPixels(RandomImage({8, 8}, CV_8UC1, 6), PngPacking::kFast);
   for (const std::size_t side : {std::size_t{65536}, std::size_t{1} << 21}) {
     std::string header = bytes.substr(16, 13);
     header.replace(0, 8, BigEndian(side) + BigEndian(side));
@@ -211,8 +211,8 @@ TEST(PngPixels, RefusesSidesThatNoPictureHas) {
 
 // Texts that unpack to a lot, many of them, empty ones, and a palette that is but a suggestion.
 TEST(PngPixels, AreReadWhateverStandsBesideThem) {
-  const cv::Mat picture = RandomPicture({9, 5}, CV_8UC3, 8);
-  const std::string bytes = EncodePngPixels(picture, PngPacking::kFast);
+  const cv::Mat image = RandomImage({9, 5}, CV_8UC3, 8);
+  const std::string bytes = EncodePngPixels(image, PngPacking::kFast);
   std::string many;
   for (int i = 0; i < 20000; ++i) many += Chunk("tEXt", std::string("a\0b", 3));
   const std::string large(std::size_t{70} << 20, 'x');
@@ -222,7 +222,7 @@ TEST(PngPixels, AreReadWhateverStandsBesideThem) {
     std::string with = bytes;
     with.insert(kAfterHeader, beside);
     std::string why;
-    EXPECT_TRUE(AreEqual(DecodePngPixels(with, &why), picture)) << beside.substr(4, 4) << why;
+    EXPECT_TRUE(AreEqual(DecodePngPixels(with, &why), image)) << beside.substr(4, 4) << why;
   }
 }
 

@@ -151,7 +151,7 @@ TEST_F(SparseApertureTest, AGaussianPhotographIsEstimatedByItsShape) {
   EXPECT_GT(right["mean"]["psnr_db"].get<double>(),
             right["dibr"]["mean"]["psnr_db"].get<double>() + 1);
 
-  // Without it a uniform one is assumed, which is told, and is worse.
+  // Without it a uniform one is assumed, which is reported, and is worse.
   const ProgramResult assumed = Estimate(photo, sparse, {});
   ASSERT_EQ(assumed.exit_code, 0) << assumed.err;
   EXPECT_THAT(assumed.err, AllOf(HasSubstr("sparse-hci"), HasSubstr("uniform one is assumed"),
@@ -200,7 +200,7 @@ TEST_F(SparseApertureTest, RenderSaysWhetherTheApertureIsStatedOrAssumed) {
 }
 
 // Estimates that were made for another aperture than the reference states.
-TEST_F(SparseApertureTest, CompareTellsOfDifferentApertures) {
+TEST_F(SparseApertureTest, CompareReportsDifferentApertures) {
   const auto compared = [&](const std::string& a, const std::string& b) {
     const ProgramResult result = Run({"compare", a, b, "--sparse"});
     EXPECT_EQ(result.exit_code, 0) << result.err;

@@ -147,7 +147,7 @@ TEST(CompareExif, ThePitchAndTheCropFactorAreThoseOfTheSensor) {
   EXPECT_EQ(VerdictOn("crop factor", exif, BenchLens(), {30, 20, true}), "");
 }
 
-TEST(CompareExif, AScaledOrCroppedPictureIsReported) {
+TEST(CompareExif, AScaledOrCroppedImageIsReported) {
   io::PhotoExif exif;
   exif.made_width_px = 600;
   exif.made_height_px = 400;
@@ -185,9 +185,9 @@ class EstimateExifTest : public ::testing::Test {
  protected:
   std::string Photo(const std::string& name, const Exiv2::ExifData& exif) const {
     std::vector<unsigned char> bytes;
-    cv::Mat picture(kPhotoHeightPx, kPhotoWidthPx, CV_8UC3);
-    cv::randu(picture, 60, 200);
-    cv::imencode(fs::path(name).extension().string(), picture, bytes);
+    cv::Mat image(kPhotoHeightPx, kPhotoWidthPx, CV_8UC3);
+    cv::randu(image, 60, 200);
+    cv::imencode(fs::path(name).extension().string(), image, bytes);
     const std::string path = folder_.Put(name, {bytes.begin(), bytes.end()});
     const auto image = Exiv2::ImageFactory::open(path);
     image->readMetadata();

@@ -9,7 +9,7 @@ namespace {
 
 TEST(FileSeconds, AreThoseOfAllViews) {
   estimator::EstimateInput input;
-  input.picture = model::LinearPicture{40, 30, 3, std::vector<float>(40 * 30 * 3, 0.5F)};
+  input.image = model::LinearImage{40, 30, 3, std::vector<float>(40 * 30 * 3, 0.5F)};
   input.disparity.width_px = 40;
   input.disparity.height_px = 30;
   input.disparity.disparity.assign(40 * 30, 0.8F);
@@ -18,7 +18,7 @@ TEST(FileSeconds, AreThoseOfAllViews) {
   EXPECT_EQ(load.views, 25);
   // Made of 40 x 30 x 3 x 25 values.
   EXPECT_GT(load.file_seconds, 1e-9 * 40 * 30 * 3 * 25);
-  input.picture = model::LinearPicture{40, 30, 2, std::vector<float>(40 * 30 * 2, 0.5F)};
+  input.image = model::LinearImage{40, 30, 2, std::vector<float>(40 * 30 * 2, 0.5F)};
   EXPECT_EQ(FileSeconds(input), 0);
 }
 

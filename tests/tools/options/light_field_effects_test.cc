@@ -8,7 +8,6 @@
 #include <functional>
 #include <string>
 
-#include "tools/options/option_values.h"
 #include "support/test_cameras.h"
 #include "thicklens/estimator/block_solver.h"
 #include "thicklens/estimator/render.h"
@@ -26,7 +25,7 @@ using thicklens::testing::CentredSensor;
 using thicklens::testing::TestCameraFocusedAt;
 
 constexpr int kSensorWidthPx = 60, kSensorHeightPx = 40;
-const EstimateOptions kUsual;
+const EstimateOptions kDefault;
 
 // Thick, with a wide field where the pixels are large.
 model::Camera ThickCamera(double pixel_pitch_mm, double aperture_radius_mm = 4) {
@@ -53,10 +52,10 @@ std::string UsageErrorOf(const std::function<void()>& work) {
 
 TEST(LightFieldEffectsTest, AnEstimateTakesWhatMatters) {
   const EffectSet kept = {Effect::kDefocus, Effect::kOcclusion};
-  EXPECT_EQ(Decided(kUsual, ThickCamera(0.2)), kept.With({Effect::kFalloff, Effect::kThickness}));
-  EXPECT_EQ(Decided(kUsual, ThickCamera(0.001, 0.05)), kept);
+  EXPECT_EQ(Decided(kDefault, ThickCamera(0.2)), kept.With({Effect::kFalloff, Effect::kThickness}));
+  EXPECT_EQ(Decided(kDefault, ThickCamera(0.001, 0.05)), kept);
   // A small field: what a wide aperture does to the blur there is in the calibrated blur ratio.
-  EXPECT_EQ(Decided(kUsual, ThickCamera(0.001)), kept);
+  EXPECT_EQ(Decided(kDefault, ThickCamera(0.001)), kept);
   EXPECT_EQ(Decided(Without("thickness"), ThickCamera(0.2)), kept.With({Effect::kFalloff}));
   EstimateOptions options;
   options.effects.effects = "all";
@@ -64,18 +63,18 @@ TEST(LightFieldEffectsTest, AnEstimateTakesWhatMatters) {
             kept.With({Effect::kFalloff, Effect::kThickness, Effect::kApertureShape}));
   options.effects.effects = "defocus,occlusion";
   EXPECT_EQ(Decided(options, ThickCamera(0.2)), kept);
-  options = kUsual;
+  options = kDefault;
   options.effects.tolerance = "30gl";
   EXPECT_EQ(Decided(options, ThickCamera(0.05, 1)), kept);
   model::Camera disc = ThickCamera(0.001, 0.05);
   disc.psf = model::Psf::kDisc;
-  EXPECT_EQ(Decided(kUsual, disc), kept.With({Effect::kApertureShape}));
+  EXPECT_EQ(Decided(kDefault, disc), kept.With({Effect::kApertureShape}));
 }
 
 TEST(LightFieldEffectsTest, WithoutACameraNothingIsKnownOfTheirImpact) {
-  EXPECT_EQ(Decided(kUsual, std::nullopt),
+  EXPECT_EQ(Decided(kDefault, std::nullopt),
             (EffectSet{Effect::kDefocus, Effect::kApertureShape, Effect::kOcclusion}));
-  EXPECT_TRUE(DecideEstimateEffects(kUsual, std::nullopt, std::nullopt).findings.empty());
+  EXPECT_TRUE(DecideEstimateEffects(kDefault, std::nullopt, std::nullopt).findings.empty());
   EstimateOptions functional;
   functional.solver = "functional";
   EXPECT_EQ(Decided(functional, std::nullopt),
@@ -88,15 +87,15 @@ TEST(LightFieldEffectsTest, WithoutACameraNothingIsKnownOfTheirImpact) {
               HasSubstr("--without: effect falloff is not available here"));
 }
 
-// What auto leaves out is within the tolerance as it is told, too: there each is alone without,
+// What auto leaves out is within the tolerance as it is reported, too: there each is alone without,
 // while they are left out one after the other, which changes bounds by a little.
 TEST(LightFieldEffectsTest, OmittedEffectsStayWithinTheReportedTolerance) {
   int left_out = 0;
   for (const double pitch_mm : {0.001, 0.003, 0.01, 0.03, 0.1}) {
     for (const double radius_mm : {0.02, 0.2, 1.0, 4.0}) {
-      const model::EffectDecision decision = DecideEstimateEffects(
-          kUsual, ThickCamera(pitch_mm, radius_mm), model::DepthStatistics{9, 0, 500, 800, 2000});
-      for (const model::EffectFinding& finding : decision.findings) {
+      const model::EffectSelection decision = DecideEstimateEffects(
+          kDefault, ThickCamera(pitch_mm, radius_mm), model::DepthStatistics{9, 0, 500, 800, 2000});
+      for (const model::LargestEffectImpact& finding : decision.findings) {
         if (decision.on.Has(finding.effect)) continue;
         EXPECT_LE(finding.impact.grey_levels, 0.6)
             << model::EffectName(finding.effect) << " " << pitch_mm << " " << radius_mm;
@@ -121,10 +120,10 @@ TEST(LightFieldEffectsTest, AnEstimateRefusesToLeaveOutWhatItIsAbout) {
   EXPECT_THAT(UsageErrorOf([&] { Decided(options, ThickCamera(0.2)); }), HasSubstr("defocus"));
 }
 
-// A uniform field, photographed by a camera and by its thin twin: the mean over the views of cos
-// cos^3, each over that of its own ray on the axis, added up.
-TEST(LightFieldEffectsTest, TheThinTwinHasAFallOffOfItsOwn) {
-  const model::Camera thick = ThickCamera(0.2), thin = model::ThinTwin(thick);
+// A uniform field, photographed by a camera and by its thin reference: the mean over the views of
+// cos cos^3, each over that of its own ray on the axis, added up.
+TEST(LightFieldEffectsTest, TheThinLensEquivalentHasAFallOffOfItsOwn) {
+  const model::Camera thick = ThickCamera(0.2), thin = model::ThinLensEquivalent(thick);
   EXPECT_NEAR(thin.focus_depth_mm(), 800, 1e-9);
   EXPECT_NEAR(thin.focal_scale_px(), thick.focal_scale_px(), 1e-9);
   EXPECT_EQ(thin.lens.lens_thickness_mm, 0);
@@ -137,7 +136,7 @@ TEST(LightFieldEffectsTest, TheThinTwinHasAFallOffOfItsOwn) {
   const auto kernels = kernels::NewReference<float>();
   std::vector<double> corner;
   for (const model::Camera* camera : {&thick, &thin}) {
-    const model::LinearPicture picture =
+    const model::LinearImage image =
         estimator::Photograph(field, field.weights, camera, nullptr, kernels.get(), 1);
     const double distance_mm = camera->image_distance_mm();
     const double scale_mm = thick.focal_scale_px() * 0.2;
@@ -159,7 +158,7 @@ TEST(LightFieldEffectsTest, TheThinTwinHasAFallOffOfItsOwn) {
       return sum;
     };
     const double expected = 0.5 * light(-29.5 * 0.2, -19.5 * 0.2);
-    EXPECT_NEAR(static_cast<double>(picture.at(0, 0, 0)), expected, 1e-5);
+    EXPECT_NEAR(static_cast<double>(image.at(0, 0, 0)), expected, 1e-5);
     corner.push_back(expected);
   }
   EXPECT_GT(std::abs(corner[0] - corner[1]), 0.01);

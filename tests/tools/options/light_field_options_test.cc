@@ -50,7 +50,7 @@ model::RawDepthMap MapOf(std::vector<float> values) {
 }
 
 // Tells nothing about surfaces.
-model::LinearPicture GreyPicture(int width_px = kMapWidth) {
+model::LinearImage GreyImage(int width_px = kMapWidth) {
   return {width_px, kMapHeight, 1,
           std::vector<float>(static_cast<std::size_t>(width_px * kMapHeight))};
 }
@@ -126,7 +126,7 @@ TEST(PrepareDepth, WithoutACameraADisparityIsScaledAndFilled) {
   options.disparity_offset_px = -1;
   // Around the hole 1 and 0 on the left, 3, -2 and .25 elsewhere: each a surface of its own.
   const PreparedDepth prepared = PrepareDepth(MapOf({1, kHole, 3, 0, -2, 0.25F}), "d.pfm", options,
-                                              GreyPicture(), nullptr, nullptr);
+                                              GreyImage(), nullptr, nullptr);
   EXPECT_THAT(prepared.disparity.disparity, ElementsAre(1, -5, 5, -1, -5, -0.5F));
   EXPECT_EQ(prepared.disparity.step, Eigen::Vector2d(1, 1));
   EXPECT_EQ(prepared.holes, 1U);
@@ -136,7 +136,7 @@ TEST(PrepareDepth, WithoutACameraADisparityIsScaledAndFilled) {
 TEST(PrepareDepth, WithoutACameraMillimetresMeanNothing) {
   EXPECT_THAT(UsageErrorOf([] {
                 PrepareDepth(MapOf(std::vector<float>(6, 500)), "d.pfm", KindAndUnit("z", "mm"),
-                             GreyPicture(), nullptr, nullptr);
+                             GreyImage(), nullptr, nullptr);
               }),
               AllOf(HasSubstr("--camera"), HasSubstr("disparity")));
 }
@@ -148,8 +148,7 @@ TEST(PrepareDepth, TheMapIsNamedWhereItIsWrong) {
   for (const model::Camera* used : {static_cast<const model::Camera*>(nullptr), &camera}) {
     const auto message = [&](const model::RawDepthMap& map, int width_px) {
       return ErrorOf([&] {
-        PrepareDepth(map, "d.pfm", KindAndUnit("disparity", ""), GreyPicture(width_px), used,
-                     &grid);
+        PrepareDepth(map, "d.pfm", KindAndUnit("disparity", ""), GreyImage(width_px), used, &grid);
       });
     };
     EXPECT_THAT(message(holes, kMapWidth), AllOf(StartsWith("d.pfm: "), HasSubstr("hole")));
@@ -164,7 +163,7 @@ TEST(PrepareDepth, DepthsNearerThanTheUvPlaneAreRefused) {
   const model::LightFieldGrid grid = model::GridOnPlanes(camera, {100, 1000}, 3, 3);
   EXPECT_THAT(ErrorOf([&] {
                 PrepareDepth(MapOf({500, 500, 500, 500, 500, 90}), "d.pfm", KindAndUnit("z", "mm"),
-                             GreyPicture(), &camera, &grid);
+                             GreyImage(), &camera, &grid);
               }),
               StartsWith("d.pfm: "));
 }
@@ -174,7 +173,7 @@ TEST(PrepareDepth, WithACameraADepthBecomesItsDisparity) {
   const model::LightFieldGrid grid = model::DefaultGrid(camera, 3, 3);
   const std::vector<float> depth_mm = {400, 800, 1200, 400, 0, 5000};
   const PreparedDepth prepared =
-      PrepareDepth(MapOf(depth_mm), "d.pfm", KindAndUnit("z", "mm"), GreyPicture(), &camera, &grid);
+      PrepareDepth(MapOf(depth_mm), "d.pfm", KindAndUnit("z", "mm"), GreyImage(), &camera, &grid);
   EXPECT_EQ(prepared.holes, 1U);
   ASSERT_TRUE(prepared.depth);
   EXPECT_EQ(prepared.depth->min_mm, 400);
@@ -195,7 +194,7 @@ TEST(PrepareDepth, WithACameraADisparityIsPerViewStepOfItsGrid) {
   for (const auto& [u_count, v_count] : {std::pair{3, 3}, std::pair{1, 5}}) {
     const model::LightFieldGrid grid = model::DefaultGrid(camera, u_count, v_count);
     const PreparedDepth prepared = PrepareDepth(
-        MapOf(disparity_px), "d.pfm", KindAndUnit("disparity", ""), GreyPicture(), &camera, &grid);
+        MapOf(disparity_px), "d.pfm", KindAndUnit("disparity", ""), GreyImage(), &camera, &grid);
     const Eigen::Vector2d step = prepared.disparity.step;
     for (std::size_t i = 0; i < disparity_px.size(); ++i) {
       const double found_px = prepared.disparity.disparity[i] * (u_count > 1 ? step.x() : step.y());
@@ -215,7 +214,7 @@ TEST(PrepareDepth, TheStepOfADisparityIsTakenOnTheAperture) {
       static_cast<float>(model::DisparityPx(camera, aperture_step_mm, depth_mm));
   const PreparedDepth prepared =
       PrepareDepth(MapOf(std::vector<float>(6, disparity_px)), "d.pfm",
-                   KindAndUnit("disparity", ""), GreyPicture(), &camera, &grid);
+                   KindAndUnit("disparity", ""), GreyImage(), &camera, &grid);
   EXPECT_NEAR(prepared.disparity.disparity[0] * prepared.disparity.step.x(),
               -model::SlopeOnGrid(grid, depth_mm), 1e-4);
 }

@@ -118,7 +118,7 @@ TEST(Profile, IsOfThisMachineIfAllOfItIs) {
   EXPECT_FALSE(IsFromHere(DefaultProfile(), DefaultProfile().threads));
 }
 
-// From files to files, on pictures so small that all takes seconds.
+// From files to files, on images so small that all takes seconds.
 TEST(MeasureProfile, GivesWhatEstimateCanChooseBy) {
   using Use = ProfileCase::Use;
   ProfileRun run;
@@ -129,16 +129,16 @@ TEST(MeasureProfile, GivesWhatEstimateCanChooseBy) {
   run.threads = 1;
   run.repeat = 2;
   run.program = THICKLENS_PROGRAM;
-  int told = 0;
+  int reported = 0;
   run.progress = [&](int done, int total) {
     EXPECT_LT(done, total);
-    ++told;
+    ++reported;
   };
   estimator::EstimatePlan ridge, tv;
   ridge.prior = "ridge";
   tv.prior = "tv";
   const MeasuredProfile measured = MeasureProfile({ridge, tv}, run);
-  EXPECT_EQ(told, 4 + 16);
+  EXPECT_EQ(reported, 4 + 16);
   EXPECT_EQ(measured.judged, 2);
   EXPECT_EQ(measured.profile.runs, 2);
   for (const estimator::TimedWorkload& timed : measured.loads[0]) {
@@ -247,12 +247,12 @@ TEST(Profile, IsRefusedByNameOfFileAndField) {
   EXPECT_THROW(ReadProfile(folder / "nothing.json"), Error);
 }
 
-// The program: a picture of the demo's size.
+// The program: an image of the demo's size.
 class EstimateTarget : public ::testing::Test {
  protected:
   // A person's own profile is none of the test's.
   EstimateTarget() : config_("XDG_CONFIG_HOME", (folder_ / "config").c_str()) {
-    ChildProgram simulate({"simulate", "picture", THICKLENS_SOURCE_DIR "/configs/scenes/demo.yaml",
+    ChildProgram simulate({"simulate", "image", THICKLENS_SOURCE_DIR "/configs/scenes/demo.yaml",
                            "-o", folder_ / "scene", "--quiet"},
                           folder_.path(), 0);
     EXPECT_EQ(simulate.Wait().exit_code, 0);

@@ -31,7 +31,7 @@ constexpr char kSmallSweep[] =
     "camera: case.yaml\n"
     "truth: {focus_depth_mm: 300, blur_ratio: 0.45, blur_floor_px: 0.5}\n"
     "size_px: [64, 64]\n"
-    "target: {kind: picture, picture: target.png}\n"
+    "target: {kind: image, image: target.png}\n"
     "bench: {first_depth_mm: 290, step_mm: 4, frames: 6}\n"
     "noise: {full_well_electrons: 10000}\n";
 
@@ -42,7 +42,7 @@ constexpr char kSmallScene[] =
     "size_px: [64, 64]\n"
     "layers:\n"
     "  - plane: {depth_mm: 300}\n"
-    "    texture: {kind: picture, picture: target.png}\n"
+    "    texture: {kind: image, image: target.png}\n"
     "  - depth: {map: map.pfm, kind: z, unit: mm}\n"
     "    outline: {mask: mask.png}\n"
     "    texture: {kind: dead-leaves}\n";
@@ -56,7 +56,7 @@ class RunFilesTest : public ::testing::Test {
     fs::copy_file(cameras + "case-ii.yaml", *made_ / "case.yaml");
     fs::copy_file(cameras + "macro-bench.yaml", *made_ / "calibrated.yaml");
     const std::string demo = std::string(THICKLENS_SOURCE_DIR) + "/configs/scenes/in-focus.yaml";
-    MakeWithProgram({"simulate", "picture", demo, "-o", *made_ / "pic"});
+    MakeWithProgram({"simulate", "image", demo, "-o", *made_ / "pic"});
     MakeWithProgram({"simulate", "light-field", demo, "--views", "2x2", "-o", *made_ / "lf"});
     MakeWithProgram({"render", *made_ / "lf", "--convert", "hci", "-o", *made_ / "hci"});
     MakeWithProgram({"render", *made_ / "lf", "--view", "0,0", "-o", *made_ / "target.png"});
@@ -159,14 +159,14 @@ TEST_F(RunFilesTest, SimulateKeepsWhatItsDescriptionNames) {
   for (const char* input : {"sw.yaml", "case.yaml", "target.png"}) {
     ExpectKept(input, {"simulate", "sweep", (*this)("sw.yaml"), "-o", out}, {"--json"});
   }
-  for (const char* what : {"picture", "light-field"}) {
+  for (const char* what : {"image", "light-field"}) {
     for (const char* input : {"scene.yaml", "case.yaml", "target.png", "mask.png", "map.pfm"}) {
       ExpectKept(input, {"simulate", what, (*this)("scene.yaml"), "-o", out}, {"--json"});
     }
   }
   ExpectKept("sw.yaml",
-             {"simulate", "picture", (*this)("scene.yaml"), "--attribute", "--sweep",
-              (*this)("sw.yaml"), "-o", out},
+             {"simulate", "image", (*this)("scene.yaml"), "--ablate", "--sweep", (*this)("sw.yaml"),
+              "-o", out},
              {"--json"});
   EXPECT_FALSE(fs::exists(out));
 }
@@ -231,15 +231,15 @@ TEST_F(RunFilesTest, EstimateKeepsItsInputs) {
 }
 
 TEST_F(RunFilesTest, TheOtherCommandsKeepTheirInputs) {
-  const std::string picture = (*this)("target.png");
+  const std::string image = (*this)("target.png");
   ExpectKept("calibrated.yaml", {"explain", (*this)("calibrated.yaml"), "--depth-range", "290:310"},
              {"--json", "--figure"});
   ExpectKept("map.pfm",
              {"explain", (*this)("calibrated.yaml"), "--depth", (*this)("map.pfm"), "--depth-kind",
               "z", "--depth-unit", "mm"},
              {"--json", "--figure"});
-  ExpectKept("target.png", {"compare", picture, (*this)("mask.png")}, {"--json"});
-  ExpectKept("target.png", {"camera", "init", "--from-exif", picture}, {"-o", "--json"});
+  ExpectKept("target.png", {"compare", image, (*this)("mask.png")}, {"--json"});
+  ExpectKept("target.png", {"camera", "init", "--from-exif", image}, {"-o", "--json"});
   ExpectKept(
       "case.yaml",
       {"target", "--camera", (*this)("case.yaml"), "--distance-mm", "300", "-o", work_ / "new.pdf"},
@@ -248,12 +248,12 @@ TEST_F(RunFilesTest, TheOtherCommandsKeepTheirInputs) {
   ExpectKept("case.yaml", {"bench", "calibration", "--sweep", (*this)("sw.yaml")}, {"--json"});
   ExpectKept("scene.yaml", {"bench", "accuracy", "--scene", (*this)("scene.yaml")}, {"--json"});
   ExpectKept("target.png",
-             {"bench", "source", "--image", picture, "--depth", (*this)("map.pfm"), "--depth-kind",
+             {"bench", "source", "--image", image, "--depth", (*this)("map.pfm"), "--depth-kind",
               "disparity"},
              {"--json"});
   // No frame that the page shows, but one of the sweep.
   ExpectKept("sweep/frames/frame_001.png",
-             {"report", (*this)("lf"), "--sweep", (*this)("sweep"), "--photo", picture}, {"-o"});
+             {"report", (*this)("lf"), "--sweep", (*this)("sweep"), "--photo", image}, {"-o"});
 }
 
 // A run that is refused early knows not all of its inputs.
@@ -323,7 +323,7 @@ TEST_F(RunFilesTest, ADashIsRefusedWhereItCannotBeStandardOutput) {
         Words{"render", lf, "--mosaic", "-o", "-"},
         Words{"render", lf, "--convert", "hci", "-o", "-"}, Words{"report", lf, "-o", "-"},
         Words{"simulate", "sweep", (*this)("sw.yaml"), "-o", "-"},
-        Words{"simulate", "picture", (*this)("scene.yaml"), "-o", "-"},
+        Words{"simulate", "image", (*this)("scene.yaml"), "-o", "-"},
         Words{"simulate", "light-field", (*this)("scene.yaml"), "-o", "-"},
         Words{"explain", camera, "--depth-range", "290:310", "--figure", "-"},
         Words{"target", "-o", "-"}, Words{"bench", "calibration", "--report", "-"},

@@ -120,22 +120,22 @@ TEST_F(SweepInputTest, ThePeriodOfTheTargetComesThrough) {
   EXPECT_EQ(ReadSweepInput(arguments_).sweep.target_period_mm.value(), 5);
 }
 
-// Numbers of the camera that a result hangs on and that nobody vouches for are told once.
+// Numbers of the camera that a result hangs on and that nobody vouches for are reported once.
 TEST_F(SweepInputTest, MissingTolerancesAreReportedUnlessTheTruthIsKnown) {
   Sweep("");
-  const auto told = [&] {
+  const auto reported = [&] {
     const SweepInput input = ReadSweepInput(arguments_);
     return std::count_if(input.notices.begin(), input.notices.end(), [](const std::string& line) {
       return line.find("no tolerance is stated") != std::string::npos;
     });
   };
-  EXPECT_EQ(told(), 1);
+  EXPECT_EQ(reported(), 1);
   arguments_.truth_path =
       folder_.Put("known.yaml",
                   "schema: thicklens/sweep-truth/1\nimage_distance_mm: 57\nfocus_depth_mm: 400\n"
                   "blur_ratio: 0.4\nblur_floor_px: 0.5\nbench_offset_mm: 10\n"
                   "frames: [{image: a.png, depth_mm: 11, reading_mm: 1, blur_sigma_px: 2}]\n");
-  EXPECT_EQ(told(), 0);
+  EXPECT_EQ(reported(), 0);
 }
 
 }  // namespace

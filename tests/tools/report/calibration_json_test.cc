@@ -7,7 +7,7 @@
 #include <string>
 
 #include "support/special_numbers.h"
-#include "tools/support/made_up_calibration.h"
+#include "tools/support/fake_calibration.h"
 
 namespace thicklens::tools {
 namespace {
@@ -42,7 +42,7 @@ TEST(CalibrationJson, HasTheKeysOfTheFormat) {
   EXPECT_EQ(out.at("warnings"), json::array());
   EXPECT_EQ(out.at("covariance").at("order").size(), 4u);
   EXPECT_NEAR(out["covariance"].at("rows")[0][3].get<double>(), -0.71 * 0.0012 * 0.11, 1e-12);
-  EXPECT_EQ(out.at("scale_law").at("frames_used"), 41);
+  EXPECT_EQ(out.at("scale_model").at("frames_used"), 41);
   EXPECT_EQ(out.at("frames").size(), 41u);
   EXPECT_TRUE(out["frames"][3]["blur_sigma_px"].is_null());
   EXPECT_EQ(out["frames"][3]["rejection"], "dark");
@@ -91,7 +91,7 @@ TEST(CalibrationJson, WhatWasNotMeasuredIsNull) {
   // Of a frame that was rejected as black, 0 was measured.
   made.calibration.frames[0].rejection = "dark: mean 0.000";
   out = CalibrationJson(made.sweep, made.calibration, nullptr, false);
-  EXPECT_EQ(out.at("frames")[0].at("statistics").at("mean_stored"), 0.0);
+  EXPECT_EQ(out.at("frames")[0].at("statistics").at("mean_encoded"), 0.0);
 }
 
 TEST(CalibrationJson, HoldsWhatTheReportShows) {
@@ -115,8 +115,8 @@ TEST(CalibrationJson, HoldsWhatTheReportShows) {
   EXPECT_EQ(out["systematic_parts"][1].at("remedy"), "have the lens measured");
   EXPECT_EQ(out.at("blur_fit").at("better_psf"), "gaussian");
   EXPECT_EQ(out["blur_fit"].at("disc_misfit_chi2_per_dof"), 2.31);
-  EXPECT_EQ(out.at("scale_law").at("kind"), "inverse-depth");
-  EXPECT_EQ(out["scale_law"].at("distortion_at_corner").at("value"), 0.0042);
+  EXPECT_EQ(out.at("scale_model").at("kind"), "inverse-depth");
+  EXPECT_EQ(out["scale_model"].at("distortion_at_corner").at("value"), 0.0042);
   EXPECT_EQ(out.at("other_methods").at("source").at("sharpest_normalised_image"),
             "/sweeps/bench/frame_020.png");
   EXPECT_EQ(out["other_methods"].at("sharpness_peak").at("log_parabola").at("coefficients").size(),
@@ -133,7 +133,7 @@ TEST(CalibrationJson, HoldsWhatTheReportShows) {
   const double d = made.calibration.image_distance_mm->value - 3, zf = 12.5 * d / (d - 12.8);
   const double a = made.calibration.blur_ratio->value * 4.46 * 12.5 * zf / (zf - 12.5) / 0.006;
   const double defocus = a * (1 / z - 1 / zf), law = std::hypot(0.508, defocus);
-  EXPECT_NEAR(frame.at("blur_law_sigma_px").get<double>(), law, 1e-9);
+  EXPECT_NEAR(frame.at("blur_model_sigma_px").get<double>(), law, 1e-9);
   const double slope = defocus * a / (z * z) / law;
   EXPECT_NEAR(frame.at("blur_residual_sigmas").get<double>(),
               (made.calibration.frames[6].blur_sigma_px - law) /

@@ -13,8 +13,8 @@
 #include <sstream>
 #include <utility>
 
-#include "tools/report/page_pictures.h"
-#include "tools/support/made_up_calibration.h"
+#include "tools/report/page_images.h"
+#include "tools/support/fake_calibration.h"
 #include "tools/support/xml_elements.h"
 
 namespace thicklens::tools {
@@ -255,7 +255,7 @@ TEST(CalibrationReport, SaysWhatTheFieldAndTheColoursDo) {
   EXPECT_THAT(html, HasSubstr("the camera file says gaussian"));
 }
 
-// The tiles stand where they lie in the picture, and the colour is a function of their value.
+// The tiles stand where they lie in the image, and the colour is a function of their value.
 TEST(CalibrationReport, DrawsTheFieldAsItLies) {
   const MadeUpCalibration made = MakeUpCalibration(41, 320, 4);
   const XmlDocument document = ParseXml(Page(made));
@@ -287,7 +287,7 @@ TEST(CalibrationReport, ShowsRejectedFramesAndCountsTheRest) {
   MadeUpCalibration made = MakeUpCalibration(41, 320, 4);
   RejectFrame(2, "reading off by 15.1 mm, or frame damaged", &made.calibration);
   std::set<std::size_t> asked;
-  const auto picture = [&](std::size_t i) {
+  const auto image = [&](std::size_t i) {
     asked.insert(i);
     return i == 20 ? cv::Mat()
                    : cv::Mat(300, 400, CV_16UC3,
@@ -296,7 +296,7 @@ TEST(CalibrationReport, ShowsRejectedFramesAndCountsTheRest) {
   const auto images = [&] {
     asked.clear();
     return ParseXml(
-               MakeCalibrationReport(made.sweep, made.calibration, nullptr, kOrigin, picture).html)
+               MakeCalibrationReport(made.sweep, made.calibration, nullptr, kOrigin, image).html)
         .Named("img");
   };
   ASSERT_EQ(images().size(), 1u);
@@ -306,12 +306,12 @@ TEST(CalibrationReport, ShowsRejectedFramesAndCountsTheRest) {
   EXPECT_EQ(images()[0].Attribute("width"), "220");
   EXPECT_EQ(images()[0].Attribute("height"), "165");
   EXPECT_THAT(images()[0].Attribute("src"), ::testing::StartsWith("data:image/jpeg;base64,"));
-  // Of 20 dark and one saturated frame, each kind is seen, and one has no picture.
+  // Of 20 dark and one saturated frame, each kind is seen, and one has no image.
   for (int i = 10; i < 30; ++i) RejectFrame(i, "dark: mean 0.001", &made.calibration);
   RejectFrame(40, "saturated: 90 %", &made.calibration);
   EXPECT_EQ(images().size(), 12u);
   EXPECT_EQ(asked.count(2) + asked.count(40), 2u);
-  EXPECT_THAT(MakeCalibrationReport(made.sweep, made.calibration, nullptr, kOrigin, picture).html,
+  EXPECT_THAT(MakeCalibrationReport(made.sweep, made.calibration, nullptr, kOrigin, image).html,
               HasSubstr("… and 10 more."));
 }
 
@@ -333,7 +333,7 @@ TEST(CalibrationReport, GivesEveryRejectedFrameItsOwnAmount) {
   EXPECT_THAT(table, HasSubstr("mean 0.029")) << "each is named further down";
 }
 
-// Linear cameras' pictures would look nearly black.
+// Linear cameras' images would look nearly black.
 TEST(CalibrationReport, ThumbnailsAreEncodedForTheScreen) {
   MadeUpCalibration made = MakeUpCalibration(9, 340, 15);
   RejectFrame(2, "blank", &made.calibration);
@@ -343,8 +343,8 @@ TEST(CalibrationReport, ThumbnailsAreEncodedForTheScreen) {
         .html;
   };
   const auto shown = [&](int level) {
-    return EmbeddedPicture(cv::Mat(20, 20, CV_8U, cv::Scalar(level)),
-                           "frame_002.png, rejected: blank", Packing::kSmall, 220);
+    return EmbeddedImage(cv::Mat(20, 20, CV_8U, cv::Scalar(level)),
+                         "frame_002.png, rejected: blank", Packing::kSmall, 220);
   };
   made.sweep.camera.sensor.transfer = model::TransferCurve::Srgb();
   EXPECT_THAT(page(), HasSubstr(shown(55)));
@@ -412,7 +412,7 @@ Scale AxisScale(const XmlDocument& document, int plot, const std::string& anchor
 }
 
 // The drawn curve against sigma^2 = S0 + A (1/z - 1/zf)^2, A = (kappa r K/p)^2, written out here.
-TEST(CalibrationReport, DrawsTheFittedBlurLaw) {
+TEST(CalibrationReport, DrawsTheFittedBlurModel) {
   const MadeUpCalibration made = MakeUpCalibration(41, 320, 4);
   const XmlDocument document = ParseXml(Page(made, false));
   const int kBlurPlot = PlotNamed(document, "blur");
@@ -455,7 +455,7 @@ std::vector<std::pair<double, double>> PathPoints(std::string d) {
 }
 
 // The drawn band against the scatter of the law over draws of its parameters.
-TEST(CalibrationReport, TheBandIsTheScatterOfTheLaw) {
+TEST(CalibrationReport, TheBandIsTheScatterOfTheModel) {
   MadeUpCalibration made = MakeUpCalibration(41, 320, 4);
   made.calibration.covariance *= 9;  // to be seen beside the drawing's roundings
   const XmlDocument document = ParseXml(Page(made, false));
@@ -512,7 +512,7 @@ TEST(CalibrationReport, DrawsEachSideAlone) {
 }
 
 // Readings that follow the law exactly leave no residual, for both directions of the bench scale.
-TEST(CalibrationReport, ScaleResidualsVanishOnTheLaw) {
+TEST(CalibrationReport, ScaleResidualsVanishOnTheModel) {
   for (const auto direction : {model::BenchDirection::kAway, model::BenchDirection::kToward}) {
     MadeUpCalibration made = MakeUpCalibration(21, 320, 8);
     made.sweep.direction = direction;
@@ -569,7 +569,8 @@ TEST(CalibrationReport, AccountsForFramesThatAreNotInTheFit) {
   made.calibration.frames[20].not_in_fit = "not registered";
   const std::string html = Page(made);
   ASSERT_EQ(ParseXml(html).error, "");
-  EXPECT_THAT(html, HasSubstr("5 more frames passed the gates and say nothing of the blur:"));
+  EXPECT_THAT(html,
+              HasSubstr("5 more frames passed the quality checks and say nothing of the blur:"));
   EXPECT_THAT(html, HasSubstr("too strongly blurred (4): frame_003.png … frame_005.png (3 frames), "
                               "frame_009.png</li>"));
   EXPECT_THAT(html, HasSubstr("not registered (1): frame_020.png</li>"));
@@ -598,7 +599,7 @@ TEST(CalibrationReport, SaysWhatWasNotStatedOfTheReadings) {
               HasSubstr("deviation of a reading not stated."));
 }
 
-TEST(CalibrationReport, SaysWhereTheFramesLieOffTheLaw) {
+TEST(CalibrationReport, SaysWhereTheFramesLieOffTheModel) {
   MadeUpCalibration made = MakeUpCalibration(31, 300, 8);
   EXPECT_THAT(Page(made), Not(HasSubstr("farther off the law")));
   made.calibration.blur.chi2_per_dof = 2.5;

@@ -9,7 +9,7 @@
 #include <sstream>
 
 #include "support/special_numbers.h"
-#include "tools/support/made_up_calibration.h"
+#include "tools/support/fake_calibration.h"
 
 namespace thicklens::tools {
 namespace {
@@ -115,7 +115,7 @@ TEST(CalibrationText, DetailsTakeFewLines) {
   EXPECT_THAT(LineWith(text, "source's recipe: "),
               HasSubstr("over mean grey frame_020.png, at 399.9"));
   EXPECT_THAT(LineWith(text, "magnification: "),
-              HasSubstr("5 mm is 26.481 px in the picture: d1 = 16.100 +- 0.050 mm, -0.70 %"));
+              HasSubstr("5 mm is 26.481 px in the image: d1 = 16.100 +- 0.050 mm, -0.70 %"));
   EXPECT_THAT(text, HasSubstr("radial distortion +0.420 +- 0.060 % of the image height"));
   EXPECT_THAT(LineWith(text, "sides of focus: "),
               HasSubstr("near side zf 398.60 +- 0.90 mm; far side zf 401.10 +- 0.90 mm; "

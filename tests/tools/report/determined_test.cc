@@ -10,7 +10,7 @@
 #include "tools/report/calibration_report.h"
 #include "tools/report/calibration_sections.h"
 #include "tools/report/calibration_summary.h"
-#include "tools/support/made_up_calibration.h"
+#include "tools/support/fake_calibration.h"
 
 namespace thicklens::tools {
 namespace {
@@ -38,7 +38,7 @@ MadeUpCalibration RefusedWithFindings() {
   return made;
 }
 
-TEST(Determined, ARefusalTellsItInTheText) {
+TEST(Determined, ARefusalReportsItInTheText) {
   const MadeUpCalibration made = RefusedWithFindings();
   EXPECT_THAT(
       CalibrationText(made.sweep, made.calibration, nullptr),
@@ -51,7 +51,7 @@ TEST(Determined, ARefusalTellsItInTheText) {
                       "named); the target moves (chi2 60); nothing at all (chi2 500)\n")));
 }
 
-TEST(Determined, ARefusalTellsItOnThePage) {
+TEST(Determined, ARefusalReportsItOnThePage) {
   const MadeUpCalibration made = RefusedWithFindings();
   EXPECT_THAT(VerdictSection(made.sweep, made.calibration),
               AllOf(HasSubstr("The sweep is sharpest at the reading 110.03"),
@@ -60,7 +60,7 @@ TEST(Determined, ARefusalTellsItOnThePage) {
                     HasSubstr("Compared: the image scale")));
 }
 
-TEST(Determined, ARefusalTellsItToPrograms) {
+TEST(Determined, ARefusalReportsItToPrograms) {
   const MadeUpCalibration made = RefusedWithFindings();
   const nlohmann::json out = CalibrationJson(made.sweep, made.calibration, nullptr, false);
   const nlohmann::json& sharpest = out.at("sharpest_reading");
@@ -68,7 +68,7 @@ TEST(Determined, ARefusalTellsItToPrograms) {
   EXPECT_EQ(sharpest.at("reading_mm").at("sigma"), 0.11);
   EXPECT_EQ(sharpest.at("sharpest_image"), "/sweeps/bench/frame_012.png");
   EXPECT_EQ(sharpest.at("focus_by_blur_mm").at("value"), 109.99841);
-  EXPECT_EQ(out.at("scale_law").at("change_over_sweep").at("value"), 0.101);
+  EXPECT_EQ(out.at("scale_model").at("change_over_sweep").at("value"), 0.101);
   const nlohmann::json& diagnosis = out.at("diagnoses").at(0);
   EXPECT_EQ(diagnosis.at("chi2_of_none"), 500);
   EXPECT_EQ(diagnosis.at("causes").at(0).at("cause"), "the lens moves");

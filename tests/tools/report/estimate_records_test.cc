@@ -88,7 +88,7 @@ TEST_F(Records, EstimateOfTheSceneIsRead) {
   const EstimateRecord record = ParseEstimateRecord(R"({
     "status": "ok", "solver": "scene", "block_solver": null, "prior": "tv", "strength": 0.0017,
     "strength_rule": "auto", "noise_sigma": 0.004, "residual_rms": 0.005, "row_share": 0.25,
-    "hidden_share": 0.125, "iterations": 57, "converged": false, "rcond_min": null,
+    "occluded_fraction": 0.125, "iterations": 57, "converged": false, "rcond_min": null,
     "views": [7, 5], "size": [64, 48], "seconds": {"files": 1.5}})",
                                                     "e.json");
   EXPECT_EQ(record.solver, "scene");
@@ -99,7 +99,7 @@ TEST_F(Records, EstimateOfTheSceneIsRead) {
   EXPECT_THAT(record.noise_sigma, Optional(0.004));
   EXPECT_THAT(record.residual_rms, Optional(0.005));
   EXPECT_THAT(record.row_share, Optional(0.25));
-  EXPECT_THAT(record.hidden_share, Optional(0.125));
+  EXPECT_THAT(record.occluded_fraction, Optional(0.125));
   EXPECT_THAT(record.iterations, Optional(57));
   EXPECT_THAT(record.converged, Optional(false));
   EXPECT_THAT(record.files_seconds, Optional(1.5));
@@ -147,7 +147,7 @@ TEST_F(Records, FilesOfOtherCommandsAreReported) {
               AllOf(HasSubstr("'solver' is missing"), HasSubstr("`thicklens estimate --json`")));
   EXPECT_THAT(ComparisonError(kEstimate),
               AllOf(HasSubstr("'mean' is missing"), HasSubstr("of two light fields")));
-  // Two pictures compared.
+  // Two images compared.
   EXPECT_THAT(ComparisonError(R"({"psnr_db": 30, "ssim": 0.9})"), HasSubstr("'mean' is missing"));
 }
 

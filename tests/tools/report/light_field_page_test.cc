@@ -22,10 +22,9 @@
 #include "thicklens/io/image_io.h"
 #include "thicklens/io/light_field_io.h"
 #include "tools/report/calibration_report.h"
-#include "tools/report/inlined_report.h"
+#include "tools/report/embedded_report.h"
 #include "tools/support/child_process.h"
-#include "tools/support/made_up_calibration.h"
-#include "tools/support/xml_elements.h"
+#include "tools/support/fake_calibration.h"
 #include "tools/support/xml_elements.h"
 
 namespace thicklens::tools {
@@ -116,20 +115,20 @@ EstimateRecord Estimate() {
 estimator::SceneMaps Maps() {
   estimator::SceneMaps maps;
   maps.residual.assign(kAcrossPx * kDownPx, 0.0F);
-  maps.hidden_share.assign(kAcrossPx * kDownPx, 0.0F);
+  maps.occluded_fraction.assign(kAcrossPx * kDownPx, 0.0F);
   maps.blur_sigma_px.assign(kAcrossPx * kDownPx, 0.0F);
   return maps;
 }
 
-// The page without its pictures: their base64 holds any short text.
-std::string WithoutPictures(const std::string& html) {
+// The page without its images: their base64 holds any short text.
+std::string WithoutImages(const std::string& html) {
   std::string text;
   std::size_t at = 0;
   while (true) {
-    const std::size_t picture = html.find(";base64,", at);
-    if (picture == std::string::npos) return text + html.substr(at);
-    text += html.substr(at, picture - at);
-    at = html.find('"', picture);
+    const std::size_t image = html.find(";base64,", at);
+    if (image == std::string::npos) return text + html.substr(at);
+    text += html.substr(at, image - at);
+    at = html.find('"', image);
   }
 }
 
@@ -148,7 +147,7 @@ class LightFieldPageTest : public ::testing::Test {
 
   void GiveAll() {
     input_.truth = &truth_;
-    input_.photo = model::ViewPicture(truth_, 1, 1);
+    input_.photo = model::ViewImage(truth_, 1, 1);
     GiveDepth();
     input_.sweep = SweepStrip{"bench/sweep.yaml", 41, {}};
     for (int i = 0; i < 7; ++i) {
@@ -178,15 +177,15 @@ class LightFieldPageTest : public ::testing::Test {
     EXPECT_EQ(ParseXml(page.html).error, "");
     return page;
   }
-  std::string Html() const { return WithoutPictures(Page().html); }
+  std::string Html() const { return WithoutImages(Page().html); }
 
   model::LightField light_field_ = SeenByCamera(3, 3, 1);
   model::LightField truth_ = SeenByCamera(3, 3, 2);
   LightFieldPageInput input_;
 };
 
-// The picture of the <img> with that text for readers who cannot see it; RGB.
-cv::Mat PictureOf(const XmlDocument& document, const std::string& alt) {
+// The image of the <img> with that text for readers who cannot see it; RGB.
+cv::Mat ImageFrom(const XmlDocument& document, const std::string& alt) {
   for (const XmlElement& image : document.Named("img")) {
     if (image.Attribute("alt") != alt) continue;
     const std::string source = image.Attribute("src");
@@ -200,9 +199,9 @@ cv::Mat PictureOf(const XmlDocument& document, const std::string& alt) {
       count += 6;
       if (count >= 8) bytes += static_cast<char>(bits >> (count -= 8) & 255);
     }
-    return io::DecodePicture(bytes, alt);
+    return io::DecodeImage(bytes, alt);
   }
-  ADD_FAILURE() << "no picture '" << alt << "'";
+  ADD_FAILURE() << "no image '" << alt << "'";
   return cv::Mat::zeros(1, 1, CV_8UC3);
 }
 
@@ -210,7 +209,7 @@ TEST_F(LightFieldPageTest, IsOneWellFormedPageThatNeedsNothingElse) {
   GiveAll();
   const LightFieldPage page = Page();
   const XmlDocument document = ParseXml(page.html);
-  const std::string text = WithoutPictures(page.html);
+  const std::string text = WithoutImages(page.html);
   for (const char* outside : {"http", "href=", "<script", "@import", "nan", "inf "})
     EXPECT_THAT(text, Not(HasSubstr(outside)));
   std::set<std::string> ids;
@@ -236,16 +235,16 @@ TEST_F(LightFieldPageTest, SaysOnlyWhatItWasGiven) {
   const std::string html = Html();
   for (const char* absent : {"DIBR", "truth", "PSNR", "sweep", "refocus", "MiB"})
     EXPECT_THAT(html.substr(html.find("<main>")), Not(HasSubstr(absent)));
-  input_.photo = model::ViewPicture(truth_, 1, 1);
-  EXPECT_THAT(Page().sections, ElementsAre("summary", "picture", "views", "epipolar", "how"));
+  input_.photo = model::ViewImage(truth_, 1, 1);
+  EXPECT_THAT(Page().sections, ElementsAre("summary", "image", "views", "epipolar", "how"));
   EXPECT_THAT(Html(), Not(HasSubstr("Depth map")));
   input_.photo.reset();
   GiveDepth();
   EXPECT_THAT(Page().sections,
-              ElementsAre("summary", "picture", "views", "epipolar", "refocus", "how"));
+              ElementsAre("summary", "image", "views", "epipolar", "refocus", "how"));
   EXPECT_THAT(Html(), Not(HasSubstr("All that is known of the light")));
   GiveAll();
-  EXPECT_THAT(Page().sections, ElementsAre("summary", "sweep", "calibration", "picture", "views",
+  EXPECT_THAT(Page().sections, ElementsAre("summary", "sweep", "calibration", "image", "views",
                                            "epipolar", "refocus", "numbers", "how"));
 }
 
@@ -253,7 +252,7 @@ TEST_F(LightFieldPageTest, EscapesNamesFromOutside) {
   GiveAll();
   const std::string nasty = "<i>&\"#'\x02\xFE";
   input_.name = input_.sweep->name = input_.version = input_.date = nasty;
-  for (SweepShot& shot : input_.sweep->shots) shot.image = nasty;
+  for (SweepShot& shot : input_.sweep->shots) shot.file_name = nasty;
   light_field_.camera->name = nasty;
   light_field_.origin.version = light_field_.origin.date = nasty;
   EstimateRecord& record = *input_.estimate;
@@ -446,7 +445,7 @@ TEST_F(LightFieldPageTest, OneColumnOrOneViewIsShownToo) {
 }
 
 // What is shown of the views: their light, encoded, and the difference to the truth.
-TEST_F(LightFieldPageTest, PicturesShowTheLightField) {
+TEST_F(LightFieldPageTest, ImagesShowTheLightField) {
   GiveAll();
   const model::TransferCurve srgb = model::TransferCurve::Srgb();
   const auto level = [&](const model::LightField& light_field, int k, int l, int s, int t, int c) {
@@ -455,13 +454,13 @@ TEST_F(LightFieldPageTest, PicturesShowTheLightField) {
     return std::lround(255 * srgb.Encode(light_field.values[at]));
   };
   const XmlDocument document = ParseXml(Page().html);
-  const cv::Mat estimate = PictureOf(document, "estimate, u 2, v 1");
-  const cv::Mat truth = PictureOf(document, "truth, u 2, v 1");
+  const cv::Mat estimate = ImageFrom(document, "estimate, u 2, v 1");
+  const cv::Mat truth = ImageFrom(document, "truth, u 2, v 1");
   const std::string html = Html();
   const std::size_t times = html.find("difference × ");
   ASSERT_NE(times, std::string::npos);
   const int gain = std::stoi(html.substr(times + std::string("difference × ").size()));
-  const cv::Mat difference = PictureOf(document, fmt::format("difference × {}, u 2, v 1", gain));
+  const cv::Mat difference = ImageFrom(document, fmt::format("difference × {}, u 2, v 1", gain));
   ASSERT_EQ(estimate.size(), cv::Size(kAcrossPx, kDownPx));
   for (const auto& [s, t] : {std::pair{0, 0}, std::pair{33, 5}, std::pair{7, 23}}) {
     for (int c = 0; c < 3; ++c) {
@@ -472,7 +471,7 @@ TEST_F(LightFieldPageTest, PicturesShowTheLightField) {
                 std::clamp(128 + gain * (a - b), 0L, 255L));
     }
   }
-  const cv::Mat epipolar = PictureOf(document, "Epipolar picture, truth");
+  const cv::Mat epipolar = ImageFrom(document, "Epipolar image, truth");
   const int repeat = epipolar.rows / 3;
   EXPECT_EQ(epipolar.ptr<unsigned char>(2 * repeat)[3 * 11 + 1], level(truth_, 2, 1, 11, 12, 1));
 }
@@ -510,7 +509,7 @@ TEST_F(LightFieldPageTest, RefocusesToDisparitiesWithoutACamera) {
   std::swap(small, *input_.depth);
   EXPECT_THAT(Html(), AllOf(HasSubstr("+0.015 px<"), HasSubstr("−0.007 px<")));
   std::swap(small, *input_.depth);
-  const cv::Mat mean = PictureOf(ParseXml(Page().html), "Refocused to +0.00 px");
+  const cv::Mat mean = ImageFrom(ParseXml(Page().html), "Refocused to +0.00 px");
   double light = 0;
   for (int l = 0; l < 3; ++l)
     for (int k = 0; k < 3; ++k)
@@ -524,7 +523,7 @@ TEST_F(LightFieldPageTest, DepthsAreColouredAndHolesCounted) {
   const std::string html = Html();
   EXPECT_THAT(html, HasSubstr("from 300 to 600 mm from the aperture; bright is near"));
   EXPECT_THAT(html, HasSubstr("Hatched in grey: 24 px (2.5 %)"));
-  const cv::Mat map = PictureOf(ParseXml(Page().html), "Depth map in colours");
+  const cv::Mat map = ImageFrom(ParseXml(Page().html), "Depth map in colours");
   const auto* row = map.ptr<unsigned char>(3);
   EXPECT_GT(row[1], 200);                       // the nearest is yellow
   EXPECT_LT(row[3 * (kAcrossPx - 1) + 1], 20);  // the farthest dark
@@ -545,7 +544,7 @@ TEST_F(LightFieldPageTest, TheResidualIsSigned) {
   maps.residual[0] = 1;
   maps.residual[1] = -1;
   maps.residual[2] = -5.0F / 255;
-  const cv::Mat map = PictureOf(ParseXml(Page().html), "Residual of the photograph");
+  const cv::Mat map = ImageFrom(ParseXml(Page().html), "Residual of the photograph");
   ASSERT_EQ(map.size(), cv::Size(kAcrossPx, kDownPx));
   const auto* row = map.ptr<unsigned char>(0);
   const int step = map.channels();
@@ -567,17 +566,17 @@ TEST_F(LightFieldPageTest, TheConfidenceHasItsShares) {
   estimator::SceneMaps maps = Maps();
   input_.maps = &maps;
   // Rows: 12 of 24 seen, 6 blurred, 3 partly seen, 3 filled in (of these one blurred as well).
-  for (std::size_t i = 0; i < maps.hidden_share.size(); ++i) {
+  for (std::size_t i = 0; i < maps.occluded_fraction.size(); ++i) {
     const std::size_t y = i / kAcrossPx;
     maps.blur_sigma_px[i] = y < 6 || y == 23 ? 3.5F : 2.5F;
-    maps.hidden_share[i] = y >= 21 ? 0.75F : y >= 18 ? 0.25F : 0.005F;
+    maps.occluded_fraction[i] = y >= 21 ? 0.75F : y >= 18 ? 0.25F : 0.005F;
   }
   const std::string html = Html();
   EXPECT_THAT(html, AllOf(HasSubstr("the centre view shows (50.0 %)"),
                           HasSubstr("some rays come past an edge or the border (12.5 %)"),
                           HasSubstr("for fine detail (25.0 %)"),
                           HasSubstr("most rays come past an edge or the border (12.5 %)")));
-  const cv::Mat map = PictureOf(ParseXml(Page().html), "Confidence of the estimate");
+  const cv::Mat map = ImageFrom(ParseXml(Page().html), "Confidence of the estimate");
   ASSERT_EQ(map.size(), cv::Size(kAcrossPx, kDownPx));
   const auto at = [&](int y, int c) {
     return static_cast<int>(map.ptr<unsigned char>(y)[3 * 5 + c]);
@@ -593,7 +592,7 @@ TEST_F(LightFieldPageTest, TheConfidenceHasItsShares) {
 TEST_F(LightFieldPageTest, TheMosaicHasEachViewInItsPlace) {
   input_.mosaic = true;
   const XmlDocument document = ParseXml(Page().html);
-  const cv::Mat mosaic = PictureOf(document, "Mosaic of the views");
+  const cv::Mat mosaic = ImageFrom(document, "Mosaic of the views");
   constexpr int kGap = 2;
   ASSERT_EQ(mosaic.size(), cv::Size(3 * kAcrossPx + 2 * kGap, 3 * kDownPx + 2 * kGap));
   const model::TransferCurve srgb = model::TransferCurve::Srgb();
@@ -604,7 +603,7 @@ TEST_F(LightFieldPageTest, TheMosaicHasEachViewInItsPlace) {
   EXPECT_THAT(Html(), Not(HasSubstr("alt=\"View u")));
   light_field_.present.assign(9, true);
   light_field_.present[0] = false;
-  EXPECT_EQ(PictureOf(ParseXml(Page().html), "Mosaic of the views").size(), mosaic.size());
+  EXPECT_EQ(ImageFrom(ParseXml(Page().html), "Mosaic of the views").size(), mosaic.size());
 }
 
 TEST_F(LightFieldPageTest, WarningsStandInTheSummary) {
@@ -631,7 +630,7 @@ TEST_F(LightFieldPageTest, AnEstimateOfTheSceneInWords) {
   input_.estimate->strength_rule = "gcv";
   input_.estimate->iterations = 9;
   input_.estimate->converged = false;
-  input_.estimate->hidden_share = 0.125;
+  input_.estimate->occluded_fraction = 0.125;
   input_.estimate->files_seconds = 2.5;
   EXPECT_THAT(Html(), AllOf(HasSubstr("<td>gradient</td>"), HasSubstr("<td>0.5 (gcv)</td>"),
                             HasSubstr("<td>9, not converged</td>"), HasSubstr("<td>12.5 %</td>"),
@@ -650,7 +649,7 @@ TEST_F(LightFieldPageTest, TheSweepNamesItsEndsAndFocus) {
 }
 
 // Views of a common camera, with noise and edges, which compress badly.
-TEST_F(LightFieldPageTest, SlowStaysBelowFourMegabytesForOrdinaryPictures) {
+TEST_F(LightFieldPageTest, SlowStaysBelowFourMegabytesForOrdinaryImages) {
   model::LightField large = model::MakeLightField(640, 480, 5, 5, 3);
   std::mt19937 generator(5);
   std::normal_distribution<float> noise(0, 0.02F);
@@ -659,7 +658,7 @@ TEST_F(LightFieldPageTest, SlowStaysBelowFourMegabytesForOrdinaryPictures) {
                       0.2F * static_cast<float>(i / 40 % 2) + noise(generator);
   }
   input_.light_field = input_.truth = &large;
-  input_.photo = model::ViewPicture(large, 0, 0);
+  input_.photo = model::ViewImage(large, 0, 0);
   input_.depth = PageDepth{640, 480, {}, false};
   for (int i = 0; i < 640 * 480; ++i)
     input_.depth->values.push_back(std::sin(0.01F * static_cast<float>(i % 640)) +
@@ -721,11 +720,11 @@ TEST_F(ReportProgram, WritesThePageAndItsSections) {
   EXPECT_EQ(json["reason"], "");
   EXPECT_EQ(json["output"], page_);
   EXPECT_EQ(json["sections"],
-            nlohmann::json({"summary", "picture", "views", "epipolar", "refocus", "how"}));
+            nlohmann::json({"summary", "image", "views", "epipolar", "refocus", "how"}));
   const std::string html = ContentOf(page_);
   EXPECT_EQ(ParseXml(html).error, "");
   EXPECT_THAT(html, HasSubstr("from 400 to 440 mm"));
-  const cv::Mat photo = PictureOf(ParseXml(html), "The photograph through the whole aperture");
+  const cv::Mat photo = ImageFrom(ParseXml(html), "The photograph through the whole aperture");
   EXPECT_EQ(photo.channels(), 3);  // its alpha says nothing about light
   EXPECT_EQ(photo.ptr<unsigned char>(0)[0], 100);
 }
@@ -739,7 +738,7 @@ TEST_F(ReportProgram, CropsAllAlikeButNotWhatIsCropped) {
   ASSERT_EQ(result.exit_code, 0) << result.err;
   // The same views: the differences are grey everywhere.
   const XmlDocument document = ParseXml(ContentOf(page_));
-  const cv::Mat difference = PictureOf(document, "difference × 32, u 0, v 1");
+  const cv::Mat difference = ImageFrom(document, "difference × 32, u 0, v 1");
   EXPECT_EQ(difference.size(), cv::Size(30, 20));
   EXPECT_EQ(cv::norm(difference, cv::Mat(20, 30, CV_8UC3, cv::Scalar::all(128)), cv::NORM_INF), 0);
 }
@@ -749,7 +748,7 @@ TEST_F(ReportProgram, TakesTheInnerViewsOfALargerTruth) {
   const std::string estimate = Write(model::InnerViews(five, 3, 3), "est");
   const ProgramResult result = Run({estimate, "--truth", Write(five, "true")});
   ASSERT_EQ(result.exit_code, 0) << result.err;
-  PictureOf(ParseXml(ContentOf(page_)), "difference × 32, u 0, v 1");
+  ImageFrom(ParseXml(ContentOf(page_)), "difference × 32, u 0, v 1");
 }
 
 TEST_F(ReportProgram, ShowsTheSweepAroundTheFocus) {
@@ -781,7 +780,7 @@ TEST_F(ReportProgram, ShowsTheSweepAroundTheFocus) {
   // z = offset - reading: frame 20 is the nearest.
   EXPECT_LT(html.find("alt=\"f20.png\""), near);
   EXPECT_GT(html.find("alt=\"f0.png\""), focus);
-  EXPECT_EQ(PictureOf(document, "f5.png").ptr<unsigned char>(0)[0], 50);
+  EXPECT_EQ(ImageFrom(document, "f5.png").ptr<unsigned char>(0)[0], 50);
 }
 
 TEST_F(ReportProgram, RefusesFilesThatDoNotFit) {
@@ -789,7 +788,7 @@ TEST_F(ReportProgram, RefusesFilesThatDoNotFit) {
   ExpectRefused({folder_ / "missing"}, {folder_ / "missing"});
   ExpectRefused({estimate, "--photo", PutPhoto(kAcrossPx, kDownPx - 1, 3)},
                 {"photo.png: it is 40x23 px, the views are 40x24 px"});
-  ExpectRefused({estimate, "--photo", folder_.Put("p.png", "no picture")}, {"p.png: cannot be"});
+  ExpectRefused({estimate, "--photo", folder_.Put("p.png", "no image")}, {"p.png: cannot be"});
   ExpectRefused({estimate, "--photo", PutPhoto(kAcrossPx, kDownPx, 3), "--crop", "30,0,20,20"},
                 {"30"});
   ExpectRefused({estimate, "--depth", PutDepth(400, kAcrossPx + 1, kDownPx), "--depth-kind", "z",

@@ -51,7 +51,7 @@ TEST(RejectionLines, ALoneFrameOrRunIsOneLine) {
 
 TEST(RejectionLines, LeaveOutWhatAllHaveInCommonButNoAmount) {
   std::vector<FrameMeasurement> frames = Frames(6);
-  const std::string rest = " % of the pixels pile up at 255, at most 5 % may";
+  const std::string rest = " % of the pixels are clipped at 255, at most 5 % may";
   frames[0].rejection = "saturated: 91" + rest;
   frames[1].rejection = "saturated: 81" + rest;  // the last digit is the same
   frames[4].rejection = "saturated: 91" + rest;

@@ -1,4 +1,4 @@
-// Pictures of scenes whose surface is a depth map.
+// Images of scenes whose surface is a depth map.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -55,16 +55,16 @@ SceneLayer FieldOf(const SceneLayer& layer) {
   return field;
 }
 
-LinearPicture RandomPicture(int width_px, int height_px) {
+LinearImage RandomImage(int width_px, int height_px) {
   RandomDraws draws(3, RandomDraws::Purpose::kTexture, 0);
-  LinearPicture picture{width_px, height_px, 3, {}};
+  LinearImage image{width_px, height_px, 3, {}};
   for (int i = 0; i < 3 * width_px * height_px; ++i) {
-    picture.values.push_back(static_cast<float>(draws.Uniform()));
+    image.values.push_back(static_cast<float>(draws.Uniform()));
   }
-  return picture;
+  return image;
 }
 
-double LargestDifference(const LinearPicture& a, const LinearPicture& b) {
+double LargestDifference(const LinearImage& a, const LinearImage& b) {
   EXPECT_EQ(a.values.size(), b.values.size());
   double largest = 0;
   for (std::size_t i = 0; i < std::min(a.values.size(), b.values.size()); ++i) {
@@ -76,18 +76,18 @@ double LargestDifference(const LinearPicture& a, const LinearPicture& b) {
 const EffectSet kLens = {Effect::kDefocus,   Effect::kApertureShape, Effect::kPixelBox,
                          Effect::kOcclusion, Effect::kFalloff,       Effect::kThickness};
 
-// A plane across the axis that is exactly as wide as the picture shows it has the picture's pixels
+// A plane across the axis that is exactly as wide as the image shows it has the image's pixels
 // where the map has them.
-TEST(HeightFieldSceneTest, LevelMapWithAPictureIsThePlaneWithIt) {
+TEST(HeightFieldSceneTest, LevelMapWithAnImageIsThePlaneWithIt) {
   Camera camera = MacroScene::Camera(kWidth, kHeight, Psf::kDisc);
   camera.sensor.principal_point_px = {(kWidth - 1) / 2.0, (kHeight - 1) / 2.0};
   SceneLayer layer = MacroScene::Uniform(MacroScene::DepthOf(1.2), 0.5);
-  layer.texture.kind = TextureKind::kPicture;
+  layer.texture.kind = TextureKind::kImage;
   layer.texture.feature_size_px = kWidth;
   SceneLayer field = FieldOf(layer);
   field.texture.feature_size_px = 0;
   LayerPixels pixels;
-  pixels.texture = RandomPicture(kWidth, kHeight);
+  pixels.texture = RandomImage(kWidth, kHeight);
   const SceneSimulator plane(MacroScene::Options(camera, {layer}, kLens, 200), {pixels});
   pixels.depth = MapOf([&](int, int) { return layer.plane.depth_mm; });
   for (const bool occlusion : {true, false}) {
@@ -97,14 +97,14 @@ TEST(HeightFieldSceneTest, LevelMapWithAPictureIsThePlaneWithIt) {
     EXPECT_LT(LargestDifference(plane.RenderView({3, -2}, kRun), sheet.RenderView({3, -2}, kRun)),
               1e-4);
   }
-  // What it shows in focus are the picture's pixels, but for what its mirrored sides bring in.
+  // What it shows in focus are the image's pixels, but for what its mirrored sides bring in.
   for (int i = 0; i < 3 * kWidth * kHeight; ++i) {
     const Eigen::Vector2d at(i / 3 % kWidth, i / 3 / kWidth);
     pixels.texture.values[static_cast<std::size_t>(i)] = static_cast<float>(
         0.5 + 0.4 * std::cos(2 * kPi / 16 * MacroScene::Direction(50 * (i % 3)).dot(at)));
   }
-  const LinearPicture seen = SceneSimulator(MacroScene::Options(camera, {field}, {}, 16), {pixels})
-                                 .RenderView({0, 0}, kRun);
+  const LinearImage seen = SceneSimulator(MacroScene::Options(camera, {field}, {}, 16), {pixels})
+                               .RenderView({0, 0}, kRun);
   for (int y = 8; y < kHeight - 8; ++y) {
     for (int x = 8; x < kWidth - 8; ++x) {
       for (int c = 0; c < 3; ++c) {
@@ -114,8 +114,8 @@ TEST(HeightFieldSceneTest, LevelMapWithAPictureIsThePlaneWithIt) {
   }
 }
 
-// 1/z of a plane is linear in the picture, bilinear interpolation of it exact. Each ray meets the
-// plane in closed form; its light is that of a sine painted on the picture.
+// 1/z of a plane is linear in the image, bilinear interpolation of it exact. Each ray meets the
+// plane in closed form; its light is that of a sine painted on the image.
 TEST(HeightFieldSceneTest, SlantedMapShowsTheSineWhereItsPlaneIsMet) {
   const Camera camera = MacroScene::Camera(kWidth, kHeight, Psf::kGaussian);
   const PlaneOptions plane = {MacroScene::DepthOf(0.8), {3, -2}};
@@ -139,7 +139,7 @@ TEST(HeightFieldSceneTest, SlantedMapShowsTheSineWhereItsPlaneIsMet) {
   };
   const SceneSimulator rays(MacroScene::Options(camera, {field}, {}, 100), {pixels});
   for (const Eigen::Vector2d& aperture_mm : {Eigen::Vector2d(0, 0), Eigen::Vector2d(6, -4)}) {
-    const LinearPicture view = rays.RenderView(aperture_mm, kRun);
+    const LinearImage view = rays.RenderView(aperture_mm, kRun);
     for (int y = 0; y < kHeight; ++y) {
       for (int x = 0; x < kWidth; ++x) {
         if (!inside(x, y)) continue;
@@ -151,7 +151,7 @@ TEST(HeightFieldSceneTest, SlantedMapShowsTheSineWhereItsPlaneIsMet) {
   // The same with all rays of the photograph, with and without occlusion.
   EffectSet on = {Effect::kDefocus, Effect::kPixelBox, Effect::kOcclusion};
   for (int i = 0; i < 2; ++i, on = on.Without({Effect::kOcclusion})) {
-    const LinearPicture picture =
+    const LinearImage image =
         SceneSimulator(MacroScene::Options(camera, {field}, on, 300), {pixels})
             .RenderNoiseless(kRun);
     const std::vector<PixelRay> bundle = PhotographRays({Psf::kGaussian, true, 0, 0}, 300);
@@ -163,7 +163,7 @@ TEST(HeightFieldSceneTest, SlantedMapShowsTheSineWhereItsPlaneIsMet) {
           sum += light(Eigen::Vector2d(x, y) + ray.offset_px,
                        MacroScene::kRatio * MacroScene::kRadiusMm * ray.aperture);
         }
-        EXPECT_NEAR(static_cast<double>(picture.at(x, y, 0)), sum / 300, 2e-5) << x << " " << y;
+        EXPECT_NEAR(static_cast<double>(image.at(x, y, 0)), sum / 300, 2e-5) << x << " " << y;
       }
     }
   }
@@ -188,10 +188,9 @@ TEST(HeightFieldSceneTest, MixesWithPlanes) {
     const SceneSimulator planes(MacroScene::Options(camera, {slanted, level, card}, on, 400), {});
     const SceneSimulator mixed(
         MacroScene::Options(camera, {FieldOf(slanted), level, card}, on, 400), {map});
-    const LinearPicture expected = planes.RenderNoiseless(kRun),
-                        found = mixed.RenderNoiseless(kRun);
-    const LinearPicture expected_view = planes.RenderView({5, 4}, kRun);
-    const LinearPicture found_view = mixed.RenderView({5, 4}, kRun);
+    const LinearImage expected = planes.RenderNoiseless(kRun), found = mixed.RenderNoiseless(kRun);
+    const LinearImage expected_view = planes.RenderView({5, 4}, kRun);
+    const LinearImage found_view = mixed.RenderView({5, 4}, kRun);
     double dark = 1, bright = 0;
     for (int y = 9; y < kHeight - 9; ++y) {
       for (int x = 9; x < kWidth - 9; ++x) {
@@ -218,19 +217,19 @@ LayerPixels StepOf(double left_mm, double right_mm) {
   return pixels;
 }
 
-// Far left, near right: near the middle of the picture rays from the left of the aperture see more
+// Far left, near right: near the middle of the image rays from the left of the aperture see more
 // of the near side, as of a plane in front, up to what is stretched between two pixels.
 TEST(HeightFieldSceneTest, NearSideOfAStepHidesTheFarOne) {
   const Camera camera = MacroScene::Camera(kWidth, kHeight, Psf::kGaussian);
   const double near_mm = MacroScene::DepthOf(2), far_mm = MacroScene::DepthOf(-2);
   SceneLayer layer = FieldOf(MacroScene::Uniform(1, 0.5));
-  layer.texture.kind = TextureKind::kPicture;
+  layer.texture.kind = TextureKind::kImage;
   const SceneSimulator sheet(MacroScene::Options(camera, {layer}, kLens, 100),
                              {StepOf(far_mm, near_mm)});
   // One sigma of the aperture moves the near side by 2 px, the far side by -2.
   const double sigma_mm = MacroScene::kRatio * MacroScene::kRadiusMm;
-  const LinearPicture left = sheet.RenderView({-2 * sigma_mm, 0}, kRun);
-  const LinearPicture right = sheet.RenderView({2 * sigma_mm, 0}, kRun);
+  const LinearImage left = sheet.RenderView({-2 * sigma_mm, 0}, kRun);
+  const LinearImage right = sheet.RenderView({2 * sigma_mm, 0}, kRun);
   const double edge = (kWidth - 1) / 2.0;
   for (int x = 8; x < kWidth - 8; ++x) {
     // x = x' - A V: the near side begins at edge + 4 seen from the left, and at edge - 4 from the
@@ -297,10 +296,10 @@ SceneSimulationOptions RandomField(unsigned seed, LayerPixels* pixels) {
   }
   SceneLayer layer = FieldOf(MacroScene::Uniform(1, 0.5));
   const TextureKind kinds[] = {TextureKind::kSine, TextureKind::kDeadLeaves, TextureKind::kNoise,
-                               TextureKind::kPicture};
+                               TextureKind::kImage};
   layer.texture.kind = kinds[seed % 4];
   layer.texture.contrast = draws.Uniform();
-  if (layer.texture.kind == TextureKind::kPicture) pixels->texture = RandomPicture(12, 10);
+  if (layer.texture.kind == TextureKind::kImage) pixels->texture = RandomImage(12, 10);
   std::vector<SceneLayer> layers = {layer};
   if (seed % 2 == 1) {
     // Before the map, or through it.
@@ -322,11 +321,11 @@ TEST(HeightFieldSceneTest, WhatAutoLeavesOutIsWithinTheTolerance) {
     SCOPED_TRACE(seed);
     LayerPixels pixels;
     SceneSimulationOptions options = RandomField(seed, &pixels);
-    options.effects.base = EffectChoice::Base::kAll;
+    options.effects.base = EffectSelectionOptions::Base::kAll;
     const SceneSimulator all(options, {pixels});
-    options.effects.base = EffectChoice::Base::kAuto;
+    options.effects.base = EffectSelectionOptions::Base::kAuto;
     const SceneSimulator some(options, {pixels});
-    const EffectSet left = PictureEffects().Without(some.effects().on);
+    const EffectSet left = ImageEffects().Without(some.effects().on);
     left_out += static_cast<int>(left.Effects().size());
     without_occlusion += left.Has(Effect::kOcclusion);
     EXPECT_LT(255 * LargestDifference(all.RenderNoiseless(kRun), some.RenderNoiseless(kRun)),
@@ -334,10 +333,10 @@ TEST(HeightFieldSceneTest, WhatAutoLeavesOutIsWithinTheTolerance) {
         << JoinedNames(left);
     // Each by itself changes no more than its bound, but for what 600 rays leave open.
     if (seed > 6) continue;
-    for (const EffectFinding& finding : all.effects().findings) {
+    for (const LargestEffectImpact& finding : all.effects().findings) {
       if (FactsOf(finding.effect).random || finding.effect == Effect::kQuantisation) continue;
       SceneSimulationOptions fewer = options;
-      fewer.effects.base = EffectChoice::Base::kAll;
+      fewer.effects.base = EffectSelectionOptions::Base::kAll;
       fewer.effects.without = {finding.effect};
       const double change =
           255 * LargestDifference(all.RenderNoiseless(kRun),
@@ -350,20 +349,20 @@ TEST(HeightFieldSceneTest, WhatAutoLeavesOutIsWithinTheTolerance) {
   EXPECT_LT(without_occlusion, 9);
 }
 
-// The set of rays that blocks ask for leaves no more error than is told.
+// The set of rays that blocks ask for leaves no more error than is reported.
 TEST(HeightFieldSceneTest, SamplingErrorIsAsStated) {
   for (const unsigned seed : {3U, 4U, 5U, 9U}) {
     LayerPixels pixels;
     SceneSimulationOptions options = RandomField(seed, &pixels);
-    options.effects.base = EffectChoice::Base::kAll;
+    options.effects.base = EffectSelectionOptions::Base::kAll;
     options.sampling_error_grey_levels = 0.2;
     options.rays_per_pixel = 600;
     const SceneSimulator simulator(options, {pixels});
     SceneSimulationOptions many = options;
     many.sampling_error_grey_levels = 0;
     many.rays_per_pixel = 6000;
-    const LinearPicture few = simulator.RenderNoiseless(kRun);
-    const LinearPicture truth = SceneSimulator(many, {pixels}).RenderNoiseless(kRun);
+    const LinearImage few = simulator.RenderNoiseless(kRun);
+    const LinearImage truth = SceneSimulator(many, {pixels}).RenderNoiseless(kRun);
     double square = 0;
     for (std::size_t i = 0; i < few.values.size(); ++i) {
       square += std::pow(255 * static_cast<double>(few.values[i] - truth.values[i]), 2);
@@ -391,7 +390,7 @@ TEST(HeightFieldSceneTest, WrongInputIsReported) {
             "layers[0] 'hill': depth.map 'map.pfm' is empty");
   EXPECT_THAT(
       message([](Layer*, Pixels* p) { p->depth.width_px = kHeight, p->depth.height_px = kWidth; }),
-      HasSubstr("layers[0] 'hill': depth.map 'map.pfm': it is 36x48 px, the picture 48x36"));
+      HasSubstr("layers[0] 'hill': depth.map 'map.pfm': it is 36x48 px, the image 48x36"));
   EXPECT_EQ(
       message([](Layer*, Pixels* p) { p->depth.values[7] = p->depth.values[70] = NAN; }),
       "layers[0] 'hill': depth.map 'map.pfm': 2 of its 1728 values are holes: a surface needs "

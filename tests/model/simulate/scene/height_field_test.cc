@@ -85,8 +85,8 @@ TEST(HeightFieldTest, RaysMeetWhatAMarchMeets) {
     RandomDraws draws(seed, RandomDraws::Purpose::kTexture, 1);
     for (int i = 0; i < 40; ++i) {
       const RandomRay ray(&draws);
-      const ValueRange met =
-          field.MetFrom({ray.position_px, ray.position_px}, {ray.aperture_mm, ray.aperture_mm});
+      const ValueRange met = field.IntersectionShiftBounds({ray.position_px, ray.position_px},
+                                                           {ray.aperture_mm, ray.aperture_mm});
       const auto beyond = [&](double shift) {
         const Eigen::Vector2d at = ray.position_px + shift * ray.aperture_mm;
         return BilinearShift(depths, at.x(), at.y()) - shift;
@@ -104,8 +104,10 @@ TEST(HeightFieldTest, RaysMeetWhatAMarchMeets) {
       several += roots > 1;
       EXPECT_LE(first - step, met.high);
       EXPECT_GE(last + step, met.low);
-      const double nearest = field.FirstMet(ray.position_px, ray.aperture_mm, met.high, met.low);
-      const double farthest = field.FirstMet(ray.position_px, ray.aperture_mm, met.low, met.high);
+      const double nearest =
+          field.FirstIntersection(ray.position_px, ray.aperture_mm, met.high, met.low);
+      const double farthest =
+          field.FirstIntersection(ray.position_px, ray.aperture_mm, met.low, met.high);
       ++rays;
       for (const double found : {nearest, farthest}) EXPECT_NEAR(beyond(found), 0, 1e-10);
       // Two roots within a step are missed by the march.
@@ -115,7 +117,8 @@ TEST(HeightFieldTest, RaysMeetWhatAMarchMeets) {
       // From a shift between, the next root in the direction of the crossing.
       const double middle = field.ShiftAt(ray.position_px);
       const ValueRange wide = {-2, 2};
-      const double near_middle = field.MetNearShift(ray.position_px, ray.aperture_mm, middle, wide);
+      const double near_middle =
+          field.IntersectionNearShift(ray.position_px, ray.aperture_mm, middle, wide);
       EXPECT_NEAR(beyond(near_middle), 0, 1e-10);
       const double toward = beyond(middle) < 0 ? -step : step;
       double marched = middle;
@@ -135,7 +138,7 @@ TEST(HeightFieldTest, SlopesAndBendsAreBounded) {
     RandomDraws draws(seed, RandomDraws::Purpose::kTexture, 1);
     double steepest = 0, sharpest = 0;
     const Eigen::Vector2d low(4 + 10 * draws.Uniform(), 4 + 10 * draws.Uniform());
-    const PictureRegion region = {low, low + Eigen::Vector2d(9, 7)};
+    const ImageRegion region = {low, low + Eigen::Vector2d(9, 7)};
     constexpr double kStep = 1e-4;
     for (int i = 0; i < 3000; ++i) {
       const Eigen::Vector2d at = low + Eigen::Vector2d(kStep + (9 - 2 * kStep) * draws.Uniform(),
@@ -168,10 +171,11 @@ TEST(HeightFieldTest, BeyondTheMapItIsAsAtItsEnd) {
   }
   const HeightField field(kWidth, kHeight, depths, kScalePx, kFocusMm);
   const Eigen::Vector2d aperture_mm(3, 40);
-  const ValueRange met = field.MetFrom({{-50, 400}, {-50, 400}}, {{-3, -3}, aperture_mm});
-  EXPECT_NEAR(field.FirstMet({-50, 400}, aperture_mm, met.high, met.low), -0.25, 1e-5);
-  EXPECT_NEAR(field.FirstMet({90, -300}, aperture_mm, 1, -1), 0.5, 1e-5);
-  EXPECT_NEAR(field.FirstMet({5, 5}, {0, 0}, 1, -1), 0.5, 1e-5);
+  const ValueRange met =
+      field.IntersectionShiftBounds({{-50, 400}, {-50, 400}}, {{-3, -3}, aperture_mm});
+  EXPECT_NEAR(field.FirstIntersection({-50, 400}, aperture_mm, met.high, met.low), -0.25, 1e-5);
+  EXPECT_NEAR(field.FirstIntersection({90, -300}, aperture_mm, 1, -1), 0.5, 1e-5);
+  EXPECT_NEAR(field.FirstIntersection({5, 5}, {0, 0}, 1, -1), 0.5, 1e-5);
 }
 
 }  // namespace

@@ -138,7 +138,7 @@ TEST(SceneTextureSum, IsThatOfItsPlaces) {
   request.pixel_mm = request.coarsest_pixel_mm = 0.02;
   request.low_mm = {-0.8, -0.5};
   request.high_mm = {0.8, 0.5};
-  const LinearPicture none;
+  const LinearImage none;
   for (const TextureKind kind :
        {TextureKind::kUniform, TextureKind::kSine, TextureKind::kDeadLeaves}) {
     TextureOptions options;
@@ -149,7 +149,7 @@ TEST(SceneTextureSum, IsThatOfItsPlaces) {
     for (const Eigen::Vector2d& centre_mm :
          {Eigen::Vector2d(0.1, -0.1), Eigen::Vector2d(-0.8, -0.1), Eigen::Vector2d(0.8, 0.5),
           Eigen::Vector2d(0, -0.5), Eigen::Vector2d(-7.3, 11.2)}) {
-      constexpr int kCount = SceneTexture::kMostAtOnce;
+      constexpr int kCount = SceneTexture::kMaxAtOnce;
       std::vector<float> x, y, weight;
       Eigen::Array4d expected(0, 0, 0, 0);
       for (int i = 0; i < kCount; ++i) {

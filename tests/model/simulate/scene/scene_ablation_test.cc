@@ -25,7 +25,7 @@ SceneSimulationOptions SineOutOfFocus() {
 TEST(AblateScene, SimulatesWithAndWithoutEachEffect) {
   const SceneSimulationOptions options = SineOutOfFocus();
   std::vector<EffectSet> modelled;
-  std::vector<StoredPicture> photographs;
+  std::vector<EncodedImage> photographs;
   const auto estimate = [&](const SceneToEstimate& scene) {
     EXPECT_EQ(scene.truth.u_count, 3);
     EXPECT_EQ(scene.truth.s_count, 24);
@@ -48,7 +48,7 @@ TEST(AblateScene, SimulatesWithAndWithoutEachEffect) {
   ASSERT_EQ(ablation.effects.size(), ablation.on.Effects().size());
   ASSERT_FALSE(modelled.empty());
   EXPECT_EQ(modelled[0], ablation.on);
-  EXPECT_EQ(photographs[0].values, ablation.picture.values);
+  EXPECT_EQ(photographs[0].values, ablation.image.values);
 
   // The change is that between two simulations.
   const SceneSimulator with(options, {{}}, 1);
@@ -57,13 +57,13 @@ TEST(AblateScene, SimulatesWithAndWithoutEachEffect) {
     SceneSimulationOptions fewer = options;
     fewer.effects.without.Add(row.effect);
     const SceneSimulator without(fewer, {{}}, 1);
-    PictureChangeMeter meter;
-    meter.Add(StoredValuesOf(with.RenderNoiseless({1, {}}), with.camera().sensor.transfer),
-              StoredValuesOf(without.RenderNoiseless({1, {}}), without.camera().sensor.transfer));
-    EXPECT_EQ(row.picture.rms_grey_levels, meter.Result().rms_grey_levels);
+    ImageChangeAccumulator meter;
+    meter.Add(EncodedValuesOf(with.RenderNoiseless({1, {}}), with.camera().sensor.transfer),
+              EncodedValuesOf(without.RenderNoiseless({1, {}}), without.camera().sensor.transfer));
+    EXPECT_EQ(row.image.rms_grey_levels, meter.Result().rms_grey_levels);
     EXPECT_EQ(row.absent, meter.Result().nothing());
     if (row.effect == Effect::kDefocus) {
-      EXPECT_GT(row.picture.rms_grey_levels, 1);
+      EXPECT_GT(row.image.rms_grey_levels, 1);
       EXPECT_TRUE(row.ignored_db);
     }
   }

@@ -1,4 +1,4 @@
-// Effects of simulated pictures: what is left out matters no more than its bound says.
+// Effects of simulated images: what is left out matters no more than its bound says.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -97,7 +97,7 @@ double Stored(float light, const TransferCurve& transfer) {
   return 255 * transfer.Encode(std::clamp(static_cast<double>(light), 0.0, 1.0));
 }
 
-double LargestChange(const LinearPicture& a, const LinearPicture& b, const SceneSimulator& of_a,
+double LargestChange(const LinearImage& a, const LinearImage& b, const SceneSimulator& of_a,
                      const SceneSimulator& of_b) {
   double largest = 0;
   for (std::size_t i = 0; i < a.values.size(); ++i) {
@@ -126,22 +126,22 @@ void BoundsHold(unsigned first_seed, int scenes) {
   for (unsigned seed = first_seed; seed < first_seed + static_cast<unsigned>(scenes); ++seed) {
     SceneSimulationOptions options = RandomScene(seed);
     SCOPED_TRACE(seed);
-    options.effects.base = EffectChoice::Base::kAll;
+    options.effects.base = EffectSelectionOptions::Base::kAll;
     // What the user leaves out changes what the rest matters.
-    const std::vector<Effect> effects = PictureEffects().Effects();
+    const std::vector<Effect> effects = ImageEffects().Effects();
     if (seed % 2 == 0) options.effects.without = {effects[seed / 2 % effects.size()]};
     const SceneSimulator all(options, {});
-    const LinearPicture with_all = all.RenderNoiseless(kRun);
+    const LinearImage with_all = all.RenderNoiseless(kRun);
 
     SceneSimulationOptions some = options;
-    some.effects.base = EffectChoice::Base::kAuto;
+    some.effects.base = EffectSelectionOptions::Base::kAuto;
     const SceneSimulator automatic(some, {});
     double by_auto = LargestChange(with_all, automatic.RenderNoiseless(kRun), all, automatic);
     if (by_auto > 0.5) by_auto = CarefulChange(options, some);
     EXPECT_LE(by_auto, 0.5 + kSampling)
-        << "left out: " << JoinedNames(PictureEffects().Without(automatic.effects().on));
+        << "left out: " << JoinedNames(ImageEffects().Without(automatic.effects().on));
 
-    for (const EffectFinding& finding : all.effects().findings) {
+    for (const LargestEffectImpact& finding : all.effects().findings) {
       const EffectFacts& facts = FactsOf(finding.effect);
       if (facts.random || options.effects.without.Has(finding.effect)) continue;
       (automatic.effects().on.Has(finding.effect) ? kept : left_out) += 1;
@@ -178,20 +178,20 @@ class SceneEffectsSlowTest : public ::testing::TestWithParam<unsigned> {};
 TEST_P(SceneEffectsSlowTest, BoundsHoldOverManyScenes) { BoundsHold(1000 * GetParam(), 50); }
 INSTANTIATE_TEST_SUITE_P(Tenths, SceneEffectsSlowTest, ::testing::Range(1U, 11U));
 
-// Against many times as many rays: rms of the stored values. A law of what is usual; of two hundred
-// scenes five pass it, by up to 1.6.
+// Against many times as many rays: rms of the encoded values. A law of what is usual; of two
+// hundred scenes five pass it, by up to 1.6.
 TEST(SceneEffectsTest, SamplingErrorIsWithinWhatIsStated) {
   double worst = 0;
   for (unsigned seed = 40; seed < 60; ++seed) {
     SceneSimulationOptions options = RandomScene(seed);
-    options.effects.base = EffectChoice::Base::kAll;
+    options.effects.base = EffectSelectionOptions::Base::kAll;
     options.rays_per_pixel = 600;
     options.sampling_error_grey_levels = 0.2;
     const SceneSimulator simulator(options, {});
     options.rays_per_pixel = 8000;
     options.sampling_error_grey_levels = 0;
-    const LinearPicture some = simulator.RenderNoiseless(kRun);
-    const LinearPicture many = SceneSimulator(options, {}).RenderNoiseless(kRun);
+    const LinearImage some = simulator.RenderNoiseless(kRun);
+    const LinearImage many = SceneSimulator(options, {}).RenderNoiseless(kRun);
     double squares = 0;
     for (std::size_t i = 0; i < some.values.size(); ++i) {
       squares += std::pow(Stored(some.values[i], options.camera.sensor.transfer) -
@@ -226,11 +226,11 @@ TEST(SceneEffectsTest, ViewsKeepWhatOnlyThePhotographDoesNotNeed) {
       12 / (camera.blur_ratio() * camera.lens.aperture_radius_mm * camera.focal_scale_px());
   layer.plane.depth_mm = 1 / inverse;
   ASSERT_GT(layer.plane.depth_mm, camera.lens.front_focal_length_mm);
-  options.effects.base = EffectChoice::Base::kAuto;
+  options.effects.base = EffectSelectionOptions::Base::kAuto;
   const SceneSimulator automatic(options, {});
   EXPECT_FALSE(automatic.effects().on.Has(Effect::kPixelBox));
   EXPECT_TRUE(automatic.effects_of_views().Has(Effect::kPixelBox));
-  options.effects.base = EffectChoice::Base::kAll;
+  options.effects.base = EffectSelectionOptions::Base::kAll;
   const SceneSimulator all(options, {});
   EXPECT_EQ(LargestChange(all.RenderView({0, 0}, kRun), automatic.RenderView({0, 0}, kRun), all,
                           automatic),
@@ -239,7 +239,7 @@ TEST(SceneEffectsTest, ViewsKeepWhatOnlyThePhotographDoesNotNeed) {
   EXPECT_TRUE(SceneSimulator(options, {}).effects_of_views().empty());
 }
 
-// Of flat pictures as they are stored, each noise alone.
+// Of flat images as they are stored, each noise alone.
 TEST(SceneEffectsTest, NoiseHasTheStandardDeviationOfItsBound) {
   for (const TransferCurve& curve :
        {TransferCurve::Linear(), TransferCurve::Srgb(), TransferCurve::Gamma(2.2)}) {
@@ -248,7 +248,7 @@ TEST(SceneEffectsTest, NoiseHasTheStandardDeviationOfItsBound) {
       options.camera.sensor.transfer = curve;
       options.full_well_electrons = 4000;
       options.read_noise_electrons = 8;
-      options.effects.base = EffectChoice::Base::kGiven;
+      options.effects.base = EffectSelectionOptions::Base::kGiven;
       options.effects.given = {effect, Effect::kTransferCurve};
       const SceneSimulator simulator(options, {});
       EffectConditions conditions;
@@ -256,14 +256,14 @@ TEST(SceneEffectsTest, NoiseHasTheStandardDeviationOfItsBound) {
       conditions.full_well_electrons = options.full_well_electrons;
       conditions.read_noise_electrons = options.read_noise_electrons;
       for (const double light : {0.02, 0.2, 0.8}) {
-        const LinearPicture flat{100, 100, 3, std::vector<float>(30000, static_cast<float>(light))};
+        const LinearImage flat{100, 100, 3, std::vector<float>(30000, static_cast<float>(light))};
         double sum = 0, squares = 0;
         for (const std::uint16_t value : simulator.Store(flat).values) {
           sum += value / 257.0;
           squares += value / 257.0 * (value / 257.0);
         }
         const double sd = std::sqrt(squares / 30000 - sum / 30000 * (sum / 30000));
-        EffectPlace place;
+        EffectSite place;
         place.depth_mm = options.camera.focus_depth_mm();
         place.dark = place.bright = light;
         const double bound = ImpactAt(effect, conditions, place, options.effects.given).grey_levels;
@@ -281,22 +281,22 @@ TEST(SceneEffectsTest, EffectsCanBeLeftOutOneByOne) {
   options.read_noise_electrons = 4;
   options.camera.sensor.transfer = TransferCurve::Srgb();
   options.effects.base =
-      EffectChoice::Base::kGiven;  // a pinhole, sampled at points, in linear light
+      EffectSelectionOptions::Base::kGiven;  // a pinhole, sampled at points, in linear light
   const SceneSimulator bare(options, {});
-  const LinearPicture picture = bare.RenderNoiseless(kRun);
-  const StoredPicture stored = bare.Store(picture);
+  const LinearImage image = bare.RenderNoiseless(kRun);
+  const EncodedImage stored = bare.Store(image);
   EXPECT_EQ(stored.bits, 16);
   EXPECT_EQ(bare.camera().sensor.transfer.Name(), "linear");
-  for (std::size_t i = 0; i < picture.values.size(); ++i) {
-    EXPECT_NEAR(stored.values[i], 65535 * std::min(picture.values[i], 1.0F), 0.51);
+  for (std::size_t i = 0; i < image.values.size(); ++i) {
+    EXPECT_NEAR(stored.values[i], 65535 * std::min(image.values[i], 1.0F), 0.51);
   }
   EXPECT_EQ(bare.Truth(bare.RenderDepth()).effects.on.size(), 0U);
   EXPECT_EQ(bare.Truth(bare.RenderDepth()).effects.left_out_grey_levels.size(), 12U);
 
-  options.effects.base = EffectChoice::Base::kAll;
+  options.effects.base = EffectSelectionOptions::Base::kAll;
   options.effects.without = {Effect::kReadNoise, Effect::kQuantisation, Effect::kTransferCurve};
   const SceneSimulator shot(options, {});
-  const LinearPicture flat{100, 100, 3, std::vector<float>(30000, 0.25F)};
+  const LinearImage flat{100, 100, 3, std::vector<float>(30000, 0.25F)};
   double sum = 0, squares = 0;
   for (const std::uint16_t value : shot.Store(flat).values) {
     const double electrons = value / 65535.0 * 5000;

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "model/base/random_draws.h"
-#include "model/simulate/scene/picture_bounds.h"
+#include "model/simulate/scene/image_bounds.h"
 #include "support/error_message.h"
 #include "support/test_cameras.h"
 #include "thicklens/model/scene_simulator.h"
@@ -27,7 +27,7 @@ using thicklens::testing::ThickMacroLens;
 
 constexpr int kWidth = 37, kHeight = 26;
 
-LinearPicture MaskOf(const std::vector<float>& values) { return {kWidth, kHeight, 1, values}; }
+LinearImage MaskOf(const std::vector<float>& values) { return {kWidth, kHeight, 1, values}; }
 
 // Some of random numbers, some of blots with empty and full parts between.
 std::vector<float> RandomValues(unsigned seed) {
@@ -59,16 +59,16 @@ double Bilinear(const std::vector<float>& values, double x, double y) {
   return sum;
 }
 
-TEST(PictureBoundsTest, HoldWhatIsInTheRegionAndNotMuchMore) {
+TEST(ImageBoundsTest, HoldWhatIsInTheRegionAndNotMuchMore) {
   for (unsigned seed = 1; seed <= 40; ++seed) {
     const std::vector<float> values = RandomValues(seed);
     const auto at = [&](int x, int y) {
       return static_cast<double>(values[static_cast<std::size_t>(y * kWidth + x)]);
     };
-    const PictureBounds bounds(kWidth, kHeight, at);
+    const ImageBounds bounds(kWidth, kHeight, at);
     RandomDraws draws(seed, RandomDraws::Purpose::kTexture, 1);
     for (int i = 0; i < 50; ++i) {
-      PictureRegion region;
+      ImageRegion region;
       region.low_px = {60 * draws.Uniform() - 12, 50 * draws.Uniform() - 12};
       const double size = std::pow(40, draws.Uniform()) - 1;
       region.high_px = region.low_px + size * Eigen::Vector2d(draws.Uniform(), draws.Uniform());
@@ -107,14 +107,14 @@ TEST(SceneMaskTest, InsideIsWhereItsBilinearValuesAreAtLeastHalf) {
     const std::vector<float> values = RandomValues(seed);
     const SceneMask mask(MaskOf(values), kWidth, kHeight, "mask");
     RandomDraws draws(seed, RandomDraws::Purpose::kTexture, 1);
-    PictureRegion hull = {{1e9, 1e9}, {-1e9, -1e9}};
+    ImageRegion hull = {{1e9, 1e9}, {-1e9, -1e9}};
     for (int i = 0; i < 60; ++i) {
       const Eigen::Vector2d centre_px(std::floor(48 * draws.Uniform() - 6),
                                       std::floor(38 * draws.Uniform() - 6));
       constexpr int kCount = 20;
       float x_px[kCount], y_px[kCount];
       bool is_inside[kCount];
-      PictureRegion region = {{1e9, 1e9}, {-1e9, -1e9}};
+      ImageRegion region = {{1e9, 1e9}, {-1e9, -1e9}};
       const double spread = 4 * draws.Uniform();
       for (int k = 0; k < kCount; ++k) {
         x_px[k] = static_cast<float>(spread * draws.Normal());
@@ -159,29 +159,28 @@ TEST(SceneMaskTest, ExtentEndsWhereTheOutermostBorderIs) {
   put(10, 7, 1);
   put(11, 7, 0.75F);
   put(10, 8, 0.5F);
-  const PictureRegion extent = SceneMask(MaskOf(values), kWidth, kHeight, "mask").extent();
+  const ImageRegion extent = SceneMask(MaskOf(values), kWidth, kHeight, "mask").extent();
   EXPECT_DOUBLE_EQ(extent.low_px.x(), 9.5);
   EXPECT_DOUBLE_EQ(extent.low_px.y(), 6.5);
   EXPECT_DOUBLE_EQ(extent.high_px.x(), 11 + 1 / 3.0);
   EXPECT_DOUBLE_EQ(extent.high_px.y(), 8);
   put(0, 7, 1);
   put(3, kHeight - 1, 1);
-  const PictureRegion open = SceneMask(MaskOf(values), kWidth, kHeight, "mask").extent();
+  const ImageRegion open = SceneMask(MaskOf(values), kWidth, kHeight, "mask").extent();
   EXPECT_EQ(open.low_px.x(), -std::numeric_limits<double>::infinity());
   EXPECT_EQ(open.high_px.y(), std::numeric_limits<double>::infinity());
   EXPECT_DOUBLE_EQ(open.high_px.x(), extent.high_px.x());
 }
 
 TEST(SceneMaskTest, WrongMasksAreReported) {
-  const auto message = [](const LinearPicture& picture) {
-    return ErrorOf([&] { SceneMask(picture, kWidth, kHeight, "outline.mask 'm.png'"); });
+  const auto message = [](const LinearImage& image) {
+    return ErrorOf([&] { SceneMask(image, kWidth, kHeight, "outline.mask 'm.png'"); });
   };
   EXPECT_EQ(message({}), "outline.mask 'm.png' is empty");
   EXPECT_EQ(message({kWidth, kHeight, 3, std::vector<float>(3 * kWidth * kHeight)}),
-            "outline.mask 'm.png' has 3 channels: a mask is a grey picture of one");
-  EXPECT_EQ(
-      message({3, 2, 1, std::vector<float>(6, 1.0F)}),
-      "outline.mask 'm.png' is 3x2 px, the scene's picture 37x26 px: the sizes must be equal");
+            "outline.mask 'm.png' has 3 channels: a mask is a grey image of one");
+  EXPECT_EQ(message({3, 2, 1, std::vector<float>(6, 1.0F)}),
+            "outline.mask 'm.png' is 3x2 px, the scene's image 37x26 px: the sizes must be equal");
   EXPECT_EQ(message(MaskOf(std::vector<float>(kWidth * kHeight, 127 / 255.0F))),
             "outline.mask 'm.png' is empty: none of its 962 values is at least half of full scale");
 }
@@ -207,12 +206,12 @@ SceneSimulationOptions CardScene(const Eigen::Vector2d& slope) {
 
 // Half of the values between the outermost pixels inside and the next: straight borders; but a
 // corner of a bilinear contour is cut off, and what rays near it show is not compared.
-TEST(SceneMaskTest, RectangleAsAMaskGivesThePictureOfTheOutline) {
+TEST(SceneMaskTest, RectangleAsAMaskGivesTheImageOfTheOutline) {
   for (const Eigen::Vector2d& slope : {Eigen::Vector2d(0, 0), Eigen::Vector2d(-0.4, 0.3)}) {
     for (const bool occlusion : {true, false}) {
       SceneSimulationOptions drawn = CardScene(slope);
       if (!occlusion) drawn.effects.without.Add(Effect::kOcclusion);
-      drawn.effects.base = EffectChoice::Base::kAll;
+      drawn.effects.base = EffectSelectionOptions::Base::kAll;
       SceneSimulationOptions masked = drawn;
       masked.layers[1].outline = {};
       masked.layers[1].outline.shape = OutlineOptions::Shape::kMask;
@@ -223,10 +222,10 @@ TEST(SceneMaskTest, RectangleAsAMaskGivesThePictureOfTheOutline) {
       }
       const SceneSimulator rectangle(drawn, {}), mask(masked, {{}, card});
       EXPECT_EQ(rectangle.RenderDepth().values, mask.RenderDepth().values);
-      const LinearPicture expected = rectangle.RenderNoiseless({1, {}});
-      const LinearPicture found = mask.RenderNoiseless({1, {}});
-      const LinearPicture expected_view = rectangle.RenderView({2, -3}, {1, {}});
-      const LinearPicture found_view = mask.RenderView({2, -3}, {1, {}});
+      const LinearImage expected = rectangle.RenderNoiseless({1, {}});
+      const LinearImage found = mask.RenderNoiseless({1, {}});
+      const LinearImage expected_view = rectangle.RenderView({2, -3}, {1, {}});
+      const LinearImage found_view = mask.RenderView({2, -3}, {1, {}});
       int compared = 0, edges = 0;
       for (int y = 0; y < 40; ++y) {
         for (int x = 0; x < 48; ++x) {
@@ -250,9 +249,9 @@ TEST(SceneMaskTest, RectangleAsAMaskGivesThePictureOfTheOutline) {
   }
 }
 
-TEST(SceneMaskTest, ReachesBeyondThePictureAsItEnds) {
+TEST(SceneMaskTest, ReachesBeyondTheImageAsItEnds) {
   SceneSimulationOptions drawn = CardScene({0, 0});
-  drawn.effects.base = EffectChoice::Base::kAll;
+  drawn.effects.base = EffectSelectionOptions::Base::kAll;
   drawn.layers[1].texture.kind = TextureKind::kUniform;
   SceneSimulationOptions masked = drawn;
   drawn.layers[1].outline.centre = {-987.5, 20};
@@ -262,8 +261,8 @@ TEST(SceneMaskTest, ReachesBeyondThePictureAsItEnds) {
   LayerPixels card;
   card.mask = {48, 40, 1, std::vector<float>(48 * 40, 0.0F)};
   for (int y = 0; y < 40; ++y) std::fill_n(card.mask.values.begin() + 48 * y, 13, 1.0F);
-  const LinearPicture expected = SceneSimulator(drawn, {}).RenderNoiseless({1, {}});
-  const LinearPicture found = SceneSimulator(masked, {{}, card}).RenderNoiseless({1, {}});
+  const LinearImage expected = SceneSimulator(drawn, {}).RenderNoiseless({1, {}});
+  const LinearImage found = SceneSimulator(masked, {{}, card}).RenderNoiseless({1, {}});
   for (std::size_t i = 0; i < expected.values.size(); ++i) {
     EXPECT_NEAR(found.values[i], expected.values[i], 1e-3);
   }

@@ -1,4 +1,4 @@
-// Simulated pictures against what can be written down without a simulator: transfer functions,
+// Simulated images against what can be written down without a simulator: transfer functions,
 // areas of apertures behind an edge, the light of a scene.
 #include <gtest/gtest.h>
 
@@ -22,19 +22,19 @@ constexpr double kPi = 3.14159265358979323846;
 const SceneRun kRun{2, {}};
 const EffectSet kAperture = {Effect::kDefocus, Effect::kApertureShape, Effect::kOcclusion};
 
-// Rms and largest difference of a picture's green from light(position).
+// Rms and largest difference of an image's green from light(position).
 struct Misfit {
   double rms = 0, largest = 0;
 };
 template <typename Light>
-Misfit MisfitOf(const LinearPicture& picture, const Light& light) {
+Misfit MisfitOf(const LinearImage& image, const Light& light) {
   Misfit misfit;
-  for (int y = 0; y < picture.height_px; ++y) {
-    for (int x = 0; x < picture.width_px; ++x) {
+  for (int y = 0; y < image.height_px; ++y) {
+    for (int x = 0; x < image.width_px; ++x) {
       const double error =
-          std::abs(static_cast<double>(picture.at(x, y, 1)) - light(Eigen::Vector2d(x, y)));
+          std::abs(static_cast<double>(image.at(x, y, 1)) - light(Eigen::Vector2d(x, y)));
       misfit.largest = std::max(misfit.largest, error);
-      misfit.rms += error * error / (picture.width_px * picture.height_px);
+      misfit.rms += error * error / (image.width_px * image.height_px);
     }
   }
   misfit.rms = std::sqrt(misfit.rms);
@@ -136,11 +136,11 @@ TEST(SceneOraclesTest, AnOccludersEdgeHidesItsShareOfTheAperture) {
         const Eigen::Vector2d f = MacroScene::Direction(60) / 7;
         const Misfit misfit =
             MisfitOf(simulator.RenderNoiseless(kRun), [&](const Eigen::Vector2d& at_px) {
-              const double hidden =
+              const double occluded =
                   ShareBelow(psf, direction.dot(at_px - middle) - kEdgeAtPx, sigma_px);
               const Eigen::Vector2d from_axis = at_px - options.camera.sensor.principal_point_px;
               const double behind = 0.5 + 0.4 * std::cos(2 * kPi * f.dot(from_axis));
-              return hidden * kLight + (1 - hidden) * behind;
+              return occluded * kLight + (1 - occluded) * behind;
             });
         EXPECT_LE(255 * misfit.rms, simulator.sampling_error_grey_levels());
         EXPECT_LE(255 * misfit.largest, 2 * simulator.sampling_error_grey_levels());
@@ -156,7 +156,7 @@ TEST(SceneOraclesTest, BlurNeitherMakesNorTakesLight) {
       camera.calibration->blur_ratio->value = ratio;
       const EffectSet effects = kAperture.With({Effect::kPixelBox});
       // Whole periods of a sine.
-      const LinearPicture sine =
+      const LinearImage sine =
           SceneSimulator(
               MacroScene::Options(camera, {MacroScene::Sine(MacroScene::DepthOf(4), 8, 0)}, effects,
                                   100),
@@ -166,12 +166,12 @@ TEST(SceneOraclesTest, BlurNeitherMakesNorTakesLight) {
       for (const float light : sine.values) mean += static_cast<double>(light);
       EXPECT_NEAR(mean / static_cast<double>(sine.values.size()), 0.5, 1e-6);
 
-      // A patch of known area before black, all of whose light lands in the picture.
+      // A patch of known area before black, all of whose light lands in the image.
       SceneLayer patch = MacroScene::Uniform(MacroScene::DepthOf(4), 0.7);
       patch.outline.shape = OutlineOptions::Shape::kDisc;
       patch.outline.centre = {27.2, 28.1};
       patch.outline.radius = 5.3;
-      const LinearPicture spot =
+      const LinearImage spot =
           SceneSimulator(
               MacroScene::Options(camera, {patch, MacroScene::Uniform(320, 0)}, effects, 600), {})
               .RenderNoiseless(kRun);
@@ -185,7 +185,7 @@ TEST(SceneOraclesTest, BlurNeitherMakesNorTakesLight) {
 }
 
 // No pixel, no sampling: a view of a tilted sine is a formula, 1/z of a tilted plane linear in the
-// picture.
+// image.
 TEST(SceneOraclesTest, ViewsOfATiltedSineAreExactInClosedForm) {
   SceneLayer layer = MacroScene::Sine(296, 25, 25);
   const Eigen::Vector2d tilt(3, -2);

@@ -59,7 +59,7 @@ TEST_F(SceneSimulationFileTest, ReadsEveryField) {
            "layers:\n"
            "- name: wall\n"
            "  plane: {depth_mm: 310, slope: [0.5, -0.25]}\n"
-           "  texture: {kind: picture, picture: wall.png, feature_size_px: 500}\n"
+           "  texture: {kind: image, image: wall.png, feature_size_px: 500}\n"
            "- plane: {depth_mm: 290}\n"
            "  outline: {centre_px: [10, 20.5], size_px: [30, 40]}\n"
            "  texture: {kind: dead-leaves, colour: [0.1, 0.2, 0.3], contrast: 0.7,\n"
@@ -93,7 +93,7 @@ TEST_F(SceneSimulationFileTest, ReadsEveryField) {
   EXPECT_EQ(options.camera.sensor.width_px, 400);
   EXPECT_EQ(options.camera.sensor.height_px, 301);
   EXPECT_EQ(options.camera.sensor.principal_point_px, Eigen::Vector2d(201.5, 150));
-  EXPECT_EQ(options.effects.base, EffectChoice::Base::kGiven);
+  EXPECT_EQ(options.effects.base, EffectSelectionOptions::Base::kGiven);
   EXPECT_EQ(options.effects.given,
             EffectSet({Effect::kDefocus, Effect::kOcclusion, Effect::kFalloff}));
   EXPECT_EQ(options.effects.without, EffectSet({Effect::kFalloff}));
@@ -117,8 +117,8 @@ TEST_F(SceneSimulationFileTest, ReadsEveryField) {
   EXPECT_EQ(wall.plane.depth_mm, 310);
   EXPECT_EQ(wall.plane.slope, Eigen::Vector2d(0.5, -0.25));
   EXPECT_EQ(wall.outline.shape, Shape::kWhole);
-  EXPECT_EQ(wall.texture.kind, TextureKind::kPicture);
-  EXPECT_EQ(wall.texture.picture_path, folder_ / "wall.png");
+  EXPECT_EQ(wall.texture.kind, TextureKind::kImage);
+  EXPECT_EQ(wall.texture.image_path, folder_ / "wall.png");
   EXPECT_EQ(wall.texture.feature_size_px, 500);
   const SceneLayer& leaves = options.layers[1];
   EXPECT_EQ(leaves.outline.shape, Shape::kRectangle);
@@ -158,7 +158,7 @@ TEST_F(SceneSimulationFileTest, WhatIsLeftOutHasTheDefaultsOfTheOptions) {
   EXPECT_EQ(options.camera.sensor.width_px, 640);
   EXPECT_EQ(options.camera.sensor.principal_point_px, Eigen::Vector2d(321.5, 240));
   EXPECT_FALSE(options.camera.calibration->blur_floor_px);
-  EXPECT_EQ(options.effects.base, EffectChoice::Base::kAuto);
+  EXPECT_EQ(options.effects.base, EffectSelectionOptions::Base::kAuto);
   EXPECT_EQ(options.effects.without, EffectSet());
   EXPECT_EQ(options.effects.tolerance.grey_levels, defaults.effects.tolerance.grey_levels);
   EXPECT_EQ(options.wavelength_mm, defaults.wavelength_mm);
@@ -193,7 +193,7 @@ TEST_F(SceneSimulationFileTest, TruthReplacesWhatItNamesInTheCalibration) {
   EXPECT_EQ(replaced.camera.calibration->blur_floor_px->value, 0.7);
   EXPECT_EQ(replaced.camera.calibration->evidence.method, "simulated");
   EXPECT_TRUE(replaced.camera.calibration->covariance_order.empty());
-  // What `simulate picture` writes can be read.
+  // What `simulate image` writes can be read.
   const Camera again = ParseCamera(CameraToYaml(replaced.camera), "camera.yaml");
   EXPECT_EQ(again.blur_ratio(), 0.5);
 }
@@ -263,8 +263,8 @@ TEST_F(SceneSimulationFileTest, ErrorsHaveTheirPlaceInTheFile) {
       {layer(plane + "texture: {kind: leaves}"), "dead-leaves"},
       {layer(plane + "texture: {kind: noise, angle_deg: 3}"), "unknown key 'angle_deg'"},
       {layer(plane + "texture: {kind: uniform, contrast: 1}"), "unknown key 'contrast'"},
-      {layer(plane + "texture: {kind: picture}"), "'picture' is missing"},
-      {layer(plane + "texture: {kind: picture, picture: a.png, colour: [1, 1, 1]}"),
+      {layer(plane + "texture: {kind: image}"), "'image' is missing"},
+      {layer(plane + "texture: {kind: image, image: a.png, colour: [1, 1, 1]}"),
        "unknown key 'colour'"},
       {layer(plane + "texture: {kind: noise, colour: [1, 1]}"), "a list of 3"},
       {layer(plane + "texture: {kind: noise, contrast: 2}"), "texture.contrast is 2"},
@@ -298,8 +298,8 @@ TEST_F(SceneSimulationFileTest, ErrorsHaveTheirPlaceInTheFile) {
       {head + kLayers + "wavelength_nm: 0\n", "wavelength_nm"},
       {head + kLayers + "read_noise_electrons: 3\n", "full_well_electrons > 0"},
   };
-  for (const auto& [text, told] : cases) {
-    EXPECT_THAT(MessageOf(text), HasSubstr(told)) << text;
+  for (const auto& [text, reported] : cases) {
+    EXPECT_THAT(MessageOf(text), HasSubstr(reported)) << text;
     EXPECT_EQ(MessageOf(text).find('\n'), std::string::npos);
   }
 }
@@ -340,7 +340,7 @@ TEST(ShippedScenesTest, AllCanBeReadAndStarted) {
     EXPECT_EQ(options.camera.sensor.width_px % 16, 0);
     EXPECT_EQ(options.camera.sensor.height_px % 16, 0);
     const SceneSimulator simulator(options, {});
-    const LinearPicture view = simulator.RenderView({0, 0}, {0, {}});
+    const LinearImage view = simulator.RenderView({0, 0}, {0, {}});
     std::size_t clipped = 0;
     for (const float light : view.values) clipped += light > 1 ? 1 : 0;
     EXPECT_LT(clipped, view.values.size() / 500) << entry.path();

@@ -61,7 +61,7 @@ SceneSimulationOptions SceneOf(const Camera& camera, std::vector<SceneLayer> lay
   SceneSimulationOptions options;
   options.camera = camera;
   options.layers = std::move(layers);
-  options.effects.base = EffectChoice::Base::kAll;
+  options.effects.base = EffectSelectionOptions::Base::kAll;
   options.sampling_error_grey_levels = 0;
   options.effects.without = {Effect::kFalloff, Effect::kDiffraction};
   return options;
@@ -80,23 +80,23 @@ double EdgeBehindPixel(double distance_px, double sigma_px) {
 struct Wave {
   double mean = 0, cosine = 0, sine = 0;
 };
-Wave FitWave(const LinearPicture& picture, const Eigen::Vector2d& centre_px,
+Wave FitWave(const LinearImage& image, const Eigen::Vector2d& centre_px,
              const Eigen::Vector2d& cycles_per_px) {
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right(0, 0, 0);
-  for (int y = 0; y < picture.height_px; ++y) {
-    for (int x = 0; x < picture.width_px; ++x) {
+  for (int y = 0; y < image.height_px; ++y) {
+    for (int x = 0; x < image.width_px; ++x) {
       const double phase = 2 * kPi * cycles_per_px.dot(Eigen::Vector2d(x, y) - centre_px);
       const Eigen::Vector3d row(1, std::cos(phase), std::sin(phase));
       normal += row * row.transpose();
-      right += row * static_cast<double>(picture.at(x, y, 1));
+      right += row * static_cast<double>(image.at(x, y, 1));
     }
   }
   const Eigen::Vector3d solved = normal.inverse() * right;
   return {solved(0), solved(1), solved(2)};
 }
 
-double LargestDifference(const LinearPicture& a, const LinearPicture& b) {
+double LargestDifference(const LinearImage& a, const LinearImage& b) {
   EXPECT_EQ(a.values.size(), b.values.size());
   double largest = 0;
   for (std::size_t i = 0; i < std::min(a.values.size(), b.values.size()); ++i) {
@@ -107,7 +107,7 @@ double LargestDifference(const LinearPicture& a, const LinearPicture& b) {
 
 // ----------------------------------------------------------------------------------- photograph
 
-TEST(SceneSimulatorTest, UniformSceneGivesAUniformPicture) {
+TEST(SceneSimulatorTest, UniformSceneGivesAUniformImage) {
   for (const Psf psf : {Psf::kGaussian, Psf::kDisc}) {
     // In front and behind look alike where both have the same light.
     const SceneSimulator simulator(
@@ -115,9 +115,9 @@ TEST(SceneSimulatorTest, UniformSceneGivesAUniformPicture) {
                 {MacroScene::Uniform(310, 0.4),
                  WithRectangle(MacroScene::Uniform(294, 0.4), 9, 8, 6, 5)}),
         {});
-    const LinearPicture picture = simulator.RenderNoiseless({1, {}});
-    ASSERT_EQ(picture.values.size(), 20u * 16 * 3);
-    for (const float light : picture.values) EXPECT_NEAR(light, 0.4f, 1e-6f);
+    const LinearImage image = simulator.RenderNoiseless({1, {}});
+    ASSERT_EQ(image.values.size(), 20u * 16 * 3);
+    for (const float light : image.values) EXPECT_NEAR(light, 0.4f, 1e-6f);
   }
 }
 
@@ -133,7 +133,7 @@ TEST(SceneSimulatorTest, FallOffIsThatOfTheFormula) {
     options.camera.lens.aperture_radius_mm = kFastRadiusMm;
     const double image_mm = options.camera.image_distance_mm();
     const SceneSimulator simulator(options, {});
-    const LinearPicture picture = simulator.RenderNoiseless({1, {}});
+    const LinearImage image = simulator.RenderNoiseless({1, {}});
     const auto irradiance = [&](const Eigen::Vector2d& position_px) {
       double sum = 0, weights = 0;
       const double sigma_mm = kRatio * kFastRadiusMm;
@@ -160,12 +160,12 @@ TEST(SceneSimulatorTest, FallOffIsThatOfTheFormula) {
     double least = 1;
     for (const auto& [x, y] : {std::pair{0, 0}, {8, 6}, {15, 0}, {15, 11}, {3, 9}}) {
       const double expected = irradiance(Eigen::Vector2d(x, y));
-      EXPECT_NEAR(picture.at(x, y, 0), expected, 6e-4) << x << " " << y;
+      EXPECT_NEAR(image.at(x, y, 0), expected, 6e-4) << x << " " << y;
       least = std::min(least, expected);
     }
     EXPECT_LT(least, 0.89);
     // The views are radiance.
-    const LinearPicture view = simulator.RenderView({2, -1}, {1, {}});
+    const LinearImage view = simulator.RenderView({2, -1}, {1, {}});
     for (const float light : view.values) EXPECT_NEAR(light, 1, 1e-6f);
   }
 }
@@ -200,25 +200,25 @@ TEST(SceneSimulatorTest, SineHasTheModulationOfItsBlur) {
   }
 }
 
-// Six hundred rays, at the largest blur and the finest detail of the scenes: the picture differs
+// Six hundred rays, at the largest blur and the finest detail of the scenes: the image differs
 // from one of fifteen times as many by less than half a grey level, rms.
 TEST(SceneSimulatorTest, SixHundredRaysAreEnough) {
   SceneSimulationOptions options =
       SceneOf(MacroScene::Camera(24, 20, Psf::kGaussian, 0.5),
               {Leaves(1 / (2 / kFocusMm - 1 / DepthOfShift(3)), 2),
                WithRectangle(Leaves(DepthOfShift(3), 2), 8, 9, 12, 11)});
-  const LinearPicture picture = SceneSimulator(options, {}).RenderNoiseless({2, {}});
+  const LinearImage image = SceneSimulator(options, {}).RenderNoiseless({2, {}});
   options.rays_per_pixel = 9000;
-  const LinearPicture fine = SceneSimulator(options, {}).RenderNoiseless({2, {}});
+  const LinearImage fine = SceneSimulator(options, {}).RenderNoiseless({2, {}});
   double sum = 0;
   for (std::size_t i = 0; i < fine.values.size(); ++i)
-    sum += std::pow(static_cast<double>(picture.values[i] - fine.values[i]), 2);
+    sum += std::pow(static_cast<double>(image.values[i] - fine.values[i]), 2);
   EXPECT_LT(std::sqrt(sum / static_cast<double>(fine.values.size())), 0.5 / 255);
 }
 
 TEST(SceneSimulatorTest, EdgeIsAsWideAsTheBlurOfTheNearerLayer) {
   const double near_mm = DepthOfShift(2.5);
-  // Right half: x > 20.3 in the picture. Bright in front of dark, then the other way round in
+  // Right half: x > 20.3 in the image. Bright in front of dark, then the other way round in
   // depth: a blurred background does not soften the edge of what is in focus.
   for (const bool focused : {false, true}) {
     const double front_mm = focused ? kFocusMm : near_mm;
@@ -229,10 +229,10 @@ TEST(SceneSimulatorTest, EdgeIsAsWideAsTheBlurOfTheNearerLayer) {
                  MacroScene::Uniform(back_mm, 0.1)});
     options.rays_per_pixel = 3000;
     const SceneSimulator simulator(options, {});
-    const LinearPicture picture = simulator.RenderNoiseless({1, {}});
+    const LinearImage image = simulator.RenderNoiseless({1, {}});
     const double sigma_px = std::hypot(0.4, focused ? 0 : 2.5);
     for (int x = 8; x < 32; ++x) {
-      EXPECT_NEAR(picture.at(x, 4, 2), 0.1 + 0.8 * EdgeBehindPixel(x - 20.3, sigma_px), 0.005)
+      EXPECT_NEAR(image.at(x, 4, 2), 0.1 + 0.8 * EdgeBehindPixel(x - 20.3, sigma_px), 0.005)
           << x << " " << focused;
     }
   }
@@ -253,7 +253,7 @@ TEST(SceneSimulatorTest, ViewsOfAFrontoParallelPlaneAreDisplacedByTheDisparity) 
         const Eigen::Vector2d shift_px =
             ShiftPxPerMm(depth_mm) *
             Eigen::Vector2d((k - 1.5) * grid.u_step_mm, (l - 1.0) * grid.v_step_mm);
-        const Wave wave = FitWave(ViewPicture(light_field, k, l),
+        const Wave wave = FitWave(ViewImage(light_field, k, l),
                                   options.camera.sensor.principal_point_px - shift_px, f);
         const double expected = 0.4 * BoxTransfer(f.x()) * BoxTransfer(f.y());
         EXPECT_NEAR(wave.mean, 0.5, 1e-4);
@@ -268,9 +268,9 @@ TEST(SceneSimulatorTest, WholeShiftsRepeatTheCentreViewOfATexture) {
   const double depth_mm = DepthOfShift(2);
   const SceneSimulator simulator(
       SceneOf(MacroScene::Camera(30, 24, Psf::kDisc, 0.5), {Leaves(depth_mm, 2)}), {});
-  const LinearPicture centre = simulator.RenderView({0, 0}, {1, {}});
+  const LinearImage centre = simulator.RenderView({0, 0}, {1, {}});
   // Three px to the left and two down: this view's (x, y) is the centre's (x + 3, y - 2).
-  const LinearPicture view =
+  const LinearImage view =
       simulator.RenderView({3 / ShiftPxPerMm(depth_mm), -2 / ShiftPxPerMm(depth_mm)}, {1, {}});
   double change = 0;
   for (int y = 2; y < 24; ++y) {
@@ -294,11 +294,11 @@ TEST(SceneSimulatorTest, GlossShowsItsLampAtTheDepthOfTheMirrorImage) {
   struct Spot {
     double sum = 0, x = 0, y = 0, variance_x = 0;
   };
-  const auto spot_of = [](const LinearPicture& picture) {
+  const auto spot_of = [](const LinearImage& image) {
     Spot spot;
     for (int y = 4; y < 36; ++y) {
       for (int x = 4; x < 36; ++x) {
-        const double light = static_cast<double>(picture.at(x, y, 1)) - 0.25;
+        const double light = static_cast<double>(image.at(x, y, 1)) - 0.25;
         spot.sum += light;
         spot.x += light * x;
         spot.y += light * y;
@@ -313,7 +313,7 @@ TEST(SceneSimulatorTest, GlossShowsItsLampAtTheDepthOfTheMirrorImage) {
   const double kWhole = 0.5 * 2 * kPi * 2 * 2, kPixel = 1 / 12.0;
   const Eigen::Vector2d aperture_mm(4, -3);
   const Eigen::Vector2d shift_px = ShiftPxPerMm(image_depth_mm) * aperture_mm;
-  const LinearPicture view = simulator.RenderView(aperture_mm, {1, {}});
+  const LinearImage view = simulator.RenderView(aperture_mm, {1, {}});
   const Spot seen = spot_of(view);
   EXPECT_NEAR(seen.sum, kWhole, 0.01 * kWhole);
   EXPECT_NEAR(seen.x, 20 - shift_px.x(), 0.02);
@@ -347,7 +347,7 @@ TEST_P(LightFieldPlanesTest, SlantedPlaneIsMetWhereTheGridsRaysMeetIt) {
   const RawDepthMap depth = simulator.RenderDepth();
   const double period_mm = 40 * 297 / kScalePx;
   for (const auto& [k, l] : {std::pair{2, 2}, {0, 2}, {4, 1}, {3, 4}}) {
-    const LinearPicture view = ViewPicture(light_field, k, l);
+    const LinearImage view = ViewImage(light_field, k, l);
     for (int y = 0; y < 30; y += 7) {
       for (int x = 0; x < 44; x += 7) {
         const Ray ray = grid.RayAt(x, y, k, l);
@@ -400,7 +400,7 @@ TEST(SceneSimulatorTest, EdgesStandWhereTheNearerLayersDisparityPutsThem) {
   for (int l = 0; l < 3; ++l) {
     for (int k = 0; k < 3; ++k) {
       const Eigen::Vector2d shift_px(-(k - 1) * d_px, -(l - 1) * d_px);
-      const LinearPicture view = ViewPicture(light_field, k, l);
+      const LinearImage view = ViewImage(light_field, k, l);
       for (int y = 0; y < 40; ++y) {
         for (int x = 0; x < 48; ++x) {
           // Share of the pixel inside the rectangle.
@@ -430,10 +430,10 @@ TEST(SceneSimulatorTest, DiscAndMillimetresDescribeTheSamePart) {
   in_mm.outline.centre = px_mm * (in_px.outline.centre - camera.sensor.principal_point_px);
   in_mm.outline.radius = px_mm * 9.5;
   const Eigen::Vector2d aperture_mm(1.3, -0.9);
-  const LinearPicture a = SceneSimulator(SceneOf(camera, {in_px, MacroScene::Uniform(302, 0)}), {})
-                              .RenderView(aperture_mm, {1, {}});
-  const LinearPicture b = SceneSimulator(SceneOf(camera, {MacroScene::Uniform(302, 0), in_mm}), {})
-                              .RenderView(aperture_mm, {1, {}});
+  const LinearImage a = SceneSimulator(SceneOf(camera, {in_px, MacroScene::Uniform(302, 0)}), {})
+                            .RenderView(aperture_mm, {1, {}});
+  const LinearImage b = SceneSimulator(SceneOf(camera, {MacroScene::Uniform(302, 0), in_mm}), {})
+                            .RenderView(aperture_mm, {1, {}});
   EXPECT_LT(LargestDifference(a, b), 0.03);
   double area = 0, x_sum = 0, y_sum = 0;
   for (int y = 0; y < 32; ++y) {
@@ -459,14 +459,14 @@ TEST(SceneSimulatorTest, PhotographIsTheMeanOfItsViews) {
                WithRectangle(MacroScene::Uniform(299, 0.9), 10, 8, 5, 5)});
   options.rays_per_pixel = 5000;
   const SceneSimulator simulator(options, {});
-  const LinearPicture picture = simulator.RenderNoiseless({2, {}});
-  std::vector<double> mean(picture.values.size(), 0.0);
+  const LinearImage image = simulator.RenderNoiseless({2, {}});
+  std::vector<double> mean(image.values.size(), 0.0);
   double weights = 0;
   constexpr double kStep = 0.3;  // standard deviations
   for (double a = -4.05; a < 4.1; a += kStep) {
     for (double b = -4.05; b < 4.1; b += kStep) {
       const double weight = std::exp(-(a * a + b * b) / 2);
-      const LinearPicture view =
+      const LinearImage view =
           simulator.RenderView(kRatio * kRadiusMm * Eigen::Vector2d(a, b), {2, {}});
       for (std::size_t i = 0; i < mean.size(); ++i)
         mean[i] += weight * static_cast<double>(view.values[i]);
@@ -475,7 +475,7 @@ TEST(SceneSimulatorTest, PhotographIsTheMeanOfItsViews) {
   }
   double sum = 0;
   for (std::size_t i = 0; i < mean.size(); ++i) {
-    const double error = mean[i] / weights - static_cast<double>(picture.values[i]);
+    const double error = mean[i] / weights - static_cast<double>(image.values[i]);
     EXPECT_LT(std::abs(error), 0.012);
     sum += error * error;
   }
@@ -504,13 +504,12 @@ TEST(SceneSimulatorTest, LightFieldStandsOnTheDefaultGrid) {
     EXPECT_TRUE((light_field.weights == ApertureWeights(ApertureShapeOf(psf), 5, 3)).all());
     for (int l = 0; l < 3; ++l) {
       for (int k = 0; k < 5; ++k) {
-        const LinearPicture view =
+        const LinearImage view =
             simulator.RenderView({(k - 2) * grid.u_step_mm, (l - 1) * grid.v_step_mm}, {1, {}});
-        EXPECT_LT(LargestDifference(ViewPicture(light_field, k, l), view), 1e-6);
+        EXPECT_LT(LargestDifference(ViewImage(light_field, k, l), view), 1e-6);
       }
     }
-    EXPECT_EQ(LargestDifference(ViewPicture(light_field, 2, 1), simulator.RenderView({0, 0}, {})),
-              0);
+    EXPECT_EQ(LargestDifference(ViewImage(light_field, 2, 1), simulator.RenderView({0, 0}, {})), 0);
   }
 }
 
@@ -568,7 +567,7 @@ SceneSimulationOptions NoisyScene() {
 TEST(SceneSimulatorTest, SameBitsOnAnyNumberOfThreads) {
   const SceneSimulator simulator(NoisyScene(), {});
   const SceneSimulator again(NoisyScene(), {});
-  const LinearPicture one = simulator.RenderNoiseless({1, {}});
+  const LinearImage one = simulator.RenderNoiseless({1, {}});
   EXPECT_EQ(one.values, again.RenderNoiseless({3, {}}).values);
   EXPECT_EQ(simulator.Store(one).values, again.Store(one).values);
   EXPECT_EQ(simulator.RenderLightField(3, 2, {1, {}}).values,
@@ -583,14 +582,14 @@ TEST(SceneSimulatorTest, SameBitsOnAnyNumberOfThreads) {
   EXPECT_EQ(simulator.RenderDepth().values, second.RenderDepth().values);
 }
 
-TEST(SceneSimulatorTest, NoiseHasItsSigmaInStoredGreyLevels) {
+TEST(SceneSimulatorTest, NoiseHasItsSigmaInEncodedGreyLevels) {
   for (const int bits : {8, 16}) {
     SceneSimulationOptions options = NoisyScene();
     options.camera.sensor.transfer = TransferCurve::Srgb();
     options.bits = bits;
     const SceneSimulator simulator(options, {});
-    const LinearPicture flat{60, 60, 3, std::vector<float>(60 * 60 * 3, 0.2f)};
-    const StoredPicture stored = simulator.Store(flat);
+    const LinearImage flat{60, 60, 3, std::vector<float>(60 * 60 * 3, 0.2f)};
+    const EncodedImage stored = simulator.Store(flat);
     EXPECT_EQ(stored.bits, bits);
     const double mean = TransferCurve::Srgb().Encode(0.2) * 255;
     double sum = 0, square = 0;
@@ -604,7 +603,7 @@ TEST(SceneSimulatorTest, NoiseHasItsSigmaInStoredGreyLevels) {
 
     options.noise_sigma_grey_levels = 0;
     EXPECT_EQ(SceneSimulator(options, {}).Store(flat).values,
-              ToStored(flat, TransferCurve::Srgb(), bits).values);
+              ToEncoded(flat, TransferCurve::Srgb(), bits).values);
   }
 }
 
@@ -648,7 +647,7 @@ TEST(SceneSimulatorTest, RefusesScenesThatCannotBe) {
       HasSubstr("layers[1] 'card': plane.depth_mm is -1"));
   EXPECT_THAT(message([](Options* o) { o->layers[0].plane.depth_mm = 49; }),
               HasSubstr("layers[0]: its plane, depth_mm 49 and slope [0, 0], is not met"));
-  // 25 px of slope 0.000075 each: a plane that rises by 600 leaves the right of the picture.
+  // 25 px of slope 0.000075 each: a plane that rises by 600 leaves the right of the image.
   EXPECT_THAT(message([](Options* o) {
                 o->layers[0].plane.slope = {700, 0};
               }),
@@ -680,10 +679,10 @@ TEST(SceneSimulatorTest, RefusesScenesThatCannotBe) {
   EXPECT_THAT(message([](Options* o) { o->layers[0].texture.angle_deg = NAN; }),
               HasSubstr("texture.angle_deg is nan"));
   EXPECT_THAT(message([](Options* o) {
-                o->layers[0].texture.kind = TextureKind::kPicture;
+                o->layers[0].texture.kind = TextureKind::kImage;
                 o->layers[0].texture.feature_size_px = 0;
               }),
-              HasSubstr("layers[0]: texture.picture '' is empty"));
+              HasSubstr("layers[0]: texture.image '' is empty"));
   EXPECT_THAT(message([](Options* o) { o->rays_per_pixel = 15; }),
               HasSubstr("rays_per_pixel is 15"));
   EXPECT_THAT(message([](Options* o) { o->noise_sigma_grey_levels = NAN; }),
@@ -709,14 +708,14 @@ TEST(SceneSimulatorTest, RefusesScenesThatCannotBe) {
 TEST(SceneSimulatorTest, EveryLayerIsPaintedAnew) {
   const Camera camera = MacroScene::Camera(24, 24, Psf::kGaussian, 0);
   SceneSimulationOptions options = SceneOf(camera, {Leaves(300, 2), Leaves(310, 2)});
-  const LinearPicture first = SceneSimulator(options, {}).RenderView({0, 0}, {1, {}});
+  const LinearImage first = SceneSimulator(options, {}).RenderView({0, 0}, {1, {}});
   options.layers[0].plane.depth_mm = 320;
   options.layers[1].plane.depth_mm = 300;
-  const LinearPicture second = SceneSimulator(options, {}).RenderView({0, 0}, {1, {}});
+  const LinearImage second = SceneSimulator(options, {}).RenderView({0, 0}, {1, {}});
   EXPECT_GT(LargestDifference(first, second), 0.1);
 }
 
-// A pinhole, an outline outside the picture, and a slanted outline beyond its plane's horizon.
+// A pinhole, an outline outside the image, and a slanted outline beyond its plane's horizon.
 TEST(SceneSimulatorTest, LimitCasesAreDrawn) {
   SceneSimulationOptions options = NoisyScene();
   options.camera.calibration->blur_ratio->value = 0;
@@ -725,10 +724,10 @@ TEST(SceneSimulatorTest, LimitCasesAreDrawn) {
   steep.plane.slope = {300, 0};
   options.layers.push_back(WithRectangle(steep, 60, 15, 200, 5));
   const SceneSimulator simulator(options, {});
-  const LinearPicture picture = simulator.RenderNoiseless({1, {}});
-  for (const float light : picture.values) EXPECT_TRUE(light > 0 && light < 1);
+  const LinearImage image = simulator.RenderNoiseless({1, {}});
+  for (const float light : image.values) EXPECT_TRUE(light > 0 && light < 1);
   const LightField light_field = simulator.RenderLightField(3, 3, {1, {}});
-  EXPECT_EQ(LargestDifference(ViewPicture(light_field, 0, 0), ViewPicture(light_field, 2, 1)), 0);
+  EXPECT_EQ(LargestDifference(ViewImage(light_field, 0, 0), ViewImage(light_field, 2, 1)), 0);
 }
 
 }  // namespace

@@ -32,9 +32,9 @@ TextureRequest SquareRequest(double side_px) {
 }
 
 SceneTexture DrawTexture(const TextureOptions& options, const TextureRequest& request,
-                         const LinearPicture& picture = {}) {
+                         const LinearImage& image = {}) {
   RandomDraws draws(5, RandomDraws::Purpose::kTexture, 0);
-  return SceneTexture(options, request, picture, &draws);
+  return SceneTexture(options, request, image, &draws);
 }
 
 TEST(SceneTextureTest, HoldsNothingThatThePixelsCannotShow) {
@@ -129,21 +129,21 @@ TEST(SceneTextureTest, CheckerboardHasItsSquaresAroundTheAxis) {
   }
 }
 
-TEST(SceneTextureTest, PictureStandsUprightAndIsMirroredBeyondItsSides) {
+TEST(SceneTextureTest, ImageStandsUprightAndIsMirroredBeyondItsSides) {
   // Red, green; blue, white.
-  LinearPicture picture{16, 16, 3, {}};
+  LinearImage image{16, 16, 3, {}};
   for (int i = 0; i < 256; ++i) {
     const bool right = i % 16 >= 8;
     const bool below = i / 16 >= 8;
-    for (const bool light : {right == below, right, below}) picture.values.push_back(light);
+    for (const bool light : {right == below, right, below}) image.values.push_back(light);
   }
   TextureOptions options;
-  options.kind = TextureKind::kPicture;
-  options.picture_path = "quarters.png";
+  options.kind = TextureKind::kImage;
+  options.image_path = "quarters.png";
   options.feature_size_px = 80;
   TextureRequest request = SquareRequest(60);
   request.centre_mm = {0.3, -0.1};
-  const SceneTexture texture = DrawTexture(options, request, picture);
+  const SceneTexture texture = DrawTexture(options, request, image);
   const auto at = [&](double x_px, double y_px) {
     return Eigen::Array3f(texture.At(0.3 + 0.02 * x_px, -0.1 + 0.02 * y_px).head<3>());
   };
@@ -159,22 +159,22 @@ TEST(SceneTextureTest, PictureStandsUprightAndIsMirroredBeyondItsSides) {
   EXPECT_LT((at(0, -36) - Eigen::Array3f(0.5f, 0.5f, 0)).abs().maxCoeff(), 0.05);
 
   EXPECT_THAT(ErrorOf([&] { DrawTexture(options, request); }),
-              HasSubstr("texture.picture 'quarters.png' is empty"));
+              HasSubstr("texture.image 'quarters.png' is empty"));
 }
 
-// A picture of waves, four of its pixels to one px, so that nothing is resampled: they pass the
+// An image of waves, four of its pixels to one px, so that nothing is resampled: they pass the
 // limit of the band with the fading alone, whatever the lines between the samples take.
 TEST(SceneTextureTest, DetailBelowTheLimitKeepsItsAmplitude) {
   for (const int period : {10, 20}) {  // of its pixels
-    LinearPicture picture{320, 320, 1, {}};
+    LinearImage image{320, 320, 1, {}};
     for (int i = 0; i < 320 * 320; ++i) {
-      picture.values.push_back(
+      image.values.push_back(
           static_cast<float>(0.5 + 0.4 * std::cos(2 * kPi * (i % 320 + 0.5) / period)));
     }
     TextureOptions options;
-    options.kind = TextureKind::kPicture;
+    options.kind = TextureKind::kImage;
     options.feature_size_px = 80;
-    const SceneTexture texture = DrawTexture(options, SquareRequest(60), picture);
+    const SceneTexture texture = DrawTexture(options, SquareRequest(60), image);
     double amplitude = 0;
     for (int i = 0; i < 4000; ++i) {  // 40 px from the left side, whole periods
       const double x_px = (i + 0.5) / 100;

@@ -1,4 +1,4 @@
-// The picture of a dot against formulas [S25], [S26] and against a lens traced surface by surface.
+// The image of a dot against formulas [S25], [S26] and against a lens traced surface by surface.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -23,11 +23,11 @@ struct Spot {
   double sum = 0;
   Eigen::Vector2d centroid_px{0, 0}, variance_px2{0, 0};
 };
-Spot SpotOf(const LinearPicture& picture) {
+Spot SpotOf(const LinearImage& image) {
   Spot spot;
-  for (int y = 0; y < picture.height_px; ++y) {
-    for (int x = 0; x < picture.width_px; ++x) {
-      const double light = static_cast<double>(picture.at(x, y, 1));
+  for (int y = 0; y < image.height_px; ++y) {
+    for (int x = 0; x < image.width_px; ++x) {
+      const double light = static_cast<double>(image.at(x, y, 1));
       const Eigen::Vector2d at_px(x, y);
       spot.sum += light;
       spot.centroid_px += light * at_px;
@@ -40,28 +40,28 @@ Spot SpotOf(const LinearPicture& picture) {
   return spot;
 }
 
-// A picture of a small soft dot, dark at its sides: a Gaussian of kDotPx, four samples to the px,
+// An image of a small soft dot, dark at its sides: a Gaussian of kDotPx, four samples to the px,
 // as textures have them, so that nothing is resampled. The limit of their band adds 1/2 px.
 constexpr double kDotPx = 1.25;
 constexpr int kDotSamples = 64;
-LinearPicture DotPicture() {
-  LinearPicture picture{kDotSamples, kDotSamples, 1, {}};
+LinearImage DotImage() {
+  LinearImage image{kDotSamples, kDotSamples, 1, {}};
   const auto gauss = [](int i) {
     return std::exp(-std::pow((i - (kDotSamples - 1) / 2.0) / (4 * kDotPx), 2) / 2);
   };
   for (int y = 0; y < kDotSamples; ++y) {
     for (int x = 0; x < kDotSamples; ++x) {
-      picture.values.push_back(static_cast<float>(gauss(x) * gauss(y)));
+      image.values.push_back(static_cast<float>(gauss(x) * gauss(y)));
     }
   }
-  return picture;
+  return image;
 }
 constexpr double kDotVariancePx2 = kDotPx * kDotPx + 0.25;
 constexpr double kDotLightPx2 = 2 * kPi * kDotPx * kDotPx;
 
 // A small bright dot off the axis, through lenses of every sort that are traced surface by surface:
-// the place and the width of its picture, of the photograph and of a view beside the middle.
-TEST(TracedDotTest, ADotsPictureIsWhereAndAsWideAsTheTracedLensPutsIt) {
+// the place and the width of its image, of the photograph and of a view beside the middle.
+TEST(TracedDotTest, ADotsImageIsWhereAndAsWideAsTheTracedLensPutsIt) {
   constexpr double kPitchMm = 0.005, kRatio = 0.45;
   const Eigen::Vector2d axis_px(-210.3, 160.2), wanted_px(19.2, 20.4);
   int number = 0;
@@ -81,9 +81,9 @@ TEST(TracedDotTest, ADotsPictureIsWhereAndAsWideAsTheTracedLensPutsIt) {
       camera.sensor.pixel_pitch_mm = kPitchMm;
       camera.sensor.principal_point_px = axis_px;
       camera.calibration->image_distance_mm->value = image_mm;
-      // The picture is turned: x = cx - i_x/p.
+      // The image is turned: x = cx - i_x/p.
       SceneLayer dot = MacroScene::Uniform(depth_mm, 1);
-      dot.texture.kind = TextureKind::kPicture;
+      dot.texture.kind = TextureKind::kImage;
       dot.texture.feature_size_px = kDotSamples / 4.0;
       dot.outline.shape = OutlineOptions::Shape::kRectangle;
       dot.outline.unit = OutlineOptions::Unit::kMm;
@@ -91,7 +91,7 @@ TEST(TracedDotTest, ADotsPictureIsWhereAndAsWideAsTheTracedLensPutsIt) {
       dot.outline.size.setConstant(kDotSamples / 4 * kPitchMm / std::abs(per_object));
       const SceneSimulator simulator(
           MacroScene::Options(camera, {dot, MacroScene::Uniform(2 * focus_mm, 0)}, kEffects, 1000),
-          {{DotPicture(), {}, {}}});
+          {{DotImage(), {}, {}}});
 
       // [S25], [S26]: sigma = kappa r |c(z)|, c = [f1 D - (D - f2) z]/(f2 z), D = d1 - rho.
       const ThickLens& thick = camera.lens;

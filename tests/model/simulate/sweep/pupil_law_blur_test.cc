@@ -6,7 +6,7 @@
 #include <string>
 
 #include "model/simulate/sweep/edge_spread.h"
-#include "model/simulate/sweep/periodic_picture.h"
+#include "model/simulate/sweep/periodic_image.h"
 #include "thicklens/model/pupil_law.h"
 #include "thicklens/model/sweep_simulator.h"
 
@@ -34,10 +34,10 @@ TEST(PupilLawBlur, WavesHaveTheContrastOfTheProfile) {
           for (int x = 0; x < kSize; ++x)
             samples.at<double>(y, x) = std::cos(2 * kPi * (a * x + b * y) / kSize);
         }
-        const PeriodicPicture picture(samples);
+        const PeriodicImage image(samples);
         FrameBlur blur{0.5, psf, 1.7, false, &profile};
         const AxisSampling axis{0, 1.0 / kSize, kSize};
-        const cv::Mat seen = picture.Evaluate(axis, axis, blur);
+        const cv::Mat seen = image.Evaluate(axis, axis, blur);
         const double nu = std::hypot(a, b) / kSize;
         const double expected =
             profile.Transfer(2 * kPi * 1.7 * nu) * std::exp(-2 * kPi * kPi * 0.25 * nu * nu);

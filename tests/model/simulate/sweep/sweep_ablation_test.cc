@@ -20,7 +20,7 @@ SweepSimulationOptions SmallSweep() {
   options.camera.sensor.width_px = options.camera.sensor.height_px = 64;
   options.camera.sensor.principal_point_px.setConstant(31.5);
   options.frame_count = 3;
-  options.effects.base = EffectChoice::Base::kGiven;
+  options.effects.base = EffectSelectionOptions::Base::kGiven;
   options.effects.given = {Effect::kDefocus, Effect::kFalloff, Effect::kLensFloor};
   return options;
 }

@@ -50,19 +50,19 @@ SweepSimulationOptions WideSweep() {
 
 SweepSimulationOptions With(const EffectSet& effects) {
   SweepSimulationOptions options = WideSweep();
-  options.effects.base = EffectChoice::Base::kGiven;
+  options.effects.base = EffectSelectionOptions::Base::kGiven;
   options.effects.given = effects;
   return options;
 }
 
-std::vector<LinearPicture> Frames(const SweepSimulationOptions& options) {
+std::vector<LinearImage> Frames(const SweepSimulationOptions& options) {
   const SweepSimulator simulator(options, {});
-  std::vector<LinearPicture> frames;
+  std::vector<LinearImage> frames;
   for (int i = 0; i < options.frame_count; ++i) frames.push_back(simulator.RenderNoiseless(i));
   return frames;
 }
 
-double Largest(const LinearPicture& a, const LinearPicture& b) {
+double Largest(const LinearImage& a, const LinearImage& b) {
   double largest = 0;
   for (std::size_t i = 0; i < a.values.size(); ++i) {
     largest = std::max(largest, std::abs(static_cast<double>(a.values[i] - b.values[i])));
@@ -71,14 +71,14 @@ double Largest(const LinearPicture& a, const LinearPicture& b) {
 }
 
 TEST(SweepEffectsTest, EachIsSwitchedAlone) {
-  const std::vector<LinearPicture> all = Frames(With(SweepEffects()));
+  const std::vector<LinearImage> all = Frames(With(SweepEffects()));
   const EffectSet of_light = {Effect::kThickness,     Effect::kDefocus,  Effect::kApertureShape,
                               Effect::kFalloff,       Effect::kPixelBox, Effect::kLensFloor,
                               Effect::kLampFalloff,   Effect::kFlicker,  Effect::kDrift,
                               Effect::kMagnification, Effect::kTilt};
   for (const Effect effect : SweepEffects().Effects()) {
     SCOPED_TRACE(EffectName(effect));
-    const std::vector<LinearPicture> without = Frames(With(SweepEffects().Without({effect})));
+    const std::vector<LinearImage> without = Frames(With(SweepEffects().Without({effect})));
     double change = 0;
     for (std::size_t i = 0; i < all.size(); ++i)
       change = std::max(change, Largest(all[i], without[i]));
@@ -97,7 +97,7 @@ TEST(SweepEffectsTest, TheTargetStaysTheSameWithoutThem) {
                                          Effect::kDefocus, Effect::kLensFloor, Effect::kDrift});
   options.first_depth_mm = kFocusMm - 2 * options.step_mm;
   options.drift_sigma_px = 0;
-  const LinearPicture in_focus = Frames(options)[2];
+  const LinearImage in_focus = Frames(options)[2];
   for (const Effect effect : {Effect::kMagnification, Effect::kDefocus, Effect::kDrift}) {
     SCOPED_TRACE(EffectName(effect));
     SweepSimulationOptions without = options;
@@ -115,11 +115,11 @@ TEST(SweepEffectsTest, EachNoiseHasDrawsOfItsOwn) {
     options.effects.given = effects;
     return SweepSimulator(options, {}).RenderFrame(1);
   };
-  const StoredPicture both = stored({Effect::kShotNoise, Effect::kReadNoise});
-  const StoredPicture none = stored({});
+  const EncodedImage both = stored({Effect::kShotNoise, Effect::kReadNoise});
+  const EncodedImage none = stored({});
   for (const Effect effect : {Effect::kShotNoise, Effect::kReadNoise}) {
     SCOPED_TRACE(EffectName(effect));
-    const StoredPicture one = stored({effect});
+    const EncodedImage one = stored({effect});
     double squares = 0;
     for (std::size_t i = 0; i < both.values.size(); ++i) {
       // The shot noise of one pixel is that of its light; the reading's is the same everywhere.
@@ -142,9 +142,9 @@ TEST(SweepEffectsTest, FalloffIsThatOfTheChiefRayOfAPinhole) {
     EffectSet effects = {Effect::kPixelBox};
     if (thick) effects.Add(Effect::kThickness);
     const SweepSimulationOptions options = With(effects);
-    const std::vector<LinearPicture> even = Frames(options);
+    const std::vector<LinearImage> even = Frames(options);
     effects.Add(Effect::kFalloff);
-    const std::vector<LinearPicture> falling = Frames(With(effects));
+    const std::vector<LinearImage> falling = Frames(With(effects));
     const Camera& camera = options.camera;
     const double scale_mm = camera.lens.front_focal_length_mm * kFocusMm /
                             (kFocusMm - camera.lens.front_focal_length_mm);
@@ -227,11 +227,11 @@ TEST(SweepEffectsTest, ReadingsAndNoiseAreLeftOutToo) {
   for (const SweepTruth::Frame& frame : simulator.truth().frames) {
     EXPECT_DOUBLE_EQ(frame.reading_mm, frame.depth_mm - 10);
   }
-  const StoredPicture stored = simulator.RenderFrame(1);
+  const EncodedImage stored = simulator.RenderFrame(1);
   EXPECT_EQ(stored.bits, 16);
   EXPECT_EQ(simulator.camera().sensor.transfer.Encode(0.25), 0.25);
-  const LinearPicture right = simulator.RenderNoiseless(1),
-                      found = ToLinear(stored, TransferCurve::Linear());
+  const LinearImage right = simulator.RenderNoiseless(1),
+                    found = ToLinear(stored, TransferCurve::Linear());
   for (std::size_t i = 0; i < right.values.size(); ++i) {
     EXPECT_NEAR(static_cast<double>(found.values[i]),
                 std::clamp(static_cast<double>(right.values[i]), 0.0, 1.0), 0.6 / 65535);
@@ -251,7 +251,7 @@ TEST(SweepEffectsTest, AutoHasAll) {
 
 // A point's rays, drawn and weighted one by one by [S12], against an edge at f/1.4: how wide the
 // blur is, where it lies and how bright it is, beside the axis and on it.
-TEST(SweepEffectsTest, FalloffWeighsTheRaysOfABlurredEdge) {
+TEST(SweepEffectsTest, FalloffWeightsTheRaysOfABlurredEdge) {
   for (const Psf psf : {Psf::kGaussian, Psf::kDisc}) {
     for (const double depth_mm : {240.0, 400.0}) {
       SCOPED_TRACE(PsfName(psf) + " at " + std::to_string(depth_mm) + " mm");
@@ -269,7 +269,7 @@ TEST(SweepEffectsTest, FalloffWeighsTheRaysOfABlurredEdge) {
       options.first_depth_mm = depth_mm;
       options.frame_count = 1;
       options.lamp_falloff = false;
-      const LinearPicture frame = SweepSimulator(options, {}).RenderNoiseless(0);
+      const LinearImage frame = SweepSimulator(options, {}).RenderNoiseless(0);
       const Camera& camera = options.camera;
       const double sigma_mm = camera.blur_ratio() * camera.lens.aperture_radius_mm;
       const double scale_mm = DefocusScaleMm(camera.lens, camera.image_distance_mm());
@@ -310,7 +310,7 @@ TEST(SweepEffectsTest, FalloffWeighsTheRaysOfABlurredEdge) {
   }
 }
 
-// Cameras of all fields: fall-off changes no stored value by more than its bound.
+// Cameras of all fields: fall-off changes no encoded value by more than its bound.
 TEST(SweepEffectsTest, FalloffKeepsToItsBound) {
   RandomDraws draws(11, RandomDraws::Purpose::kTexture, 3);
   int matters = 0;
@@ -323,18 +323,18 @@ TEST(SweepEffectsTest, FalloffKeepsToItsBound) {
     options.camera.lens.aperture_radius_mm = 0.02 * std::pow(100, draws.Uniform());
     options.frame_count = 2;
     options.step_mm = 300 * draws.Uniform();
-    options.effects.base = EffectChoice::Base::kAll;
+    options.effects.base = EffectSelectionOptions::Base::kAll;
     SweepSimulationOptions even = options;
     even.effects.without = {Effect::kFalloff};
     const SweepSimulator all(options, {}), without(even, {});
     double bound = 0;
-    for (const EffectFinding& finding : all.effects().findings) {
+    for (const LargestEffectImpact& finding : all.effects().findings) {
       if (finding.effect == Effect::kFalloff) bound = finding.impact.grey_levels;
     }
     matters += bound > 0.5 ? 1 : 0;
     const TransferCurve& curve = options.camera.sensor.transfer;
     for (int frame = 0; frame < 2; ++frame) {
-      const LinearPicture a = all.RenderNoiseless(frame), b = without.RenderNoiseless(frame);
+      const LinearImage a = all.RenderNoiseless(frame), b = without.RenderNoiseless(frame);
       double largest = 0;
       for (std::size_t p = 0; p < a.values.size(); ++p) {
         const auto stored = [&](float value) {
@@ -355,7 +355,7 @@ TEST(SweepEffectsTest, RefusesWhatASweepDoesNotHave) {
     const SweepSimulator simulator(options, {});
     FAIL();
   } catch (const Error& error) {
-    EXPECT_THAT(error.what(), HasSubstr("effect occlusion is not one of this picture's"));
+    EXPECT_THAT(error.what(), HasSubstr("effect occlusion is not one of this image's"));
   }
 }
 

@@ -63,7 +63,7 @@ TEST_F(SweepSimulationFileTest, ReadsEveryField) {
   const SweepSimulationOptions options =
       Read(std::string(kHead) + kTruth +
            "size_px: [400, 301]\n"
-           "target: {kind: picture, picture: scene.png, contrast: 0.7, feature_size_mm: 3,\n"
+           "target: {kind: image, image: scene.png, contrast: 0.7, feature_size_mm: 3,\n"
            "         edge_angle_deg: -4, ink_sigma_mm: 0.02}\n"
            "bench: {first_depth_mm: 310, step_mm: -1.5, frames: 12, offset_mm: 106.5,\n"
            "        direction: toward, reading_sigma_mm: 0.07}\n"
@@ -80,8 +80,8 @@ TEST_F(SweepSimulationFileTest, ReadsEveryField) {
   EXPECT_EQ(options.camera.sensor.height_px, 301);
   EXPECT_EQ(options.camera.sensor.principal_point_px.x(), 199.5);
   EXPECT_EQ(options.camera.sensor.principal_point_px.y(), 150);
-  EXPECT_EQ(options.target.kind, TargetKind::kPicture);
-  EXPECT_EQ(options.target.picture_path, (folder_ / "scene.png").string());
+  EXPECT_EQ(options.target.kind, TargetKind::kImage);
+  EXPECT_EQ(options.target.image_path, (folder_ / "scene.png").string());
   EXPECT_EQ(options.target.contrast, 0.7);
   EXPECT_EQ(options.target.feature_size_mm, 3);
   EXPECT_EQ(options.target.edge_angle_deg, -4);
@@ -155,9 +155,9 @@ TEST_F(SweepSimulationFileTest, ErrorsHaveTheirPlaceInTheFile) {
       {head + kTruth + "size_px: [641, 10]\n" + rest, "from 1 to 640"},
       {head + kTruth + "size_px: [10]\n" + rest, "a list of 2"},
       {head + kTruth + "target: {kind: leaves}\n" + kBench, "dead-leaves"},
-      {head + kTruth + "target: {kind: picture}\n" + kBench, "needs the picture's path"},
-      {head + kTruth + "target: {kind: knife-edge, picture: a.png}\n" + kBench,
-       "only a target of the kind 'picture'"},
+      {head + kTruth + "target: {kind: image}\n" + kBench, "needs the image's path"},
+      {head + kTruth + "target: {kind: knife-edge, image: a.png}\n" + kBench,
+       "only a target of the kind 'image'"},
       {head + kTruth + rest + "noise: {read_noise_electrons: 3}\n", "needs noise.full_well"},
       {head + kTruth + rest + "bits: 12\n", "bits is 12: it must be 8 or 16"},
       {head + kTruth + rest + "light: {lamp_falloff: 1}\n", "true, false"},

@@ -63,12 +63,12 @@ SweepSimulationOptions StillOptions(int width_px, int height_px, double depth_mm
   return options;
 }
 
-LinearPicture UniformPicture() { return {4, 3, 1, std::vector<float>(12, 0.37f)}; }
+LinearImage UniformImage() { return {4, 3, 1, std::vector<float>(12, 0.37f)}; }
 
 SweepSimulationOptions UniformOptions(int width_px, int height_px, double depth_mm) {
   SweepSimulationOptions options = StillOptions(width_px, height_px, depth_mm);
-  options.target.kind = TargetKind::kPicture;
-  options.target.picture_path = "uniform";
+  options.target.kind = TargetKind::kImage;
+  options.target.image_path = "uniform";
   return options;
 }
 
@@ -76,11 +76,11 @@ SweepSimulationOptions UniformOptions(int width_px, int height_px, double depth_
 
 // Place, px, and variance, px^2, of the line spread of the edge that the middle row crosses.
 // Differences of neighbouring pixels are the line spread behind one more box of a pixel.
-Moments LineSpread(const LinearPicture& picture) {
-  const int y = picture.height_px / 2;
+Moments LineSpread(const LinearImage& image) {
+  const int y = image.height_px / 2;
   double mass = 0, first = 0, second = 0;
-  for (int x = 0; x + 1 < picture.width_px; ++x) {
-    const double difference = static_cast<double>(picture.at(x + 1, y, 0)) - picture.at(x, y, 0);
+  for (int x = 0; x + 1 < image.width_px; ++x) {
+    const double difference = static_cast<double>(image.at(x + 1, y, 0)) - image.at(x, y, 0);
     const double position = x + 0.5;
     mass += difference;
     first += difference * position;
@@ -120,15 +120,15 @@ TEST(SweepSimulatorTest, EdgeHasItsTwoGreysSlantAndPlace) {
   options.target.contrast = 0.5;
   options.target.edge_angle_deg = 10;
   options.light_level = 0.4;
-  const LinearPicture picture = SweepSimulator(options, {}).RenderNoiseless(0);
-  EXPECT_NEAR(picture.at(0, 40, 0), 0.2, 1e-6);
-  EXPECT_NEAR(picture.at(100, 40, 0), 0.6, 1e-6);
-  EXPECT_NEAR(picture.at(50, 40, 0), 0.4, 1e-6);
+  const LinearImage image = SweepSimulator(options, {}).RenderNoiseless(0);
+  EXPECT_NEAR(image.at(0, 40, 0), 0.2, 1e-6);
+  EXPECT_NEAR(image.at(100, 40, 0), 0.6, 1e-6);
+  EXPECT_NEAR(image.at(50, 40, 0), 0.4, 1e-6);
   // 10 degrees from the vertical: 30 rows up it stands 30 tan 10 px = 5.29 px further right.
-  EXPECT_LT(picture.at(55, 10, 0), 0.4);
-  EXPECT_GT(picture.at(56, 10, 0), 0.4);
-  EXPECT_LT(picture.at(44, 70, 0), 0.4);
-  EXPECT_GT(picture.at(45, 70, 0), 0.4);
+  EXPECT_LT(image.at(55, 10, 0), 0.4);
+  EXPECT_GT(image.at(56, 10, 0), 0.4);
+  EXPECT_LT(image.at(44, 70, 0), 0.4);
+  EXPECT_GT(image.at(45, 70, 0), 0.4);
 }
 
 TEST(SweepSimulatorTest, ImageScaleIsOneOverDepth) {
@@ -148,18 +148,18 @@ TEST(SweepSimulatorTest, ImageScaleIsOneOverDepth) {
 
 // ------------------------------------------------------------------------------------- textures
 
-// The Fourier component of a picture at a frequency in cycles per px, behind a window that falls to
+// The Fourier component of an image at a frequency in cycles per px, behind a window that falls to
 // 0 at the borders and has the sum 1.
-std::complex<double> Component(const LinearPicture& picture, double fx, double fy) {
+std::complex<double> Component(const LinearImage& image, double fx, double fy) {
   std::complex<double> sum = 0;
   double weights = 0;
-  for (int y = 0; y < picture.height_px; ++y) {
-    for (int x = 0; x < picture.width_px; ++x) {
-      const double w = std::pow(std::sin(kPi * (x + 0.5) / picture.width_px) *
-                                    std::sin(kPi * (y + 0.5) / picture.height_px),
-                                4);
+  for (int y = 0; y < image.height_px; ++y) {
+    for (int x = 0; x < image.width_px; ++x) {
+      const double w = std::pow(
+          std::sin(kPi * (x + 0.5) / image.width_px) * std::sin(kPi * (y + 0.5) / image.height_px),
+          4);
       weights += w;
-      sum += w * static_cast<double>(picture.at(x, y, 0)) *
+      sum += w * static_cast<double>(image.at(x, y, 0)) *
              std::polar(1.0, -2 * kPi * (fx * x + fy * y));
     }
   }
@@ -178,7 +178,7 @@ TEST(SweepSimulatorTest, CheckerboardHasTheSizeAndTheModulationOfItsDepth) {
     const SweepSimulator simulator(options, {});
     for (int i = 0; i < 5; ++i) {
       const double depth_mm = 294 + 3 * i;
-      const LinearPicture picture = simulator.RenderNoiseless(i);
+      const LinearImage image = simulator.RenderNoiseless(i);
       const double f = PixelOnTargetMm(depth_mm) / (2 * kSquareMm);
       const double sigma = DefocusSigmaPx(depth_mm);
       const double defocused = psf == Psf::kDisc ? DiscTransfer(2 * sigma, f * std::sqrt(2.0))
@@ -187,36 +187,36 @@ TEST(SweepSimulatorTest, CheckerboardHasTheSizeAndTheModulationOfItsDepth) {
       const double expected = options.light_level * options.target.contrast * 4 / (kPi * kPi) *
                               GaussianTransfer(kFloorPx, f * std::sqrt(2.0)) * defocused *
                               std::pow(BoxTransfer(f), 2);
-      const double found = std::abs(Component(picture, f, f));
+      const double found = std::abs(Component(image, f, f));
       // The target is drawn by the mean light of its samples' cells, half a px of the nearest
       // frame.
       EXPECT_NEAR(found, std::abs(expected), 4e-3 * std::abs(expected))
           << PsfName(psf) << " at " << depth_mm;
       if (sigma < 3) {
-        EXPECT_GT(found, std::abs(Component(picture, 1.02 * f, f)));
-        EXPECT_GT(found, std::abs(Component(picture, 0.98 * f, f)));
+        EXPECT_GT(found, std::abs(Component(image, 1.02 * f, f)));
+        EXPECT_GT(found, std::abs(Component(image, 0.98 * f, f)));
       }
     }
   }
 }
 
-TEST(SweepSimulatorTest, PictureStandsUprightAndCovers) {
-  // Four greys in four quarters, as the user's picture has them.
-  LinearPicture quarters{64, 64, 1, {}};
+TEST(SweepSimulatorTest, ImageStandsUprightAndCovers) {
+  // Four greys in four quarters, as the user's image has them.
+  LinearImage quarters{64, 64, 1, {}};
   for (int y = 0; y < 64; ++y) {
     for (int x = 0; x < 64; ++x) {
       quarters.values.push_back(0.1f + (x < 32 ? 0.0f : 0.3f) + (y < 32 ? 0.0f : 0.15f));
     }
   }
   SweepSimulationOptions options = StillOptions(96, 96, kFocusMm);
-  options.target.kind = TargetKind::kPicture;
-  options.target.picture_path = "quarters";
-  const LinearPicture picture = SweepSimulator(options, quarters).RenderNoiseless(0);
+  options.target.kind = TargetKind::kImage;
+  options.target.image_path = "quarters";
+  const LinearImage image = SweepSimulator(options, quarters).RenderNoiseless(0);
   const double scale = 0.5 / 0.325;  // mean light 0.5
-  EXPECT_NEAR(picture.at(20, 20, 0), 0.1 * scale, 0.02);
-  EXPECT_NEAR(picture.at(75, 20, 0), 0.4 * scale, 0.02);
-  EXPECT_NEAR(picture.at(20, 75, 0), 0.25 * scale, 0.02);
-  EXPECT_NEAR(picture.at(75, 75, 0), 0.55 * scale, 0.02);
+  EXPECT_NEAR(image.at(20, 20, 0), 0.1 * scale, 0.02);
+  EXPECT_NEAR(image.at(75, 20, 0), 0.4 * scale, 0.02);
+  EXPECT_NEAR(image.at(20, 75, 0), 0.25 * scale, 0.02);
+  EXPECT_NEAR(image.at(75, 75, 0), 0.55 * scale, 0.02);
 }
 
 TEST(SweepSimulatorTest, BlurKeepsTheLightAndTheLampFallsAsTheSquare) {
@@ -224,13 +224,13 @@ TEST(SweepSimulatorTest, BlurKeepsTheLightAndTheLampFallsAsTheSquare) {
   options.step_mm = 5;
   options.frame_count = 7;
   options.light_level = 0.3;
-  const SweepSimulator steady(options, UniformPicture());
+  const SweepSimulator steady(options, UniformImage());
   options.lamp_falloff = true;
-  const SweepSimulator falling(options, UniformPicture());
+  const SweepSimulator falling(options, UniformImage());
   for (int i = 0; i < 7; ++i) {
     const double falloff = std::pow(kFocusMm / (285 + 5 * i), 2);
-    const LinearPicture even = steady.RenderNoiseless(i);
-    const LinearPicture lamp = falling.RenderNoiseless(i);
+    const LinearImage even = steady.RenderNoiseless(i);
+    const LinearImage lamp = falling.RenderNoiseless(i);
     for (std::size_t k = 0; k < even.values.size(); ++k) {
       EXPECT_NEAR(even.values[k], 0.3, 1e-6);
       EXPECT_NEAR(lamp.values[k], 0.3 * falloff, 1e-6);
@@ -248,7 +248,7 @@ TEST(SweepSimulatorTest, ShotAndReadNoiseHaveTheirVariances) {
       options.full_well_electrons = 10000;
       options.read_noise_electrons = read;
       options.bits = 16;
-      const StoredPicture frame = SweepSimulator(options, UniformPicture()).RenderFrame(0);
+      const EncodedImage frame = SweepSimulator(options, UniformImage()).RenderFrame(0);
       std::vector<double> electrons;
       for (const auto value : frame.values) electrons.push_back(value / 65535.0 * 10000);
       const double quantum = 10000 / 65535.0;
@@ -262,10 +262,10 @@ TEST(SweepSimulatorTest, NoiseOfPixelsAndFramesIsIndependent) {
   options.full_well_electrons = 1000;
   options.bits = 16;
   options.frame_count = 2;
-  const SweepSimulator simulator(options, UniformPicture());
-  const StoredPicture first = simulator.RenderFrame(0);
-  const StoredPicture second = simulator.RenderFrame(1);
-  const auto deviation = [](const StoredPicture& frame, std::size_t i) {
+  const SweepSimulator simulator(options, UniformImage());
+  const EncodedImage first = simulator.RenderFrame(0);
+  const EncodedImage second = simulator.RenderFrame(1);
+  const auto deviation = [](const EncodedImage& frame, std::size_t i) {
     return (frame.values[i] / 65535.0 - 0.5) / std::sqrt(0.5 / 1000);
   };
   double neighbours = 0, frames = 0;
@@ -285,8 +285,8 @@ TEST(SweepSimulatorTest, QuantisesAfterTheTransferCurveAndClips) {
     options.light_level = 0.8;  // the brightest leaves are beyond full scale
     options.bits = bits;
     const SweepSimulator simulator(options, {});
-    const LinearPicture light = simulator.RenderNoiseless(0);
-    const StoredPicture stored = simulator.RenderFrame(0);
+    const LinearImage light = simulator.RenderNoiseless(0);
+    const EncodedImage stored = simulator.RenderFrame(0);
     EXPECT_EQ(stored.bits, bits);
     EXPECT_EQ(stored.channels, 1);
     const double full_scale = bits == 8 ? 255 : 65535;
@@ -312,7 +312,7 @@ TEST(SweepSimulatorTest, ReadingsFollowTheBenchWithTheirError) {
     options.bench_offset_mm = 412.5;
     options.direction = direction;
     options.reading_sigma_mm = 0.07;
-    const SweepSimulator simulator(options, UniformPicture());
+    const SweepSimulator simulator(options, UniformImage());
     const SweepTruth& truth = simulator.truth();
     EXPECT_EQ(truth.bench_offset_mm, 412.5);
     ASSERT_EQ(truth.frames.size(), 2000u);
@@ -331,7 +331,7 @@ TEST(SweepSimulatorTest, ReadingsFollowTheBenchWithTheirError) {
 }
 
 TEST(SweepSimulatorTest, TruthIsTheCamerasCalibration) {
-  const SweepSimulator simulator(UniformOptions(4, 4, 290), UniformPicture());
+  const SweepSimulator simulator(UniformOptions(4, 4, 290), UniformImage());
   EXPECT_DOUBLE_EQ(simulator.truth().image_distance_mm, kImageMm);
   EXPECT_NEAR(simulator.truth().focus_depth_mm, kFocusMm, 1e-9);
   EXPECT_EQ(simulator.truth().blur_ratio, kRatio);
@@ -342,15 +342,15 @@ TEST(SweepSimulatorTest, FlickerHasItsDeviation) {
   SweepSimulationOptions options = UniformOptions(2, 2, kFocusMm);
   options.frame_count = 1500;
   options.flicker = 0.05;
-  const SweepSimulator simulator(options, UniformPicture());
+  const SweepSimulator simulator(options, UniformImage());
   std::vector<double> levels;
   for (int i = 0; i < 1500; ++i) levels.push_back(simulator.RenderNoiseless(i).values[0]);
   ExpectMoments(levels, 0.5, std::pow(0.5 * 0.05, 2));
 }
 
-TEST(SweepSimulatorTest, DriftHasItsDeviationOnBothAxesAndScalesWithThePicture) {
+TEST(SweepSimulatorTest, DriftHasItsDeviationOnBothAxesAndScalesWithTheImage) {
   // An upright edge shows the drift to the right, a level one the drift down: its bright side is
-  // below, so that the picture's middle column read downward is the row of the upright one.
+  // below, so that the image's middle column read downward is the row of the upright one.
   std::vector<double> right, down;
   for (const double angle_deg : {0.0, 90.0}) {
     SweepSimulationOptions options = StillOptions(33, 33, kFocusMm);
@@ -360,17 +360,17 @@ TEST(SweepSimulatorTest, DriftHasItsDeviationOnBothAxesAndScalesWithThePicture) 
     options.frame_count = 800;
     const SweepSimulator simulator(options, {});
     for (int i = 0; i < options.frame_count; ++i) {
-      LinearPicture picture = simulator.RenderNoiseless(i);
+      LinearImage image = simulator.RenderNoiseless(i);
       if (angle_deg == 90) {
-        LinearPicture turned = picture;
+        LinearImage turned = image;
         for (int y = 0; y < 33; ++y) {
           for (int x = 0; x < 33; ++x) {
-            turned.values[static_cast<std::size_t>(y * 33 + x)] = picture.at(y, x, 0);
+            turned.values[static_cast<std::size_t>(y * 33 + x)] = image.at(y, x, 0);
           }
         }
-        picture = turned;
+        image = turned;
       }
-      (angle_deg == 0 ? right : down).push_back(LineSpread(picture).mean - 16);
+      (angle_deg == 0 ? right : down).push_back(LineSpread(image).mean - 16);
     }
   }
   ExpectMoments(right, 0, 1.5 * 1.5);
@@ -392,9 +392,9 @@ TEST(SweepSimulatorTest, DriftMovesTexturesAsItMovesEdges) {
   SweepSimulationOptions options = StillOptions(192, 192, kFocusMm);
   options.target.kind = TargetKind::kCheckerboard;
   options.target.feature_size_mm = 0.25;
-  const LinearPicture still = SweepSimulator(options, {}).RenderNoiseless(0);
+  const LinearImage still = SweepSimulator(options, {}).RenderNoiseless(0);
   options.drift_sigma_px = 1.5;
-  const LinearPicture moved = SweepSimulator(options, {}).RenderNoiseless(0);
+  const LinearImage moved = SweepSimulator(options, {}).RenderNoiseless(0);
   options.target.kind = TargetKind::kKnifeEdge;
   options.target.edge_angle_deg = 0;
   const double right_px = LineSpread(SweepSimulator(options, {}).RenderNoiseless(0)).mean - 95.5;
@@ -417,7 +417,7 @@ TEST(SweepSimulatorTest, SameBitsInAnyOrderAndOnAnyThread) {
   options.full_well_electrons = 5000;
   options.read_noise_electrons = 4;
   const SweepSimulator simulator(options, {});
-  std::vector<StoredPicture> backward(9), parallel(9);
+  std::vector<EncodedImage> backward(9), parallel(9);
   for (int i = 8; i >= 0; --i) backward[static_cast<std::size_t>(i)] = simulator.RenderFrame(i);
   const SweepSimulator again(options, {});
   ParallelFor(9, 4, [&](int i) { parallel[static_cast<std::size_t>(i)] = again.RenderFrame(i); });
@@ -438,7 +438,7 @@ TEST(SweepSimulatorTest, OneEffectDoesNotChangeTheDrawsOfAnother) {
   options.full_well_electrons = 1000;
   const SweepSimulator more(options, {});
   EXPECT_EQ(plain.truth().frames[0].reading_mm, more.truth().frames[0].reading_mm);
-  const LinearPicture a = plain.RenderNoiseless(0), b = more.RenderNoiseless(0);
+  const LinearImage a = plain.RenderNoiseless(0), b = more.RenderNoiseless(0);
   const double ratio = static_cast<double>(b.values[0]) / a.values[0];
   EXPECT_NE(ratio, 1);
   for (std::size_t i = 0; i < a.values.size(); ++i) {
@@ -451,7 +451,7 @@ TEST(SweepSimulatorTest, OneEffectDoesNotChangeTheDrawsOfAnother) {
 TEST(SweepSimulatorTest, RefusesImpossibleOptions) {
   struct Case {
     std::function<void(SweepSimulationOptions*)> spoil;
-    const char* told;
+    const char* reported;
   };
   const double nan = std::nan("");
   const Case cases[] = {
@@ -483,18 +483,18 @@ TEST(SweepSimulatorTest, RefusesImpossibleOptions) {
     std::string why;
     ASSERT_TRUE(options.IsValid(&why)) << why;
     c.spoil(&options);
-    EXPECT_FALSE(options.IsValid(&why)) << c.told;
-    EXPECT_THAT(why, HasSubstr(c.told));
-    EXPECT_THROW(SweepSimulator(options, {}), Error) << c.told;
+    EXPECT_FALSE(options.IsValid(&why)) << c.reported;
+    EXPECT_THAT(why, HasSubstr(c.reported));
+    EXPECT_THROW(SweepSimulator(options, {}), Error) << c.reported;
   }
 }
 
-TEST(SweepSimulatorTest, RefusesFramesAndPicturesThatAreNotThere) {
-  const SweepSimulator simulator(UniformOptions(4, 4, kFocusMm), UniformPicture());
+TEST(SweepSimulatorTest, RefusesFramesAndImagesThatAreNotThere) {
+  const SweepSimulator simulator(UniformOptions(4, 4, kFocusMm), UniformImage());
   EXPECT_THROW(simulator.RenderNoiseless(1), Error);
   EXPECT_THROW(simulator.RenderFrame(-1), Error);
   EXPECT_THROW(SweepSimulator(UniformOptions(4, 4, kFocusMm), {}), Error);
-  const LinearPicture black{2, 2, 1, std::vector<float>(4, 0.0f)};
+  const LinearImage black{2, 2, 1, std::vector<float>(4, 0.0f)};
   EXPECT_THROW(SweepSimulator(UniformOptions(4, 4, kFocusMm), black), Error);
 }
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "model/base/random_draws.h"
-#include "model/simulate/sweep/periodic_picture.h"
+#include "model/simulate/sweep/periodic_image.h"
 #include "thicklens/base/error.h"
 
 namespace thicklens::model {
@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-LinearPicture UniformPicture() { return {4, 3, 1, std::vector<float>(12, 0.37f)}; }
+LinearImage UniformImage() { return {4, 3, 1, std::vector<float>(12, 0.37f)}; }
 
 TargetTile Tile(TargetKind kind, double contrast, double feature_size_mm) {
   TargetOptions options;
@@ -29,13 +29,13 @@ TargetTile Tile(TargetKind kind, double contrast, double feature_size_mm) {
   request.pixel_mm = 0.04;
   request.field_mm = 8;
   RandomDraws draws(3, RandomDraws::Purpose::kTexture, 0);
-  return DrawTargetTile(options, request, UniformPicture(), &draws);
+  return DrawTargetTile(options, request, UniformImage(), &draws);
 }
 
 TEST(SweepTargetTest, EveryTextureHasTheMeanOneAndNoNegativeLight) {
   for (const TargetKind kind :
        {TargetKind::kDeadLeaves, TargetKind::kPinkNoise, TargetKind::kWhiteNoise,
-        TargetKind::kCheckerboard, TargetKind::kSiemensStar, TargetKind::kPicture}) {
+        TargetKind::kCheckerboard, TargetKind::kSiemensStar, TargetKind::kImage}) {
     const TargetTile tile = Tile(kind, 0.6, 0);
     EXPECT_NEAR(cv::mean(tile.samples)[0], 1, 1e-12) << TargetKindName(kind);
     double low, high;
@@ -44,7 +44,7 @@ TEST(SweepTargetTest, EveryTextureHasTheMeanOneAndNoNegativeLight) {
     EXPECT_LE(high, 2.1) << TargetKindName(kind);
     EXPECT_GE(tile.width_mm, 12 - 1e-9);
     EXPECT_GE(tile.height_mm, 9 - 1e-9);
-    if (kind != TargetKind::kPicture) {
+    if (kind != TargetKind::kImage) {
       EXPECT_GT(high - low, 0.5) << TargetKindName(kind);
     }
   }
@@ -61,14 +61,14 @@ TEST(SweepTargetTest, DeadLeavesHaveEveryGreyOfTheContrast) {
 
 // Mean power of the tile's spectrum in a ring of frequencies, cycles per mm.
 double RingPower(const TargetTile& tile, double from, double to) {
-  const PeriodicPicture picture(tile.samples);
+  const PeriodicImage image(tile.samples);
   double sum = 0;
   int count = 0;
-  for (int b = 0; b <= picture.max_y_frequency(); ++b) {
-    for (int a = -picture.max_x_frequency(); a <= picture.max_x_frequency(); ++a) {
+  for (int b = 0; b <= image.max_y_frequency(); ++b) {
+    for (int a = -image.max_x_frequency(); a <= image.max_x_frequency(); ++a) {
       const double f = std::hypot(a / tile.width_mm, b / tile.height_mm);
       if (f < from || f > to) continue;
-      sum += std::norm(picture.Coefficient(a, b));
+      sum += std::norm(image.Coefficient(a, b));
       ++count;
     }
   }
@@ -90,9 +90,9 @@ TEST(SweepTargetTest, NoiseHasItsSpectrum) {
 TEST(SweepTargetTest, SiemensStarTurnsIntoItself) {
   // 36 cycles: half a turn changes nothing, a quarter neither.
   const TargetTile tile = Tile(TargetKind::kSiemensStar, 0.8, 0);
-  const PeriodicPicture picture(tile.samples);
+  const PeriodicImage image(tile.samples);
   const auto at = [&](double x_mm, double y_mm) {
-    return picture
+    return image
         .Evaluate({x_mm / tile.width_mm + 0.5, 1e-3, 1}, {y_mm / tile.height_mm + 0.5, 1e-3, 1},
                   {3, Psf::kGaussian, 0})
         .at<double>(0, 0);

@@ -121,7 +121,7 @@ TEST(LayOutTarget, TakesTheFinestPrintWhereThreePixelsAreFiner) {
   request.sheet = kA4;
   request.view = MadeUpView(640, 480, 0.02);
   EXPECT_DOUBLE_EQ(LayOutTarget(request).feature_mm, 0.1);
-  EXPECT_THAT(LayOutTarget(request).choice, HasSubstr("5.0 px of the picture at 1000 mm"));
+  EXPECT_THAT(LayOutTarget(request).choice, HasSubstr("5.0 px of the image at 1000 mm"));
   request.finest_mm = 0.05;
   EXPECT_DOUBLE_EQ(LayOutTarget(request).feature_mm, 0.06);
 }
@@ -150,12 +150,11 @@ TEST(LayOutTarget, FeaturesThatDoNotSuitTheCameraAreReported) {
   request.sheet = kA4;
   request.view = MadeUpView(640, 480, 0.2);
   request.feature_mm = 0.2;
-  EXPECT_THAT(LayOutTarget(request).choice, HasSubstr("1.0 px of the picture at 1000 mm, finer"));
+  EXPECT_THAT(LayOutTarget(request).choice, HasSubstr("1.0 px of the image at 1000 mm, finer"));
   request.feature_mm = 2;
-  EXPECT_THAT(LayOutTarget(request).choice,
-              HasSubstr("10.0 px of the picture at 1000 mm, coarser"));
+  EXPECT_THAT(LayOutTarget(request).choice, HasSubstr("10.0 px of the image at 1000 mm, coarser"));
   request.feature_mm = 0.8;
-  EXPECT_THAT(LayOutTarget(request).choice, HasSubstr("4.0 px of the picture at 1000 mm)"));
+  EXPECT_THAT(LayOutTarget(request).choice, HasSubstr("4.0 px of the image at 1000 mm)"));
 }
 
 // In focus m = f1/(zf - f1), whatever f2 and the thickness; the distance that a refusal names is

@@ -32,13 +32,13 @@ SweepSimulationOptions Sweep(TargetKind kind, double tilt_deg) {
   options.target.tilt_deg = tilt_deg;
   options.first_depth_mm = 306;
   options.frame_count = 1;
-  options.effects.base = EffectChoice::Base::kGiven;
+  options.effects.base = EffectSelectionOptions::Base::kGiven;
   options.effects.given = {Effect::kDefocus, Effect::kPixelBox, Effect::kMagnification,
                            Effect::kLensFloor, Effect::kTilt};
   return options;
 }
 
-double Largest(const LinearPicture& a, const LinearPicture& b) {
+double Largest(const LinearImage& a, const LinearImage& b) {
   double largest = 0;
   for (std::size_t i = 0; i < a.values.size(); ++i) {
     largest = std::max(largest, std::abs(static_cast<double>(a.values[i] - b.values[i])));
@@ -102,7 +102,7 @@ TEST(TiltedSweepTest, ShowsAnEdgeAsRaysDo) {
       SweepSimulationOptions sweep = Sweep(TargetKind::kPrintedEdge, tilt_deg);
       sweep.target.edge_angle_deg = edge_deg;
       sweep.target.ink_sigma_mm = 0.25;
-      const LinearPicture found = SweepSimulator(sweep, {}).RenderNoiseless(0);
+      const LinearImage found = SweepSimulator(sweep, {}).RenderNoiseless(0);
 
       SceneSimulationOptions scene;
       scene.camera = sweep.camera;
@@ -131,7 +131,7 @@ TEST(TiltedSweepTest, ShowsAnEdgeAsRaysDo) {
       behind.plane.depth_mm = 2000;
       behind.texture.kind = TextureKind::kUniform;
       scene.layers = {plane, behind};
-      const LinearPicture rays = SceneSimulator(scene, {}).RenderNoiseless({2, {}});
+      const LinearImage rays = SceneSimulator(scene, {}).RenderNoiseless({2, {}});
 
       // The depth that changes within a pixel's blur is left out by the sweep, and what 3000 rays
       // leave by the scene.
@@ -143,7 +143,7 @@ TEST(TiltedSweepTest, ShowsAnEdgeAsRaysDo) {
       }
       EXPECT_LT(largest, 0.004);
       EXPECT_LT(std::sqrt(squares / static_cast<double>(found.values.size())), 6e-4);
-      // Without tilt it is another picture.
+      // Without tilt it is another image.
       sweep.effects.without.Add(Effect::kTilt);
       EXPECT_GT(Largest(SweepSimulator(sweep, {}).RenderNoiseless(0), found), 0.02);
     }
@@ -154,7 +154,7 @@ TEST(TiltedSweepTest, TheLampIsNearerToTheNearSide) {
   SweepSimulationOptions options = Sweep(TargetKind::kPrintedEdge, 30);
   options.target.contrast = 1e-9;
   options.effects.given.Add(Effect::kLampFalloff);
-  const LinearPicture light = SweepSimulator(options, {}).RenderNoiseless(0);
+  const LinearImage light = SweepSimulator(options, {}).RenderNoiseless(0);
   const TiltedTarget target(30 * kPi / 180, options.first_depth_mm,
                             options.camera.focal_scale_px());
   for (const int x : {0, 79, 159}) {
@@ -180,7 +180,7 @@ TEST(TiltedSweepTest, EffectsKeepToTheirBounds) {
                                      EffectSet{Effect::kMagnification, Effect::kTilt}}) {
         options.effects.given = given;
         const SweepSimulator with(options, {});
-        for (const EffectFinding& finding : with.effects().findings) {
+        for (const LargestEffectImpact& finding : with.effects().findings) {
           if (!given.Has(finding.effect)) continue;
           SCOPED_TRACE(::testing::Message() << EffectName(finding.effect) << ", tilt " << tilt_deg
                                             << ", " << first_mm << " mm, " << JoinedNames(given));

@@ -53,7 +53,7 @@ TEST(TransferOraclesTest, FramesOfAnEdgeAreExactToAMillionth) {
         options.frame_count = 1;
         options.lamp_falloff = false;
         options.effects.without = {Effect::kFalloff};
-        const LinearPicture frame = SweepSimulator(options, {}).RenderNoiseless(0);
+        const LinearImage frame = SweepSimulator(options, {}).RenderNoiseless(0);
         // Through the middle of the frame; the upper end leans right, bright is on the right.
         const Eigen::Vector2d direction = MacroScene::Direction(6), edge_px(24, 4);
         for (int y = 0; y < 9; y += 4) {

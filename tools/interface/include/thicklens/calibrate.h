@@ -64,7 +64,7 @@ struct CalibrationDiagnostics {
   calib::FrameStructureFinding structure;
   calib::SourceRecipe paper_recipe;
   calib::SharpnessPeak sharpness;
-  calib::ScaleLaw scale;
+  calib::ScaleModel scale;
   calib::BlurFit blur;
   calib::SideFit nearer, farther;
   calib::FieldMap field;

@@ -13,8 +13,8 @@
 
 namespace thicklens {
 
-// Metrics of an image against a reference, on stored values in [0, 1]. The definitions are those of
-// thicklens/estimator/compare.h ([L19], Wang et al. 2004, CIE94, [D119]).
+// Metrics of an image against a reference, on encoded values in [0, 1]. The definitions are those
+// of thicklens/estimator/compare.h ([L19], Wang et al. 2004, CIE94, [D119]).
 struct ImageScores {
   double psnr_db = 0;                    // +inf for equal images
   double ssim = 0;                       // NaN if the image is smaller than the window of 11 px

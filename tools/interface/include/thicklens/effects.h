@@ -5,7 +5,7 @@
 #include <string>
 
 #include "thicklens/export.h"
-#include "thicklens/model/effect_choice.h"
+#include "thicklens/model/effect_selection.h"
 
 namespace thicklens {
 

@@ -82,7 +82,7 @@ struct EstimateSeconds {
 };
 
 // The result in numbers.
-struct EstimateSummary {
+struct BlockSummary {
   std::string message = "not run";  // of the solver
   std::string solver;               // "scene", "blocks", "functional", "grid" or a program's own
   std::string prior;                // of SceneSolver; otherwise empty
@@ -113,7 +113,7 @@ struct ExifComparison {
   std::string remark;  // what a disagreement may mean
 };
 
-// A part of the photograph that the estimate does not explain, px; rms in stored values, 1 at full
+// A part of the photograph that the estimate does not explain, px; rms in encoded values, 1 at full
 // scale.
 struct UnexplainedPatch {
   int x = 0, y = 0, width_px = 0, height_px = 0;
@@ -131,7 +131,7 @@ struct EstimateDiagnostics {
   std::optional<double> aperture_calibrated_sigma_mm;  // kappa r, with a camera
   Eigen::Vector2d aperture_sigma_mm{0, 0};             // that the views have, along u and v [D30]
   Eigen::Vector2d aperture_corner_change{0, 0};  // relative change of it in the corners, largest
-  model::EffectDecision effects;
+  model::EffectSelection effects;
   std::optional<model::DepthStatistics> depth;  // mm from Ap, with a camera
   std::size_t holes_filled = 0;
   double holes_share = 0;
@@ -139,8 +139,8 @@ struct EstimateDiagnostics {
   std::optional<double> depth_noise_px, depth_noise_left_px;  // px per view step [D93], [D94]
   double largest_step_px = 0;  // displacement between neighbouring views
   double coarse_share = 0;     // share of the pixels whose step is above 3 px
-  std::optional<double> strength, noise_sigma, residual_rms;  // noise, residual in stored values
-  std::optional<double> row_share, hidden_share, unexplained_share;
+  std::optional<double> strength, noise_sigma, residual_rms;  // noise, residual in encoded values
+  std::optional<double> row_share, occluded_fraction, unexplained_share;
   std::vector<UnexplainedPatch> patches;  // by descending residual
   int bands = 1;
   int reweightings = 0;
@@ -149,7 +149,7 @@ struct EstimateDiagnostics {
   std::optional<int> block_px;
   // Shares of all rays: seen by the whole aperture, in part, blurred too strongly for details, and
   // filled in. The sum is 1.
-  double rays_seen = 0, rays_partly_seen = 0, rays_blurred = 0, rays_filled_in = 0;
+  double rays_visible = 0, rays_partly_visible = 0, rays_blurred = 0, rays_filled_in = 0;
   std::size_t inpainted_rays = 0;
   std::string blur_check;  // what SceneSolver::check_blur found, one line; empty: not asked for
   std::vector<Notice> notices;
@@ -164,7 +164,7 @@ struct BlockRecord {
 
 struct LightFieldEstimate {
   LightField light_field;
-  EstimateSummary summary;
+  BlockSummary summary;
   EstimateDiagnostics diagnostics;
   std::vector<BlockRecord> blocks;
   // One byte per ray, view by view (index l * U + k), row by row: how well the photograph shows it
@@ -177,7 +177,7 @@ struct LightFieldEstimate {
 class THICKLENS_EXPORT ViewSink {
  public:
   virtual ~ViewSink();
-  virtual void TakeView(int k, int l, const model::LinearPicture& view) = 0;
+  virtual void TakeView(int k, int l, const model::LinearImage& view) = 0;
   // One byte per ray of the view, row by row.
   virtual void TakeConfidence(int k, int l, const std::vector<std::uint8_t>& confidence,
                               int width_px) = 0;
@@ -192,7 +192,7 @@ class THICKLENS_EXPORT ViewSink {
 // one the depth must be a disparity, and the light field is relative.
 //
 // Steps: crop; camera, EXIF and part of the sensor; linear light; aperture weights; grid; depth to
-// disparity, holes filled; noise smoothed; effects chosen; solver; hidden rays; checks. Sources:
+// disparity, holes filled; noise smoothed; effects chosen; solver; occluded rays; checks. Sources:
 // the paper's (10), (16), (18) to (21) for the model and the functional, [D101] for SceneSolver.
 //
 // The result does not depend on the number of threads. Throws OptionError for options, Error for

@@ -13,7 +13,7 @@
 
 namespace thicklens {
 
-// The curve between linear light and stored values: Linear(), Srgb() or Gamma(2.2).
+// The curve between linear light and encoded values: Linear(), Srgb() or Gamma(2.2).
 using TransferCurve = model::TransferCurve;
 
 // The order of the channels of one pixel. There is no default: a reader states it.
@@ -46,7 +46,7 @@ class THICKLENS_EXPORT Image {
   int height_px() const;
   int channels() const;        // 1, 3 or 4
   ChannelOrder order() const;  // kGrey, kRgb or kRgba
-  bool is_linear() const { return std::holds_alternative<model::LinearPicture>(pixels_); }
+  bool is_linear() const { return std::holds_alternative<model::LinearImage>(pixels_); }
   int bits() const;  // 8 or 16; 32 for linear light
   const std::optional<TransferCurve>& transfer() const { return transfer_; }
   // The file that ReadImage read, or the name that was given; empty: none. Messages name it.
@@ -56,19 +56,19 @@ class THICKLENS_EXPORT Image {
 
   // The values, channels interleaved in the order order(). encoded() throws Error for linear light,
   // light() for encoded values.
-  const model::StoredPicture& encoded() const;
-  const model::LinearPicture& light() const;
+  const model::EncodedImage& encoded() const;
+  const model::LinearImage& light() const;
 
   // Returns the image in linear light. Encoded values are decoded by `transfer`; it has no effect
   // on an image that is linear already. Alpha is decoded like a colour, as model::ToLinear does.
-  model::LinearPicture ToLight(const TransferCurve& transfer) const;
+  model::LinearImage ToLight(const TransferCurve& transfer) const;
   // Returns a copy without the alpha channel.
   Image WithoutAlpha() const;
 
  private:
   friend THICKLENS_EXPORT Image ReadImage(const std::string& path,
                                           std::optional<TransferCurve> transfer);
-  std::variant<model::StoredPicture, model::LinearPicture> pixels_;
+  std::variant<model::EncodedImage, model::LinearImage> pixels_;
   std::optional<TransferCurve> transfer_;
   std::string source_;
   bool is_from_file_ = false;

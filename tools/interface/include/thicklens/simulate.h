@@ -39,7 +39,7 @@ struct SimulatedPhotograph {
   DepthMap depth;
   Camera camera;  // with the true calibration
   model::SceneTruth truth;
-  model::EffectDecision effects;
+  model::EffectSelection effects;
 };
 THICKLENS_EXPORT SimulatedPhotograph SimulatePhotograph(const SceneSimulation& simulation,
                                                         const RunControl& run = {});

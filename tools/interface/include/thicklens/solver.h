@@ -111,10 +111,10 @@ class THICKLENS_EXPORT Problem {
   int channels() const;
   int u_count() const;
   int v_count() const;
-  const model::LinearPicture& photograph() const;  // linear light, 1 at full scale
-  const std::vector<float>& disparity() const;     // one per pixel; near points are larger
-  Eigen::Vector2d disparity_step() const;          // times this: px per view step along u and v
-  const Eigen::ArrayXXd& weights() const;          // V x U, sum 1
+  const model::LinearImage& photograph() const;  // linear light, 1 at full scale
+  const std::vector<float>& disparity() const;   // one per pixel; near points are larger
+  Eigen::Vector2d disparity_step() const;        // times this: px per view step along u and v
+  const Eigen::ArrayXXd& weights() const;        // V x U, sum 1
   const std::optional<Camera>& camera() const;
   const std::optional<model::LightFieldGrid>& grid() const;
   bool falloff() const { return falloff_; }  // whether the photograph contains the fall-off [S12]
@@ -124,9 +124,9 @@ class THICKLENS_EXPORT Problem {
   // light field of a scene without blur, and the usual start of a solver. Throws Error if the size
   // or the channels differ from the photograph's.
   LightField WarpToViews(const RunControl& run) const;
-  LightField WarpToViews(const model::LinearPicture& image, const RunControl& run) const;
+  LightField WarpToViews(const model::LinearImage& image, const RunControl& run) const;
   // The photograph that the aperture would take of the light field: H L, linear light.
-  model::LinearPicture Photograph(const LightField& light_field, const RunControl& run) const;
+  model::LinearImage Photograph(const LightField& light_field, const RunControl& run) const;
 
   const estimator::EstimateInput& input() const { return *input_; }  // for the library's solvers
 

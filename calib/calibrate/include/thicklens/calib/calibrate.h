@@ -6,13 +6,13 @@
 
 #include "thicklens/calib/calibration.h"
 #include "thicklens/calib/focus_sweep.h"
-#include "thicklens/calib/frame_gates.h"
+#include "thicklens/calib/frame_checks.h"
 #include "thicklens/model/camera.h"
 
 namespace thicklens::calib {
 
 struct CalibrationOptions {
-  GateOptions gates;
+  QualityCheckOptions checks;
   // If false, only the paper's recipe and the sharpness peak are computed. Where the bench zero is
   // given they need no image scale, and no frame is registered: a wrong reading is not noticed.
   bool fit_blur = true;
@@ -29,8 +29,8 @@ struct CalibrationOptions {
 // without opening a frame. If not, `why` receives the reason.
 bool HasEnoughFrames(const FocusSweep& sweep, std::string* why);
 
-// Runs the gates, the meters and both methods. Bad data give a Calibration whose outcome is
-// kRefused or kPartial, with the reason. A wrong file or setting throws Error.
+// Runs the quality checks, the estimators and both methods. Bad data give a Calibration whose
+// outcome is kRefused or kPartial, with the reason. A wrong file or setting throws Error.
 Calibration Calibrate(const FocusSweep& sweep, const CalibrationOptions& options);
 
 // Returns the camera with the calibrated values, as it is written to a file. The manufacturer's

@@ -41,11 +41,11 @@ struct ComparedParameter {
   double smallest_detectable = 0;
 };
 
-enum class Verdict { kHolds, kDoesNotHold, kCannotTell };
+enum class Verdict { kHolds, kDoesNotHold, kUndetermined };
 std::string VerdictName(Verdict verdict);  // "holds", "does-not-hold", "cannot-tell"
 
 struct Verification {
-  Verdict verdict = Verdict::kCannotTell;
+  Verdict verdict = Verdict::kUndetermined;
   std::string reason = "not run";
   std::vector<ComparedParameter> parameters;  // present in both: d1, zf, kappa, floor, bench zero
   int degrees_of_freedom = 0;                 // number of counted parameters

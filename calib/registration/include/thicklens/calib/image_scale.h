@@ -65,9 +65,9 @@ struct ScaleSample {
 // of radial distortion are added in quadrature. `done` is false, with the reason in `message`,
 // where the samples are too few or another law holds. If `corner_radius_px` is given, the distance
 // of the region's farthest corner from the optical axis, radial distortion is reported, too.
-ScaleLaw FitScaleLaw(const std::vector<ScaleSample>& samples, int reference_frame,
-                     double reading_sigma_mm, model::BenchDirection direction,
-                     double corner_radius_px = 0);
+ScaleModel FitScaleModel(const std::vector<ScaleSample>& samples, int reference_frame,
+                         double reading_sigma_mm, model::BenchDirection direction,
+                         double corner_radius_px = 0);
 
 }  // namespace thicklens::calib
 

@@ -45,7 +45,7 @@ struct FrameMeasurement {
   double source_blur_sigma_px = 0;    // measured by the method of Zhuo and Sim, as in the paper
   double blur_sigma_px = 0;           // of lens and defocus, without pixel box and operator
   double blur_sigma_error_px = 0;     // its standard deviation
-  bool in_blur_fit = false;           // false: outside the meter's range, or rejected
+  bool in_blur_fit = false;           // false: outside the estimator's range, or rejected
   std::string not_in_fit;             // reason why a frame that was not rejected is not in the fit
   double blur_fit_weight = 0;         // 0 to 1, from the robust loss
   std::optional<double> image_scale;  // relative to the reference frame
@@ -95,7 +95,7 @@ enum class ScaleKind {
 };
 
 // The bench zero from the image scale: 1/scale = (offset + direction * reading)/z_reference.
-struct ScaleLaw {
+struct ScaleModel {
   bool done = false;  // true if the offset was found; for kInverseDepth alone
   std::string message = "not run";
   ScaleKind kind = ScaleKind::kUnknown;
@@ -197,7 +197,7 @@ struct BlurFit {
   std::vector<std::string> undetermined;  // parameters that the data do not fix
   std::string weak_direction;             // the combination of parameters that is least certain
   double weak_correlation = 0;            // correlation of these parameters
-  std::string meter;                      // "edges" or "relative spectrum"
+  std::string estimator;                  // "edges" or "relative spectrum"
   // The PSF family whose second moment is the blur ratio. For spectra also the band of the fit:
   // frequencies up to this value of 2 pi^2 sigma^2 nu^2, where sigma is the blur beyond that of the
   // sharpest frame.
@@ -207,8 +207,9 @@ struct BlurFit {
   // doubt: H exp(4 tails u^2), u = 2 pi^2 sigma^2 nu^2. A pupil that obeys the sine condition has
   // about (kappa r/d1)^2/2. 0: no change.
   double tails = 0;
-  model::Psf better_psf = model::Psf::kGaussian;       // the shape that describes the frames better
-  std::optional<double> gaussian_misfit, disc_misfit;  // chi^2 per dof of the meter with each shape
+  model::Psf better_psf = model::Psf::kGaussian;  // the shape that describes the frames better
+  std::optional<double> gaussian_misfit,
+      disc_misfit;        // chi^2 per dof of the estimator with each shape
   double outside_mm = 0;  // distance of the focus outside the sweep; 0: inside
 };
 
@@ -241,7 +242,7 @@ struct Calibration {
 
   SourceRecipe source;
   SharpnessPeak sharpness;
-  ScaleLaw scale;
+  ScaleModel scale;
   BlurFit blur;
   SideFit nearer, farther;  // fits of the frames on each side of focus
   FieldMap field;
@@ -251,7 +252,8 @@ struct Calibration {
   std::string advice;                            // how to shrink the largest error, and to what
   std::vector<BlurExample> examples;             // the nearest, the sharpest and the farthest frame
   std::vector<FrameMeasurement> frames;          // in the sweep's order
-  int frames_used = 0;  // in the blur fit, or, before the fit, the frames that passed the gates
+  int frames_used =
+      0;  // in the blur fit, or, before the fit, the frames that passed the quality checks
   double seconds = 0;
 };
 

@@ -55,8 +55,8 @@ struct SharpestReading {
 struct FrameStructureFinding {
   // Limits, as differences of the logarithm of the light, above which the structure matters to
   // registrations: the effect of less on an image scale is below the scale's errors.
-  static constexpr double kLeastVignetting = 0.1;
-  static constexpr double kLeastBands = 0.01, kLeastFixed = 0.002;
+  static constexpr double kMinVignetting = 0.1;
+  static constexpr double kMinBands = 0.01, kMinFixed = 0.002;
   static constexpr double kSignificant = 4;  // standard deviations
 
   bool measured = false;

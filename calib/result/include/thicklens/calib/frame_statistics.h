@@ -7,7 +7,7 @@ namespace thicklens::calib {
 
 // Statistics of a frame before any normalisation. Levels are in units of full scale.
 struct FrameStatistics {
-  double mean_stored = 0;   // mean of the stored grey values
+  double mean_encoded = 0;  // mean of the stored grey values
   double mean_linear = 0;   // mean of the linear grey
   double contrast = 0;      // standard deviation over mean, linear, of the smoothed frame
   double noise_sigma = 0;   // standard deviation of a linear grey pixel, from the flattest parts
@@ -16,7 +16,7 @@ struct FrameStatistics {
   // noise alone would give: a strongly blurred texture is still detected.
   double coarse_texture = 0;
   double saturated_fraction = 0;  // share of the samples at full scale or piled up on one value
-  double saturation_level = 0;    // stored value of the pile-up; 0 if there is none
+  double saturation_level = 0;    // encoded value of the clipping; 0 if there is none
   // The corresponding values at the dark end. A backlit edge is normally black on one side: there
   // the black pixels fill one side of a straight line.
   double black_fraction = 0;

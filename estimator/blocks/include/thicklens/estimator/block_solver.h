@@ -80,7 +80,7 @@ struct BlockReport {
   double relative_residual = 0;  // |N x - b|/|b|, recomputed; the maximum over the channels
 };
 
-struct EstimateSummary {
+struct BlockSummary {
   std::string message = "not run";
   int block_px = 0;
   std::vector<BlockReport> blocks;
@@ -117,7 +117,7 @@ struct EstimateSummary {
 // relative residual of 10 or more, and for a memory limit that blocks of BlockOptions::block_px, or
 // without it the smallest blocks, exceed.
 model::LightField EstimateByBlocks(const EstimateInput& input, const BlockOptions& options,
-                                   kernels::Backend* backend, EstimateSummary* summary);
+                                   kernels::Backend* backend, BlockSummary* summary);
 
 }  // namespace thicklens::estimator
 

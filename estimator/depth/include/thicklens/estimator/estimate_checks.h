@@ -40,22 +40,22 @@ std::optional<double> DepthNoisePx(const DisparityMap& map);
 // A part of the photograph that the estimate does not explain; position and size in px.
 struct ResidualPatch {
   int x = 0, y = 0, width_px = 0, height_px = 0;
-  double rms = 0;  // rms of the residual, in stored values
+  double rms = 0;  // rms of the residual, in encoded values
 };
 // Returns the blocks of 32 x 32 px (less at the right and lower border) whose residual has an rms
 // of more than four times the noise and more than four times the rms of the median block, sorted by
 // descending rms. Left out are pixels where more than a hundredth of the aperture sees past an
 // edge, and blocks of which less than a quarter remains. In these blocks the depth is most probably
 // wrong, so that the blur is assumed too wide. (Too narrow a blur fits and is not detected.)
-// `residual`: H r - I in stored values; `hidden_share`: as in SceneMaps. Throws Error for sizes
-// that do not fit.
+// `residual`: H r - I in encoded values; `occluded_fraction`: as in SceneMaps. Throws Error for
+// sizes that do not fit.
 std::vector<ResidualPatch> ResidualPatches(const std::vector<float>& residual,
-                                           const std::vector<float>& hidden_share, int width_px,
-                                           int height_px, double noise_sigma);
+                                           const std::vector<float>& occluded_fraction,
+                                           int width_px, int height_px, double noise_sigma);
 
 // Share of unexplained blocks (UnexplainedShare) above which the estimate as a whole does not
 // explain the photograph.
-constexpr double kMostUnexplained = 0.2;
+constexpr double kMaxUnexplained = 0.2;
 // Returns how much of the photograph the estimate leaves unexplained: the share of the blocks, as
 // in ResidualPatches, whose residual has an rms of more than 1.5 times the noise, whatever the rms
 // of the others. The residual of one channel has about the rms of the noise, and the mean of three
@@ -63,7 +63,7 @@ constexpr double kMostUnexplained = 0.2;
 // would have removed. Absent if fewer than a tenth of all blocks count. Throws Error for sizes that
 // do not fit.
 std::optional<double> UnexplainedShare(const std::vector<float>& residual,
-                                       const std::vector<float>& hidden_share, int width_px,
+                                       const std::vector<float>& occluded_fraction, int width_px,
                                        int height_px, double noise_sigma);
 
 }  // namespace thicklens::estimator

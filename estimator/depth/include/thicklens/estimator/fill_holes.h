@@ -20,11 +20,11 @@ namespace thicklens::estimator {
 // Neighbours belong to two surfaces where their disparities differ by more than six times the map's
 // noise, but at least 0.2 and at most 1 px per view step.
 //
-// The image `picture` must have the size of the map. `filled` (may be null) receives the number of
+// The image `image` must have the size of the map. `filled` (may be null) receives the number of
 // filled pixels. No filled value is below both the smallest known value and `at_infinity`, the
 // disparity of an infinitely far point, where that is known. Throws Error if all values are holes,
 // the sizes differ, or a value of the image is not finite.
-DisparityMap FillHoles(const DisparityMap& map, const model::LinearPicture& picture,
+DisparityMap FillHoles(const DisparityMap& map, const model::LinearImage& image,
                        std::size_t* filled,
                        double at_infinity = -std::numeric_limits<double>::infinity());
 

@@ -32,7 +32,7 @@ std::optional<model::ApertureShape> ShapeOfWeights(const model::LightField& ligh
 // Returns how far the centre of the rays of a pixel moves across the aperture at most, relative to
 // half of the width that the views of one pixel cover there: this share of their light is missing
 // on one side. Needs a grid and a camera.
-double LargestWander(const model::LightField& light_field);
+double MaxPupilShift(const model::LightField& light_field);
 
 // Weighting of a ray by the place where it crosses the aperture: the weight of `shape` at that
 // place, in view steps on the aperture, times the share that the smaller aperture of
@@ -46,8 +46,8 @@ struct Vignetting {
 // Returns the weight of every ray of the view (k, l), T x S numbers row by row, 1 in the middle of
 // the aperture. From [S10]: the ray (s, t, u, v) crosses at a = ((zl + d0) u - zl s)/d0. A view
 // step is that of model::ApertureStepsMm. Needs a grid and a camera.
-std::vector<float> PassedRays(const model::LightField& light_field, const Vignetting& vignetting,
-                              int k, int l);
+std::vector<float> ApertureTransmissionMap(const model::LightField& light_field,
+                                           const Vignetting& vignetting, int k, int l);
 
 }  // namespace thicklens::estimator
 

@@ -13,7 +13,7 @@
 
 namespace thicklens::estimator {
 
-struct PictureScores {
+struct ImageScores {
   double psnr_db = 0;                    // +inf for equal images
   double ssim = 0;                       // NaN if the image is smaller than the SSIM window
   double delta_e94_mean = 0;             // grey is taken as R = G = B
@@ -25,7 +25,7 @@ struct PictureScores {
 // sizes or channels differ or the border leaves nothing.
 //
 // PSNR: -10 log10 of the mean squared difference, channels pooled [L19].
-// SSIM (Wang et al. 2004): on 0.2126 R + 0.7152 G + 0.0722 B of the stored values, Gaussian window
+// SSIM (Wang et al. 2004): on 0.2126 R + 0.7152 G + 0.0722 B of the encoded values, Gaussian window
 // of 11 x 11 px, sigma 1.5, K1 = 0.01, K2 = 0.03, range 1. Windows that leave the image are left
 // out.
 // M-dE94: mean CIE94 difference, graphic arts (kL = kC = kH = 1, K1 = 0.045, K2 = 0.015), D65 sRGB
@@ -36,8 +36,8 @@ struct PictureScores {
 // An edge pixel has at least half of the gradient that one pixel in a hundred of the reference
 // exceeds, and at least 2/255 per px (a fixed multiple of the noise of 8-bit values). If the other
 // image has no gradient at all at an edge pixel, an edge was lost and the pixel counts 0.
-PictureScores ComparePictures(const model::StoredValues& reference,
-                              const model::StoredValues& other, int border_px);
+ImageScores CompareImages(const model::EncodedValues& reference, const model::EncodedValues& other,
+                          int border_px);
 
 // CIE94 difference of two colours in L*, a*, b*; the first one is the reference.
 double DeltaE94(const Eigen::Vector3d& reference_lab, const Eigen::Vector3d& lab);
@@ -46,8 +46,8 @@ Eigen::Vector3d LabOf(const Eigen::Vector3d& srgb);
 
 struct ViewScores {
   int u = 0, v = 0;  // indices k, l
-  PictureScores scores;
-  std::optional<PictureScores> dibr;
+  ImageScores scores;
+  std::optional<ImageScores> dibr;
 };
 // Scores of all views, with means over groups of views. The mean of PSNRs is over the finite ones
 // (inf if there are none), so that views equal to the reference do not hide the others. With a
@@ -56,13 +56,13 @@ struct LightFieldScores {
   std::vector<ViewScores> views;  // views that are present in both light fields
   // Means over all views, over the views nearest to the middle (one for odd counts, two or four for
   // even counts), and over the views farthest from it (the four corners, unless they are missing).
-  PictureScores mean, centre, corner;
-  std::optional<PictureScores> dibr_mean, dibr_centre, dibr_corner;
+  ImageScores mean, centre, corner;
+  std::optional<ImageScores> dibr_mean, dibr_centre, dibr_corner;
 };
 
 // Input of the baseline, depth-image-based rendering (DIBR): a photograph and its disparity.
 struct DibrInput {
-  model::LinearPicture photograph;
+  model::LinearImage photograph;
   DisparityMap disparity;  // without holes
 };
 // Compares two light fields view by view, with values as the reference's transfer curve would store

@@ -21,7 +21,7 @@ struct InpaintOptions {
 
 struct InpaintSummary {
   std::string message = "not run";
-  std::size_t holes = 0;    // hidden rays: they show something that the centre view does not
+  std::size_t holes = 0;    // occluded rays: they show something that the centre view does not
   std::size_t filled = 0;   // holes that the method filled in their own view
   std::size_t carried = 0;  // holes filled from the view in which their point was filled
   int views_visited = 0;    // views that still had holes to fill
@@ -42,8 +42,8 @@ struct InpaintSummary {
 // border of the centre view are not holes, because they have no surroundings to continue from.
 // `map` belongs to the centre view and has no holes. Absent views are left out. Throws Error for
 // options and sizes that do not fit, and for an invalid light field.
-void InpaintHiddenRays(const DisparityMap& map, const InpaintOptions& options,
-                       model::LightField* light_field, InpaintSummary* summary);
+void InpaintOccludedRays(const DisparityMap& map, const InpaintOptions& options,
+                         model::LightField* light_field, InpaintSummary* summary);
 
 }  // namespace thicklens::estimator
 

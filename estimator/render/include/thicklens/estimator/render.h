@@ -23,32 +23,31 @@ namespace thicklens::estimator {
 // vector instructions; the numbers equal those of the kernels except for rounding. Throws Error for
 // an invalid light field, for weights that do not fit, and if all rays of a pixel are outside of
 // the aperture.
-model::LinearPicture Photograph(const model::LightField& light_field,
-                                const Eigen::ArrayXXd& weights, const model::Camera* falloff,
-                                const Vignetting* vignetting, kernels::Kernels<float>* kernels,
-                                int threads);
+model::LinearImage Photograph(const model::LightField& light_field, const Eigen::ArrayXXd& weights,
+                              const model::Camera* falloff, const Vignetting* vignetting,
+                              kernels::Kernels<float>* kernels, int threads);
 
 // Refocuses the photograph [D98]: shifts the views so that points of the given disparity (px per
 // view step) coincide, and averages them with `weights`. Interpolation is bicubic between samples.
 // Where the shift moves some views out of the image, the mean is over the others; where it moves
 // all of them out, the result is black. Throws Error for an invalid light field, for weights that
 // do not fit, and for a disparity that is not finite.
-model::LinearPicture Refocus(const model::LightField& light_field, double disparity_u_px,
-                             double disparity_v_px, const Eigen::ArrayXXd& weights, int threads);
+model::LinearImage Refocus(const model::LightField& light_field, double disparity_u_px,
+                           double disparity_v_px, const Eigen::ArrayXXd& weights, int threads);
 // Returns the disparity -m of the light field's grid at a depth from the aperture plane, for each
 // axis, in px per view step. Throws Error without a camera and at the depth of the UV plane.
 Eigen::Vector2d DisparityAtDepthPx(const model::LightField& light_field, double depth_mm);
 
 // Returns all views side by side, (0, 0) at the top left, with `gap_px` (>= 0) black pixels between
 // them. Throws Error for an invalid light field.
-model::LinearPicture Mosaic(const model::LightField& light_field, int gap_px);
+model::LinearImage Mosaic(const model::LightField& light_field, int gap_px);
 
 // Return epipolar-plane images: row t of all views of the view row l, one above the other, each
 // repeated to a height of `repeat_px` (>= 1); or column s of all views of the view column k, side
 // by side. They throw Error for an invalid light field or index.
-model::LinearPicture EpipolarRow(const model::LightField& light_field, int t, int l, int repeat_px);
-model::LinearPicture EpipolarColumn(const model::LightField& light_field, int s, int k,
-                                    int repeat_px);
+model::LinearImage EpipolarRow(const model::LightField& light_field, int t, int l, int repeat_px);
+model::LinearImage EpipolarColumn(const model::LightField& light_field, int s, int k,
+                                  int repeat_px);
 
 }  // namespace thicklens::estimator
 

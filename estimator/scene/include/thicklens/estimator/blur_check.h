@@ -51,7 +51,7 @@ struct BlurCheckOptions {
 
 struct BlurCheck {
   std::string message = "not run";
-  double noise_sigma = 0;      // of stored values, in the image that was checked
+  double noise_sigma = 0;      // of encoded values, in the image that was checked
   int blocks = 0;              // number of informative blocks
   int unexplained_blocks = 0;  // number of these that the given blur leaves unexplained
   std::vector<BlurTrial> trials;

@@ -23,18 +23,18 @@ namespace thicklens::estimator {
 using Confidence = std::uint8_t;
 constexpr Confidence kFilledIn = 0;
 
-// Returns the confidence of a point. `seen_share` is the share of the aperture by its weights, 0 to
-// 1; `blur_sigma_px` is the standard deviation of its blur.
-Confidence ConfidenceOfPoint(double seen_share, double blur_sigma_px);
+// Returns the confidence of a point. `visible_fraction` is the share of the aperture by its
+// weights, 0 to 1; `blur_sigma_px` is the standard deviation of its blur.
+Confidence ConfidenceOfPoint(double visible_fraction, double blur_sigma_px);
 // Returns the share to half a 126th; 0 for a ray that is filled in.
-double SeenShareOf(Confidence confidence);
+double VisibleFractionOf(Confidence confidence);
 bool IsResolved(Confidence confidence);
 
 // Shares of many rays, sum 1.
 struct ConfidenceShares {
-  double seen = 0;         // seen by more than 99 % of the aperture, and resolved
-  double partly_seen = 0;  // seen by less, and resolved
-  double blurred = 0;      // blurred too strongly for details
+  double visible = 0;         // seen by more than 99 % of the aperture, and resolved
+  double partly_visible = 0;  // seen by less, and resolved
+  double blurred = 0;         // blurred too strongly for details
   double filled_in = 0;
 };
 // Converts counts to shares. `counts`: the number of rays with each confidence. All shares are 0 if
@@ -47,8 +47,8 @@ ConfidenceShares SharesOf(const std::array<std::size_t, 256>& counts);
 // fit.
 std::vector<Confidence> PointConfidence(const EstimateInput& input, int threads);
 
-// Returns the confidence of the rays of one rendered view from that of the points. A mixed sample
-// has the confidence of the point at its middle.
+// Returns the confidence of the rays of one rendered view from that of the points. A boundary
+// sample has the confidence of the point at its middle.
 std::vector<Confidence> RayConfidence(const std::vector<Confidence>& of_points,
                                       const CompactView& view);
 

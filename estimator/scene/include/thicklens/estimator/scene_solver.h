@@ -44,10 +44,10 @@ struct SceneOptions {
   // Maximum number of conjugate-gradient iterations, for all solves of one strength together; >= 1.
   int max_iterations = 200;
   bool double_precision = false;
-  // Compare stored values, as the eye and the metrics do. False: the mean slope s is used
+  // Compare encoded values, as the eye and the metrics do. False: the mean slope s is used
   // everywhere.
   bool slope_weights = true;
-  bool hidden_weights =
+  bool disocclusion_weights =
       true;  // reduce the weight of pixels that show points hidden from the centre view
   // Interpolate bicubically between the pixels of a surface, far from its edges. False: linear, as
   // in EstimateFunctional.
@@ -69,7 +69,7 @@ struct SceneSummary {
   std::string message = "not run";
   Prior prior = Prior::kTotalVariation;
   double strength = 0;
-  double noise_sigma = 0;  // of stored values in [0, 1], as found in the photograph
+  double noise_sigma = 0;  // of encoded values in [0, 1], as found in the photograph
   int iterations = 0;      // conjugate-gradient iterations at full size, for all strengths together
   int reweightings = 0;    // of total variation: one per iteration, after the first few
   bool converged = false;  // whether the last system converged to the tolerance
@@ -77,8 +77,8 @@ struct SceneSummary {
   double relative_residual = 0;
   // The share of the photograph's pixels that have a row of their own in H (occlusions, steep
   // surfaces), and the share of the aperture's rays that show points hidden from the centre view.
-  double row_share = 0, hidden_share = 0;
-  // Rms over the photograph of (H r - I), in stored values; noise alone would give about
+  double row_share = 0, occluded_fraction = 0;
+  // Rms over the photograph of (H r - I), in encoded values; noise alone would give about
   // noise_sigma.
   double residual_rms = 0;
   double setup_seconds = 0, solve_seconds = 0, views_seconds = 0;
@@ -92,10 +92,10 @@ struct SceneSummary {
 
 // Maps of the estimate's quality. All have the size of the image except the last.
 struct SceneMaps {
-  model::LinearPicture radiance;    // radiance of the scene's points, as the centre view shows them
-  std::vector<float> residual;      // H r - I in stored values, the channels' mean
-  std::vector<float> hidden_share;  // share of the aperture that sees a pixel past an edge
-  std::vector<float> blur_sigma_px;  // blur of the photograph, by the depth
+  model::LinearImage radiance;  // radiance of the scene's points, as the centre view shows them
+  std::vector<float> residual;  // H r - I in encoded values, the channels' mean
+  std::vector<float> occluded_fraction;  // share of the aperture that sees a pixel past an edge
+  std::vector<float> blur_sigma_px;      // blur of the photograph, by the depth
   // Confidence of all rays, view by view, row by row; set only by EstimateScene.
   std::vector<Confidence> confidence;
 };
@@ -107,8 +107,8 @@ struct SceneMaps {
 //   sum_x W(x) |H r - I|^2 + prior,
 //
 // W = s^2/(1 + (20 h)^2), where s is the slope of the transfer curve at the smoothed intensity
-// (errors of stored values count) and h the share of the aperture that sees past an edge. H is that
-// of SceneProjection. Derived here [D101]. Priors:
+// (errors of encoded values count) and h the share of the aperture that sees past an edge. H is
+// that of SceneProjection. Derived here [D101]. Priors:
 //
 //   ridge      mu sum s^2 |r - I|^2
 //   gradient   eta sum s^2 |grad r|^2 + 1e-6 |r|^2
@@ -121,7 +121,7 @@ struct SceneMaps {
 //              patches that noise can make (see SolveWithPatches). The strength and kGcv refer to
 //              the tv.
 //
-// Strengths for a noise of sigma in stored values (at least that of the rounding of 8 bits):
+// Strengths for a noise of sigma in encoded values (at least that of the rounding of 8 bits):
 //
 //   kAuto      mu = 0.2 sigma^2/var(s (I - H I)), eta = 0.125 sigma^2/var(s grad I), both
 //              variances without their noise; lambda = 1e-3 (255 sigma)^1.5
@@ -143,7 +143,7 @@ model::LightField EstimateScene(const EstimateInput& input, const SceneOptions& 
 // the same time. May throw to stop.
 struct SceneViewSink {
   // `confidence` is empty unless wants_confidence is set.
-  std::function<void(int k, int l, const model::LinearPicture& view,
+  std::function<void(int k, int l, const model::LinearImage& view,
                      const std::vector<Confidence>& confidence)>
       take;
   double bytes = 0;  // memory that the sink needs per view while it processes it
@@ -154,11 +154,11 @@ model::LightField EstimateSceneViews(const EstimateInput& input, const SceneOpti
                                      const SceneViewSink& sink, SceneSummary* summary,
                                      SceneMaps* maps, kernels::Backend* backend = nullptr);
 
-// Returns the standard deviation of the noise of stored values in [0, 1], quantisation included
+// Returns the standard deviation of the noise of encoded values in [0, 1], quantisation included
 // [D97]. For each 16 x 16 block with a mean of 12/255 to 243/255 it takes the rms of (p00 - p10 -
 // p01 + p11)/2, and of these the 25th percentile. Absent if there is no such block.
-std::optional<double> StoredNoiseSigma(const model::LinearPicture& picture,
-                                       const model::TransferCurve& transfer);
+std::optional<double> EncodedNoiseSigma(const model::LinearImage& image,
+                                        const model::TransferCurve& transfer);
 
 }  // namespace thicklens::estimator
 

@@ -15,7 +15,7 @@ namespace thicklens::estimator {
 
 // The data that an estimate starts from. Valid inputs satisfy CheckInput (input_checks.h).
 struct EstimateInput {
-  model::LinearPicture picture;
+  model::LinearImage image;
   DisparityMap disparity;   // without holes, of the image's size
   Eigen::ArrayXXd weights;  // V x U, sum 1, >= 0
   model::TransferCurve transfer = model::TransferCurve::Srgb();
@@ -31,11 +31,11 @@ struct EstimateInput {
 };
 
 // Returns the radiance of a photograph: each pixel is divided by the value that the irradiance
-// fall-off of [S12] leaves of a uniform radiance 1 at that pixel (FalloffOfPicture). Throws Error
+// fall-off of [S12] leaves of a uniform radiance 1 at that pixel (FalloffOfImage). Throws Error
 // if the weights (V x U) do not fit the grid.
-model::LinearPicture WithoutFalloff(const model::LinearPicture& photograph,
-                                    const model::LightFieldGrid& grid, const model::Camera& camera,
-                                    const Eigen::ArrayXXd& weights, int threads);
+model::LinearImage WithoutFalloff(const model::LinearImage& photograph,
+                                  const model::LightFieldGrid& grid, const model::Camera& camera,
+                                  const Eigen::ArrayXXd& weights, int threads);
 
 // Returns the image warped to every view: the prior of the estimate and the baseline DIBR.
 // `falloff`: the fall-off is divided out of the image first if the input has a camera.

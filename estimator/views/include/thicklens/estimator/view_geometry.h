@@ -41,10 +41,10 @@ DisparityMap DisparityFromMap(const model::RawDepthMap& map, double scale, doubl
 // Returns the disparity on that grid of an infinitely far point, in the unit of DisparityOnGrid.
 double DisparityAtInfinity(const model::LightFieldGrid& grid);
 
-enum class Seen : std::uint8_t {
-  kSeen,    // the sample shows a point of the centre view
-  kHidden,  // no point of the centre view is visible here; disparity and source are of the
-            // background beside it
+enum class Visibility : std::uint8_t {
+  kVisible,   // the sample shows a point of the centre view
+  kOccluded,  // no point of the centre view is visible here; disparity and source are of the
+              // background beside it
 };
 
 // The content of a view: one disparity for each of its samples.
@@ -52,32 +52,32 @@ struct ViewDisparity {
   int width_px = 0;
   int height_px = 0;
   std::vector<float> disparity;  // in the unit of the DisparityMap
-  std::vector<Seen> seen;
+  std::vector<Visibility> visibility;
   // Displacement from the sample to its source in the centre view, px: its source is at sample +
-  // (source_x, source_y). For kSeen the displacement is disparity * (a step.x, b step.y). For
-  // kHidden it leads to the background: either the source of the sample that shows the background,
-  // or a pixel of the centre view. Rounding may place this position outside of the image;
-  // readers clamp it.
+  // (source_x, source_y). For kVisible the displacement is disparity * (a step.x, b step.y). For
+  // kOccluded it leads to the background: either the source of the sample that shows the
+  // background, or a pixel of the centre view. Rounding may place this position outside of the
+  // image; readers clamp it.
   std::vector<float> source_x, source_y;
   // Samples whose pixels two surfaces share, by index. The members above describe the surface at
   // the sample's middle.
-  std::vector<kernels::MixedSample> mixed;
+  std::vector<kernels::BoundarySample> boundary;
 };
 
 // A ViewDisparity in less memory (a third, where few samples are hidden or mixed). The displacement
 // to the source of a visible sample follows from its disparity.
 struct CompactView {
-  using Hidden = kernels::HiddenSample;
-  using Mixed = kernels::MixedSample;
+  using Occluded = kernels::OccludedSample;
+  using Boundary = kernels::BoundarySample;
   int width_px = 0;
   int height_px = 0;
-  Eigen::Vector2d shift{0, 0};   // px per unit of disparity
-  std::vector<float> disparity;  // NaN: hidden
-  std::vector<Hidden> hidden;    // sorted by index
-  std::vector<Mixed> mixed;      // sorted by index
+  Eigen::Vector2d shift{0, 0};     // px per unit of disparity
+  std::vector<float> disparity;    // NaN: hidden
+  std::vector<Occluded> occluded;  // sorted by index
+  std::vector<Boundary> boundary;  // sorted by index
 
   // Returns the entry of a sample that must be hidden.
-  const Hidden& HiddenAt(std::size_t index) const;
+  const Occluded& OccludedAt(std::size_t index) const;
 };
 
 // Sets `view`; its memory is reused where it is large enough.
@@ -103,9 +103,9 @@ void Expand(const CompactView& compact, ViewDisparity* view);
 // one) becomes its source; if there is none, the closest covered sample in any direction; if
 // nothing of the image is in the view, the centre view's own sample.
 //
-// Mixed samples. So far a sample shows the surface at its middle, but at the edge of a surface its
-// pixel shows two surfaces. With (x, y) the source of the sample on a surface of disparity D, that
-// surface covers this share of the pixel:
+// Boundary samples. So far a sample shows the surface at its middle, but at the edge of a surface
+// its pixel shows two surfaces. With (x, y) the source of the sample on a surface of disparity D,
+// that surface covers this share of the pixel:
 //
 //   sum over the four pixels q around (x, y) that are of the surface (|D_q - D| <= 0.3 px per view
 //   step) of (1 - |x - q_x|) (1 - |y - q_y|).
@@ -117,10 +117,10 @@ void Expand(const CompactView& compact, ViewDisparity* view);
 // is mixed with the background, by the remaining share. The background is what the first suitable
 // one of the eight samples around (sides before corners) shows that is farther. In this order: a
 // visible sample whose surface the centre view also has here; a visible sample, at its own source;
-// a hidden sample, by its displacement to a source if that also leads to its surface from here, and
-// at its own source if it does not. A hidden sample that shares its pixel with no nearer surface is
-// mixed with the visible share of its own surface. Of several shares the largest counts, and of
-// equal shares the nearer; shares less than 0.01 are ignored. Derived here [D91].
+// an occluded sample, by its displacement to a source if that also leads to its surface from here,
+// and at its own source if it does not. An occluded sample that shares its pixel with no nearer
+// surface is mixed with the visible share of its own surface. Of several shares the largest counts,
+// and of equal shares the nearer; shares less than 0.01 are ignored. Derived here [D91].
 ViewDisparity RenderDisparity(const DisparityMap& map, double a, double b);
 
 struct SupportedPixels;  // defined in hole_filler.h
@@ -148,22 +148,22 @@ class DisparityRenderer {
 // depth-image-based rendering, DIBR). A sample is bicubic (Catmull-Rom) where all 16 taps agree
 // with its disparity to 0.3 px per view step. Otherwise it is bilinear from the taps that agree,
 // renormalised. Hidden samples take the value of their background source. The share of the other
-// surface in mixed samples is bilinear. Throws Error if the sizes of image, map and view differ.
-model::LinearPicture WarpPicture(const model::LinearPicture& picture, const DisparityMap& map,
-                                 const ViewDisparity& view);
+// surface in boundary samples is bilinear. Throws Error if the sizes of image, map and view differ.
+model::LinearImage WarpImage(const model::LinearImage& image, const DisparityMap& map,
+                             const ViewDisparity& view);
 
-// WarpPicture for many views of one image: data that all views need is computed once. Several
+// WarpImage for many views of one image: data that all views need is computed once. Several
 // threads may warp at the same time.
-class PictureWarper {
+class ImageWarper {
  public:
   // The map is kept by reference and must outlive the warper; the image is copied. Throws Error if
   // the sizes of image and map differ.
-  PictureWarper(const model::LinearPicture& picture, const DisparityMap& map);
-  PictureWarper(const model::LinearPicture& picture, const DisparityMap&& map) = delete;
+  ImageWarper(const model::LinearImage& image, const DisparityMap& map);
+  ImageWarper(const model::LinearImage& image, const DisparityMap&& map) = delete;
 
-  model::LinearPicture Warp(const ViewDisparity& view) const;
+  model::LinearImage Warp(const ViewDisparity& view) const;
   // Warps into `warped`, whose memory is reused where it is large enough.
-  void Warp(const CompactView& view, model::LinearPicture* warped) const;
+  void Warp(const CompactView& view, model::LinearImage* warped) const;
 
  private:
   const DisparityMap& map_;

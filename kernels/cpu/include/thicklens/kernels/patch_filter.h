@@ -19,7 +19,7 @@ namespace thicklens::kernels {
 // above and below.
 template <typename Real>
 std::vector<Real> FilterPatches(int width_px, int height_px, int channels,
-                                const std::vector<Real>& picture, double threshold, int threads);
+                                const std::vector<Real>& image, double threshold, int threads);
 
 }  // namespace thicklens::kernels
 

@@ -6,14 +6,14 @@
 #include <memory>
 #include <vector>
 
-#include "thicklens/kernels/picture_filter.h"
+#include "thicklens/kernels/image_filter.h"
 
 namespace thicklens::kernels {
 
 // A linear map H between images of one size. Images are planar: one plane per channel, rows top to
 // bottom. The results are set, not added to.
 template <typename Real>
-struct PictureMap {
+struct ImageMap {
   std::function<void(const Real* x, int channels, Real* y)> apply;             // computes y = H x
   std::function<void(const Real* y, int channels, Real* x)> apply_transposed;  // computes x = H^T y
 };
@@ -24,11 +24,11 @@ struct PictureMap {
 template <typename Real>
 struct FilteredMap {
   struct Product {
-    const PixelFilter<Real>* across = nullptr;
-    const PixelFilter<Real>* down = nullptr;
+    const VaryingFilter<Real>* across = nullptr;
+    const VaryingFilter<Real>* down = nullptr;
   };
   std::vector<Product> products;  // none: every pixel has a row
-  const PixelRuns<Real>* rows = nullptr;
+  const PixelBlockedCsr<Real>* rows = nullptr;
 };
 
 // The data term that all systems of one photograph share: sum_x W(x) |H r - I|^2, with the same
@@ -36,12 +36,12 @@ struct FilteredMap {
 template <typename Real>
 struct DataTerm {
   int width_px = 0, height_px = 0, channels = 0;
-  PictureMap<Real> projection;    // the map H
-  FilteredMap<Real> filters;      // H as numbers; only for a device
-  std::vector<Real> photograph;   // photograph I, planar
-  std::vector<Real> weight;       // weight W, one plane
-  std::vector<Real> squared_row;  // sum_j H_ij^2 of each pixel i: small if the pixel is a mean of
-                                  // many
+  ImageMap<Real> projection;     // the map H
+  FilteredMap<Real> filters;     // H as numbers; only for a device
+  std::vector<Real> photograph;  // photograph I, planar
+  std::vector<Real> weight;      // weight W, one plane
+  std::vector<Real> row_norm2;   // sum_j H_ij^2 of each pixel i: small if the pixel is a mean of
+                                 // many
   int threads = 1;
 
   std::size_t pixels() const {
@@ -49,50 +49,50 @@ struct DataTerm {
   }
 };
 
-// A quadratic prior: sum_p smoothness(p) |grad r(p)|^2 + pull(p) |r(p) - target(p)|^2. The gradient
-// grad consists of the two forward differences; differences beyond the image are 0. All channels
-// have the same weights.
+// A quadratic prior: sum_p gradient_weight(p) |grad r(p)|^2 + tikhonov_weight(p) |r(p) -
+// target(p)|^2. The gradient grad consists of the two forward differences; differences beyond the
+// image are 0. All channels have the same weights.
 template <typename Real>
 struct QuadraticPrior {
-  std::vector<Real> smoothness;  // one plane; empty: 0
-  std::vector<Real> pull;        // one plane, > 0
+  std::vector<Real> gradient_weight;  // one plane; empty: 0
+  std::vector<Real> tikhonov_weight;  // one plane, > 0
   bool target_is_photograph = false;
   std::vector<Real> target = {};  // used unless target_is_photograph; planar, with the number of
                                   // channels of the solution; empty: 0
 };
 
-// The total variation prior: strength sum_p (g + eps^2)^(1/2) + pull |r|^2, where g is the sum over
-// channels and both differences of s^2 |dr|^2.
+// The total variation prior: strength sum_p (g + eps^2)^(1/2) + tikhonov_weight |r|^2, where g is
+// the sum over channels and both differences of s^2 |dr|^2.
 template <typename Real>
 struct TotalVariation {
   const std::vector<Real>* slope_squared = nullptr;  // s^2, one plane
-  double strength = 0, eps = 0, pull = 0;
+  double strength = 0, eps = 0, tikhonov_weight = 0;
 };
 
 struct ResidualSums {
   double squared = 0;         // value of |r|^2
   double preconditioned = 0;  // value of r . M^-1 r
-  double with_former = 0;     // value of r . M^-1 (previous r)
+  double with_previous = 0;   // value of r . M^-1 (previous r)
 };
 
 // The steps of conjugate gradients for (H^T W H + P) x = b [D106], where P is the matrix of the
-// prior, b = H^T W I + pull target, and M = diag(H^T W H) (approximately) + diag(P). The vectors
-// stay where they are computed. Sums are added in double (on a device without double, from sums in
-// float over some hundred pixels), in a fixed order. An object is used by one thread at a time.
-// Order of calls: a prior, Start, and for each step UpdateResidual, Turn, Curvature, Advance. A
-// prior may be set at any time and applies from the next UpdateResidual on. Throws Error for errors
-// of a device.
+// prior, b = H^T W I + tikhonov_weight target, and M = diag(H^T W H) (approximately) + diag(P). The
+// vectors stay where they are computed. Sums are added in double (on a device without double, from
+// sums in float over some hundred pixels), in a fixed order. An object is used by one thread at a
+// time. Order of calls: a prior, Start, and for each step UpdateResidual, UpdateDirection,
+// ApplyNormalOperator, UpdateSolution. A prior may be set at any time and applies from the next
+// UpdateResidual on. Throws Error for errors of a device.
 template <typename Real>
 class RadianceSteps {
  public:
   virtual ~RadianceSteps() = default;
 
   virtual void SetPrior(const QuadraticPrior<Real>& prior) = 0;
-  // Stores s^2 and the numbers. The prior does not change until TouchVariation.
+  // Stores s^2 and the numbers. The prior does not change until ReweightVariation.
   virtual void SetVariation(const TotalVariation<Real>& variation) = 0;
   // Sets the prior to the quadratic that touches the total variation from above at x [D105]:
   // strength/2 g/(g(x) + eps^2)^(1/2) up to a constant.
-  virtual void TouchVariation() = 0;
+  virtual void ReweightVariation() = 0;
 
   // Sets x, for all channels of the photograph, and discards previous directions.
   virtual void Start(const std::vector<Real>& x) = 0;
@@ -100,10 +100,10 @@ class RadianceSteps {
   virtual void StartFor(const std::vector<Real>& photograph, const std::vector<Real>& x) = 0;
   virtual double SquaredRightSide() = 0;  // returns |b|^2
 
-  virtual ResidualSums UpdateResidual() = 0;  // r = b - (H^T W H + P) x
-  virtual double Turn(double beta) = 0;       // p = M^-1 r + beta p; returns p . r
-  virtual double Curvature() = 0;             // returns p . (H^T W H + P) p
-  virtual void Advance(double step) = 0;      // x += step p
+  virtual ResidualSums UpdateResidual() = 0;        // r = b - (H^T W H + P) x
+  virtual double UpdateDirection(double beta) = 0;  // p = M^-1 r + beta p; returns p . r
+  virtual double ApplyNormalOperator() = 0;         // returns p . (H^T W H + P) p
+  virtual void UpdateSolution(double step) = 0;     // x += step p
 
   virtual std::vector<Real> Radiance() = 0;  // returns x
 
@@ -115,7 +115,7 @@ class RadianceSteps {
 // Returns the C++ implementation for the processor, which is the specification. `data` is kept by
 // reference. The result does not depend on the number of threads.
 template <typename Real>
-std::unique_ptr<RadianceSteps<Real>> NewNativeSteps(const DataTerm<Real>& data);
+std::unique_ptr<RadianceSteps<Real>> NewCpuRadianceSteps(const DataTerm<Real>& data);
 
 }  // namespace thicklens::kernels
 

@@ -25,7 +25,7 @@ class RowWarper {
 
   // Copies the values of the image and keeps its disparities by reference. The counts of both must
   // fit the sizes. Throws Interrupted after a cancellation.
-  explicit RowWarper(const SurfacePicture& picture);
+  explicit RowWarper(const SurfaceImage& image);
 
   // Sets the values of row y of a view, the channels of a sample together. Sample x has the
   // disparity disparity[x] and is read at the displacement (source_x[x], source_y[x]), px.
@@ -33,7 +33,7 @@ class RowWarper {
             Places* places, float* warped) const;
 
   // Replaces the share of the other place in the values of a view.
-  void Mix(const std::vector<MixedSample>& mixed, float* warped) const;
+  void Mix(const std::vector<BoundarySample>& mixed, float* warped) const;
 
  private:
   struct Range {

@@ -16,8 +16,8 @@ namespace thicklens::kernels {
 // The device that the user requests for the kernels.
 struct DeviceRequest {
   enum class Kind {
-    kAuto,    // the best OpenCL device that works, or the C++ twin if none works
-    kCpu,     // the C++ twin; OpenCL is not used
+    kAuto,    // the best OpenCL device that works, or the C++ reference if none works
+    kCpu,     // the C++ reference; OpenCL is not used
     kOpenCl,  // OpenCL or an error
   };
   Kind kind = Kind::kAuto;
@@ -58,7 +58,7 @@ struct DeviceSurvey {
 // result is kept.
 const DeviceSurvey& SurveyDevices(bool again = false, const std::function<void()>& stop = {});
 
-// A place where kernels are computed: a device with its compiled program, or the C++ twin.
+// A place where kernels are computed: a device with its compiled program, or the C++ reference.
 class Backend {
  public:
   virtual ~Backend() = default;
@@ -72,20 +72,20 @@ class Backend {
   virtual std::unique_ptr<RadianceSteps<float>> NewSteps(const DataTerm<float>& data) = 0;
   virtual std::unique_ptr<RadianceSteps<double>> NewSteps(const DataTerm<double>& data) = 0;
   // Keeps the data of the image by reference.
-  virtual std::unique_ptr<ViewWarp> NewWarp(const SurfacePicture& picture) = 0;
+  virtual std::unique_ptr<ViewWarp> NewWarp(const SurfaceImage& image) = 0;
 };
 
-// Opens the requested device. kAuto falls back to the twin and writes the reason to `notice` (one
-// line; may be null). kOpenCl throws Error with every problem found and, if a program does not
+// Opens the requested device. kAuto falls back to the reference and writes the reason to `notice`
+// (one line; may be null). kOpenCl throws Error with every problem found and, if a program does not
 // build, the build log. A device is tried in a child process with a small kernel before this
 // process uses it (in this process if it already uses another device). The function must be called
 // before anything else in the process uses OpenCL. `stop` is that of SurveyDevices.
 std::shared_ptr<Backend> OpenBackend(const DeviceRequest& request, std::string* notice,
                                      const std::function<void()>& stop = {});
 
-// Maximum relative differences between a backend and the twin over all kernels, for a small problem
-// with odd sizes, empty rows and borders.
-struct AgreementCheck {
+// Maximum relative differences between a backend and the reference over all kernels, for a small
+// problem with odd sizes, empty rows and borders.
+struct BackendSelfTest {
   double float_limit = 1e-4;
   double double_limit = 1e-10;
   double float_error = 0;
@@ -93,7 +93,7 @@ struct AgreementCheck {
   bool agrees = false;      // both errors are within their limits
   std::string worst;        // kernel with the largest difference; empty if there is none
 };
-AgreementCheck CheckAgreement(Backend* backend);
+BackendSelfTest RunBackendSelfTest(Backend* backend);
 
 }  // namespace thicklens::kernels
 

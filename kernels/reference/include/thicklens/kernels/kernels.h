@@ -48,10 +48,10 @@ inline int RaySlots(const BlockGeometry& block, Splat splat) {
   return block.views() * (splat == Splat::kNearest ? 1 : 4);
 }
 
-// The computations of the estimator that a device can do. FindRays to FormPicture are pure
+// The computations of the estimator that a device can do. FindRays to FormImage are pure
 // functions of their arguments; StartWhole, AddBlock and FinishWhole accumulate a light field. The
-// plain C++ twin (NewReference) is the specification; the results of a device differ from it only
-// by rounding. An object is used by one thread at a time; Clone makes one for another thread.
+// plain C++ reference (NewReference) is the specification; the results of a device differ from it
+// only by rounding. An object is used by one thread at a time; Clone makes one for another thread.
 // Throws Error for arguments whose sizes do not fit, and for errors of the device.
 template <typename Real>
 class Kernels {
@@ -69,9 +69,9 @@ class Kernels {
   // of the splat. Rows are divided by their sums (W = 1/(H0 1), for the samples that exist; a row
   // of sum 0 remains 0) and then multiplied by `irradiance` (one number per ray of the block;
   // empty: 1).
-  virtual EllMatrix<Real> WeighRays(const BlockGeometry& block, Splat splat,
-                                    const std::vector<std::int32_t>& rays,
-                                    const std::vector<Real>& irradiance) = 0;
+  virtual EllMatrix<Real> WeightRays(const BlockGeometry& block, Splat splat,
+                                     const std::vector<std::int32_t>& rays,
+                                     const std::vector<Real>& irradiance) = 0;
 
   // The derivation mask of each ray in the warp form [M18], [D111]: (D L)(i, k) = L(i + m, k + 1) -
   // L(i, k), with m in samples per view step and linear interpolation between samples. There are
@@ -105,10 +105,10 @@ class Kernels {
 
   // Returns the image of a light field of one channel. `views` has sample (s, t) of view (k, l) at
   // (l * u_count + k) * t_count * s_count + t * s_count + s. Every pixel of the block `whole`
-  // (usually the whole image) is the sum with the weights of WeighRays without irradiance. The
+  // (usually the whole image) is the sum with the weights of WeightRays without irradiance. The
   // pixels are at y * width_px + x.
-  virtual std::vector<Real> FormPicture(const BlockGeometry& whole, Splat splat,
-                                        const std::vector<Real>& views) = 0;
+  virtual std::vector<Real> FormImage(const BlockGeometry& whole, Splat splat,
+                                      const std::vector<Real>& views) = 0;
 
   // Starts a whole light field to which blocks are added; it is kept in the memory of the device.
   virtual void StartWhole(int s_count, int t_count, int u_count, int v_count, int channels) = 0;

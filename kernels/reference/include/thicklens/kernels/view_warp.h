@@ -9,7 +9,7 @@ namespace thicklens::kernels {
 
 // An image of surfaces. Pixels whose disparities differ by at most `tolerance` (in the unit of the
 // disparity) belong to one surface. The vectors are not owned.
-struct SurfacePicture {
+struct SurfaceImage {
   int width_px = 0, height_px = 0, channels = 0;
   const std::vector<float>* values = nullptr;     // row by row, the channels of a pixel together
   const std::vector<float>* disparity = nullptr;  // one per pixel, finite
@@ -17,7 +17,7 @@ struct SurfacePicture {
 };
 
 // A sample of a view that does not show the point at its disparity.
-struct HiddenSample {
+struct OccludedSample {
   std::int32_t index = 0;            // at y width + x
   float source_x = 0, source_y = 0;  // displacement to the pixel that is read instead, px
   float disparity = 0;               // disparity of the pixel that is read instead
@@ -26,11 +26,11 @@ struct HiddenSample {
 // A sample whose pixel two surfaces share. It is (1 - share) of its unmixed value plus `share` of
 // the value at another place. The latter is the mean of those of the four surrounding pixels that
 // belong to the surface there.
-struct MixedSample {
+struct BoundarySample {
   std::int32_t index = 0;
-  HiddenSample other;  // displacement and disparity of the other place; its index is that of the
-                       // sample whose displacement is used
-  float share = 0;     // 0 to 1
+  OccludedSample other;  // displacement and disparity of the other place; its index is that of the
+                         // sample whose displacement is used
+  float share = 0;       // 0 to 1
 };
 
 // The positions at which the samples of a view read the image, clamped to it. They follow from the
@@ -39,9 +39,9 @@ struct ViewSources {
   // One per sample, as many as the image has pixels. Sample (x, y) of disparity d reads at (x +
   // shift_x d, y + shift_y d), on the surface of d. NaN: the sample is one of `hidden`.
   const std::vector<float>* disparity = nullptr;
-  double shift_x = 0, shift_y = 0;                    // px per unit of disparity
-  const std::vector<HiddenSample>* hidden = nullptr;  // the samples that are NaN, each once
-  const std::vector<MixedSample>* mixed = nullptr;    // ascending index, each once; null: none
+  double shift_x = 0, shift_y = 0;                        // px per unit of disparity
+  const std::vector<OccludedSample>* occluded = nullptr;  // the samples that are NaN, each once
+  const std::vector<BoundarySample>* boundary = nullptr;  // ascending index, each once; null: none
 };
 
 // Reads one image for many views. The interpolation is bicubic (Catmull-Rom, the borders repeated)
@@ -51,14 +51,14 @@ struct ViewSources {
 class ViewWarp {
  public:
   virtual ~ViewWarp() = default;
-  // Sets `values` in the order of SurfacePicture and resizes them. Throws Error for sizes and
+  // Sets `values` in the order of SurfaceImage and resizes them. Throws Error for sizes and
   // indices that do not fit, and for errors of a device.
   virtual void Warp(const ViewSources& view, std::vector<float>* values) = 0;
 };
 
 // Returns the plain C++ implementation, which is the specification for devices. Keeps the data of
 // the image by reference. Throws Error for sizes that do not fit.
-std::unique_ptr<ViewWarp> NewReferenceWarp(const SurfacePicture& picture);
+std::unique_ptr<ViewWarp> NewReferenceWarp(const SurfaceImage& image);
 
 }  // namespace thicklens::kernels
 

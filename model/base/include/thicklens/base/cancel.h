@@ -24,8 +24,8 @@
 //   factorization of one block by SuiteSparse or Eigen (EstimateByBlocks: 1 s was measured for
 //   blocks of the usual size; it grows with the power 1.5 to 2 of the number of unknowns), the
 //   dense decompositions of ConditioningOfBlock (2.4 s), the blur, transformation or registration
-//   of one image by OpenCV, cv::inpaint (InpaintHiddenRays; minutes where most of a large image is
-//   hidden), and an OpenCL driver that compiles or computes (seconds).
+//   of one image by OpenCV, cv::inpaint (InpaintOccludedRays; minutes where most of a large image
+//   is hidden), and an OpenCL driver that compiles or computes (seconds).
 // A program that must end immediately removes its unfinished outputs by AbandonOutputs
 // (thicklens/base/temporaries.h) and ends its process.
 namespace thicklens {

@@ -39,7 +39,7 @@ using InputWatch = std::function<void(const std::string& path)>;
 // Sets the InputWatch. Must not be called while another thread reads.
 void WatchInputs(InputWatch watch);
 // Calls the InputWatch. Readers of files that name other files call this function.
-void TellInput(const std::string& path);
+void ReportInput(const std::string& path);
 
 }  // namespace thicklens
 

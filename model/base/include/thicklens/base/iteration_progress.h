@@ -15,7 +15,7 @@ class IterationProgress {
   IterationProgress(const std::function<void(int done, int total)>& report, int total)
       : report_(report), total_(total) {}
 
-  void Tell() { Advance(0); }
+  void Report() { Advance(0); }
   void Count() { Advance(1); }
   void CountUpTo(int limit) { Advance(done_ < limit ? 1 : 0); }  // for a single counting thread
   void SkipTo(int done) { Advance(std::max(0, done - done_)); }

@@ -29,9 +29,9 @@ struct EffectConditions {
   // Planes of the light field from which the image is made; absent: UV is the aperture plane.
   std::optional<LightFieldPlanes> planes;
   double wavelength_mm = 550e-6;
-  int bits = 8;                         // bits per value of the stored image
-  double stored_noise_grey_levels = 0;  // sd of the noise that is added to stored values
-  double full_well_electrons = 0;       // at full scale; 0: no noise in electrons is known
+  int bits = 8;                          // bits per value of the encoded image
+  double encoded_noise_grey_levels = 0;  // sd of the noise that is added to encoded values
+  double full_well_electrons = 0;        // at full scale; 0: no noise in electrons is known
   double read_noise_electrons = 0;
   std::optional<BenchConditions> bench;  // absent: a single image
 
@@ -42,7 +42,7 @@ struct EffectConditions {
 
 // A place of a scene and the radiance around it. The default is an edge between black and white
 // across the image, without another surface near or behind it.
-struct EffectPlace {
+struct EffectSite {
   Eigen::Vector2d position_px{0, 0};  // position in the image
   double depth_mm = 0;                // depth from Ap; may be +inf
   // Depth from Ap of the surface whose 1/z differs most, among all surfaces that blur spreads to
@@ -61,7 +61,7 @@ struct EffectPlace {
 // Change of the image by one effect at one place.
 struct EffectImpact {
   double amount = 0;  // in the unit of the effect (EffectFacts::unit)
-  // Bound of the change of stored values, 255 at full scale; the standard deviation for random
+  // Bound of the change of encoded values, 255 at full scale; the standard deviation for random
   // effects. It holds wherever the radiance is as the place states.
   double grey_levels = 0;
   // The part of `grey_levels` that `amount` does not cover: for effects in px, their change of the
@@ -72,27 +72,27 @@ struct EffectImpact {
 // Impact of the effect at a place on an image that also has the effects `others`. Effects of a
 // bench do not change a single image. The derivation of each bound is at its function in
 // effects_of_*.cc. Throws Error if the conditions are not valid.
-EffectImpact ImpactAt(Effect effect, const EffectConditions& conditions, const EffectPlace& place,
+EffectImpact ImpactAt(Effect effect, const EffectConditions& conditions, const EffectSite& place,
                       const EffectSet& others);
 
 // The place where an effect has its largest impact, and that impact.
-struct EffectFinding {
+struct LargestEffectImpact {
   Effect effect = Effect::kThickness;
   EffectImpact impact;
-  EffectPlace place;
+  EffectSite place;
 };
 // One finding for each of `effects`, in their order, in an image with all the other `effects`.
 // Throws Error if the conditions are not valid or there is no place. `threads`: 0 means one per
 // core.
-std::vector<EffectFinding> FindImpacts(const EffectConditions& conditions,
-                                       const std::vector<EffectPlace>& places,
-                                       const EffectSet& effects, int threads = 1);
+std::vector<LargestEffectImpact> FindImpacts(const EffectConditions& conditions,
+                                             const std::vector<EffectSite>& places,
+                                             const EffectSet& effects, int threads = 1);
 
 // Black and white edges in the middle and in the farthest corner of the image, at depths from Ap
 // that are equally spaced in 1/z. With `occlusion` there are also edges at near_mm in front of
 // far_mm. Throws Error unless 0 < near_mm <= far_mm and near_mm is finite.
-std::vector<EffectPlace> PlacesBetween(const Camera& camera, double near_mm, double far_mm,
-                                       bool occlusion);
+std::vector<EffectSite> PlacesBetween(const Camera& camera, double near_mm, double far_mm,
+                                      bool occlusion);
 
 }  // namespace thicklens::model
 

@@ -37,7 +37,7 @@ enum class Effect {
 enum class EffectUnit {
   kPx,          // px of the sensor: a displacement, or the sigma of a blur per axis
   kRelative,    // relative change of the irradiance
-  kGreyLevels,  // grey levels of stored values, 255 at full scale
+  kGreyLevels,  // grey levels of encoded values, 255 at full scale
   kMm,          // millimetres of depth
 };
 std::string EffectUnitName(EffectUnit unit);  // "px", "relative", "grey-levels", "mm"

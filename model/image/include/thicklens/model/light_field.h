@@ -26,7 +26,7 @@ struct LightFieldOrigin {
   std::vector<std::string> effects;
   std::string version, date;
   std::string prior;  // prior of the scene's radiance: "ridge", "gradient", "tv", "patches"
-  // Strength of that prior; noise of the stored values of the photograph.
+  // Strength of that prior; noise of the encoded values of the photograph.
   std::optional<double> strength, noise_sigma;
   std::optional<int> iterations;
 };
@@ -90,10 +90,10 @@ LightField DescriptionOf(const LightField& light_field);
 
 // Copy of one view as an image of S x T px, channels interleaved. Throws Error if the view does not
 // exist.
-LinearPicture ViewPicture(const LightField& light_field, int k, int l);
+LinearImage ViewImage(const LightField& light_field, int k, int l);
 // Replaces one view and marks it as present. Throws Error if the view does not exist or the size or
 // the channels of the image differ.
-void SetView(LightField* light_field, int k, int l, const LinearPicture& picture);
+void SetView(LightField* light_field, int k, int l, const LinearImage& image);
 
 // The central u x v views, with weights scaled to the sum 1. Throws Error unless each count is from
 // 1 to the present one and of the same parity (otherwise the middle would move), and unless the
@@ -108,8 +108,8 @@ struct PixelRect {
 // camera and the origin of the grid move with the rectangle. Each function throws Error if `rect`
 // is empty or not inside.
 LightField CropViews(const LightField& light_field, const PixelRect& rect);
-LinearPicture CropPicture(const LinearPicture& picture, const PixelRect& rect);
-StoredPicture CropPicture(const StoredPicture& picture, const PixelRect& rect);
+LinearImage CropImage(const LinearImage& image, const PixelRect& rect);
+EncodedImage CropImage(const EncodedImage& image, const PixelRect& rect);
 RawDepthMap CropDepth(const RawDepthMap& map, const PixelRect& rect);
 // Copy of the camera whose sensor is only the rectangle `rect` of the sensor. Throws Error if
 // `rect` is empty or not inside the sensor.

@@ -32,7 +32,7 @@ ProjectionCoefficients ProjectionOf(const ThickLens& lens, double image_distance
 
 // Landing point of the ray on the sensor, mm from the optical axis: [S16], [M13]. The orientation
 // is that of the scene. The optical image is inverted, so that a positive coordinate is left of or
-// above the principal point in the stored image.
+// above the principal point in the encoded image.
 Eigen::Vector2d LandingPointMm(const ThickLens& lens, double image_distance_mm,
                                const LightFieldPlanes& planes, const Ray& ray);
 
@@ -50,7 +50,7 @@ Eigen::Vector2d ApertureCrossingMm(const LightFieldPlanes& planes, const Ray& ra
 Eigen::Vector2d PositionAtDepthMm(const LightFieldPlanes& planes, const Ray& ray, double depth_mm);
 
 // Position of a landing point in the image, px [D11]: x = cx - i_x/p, y = cy - i_y/p.
-Eigen::Vector2d PicturePositionPx(const Sensor& sensor, const Eigen::Vector2d& landing_mm);
+Eigen::Vector2d ImagePositionPx(const Sensor& sensor, const Eigen::Vector2d& landing_mm);
 
 // cos(alpha) = 1/sqrt(1 + ((u - s)^2 + (v - t)^2)/d0^2), where alpha is the angle between the ray
 // in the scene and the axis: [S8] in a form that is finite at zl = 0.

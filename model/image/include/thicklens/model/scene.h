@@ -12,7 +12,7 @@ namespace thicklens::model {
 
 // An image as a file stores it: integer values, rows from top to bottom, channels interleaved
 // (RGB).
-struct StoredPicture {
+struct EncodedImage {
   int width_px = 0;
   int height_px = 0;
   int channels = 0;
@@ -22,8 +22,8 @@ struct StoredPicture {
   double full_scale() const { return bits == 8 ? 255.0 : 65535.0; }
 };
 
-// An image in linear light, 1 at full scale; the order of the values is that of StoredPicture.
-struct LinearPicture {
+// An image in linear light, 1 at full scale; the order of the values is that of EncodedImage.
+struct LinearImage {
   int width_px = 0;
   int height_px = 0;
   int channels = 0;
@@ -37,20 +37,20 @@ struct LinearPicture {
   }
 };
 
-// Decodes the stored values. Throws Error if `bits` is not 8 or 16, the number of values does not
+// Decodes the encoded values. Throws Error if `bits` is not 8 or 16, the number of values does not
 // fit the size, or a value is above full scale.
-LinearPicture ToLinear(const StoredPicture& picture, const TransferCurve& transfer);
+LinearImage ToLinear(const EncodedImage& image, const TransferCurve& transfer);
 // Encodes, rounds and clips the values; NaN becomes 0. Throws Error if `bits` is not 8 or 16 or the
 // number of values does not fit the size.
-StoredPicture ToStored(const LinearPicture& picture, const TransferCurve& transfer, int bits);
-// ToStored with normal noise, which is added to the encoded values before they are rounded. `sigma`
-// is its standard deviation in units of full scale; 0 gives ToStored. The seed alone determines the
-// noise. Throws Error also unless sigma is finite and >= 0.
-StoredPicture ToStoredWithNoise(const LinearPicture& picture, const TransferCurve& transfer,
-                                int bits, double sigma, std::uint64_t seed);
+EncodedImage ToEncoded(const LinearImage& image, const TransferCurve& transfer, int bits);
+// ToEncoded with normal noise, which is added to the encoded values before they are rounded.
+// `sigma` is its standard deviation in units of full scale; 0 gives ToEncoded. The seed alone
+// determines the noise. Throws Error also unless sigma is finite and >= 0.
+EncodedImage ToEncodedWithNoise(const LinearImage& image, const TransferCurve& transfer, int bits,
+                                double sigma, std::uint64_t seed);
 // Grey image 0.2126 R + 0.7152 G + 0.0722 B of three channels. One channel is returned unchanged;
 // the last of four channels (alpha) is ignored. Throws Error for other numbers of channels.
-LinearPicture ToGrey(const LinearPicture& picture);
+LinearImage ToGrey(const LinearImage& image);
 
 // Meaning of the numbers of a depth map. The user states it; it is never guessed.
 enum class DepthKind {
@@ -89,7 +89,7 @@ struct DepthStatistics {
 
 // An image in linear light with the depth of the surface that the chief ray of each pixel meets.
 struct Scene {
-  LinearPicture picture;
+  LinearImage image;
   std::vector<float> depth_mm;  // z from Ap, one value per pixel of the image; NaN marks a hole
   DepthStatistics depth;
 };
@@ -103,7 +103,7 @@ struct Scene {
 // than its front focal point, or with a unit that is wrong by a factor of 1000); the latter message
 // states the minimum, median and maximum in mm. Throws Error also if the convention is invalid or
 // the camera lacks the calibration that range and disparity need.
-Scene MakeScene(const Camera& camera, LinearPicture picture, const RawDepthMap& map,
+Scene MakeScene(const Camera& camera, LinearImage image, const RawDepthMap& map,
                 const DepthConvention& convention, const std::string& depth_name);
 
 }  // namespace thicklens::model

@@ -8,18 +8,18 @@
 
 namespace thicklens::model {
 
-// Stored values of an image in [0, 1], on which image metrics are computed. Channels are
+// Encoded values of an image in [0, 1], on which image metrics are computed. Channels are
 // interleaved.
-struct StoredValues {
+struct EncodedValues {
   int width_px = 0;
   int height_px = 0;
   int channels = 0;  // 1 (grey) or 3 (sRGB)
   std::vector<float> values;
 };
-// Divides the stored values by full scale and leaves alpha out.
-StoredValues StoredValuesOf(const StoredPicture& picture);
+// Divides the encoded values by full scale and leaves alpha out.
+EncodedValues EncodedValuesOf(const EncodedImage& image);
 // Encodes by the transfer curve and clips to [0, 1], without rounding.
-StoredValues StoredValuesOf(const LinearPicture& picture, const TransferCurve& transfer);
+EncodedValues EncodedValuesOf(const LinearImage& image, const TransferCurve& transfer);
 
 }  // namespace thicklens::model
 

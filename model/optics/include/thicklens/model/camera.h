@@ -42,7 +42,7 @@ struct Estimate {
 };
 
 // Reliability of a number that was typed in rather than measured.
-struct Statement {
+struct Provenance {
   double tolerance = 0;  // in the unit of the number; 0: no tolerance is stated
   bool assumed = false;  // true: an assumption, neither published by the maker nor measured
 };
@@ -93,7 +93,7 @@ struct Camera {
   Psf psf = Psf::kGaussian;
   // The key is the path of the field in the file, e.g. "lens.aperture_radius_mm"; an element of a
   // list is "sensor.principal_point_px[0]". Only fields with a statement are present.
-  std::map<std::string, Statement> statements;
+  std::map<std::string, Provenance> statements;
   std::optional<CameraCalibration> calibration;
   // Remarks on how the camera was read, one sentence each. They are not written to files.
   std::vector<std::string> notices;
@@ -119,7 +119,7 @@ std::vector<std::string> AssumedFields(const Camera& camera);
 // Copy of the camera with the thin lens of focal length f1, focused on the same plane. Its image
 // distance is f1 zf/(zf - f1), and every ray has the same landing point as before. Throws Error if
 // the image distance is absent.
-Camera ThinTwin(const Camera& camera);
+Camera ThinLensEquivalent(const Camera& camera);
 
 }  // namespace thicklens::model
 

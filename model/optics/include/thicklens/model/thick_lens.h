@@ -25,7 +25,7 @@ struct ThickLens {
 
 // The thin lens for comparison: f1 = f2 = the front focal length of `lens`, rho = 0, the same
 // aperture.
-ThickLens ThinCounterpart(const ThickLens& lens);
+ThickLens ThinLensEquivalent(const ThickLens& lens);
 
 // Image distance d1 = rho + f2 zf/(zf - f1), mm, for the plane of focus zf, mm. From [S13]:
 // 1 = f2/D + f1/zf. Throws Error unless zf > f1 (a nearer object has no real image). zf = +inf

@@ -20,7 +20,7 @@ class TransferCurve {
   static TransferCurve FromName(const std::string& name);
   std::string Name() const;
 
-  // Encode gives the stored value, Decode is its inverse. The curve is IEC 61966-2-1 for srgb and
+  // Encode gives the encoded value, Decode is its inverse. The curve is IEC 61966-2-1 for srgb and
   // stored = light^(1/gamma) for gamma. Outside [0, 1] the curves srgb and gamma are continued as
   // odd functions, so that noise around 0 keeps its mean.
   double Encode(double light) const;

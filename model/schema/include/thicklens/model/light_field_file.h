@@ -11,7 +11,7 @@ namespace thicklens::model {
 // without its values. The camera has a file of its own in the same folder.
 struct LightFieldDescription {
   LightField light_field;       // without values and without `camera`
-  std::string view_format;      // "png" (16 bit, stored values) or "tiff" (float, linear light)
+  std::string view_format;      // "png" (16 bit, encoded values) or "tiff" (float, linear light)
   bool has_confidence = false;  // true: each ray has a confidence in confidence/view_VV_UU.png
   std::string camera_file;      // path relative to the description; empty: no camera
 };

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "thicklens/model/camera.h"
-#include "thicklens/model/effect_choice.h"
+#include "thicklens/model/effect_selection.h"
 
 namespace thicklens::model {
 
@@ -105,7 +105,7 @@ struct SweepTruth {
     double blur_sigma_px = 0;
   };
   std::vector<Frame> frames;
-  EffectRecord effects;  // written, but not read
+  EffectSelectionRecord effects;  // written, but not read
 };
 // Throws Error with file:line:column for invalid content.
 SweepTruth ReadSweepTruth(const std::string& path);

@@ -10,16 +10,16 @@ namespace thicklens::io {
 
 // Decodes the image in the bytes of a file, exactly as stored: 8 or 16 bit; 1, 3 (RGB) or 4 (RGBA)
 // channels; never rotated. Throws Error that begins with `name`.
-cv::Mat DecodePicture(const std::string& bytes, const std::string& name);
-cv::Mat ReadPictureFile(const std::string& path);
+cv::Mat DecodeImage(const std::string& bytes, const std::string& name);
+cv::Mat ReadImageFile(const std::string& path);
 
-model::StoredPicture ToStoredPicture(const cv::Mat& picture);
+model::EncodedImage ToEncodedImage(const cv::Mat& image);
 // Returns the first three of four channels, and other images unchanged: alpha contains no light.
-model::StoredPicture WithoutAlpha(const model::StoredPicture& picture);
+model::EncodedImage WithoutAlpha(const model::EncodedImage& image);
 
 // Encodes a PNG file of 1, 3 or 4 channels, 8 or 16 bit. The compression is light: a stronger one
 // takes much longer and hardly makes the noise of a photograph smaller.
-std::string EncodePng(const model::StoredPicture& picture);
+std::string EncodePng(const model::EncodedImage& image);
 // Encodes bytes unchanged in one channel. Throws Error if they are not rows of that width.
 std::string EncodeBytesPng(const std::vector<std::uint8_t>& bytes, int width_px);
 

@@ -11,7 +11,7 @@
 
 #include "thicklens/base/output_file.h"
 #include "thicklens/model/light_field.h"
-#include "thicklens/model/stored_levels.h"
+#include "thicklens/model/quantised_levels.h"
 
 namespace thicklens::io {
 
@@ -46,7 +46,7 @@ class LightFieldWriter {
   // `folder` is not owned and must outlive the writer; the caller commits it.
   LightFieldWriter(const model::TransferCurve& transfer, ViewFormat format, OutputFolder* folder);
 
-  void WriteView(int k, int l, const model::LinearPicture& view);
+  void WriteView(int k, int l, const model::LinearImage& view);
   // Writes one byte for each ray, row by row (docs/file-formats.md). Call it for all views or for
   // none.
   void WriteConfidence(int k, int l, const std::vector<std::uint8_t>& confidence, int width_px);
@@ -62,7 +62,7 @@ class LightFieldWriter {
 
  private:
   const model::TransferCurve transfer_;
-  std::optional<model::StoredLevels> levels_;  // levels of PNG files
+  std::optional<model::QuantisedLevels> levels_;  // levels of PNG files
   const ViewFormat format_;
   OutputFolder* folder_;
   std::mutex mutex_;
@@ -91,7 +91,7 @@ OutputFolder ClaimHciFolder(const std::string& path);
 
 // Counts the values that a file of 8 or 16 bits cannot hold: those more than half a level below 0
 // or above full scale, and NaN.
-std::size_t CountClipped(const model::LinearPicture& picture, const model::TransferCurve& transfer,
+std::size_t CountClipped(const model::LinearImage& image, const model::TransferCurve& transfer,
                          int bits);
 
 }  // namespace thicklens::io

@@ -9,14 +9,14 @@
 namespace thicklens::io {
 
 // Reads the user's own image in linear light; empty for other targets. Throws Error.
-model::LinearPicture ReadTargetPicture(const model::TargetOptions& target);
+model::LinearImage ReadTargetImage(const model::TargetOptions& target);
 
 // Describes the sweep as a user at the bench would; paths are relative to the sweep's folder.
 model::SweepFile DescribeSweep(const model::SweepSimulationOptions& simulation,
                                const model::SweepSimulator& simulator, bool unknown_offset);
 
 // Returns an image as it would be read from its file.
-cv::Mat AsFile(const model::StoredPicture& picture);
+cv::Mat AsFile(const model::EncodedImage& image);
 
 }  // namespace thicklens::io
 

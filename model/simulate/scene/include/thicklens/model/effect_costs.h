@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "thicklens/model/effect_choice.h"
+#include "thicklens/model/effect_selection.h"
 #include "thicklens/model/explanation.h"
 #include "thicklens/model/scene_simulator.h"
 
@@ -26,7 +26,8 @@ struct EffectCosts {
 // and the bits are used, not the camera, layers and effects. `tell` is called before each
 // simulation and may throw to stop. Throws Error for a camera or depths that cannot be simulated.
 EffectCosts MeasureEffectCosts(const Camera& camera, const DepthRange& range,
-                               const SceneSimulationOptions& sensor, const EffectDecision& decision,
+                               const SceneSimulationOptions& sensor,
+                               const EffectSelection& decision,
                                const std::function<void(int done, int total)>& tell);
 
 }  // namespace thicklens::model

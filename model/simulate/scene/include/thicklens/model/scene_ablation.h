@@ -30,15 +30,15 @@ struct SceneAblation {
   EffectSet on;  // effects of the scene that is the reference
   int u_count = 0, v_count = 0;
   double light_field_psnr_db = 0;
-  double picture_seconds = 0, estimate_seconds = 0;
+  double image_seconds = 0, estimate_seconds = 0;
   double sampling_error_grey_levels = 0;  // rms, where it is largest
   std::vector<AblatedSceneEffect> effects;
-  StoredPicture picture;
+  EncodedImage image;
 };
 
 // What an estimate starts from, and the true views at the places of its grid.
 struct SceneToEstimate {
-  const StoredPicture& photograph;
+  const EncodedImage& photograph;
   const Camera& camera;
   const RawDepthMap& depth;
   const LightField& truth;

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "thicklens/model/camera.h"
-#include "thicklens/model/effect_choice.h"
+#include "thicklens/model/effect_selection.h"
 #include "thicklens/model/light_field.h"
 #include "thicklens/model/scene.h"
 
@@ -33,13 +33,13 @@ enum class TextureKind {
                   // bright
   kDeadLeaves,    // discs of many sizes that occlude each other, each with its own colour
   kNoise,         // the amplitude decreases as 1/frequency
-  kPicture,       // an image of the user
+  kImage,         // an image of the user
 };
 std::string TextureKindName(TextureKind kind);  // "uniform", "sine", "checkerboard", ...
 
 struct TextureOptions {
   TextureKind kind = TextureKind::kDeadLeaves;
-  // Mean radiance, RGB in linear light, 1 at full scale. An image (kPicture) keeps its own colours.
+  // Mean radiance, RGB in linear light, 1 at full scale. An image (kImage) keeps its own colours.
   Eigen::Vector3d colour{0.5, 0.5, 0.5};
   // Value of (bright - dark)/(bright + dark) for a sine, an edge, squares and sectors. Leaves have
   // every radiance between the two. Noise has the relative standard deviation contrast/2.
@@ -50,7 +50,7 @@ struct TextureOptions {
   // Size of the detail, in px of the simulated image at the layer's depth on the axis: radius of
   // the smallest leaf, shortest period of noise, period of a sine, sigma of an edge, side of a
   // square, width of a star's sector (at half the shorter side of the visible part from its middle)
-  // or width of the whole image (kPicture). The value 0 selects 2 px (leaf), 4 px (noise), 8 px
+  // or width of the whole image (kImage). The value 0 selects 2 px (leaf), 4 px (noise), 8 px
   // (sine), the sharpest possible edge, 12 px (square), 36 bright sectors, or the width that covers
   // the visible part.
   double feature_size_px = 0;
@@ -58,7 +58,7 @@ struct TextureOptions {
   // positive downward. The middle of an edge, a star or an image is that of the outline or, without
   // an outline, of the visible part.
   double angle_deg = 0;
-  std::string picture_path;  // path of the image (kPicture), for messages
+  std::string image_path;  // path of the image (kImage), for messages
 };
 
 // A plane z = depth_mm + slope . (X, Y), where X (right) and Y (down) are positions from the
@@ -72,7 +72,7 @@ struct PlaneOptions {
 // A surface of any shape instead of a plane: 1/z = W(x'), where x' is the image position at which
 // the chief ray shows it. W comes from a depth map of the scene's size; it is bilinear between
 // pixel centres and constant beyond the outermost ones. The texture is painted on x': by default an
-// image (kPicture) with the map's aspect ratio has its pixels at those of the map. Across a depth
+// image (kImage) with the map's aspect ratio has its pixels at those of the map. Across a depth
 // edge the surface and its texture are stretched from one pixel to the next.
 struct DepthMapOptions {
   std::string map_path;        // for messages
@@ -116,20 +116,20 @@ struct SceneLayer {
 
 // Contents of the files that a layer names. A field is empty if the layer names no such file.
 struct LayerPixels {
-  LinearPicture texture;  // kPicture, in linear light
-  LinearPicture mask;     // kMask: one channel of stored values, 1 at full scale
-  RawDepthMap depth;      // depth map of SceneLayer::depth
+  LinearImage texture;  // kImage, in linear light
+  LinearImage mask;     // kMask: one channel of encoded values, 1 at full scale
+  RawDepthMap depth;    // depth map of SceneLayer::depth
 };
 
 // Returns the effects that an image of a scene can have.
-EffectSet PictureEffects();
+EffectSet ImageEffects();
 
 struct SceneSimulationOptions {
   // Image size, pitch and lens. The calibration gives d1, kappa and the lens floor (0 if absent).
   Camera camera;
   std::vector<SceneLayer> layers;  // in any order: each ray shows the nearest layer
-  EffectChoice effects;            // a choice of the effects PictureEffects()
-  // Allowed rms error of the stored values because of the finite number of rays, in 1/255 of full
+  EffectSelectionOptions effects;  // a choice of the effects ImageEffects()
+  // Allowed rms error of the encoded values because of the finite number of rays, in 1/255 of full
   // scale. 0: all pixels get rays_per_pixel rays.
   double sampling_error_grey_levels = 0.2;
   int rays_per_pixel = 600;  // maximum number
@@ -137,7 +137,7 @@ struct SceneSimulationOptions {
   // Sensor noise: electrons at full scale (0: no shot noise) and standard deviation of the read
   // noise.
   double full_well_electrons = 0, read_noise_electrons = 0;
-  // Standard deviation of the noise of the stored values, in 1/255 of full scale at 8 and 16 bits.
+  // Standard deviation of the noise of the encoded values, in 1/255 of full scale at 8 and 16 bits.
   double noise_sigma_grey_levels = 0;
   int bits = 8;                  // 8 or 16
   int u_count = 5, v_count = 5;  // numbers of views of the true light field
@@ -159,7 +159,7 @@ struct SceneTruth {
   double blur_floor_px = 0;
   double nearest_depth_mm = 0, farthest_depth_mm = 0;  // minimum and maximum of the depth map
   double largest_blur_sigma_px = 0;  // maximum of defocus alone, over the depth map
-  EffectRecord effects;
+  EffectSelectionRecord effects;
   double sampling_error_grey_levels = 0;  // rms, of the pixels where it is largest
   std::uint64_t seed = 0;
 };
@@ -203,11 +203,11 @@ class SceneSimulator {
   SceneSimulator(const SceneSimulator&) = delete;
   SceneSimulator& operator=(const SceneSimulator&) = delete;
 
-  const EffectDecision& effects() const;      // effects of the photograph
+  const EffectSelection& effects() const;     // effects of the photograph
   const EffectSet& effects_of_views() const;  // the chosen ones of pixel box, lens floor and
                                               // diffraction
-  // Rms error of the stored values of the photograph because of the finite number of rays, where it
-  // is largest, in 1/255 of full scale.
+  // Rms error of the encoded values of the photograph because of the finite number of rays, where
+  // it is largest, in 1/255 of full scale.
   double sampling_error_grey_levels() const;
   // Mean number of rays per pixel of the photograph, which determines the cost.
   double mean_rays_per_pixel() const;
@@ -217,10 +217,10 @@ class SceneSimulator {
 
   // Returns linear light before noise and quantisation. The radiance 1 gives 1 at the principal
   // point.
-  LinearPicture RenderNoiseless(const SceneRun& run) const;
-  // Returns the stored values of the camera: noise, transfer curve, rounding and clipping are
+  LinearImage RenderNoiseless(const SceneRun& run) const;
+  // Returns the encoded values of the camera: noise, transfer curve, rounding and clipping are
   // applied.
-  StoredPicture Store(const LinearPicture& noiseless) const;
+  EncodedImage Store(const LinearImage& noiseless) const;
 
   // Returns the depth z, in mm, of the point that the chief ray of each pixel's centre meets.
   RawDepthMap RenderDepth() const;
@@ -229,7 +229,7 @@ class SceneSimulator {
   // Returns the radiance seen from one aperture position, mm, with effects_of_views() and with
   // neither defocus nor fall-off. Throws Error if the position is on either axis more than 6
   // standard deviations (kappa r) from the middle.
-  LinearPicture RenderView(const Eigen::Vector2d& aperture_mm, const SceneRun& run) const;
+  LinearImage RenderView(const Eigen::Vector2d& aperture_mm, const SceneRun& run) const;
   // Returns such views on GridOnPlanes, with the UV plane of the options. If UV is not the
   // aperture, a view is seen from a point of UV, and its rays cross the aperture at different
   // places. Throws Error if one of them crosses farther than 4 standard deviations (kappa r per

@@ -31,7 +31,7 @@ struct SweepAblation {
   int frames = 0;
   double true_image_distance_mm = 0, true_blur_ratio = 0;
   CalibratedValues calibration;
-  double picture_seconds = 0, calibration_seconds = 0;
+  double image_seconds = 0, calibration_seconds = 0;
   std::vector<AblatedSweepEffect> effects;
 };
 
@@ -39,7 +39,7 @@ struct SweepAblation {
 struct SweepToCalibrate {
   const SweepSimulationOptions& options;
   const SweepSimulator& simulator;
-  std::function<StoredPicture(int frame)> stored_frame;
+  std::function<EncodedImage(int frame)> stored_frame;
   std::function<void()> tell;  // to be called often; may throw to stop
 };
 struct SweepCalibration {
@@ -52,7 +52,7 @@ using CalibrateSweep = std::function<SweepCalibration(const SweepToCalibrate&)>;
 
 // The reference is as for AblateScene. Throws Error as SweepSimulator does, and if the sweep with
 // all effects has no calibration.
-SweepAblation AblateSweep(const SweepSimulationOptions& sweep, const LinearPicture& target_picture,
+SweepAblation AblateSweep(const SweepSimulationOptions& sweep, const LinearImage& target_image,
                           const CalibrateSweep& calibrate, const AblationRun& run);
 
 }  // namespace thicklens::model

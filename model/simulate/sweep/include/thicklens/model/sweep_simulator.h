@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "thicklens/model/camera.h"
-#include "thicklens/model/effect_choice.h"
+#include "thicklens/model/effect_selection.h"
 #include "thicklens/model/pupil_law.h"
 #include "thicklens/model/scene.h"
 #include "thicklens/model/sweep_file.h"
@@ -22,7 +22,7 @@ enum class TargetKind {
   kWhiteNoise,
   kCheckerboard,
   kSiemensStar,
-  kPicture,      // an image of the user
+  kImage,        // an image of the user
   kPrintedEdge,  // a slanted edge blurred by its ink: a Gaussian of ink_sigma_mm on the target
   kKnifeEdge,    // a slanted sharp edge
 };
@@ -30,14 +30,14 @@ std::string TargetKindName(TargetKind kind);  // "dead-leaves", "pink-noise", ..
 
 struct TargetOptions {
   TargetKind kind = TargetKind::kDeadLeaves;
-  std::string picture_path;  // path of the image (kPicture), for messages and the record
+  std::string image_path;  // path of the image (kImage), for messages and the record
   // Value of (bright - dark)/(bright + dark) for two-valued targets. Leaves have every grey between
-  // the two. Noise has the relative standard deviation contrast/2. An image (kPicture) keeps its
+  // the two. Noise has the relative standard deviation contrast/2. An image (kImage) keeps its
   // own contrast.
   double contrast = 0.6;
   // Size of the detail on the target: radius of the smallest leaf, shortest period of the noise,
   // side of a square, width of a star's sector (at half the field's shorter side from its centre)
-  // or width of the whole image (kPicture). The value 0 selects it from the field of view: 2 px, 2
+  // or width of the whole image (kImage). The value 0 selects it from the field of view: 2 px, 2
   // px, 24 px, 36 cycles, or the width that the frames see.
   double feature_size_mm = 0;
   // Angle of an edge from the vertical; positive: the upper end leans right. The bright side is on
@@ -72,7 +72,7 @@ struct SweepSimulationOptions {
   // otherwise.
   std::optional<PupilLaw> pupil_law;
   // A choice of SweepEffects(); kAuto selects all of them.
-  EffectChoice effects;
+  EffectSelectionOptions effects;
   std::uint64_t seed = 1;
 
   bool IsValid(std::string* why) const;
@@ -93,9 +93,9 @@ SweepSimulationOptions ReadSweepSimulation(const std::string& path);
 // a tilted target is at its own depth, within about 0.01 px of its blur and position.
 class SweepSimulator {
  public:
-  // `target_picture` is linear light; only kPicture uses it. Throws Error if the options are not
+  // `target_image` is linear light; only kImage uses it. Throws Error if the options are not
   // valid.
-  SweepSimulator(const SweepSimulationOptions& options, const LinearPicture& target_picture);
+  SweepSimulator(const SweepSimulationOptions& options, const LinearImage& target_image);
   ~SweepSimulator();
   SweepSimulator(const SweepSimulator&) = delete;
   SweepSimulator& operator=(const SweepSimulator&) = delete;
@@ -103,14 +103,14 @@ class SweepSimulator {
   // Returns linear light before noise and quantisation, 1 at full scale, not clipped. Thread safe:
   // the same index gives the same bits in any order and on any thread. Throws Error if the frame
   // does not exist.
-  LinearPicture RenderNoiseless(int frame_index) const;
-  // Returns the stored values of the camera: noise, transfer curve, rounding and clipping are
+  LinearImage RenderNoiseless(int frame_index) const;
+  // Returns the encoded values of the camera: noise, transfer curve, rounding and clipping are
   // applied. Thread safe; throws Error if the frame does not exist.
-  StoredPicture RenderFrame(int frame_index) const;
+  EncodedImage RenderFrame(int frame_index) const;
 
   const SweepTruth& truth() const;
-  const EffectDecision& effects() const;
-  // The camera of the options with which the stored values must be interpreted. Its transfer curve
+  const EffectSelection& effects() const;
+  // The camera of the options with which the encoded values must be interpreted. Its transfer curve
   // is linear if that effect is off, and its PSF is Gaussian if the effect aperture shape is off.
   const Camera& camera() const;
 

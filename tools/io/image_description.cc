@@ -1,0 +1,45 @@
+#include "thicklens/io/image_description.h"
+
+#include <fmt/format.h>
+
+#include <exiv2/exiv2.hpp>
+
+#include "thicklens/base/error.h"
+
+namespace thicklens::io {
+namespace {
+
+Exiv2::Image::AutoPtr Opened(const std::string& png) {
+  auto image =
+      Exiv2::ImageFactory::open(reinterpret_cast<const Exiv2::byte*>(png.data()),  // NOLINT: bytes
+                                static_cast<long>(png.size()));
+  image->readMetadata();
+  return image;
+}
+
+}  // namespace
+
+std::string WithDescription(const std::string& png, const std::string& text) {
+  try {
+    const auto image = Opened(png);
+    image->setComment(text);
+    image->writeMetadata();
+    Exiv2::BasicIo& file = image->io();
+    file.open();
+    const Exiv2::DataBuf bytes = file.read(static_cast<long>(file.size()));
+    return {reinterpret_cast<const char*>(bytes.pData_),  // NOLINT: bytes
+            static_cast<std::size_t>(bytes.size_)};
+  } catch (const Exiv2::AnyError& error) {
+    throw Error(fmt::format("the description of a PNG file: {}", error.what()));
+  }
+}
+
+std::string DescriptionOf(const std::string& png, const std::string& name) {
+  try {
+    return Opened(png)->comment();
+  } catch (const Exiv2::AnyError& error) {
+    throw Error(fmt::format("{}: {}", name, error.what()));
+  }
+}
+
+}  // namespace thicklens::io

@@ -1,0 +1,198 @@
+#include "tools/report/calibration_text.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdlib>
+
+#include "tools/report/rounding.h"
+
+namespace thicklens::tools {
+namespace {
+
+using model::Estimate;
+
+// Further from zero than its error explains.
+bool IsSeen(const Estimate& estimate) { return std::abs(estimate.value) > 2 * estimate.sigma; }
+
+std::string Signed(const Estimate& estimate, const std::string& unit) {
+  return SignedWithError(estimate.value, estimate.sigma, unit);
+}
+
+std::string TiltLine(const Estimate& tilt, const char* axis, const char* positive,
+                     const char* negative) {
+  return fmt::format("tilt about the {} axis {} ({})", axis, Signed(tilt, "deg"),
+                     !IsSeen(tilt)    ? "none beyond its error"
+                     : tilt.value > 0 ? positive
+                                      : negative);
+}
+
+std::string ClusterLine(const std::vector<calib::DepthCluster>& clusters) {
+  std::vector<std::string> depths;
+  depths.reserve(clusters.size());
+  for (const calib::DepthCluster& cluster : clusters)
+    depths.push_back(
+        fmt::format("{} ({} tile{})",
+                    WithError(cluster.focus_depth_mm.value, cluster.focus_depth_mm.sigma, "mm"),
+                    cluster.tiles, cluster.tiles == 1 ? "" : "s"));
+  return fmt::format("parts of the field come into focus at {} different readings: zf = {}",
+                     clusters.size(), fmt::join(depths, ", "));
+}
+
+}  // namespace
+
+std::string ScaleKindName(calib::ScaleKind kind) {
+  switch (kind) {
+    case calib::ScaleKind::kInverseDepth:
+      return "inverse-depth";
+    case calib::ScaleKind::kConstant:
+      return "constant";
+    case calib::ScaleKind::kReversed:
+      return "reversed";
+    case calib::ScaleKind::kUnknown:
+      break;
+  }
+  return "unknown";
+}
+
+std::string ScaleKindWords(calib::ScaleKind kind) {
+  switch (kind) {
+    case calib::ScaleKind::kInverseDepth:
+      return "as 1/z: a camera whose pupil stands still";
+    case calib::ScaleKind::kConstant:
+      return "constant: the lens is telecentric, the sensor moves, the frames were aligned, or one "
+             "image was repeated";
+    case calib::ScaleKind::kReversed:
+      return "as 1/z with the readings the other way: check the direction of the scale, and "
+             "whether "
+             "the target moved and not the lens";
+    case calib::ScaleKind::kUnknown:
+      break;
+  }
+  return "unknown";
+}
+
+std::vector<std::string> FieldLines(const calib::FieldMap& field) {
+  std::vector<std::string> lines;
+  if (!field.done) return lines;
+  if (field.tilt_right_deg)
+    lines.push_back(TiltLine(*field.tilt_right_deg, "vertical", "the target's right side is nearer",
+                             "the target's left side is nearer"));
+  if (field.tilt_down_deg)
+    lines.push_back(TiltLine(*field.tilt_down_deg, "horizontal", "the target's bottom is nearer",
+                             "the target's top is nearer"));
+  if (field.curvature_mm)
+    lines.push_back(fmt::format("curvature {} from the centre to the outermost part",
+                                Signed(*field.curvature_mm, "mm")));
+  if (field.astigmatism_mm)
+    lines.push_back(fmt::format("astigmatism {}, horizontal blur against vertical",
+                                Signed(*field.astigmatism_mm, "mm")));
+  if (field.clusters.size() > 1) lines.push_back(ClusterLine(field.clusters));
+  return lines;
+}
+
+std::string ChannelLine(const std::vector<calib::ChannelFocus>& channels) {
+  std::vector<std::string> parts;
+  for (const calib::ChannelFocus& channel : channels)
+    parts.push_back(channel.done ? fmt::format("{} {}", channel.name,
+                                               WithError(channel.focus_depth_mm.value,
+                                                         channel.focus_depth_mm.sigma, "mm"))
+                                 : fmt::format("{} none ({})", channel.name, channel.message));
+  return fmt::format("{}", fmt::join(parts, ", "));
+}
+
+// The sides share no frame, so their errors are independent but for the bench zero, which moves
+// both alike: the hypotenuse is the upper bound.
+std::optional<Estimate> SidesApartMm(const calib::Calibration& calibration) {
+  const calib::SideFit& nearer = calibration.nearer;
+  const calib::SideFit& farther = calibration.farther;
+  if (!nearer.done || !farther.done) return std::nullopt;
+  return Estimate{farther.focus_depth_mm.value - nearer.focus_depth_mm.value,
+                  std::hypot(nearer.focus_depth_mm.sigma, farther.focus_depth_mm.sigma)};
+}
+
+std::string SidesLine(const calib::Calibration& calibration) {
+  const auto side = [](const char* name, const calib::SideFit& fit) {
+    return fit.done
+               ? fmt::format("{} side zf {}", name,
+                             WithError(fit.focus_depth_mm.value, fit.focus_depth_mm.sigma, "mm"))
+               : fmt::format("{} side none, {}", name, fit.message);
+  };
+  std::string line = side("near", calibration.nearer) + "; " + side("far", calibration.farther);
+  if (const auto apart = SidesApartMm(calibration))
+    line += fmt::format("; apart {}", Signed(*apart, "mm"));
+  return line;
+}
+
+std::string ShapeLine(const calib::FocusSweep& sweep, const calib::BlurFit& blur) {
+  if (!blur.done || !blur.gaussian_misfit || !blur.disc_misfit) return "";
+  const bool disc = blur.better_psf == model::Psf::kDisc;
+  std::string line =
+      fmt::format("a {} describes the frames better than a {} (chi2/dof {:.3g} against {:.3g})",
+                  disc ? "disc" : "Gaussian", disc ? "Gaussian" : "disc",
+                  disc ? *blur.disc_misfit : *blur.gaussian_misfit,
+                  disc ? *blur.gaussian_misfit : *blur.disc_misfit);
+  if (blur.better_psf != sweep.camera.psf)
+    line += fmt::format("; the camera file says {}", model::PsfName(sweep.camera.psf));
+  return line;
+}
+
+std::string MagnificationLine(const calib::Calibration& calibration) {
+  if (!calibration.magnification) return "";
+  const calib::MagnificationCheck& check = *calibration.magnification;
+  const Estimate& d1 = check.image_distance_mm;
+  std::string line =
+      fmt::format("the target's period of {:.6g} mm is {:.5g} px in the image: d1 = {}",
+                  check.period_mm, check.period_px, WithError(d1.value, d1.sigma, "mm"));
+  if (calibration.image_distance_mm && std::isfinite(calibration.image_distance_mm->value)) {
+    const double apart = d1.value / calibration.image_distance_mm->value - 1;
+    line += fmt::format(", {:+.2f} % from that of focus", 100 * apart);
+  }
+  return line;
+}
+
+std::string DistortionLine(const calib::ScaleModel& scale) {
+  if (!scale.distortion_at_corner) return "";
+  const Estimate percent{100 * scale.distortion_at_corner->value,
+                         100 * scale.distortion_at_corner->sigma};
+  return fmt::format("radial distortion {} of the image height at the corner ({})",
+                     Signed(percent, "%"),
+                     !IsSeen(percent)    ? "none beyond its error"
+                     : percent.value > 0 ? "pincushion"
+                                         : "barrel");
+}
+
+std::string OutsideLine(const calib::BlurFit& blur) {
+  if (!(blur.outside_mm > 0)) return "";
+  return fmt::format("the focus lies {:.2g} mm outside the sweep and is extrapolated",
+                     blur.outside_mm);
+}
+
+std::string WorstKnownLine(const calib::BlurFit& blur) {
+  constexpr double kWorthReporting = 0.5;
+  if (blur.weak_direction.empty() || std::abs(blur.weak_correlation) < kWorthReporting) return "";
+  return "known worst: " + blur.weak_direction;
+}
+
+std::string WidenedLine(const calib::BlurFit& blur) {
+  constexpr double kWorthReporting = 2;
+  // Chance alone reaches this with few frames, and the fit widens nothing for chance.
+  constexpr double kBeyondChance = 3.5;
+  constexpr int kManyFrames = 20;
+  if (!blur.done || !(blur.chi2_per_dof > kWorthReporting)) return "";
+  const bool widened = blur.chi2_per_dof > kBeyondChance || blur.frames_used >= kManyFrames;
+  return fmt::format("the frames lie farther off the law than their errors (chi2/dof {:.3g}){}",
+                     blur.chi2_per_dof, widened ? "; the errors were widened for it" : "");
+}
+
+std::string PartRange(const Eigen::Vector2d& range) {
+  if (!range.allFinite()) return "-";
+  const double largest = range.cwiseAbs().maxCoeff();
+  if (!(largest > 5e-6)) return "0";  // nothing that any of the units could show
+  return fmt::format("{} .. {}", SignedRoundedTo(range.x(), largest),
+                     SignedRoundedTo(range.y(), largest));
+}
+
+}  // namespace thicklens::tools

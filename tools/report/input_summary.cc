@@ -1,0 +1,132 @@
+#include "tools/report/input_summary.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <iterator>
+#include <optional>
+#include <set>
+#include <utility>
+
+#include "thicklens/base/error.h"
+#include "thicklens/base/printable_text.h"
+#include "thicklens/calib/calibrate.h"
+
+namespace thicklens::tools {
+namespace {
+
+// Depths of the nearest and the farthest frame, where the offset is known.
+std::optional<std::pair<double, double>> DepthRangeMm(const SweepInput& input,
+                                                      const Understanding& found) {
+  if (!input.sweep.offset_mm) return std::nullopt;
+  const double sign = model::DirectionSign(input.sweep.direction);
+  return std::minmax(input.sweep.offset_mm->value + sign * found.min_reading_mm,
+                     input.sweep.offset_mm->value + sign * found.max_reading_mm);
+}
+
+std::string EstimateText(const std::optional<model::Estimate>& estimate, const char* unit) {
+  if (!estimate) return "unknown";
+  if (!(estimate->sigma > 0)) return fmt::format("{:.6g} {}", estimate->value, unit);
+  return fmt::format("{:.6g} +- {:.2g} {}", estimate->value, estimate->sigma, unit);
+}
+
+std::string FloorText(const model::FloorKnowledge& floor) {
+  if (floor.from_px) return fmt::format("{:.4g} to {:.4g} px", *floor.from_px, *floor.to_px);
+  return EstimateText(floor.given_px, "px");
+}
+
+std::string CameraText(const model::Camera& camera) {
+  const model::ThickLens& lens = camera.lens;
+  return fmt::format(
+      "camera     {}: f1 {:.6g} mm, f2 {:.6g} mm, thickness {:.6g} mm, aperture radius {:.6g} mm\n"
+      "           {} x {} px of {:.6g} mm, principal point ({:.6g}, {:.6g}) px, {}, PSF {}\n",
+      PrintableUtf8(camera.name), lens.front_focal_length_mm, lens.rear_focal_length_mm,
+      lens.lens_thickness_mm, lens.aperture_radius_mm, camera.sensor.width_px,
+      camera.sensor.height_px, camera.sensor.pixel_pitch_mm, camera.sensor.principal_point_px.x(),
+      camera.sensor.principal_point_px.y(), camera.sensor.transfer.Name(),
+      model::PsfName(camera.psf));
+}
+
+std::string BenchText(const SweepInput& input, const Understanding& found) {
+  const auto depths = DepthRangeMm(input, found);
+  return fmt::format(
+      "readings   {:.6g} to {:.6g} mm, {} distinct, step {:.4g} mm (median), sigma {:.3g} mm\n"
+      "bench      direction {}, offset {}\n"
+      "depths     {}\n",
+      found.min_reading_mm, found.max_reading_mm, found.distinct_readings, found.median_step_mm,
+      input.sweep.reading_sigma_mm, model::BenchDirectionName(input.sweep.direction),
+      EstimateText(input.sweep.offset_mm, "mm"),
+      depths ? fmt::format("{:.6g} to {:.6g} mm from the aperture", depths->first, depths->second)
+             : "follow from the offset, which is to be found from the image scale");
+}
+
+}  // namespace
+
+Understanding Understand(const SweepInput& input) {
+  std::string why;
+  if (!input.sweep.IsValid(&why)) throw Error(fmt::format("{}: {}", input.file.source, why));
+  if (!calib::HasEnoughFrames(input.sweep, &why))
+    throw Error(fmt::format("{}: {}", input.file.source, why));
+  const cv::Mat first = input.sweep.read_frame(0);
+  calib::LinearGrey(first, input.sweep, 0);
+  std::set<double> readings;
+  for (const model::SweepFrame& frame : input.sweep.frames) readings.insert(frame.reading_mm);
+  std::multiset<double> steps;
+  for (auto reading = std::next(readings.begin()); reading != readings.end(); ++reading)
+    steps.insert(*reading - *std::prev(reading));
+  return {
+      first.size(),       first.depth() == CV_8U ? 8 : 16,
+      first.channels(),   *readings.begin(),
+      *readings.rbegin(), *std::next(steps.begin(), static_cast<std::ptrdiff_t>(steps.size() / 2)),
+      readings.size()};
+}
+
+std::string UnderstandingText(const SweepInput& input, const Understanding& found,
+                              const std::string& method, const std::string& outputs) {
+  const model::RegionOfInterest& roi = input.sweep.roi;
+  return fmt::format(
+      "frames     {}, the first {} x {} px, {} bit, {} channel{}\n{}{}"
+      "region     {}\n"
+      "target     {}, blur floor {}\n"
+      "method     {}\n"
+      "output     {}\n"
+      "dry run: nothing was measured\n",
+      input.sweep.frames.size(), found.frame_size_px.width, found.frame_size_px.height,
+      found.frame_bits, found.frame_channels, found.frame_channels == 1 ? "" : "s",
+      BenchText(input, found), CameraText(input.sweep.camera),
+      roi.width > 0 ? fmt::format("{} x {} px from ({}, {})", roi.width, roi.height, roi.x, roi.y)
+                    : "the whole field",
+      model::SweepTargetName(input.sweep.target), FloorText(input.sweep.floor), method, outputs);
+}
+
+nlohmann::json UnderstandingJson(const SweepInput& input, const Understanding& found,
+                                 const std::string& method) {
+  nlohmann::json json = {{"status", "ok"},
+                         {"reason", ""},
+                         {"dry_run", true},
+                         {"method", method},
+                         {"camera", input.sweep.camera.name},
+                         {"frames", input.sweep.frames.size()},
+                         {"width_px", found.frame_size_px.width},
+                         {"height_px", found.frame_size_px.height},
+                         {"bits", found.frame_bits},
+                         {"channels", found.frame_channels},
+                         {"min_reading_mm", found.min_reading_mm},
+                         {"max_reading_mm", found.max_reading_mm},
+                         {"median_step_mm", found.median_step_mm},
+                         {"distinct_readings", found.distinct_readings},
+                         {"reading_sigma_mm", input.sweep.reading_sigma_mm},
+                         {"direction", model::BenchDirectionName(input.sweep.direction)},
+                         {"target", model::SweepTargetName(input.sweep.target)},
+                         {"offset_mm", nullptr},
+                         {"depth_range_mm", nullptr}};
+  if (input.sweep.offset_mm) {
+    json["offset_mm"] = {{"value", input.sweep.offset_mm->value},
+                         {"sigma", input.sweep.offset_mm->sigma}};
+  }
+  if (const auto depths = DepthRangeMm(input, found))
+    json["depth_range_mm"] = {depths->first, depths->second};
+  return json;
+}
+
+}  // namespace thicklens::tools

@@ -1,0 +1,300 @@
+// What is hard about calibrating: sweeps that are short, one-sided, damaged or wrongly described.
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tools/stress/stress_suite.h"
+#include "tools/stress/stress_sweeps.h"
+
+namespace thicklens::tools {
+namespace {
+
+namespace fs = std::filesystem;
+using Frames = std::vector<model::EncodedImage>;
+
+// What d1 may be off by: two thirds of what a depth of field of half a pixel leaves open, .4 mm.
+constexpr double kMaxUm = 10;
+const char kTruth[] =
+    "d1, zf and kappa within 4 standard errors of the truth (beside the systematic interval), d1 "
+    "within 10 um";
+
+using Outcome = std::function<Requirement(const model::SweepTruth&)>;
+Outcome Truth(double most_um = kMaxUm) {
+  return [most_um](const model::SweepTruth& truth) { return FindsTruth(truth, most_um); };
+}
+Outcome Refusal(std::vector<std::string> words) {
+  return [words](const model::SweepTruth&) { return Refused(words); };
+}
+
+StressCase Sweep(std::string name, std::string why, std::string required, const StressSweep& sweep,
+                 const Outcome& outcome) {
+  StressCase hard;
+  hard.name = "calibration/" + std::move(name);
+  hard.why = std::move(why);
+  hard.required = std::move(required);
+  hard.prepare = [=](const fs::path& folder, const Capabilities&) {
+    return std::vector<StressRun>{CalibrationOf(outcome(WriteSweep(folder, sweep)))};
+  };
+  return hard;
+}
+
+StressSweep Simulated(const std::function<void(model::SweepSimulationOptions*)>& change) {
+  StressSweep sweep;
+  change(&sweep.simulation);
+  return sweep;
+}
+StressSweep Damaged(std::function<void(Frames*)> damage) {
+  StressSweep sweep;
+  sweep.damage = std::move(damage);
+  return sweep;
+}
+StressSweep Described(std::function<void(model::SweepFile*)> describe) {
+  StressSweep sweep;
+  sweep.describe = std::move(describe);
+  return sweep;
+}
+
+// So many frames about the plane of focus, over the same depths as the usual sweep.
+StressSweep OfFrames(int count) {
+  return Simulated([count](model::SweepSimulationOptions* simulation) {
+    // The outermost frames still show some texture: none of so few can be spared.
+    constexpr double kPart = 0.85;
+    const double whole_mm = simulation->step_mm * (simulation->frame_count - 1);
+    const double length_mm = kPart * whole_mm;
+    simulation->first_depth_mm += (whole_mm - length_mm) / 2;
+    simulation->frame_count = count;
+    simulation->step_mm = length_mm / (count - 1);
+  });
+}
+
+// The usual sweep, moved away from the plane of focus at 300 mm.
+StressSweep BeginningAt(double first_depth_mm) {
+  return Simulated([first_depth_mm](model::SweepSimulationOptions* simulation) {
+    simulation->first_depth_mm = first_depth_mm;
+  });
+}
+
+std::vector<StressCase> Frames2To5() {
+  std::vector<StressCase> cases;
+  for (const int count : {2, 3, 4}) {
+    const std::string name = count == 2   ? "two-frames"
+                             : count == 3 ? "three-frames"
+                                          : "four-frames";
+    cases.push_back(
+        Sweep(name, "not more readings than unknowns: nothing would be left to check them",
+              "refused: how many frames there are, and how many are needed", OfFrames(count),
+              Refusal({"at least 5 frames", "has " + std::to_string(count)})));
+  }
+  cases.push_back(Sweep("five-frames", "one more than unknowns", kTruth, OfFrames(5), Truth()));
+  return cases;
+}
+
+std::vector<StressCase> Focus() {
+  std::vector<StressCase> cases;
+  cases.push_back(Sweep("focus-at-first-frame", "one side of the plane of focus alone is seen",
+                        kTruth, BeginningAt(300), Truth()));
+  cases.push_back(Sweep("focus-at-last-frame", "one side of the plane of focus alone is seen",
+                        kTruth, BeginningAt(270), Truth()));
+  cases.push_back(Sweep("focus-a-little-before-the-sweep",
+                        "the plane of focus is 5 mm nearer than any frame",
+                        "d1, zf and kappa within 4 standard errors of the truth, d1 within 20 um",
+                        BeginningAt(305), Truth(20)));
+  cases.push_back(Sweep("focus-a-little-behind-the-sweep",
+                        "the plane of focus is 5 mm beyond any frame",
+                        "d1, zf and kappa within 4 standard errors of the truth, d1 within 20 um",
+                        BeginningAt(265), Truth(20)));
+  cases.push_back(
+      Sweep("focus-far-before-the-sweep",
+            "the plane of focus is 10 mm nearer than any frame: too few frames are sharp "
+            "enough to tell where it is",
+            "refused: that the focus is outside, and on which side", BeginningAt(310),
+            Refusal({"sharpness is monotone", "nearer"})));
+  cases.push_back(Sweep("focus-far-behind-the-sweep",
+                        "the plane of focus is 10 mm beyond any frame: too few frames are sharp "
+                        "enough to tell where it is",
+                        "refused: that the focus is outside, and on which side", BeginningAt(260),
+                        Refusal({"sharpness is monotone", "farther"})));
+  return cases;
+}
+
+void Swap(model::SweepFile* file, std::size_t a, std::size_t b) {
+  std::swap(file->frames[a].reading_mm, file->frames[b].reading_mm);
+}
+
+std::vector<StressCase> Readings() {
+  std::vector<StressCase> cases;
+  cases.push_back(Sweep("readings-all-equal", "nothing moved, the file says",
+                        "refused: that the readings are equal",
+                        Described([](model::SweepFile* file) {
+                          for (model::SweepFrame& frame : file->frames) frame.reading_mm = 300;
+                        }),
+                        Refusal({"at least 5 different readings", "300"})));
+  cases.push_back(Sweep("readings-reversed", "the bench scale is read from the wrong end",
+                        "refused: that image scale and readings run against each other",
+                        Described([](model::SweepFile* file) {
+                          for (std::size_t i = 0, j = file->frames.size() - 1; i < j; ++i, --j) {
+                            Swap(file, i, j);
+                          }
+                        }),
+                        Refusal({"direction", "toward"})));
+  cases.push_back(Sweep("readings-in-centimetres",
+                        "all readings are a tenth of what they should be",
+                        "refused: that the readings contradict the image scale or the camera",
+                        Described([](model::SweepFile* file) {
+                          for (model::SweepFrame& frame : file->frames) frame.reading_mm /= 10;
+                        }),
+                        Refusal({"image scale", "are the readings in mm?"})));
+  cases.push_back(Sweep("readings-in-micrometres",
+                        "all readings are a thousand times what they should be",
+                        "refused: that the readings contradict the image scale",
+                        Described([](model::SweepFile* file) {
+                          for (model::SweepFrame& frame : file->frames) frame.reading_mm *= 1000;
+                        }),
+                        Refusal({"blur ratio", "unit of the readings"})));
+  cases.push_back(Sweep("two-readings-swapped", "frames 8 and 20 have each other's reading", kTruth,
+                        Described([](model::SweepFile* file) { Swap(file, 8, 20); }), Truth()));
+  cases.push_back(Sweep("one-reading-off", "frame 20 is off by three steps", kTruth,
+                        Described([](model::SweepFile* file) { file->frames[20].reading_mm += 3; }),
+                        Truth()));
+  return cases;
+}
+
+void Fill(model::EncodedImage* frame, std::uint16_t value) {
+  std::fill(frame->values.begin(), frame->values.end(), value);
+}
+
+// A box of so many pixels along the rows.
+void Smear(model::EncodedImage* frame, int length_px) {
+  const std::vector<std::uint16_t> sharp = frame->values;
+  for (int y = 0; y < frame->height_px; ++y) {
+    for (int x = 0; x < frame->width_px; ++x) {
+      int sum = 0;
+      for (int i = 0; i < length_px; ++i) {
+        const int at = std::clamp(x + i - length_px / 2, 0, frame->width_px - 1);
+        sum += sharp[static_cast<std::size_t>(y * frame->width_px + at)];
+      }
+      frame->values[static_cast<std::size_t>(y * frame->width_px + x)] =
+          static_cast<std::uint16_t>(sum / length_px);
+    }
+  }
+}
+
+void TurnAround(model::EncodedImage* frame) {
+  std::reverse(frame->values.begin(), frame->values.end());
+}
+
+std::vector<StressCase> Damages() {
+  std::vector<StressCase> cases;
+  cases.push_back(Sweep("one-image-thirty-one-times", "the shutter fired, the bench did not move",
+                        "refused: that the frames are the same image, or do not change",
+                        Damaged([](Frames* frames) {
+                          for (std::size_t i = 1; i < frames->size(); ++i) {
+                            (*frames)[i] = frames->front();
+                          }
+                        }),
+                        Refusal({"one image was repeated"})));
+  cases.push_back(Sweep("all-frames-blank", "a target without texture",
+                        "refused: that the frames show no texture", Damaged([](Frames* frames) {
+                          for (model::EncodedImage& frame : *frames) Fill(&frame, 128);
+                        }),
+                        Refusal({"no texture above the noise"})));
+  for (const bool black : {true, false}) {
+    cases.push_back(Sweep(black ? "all-frames-black" : "all-frames-white",
+                          black ? "the cap was on" : "the exposure was far too long",
+                          "refused: that no frame can be used", Damaged([black](Frames* frames) {
+                            for (model::EncodedImage& frame : *frames)
+                              Fill(&frame, black ? 0 : 255);
+                          }),
+                          Refusal({black ? "under-exposed" : "over-exposed"})));
+  }
+  cases.push_back(Sweep("black-white-blank-frames", "three frames show nothing", kTruth,
+                        Damaged([](Frames* frames) {
+                          Fill(&(*frames)[3], 0);
+                          Fill(&(*frames)[9], 255);
+                          Fill(&(*frames)[22], 128);
+                        }),
+                        Truth()));
+  cases.push_back(Sweep("smeared-frame", "somebody hit the bench: 15 px of smear near focus",
+                        kTruth, Damaged([](Frames* frames) { Smear(&(*frames)[18], 15); }),
+                        Truth()));
+  cases.push_back(Sweep("rotated-frame", "one frame is upside down", kTruth,
+                        Damaged([](Frames* frames) { TurnAround(&(*frames)[12]); }), Truth()));
+  cases.push_back(Sweep("tilted-target",
+                        "the target leans by 10 degrees: every column has a depth of its own",
+                        kTruth, Simulated([](model::SweepSimulationOptions* simulation) {
+                          simulation->target.tilt_deg = 10;
+                        }),
+                        Truth()));
+  cases.push_back(Sweep("noise-at-the-signals-level", "shot and read noise as large as the texture",
+                        kTruth, Simulated([](model::SweepSimulationOptions* simulation) {
+                          simulation->full_well_electrons = 100;
+                          simulation->read_noise_electrons = 12;
+                        }),
+                        Truth()));
+  cases.push_back(Sweep("noise-alone", "no target at all",
+                        "refused: that the frames show no texture", Damaged([](Frames* frames) {
+                          std::mt19937 engine(5);
+                          for (model::EncodedImage& frame : *frames) {
+                            for (std::uint16_t& value : frame.values) {
+                              value = static_cast<std::uint16_t>(118 + engine() % 20);
+                            }
+                          }
+                        }),
+                        Refusal({"no texture above the noise"})));
+  return cases;
+}
+
+std::vector<StressCase> Optics() {
+  std::vector<StressCase> cases;
+  StressSweep soft = Simulated([](model::SweepSimulationOptions* simulation) {
+    simulation->camera.lens.aperture_radius_mm /= 16;
+    simulation->camera.calibration->blur_floor_px = model::Estimate{3, 0};
+  });
+  cases.push_back(Sweep("floor-larger-than-blur",
+                        "a lens floor of 3 px, and 1 px of defocus at most",
+                        "d1, zf and kappa within 4 standard errors of the truth, d1 within 200 um",
+                        soft, Truth(200)));
+  for (const double wrong_mm : {35.0, 70.0}) {
+    StressSweep wrong_lens;
+    wrong_lens.change_camera = [wrong_mm](model::Camera* camera) {
+      camera->lens.front_focal_length_mm = camera->lens.rear_focal_length_mm = wrong_mm;
+    };
+    cases.push_back(Sweep(
+        wrong_mm < 50 ? "focal-length-too-short" : "focal-length-too-long",
+        "the camera file says 35 or 70 mm, the lens has 50: no texture shows that, kappa takes "
+        "it up",
+        "told: the blur ratio is not what apertures give, and a wrong focal length looks like "
+        "this",
+        wrong_lens, [](const model::SweepTruth&) {
+          return Warned({"blur ratio", "focal length", "target_period_mm"});
+        }));
+  }
+  StressSweep at_focus = Simulated([](model::SweepSimulationOptions* simulation) {
+    simulation->step_mm = 0.01;
+    simulation->first_depth_mm = 299.85;
+  });
+  cases.push_back(Sweep("no-defocus",
+                        "all frames lie within .15 mm of the plane of focus, readings "
+                        "are good to .07 mm",
+                        kTruth, at_focus, Truth()));
+  return cases;
+}
+
+}  // namespace
+
+std::vector<StressCase> CalibrationStressCases() {
+  std::vector<StressCase> all;
+  for (std::vector<StressCase> part : {Frames2To5(), Focus(), Readings(), Damages(), Optics()}) {
+    for (StressCase& hard : part) all.push_back(std::move(hard));
+  }
+  return all;
+}
+
+}  // namespace thicklens::tools

@@ -1,0 +1,125 @@
+#include "tools/stress/stress_sweeps.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/output_file.h"
+#include "thicklens/io/image_io.h"
+#include "thicklens/io/simulated_sweep.h"
+#include "thicklens/model/camera_file.h"
+#include "thicklens/model/light_field.h"
+#include "tools/bench/bench_sweep.h"
+
+namespace thicklens::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kFieldPx = 192;
+// Standard errors within which the truth has to lie: by chance one of 16000 values does not.
+constexpr double kMaxSigmas = 4;
+
+double OffInSigmas(const nlohmann::json& summary, const char* name, double truth) {
+  const nlohmann::json& found = summary.at(name);
+  if (!found.is_object() || !found.at("value").is_number() || !found.at("sigma").is_number()) {
+    throw Error(fmt::format("{} was not found: {}", name, found.dump()));
+  }
+  double from = found["value"], to = found["value"];
+  if (found.contains("systematic") && found["systematic"].is_array()) {
+    from = std::min(from, found["systematic"].at(0).get<double>());
+    to = std::max(to, found["systematic"].at(1).get<double>());
+  }
+  const auto sigma = found["sigma"].get<double>();
+  if (!(sigma > 0)) throw Error(fmt::format("{} has a standard error of {:g}", name, sigma));
+  return std::max({0.0, from - truth, truth - to}) / sigma;
+}
+
+}  // namespace
+
+model::SweepSimulationOptions StressSweep::UsualSimulation() {
+  model::SweepSimulationOptions options = BenchSweepOptions();
+  const model::Sensor& sensor = options.camera.sensor;
+  options.camera = model::CropCamera(
+      options.camera,
+      {(sensor.width_px - kFieldPx) / 2, (sensor.height_px - kFieldPx) / 2, kFieldPx, kFieldPx});
+  options.camera.calibration->blur_floor_px = model::Estimate{0.5, 0};
+  return options;
+}
+
+model::SweepTruth WriteSweep(const fs::path& folder, const StressSweep& sweep) {
+  const model::SweepSimulator simulator(sweep.simulation, {});
+  const model::SweepTruth& truth = simulator.truth();
+  std::vector<model::EncodedImage> frames;
+  for (int i = 0; i < sweep.simulation.frame_count; ++i) {
+    ThrowIfCancelled();
+    frames.push_back(simulator.RenderFrame(i));
+  }
+  if (sweep.damage) sweep.damage(&frames);
+  model::SweepFile file = io::DescribeSweep(sweep.simulation, simulator, false);
+  file.floor.given_px = model::Estimate{truth.blur_floor_px, 0.01};
+  model::Camera camera = simulator.camera();
+  camera.calibration.reset();
+  if (sweep.describe) sweep.describe(&file);
+  if (sweep.change_camera) sweep.change_camera(&camera);
+  const fs::path sweep_folder = folder / "sweep";
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const fs::path image = sweep_folder / truth.frames[i].image;
+    fs::create_directories(image.parent_path());
+    WriteFileAtomically(image.string(), io::EncodePng(frames[i]));
+  }
+  WriteFileAtomically((sweep_folder / "camera.yaml").string(), model::CameraToYaml(camera));
+  WriteFileAtomically((sweep_folder / "sweep.yaml").string(), model::SweepToYaml(file));
+  return truth;
+}
+
+StressRun CalibrationOf(Requirement required) {
+  StressRun run;
+  run.output = "camera.yaml";
+  run.arguments = {"calibrate", "sweep/sweep.yaml", "--no-field", "-o", run.output};
+  run.required = std::move(required);
+  return run;
+}
+
+Requirement FindsTruth(const model::SweepTruth& truth, double most_um) {
+  return Solved(
+      [=](const fs::path&, const nlohmann::json& summary) {
+        const double off =
+            std::max({OffInSigmas(summary, "image_distance_mm", truth.image_distance_mm),
+                      OffInSigmas(summary, "focus_depth_mm", truth.focus_depth_mm),
+                      OffInSigmas(summary, "blur_ratio", truth.blur_ratio)});
+        const double off_um = 1000 * std::abs(summary["image_distance_mm"]["value"].get<double>() -
+                                              truth.image_distance_mm);
+        if (!(off_um <= most_um)) {
+          throw Error(fmt::format("d1 is off by {:.3g} um, more than {:g}", off_um, most_um));
+        }
+        return off;
+      },
+      kMaxSigmas);
+}
+
+Requirement Warned(const std::vector<std::string>& words) {
+  return Solved(
+      [words](const fs::path&, const nlohmann::json& summary) {
+        for (const nlohmann::json& warning : summary.at("warnings")) {
+          const std::string text = warning.get<std::string>();
+          if (std::all_of(words.begin(), words.end(), [&](const std::string& word) {
+                return text.find(word) != std::string::npos;
+              })) {
+            return 0.0;
+          }
+        }
+        throw Error("no warning says " + fmt::format("{}", fmt::join(words, ", ")) + ": " +
+                    summary["warnings"].dump());
+      },
+      0);
+}
+
+}  // namespace thicklens::tools
