@@ -44,3 +44,45 @@ run(${CMAKE_COMMAND} -S "${CMAKE_CURRENT_LIST_DIR}/consumer" -B "${work_dir}/con
     -D "CMAKE_PREFIX_PATH=${prefix}")
 run(${CMAKE_COMMAND} --build "${work_dir}/consumer" --config ${config})
 run("${work_dir}/consumer/consumer")
+
+# The examples of the documentation, and the program of the README, as a user builds and runs them.
+set(examples "${work_dir}/examples")
+run(${CMAKE_COMMAND} -S "${configs_dir}/../docs/examples" -B "${examples}" -G "${generator}"
+    -D CMAKE_BUILD_TYPE=${config} -D CMAKE_CXX_COMPILER=${compiler} -D "CMAKE_PREFIX_PATH=${prefix}")
+run(${CMAKE_COMMAND} --build "${examples}" --config ${config})
+set(data_dir "${work_dir}/data")
+file(MAKE_DIRECTORY "${data_dir}")
+# A scene as large as the sensor of the sweep.
+file(READ "${configs_dir}/scenes/demo.yaml" scene)
+string(REGEX REPLACE "size_px: \\[[0-9, ]*\\]  *#" "size_px: [400, 400]  #" scene "${scene}")
+string(REPLACE "../cameras/" "${configs_dir}/cameras/" scene "${scene}")
+file(WRITE "${data_dir}/scene.yaml" "${scene}")
+function(run_in folder)
+  list(JOIN ARGN " " command)
+  message(STATUS "${command}")
+  execute_process(COMMAND ${ARGN} WORKING_DIRECTORY "${folder}" RESULT_VARIABLE code)
+  if(NOT code EQUAL 0)
+    message(FATAL_ERROR "exit ${code}: ${command}")
+  endif()
+endfunction()
+run_in("${data_dir}" "${prefix}/${bin}/thicklens" simulate image scene.yaml -o scene --quiet)
+run_in("${data_dir}" "${prefix}/${bin}/thicklens" simulate light-field scene.yaml --views 3x3
+       -o truth --quiet)
+run_in("${data_dir}" "${examples}/simulate_sweep" "${configs_dir}/sweeps/demo.yaml" sweep)
+run_in("${data_dir}" "${examples}/calibrate_sweep" sweep/sweep.yaml camera.yaml)
+run_in("${data_dir}" "${examples}/estimate" scene/picture.png scene/depth.pfm camera.yaml estimate)
+run_in("${data_dir}" "${examples}/refocus" estimate 0.5 refocused.png photograph.png)
+# A disparity map of 0.747 px everywhere: the float whose four bytes are the character "?".
+string(REPEAT "????" 160000 disparities)
+file(WRITE "${data_dir}/disparity.pfm" "Pf\n400 400\n-1.0\n${disparities}")
+run_in("${data_dir}" "${examples}/custom_solver" scene/picture.png disparity.pfm custom)
+run_in("${data_dir}" "${examples}/compare" truth truth)
+# It reads and writes files of fixed names.
+file(COPY "${data_dir}/scene/picture.png" "${data_dir}/scene/depth.pfm" DESTINATION
+     "${data_dir}/sweep")
+file(RENAME "${data_dir}/sweep/picture.png" "${data_dir}/sweep/photo.png")
+file(RENAME "${data_dir}/sweep/depth.pfm" "${data_dir}/sweep/depth.png")
+run_in("${data_dir}/sweep" "${work_dir}/consumer/first_program")
+if(NOT EXISTS "${data_dir}/sweep/light_field/lightfield.yaml")
+  message(FATAL_ERROR "the first program wrote no light field")
+endif()

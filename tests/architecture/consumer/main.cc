@@ -43,7 +43,7 @@ bool BitmapIsRead() {
       "BM\x3A\0\0\0\0\0\0\0\x36\0\0\0\x28\0\0\0\x01\0\0\0\x01\0\0\0\x01\0\x18\0"
       "\0\0\0\0\x04\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\xFF\0\0\0",
       58);
-  const cv::Mat image = thicklens::io::DecodePicture(bitmap, "one pixel");
+  const cv::Mat image = thicklens::io::DecodeImage(bitmap, "one pixel");
   const auto pixel = image.at<cv::Vec3b>(0, 0);
   return (pixel[0] == 0 && pixel[2] == 255) || Fail("the pixel is not blue");
 }
@@ -51,7 +51,7 @@ bool BitmapIsRead() {
 // Warps the photograph by its depth, writes the light field to a folder and reads it again.
 bool LightFieldIsWritten() {
   thicklens::estimator::EstimateInput input;
-  input.picture = {8, 8, 1, std::vector<float>(64, 0.5F)};
+  input.image = {8, 8, 1, std::vector<float>(64, 0.5F)};
   input.disparity.width_px = input.disparity.height_px = 8;
   input.disparity.disparity.assign(64, 0.5F);
   input.weights = Eigen::ArrayXXd::Constant(3, 3, 1.0 / 9);
