@@ -19,7 +19,7 @@
 #include "thicklens/estimator/compare.h"
 #include "thicklens/estimator/render.h"
 #include "thicklens/kernels/device.h"
-#include "thicklens/model/stored_values.h"
+#include "thicklens/model/encoded_values.h"
 #include "tools/bench/bench_loop.h"
 #include "tools/bench/bench_machine.h"
 #include "tools/bench/bench_parts.h"

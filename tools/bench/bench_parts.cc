@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "thicklens/estimator/render.h"
-#include "thicklens/model/stored_values.h"
+#include "thicklens/model/encoded_values.h"
 
 namespace thicklens::tools {
 namespace {

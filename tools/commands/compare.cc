@@ -22,7 +22,7 @@
 #include "thicklens/io/depth_io.h"
 #include "thicklens/io/image_io.h"
 #include "thicklens/io/light_field_io.h"
-#include "thicklens/model/stored_values.h"
+#include "thicklens/model/encoded_values.h"
 #include "tools/commands/commands.h"
 #include "tools/options/command_frame.h"
 #include "tools/options/light_field_options.h"

@@ -8,7 +8,7 @@
 #include "thicklens/base/error.h"
 #include "thicklens/estimator/compare.h"
 #include "thicklens/estimator/estimate_input.h"
-#include "thicklens/model/stored_values.h"
+#include "thicklens/model/encoded_values.h"
 #include "tools/interface/problem.h"
 #include "tools/interface/run_scope.h"
 #include "tools/interface/validation.h"

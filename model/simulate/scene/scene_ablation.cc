@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "thicklens/base/stopwatch.h"
-#include "thicklens/model/stored_values.h"
+#include "thicklens/model/encoded_values.h"
 
 namespace thicklens::model {
 namespace {

@@ -11,7 +11,7 @@
 #include "thicklens/base/error.h"
 #include "thicklens/base/parallel.h"
 #include "thicklens/base/stopwatch.h"
-#include "thicklens/model/stored_values.h"
+#include "thicklens/model/encoded_values.h"
 
 namespace thicklens::model {
 namespace {

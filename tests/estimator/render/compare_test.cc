@@ -10,7 +10,7 @@
 
 #include "support/error_message.h"
 #include "thicklens/estimator/view_geometry.h"
-#include "thicklens/model/stored_values.h"
+#include "thicklens/model/encoded_values.h"
 
 namespace thicklens::estimator {
 namespace {

@@ -22,8 +22,8 @@
 #include "thicklens/io/image_io.h"
 #include "thicklens/io/light_field_io.h"
 #include "thicklens/model/camera.h"
+#include "thicklens/model/encoded_values.h"
 #include "thicklens/model/light_field_grid.h"
-#include "thicklens/model/stored_values.h"
 #include "tools/report/compare_table.h"
 #include "tools/support/child_process.h"
 

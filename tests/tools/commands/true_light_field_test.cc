@@ -12,10 +12,10 @@
 #include "thicklens/estimator/view_geometry.h"
 #include "thicklens/io/depth_io.h"
 #include "thicklens/io/light_field_io.h"
+#include "thicklens/model/encoded_values.h"
 #include "thicklens/model/light_field.h"
 #include "thicklens/model/light_field_grid.h"
 #include "thicklens/model/scene.h"
-#include "thicklens/model/stored_values.h"
 
 namespace thicklens::tools {
 namespace {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "support/macro_scene.h"
-#include "thicklens/model/stored_values.h"
+#include "thicklens/model/encoded_values.h"
 
 namespace thicklens::model {
 namespace {

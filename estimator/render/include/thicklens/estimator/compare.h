@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "thicklens/estimator/view_geometry.h"
+#include "thicklens/model/encoded_values.h"
 #include "thicklens/model/light_field.h"
 #include "thicklens/model/scene.h"
-#include "thicklens/model/stored_values.h"
 
 namespace thicklens::estimator {
 

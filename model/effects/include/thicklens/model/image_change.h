@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "thicklens/model/stored_values.h"
+#include "thicklens/model/encoded_values.h"
 
 namespace thicklens::model {
 

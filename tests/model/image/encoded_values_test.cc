@@ -1,4 +1,4 @@
-#include "thicklens/model/stored_values.h"
+#include "thicklens/model/encoded_values.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
