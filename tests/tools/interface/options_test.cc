@@ -16,7 +16,7 @@ namespace thicklens {
 namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInf = std::numeric_limits<double>::infinity();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Expects that the options are not valid, and that the reason begins with the field.
 template <typename Options>
@@ -75,7 +75,7 @@ TEST(InterfaceOptionsTest, ImageFilesHaveEightOrSixteenBits) {
     ExpectRefused(options, "bits");
   }
   ExpectEachRefused(ImageFileOptions(), &ImageFileOptions::noise_levels, "noise_levels",
-                    {kNan, kInf, -kInf, -1});
+                    {kNan, kInfinity, -kInfinity, -1});
 }
 
 TEST(InterfaceOptionsTest, DepthNeedsAUnitOrNone) {
@@ -91,9 +91,9 @@ TEST(InterfaceOptionsTest, DepthNeedsAUnitOrNone) {
 TEST(InterfaceOptionsTest, DisparitiesHaveAFiniteScale) {
   const DepthMeaning disparity{DepthKind::kDisparity};
   ExpectEachRefused(disparity, &DepthMeaning::disparity_scale, "disparity_scale",
-                    {kNan, kInf, -kInf, 0});
+                    {kNan, kInfinity, -kInfinity, 0});
   ExpectEachRefused(disparity, &DepthMeaning::disparity_offset_px, "disparity_offset_px",
-                    {kNan, kInf, -kInf});
+                    {kNan, kInfinity, -kInfinity});
   const DepthMeaning z{DepthKind::kZ, LengthUnit::kMetre};
   ExpectEachRefused(z, &DepthMeaning::disparity_scale, "disparity_scale", {kNan, 2});
   ExpectEachRefused(z, &DepthMeaning::disparity_offset_px, "disparity_offset_px", {kNan, 1});
@@ -112,11 +112,12 @@ TEST(InterfaceOptionsTest, DepthMapsHaveAllValues) {
 }
 
 TEST(InterfaceOptionsTest, SweepStatementsAreFinite) {
-  ExpectEachRefused(SweepOverrides(), &SweepOverrides::offset_mm, "offset_mm", {kNan, kInf, -kInf});
+  ExpectEachRefused(SweepOverrides(), &SweepOverrides::offset_mm, "offset_mm",
+                    {kNan, kInfinity, -kInfinity});
   ExpectEachRefused(SweepOverrides(), &SweepOverrides::offset_sigma_mm, "offset_sigma_mm",
-                    {kNan, kInf, -1});
+                    {kNan, kInfinity, -1});
   ExpectEachRefused(SweepOverrides(), &SweepOverrides::reading_sigma_mm, "reading_sigma_mm",
-                    {kNan, kInf, -1});
+                    {kNan, kInfinity, -1});
   SweepOverrides floor;
   floor.floor_px = Measured{kNan, 0};
   ExpectRefused(floor, "floor_px.value");
@@ -142,10 +143,10 @@ TEST(InterfaceOptionsTest, SweepStatementsDoNotContradictEachOther) {
 
 TEST(InterfaceOptionsTest, SceneSolver) {
   ExpectEachRefused(thicklens::SceneSolver(), &thicklens::SceneSolver::tolerance, "tolerance",
-                    {kNan, kInf, -kInf, 0, 1, -0.1});
+                    {kNan, kInfinity, -kInfinity, 0, 1, -0.1});
   thicklens::SceneSolver given;
   given.strength_rule = StrengthRule::kGiven;
-  ExpectEachRefused(given, &thicklens::SceneSolver::strength, "strength", {kNan, kInf, 0, -1});
+  ExpectEachRefused(given, &thicklens::SceneSolver::strength, "strength", {kNan, kInfinity, 0, -1});
   ExpectEachRefused(thicklens::SceneSolver(), &thicklens::SceneSolver::strength, "strength",
                     {kNan, 1});
   thicklens::SceneSolver iterations;
@@ -160,14 +161,14 @@ TEST(InterfaceOptionsTest, SceneSolver) {
 
 TEST(InterfaceOptionsTest, BlockSolver) {
   using Blocks = thicklens::BlockSolver;
-  ExpectEachRefused(Blocks(), &Blocks::gamma, "gamma", {kNan, kInf, 0, -1});
-  ExpectEachRefused(Blocks(), &Blocks::ridge, "ridge", {kNan, kInf, -1});
+  ExpectEachRefused(Blocks(), &Blocks::gamma, "gamma", {kNan, kInfinity, 0, -1});
+  ExpectEachRefused(Blocks(), &Blocks::ridge, "ridge", {kNan, kInfinity, -1});
   Blocks direct;
   direct.tolerance = 0.1;
   ExpectRefused(direct, "tolerance");  // a direct solver has none
   Blocks iterative;
   iterative.linear = Blocks::Linear::kCg;
-  ExpectEachRefused(iterative, &Blocks::tolerance, "tolerance", {kNan, kInf, 0, 1, -1});
+  ExpectEachRefused(iterative, &Blocks::tolerance, "tolerance", {kNan, kInfinity, 0, 1, -1});
   iterative.max_iterations = 0;
   ExpectRefused(iterative, "max_iterations");
   Blocks block_px;
@@ -177,16 +178,16 @@ TEST(InterfaceOptionsTest, BlockSolver) {
 
 TEST(InterfaceOptionsTest, FunctionalSolver) {
   using Functional = thicklens::FunctionalSolver;
-  ExpectEachRefused(Functional(), &Functional::gamma, "gamma", {kNan, kInf, 0, -1});
-  ExpectEachRefused(Functional(), &Functional::ridge, "ridge", {kNan, kInf, 0, -1});
-  ExpectEachRefused(Functional(), &Functional::tolerance, "tolerance", {kNan, kInf, 0, 1, -1});
+  ExpectEachRefused(Functional(), &Functional::gamma, "gamma", {kNan, kInfinity, 0, -1});
+  ExpectEachRefused(Functional(), &Functional::ridge, "ridge", {kNan, kInfinity, 0, -1});
+  ExpectEachRefused(Functional(), &Functional::tolerance, "tolerance", {kNan, kInfinity, 0, 1, -1});
 }
 
 TEST(InterfaceOptionsTest, EstimateNumbersAreInTheirRange) {
   ExpectEachRefused(EstimateOptions(), &EstimateOptions::st_depth_mm, "st_depth_mm",
-                    {kNan, kInf, -kInf, 0, -1, 2e9});
+                    {kNan, kInfinity, -kInfinity, 0, -1, 2e9});
   ExpectEachRefused(EstimateOptions(), &EstimateOptions::memory_limit_mib, "memory_limit_mib",
-                    {kNan, kInf, 0, -1, 2e9});
+                    {kNan, kInfinity, 0, -1, 2e9});
   EstimateOptions options;
   options.views = {1, 1};
   ExpectRefused(options, "views");
@@ -236,7 +237,7 @@ TEST(InterfaceOptionsTest, EffectsAreConsistent) {
   effects = {};
   effects.tolerance = model::EffectTolerance{kNan, {}};
   ExpectRefused(effects, "tolerance");
-  effects.tolerance = model::EffectTolerance{0.5, kInf};
+  effects.tolerance = model::EffectTolerance{0.5, kInfinity};
   ExpectRefused(effects, "tolerance");
   effects.tolerance = model::EffectTolerance{};
   effects.base = EffectSelection::Base::kAll;
@@ -248,11 +249,12 @@ TEST(InterfaceOptionsTest, EffectsAreConsistent) {
 }
 
 TEST(InterfaceOptionsTest, RenderNumbersAreFinite) {
-  ExpectEachRefused(RenderAperture(), &RenderAperture::radius, "radius", {kNan, kInf, -kInf, -1});
+  ExpectEachRefused(RenderAperture(), &RenderAperture::radius, "radius",
+                    {kNan, kInfinity, -kInfinity, -1});
   ExpectRefused(FocusOptions(), "depth_mm");  // neither depth nor disparity
-  ExpectEachRefused(FocusOptions(), &FocusOptions::depth_mm, "depth_mm", {kNan, kInf, 0, -1});
+  ExpectEachRefused(FocusOptions(), &FocusOptions::depth_mm, "depth_mm", {kNan, kInfinity, 0, -1});
   ExpectEachRefused(FocusOptions(), &FocusOptions::disparity_px, "disparity_px",
-                    {kNan, kInf, -kInf});
+                    {kNan, kInfinity, -kInfinity});
 }
 
 TEST(InterfaceOptionsTest, CompareBorderIsBounded) {
