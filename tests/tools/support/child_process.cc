@@ -10,8 +10,8 @@
 #include <filesystem>
 #include <stdexcept>
 
-#include "tools/system/program_run.h"
 #include "thicklens/base/output_file.h"
+#include "tools/system/program_run.h"
 
 namespace thicklens::tools {
 namespace {
