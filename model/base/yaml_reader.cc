@@ -188,7 +188,8 @@ void YamlNode::RequireSchema(const std::string& schema) const {
   }
 }
 
-void YamlNode::RequireKeys(const std::vector<std::string>& allowed) const {
+void YamlNode::RequireKeys(const std::vector<std::string>& allowed,
+                           const std::vector<RenamedWord>& renamed) const {
   if (!IsMap()) throw ErrorHere(fmt::format("a map is expected, found {}", KindOf(impl_->node)));
   std::set<std::string> seen;
   for (const auto& entry : impl_->node) {
@@ -197,7 +198,10 @@ void YamlNode::RequireKeys(const std::vector<std::string>& allowed) const {
     const YamlNode key(key_impl);
     if (!entry.first.IsScalar()) throw key.ErrorHere("a key must be a plain word");
     const std::string name = entry.first.Scalar();
-    if (std::find(allowed.begin(), allowed.end(), name) == allowed.end()) {
+    const bool is_former =
+        std::any_of(renamed.begin(), renamed.end(),
+                    [&name](const RenamedWord& word) { return word.former == name; });
+    if (!is_former && std::find(allowed.begin(), allowed.end(), name) == allowed.end()) {
       throw key.ErrorHere(
           fmt::format("unknown key '{}'; {}", Shown(name), SuggestionFor(name, allowed)));
     }
@@ -218,6 +222,32 @@ std::optional<YamlNode> YamlNode::Find(const std::string& key) const {
   impl->source = impl_->source;
   impl->path = impl_->path.empty() ? key : impl_->path + "." + key;
   return YamlNode(impl);
+}
+
+std::optional<YamlNode> YamlNode::Find(const RenamedWord& key,
+                                       std::vector<std::string>* notices) const {
+  const std::optional<YamlNode> former = Find(key.former);
+  if (!former) return Find(key.now);
+  if (Has(key.now)) {
+    throw former->ErrorHere(
+        fmt::format("'{}' is the former name of '{}', which is here as well: "
+                    "give only '{}'",
+                    key.former, key.now, key.now));
+  }
+  former->NoteFormerName(key, notices);
+  return former;
+}
+
+// One line for all uses of a name in a file: a scene may have many layers.
+void YamlNode::NoteFormerName(const RenamedWord& word, std::vector<std::string>* notices) const {
+  const std::string text = DeprecationText(word);
+  const auto ends_so = [&text](const std::string& notice) {
+    return notice.size() >= text.size() &&
+           notice.compare(notice.size() - text.size(), text.size(), text) == 0;
+  };
+  if (std::none_of(notices->begin(), notices->end(), ends_so)) {
+    notices->emplace_back(ErrorHere(text).what());
+  }
 }
 
 YamlNode YamlNode::At(const std::string& key) const {
@@ -318,6 +348,13 @@ std::string YamlNode::OneOf(const std::vector<std::string>& allowed) const {
     throw ErrorHere(fmt::format("one of {} is expected, found '{}'", Join(allowed), Shown(text)));
   }
   return text;
+}
+
+std::string YamlNode::OneOf(const std::vector<std::string>& allowed, const RenamedWord& value,
+                            std::vector<std::string>* notices) const {
+  if (Text() != value.former) return OneOf(allowed);
+  NoteFormerName(value, notices);
+  return value.now;
 }
 
 const std::string& YamlNode::path() const { return impl_->path; }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "model/schema/effect_yaml.h"
+#include "model/schema/renamed_keys.h"
 #include "model/schema/yaml_fields.h"
 #include "model/schema/yaml_writer.h"
 #include "thicklens/base/yaml_reader.h"
@@ -91,13 +92,13 @@ OutlineOptions ReadOutline(const YamlNode& node) {
   return outline;
 }
 
-TextureKind ReadKind(const YamlNode& node) {
+TextureKind ReadKind(const YamlNode& node, std::vector<std::string>* notices) {
   return ReadNamed<TextureKind>(
       node,
       {TextureKind::kUniform, TextureKind::kSine, TextureKind::kEdge, TextureKind::kCheckerboard,
        TextureKind::kSiemensStar, TextureKind::kDeadLeaves, TextureKind::kNoise,
        TextureKind::kImage},
-      TextureKindName);
+      TextureKindName, RenamedImage(), notices);
 }
 
 // Each kind accepts only the keys that apply to it.
@@ -120,10 +121,12 @@ std::vector<std::string> TextureKeys(TextureKind kind) {
   return {"kind", "image", "feature_size_px"};
 }
 
-TextureOptions ReadTexture(const YamlNode& node) {
+TextureOptions ReadTexture(const YamlNode& node, std::vector<std::string>* notices) {
   TextureOptions texture;
-  texture.kind = ReadKind(node.At("kind"));
-  node.RequireKeys(TextureKeys(texture.kind));
+  texture.kind = ReadKind(node.At("kind"), notices);
+  std::vector<RenamedWord> renamed;
+  if (texture.kind == TextureKind::kImage) renamed.push_back(RenamedImage());
+  node.RequireKeys(TextureKeys(texture.kind), renamed);
   if (const auto colour = node.Find("colour")) {
     const auto channels = colour->ElementsExactly(3);
     for (int c = 0; c < 3; ++c) {
@@ -135,7 +138,8 @@ TextureOptions ReadTexture(const YamlNode& node) {
   ReadNumber(node, "feature_size_px", &texture.feature_size_px);
   ReadNumber(node, "angle_deg", &texture.angle_deg);
   if (texture.kind == TextureKind::kImage) {
-    texture.image_path = node.ResolvePath(node.At("image").Text());
+    const auto image = node.Find(RenamedImage(), notices);
+    texture.image_path = node.ResolvePath(image ? image->Text() : node.At("image").Text());
   }
   return texture;
 }
@@ -146,7 +150,7 @@ GlossOptions ReadGloss(const YamlNode& node) {
           node.At("sigma_px").PositiveNumber(), node.At("strength").NonNegativeNumber()};
 }
 
-SceneLayer ReadLayer(const YamlNode& node) {
+SceneLayer ReadLayer(const YamlNode& node, std::vector<std::string>* notices) {
   node.RequireKeys({"name", "plane", "depth", "outline", "texture", "gloss"});
   SceneLayer layer;
   if (const auto name = node.Find("name")) layer.name = name->Text();
@@ -159,7 +163,7 @@ SceneLayer ReadLayer(const YamlNode& node) {
     layer.plane = ReadPlane(node.At("plane"));
   }
   if (const auto outline = node.Find("outline")) layer.outline = ReadOutline(*outline);
-  layer.texture = ReadTexture(node.At("texture"));
+  layer.texture = ReadTexture(node.At("texture"), notices);
   if (const auto gloss = node.Find("gloss")) {
     for (const YamlNode& image : gloss->Elements()) layer.gloss.push_back(ReadGloss(image));
   }
@@ -181,7 +185,7 @@ SceneSimulationOptions ReadSceneSimulation(const std::string& path) {
   if (const auto truth = root.Find("truth")) ReadTruth(*truth, &options.camera);
   if (const auto size = root.Find("size_px")) options.camera = ReadCrop(*size, options.camera);
   for (const YamlNode& layer : root.At("layers").Elements()) {
-    options.layers.push_back(ReadLayer(layer));
+    options.layers.push_back(ReadLayer(layer, &options.notices));
   }
   ReadEffectSelectionOptions(root, &options.effects);
   if (const auto rays = root.Find("rays_per_pixel"))

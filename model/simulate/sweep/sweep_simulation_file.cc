@@ -1,6 +1,10 @@
 #include <limits>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include "model/schema/effect_yaml.h"
+#include "model/schema/renamed_keys.h"
 #include "model/schema/yaml_fields.h"
 #include "thicklens/base/yaml_reader.h"
 #include "thicklens/model/camera_file.h"
@@ -28,27 +32,28 @@ void ReadTruth(const YamlNode& node, Camera* camera) {
   ReadTruthValues(node, camera->lens, &calibration);
 }
 
-TargetKind ReadKind(const YamlNode& node) {
+TargetKind ReadKind(const YamlNode& node, std::vector<std::string>* notices) {
   return ReadNamed<TargetKind>(
       node,
       {TargetKind::kDeadLeaves, TargetKind::kPinkNoise, TargetKind::kWhiteNoise,
        TargetKind::kCheckerboard, TargetKind::kSiemensStar, TargetKind::kImage,
        TargetKind::kPrintedEdge, TargetKind::kKnifeEdge},
-      TargetKindName);
+      TargetKindName, RenamedImage(), notices);
 }
 
-TargetOptions ReadTarget(const YamlNode& node) {
+TargetOptions ReadTarget(const YamlNode& node, std::vector<std::string>* notices) {
   node.RequireKeys({"kind", "contrast", "feature_size_mm", "edge_angle_deg", "ink_sigma_mm",
-                    "tilt_deg", "image"});
+                    "tilt_deg", "image"},
+                   {RenamedImage()});
   TargetOptions target;
   const YamlNode kind = node.At("kind");
-  target.kind = ReadKind(kind);
+  target.kind = ReadKind(kind, notices);
   ReadNumber(node, "contrast", &target.contrast);
   ReadNumber(node, "feature_size_mm", &target.feature_size_mm);
   ReadNumber(node, "edge_angle_deg", &target.edge_angle_deg);
   ReadNumber(node, "ink_sigma_mm", &target.ink_sigma_mm);
   ReadNumber(node, "tilt_deg", &target.tilt_deg);
-  if (const auto image = node.Find("image")) {
+  if (const auto image = node.Find(RenamedImage(), notices)) {
     if (target.kind != TargetKind::kImage) {
       throw image->ErrorHere("only a target of the kind 'image' has one, found kind '" +
                              TargetKindName(target.kind) + "'");
@@ -98,7 +103,7 @@ SweepSimulationOptions ReadSweepSimulation(const std::string& path) {
   options.camera = ReadCamera(root.ResolvePath(root.At("camera").Text()));
   if (const auto truth = root.Find("truth")) ReadTruth(*truth, &options.camera);
   if (const auto size = root.Find("size_px")) options.camera = ReadCrop(*size, options.camera);
-  options.target = ReadTarget(root.At("target"));
+  options.target = ReadTarget(root.At("target"), &options.notices);
   ReadBench(root.At("bench"), &options);
   if (const auto light = root.Find("light")) ReadLight(*light, &options);
   ReadNumber(root, "drift_sigma_px", &options.drift_sigma_px);

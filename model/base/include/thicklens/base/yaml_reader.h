@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/base/deprecation.h"
 #include "thicklens/base/error.h"
 
 namespace thicklens {
@@ -27,12 +28,17 @@ class YamlNode {
   void RequireSchema(const std::string& schema) const;
   // Throws Error for the first key that is not in the list, with a suggestion if a similar key is
   // allowed; a key that differs only in its unit suffix is reported as a wrong unit. Throws Error
-  // also for a key that occurs twice, and if this is no map.
-  void RequireKeys(const std::vector<std::string>& allowed) const;
+  // also for a key that occurs twice, and if this is no map. The former names of `renamed` are
+  // accepted too, but messages do not list them.
+  void RequireKeys(const std::vector<std::string>& allowed,
+                   const std::vector<RenamedWord>& renamed = {}) const;
 
   bool Has(const std::string& key) const;
   YamlNode At(const std::string& key) const;                   // throws Error if absent
   std::optional<YamlNode> Find(const std::string& key) const;  // absent or null: nullopt
+  // Finds a renamed key by either name. Throws Error if both are there. The first use of the former
+  // name adds a line to `notices`.
+  std::optional<YamlNode> Find(const RenamedWord& key, std::vector<std::string>* notices) const;
 
   bool IsMap() const;
   bool IsSequence() const;
@@ -50,6 +56,10 @@ class YamlNode {
   bool Boolean() const;
   std::string Text() const;                                          // a non-empty scalar
   std::string OneOf(const std::vector<std::string>& allowed) const;  // a scalar of the list
+  // As OneOf, for a list that contains a renamed value. Its former name gives the present one, and
+  // its first use adds a line to `notices`.
+  std::string OneOf(const std::vector<std::string>& allowed, const RenamedWord& value,
+                    std::vector<std::string>* notices) const;
 
   // The Error with the message "file:12:7: lens.aperture_radius_mm: " + what.
   Error ErrorHere(const std::string& what) const;
@@ -62,6 +72,7 @@ class YamlNode {
 
  private:
   struct Impl;
+  void NoteFormerName(const RenamedWord& word, std::vector<std::string>* notices) const;
   explicit YamlNode(std::shared_ptr<const Impl> impl) : impl_(std::move(impl)) {}
   std::shared_ptr<const Impl> impl_;
 };

@@ -143,6 +143,7 @@ struct SceneSimulationOptions {
   int u_count = 5, v_count = 5;  // numbers of views of the true light field
   double uv_depth_mm = 0;        // depth of its UV plane; ST is in the plane of focus
   std::uint64_t seed = 1;
+  std::vector<std::string> notices;  // of the file, one line each: names that are deprecated
 
   bool IsValid(std::string* why) const;
 };

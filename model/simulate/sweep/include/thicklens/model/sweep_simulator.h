@@ -74,6 +74,7 @@ struct SweepSimulationOptions {
   // A choice of SweepEffects(); kAuto selects all of them.
   EffectSelectionOptions effects;
   std::uint64_t seed = 1;
+  std::vector<std::string> notices;  // of the file, one line each: names that are deprecated
 
   bool IsValid(std::string* why) const;
 };
