@@ -32,8 +32,20 @@ void ReadTruthValues(const YamlNode& node, const ThickLens& lens, CameraCalibrat
 // row or column below or on the right.
 Camera ReadCrop(const YamlNode& node, const Camera& camera);
 
-// Reads the name of one of these values. If one of them was renamed, its former name is accepted,
-// and its first use adds a line to `notices`.
+// Reads the name of one of these values.
+template <typename Value>
+Value ReadNamed(const YamlNode& node, const std::vector<Value>& values,
+                std::string (*name_of)(Value)) {
+  std::vector<std::string> names;
+  for (const Value value : values) names.push_back(name_of(value));
+  const std::string name = node.OneOf(names);
+  std::size_t i = 0;
+  while (names[i] != name) ++i;
+  return values[i];
+}
+
+// The same for values of which one was renamed: its former name is accepted, and its first use adds
+// a line to `notices`.
 template <typename Value>
 Value ReadNamed(const YamlNode& node, const std::vector<Value>& values,
                 std::string (*name_of)(Value), const RenamedWord& renamed,

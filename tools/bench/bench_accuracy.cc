@@ -95,6 +95,7 @@ std::vector<Scene> ScenesOf(const BenchAccuracyOptions& options) {
     scene.name = name;
     if (!IsOfTheBench(name)) {
       scene.description = model::ReadSceneSimulation(name);
+      ReportDeprecated(options.common, scene.description->notices);
       if (options.seed) scene.description->seed = *options.seed;
       scene.pixels = io::ReadScenePixels(*scene.description);
     }

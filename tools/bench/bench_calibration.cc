@@ -331,6 +331,7 @@ CommandResult BenchCalibration(const BenchCalibrationOptions& options) {
   const model::SweepSimulationOptions description =
       options.sweep_path.empty() ? BenchSweepOptions()
                                  : model::ReadSweepSimulation(options.sweep_path);
+  ReportDeprecated(options.common, description.notices);
   const Grid grid = GridOf(options, description);
   const int sweeps = options.sweeps.value_or(options.full ? kFullSweeps : kDefaultSweeps);
   BenchReport report(options.report_folder);

@@ -23,6 +23,7 @@
 #include "tools/commands/commands.h"
 #include "tools/commands/simulate_scene.h"
 #include "tools/options/command_frame.h"
+#include "tools/options/deprecated_names.h"
 #include "tools/options/effect_options.h"
 #include "tools/report/ablation_page.h"
 #include "tools/report/ablation_run.h"
@@ -89,6 +90,7 @@ nlohmann::json Summary(const SimulateOptions& options,
 CommandResult SimulateSweep(const SimulateOptions& options) {
   const auto start = Clock::now();
   model::SweepSimulationOptions simulation = model::ReadSweepSimulation(options.config_path);
+  ReportDeprecated(options.common, simulation.notices);
   if (options.seed) simulation.seed = static_cast<std::uint64_t>(*options.seed);
   CheckEffectNames(options.effects, model::SweepEffects());
   ApplyEffectOptions(options.effects, &simulation.effects);
@@ -157,6 +159,7 @@ void AddSimulateCommand(CLI::App* program, CommandAction* action) {
   command->add_flag("--ablate", options->ablate,
                     "Also simulate and calibrate without each effect in turn, and report what each "
                     "effect changes: a table, attribution.csv and the page attribution.html");
+  AddDeprecatedFlags(command, "--ablate", &options->ablate, &options->common);
   AddCommonOptions(command, &options->common);
   command->callback([options, action] {
     *action = [options] {

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "thicklens/base/cancel.h"
+#include "thicklens/base/deprecation.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/base/stopwatch.h"
 #include "thicklens/base/utc_time.h"
@@ -25,6 +26,7 @@
 #include "thicklens/io/simulated_sweep.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/scene_simulator.h"
+#include "tools/options/deprecated_names.h"
 #include "tools/options/effect_options.h"
 #include "tools/options/light_field_options.h"
 #include "tools/options/option_values.h"
@@ -38,6 +40,9 @@ namespace {
 
 // A folder with this file was written by this program, which may replace it.
 constexpr char kImageMarker[] = "truth.yaml";
+
+const std::string kSimulate = "simulate ";
+constexpr char kImageCommand[] = "image";
 
 struct SceneOptions {
   CommonOptions common;
@@ -54,6 +59,7 @@ struct SceneOptions {
 
 model::SceneSimulationOptions ReadConfig(const SceneOptions& options) {
   model::SceneSimulationOptions scene = model::ReadSceneSimulation(options.config_path);
+  ReportDeprecated(options.common, scene.notices);
   if (options.seed) scene.seed = static_cast<std::uint64_t>(*options.seed);
   CheckEffectNames(options.effects, model::ImageEffects());
   ApplyEffectOptions(options.effects, &scene.effects);
@@ -112,6 +118,7 @@ Ablation Attribute(const SceneOptions& options, const model::SceneSimulationOpti
   std::optional<model::SweepSimulationOptions> sweep;
   if (!options.sweep_path.empty()) {  // read before anything that takes long
     sweep = model::ReadSweepSimulation(options.sweep_path);
+    ReportDeprecated(options.common, sweep->notices);
     if (options.seed) sweep->seed = static_cast<std::uint64_t>(*options.seed);
   }
   // The sweep is read first, because it may have no calibration to compare with.
@@ -233,12 +240,11 @@ CLI::App* AddSceneCommand(CLI::App* simulate, const std::string& name, const std
   return command;
 }
 
-}  // namespace
-
-void AddSimulateSceneCommands(CLI::App* simulate, CommandAction* action) {
+// `name` is the command's present or a former name.
+void AddImageCommand(CLI::App* simulate, const std::string& name, CommandAction* action) {
   const auto image = std::make_shared<SceneOptions>();
   CLI::App* command =
-      AddSceneCommand(simulate, "image",
+      AddSceneCommand(simulate, name,
                       "A photograph of a scene: picture.png, depth.pfm (z in mm), camera.yaml (the "
                       "true calibration) and truth.yaml",
                       image.get());
@@ -246,12 +252,19 @@ void AddSimulateSceneCommands(CLI::App* simulate, CommandAction* action) {
       "--ablate", image->ablate,
       "Also simulate the image and estimate its light field without each effect in turn, and "
       "report what each effect changes: a table, attribution.csv and the page attribution.html");
+  AddDeprecatedFlags(command, "--ablate", &image->ablate, &image->common);
   command
       ->add_option("--sweep", image->sweep_path,
                    "For --ablate: a simulated sweep (as for simulate sweep), to report what "
                    "each effect changes in its calibration")
       ->type_name("SWEEP");
-  command->callback([image, action] {
+  const bool is_former = name != kImageCommand;
+  if (is_former) command->group("");  // hidden in --help
+  command->callback([image, name, is_former, action] {
+    if (is_former) {
+      image->common.deprecated.push_back(
+          DeprecationText({kSimulate + name, kSimulate + std::string(kImageCommand)}));
+    }
     *action = [image] {
       if (!image->sweep_path.empty() && !image->ablate) {
         throw UsageError("--sweep requires --ablate");
@@ -261,9 +274,19 @@ void AddSimulateSceneCommands(CLI::App* simulate, CommandAction* action) {
       RunCommand(image->common, [&] { return SimulateImage(*image); });
     };
   });
+}
+
+}  // namespace
+
+void AddSimulateSceneCommands(CLI::App* simulate, CommandAction* action) {
+  const std::string now = kImageCommand;
+  AddImageCommand(simulate, now, action);
+  for (const std::string& former : FormerNames(NameKind::kCommand, kSimulate + now)) {
+    AddImageCommand(simulate, former.substr(kSimulate.size()), action);
+  }
 
   const auto views = std::make_shared<SceneOptions>();
-  command = AddSceneCommand(simulate, "light-field",
+  CLI::App* command = AddSceneCommand(simulate, "light-field",
                             "The true light field of a scene, as its views", views.get());
   AddViewsOption(command, &views->views, "Number of views across and down; overrides the config");
   command

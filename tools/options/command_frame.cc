@@ -18,6 +18,7 @@
 #include "thicklens/base/parallel.h"
 #include "thicklens/base/printable_text.h"
 #include "thicklens/base/temporaries.h"
+#include "tools/options/deprecated_names.h"
 #include "tools/options/option_values.h"
 #include "tools/options/run_files.h"
 #include "tools/system/interrupt.h"
@@ -96,6 +97,7 @@ void AddCommonOptions(CLI::App* command, CommonOptions* options) {
 
 void RunCommand(const CommonOptions& options, const std::function<CommandResult()>& command) {
   if (options.verbose) spdlog::set_level(spdlog::level::debug);
+  ReportDeprecated(options, options.deprecated);
   // More threads than cores would not be faster, and the library below would complain.
   cv::setNumThreads(std::min(ResolveThreads(options.threads), ResolveThreads(0)));
   EnterRunOutput(options.json_path);
@@ -113,6 +115,7 @@ void RunCommand(const CommonOptions& options, const std::function<CommandResult(
     summary.WriteRefusal(MessageLine(error.what()));
     throw;
   }
+  AddDeprecatedKeys(&result.summary);
   summary.Write(result.summary);
   if (!result.refusal.empty()) throw Error(result.refusal);
 }
@@ -120,6 +123,11 @@ void RunCommand(const CommonOptions& options, const std::function<CommandResult(
 void PrintResult(const CommonOptions& options, const std::string& text) {
   if (!options.quiet && options.json_path != kStandardOutput)
     std::fwrite(text.data(), 1, text.size(), stdout);
+}
+
+void ReportDeprecated(const CommonOptions& options, const std::vector<std::string>& notices) {
+  if (options.quiet) return;
+  for (const std::string& notice : notices) spdlog::warn("{}", PrintableUtf8(notice));
 }
 
 void ReportAssumedFields(const model::Camera& camera) {

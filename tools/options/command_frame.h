@@ -17,7 +17,8 @@ struct CommonOptions {
   std::string json_path;  // empty: none; "-": standard output, which then gets no text
   bool quiet = false;
   bool verbose = false;
-  int threads = 0;  // 0: one per core
+  int threads = 0;                      // 0: one per core
+  std::vector<std::string> deprecated;  // notices of former names on the command line
 };
 void AddCommonOptions(CLI::App* command, CommonOptions* options);
 
@@ -36,6 +37,9 @@ void RunCommand(const CommonOptions& options, const std::function<CommandResult(
 
 // Prints a result to stdout, unless --quiet is given or --json uses stdout.
 void PrintResult(const CommonOptions& options, const std::string& text);
+
+// Reports former names on stderr, unless --quiet is given; `notices` has one line for each.
+void ReportDeprecated(const CommonOptions& options, const std::vector<std::string>& notices);
 
 // Reports on stderr, in one line, which numbers of the camera are assumed.
 void ReportAssumedFields(const model::Camera& camera);

@@ -306,7 +306,8 @@ std::string AblationCsv(const Ablation& ablation) {
   std::string text =
       "effect,image_of,absent,kept_by_auto,bound_grey_levels,as_shift_px,rms_grey_levels,"
       "largest_grey_levels,psnr_db,light_field_db,ignored_db,image_distance_um,"
-      "blur_ratio_percent,image_seconds,estimate_seconds,sweep_seconds,calibration_seconds\n";
+      "blur_ratio_percent,image_seconds,estimate_seconds,sweep_seconds,calibration_seconds,"
+      "picture_of,picture_seconds\n";  // the former names, until version 1.0
   for (const AblationRow& row : RowsOf(ablation)) {
     const model::AblatedEffect& effect = row.image();
     text += fmt::format("{},{},{},{},{}", model::EffectName(row.effect),
@@ -329,6 +330,8 @@ std::string AblationCsv(const Ablation& ablation) {
     text += scene == nullptr ? ",," : Field(scene->image_seconds) + Field(scene->estimate_seconds);
     text +=
         sweep == nullptr ? ",," : Field(sweep->image_seconds) + Field(sweep->calibration_seconds);
+    text += row.scene != nullptr ? ",scene" : ",sweep";
+    text += Field(scene == nullptr ? std::nullopt : std::optional(scene->image_seconds));
     text += "\n";
   }
   return text;

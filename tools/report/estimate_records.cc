@@ -10,6 +10,7 @@
 #include "thicklens/base/error.h"
 #include "thicklens/base/input_file.h"
 #include "thicklens/base/printable_text.h"
+#include "tools/options/deprecated_names.h"
 
 namespace thicklens::tools {
 namespace {
@@ -134,6 +135,7 @@ json ParseJson(const std::string& text, const std::string& path, const std::stri
     throw Error(
         fmt::format("{}: an object is expected, as in {}; found {}", path, kind, Shown(parsed)));
   }
+  AcceptDeprecatedKeys(path, &parsed);
   return parsed;
 }
 

@@ -12,8 +12,10 @@
 #include <system_error>
 
 #include "thicklens/base/cancel.h"
+#include "thicklens/base/deprecation.h"
 #include "thicklens/base/error.h"
 #include "thicklens/kernels/device.h"
+#include "tools/options/deprecated_names.h"
 #include "tools/options/option_values.h"
 #include "tools/system/build_info.h"
 #include "tools/system/machine.h"
@@ -169,7 +171,9 @@ Capabilities ExamineCapabilities() {
 }
 
 CommandResult RunStressCases(const StressSuiteOptions& options, const CommonOptions& common) {
-  const std::vector<StressCase> cases = ChosenCases(options.only);
+  const std::string only = PresentName(NameKind::kHardCase, options.only);
+  if (only != options.only) ReportDeprecated(common, {DeprecationText({options.only, only})});
+  const std::vector<StressCase> cases = ChosenCases(only);
   const Workplace workplace(options.keep_folder);
   const std::string program = ThisProgram();
   const Capabilities capabilities = ExamineCapabilities();

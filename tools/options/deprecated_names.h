@@ -1,0 +1,48 @@
+#ifndef THICKLENS_TOOLS_OPTIONS_DEPRECATED_NAMES_H_
+#define THICKLENS_TOOLS_OPTIONS_DEPRECATED_NAMES_H_
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "tools/options/command_frame.h"
+
+namespace thicklens::tools {
+
+enum class NameKind { kCommand, kOption, kHardCase, kYaml, kJson, kColumn };
+
+// A name of the program's interface that was renamed. Its former name is accepted, or written
+// beside the present one, until version 1.0.
+struct DeprecatedName {
+  NameKind kind;
+  std::string former, now;
+  std::string where;  // commands or files, for the documentation
+  // A JSON key that may mean something else in other objects is renamed in those alone that have
+  // this key (by its present name); empty: in all.
+  std::string beside = "";
+};
+
+// All of them. docs/file-formats.md and CHANGELOG.md list them as well, which a test compares.
+const std::vector<DeprecatedName>& DeprecatedNames();
+
+// The former names of a command or an option.
+std::vector<std::string> FormerNames(NameKind kind, const std::string& now);
+// Returns the present name, and `name` itself if it was never renamed.
+std::string PresentName(NameKind kind, const std::string& name);
+
+// Adds the former names of a flag to a command. --help does not show them, and each use is noted
+// in `common`.
+void AddDeprecatedFlags(CLI::App* command, const std::string& now, bool* flag,
+                        CommonOptions* common);
+
+// Adds the former names of all keys, with the same values, to what a command writes.
+void AddDeprecatedKeys(nlohmann::json* written);
+
+// Gives the former names of keys their present names in what was read from a file. Throws Error if
+// an object has both names with different values; `source` is the name of the file.
+void AcceptDeprecatedKeys(const std::string& source, nlohmann::json* read);
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_OPTIONS_DEPRECATED_NAMES_H_
