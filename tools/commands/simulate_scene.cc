@@ -287,7 +287,7 @@ void AddSimulateSceneCommands(CLI::App* simulate, CommandAction* action) {
 
   const auto views = std::make_shared<SceneOptions>();
   CLI::App* command = AddSceneCommand(simulate, "light-field",
-                            "The true light field of a scene, as its views", views.get());
+                                      "The true light field of a scene, as its views", views.get());
   AddViewsOption(command, &views->views, "Number of views across and down; overrides the config");
   command
       ->add_option("--uv-depth", views->uv_depth_mm,
