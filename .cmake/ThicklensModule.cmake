@@ -1,4 +1,4 @@
-# A folder is a module is a target is a namespace (see CONTRIBUTING.md).
+# A module is a folder, a target and a namespace (see CONTRIBUTING.md).
 
 # Compiler settings that every target of the project shares.
 function(thicklens_compile_settings target)
@@ -6,26 +6,27 @@ function(thicklens_compile_settings target)
     ${target} PRIVATE -Wall -Wextra -Wconversion -Wshadow
                       $<$<BOOL:${THICKLENS_WARNINGS_AS_ERRORS}>:-Werror>)
   if(THICKLENS_SANITIZE)
-    # Without the checks of each pointer that take a quarter of the time of compiling: null pointers
-    # and sizes are told by the address sanitizer, and alignment by instructions that ask for it.
+    # The checks of each pointer, which take a quarter of the compile time, are off: the address
+    # sanitizer detects null pointers and wrong sizes, and aligned instructions wrong alignment.
     target_compile_options(
       ${target}
       PUBLIC -fsanitize=${THICKLENS_SANITIZE} -fno-sanitize=null,alignment,object-size
              -fno-sanitize-recover=all -fno-omit-frame-pointer)
     target_link_options(${target} PUBLIC -fsanitize=${THICKLENS_SANITIZE})
-    # Under a sanitizer Eigen would align memory by itself, but the Eigen inside of Debian's Ceres
-    # does not: the linker takes one's malloc and the other's free.
+    # Under a sanitizer Eigen would align memory by itself, but the Eigen in Debian's Ceres does not,
+    # and the linker would combine the malloc of one with the free of the other.
     target_compile_definitions(${target} PUBLIC EIGEN_MALLOC_ALREADY_ALIGNED=1)
   endif()
 endfunction()
 
-# For targets most of whose time goes into what libraries make of templates anew in each file: command
-# lines and JSON. Their files must not give one name to two things, in namespaces without name either.
+# Unity builds, for targets whose compile time is mostly that of library templates in each file:
+# command lines and JSON. Two of their files must not define the same name, not even in unnamed
+# namespaces.
 function(thicklens_unity_build target)
   set_target_properties(${target} PROPERTIES UNITY_BUILD ${THICKLENS_UNITY_BUILD}
                                              UNITY_BUILD_BATCH_SIZE 10)
   if(THICKLENS_UNITY_BUILD)
-    # A local name that another file of the ten uses outside shadows nothing.
+    # A local name that another file of the ten defines at namespace scope is not a real shadowing.
     target_compile_options(${target} PRIVATE -Wno-shadow)
   endif()
 endfunction()
@@ -53,8 +54,8 @@ function(thicklens_module name)
     PRIVATE "${PROJECT_SOURCE_DIR}")
   target_compile_features(${target} PUBLIC cxx_std_17)
   thicklens_compile_settings(${target})
-  # What takes longest to read of what most files include. Each still includes what it uses: files are
-  # compiled without this where there is ccache.
+  # The headers that most files include and that take longest to compile. Each file still includes
+  # what it uses, because files are compiled without precompiled headers if there is ccache.
   target_precompile_headers(${target} PRIVATE ${ARG_PRECOMPILE} <algorithm> <cmath> <functional>
                             <optional> <string> <vector>)
   install(

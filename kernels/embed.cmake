@@ -22,7 +22,7 @@ function(thicklens_embed_kernels variable)
   set(${variable} "${output}" PARENT_SCOPE)
 endfunction()
 
-# Numbers, not string literals: those have escapes and a greatest length.
+# The bytes are written as numbers, because string literals have escapes and a maximum length.
 function(embed_files root files output)
   set(arrays "")
   set(entries "")
@@ -34,7 +34,7 @@ function(embed_files root files output)
     math(EXPR size "${size} / 2")
     string(REGEX REPLACE "(................................)" "\\1\n" hex "${hex}")
     string(REGEX REPLACE "([0-9a-f][0-9a-f])" "0x\\1," bytes "${hex}")
-    # The last one is there because an array cannot be empty.
+    # A last 0 is added because an array cannot be empty.
     string(APPEND arrays "const unsigned char kFile${number}[] = {\n${bytes}0};\n")
     string(APPEND entries "      {\"${path}\", {reinterpret_cast<const char*>(kFile${number}), "
                           "${size}}},\n")

@@ -16,7 +16,7 @@ function(run)
   endif()
 endfunction()
 
-# The caller's own DESTDIR would move everything away from the prefix.
+# A DESTDIR of the caller would move the files away from the prefix.
 unset(ENV{DESTDIR})
 set(prefix "${work_dir}/prefix")
 file(REMOVE_RECURSE "${work_dir}")
@@ -27,7 +27,7 @@ run(${CMAKE_COMMAND} -E env "THICKLENS_INSTALLED=${prefix}" "${architecture_test
     --gtest_filter=ElfSearchPaths.*)
 
 run("${prefix}/${bin}/thicklens" --help)
-# What it loads itself is not on the system's search path.
+# The library that the program loads is not on the system's search path.
 run("${prefix}/${bin}/thicklens" doctor --device cpu)
 file(GLOB_RECURSE configs RELATIVE "${configs_dir}" "${configs_dir}/*.yaml")
 if(NOT configs)

@@ -14,8 +14,9 @@
 
 namespace thicklens::testing {
 
-// A sweep whose blur is known in closed form, as SolveFocus gets it: gated, with depths, measured.
-// A dark frame comes first, so that a frame of the fit is not the frame of that number.
+// A sweep whose blur is known in closed form, in the state in which SolveFocus gets it: checked,
+// with depths, measured. A dark frame comes first, so that the number of a frame differs from its
+// number in the fit.
 struct FocusCase {
   static constexpr std::size_t kChecked = 1;
 
@@ -49,7 +50,7 @@ struct FocusCase {
     }
   }
 
-  // What the table of readings says of a frame.
+  // Changes the reading of a frame in the table of readings.
   void WriteReading(std::size_t fit_frame, double reading_mm) {
     evidence.setup.frames[fit_frame].reading_mm = reading_mm;
     frame(fit_frame).reading_mm = reading_mm;
@@ -96,9 +97,9 @@ struct FocusCase {
   }
 };
 
-// What linear error propagation gives for exact readings: the covariance of (d1, kappa, floor in
-// px, bench zero), by finite differences of the bench's own formulas. `softness_is_free`: every V
-// has an unknown constant in common. `floor_sigma_px`: of a floor that was given, 0 for none.
+// The covariance of (d1, kappa, floor in px, bench zero) by linear error propagation for exact
+// readings, from finite differences of the bench's own formulas. `softness_is_free`: all V have one
+// unknown constant in common. `floor_sigma_px`: sigma of a given floor, 0 for none.
 struct LinearReference {
   double error_px2 = 0;
   bool softness_is_free = false;

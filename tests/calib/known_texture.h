@@ -11,7 +11,8 @@
 
 namespace thicklens::testing {
 
-// Where a frame sees the target: p_frame = origin + shift + scale R (p_target - origin).
+// The position at which a frame shows a point of the target: p_frame = origin + shift + scale R
+// (p_target - origin).
 struct TextureView {
   double scale = 1, rotation_rad = 0;
   Eigen::Vector2d shift_px{0, 0};
@@ -27,8 +28,8 @@ inline Transfer GaussianOf(double variance_px2) {
   };
 }
 
-// A dense texture that is known everywhere: many waves, whose amplitude falls with frequency. Each
-// frame is rendered in closed form with its blur and its pixels' box, without resampling.
+// A dense texture that is known everywhere: many waves whose amplitude falls with frequency. Each
+// frame is rendered in closed form with its blur and the box of its pixels, without resampling.
 class KnownTexture {
  public:
   explicit KnownTexture(unsigned seed, double highest = 0.4, int count = 500) {
@@ -47,7 +48,7 @@ class KnownTexture {
     cv::Mat_<double> sum(height_px, width_px, view.mean);
     const double c = std::cos(view.rotation_rad), s = std::sin(view.rotation_rad);
     for (const Wave& wave : waves_) {
-      // In cycles per frame px.
+      // The frequency is in cycles per frame px.
       const Eigen::Vector2d nu(c * wave.nu.x() - s * wave.nu.y(),
                                s * wave.nu.x() + c * wave.nu.y());
       const Eigen::Vector2d in_frame = nu / view.scale;

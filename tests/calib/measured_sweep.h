@@ -14,8 +14,8 @@
 
 namespace thicklens::testing {
 
-// Case iii on a small field, nothing unknown but the noise: what a sweep's registration says is
-// taken from the truth.
+// Case iii on a small field, in which only the noise is unknown: the results of the registration
+// are replaced by the truth.
 inline model::SweepSimulationOptions StillSweep(model::TargetKind kind, int size_px,
                                                 double first_mm, double step_mm, int count) {
   model::SweepSimulationOptions options = SweepCase("iii", size_px, 3);
@@ -55,7 +55,7 @@ struct MeasuredSweep {
     }
     task->offset_mm = {truth.bench_offset_mm, 0};
     task->start_focus_depth_mm = truth.focus_depth_mm;
-    task->pixel_noise = 0.008;  // at the light's level
+    task->pixel_noise = 0.008;  // at the level of the light
     task->threads = 1;
   }
 
@@ -77,7 +77,7 @@ inline SimulatedSweep Rendered(model::TargetKind kind, model::Psf psf = model::P
   return Simulate(options);
 }
 
-// Images are not written to: one rendering serves all tests of a target.
+// The images are read only, so one rendering serves all tests of a target.
 inline const SimulatedSweep& Leaves() {
   static const SimulatedSweep rendered = Rendered(model::TargetKind::kDeadLeaves);
   return rendered;
@@ -94,8 +94,8 @@ inline MeasuredSweep Measured(const SimulatedSweep& simulated,
   return m;
 }
 
-// V of every sample against the truth: px^2 of the target; a relative estimator's reference has
-// what it was expected to have.
+// Compares V of every sample with the truth, in px^2 of the target. The reference of a relative
+// blur estimator has its expected blur.
 inline void ExpectTrueVariances(const MeasuredSweep& m, const calib::BlurEvidence& evidence,
                                 const calib::BlurSamples& samples, double within_px2) {
   ASSERT_EQ(samples.variances_px2.size(), static_cast<Eigen::Index>(samples.frames.size()));

@@ -34,7 +34,7 @@ inline cv::Mat EncodedMat(const model::EncodedImage& image) {
   return stored;
 }
 
-// One of configs/sweeps, on the middle `size_px` pixels of its sensor (0: all of them).
+// One of configs/sweeps, restricted to the middle `size_px` pixels of its sensor (0: all of them).
 inline model::SweepSimulationOptions SweepCase(const std::string& name, int size_px,
                                                std::uint64_t seed) {
   model::SweepSimulationOptions options =
@@ -47,26 +47,27 @@ inline model::SweepSimulationOptions SweepCase(const std::string& name, int size
   return options;
 }
 
-// A simulated sweep as a calibration gets it: frames rendered once and kept, the truth beside. The
-// camera has no calibration, the bench zero is given, the floor is not.
+// A simulated sweep in the form that a calibration gets, with the truth. The frames are rendered
+// once and kept. The camera has no calibration, the bench zero is given and the floor is not.
 struct SimulatedSweep {
   calib::FocusSweep sweep;
   model::SweepTruth truth;
-  std::shared_ptr<std::vector<cv::Mat>> stored;  // what read_frame gives; a test may damage them
+  // The frames that read_frame returns; a test may damage them
+  std::shared_ptr<std::vector<cv::Mat>> stored;
 
-  // Depth of the centre of perspective, which the pupil law puts before or behind the aperture: the
-  // size in a frame goes as one over the distance from there.
+  // Depth of the centre of perspective, which the pupil law puts before or behind the aperture.
+  // Sizes in a frame are proportional to one over the distance from this centre.
   double centre_mm = 0;
 
   cv::Mat& frame(int index) { return (*stored)[static_cast<std::size_t>(index)]; }
-  // Of what one frame shows in another.
+  // Scale of one frame relative to another.
   double TrueScale(std::size_t frame, std::size_t reference) const {
     return (truth.frames[reference].depth_mm - centre_mm) /
            (truth.frames[frame].depth_mm - centre_mm);
   }
 };
 
-// `target_image` is for a target of that kind alone.
+// `target_image` is used for a target of that kind only.
 inline SimulatedSweep Simulate(const model::SweepSimulationOptions& options,
                                const model::LinearImage& target_image = {}) {
   const model::SweepSimulator simulator(options, target_image);
@@ -91,18 +92,19 @@ inline SimulatedSweep Simulate(const model::SweepSimulationOptions& options,
   return result;
 }
 
-// The same, told what a person can know who has measured the lens floor on a knife edge before.
+// States the floor, as known to a user who has measured the lens floor on a knife edge before.
 inline void GiveFloor(SimulatedSweep* simulated) {
   simulated->sweep.floor.given_px = model::Estimate{simulated->truth.blur_floor_px, 0.01};
 }
 
-// The same, as a measurement really is: the variance drawn about the truth with the error that is
-// stated, d(floor) = d(variance)/(2 floor).
+// States the floor as a real measurement gives it: the variance is drawn about the truth with the
+// stated error, d(floor) = d(variance)/(2 floor).
 inline void GiveDrawnFloor(SimulatedSweep* simulated, std::uint64_t seed) {
   constexpr double kVarianceSigmaPx2 = 0.01;
   constexpr double kTwoPi = 6.283185307179586;
   std::mt19937_64 engine(seed);
-  // Box and Muller's, because std::normal_distribution differs between standard libraries.
+  // The method of Box and Muller is used, because std::normal_distribution differs between standard
+  // libraries.
   const auto uniform = [&engine] { return (static_cast<double>(engine() >> 11) + 0.5) * 0x1p-53; };
   const double radius = std::sqrt(-2 * std::log(uniform()));
   const double normal = radius * std::cos(kTwoPi * uniform());

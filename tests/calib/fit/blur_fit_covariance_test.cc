@@ -1,4 +1,4 @@
-// The covariance that FitBlur states against the scatter of its answers.
+// The covariance that FitBlur states is compared with the scatter of its answers.
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
@@ -20,7 +20,7 @@ using thicklens::testing::WithTexture;
 
 using Draw = std::function<BlurFitSetup(std::mt19937*)>;
 
-// The scatter of (zf, kappa, S0) over seeded draws against the covariance stated.
+// The scatter of (zf, kappa, S0) over seeded draws is compared with the stated covariance.
 void ExpectCovers(const BlurBench& bench, const Draw& draw, int parameters, int runs,
                   double within = 0.15) {
   const Eigen::Vector3d truth(bench.focus_mm, bench.ratio, bench.floor_px2);
@@ -33,7 +33,7 @@ void ExpectCovers(const BlurBench& bench, const Draw& draw, int parameters, int 
     const Eigen::Vector3d error = fit.values.head<3>() - truth;
     mean += error / runs;
     squares += error * error.transpose() / runs;
-    // What chance alone widens now and then is no part of the covariance proper.
+    // The widening by chance that occurs now and then is not a part of the covariance itself.
     stated += fit.covariance.topLeftCorner<3, 3>() / (fit.error_factor * fit.error_factor) / runs;
   }
   const Eigen::Matrix3d scatter = squares - mean * mean.transpose();
@@ -80,7 +80,7 @@ TEST(FitBlurCovariance, IncludesTheReadingsErrors) {
   bench.reading_sigma_mm = 0.3;
   ExpectCovers(
       bench, [&](std::mt19937* random) { return WithEdge(bench, 0.01, random); }, 3, kRuns);
-  // They are the larger part here.
+  // The errors of the readings are the larger part here.
   std::mt19937 random(1);
   const double with = FitBlur(WithEdge(bench, 0.01, &random)).covariance(0, 0);
   bench.reading_sigma_mm = 0;
@@ -120,8 +120,8 @@ TEST(FitBlurCovariance, HoldsForTwoEstimators) {
       3, kRuns);
 }
 
-// Bench zeros drawn from their distribution and taken as exact scatter the results by as much as
-// the covariance says for a zero with that sigma.
+// Bench zeros are drawn from their distribution and used as exact. The results scatter by as much
+// as the covariance states for a zero with that sigma.
 TEST(FitBlurCovariance, CarriesTheBenchZerosError) {
   BlurBench bench;
   bench.noise = 0;
@@ -146,7 +146,7 @@ TEST(FitBlurCovariance, CarriesTheBenchZerosError) {
   const Eigen::Matrix2d scatter = squares - mean * mean.transpose();
   for (const int i : {kFocusDepth, kBlurRatio})
     EXPECT_NEAR(std::sqrt(fit.covariance(i, i) / scatter(i, i)), 1, 0.15) << i;
-  // It goes one to one into the plane of focus.
+  // The error of the zero enters the plane of focus one to one.
   EXPECT_NEAR(std::sqrt(fit.covariance(0, 0)), offset_sigma_mm, 0.2 * offset_sigma_mm);
   EXPECT_GT(fit.covariance(kFocusDepth, kBenchOffset), 0);
 }

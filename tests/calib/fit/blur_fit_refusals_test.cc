@@ -1,4 +1,4 @@
-// What FitBlur says where the data do not fix the answer.
+// Messages of FitBlur if the data do not determine the answer.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -50,7 +50,8 @@ TEST(FitBlur, TwoDepthsDoNotFixThreeParameters) {
 TEST(FitBlur, TheWorstKnownCombinationIsNamedWithItsCorrelation) {
   const BlurBench bench = ExactBench();
   std::mt19937 random(1);
-  // Of a texture zf and the floor go together (a wrong floor moves the focus), all but entirely.
+  // With a texture alone, zf and the floor are almost completely correlated, because a wrong floor
+  // moves the focus.
   const BlurFitResult fit = FitBlur(WithTexture(bench, 1e-3, 0.5, &random));
   ASSERT_TRUE(fit.done);
   EXPECT_THAT(fit.weak_direction, HasSubstr("blur_floor_px"));

@@ -79,9 +79,9 @@ TEST(FitBlur, AStartSavesTheSearchAndChangesNothing) {
   EXPECT_NEAR(again.values[kBlurRatio], fit.values[kBlurRatio], 1e-8);
 }
 
-// V = S0 z^2/zr^2 + A (1 - z/zf)^2/zr^2 + c for every c, so a texture leaves a = A uf^2 + S0 and
-// the vertex zf (a - S0)/a alone; a floor that is off by dS0 gives zf = vertex a/(a - S0 - dS0) and
-// kappa^2 in proportion to (a - S0 - dS0) (zf - f1)^2. To first order dzf = zf dS0/(A uf^2).
+// V = S0 z^2/zr^2 + A (1 - z/zf)^2/zr^2 + c for every c, so a texture determines only a = A uf^2 +
+// S0 and the vertex zf (a - S0)/a. A floor that is wrong by dS0 gives zf = vertex a/(a - S0 - dS0)
+// and kappa^2 in proportion to (a - S0 - dS0) (zf - f1)^2. To first order dzf = zf dS0/(A uf^2).
 TEST(FitBlur, AWrongFloorMovesFocusAndRatioAsDerived) {
   const BlurBench bench = ExactBench();
   const double curvature = bench.Curvature(), a = curvature + bench.floor_px2;
@@ -136,7 +136,7 @@ TEST(FitBlur, AGivenFloorsErrorGoesIntoFocusAndRatio) {
   const double sigma_px2 = 0.5;
   const BlurFitResult fit = FitBlur(WithTexture(bench, 1e-3, sigma_px2, &random));
   ASSERT_TRUE(fit.done);
-  // A texture says nothing of the floor.
+  // A texture contains no information about the floor.
   EXPECT_NEAR(std::sqrt(fit.covariance(kFloorVariance, kFloorVariance)), sigma_px2,
               1e-3 * sigma_px2);
   const double per_px2 = bench.focus_mm / bench.Curvature();
@@ -144,7 +144,7 @@ TEST(FitBlur, AGivenFloorsErrorGoesIntoFocusAndRatio) {
               0.01 * per_px2 * sigma_px2);
   EXPECT_NEAR(fit.covariance(kFocusDepth, kFloorVariance), per_px2 * sigma_px2 * sigma_px2,
               0.01 * per_px2 * sigma_px2 * sigma_px2);
-  // Where the data say it better, their own error counts.
+  // If the data determine the floor better, their own error counts.
   BlurFitSetup edge = WithEdge(bench, 0.02, &random);
   const double alone = FitBlur(edge).covariance(kFloorVariance, kFloorVariance);
   edge.floor_variance_px2 = model::Estimate{bench.floor_px2, 2 * std::sqrt(alone)};
@@ -152,7 +152,7 @@ TEST(FitBlur, AGivenFloorsErrorGoesIntoFocusAndRatio) {
               1e-3 * alone);
 }
 
-// A knife edge in a texture: the one gives the floor, the other the precision.
+// A knife edge in a texture: the edge determines the floor, and the texture adds precision.
 TEST(FitBlur, EdgesAndTextureTogetherAreBetterThanEither) {
   const BlurBench bench = ExactBench();
   std::mt19937 random(1);
@@ -201,7 +201,8 @@ TEST(FitBlur, PreciseScalesTellTheReadingsErrors) {
         ++count;
       }
     }
-    // A common offset and stretch of the readings is the scales' law: that much stays unknown.
+    // A common offset and stretch of the readings is equivalent to the scale law, so that part
+    // stays unknown.
     EXPECT_LT(squares, 0.15 * drawn_squares);
     EXPECT_NEAR(std::sqrt(standardised / count), 1, 0.15);
   }
@@ -229,7 +230,7 @@ TEST(FitBlur, AReadingFarOffIsFoundAndDoesNoHarm) {
               std::sqrt(clean.covariance(kFocusDepth, kFocusDepth)));
 }
 
-// The blur is judged at the reading that is believed, not at the one that was written.
+// The blur is compared at the estimated reading, not at the written one.
 TEST(FitBlur, AReadingWithinItsErrorCostsNoWeight) {
   for (const BenchDirection direction : {BenchDirection::kAway, BenchDirection::kToward}) {
     BlurBench bench = ExactBench();
@@ -241,7 +242,7 @@ TEST(FitBlur, AReadingWithinItsErrorCostsNoWeight) {
     const BlurFitResult fit = FitBlur(setup);
     ASSERT_TRUE(fit.done);
     EXPECT_EQ(fit.weights.minCoeff(), 1);
-    EXPECT_NEAR(fit.reading_errors_mm[3], 0.9, 0.3);  // zf takes up a part
+    EXPECT_NEAR(fit.reading_errors_mm[3], 0.9, 0.3);  // zf absorbs a part
   }
 }
 
@@ -266,7 +267,7 @@ TEST(FitBlur, WeightIsLostBeyondFourStandardDeviationsOnly) {
   setup.estimators[0].variances_px2[20] += 16 * kErrorPx2;
   const BlurFitResult fit = FitBlur(setup);
   ASSERT_TRUE(fit.done);
-  // 4/16, the fit's own part in the frame aside.
+  // The weight is 4/16, apart from the influence of the frame on the fit.
   EXPECT_NEAR(fit.weights[20], 0.25, 0.03);
   EXPECT_EQ(fit.weights[8], 1);
   EXPECT_NEAR(fit.residuals[20], 16, 1);
@@ -283,12 +284,12 @@ TEST(FitBlur, OutliersDoLittleHarm) {
   ASSERT_TRUE(clean.done && fit.done);
   for (const int i : {4, 20}) EXPECT_LT(fit.weights[i], 0.1) << i;
   for (const int i : {kFocusDepth, kBlurRatio}) {
-    // Each pulls like one that is four standard deviations off.
+    // Each outlier has the influence of a sample that is four standard deviations off.
     EXPECT_NEAR(fit.values[i], clean.values[i], 3 * std::sqrt(clean.covariance(i, i))) << i;
   }
 }
 
-// A datum that has lost its weight is none: chi^2 and its degrees of freedom count what is left.
+// A sample without weight is not counted in chi^2 and its degrees of freedom.
 TEST(FitBlur, LostWeightCountsInTheDegreesOfFreedom) {
   BlurBench bench;
   std::mt19937 random(3);

@@ -1,4 +1,4 @@
-// How the error of the bench zero is carried into the results of a sweep that is short against it.
+// The error of the bench zero in the results of a sweep that is short compared with it.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -13,8 +13,8 @@ using thicklens::testing::BlurBench;
 using thicklens::testing::ExactBench;
 using thicklens::testing::FocusCase;
 
-// 20 mm of sweep, a zero that is good to 30 mm: each end of its error puts the whole sweep beside
-// where focus was. The oracle are fits there that start from their own data.
+// A sweep of 20 mm and a zero with an error of 30 mm: at each end of the interval, the whole sweep
+// is beside the former focus. The oracles are fits at these ends that start from their own data.
 TEST(FitBlur, CarriesOnTheZerosErrorOfAShortSweep) {
   constexpr double kZeroSigmaMm = 30;
   BlurBench bench = ExactBench();

@@ -20,7 +20,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using namespace thicklens::testing;
 
-// ---- the spectral estimator ----
+// ---- the spectral blur estimator ----
 
 TEST(MeasureBlur, ATexturesBlurIsThatOfTheLens) {
   MeasuredSweep m = Measured(Leaves());
@@ -31,7 +31,7 @@ TEST(MeasureBlur, ATexturesBlurIsThatOfTheLens) {
   EXPECT_EQ(evidence.edges, -1);
   ASSERT_EQ(evidence.setup.estimators.size(), 1U);
   EXPECT_EQ(evidence.message, "");
-  EXPECT_EQ(ticks, kFrames);  // what was expected was right: one pass
+  EXPECT_EQ(ticks, kFrames);  // the expectation was right, so there is one pass
   EXPECT_EQ(Spectrum(evidence).frames.size(), static_cast<std::size_t>(kFrames));
   ExpectTrueVariances(m, evidence, Spectrum(evidence), 0.02);
   ASSERT_EQ(evidence.frame_noise_ratios.size(), static_cast<std::size_t>(kFrames));
@@ -39,7 +39,8 @@ TEST(MeasureBlur, ATexturesBlurIsThatOfTheLens) {
   EXPECT_FALSE(evidence.setup.floor_variance_px2);
 }
 
-// Windows and bands are laid out for the blur that is expected: of a wrong focus, once more.
+// Windows and bands depend on the expected blur. If the expected focus is wrong, a second pass is
+// made.
 TEST(MeasureBlur, AWrongStartIsFoundOutAndRightedInASecondPass) {
   MeasuredSweep m = Measured(Leaves());
   const BlurEvidence right = m.Measure();
@@ -61,7 +62,7 @@ TEST(MeasureBlur, AWrongStartIsFoundOutAndRightedInASecondPass) {
   }
 }
 
-// Blur that is not what the usual ratio makes of the stated aperture.
+// The blur differs from that of the default ratio and the stated aperture.
 TEST(MeasureBlur, AWrongApertureIsFoundOutToo) {
   for (const double factor : {0.5, 2.0}) {
     SCOPED_TRACE(factor);
@@ -81,8 +82,8 @@ TEST(MeasureBlur, AWrongApertureIsFoundOutToo) {
   }
 }
 
-// Strong blur: a window laid out for a focus at the sweep's end holds few of the frames that a
-// window for the true one does.
+// Strong blur: a window for a focus at the end of the sweep contains few of the frames that a
+// window for the true focus contains.
 TEST(MeasureBlur, InStrongBlurTheLastPassIsLaidOutForTheTruth) {
   model::SweepSimulationOptions options = thicklens::testing::SweepCase("ii", kFieldPx, 3);
   options.drift_sigma_px = options.reading_sigma_mm = options.flicker = 0;
@@ -102,8 +103,8 @@ TEST(MeasureBlur, InStrongBlurTheLastPassIsLaidOutForTheTruth) {
   ExpectTrueVariances(m, evidence, Spectrum(evidence), 0.1);
 }
 
-// A frame that was gated and one that could not be registered: every sample is still said of its
-// own frame.
+// One frame was rejected and one could not be registered. Every sample must still refer to its own
+// frame.
 TEST(MeasureBlur, SamplesBelongToTheFramesThatTheyName) {
   MeasuredSweep m = Measured(Leaves());
   m.task->frames.erase(m.task->frames.begin() + 2);
@@ -125,7 +126,7 @@ TEST(MeasureBlur, SamplesBelongToTheFramesThatTheyName) {
 
 // ---- edges ----
 
-// Of frames by index, those that are least out of focus.
+// Indices of the frames that are least out of focus.
 std::vector<std::size_t> Sharpest(const MeasuredSweep& m, std::size_t count) {
   std::vector<std::size_t> order = m.task->frames;
   std::sort(order.begin(), order.end(),
@@ -144,13 +145,13 @@ TEST(MeasureBlur, AKnifeEdgeIsMeasuredThroughoutAndHasNoSoftness) {
   EXPECT_EQ(edges.frames.size(), static_cast<std::size_t>(kFrames));
   ExpectTrueVariances(m, evidence, edges, 0.02);
   EXPECT_FALSE(evidence.unstated_edges);
-  // d(sigma^2/s^2) = 2 sigma d sigma/s^2: a per cent or so of the variance.
+  // d(sigma^2/s^2) = 2 sigma d sigma/s^2: about a per cent of the variance.
   for (Eigen::Index i = 0; i < edges.covariance.rows(); ++i) {
     EXPECT_GT(std::sqrt(edges.covariance(i, i)), 0.001 * edges.variances_px2[i]);
     EXPECT_LT(std::sqrt(edges.covariance(i, i)), 0.05 * edges.variances_px2[i]);
     EXPECT_EQ(edges.covariance.row(i).cwiseAbs().sum(), edges.covariance(i, i));
   }
-  // The spectra are beside it, their constant left free.
+  // The spectra are used as well, with a free constant.
   ASSERT_GE(evidence.spectrum, 0);
   EXPECT_FALSE(Spectrum(evidence).held_softness_px2);
 }
@@ -179,7 +180,8 @@ TEST(MeasureBlur, OfATextureNoEdgesAreMeasured) {
   EXPECT_GE(evidence.spectrum, 0);
 }
 
-// Without spectra edges are all there is: every frame, the softness free unless it is a knife edge.
+// Without spectra only the edges are left: every frame is used, and the softness is free unless the
+// target is a knife edge.
 TEST(MeasureBlur, EdgesStandInWhereNothingRegisters) {
   for (const SweepTarget target :
        {SweepTarget::kAuto, SweepTarget::kPrintedEdge, SweepTarget::kKnifeEdge}) {
@@ -197,7 +199,7 @@ TEST(MeasureBlur, EdgesStandInWhereNothingRegisters) {
   }
 }
 
-// Four frames with an edge are no estimator.
+// Four frames with an edge are not enough for a blur estimator.
 TEST(MeasureBlur, TooFewFramesWithAnEdgeAreNoEstimator) {
   for (const std::size_t count : {4U, 5U}) {
     MeasuredSweep m = Measured(Edge(), SweepTarget::kKnifeEdge);
@@ -209,7 +211,7 @@ TEST(MeasureBlur, TooFewFramesWithAnEdgeAreNoEstimator) {
   }
 }
 
-// ---- what cannot be measured ----
+// ---- failed measurements ----
 
 TEST(MeasureBlur, FewerThanFiveRegisteredFramesAreReported) {
   MeasuredSweep m = Measured(Leaves(), SweepTarget::kTexture);
@@ -229,7 +231,7 @@ TEST(MeasureBlur, FramesThatDoNotOverlapAreReported) {
   EXPECT_THAT(evidence.message, HasSubstr("too few frames see enough of the same target"));
 }
 
-// A reference that is itself far out of focus, so that the window has no room for its blur.
+// The reference is far out of focus itself, so that the window is too small for its blur.
 TEST(MeasureBlur, ABlurredReferenceIsNoReference) {
   MeasuredSweep m = Measured(Leaves(), SweepTarget::kTexture);
   m.simulated.sweep.camera.lens.aperture_radius_mm *= 8;

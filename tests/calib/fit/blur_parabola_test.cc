@@ -84,11 +84,12 @@ TEST(FitParabola, AQuarterOfWrongSamplesIsNamedAndLeftOut) {
   }
 }
 
-// A reading that is off by dz is off by slope dz in V: far from focus much, at focus nothing.
+// A reading that is wrong by dz changes V by slope dz: strongly far from focus, and not at all in
+// focus.
 TEST(FitParabola, ReadingsErrorsCountBySlope) {
   Drawn drawn = Draw(31, 0.01, 0, 1);
   const double reading_sigma_mm = 0.5;
-  // Three standard deviations of the reading at the end, forty of the blur.
+  // The change is three standard deviations of the reading at the end, and forty of the blur.
   drawn.variances_px2[30] += 2 * kCurve * (460 - kVertexMm) * 1.5;
   EXPECT_TRUE(drawn.Fit(reading_sigma_mm).follows[30]);
   EXPECT_FALSE(drawn.Fit(0).follows[30]);
@@ -101,7 +102,7 @@ TEST(FitParabola, ReadingsErrorsCountBySlope) {
               0.03 * parabola.sigmas_px2[0]);
 }
 
-// No lens follows the law better than to 0.002 of the blur's range.
+// No lens follows the law with a smaller error than 0.002 of the blur's range.
 TEST(FitParabola, AllowsForTheErrorOfTheModelItself) {
   Drawn drawn = Draw(31, 1e-4, 0, 1);
   const double range = drawn.variances_px2.maxCoeff() - drawn.variances_px2.minCoeff();
@@ -125,7 +126,8 @@ TEST(FitParabola, GivesTheSameEveryTime) {
   EXPECT_EQ(drawn.Fit().vertex_mm, drawn.Fit().vertex_mm);
 }
 
-// Any c leaves vertex and curve alone, so a texture starts the fit as well as an edge.
+// The vertex and the curve do not depend on c, so a texture is as good a start of the fit as an
+// edge.
 TEST(FromParabola, GivesFocusAndRatioByBothModelsWhateverTheSoftness) {
   for (const BlurModel law : {BlurModel::kPerspective, BlurModel::kTelecentric}) {
     for (const double softness_px2 : {0.0, 2.0, -0.9}) {
@@ -152,7 +154,7 @@ TEST(FromParabola, SaysNothingWhereTheBlurHasNoMinimumAboveTheFloor) {
   std::mt19937 random(1);
   const BlurFitSetup setup = bench.Setup(&random);
   Drawn drawn = Draw(15, 0.01, 0, 1);
-  const double a = kCurve * 400 * 400;  // of z^2, times the reference's depth squared
+  const double a = kCurve * 400 * 400;  // for z^2, times the reference's depth squared
   EXPECT_TRUE(FromParabola(drawn.Fit(), setup, 400, 0.99 * a));
   EXPECT_FALSE(FromParabola(drawn.Fit(), setup, 400, 1.01 * a));
   drawn.variances_px2 *= -1;

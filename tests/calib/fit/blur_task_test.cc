@@ -1,4 +1,4 @@
-// What a measurement of the blur takes over from its task: places, scales, expectations.
+// Data that a measurement of the blur copies from its task: places, scales, expectations.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -14,7 +14,7 @@ namespace {
 using model::SweepTarget;
 using ::testing::ElementsAre;
 
-// A task whose frames need not be read: nothing registers, and edges are not looked for.
+// A task whose frames need not be read: no frame is registered, and edges are not searched.
 struct Unread {
   FocusSweep sweep;
   FrameStore store{sweep};
@@ -80,7 +80,8 @@ TEST(MeasureBlur, ARegisteredScaleCountsMoreThanTheReadingsUnlessItCannotBeRight
   for (const FitFrame& frame : setup.frames) EXPECT_FALSE(frame.scale_sigma);
 }
 
-// Only then do scales tell readings' errors; the reference's scale is 1 whatever its reading.
+// Only then do the scales determine the errors of the readings. The scale of the reference is 1
+// whatever its reading is.
 TEST(MeasureBlur, ScalesThatFollowTheReadingsKeepTheirErrors) {
   Unread u(6);
   for (const std::size_t i : {1U, 3U, 4U})
@@ -112,7 +113,7 @@ TEST(MeasureBlur, TheFloorThatIsAssumedIsTheOneThatIsKnown) {
   EXPECT_NEAR(MeasureBlur(u.task).assumed_floor_px2, 0.49, 1e-12);
 }
 
-// What the spectral estimator is told of every frame, by hand.
+// The input of the spectral blur estimator for every frame, computed by hand.
 TEST(MeasureBlur, TheSpectralMeterGetsTheExpectedBlur) {
   Unread u(4);  // too few to be measured
   u.sweep.roi = {100, 80, 320, 200};
@@ -132,7 +133,7 @@ TEST(MeasureBlur, TheSpectralMeterGetsTheExpectedBlur) {
   EXPECT_EQ(estimator.frames[0].place.shift_px, Eigen::Vector2d(1, 2));
   EXPECT_EQ(estimator.frames[0].rotation_rad, 0.01);
   EXPECT_EQ(estimator.frames[0].pixel_noise, 0.004);
-  // (S0 + (kappa r_defocus/p)^2)/scale^2 with kappa .45, at 350 mm, in focus at 380.
+  // (S0 + (kappa r_defocus/p)^2)/scale^2 with kappa 0.45, at 350 mm, in focus at 380.
   const double radius_mm = model::BlurRadiusMm(
       u.sweep.camera.lens, model::ImageDistanceMm(u.sweep.camera.lens, 380), 350);
   const double scale = 370.0 / 350;

@@ -1,5 +1,5 @@
-// The readings' errors eliminated from the fit of the blur, against a plain reference that keeps
-// them: one dense matrix, derivatives by complex steps, which are exact to rounding.
+// The fit of the blur eliminates the errors of the readings. It is compared with a plain reference
+// that keeps them: one dense matrix, and derivatives by complex steps, which are exact to rounding.
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
@@ -25,7 +25,7 @@ using thicklens::testing::WithTexture;
 
 using Complex = std::complex<double>;
 
-// V of a frame, px^2 of the target, as the source has it.
+// V of a frame, px^2 of the target, as the paper defines it.
 Complex PlainVariance(const BlurFitSetup& setup, const Eigen::Vector4cd& global, Complex depth_mm,
                       double scale) {
   const double f1 = setup.lens.front_focal_length_mm;
@@ -37,8 +37,8 @@ Complex PlainVariance(const BlurFitSetup& setup, const Eigen::Vector4cd& global,
   return (global[kFloorVariance] + sigma_px * sigma_px) / (scale * scale);
 }
 
-// With the regularisation that keeps it whole: of a sample before it is weighted, of the reference
-// after.
+// The covariance with its small diagonal regularisation, which is added to a sample before it is
+// weighted, and to the reference after.
 Eigen::MatrixXd WeightedCovariance(const Eigen::MatrixXd& covariance,
                                    const Eigen::VectorXd& weights) {
   const Eigen::VectorXd variances = covariance.diagonal();
@@ -55,7 +55,8 @@ Eigen::MatrixXd WeightedCovariance(const Eigen::MatrixXd& covariance,
   return weighted;
 }
 
-// The whole problem: global, softness of each estimator, scale law, error of each reading.
+// The whole problem: global parameters, softness of each blur estimator, scale law, error of each
+// reading.
 struct Reference {
   const BlurFitSetup& setup;
   const BlurWeights& weights;
@@ -125,7 +126,7 @@ struct Reference {
     }
     return jacobian;
   }
-  // Of the columns named, by SVD of them all.
+  // Covariance of the named columns, by the SVD of all columns.
   static Eigen::MatrixXd Covariance(const Eigen::MatrixXd& jacobian) {
     const Eigen::VectorXd norms = jacobian.colwise().norm();
     const Eigen::JacobiSVD<Eigen::MatrixXd> svd(jacobian * norms.cwiseInverse().asDiagonal(),
@@ -136,7 +137,7 @@ struct Reference {
   }
 };
 
-// Edges on every other frame and a relative estimator, scales, weights lost here and there.
+// Edges on every other frame and a relative blur estimator, with scales, some with reduced weights.
 struct SmallCase {
   BlurFitSetup setup;
   BlurWeights weights;
@@ -261,8 +262,8 @@ TEST(ReadingErrorProjection, GivesTheCovarianceOfTheWholeProblem) {
         ASSERT_EQ(residuals.rows(), values.size());
         EXPECT_LT((reduced.values - values).norm(), 1e-9 * values.norm());
 
-        // What is held (the bench zero; the floor, which one sweep does not tell from softness)
-        // has no column.
+        // Fixed parameters have no column: the bench zero, and the floor, which one sweep cannot
+        // distinguish from softness.
         std::vector<Eigen::Index> few = {kFocusDepth, kBlurRatio, 4, 5, 6, 7, 8};
         std::vector<Eigen::Index> all = few;
         for (Eigen::Index f = 0; f < 15; ++f) all.push_back(reference.Few() + f);
@@ -296,7 +297,7 @@ TEST(ReadingErrorProjection, LeavesTheGradientOfTheWholeProblem) {
     const Eigen::MatrixXd jacobian = reference.Jacobian(u);
     const Eigen::VectorXd values = reference.Residuals(u.cast<Complex>()).real();
     const Eigen::VectorXd gradient = jacobian.transpose() * values;
-    // In the units of the sum whose terms cancel.
+    // The unit is that of the sum whose terms cancel.
     for (Eigen::Index f = 0; f < 15; ++f) {
       EXPECT_LT(std::abs(gradient[reference.Few() + f]),
                 1e-6 * jacobian.col(reference.Few() + f).norm() * values.norm())
@@ -306,7 +307,7 @@ TEST(ReadingErrorProjection, LeavesTheGradientOfTheWholeProblem) {
     const Eigen::VectorXd left = reduced.jacobian.transpose() * reduced.values;
     for (Eigen::Index p = 0; p < reference.Few(); ++p)
       EXPECT_NEAR(left[p], gradient[p], 1e-5 * jacobian.col(p).norm() * values.norm()) << p;
-    // No other errors nearby are better.
+    // No other errors nearby give a smaller sum.
     std::mt19937 random(5);
     std::normal_distribution<double> normal(0, 0.1 * reading_sigma_mm);
     for (int trial = 0; trial < 50; ++trial) {
@@ -324,8 +325,8 @@ TEST(ReadingErrorProjection, RefusesWhatLiesBehindTheLens) {
   EXPECT_FALSE(SolveErrors(residuals, &c.point));
 }
 
-// Not only the covariance: the answer is a minimum of the whole problem, errors and all, also where
-// the readings' errors are as large as the depth of field (case ii of the sweeps).
+// The answer, and not only the covariance, is a minimum of the whole problem, including the errors,
+// even if the errors of the readings are as large as the depth of field (case ii of the sweeps).
 TEST(ReadingErrorProjection, FitBlurEndsAtTheMinimumOfTheWholeProblem) {
   for (const bool is_steep : {false, true}) {
     SCOPED_TRACE(is_steep);
@@ -358,7 +359,7 @@ TEST(ReadingErrorProjection, FitBlurEndsAtTheMinimumOfTheWholeProblem) {
     const Eigen::MatrixXd jacobian = reference.Jacobian(u)(Eigen::all, all);
     const Eigen::VectorXd values = reference.Residuals(u.cast<Complex>()).real();
     const Eigen::MatrixXd covariance = Reference::Covariance(jacobian);
-    // What one more step of the whole problem would move, in standard deviations.
+    // The change that one more step of the whole problem would make, in standard deviations.
     const Eigen::VectorXd step = covariance * (jacobian.transpose() * values);
     for (Eigen::Index i = 0; i < step.size(); ++i)
       EXPECT_LT(std::abs(step[i]), 2e-3 * std::sqrt(covariance(i, i))) << i;

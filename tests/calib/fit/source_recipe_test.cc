@@ -19,8 +19,8 @@ FrameMeasurement Frame(double depth_mm, double slope, double normalised, double 
   return frame;
 }
 
-// f1 = f2 = 50 mm, r = 10 mm, 5 um, in focus at 300 mm: K = 60 mm, so that the blur's radius is
-// 10 60 |1/z - 1/300|/0.005 px.
+// f1 = f2 = 50 mm, r = 10 mm, 5 um, in focus at 300 mm: K = 60 mm, so that the radius of the blur
+// is 10 60 |1/z - 1/300|/0.005 px.
 model::Camera ThinCamera() {
   model::Camera camera;
   camera.lens = testing::ThinLens(50, 10);
@@ -46,7 +46,7 @@ TEST(RunSourceRecipe, IsTheSharpestFrameAndTheMeanOfRatios) {
   EXPECT_NEAR(recipe.image_distance_mm, 60, 1e-12);
   EXPECT_EQ(recipe.ratio_frames, 3);
   EXPECT_NEAR(recipe.blur_ratio, (9.0 / 80 + 7 * 31.0 / 400 + 20.0 / 100) / 3, 1e-12);
-  // By brightness another frame is the sharpest.
+  // By brightness, another frame is the sharpest.
   EXPECT_EQ(recipe.sharpest_normalised_frame, 4);
   EXPECT_EQ(recipe.normalised_focus_depth_mm, 310);
 }
@@ -64,7 +64,7 @@ TEST(RunSourceRecipe, WithoutABlurredEdgeThereIsNoRatio) {
   EXPECT_EQ(recipe.focus_depth_mm, 300);
 }
 
-// Two frames at the sharpest's depth: neither says anything of the ratio.
+// Two frames are at the depth of the sharpest one. Neither determines the ratio.
 TEST(RunSourceRecipe, FramesInThePlaneOfFocusAreLeftOut) {
   std::vector<FrameMeasurement> frames = Frames();
   frames.push_back(Frame(300, 4, 1, 3));

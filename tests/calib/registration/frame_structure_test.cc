@@ -1,4 +1,4 @@
-// What belongs to the frame or to the light, found in simulated sweeps that are spoilt by it.
+// Structure of the frame or of the light, found in simulated sweeps that contain it.
 #include "calib/registration/frame_structure.h"
 
 #include <gmock/gmock.h>
@@ -49,7 +49,7 @@ TEST(FrameStructure, ACleanSweepHasNone) {
   EXPECT_FALSE(found.HasFixedStructure());
   EXPECT_EQ(StructureInWords(found), "");
   ASSERT_TRUE(found.vignetting && found.bands && found.fixed_structure) << "and it was looked for";
-  // A small image cannot exclude a weak one, and says so.
+  // A small image cannot exclude weak vignetting, and its stated error shows that.
   EXPECT_LT(found.vignetting->sigma, 0.3);
   EXPECT_FALSE(VignettingIsExcluded(found));
 }
@@ -60,7 +60,7 @@ TEST(FrameStructure, VignettingIsMeasured) {
     Vignette(&s, loss);
     const FrameStructureFinding found = Found(s);
     ASSERT_TRUE(found.HasVignetting()) << loss;
-    // ln(1 - loss q) is no parabola: what is found is its slope over the middle of the field.
+    // ln(1 - loss q) is not a parabola; the result is its slope over the middle of the field.
     EXPECT_NEAR(found.vignetting->value, std::log(1 - loss), 0.35 * -std::log(1 - loss));
     EXPECT_FALSE(found.HasBands() || found.HasFixedStructure());
     EXPECT_THAT(StructureInWords(found), AllOf(HasSubstr("the corners are"), HasSubstr("darker"),
@@ -68,7 +68,7 @@ TEST(FrameStructure, VignettingIsMeasured) {
   }
 }
 
-// A lamp that flickers under a rolling shutter: bands with a phase of their own in each frame.
+// A lamp that flickers under a rolling shutter makes bands with an independent phase in each frame.
 void AddBands(SimulatedSweep* s, double amplitude, double period_px, bool along_columns) {
   std::mt19937 engine(3);
   for (cv::Mat& frame : *s->stored) {
@@ -91,14 +91,14 @@ TEST(FrameStructure, BandsOfTheLightAreFoundAlongTheirDirection) {
     const FrameStructureFinding found = Found(s);
     ASSERT_TRUE(found.HasBands());
     EXPECT_EQ(found.bands_are_columns, along_columns);
-    // The ratio of two sines of random phases has their amplitude as its standard deviation.
+    // The ratio of two sines with random phases has the standard deviation of their amplitude.
     EXPECT_NEAR(found.bands->value, 0.1 / std::sqrt(2.0), 0.02);
     EXPECT_THAT(StructureInWords(found),
                 HasSubstr(along_columns ? "whole columns brighten" : "whole rows brighten"));
   }
 }
 
-// A target that is striped itself says nothing of the light.
+// The stripes of a target are not evidence of bands in the light.
 TEST(FrameStructure, AStripedTargetIsNotTakenForBands) {
   model::SweepSimulationOptions options = SweepCase("ii", kSizePx, 1);
   options.target.kind = model::TargetKind::kPrintedEdge;
@@ -110,7 +110,7 @@ TEST(FrameStructure, WhatStaysOnTheSensorIsFound) {
   SimulatedSweep s = DeepCopy(Clean());
   const cv::Size size = s.frame(0).size();
   cv::Mat gain(size, CV_32F, cv::Scalar(1));
-  // Near the corners, where the target moves by more than a speck is wide.
+  // The specks are near the corners, where the target moves by more than the width of a speck.
   for (const int x : {36, 47, 145, 156}) {
     for (const int y : {36, 47, 145, 156}) gain -= 0.3 * Spot(size, cv::Point2d(x, y), 2);
   }

@@ -1,4 +1,4 @@
-// The laws by which the image scale can go with the readings, on samples that are made up.
+// The laws that relate the image scale to the readings, tested on synthetic samples.
 #include "thicklens/calib/image_scale.h"
 
 #include <gmock/gmock.h>
@@ -82,7 +82,7 @@ TEST(FitScaleModel, AFewWrongReadingsDoNotMoveIt) {
   EXPECT_EQ(law.frames_used, 27);
 }
 
-// Scales with errors of their own, told of them.
+// Adds errors to the scales and states them.
 void AddScaleErrors(double sigma, unsigned seed, std::vector<ScaleSample>* samples) {
   std::mt19937 random(seed);
   std::normal_distribution<double> noise(0, 1);
@@ -94,7 +94,7 @@ void AddScaleErrors(double sigma, unsigned seed, std::vector<ScaleSample>* sampl
 }
 
 TEST(FitScaleModel, ScalesAreWeightedByTheirOwnErrors) {
-  // Every other scale is bad and says so.
+  // Every other scale is bad, and its stated error shows that.
   constexpr int kRuns = 60;
   double reported = 0, untold = 0;
   for (unsigned run = 0; run < kRuns; ++run) {
@@ -163,7 +163,7 @@ TEST(FitScaleModel, AFifthOfTheFramesMayBeWrong) {
   }
 }
 
-// The readings of a bench, in any other order than the frames'.
+// The readings of a bench in an order that differs from that of the frames.
 TEST(FitScaleModel, ReadingsInARandomOrderFollowNoModel) {
   for (const int count : {7, 15, 41, 131}) {
     for (unsigned seed = 1; seed <= 20; ++seed) {
@@ -184,8 +184,8 @@ TEST(FitScaleModel, ReadingsInARandomOrderFollowNoModel) {
   }
 }
 
-// Frames taken at even steps of 1/z, whose table is sorted the wrong way round or in no way at all:
-// the readings are those of the sweep. Mirrored, such readings lie on no line.
+// Frames were taken at even steps of 1/z, and their table is sorted in reverse or not at all, so
+// the readings are those of the sweep. If they are mirrored, such readings are not on a line.
 TEST(FitScaleModel, ReadingsOfTheSweepBesideOtherFramesAreRecognised) {
   for (const BenchDirection direction : {BenchDirection::kAway, BenchDirection::kToward}) {
     for (unsigned seed = 1; seed <= 20; ++seed) {
@@ -218,8 +218,8 @@ TEST(FitScaleModel, ReadingsOfTheSweepBesideOtherFramesAreRecognised) {
   }
 }
 
-// Readings on a line but for errors that nobody stated. What is reported is about their size, and
-// where it is stated the law holds.
+// The readings are on a line except for errors that were not stated. The advice gives about their
+// size, and if that size is stated, the law holds.
 TEST(FitScaleModel, CoarseReadingsGetTheAdviceToStateTheirError) {
   constexpr double kSigmaMm = 3;
   int reported = 0;
@@ -239,7 +239,7 @@ TEST(FitScaleModel, CoarseReadingsGetTheAdviceToStateTheirError) {
   EXPECT_GT(reported, 5);
 }
 
-// A third of the readings far off is no coarse scale.
+// If a third of the readings are far off, they are not just coarse.
 TEST(FitScaleModel, ManyWrongReadingsAreNotReportedAsCoarse) {
   auto samples = Samples(20, BenchDirection::kAway, 30, 0.05, 3);
   for (std::size_t i = 0; i < samples.size(); i += 3) samples[i].reading_mm += 25 + 2.0 * double(i);
@@ -262,7 +262,7 @@ TEST(FitScaleModel, RefusesAConstantScale) {
   }
 }
 
-// Half a millimetre at 2 m changes the scale by 2.5e-4, which errors of 3e-4 hide.
+// Half a millimetre at 2 m changes the scale by 2.5e-4, less than the errors of 3e-4.
 TEST(FitScaleModel, TooShortARangeDeterminesNothing) {
   std::vector<ScaleSample> samples;
   for (std::size_t i = 0; i < 9; ++i) {
@@ -278,7 +278,7 @@ TEST(FitScaleModel, TooShortARangeDeterminesNothing) {
   EXPECT_EQ(law.kind, ScaleKind::kUnknown);
   EXPECT_THAT(law.message, HasSubstr("too little to tell"));
   EXPECT_THAT(law.message, EndsWith("extend the sweep"));
-  // Without the errors it is seen for what it is.
+  // Without the errors the law is found.
   for (ScaleSample& s : samples) {
     s.scale = 2000.25 / s.reading_mm;
     s.registration.scale_sigma = 1e-6;
@@ -340,7 +340,7 @@ TEST(FitScaleModel, RefusesFewerThanFiveDifferentReadings) {
   EXPECT_THAT(law.message, HasSubstr("5 are needed at different readings"));
 }
 
-// Cubic terms by the closed form k (1 - 1/s^2), with errors and wrong ones among them.
+// Cubic terms from the closed form k (1 - 1/s^2), with errors and with some wrong ones.
 TEST(FitScaleModel, ReportsTheDistortionOfTheCorner) {
   constexpr double kCornerPx = 360, kDistortion = -0.012;
   const double k = kDistortion / (kCornerPx * kCornerPx);
@@ -368,7 +368,7 @@ TEST(FitScaleModel, ReportsTheDistortionOfTheCorner) {
   EXPECT_LT(std::sqrt(squares), 1.3);
 }
 
-// Strong distortion is known badly where the registrations are bad; that it is there is clear.
+// Strong distortion is determined badly if the registrations are bad, but its existence is certain.
 TEST(FitScaleModel, StrongDistortionIsReportedHoweverUncertain) {
   constexpr double kCornerPx = 360, kPerSquare = 1 / (kCornerPx * kCornerPx);
   auto samples = Samples(20, BenchDirection::kAway, 31, 0.05, 9);
@@ -391,7 +391,7 @@ TEST(FitScaleModel, StrongDistortionIsReportedHoweverUncertain) {
   EXPECT_FALSE(at_corner(0.04)) << "two standard deviations";
 }
 
-// What is not known of the distortion is not known of the offset either.
+// The uncertainty of the distortion makes the offset uncertain as well.
 TEST(FitScaleModel, UncertainDistortionWidensTheOffset) {
   auto samples = Samples(20, BenchDirection::kAway, 31, 0.05, 9);
   double narrow_mm = 0;

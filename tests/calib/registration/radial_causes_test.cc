@@ -1,5 +1,5 @@
-// What is named where the frames lie against one another like distorted images, or the readings
-// bend against the image scale.
+// Causes that are named if the frames are related to one another like distorted images, or if the
+// readings are a nonlinear function of the image scale.
 #include "calib/registration/radial_causes.h"
 
 #include <gmock/gmock.h>
@@ -34,7 +34,7 @@ TEST(CheckDistortion, IsSilentWithoutASignificantOne) {
   EXPECT_TRUE(small.warnings.empty() && none.warnings.empty() && small.diagnoses.empty());
 }
 
-// A flat target and a lens that distorts look like a straight lens and a target that is not flat.
+// A flat target with a distorting lens looks like a target that is not flat with a perfect lens.
 TEST(CheckDistortion, NamesLensAndTargetWhereNothingElseIsSeen) {
   Calibration c = Distorted(0.02, 0.001);
   EXPECT_FALSE(CheckDistortion(&c));
@@ -49,7 +49,7 @@ TEST(CheckDistortion, NamesLensAndTargetWhereNothingElseIsSeen) {
                c.diagnoses[0].Names(kFixedStructureShifts));
 }
 
-// What a small sweep cannot show stays among the causes.
+// Causes that a small sweep cannot exclude stay in the list.
 TEST(CheckDistortion, WhatIsNotExcludedIsNamedToo) {
   Calibration c = Distorted(0.02, 0.001);
   c.structure.vignetting->sigma = 0.2;
@@ -65,7 +65,7 @@ TEST(CheckDistortion, RefusesWhatCannotBeAllowedFor) {
               AllOf(HasSubstr("-14.0 +- 3.0 % at the corner (barrel)"), HasSubstr("undistort")));
 }
 
-// A gear in steps on a stage came out as "+158.8 % pincushion".
+// A stage with a stepped gear gave "+158.8 % pincushion".
 TEST(CheckDistortion, WhatNoLensDoesIsNotBlamedOnTheLens) {
   Calibration c = Distorted(1.588, 0.05);
   EXPECT_THAT(CheckDistortion(&c).value_or(""),
@@ -106,7 +106,7 @@ TEST(ScaleNonlinearity, NamesWhatTheFramesShow) {
               AllOf(HasSubstr("measure offset_mm"), Not(HasSubstr("rail"))));
 }
 
-// Frames of one scale show no distortion, whatever their registrations' cubic terms are.
+// Frames of one scale show no distortion, whatever the cubic terms of their registrations are.
 TEST(FitRadialDistortion, IsNothingWhereTheScaleDoesNotChange) {
   std::vector<ScaleSample> samples(31);
   for (std::size_t i = 0; i < samples.size(); ++i) {

@@ -17,7 +17,7 @@ using ::testing::Not;
 
 constexpr double kOffsetMm = 30, kReferenceMm = 400;
 
-// A sweep of 21 frames at every fifth millimetre, its scales as 1/z with a little noise.
+// A sweep of 21 frames at every fifth millimetre, with scales as 1/z and a little noise.
 struct Bench {
   FocusSweep sweep;
   std::vector<FrameMeasurement> frames;
@@ -91,7 +91,7 @@ TEST(RejectWrongReadings, NamesAShiftedReadingWithItsAmount) {
       const double right_mm = bench.frames[7].reading_mm;
       bench.SetReading(7, right_mm + error_mm);
       ASSERT_EQ(bench.Reject(), Indices{7});
-      // Written minus what it should be; the reading's own error is in it.
+      // The written reading minus the right one. It includes the error of the reading.
       EXPECT_NEAR(bench.frames[7].reading_error_mm, error_mm, 0.2);
       const std::string amount = error_mm > 0 ? "off by 2." : "off by -12.";
       EXPECT_THAT(bench.frames[7].rejection, AllOf(HasSubstr(amount), Not(HasSubstr("swapped"))));
@@ -153,7 +153,7 @@ TEST(RejectWrongReadings, NamesARepeatedImageBothWays) {
   EXPECT_THAT(bench.frames[3].rejection, HasSubstr("frame-9.png"));
 }
 
-// Two images of one reading may well be equal (an averaged pair, a copy): no reading is in doubt.
+// Two images of one reading may be equal (an averaged pair, a copy), so no reading is in doubt.
 TEST(RejectWrongReadings, TheImageOfOneReadingMayBeThereTwice) {
   Bench bench;
   bench.frames[9].statistics.content_hash = bench.frames[3].statistics.content_hash;
@@ -163,7 +163,7 @@ TEST(RejectWrongReadings, TheImageOfOneReadingMayBeThereTwice) {
   EXPECT_EQ(bench.Reject(), Indices{});
 }
 
-// Of three the message must name one that stands at another reading.
+// If there are three equal images, the message must name one that is at another reading.
 TEST(RejectWrongReadings, ARepeatedImageIsComparedWithOneOfAnotherReading) {
   Bench bench;
   for (const std::size_t i : {5U, 9U}) {
@@ -201,7 +201,7 @@ TEST(ReasonAgainstScales, OneImageForAllFramesIsRecognised) {
   const auto reason = bench.Reason();
   ASSERT_TRUE(reason);
   EXPECT_THAT(*reason, AllOf(HasSubstr("one image was repeated"), HasSubstr("21 frames")));
-  // A few copies are the frames' own matter.
+  // A few copies only concern these frames.
   for (std::size_t i = 3; i < 21; ++i) bench.frames[i].statistics.content_hash = i;
   bench.law.kind = ScaleKind::kInverseDepth;
   EXPECT_FALSE(bench.Reason());
@@ -212,7 +212,7 @@ TEST(ReasonAgainstScales, ReversedReadingsForbidAResult) {
   bench.law = {};
   bench.law.kind = ScaleKind::kReversed;
   bench.law.message = "direction must be 'toward'";
-  bench.sweep.offset_mm = model::Estimate{30, 0.1};  // even where the bench zero is known
+  bench.sweep.offset_mm = model::Estimate{30, 0.1};  // even if the bench zero is known
   EXPECT_EQ(bench.Reason(), "direction must be 'toward'");
 }
 
@@ -229,7 +229,7 @@ TEST(ReasonAgainstScales, AConstantScaleNeedsTheBenchZero) {
   EXPECT_FALSE(bench.Reason());
 }
 
-// The law of a star, from the readings' scales.
+// The law of a star, whose scales are computed from the readings.
 ScaleModel StarModel() {
   Bench bench;
   for (ScaleSample& sample : bench.samples) sample.scale_is_from_reading = true;

@@ -1,4 +1,4 @@
-// Registration against textures that are known in closed form, and against simulated sweeps.
+// Registration is compared with textures that are known in closed form and with simulated sweeps.
 #include "calib/registration/registration.h"
 
 #include <gtest/gtest.h>
@@ -45,7 +45,7 @@ TEST(Register, FindsScaleRotationAndShiftOfAHandHeldRail) {
   }
 }
 
-// The centre is the caller's: shift and scale about another pixel describe the same map.
+// The caller chooses the centre: shift and scale about another pixel describe the same map.
 TEST(Register, ShiftIsAboutTheGivenCentre) {
   const WaveImage texture(2);
   View view;
@@ -75,7 +75,7 @@ TEST(Register, SymmetricBlurDoesNotBias) {
   }
 }
 
-// A disc turns the sign of what lies beyond its first zero, here at 0.12 cycles per px.
+// A disc changes the sign of frequencies beyond its first zero, here at 0.12 cycles per px.
 TEST(Register, ADiscsTurnedSignsDoNotBias) {
   const WaveImage texture(9);
   View disc;
@@ -104,7 +104,8 @@ TEST(Register, GainOffsetAndSlopeOfTheLightDoNotBias) {
   EXPECT_NEAR(uneven->shift_px.x(), even->shift_px.x(), 0.02);
 }
 
-// Both images distorted by x' = X (1 + k X^2): the closed form says k (1 - 1/s^2) is left over.
+// Both images are distorted by x' = X (1 + k X^2). In closed form, the remaining distortion is k
+// (1 - 1/s^2).
 TEST(Register, FindsRadialDistortionAsACubicTerm) {
   const WaveImage texture(5);
   const double k = 0.02 / (2 * kMiddlePx * kMiddlePx);  // 2 % at the corner
@@ -134,7 +135,8 @@ TEST(Register, WithoutDistortionTheCubicTermIsNothing) {
   EXPECT_LT(found->cubic_sigma * kMiddlePx * kMiddlePx, 2e-3);
 }
 
-// A known cubic term instead of a free one: less scatter, and the answer of the affine map.
+// With a known cubic term instead of a free one, the scatter is smaller and the answer is that of
+// the affine map.
 TEST(FreeRegistration, AKnownCubicTermMakesTheScaleSurer) {
   const WaveImage texture(7);
   View view;
@@ -191,7 +193,7 @@ TEST(Register, RejectsBlankAndTinyImages) {
   EXPECT_FALSE(Register(image, image, 9, kCentre));  // 28 px of the reference would be left
 }
 
-// Frames of a simulated sweep, their true scales to the middle one.
+// Frames of a simulated sweep, with their true scales relative to the middle one.
 struct Frames {
   std::vector<cv::Mat> grey;
   std::vector<double> scale;
@@ -215,7 +217,8 @@ Frames Simulated(const std::string& name, model::TargetKind kind, std::uint64_t 
   return frames;
 }
 
-// Spokes look the same at any scale, a lone edge along it: no answer instead of a wrong one.
+// Spokes look the same at any scale, and a lone edge at any scale along it. The test expects no
+// answer instead of a wrong one.
 TEST(Register, RejectsTargetsWithoutAScale) {
   for (const char* name : {"i", "ii", "iv"}) {
     for (const model::TargetKind kind :
@@ -228,7 +231,7 @@ TEST(Register, RejectsTargetsWithoutAScale) {
   }
 }
 
-// Errors over the stated sigma, started half a per cent off.
+// Errors divided by the stated sigma. The registration starts half a per cent off.
 struct Pull {
   double square = 0, worst = 0;
   int count = 0, missed = 0;
@@ -265,7 +268,7 @@ TEST(Register, StatedSigmaIsTheErrorOnSimulatedSweeps) {
   EXPECT_LT(pull.worst, 4e-4);
 }
 
-// Up to 9 px of blur, on 256 px.
+// Up to 9 px of blur on 256 px.
 TEST(Register, StatedSigmaIsTheErrorWhereDefocusIsStrong) {
   Pull pull;
   std::uint64_t seed = 21;

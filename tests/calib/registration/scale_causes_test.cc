@@ -1,4 +1,4 @@
-// Which cause is named for the way in which the image scale goes with the readings.
+// Causes that are named for the relation between image scale and readings.
 #include "calib/registration/scale_causes.h"
 
 #include <gmock/gmock.h>
@@ -51,8 +51,8 @@ FocusSweep Bench() {
 
 constexpr double kRatio = 0.45, kFloorPx = 0.5;
 
-// A sample of scale `scale` whose blur has the sigma `blur_px`, as the registrations see it: with
-// an error of a tenth.
+// A sample of scale `scale` whose blur has the sigma `blur_px`, with an error of a tenth as from
+// the registrations.
 ScaleSample Sample(std::size_t frame, double reading_mm, double scale, double blur_px,
                    std::mt19937* random) {
   std::normal_distribution<double> normal(0, 1);
@@ -67,8 +67,8 @@ ScaleSample Sample(std::size_t frame, double reading_mm, double scale, double bl
   return sample;
 }
 
-// Of a target that moves through focus at `focus_mm`, by the blur law; `reading` says what is
-// written down at a depth.
+// Samples of a target that moves through focus at `focus_mm`, by the blur law. `reading` returns
+// the written reading for a depth.
 std::vector<ScaleSample> MovingTarget(FocusSweep* sweep, double focus_mm, double half_mm,
                                       const std::function<double(double)>& reading) {
   std::mt19937 random(5);
@@ -88,7 +88,8 @@ std::vector<ScaleSample> MovingTarget(FocusSweep* sweep, double focus_mm, double
   return samples;
 }
 
-// Of a lens that moves before a target at 300 mm: the distance to the sensor is 60 mm in focus.
+// Samples of a lens that moves before a target at 300 mm; the distance to the sensor is 60 mm in
+// focus.
 std::vector<ScaleSample> MovingLens(FocusSweep* sweep, double half_mm,
                                     const std::function<double(double)>& reading) {
   constexpr double kInFocusMm = 60;
@@ -152,7 +153,7 @@ TEST(ScaleCauses, ReversedReadingsNameTheDirectionAlone) {
               AllOf(HasSubstr("direction must be 'toward'"), Not(HasSubstr("lens"))));
 }
 
-// At a magnification of 1 the blur grows alike whether the lens or the target moves.
+// At a magnification of 1, the blur grows equally whether the lens or the target moves.
 TEST(ScaleCauses, LensAndTargetAreBothNamedWhereTheyLookAlike) {
   FocusSweep sweep = Bench();
   const auto samples = MovingTarget(&sweep, 100, 0.8, [](double z) { return 500 - z; });
@@ -173,8 +174,8 @@ TEST(ScaleCauses, ALensThatMovesIsNamedWhicheverDirectionIsStated) {
   }
 }
 
-// A Pi camera, 4.74 mm f/1.8: its reading would be a depth of some 200 mm, at which the blur would
-// need a blur ratio of 19.
+// A Pi camera, 4.74 mm f/1.8. Its reading would be a depth of about 200 mm, at which the blur would
+// require a blur ratio of 19.
 TEST(ScaleCauses, AFocusMotorInDioptresIsRecognised) {
   for (const auto direction : {model::BenchDirection::kAway, model::BenchDirection::kToward}) {
     FocusSweep sweep = Bench();
@@ -182,7 +183,7 @@ TEST(ScaleCauses, AFocusMotorInDioptresIsRecognised) {
     sweep.camera.lens = testing::ThinLens(4.74, 1.3167);
     sweep.camera.sensor.pixel_pitch_mm = 0.0014;
     constexpr double kInFocusMm = 4.872;
-    // 1/d = 1/f - q/1000; d goes as the scale.
+    // 1/d = 1/f - q/1000; d is proportional to the scale.
     const auto samples = MovingLens(
         &sweep, 0.9, [](double d) { return 1000 / 4.74 - 1000 / (kInFocusMm * d / 60); });
     EXPECT_THAT(ReasonOf(samples, sweep),
@@ -191,7 +192,7 @@ TEST(ScaleCauses, AFocusMotorInDioptresIsRecognised) {
   }
 }
 
-// The same of a lens of 50 mm could be a target whose readings are in centimetres.
+// For a lens of 50 mm, the samples could also be those of a target with readings in centimetres.
 TEST(ScaleCauses, ACauseThatUnitAndLensExplainAlikeIsLeftOpen) {
   for (const auto direction : {model::BenchDirection::kAway, model::BenchDirection::kToward}) {
     FocusSweep sweep = Bench();
@@ -219,7 +220,8 @@ TEST(ScaleCauses, TheUnitThatFitsScaleAndBlurIsNamed) {
   }
 }
 
-// Larger than life: nearer than two focal lengths, and in mm all the same.
+// The magnification is above 1 because the target is nearer than two focal lengths. The readings
+// are in mm nevertheless.
 TEST(UnitAdvice, DoesNotDoubtAMagnificationAboveOneThatTheBlurShows) {
   FocusSweep sweep = Bench();
   sweep.camera.lens = testing::ThinLens(45, 4.6);
@@ -244,7 +246,7 @@ TEST(UnitAdvice, PutsTheQuestionWithTheUnitThatFits) {
             HasSubstr("are the readings in mm? With readings in inches it is at about 300 mm")));
 }
 
-// A given zero that is wrong is no moving lens.
+// A wrong given zero is not reported as a moving lens.
 TEST(ScaleCauses, AWrongOffsetIsNotTakenForSomethingElse) {
   FocusSweep sweep = Bench();
   sweep.offset_mm = model::Estimate{250, 0.1};

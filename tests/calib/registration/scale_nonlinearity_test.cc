@@ -1,4 +1,4 @@
-// Readings that bend against the image scale, on samples that are made up.
+// Readings that are a nonlinear function of the image scale, on synthetic samples.
 #include "calib/registration/scale_nonlinearity.h"
 
 #include <gtest/gtest.h>
@@ -14,16 +14,16 @@ using model::BenchDirection;
 
 constexpr double kNearestMm = 320, kFarthestMm = 480, kReferenceMm = 400, kOffsetMm = 30;
 
-// How a sweep of made-up samples comes about. The reading is that of the law, plus the square of
-// the way from the middle to the ends times `square_mm`, plus what is wrong with it.
+// Parameters of a synthetic sweep. The reading is that of the law, plus `square_mm` times the
+// square of the distance from the middle relative to that of the ends, plus its error.
 struct Recipe {
   BenchDirection direction = BenchDirection::kAway;
   int frames = 41;
   double square_mm = 0;
   double reading_sigma_mm = 0.07;
-  double scale_sigma = 2e-5;      // relative, of each frame alone
-  double stated_sigma_mm = 0.07;  // of the readings
-  double shared_mm = 0;           // of runs of five neighbours
+  double scale_sigma = 2e-5;      // relative, independent for each frame
+  double stated_sigma_mm = 0.07;  // for the readings
+  double shared_mm = 0;           // common to runs of five neighbours
   unsigned seed = 1;
 };
 
@@ -76,7 +76,7 @@ int Found(Recipe recipe, int runs) {
   return found;
 }
 
-// Straight line through two points of the curve, and where it meets depth 0.
+// The straight line through two points of the curve, and the reading at which it has depth 0.
 double ZeroMm(double sign, double from_u, double to_u, double square_mm) {
   const auto depth = [](double u) { return 400 + 80 * u; };
   const auto reading = [&](double u) { return sign * (depth(u) - kOffsetMm) + square_mm * u * u; };
@@ -92,7 +92,7 @@ TEST(FindScaleNonlinearity, MeasuresTheBowAndItsMeaningInBothDirections) {
       recipe.square_mm = square_mm;
       const std::optional<ScaleNonlinearity> nonlinearity = Find(recipe);
       ASSERT_TRUE(nonlinearity) << square_mm;
-      // The middle of the curve is 0, the chord through its ends is there at square_mm.
+      // The middle of the curve is at 0, and the chord through its ends is at square_mm there.
       EXPECT_NEAR(nonlinearity->bow_mm.value, -square_mm, 4 * nonlinearity->bow_mm.sigma);
       EXPECT_LT(nonlinearity->bow_mm.sigma, 0.1);
       const double sign = model::DirectionSign(direction);
@@ -103,7 +103,7 @@ TEST(FindScaleNonlinearity, MeasuresTheBowAndItsMeaningInBothDirections) {
   }
 }
 
-// Of 200 sweeps each, seeded.
+// The shares are of 200 seeded sweeps each.
 TEST(FindScaleNonlinearity, AStraightModelIsLeftAlone) {
   constexpr int kRuns = 200;
   Recipe recipe;
@@ -120,8 +120,8 @@ TEST(FindScaleNonlinearity, AStraightModelIsLeftAlone) {
   EXPECT_LE(Found(recipe, kRuns), 4) << "errors that neighbours share";
 }
 
-// What a rest of radial distortion k does: the scales are wrong by k (1 - 1/s^2), each less than
-// what is stated of them, but all in one curve.
+// Remaining radial distortion k changes the scales by k (1 - 1/s^2), each by less than its stated
+// error, but all along one curve.
 TEST(FindScaleNonlinearity, ACurveThatTheErrorsOfTheScalesAllowIsNone) {
   Recipe recipe;
   recipe.reading_sigma_mm = recipe.stated_sigma_mm = 0.005;
@@ -171,7 +171,7 @@ TEST(FindScaleNonlinearity, NeedsAModelAndNineFrames) {
   EXPECT_TRUE(Find(recipe));
 }
 
-// Found from the same samples in any order, with the same bits.
+// The result is the same to the last bit for the same samples in any order.
 TEST(FindScaleNonlinearity, DoesNotDependOnTheOrderOfTheFrames) {
   Recipe recipe;
   recipe.square_mm = 0.8;

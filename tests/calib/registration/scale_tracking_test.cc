@@ -83,7 +83,8 @@ TEST(TrackScale, FindsTheScalesWithAndWithoutAnOffset) {
   }
 }
 
-// Spokes look the same at every scale: it is the readings', and only the shifts are measured.
+// Spokes look the same at every scale. Therefore the scale is computed from the readings, and only
+// the shifts are measured.
 TEST(TrackScale, TakesAStarsScalesFromTheReadings) {
   SimulatedSweep s = Sweep("iii", model::TargetKind::kSiemensStar, 15, 8);
   s.sweep.offset_mm->value = 3;  // the scale is that of the stated depths, right or wrong
@@ -121,7 +122,7 @@ TEST(TrackScale, AStarWithoutAnOffsetLeavesTheReferenceAlone) {
   EXPECT_TRUE(law.shows_no_scale);
 }
 
-// Depths that cannot be: no scale, no sample.
+// Frames at impossible depths have no scale and give no sample.
 TEST(TrackScale, AStarsFramesAtNoDepthAreLeftOut) {
   SimulatedSweep s = Sweep("iii", model::TargetKind::kSiemensStar, 7, 8);
   s.sweep.frames[1].reading_mm = -5;
@@ -129,7 +130,7 @@ TEST(TrackScale, AStarsFramesAtNoDepthAreLeftOut) {
   EXPECT_EQ(Track(s.sweep, Reader(s)).size(), 5U);
 }
 
-// Whose edge the estimator of edges measures: there is nothing to be gained by a shift.
+// The edge is measured by the edge estimator, which needs no shift.
 TEST(TrackScale, AKnifeEdgeIsNotGivenAScale) {
   SimulatedSweep s = Sweep("iii", model::TargetKind::kSiemensStar, 7, 8);
   s.sweep.target = model::SweepTarget::kKnifeEdge;
@@ -161,8 +162,8 @@ TEST(TrackScale, TicksOnceAFrame) {
   EXPECT_EQ(ticks, 3);
 }
 
-// A wrong reading starts a registration far off; its frame is registered all the same, so that the
-// law can tell by how much the reading is wrong.
+// With a wrong reading, the registration starts far off. The frame is registered nevertheless, so
+// that the law can determine the error of the reading.
 TEST(TrackScale, AFrameWithAWrongReadingIsRegistered) {
   for (const std::size_t wrong : {std::size_t{3}, std::size_t{7}}) {  // 7: the reference
     SimulatedSweep s = Sweep("iii", model::TargetKind::kDeadLeaves, 15, 3);
@@ -209,8 +210,8 @@ TEST(TrackScale, TheWrongDirectionIsReversed) {
   EXPECT_EQ(law.kind, ScaleKind::kReversed) << law.message;
 }
 
-// A lens that distorts by 1 % at the corner, closed form; without a word about it the bench zero
-// would come out 2 mm off.
+// A lens that distorts by 1 % at the corner, in closed form. If the distortion were ignored, the
+// bench zero would be 2 mm off.
 TEST(TrackScale, DistortionIsFoundAndTakenOut) {
   constexpr int kSizePx = 192;
   FocusSweep sweep;

@@ -1,4 +1,5 @@
-// The shift of targets that look the same at every scale, against stars known in closed form.
+// The shift of targets that look the same at every scale is compared with stars known in closed
+// form.
 #include "calib/registration/shift_registration.h"
 
 #include <gtest/gtest.h>
@@ -22,7 +23,7 @@ constexpr int kSizePx = 192;
 constexpr double kMiddlePx = 0.5 * (kSizePx - 1);
 const cv::Point2d kCentre(kMiddlePx, kMiddlePx);
 
-// Dark where u v < 0, u and v the distances from two lines through the middle.
+// Dark where u v < 0; u and v are the distances from two lines through the middle.
 cv::Mat Corner(double first_rad, double second_rad) {
   cv::Mat image(kSizePx, kSizePx, CV_32F);
   for (int y = 0; y < kSizePx; ++y) {
@@ -68,7 +69,7 @@ TEST(IsScaleInvariant, DoesNotHoldForTexturesEdgesAndNothing) {
   EXPECT_FALSE(IsScaleInvariant(edge));
   EXPECT_FALSE(IsScaleInvariant(WithNoise(edge, 0.005)));
   EXPECT_FALSE(IsScaleInvariant(cv::Mat(kSizePx, kSizePx, CV_32F, cv::Scalar(0.5))));
-  // Rings about the star's middle tell its scale.
+  // Rings about the middle of the star determine its scale.
   cv::Mat ringed = StarImage(36).Render(kSizePx, {});
   for (int radius = 20; radius < 90; radius += 12)
     cv::circle(ringed, {kSizePx / 2, kSizePx / 2}, radius, cv::Scalar(0.1), 2, cv::LINE_AA);
@@ -99,7 +100,7 @@ TEST(RegisterShift, FindsSubPixelShiftsWhateverTheBlur) {
   }
 }
 
-// What was not measured is not given out as measured.
+// Values that were not measured are not reported as measured.
 TEST(RegisterShift, TakesTheScaleAsItIs) {
   const StarImage star(24);
   const cv::Mat reference = star.Render(kSizePx, {});
@@ -115,7 +116,8 @@ TEST(RegisterShift, TakesTheScaleAsItIs) {
   }
 }
 
-// A star not in the middle: where it lies in a frame depends on the scale about the given centre.
+// If the star is not in the middle, its position in a frame depends on the scale about the given
+// centre.
 TEST(RegisterShift, ShiftIsAboutTheGivenCentre) {
   const StarImage star(36);
   StarView aside;
@@ -129,7 +131,7 @@ TEST(RegisterShift, ShiftIsAboutTheGivenCentre) {
   constexpr double kScale = 1.05;
   const auto found = RegisterShift(reference, star.Render(kSizePx, moved), kScale, centre);
   ASSERT_TRUE(found);
-  // p_frame = centre + shift + scale (p_reference - centre) for the star's middle.
+  // p_frame = centre + shift + scale (p_reference - centre) for the middle of the star.
   const Eigen::Vector2d c(centre.x, centre.y), middle(kMiddlePx, kMiddlePx);
   const Eigen::Vector2d before = middle + Eigen::Vector2d(aside.shift_x, aside.shift_y);
   const Eigen::Vector2d after = middle + Eigen::Vector2d(moved.shift_x, moved.shift_y);

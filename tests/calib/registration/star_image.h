@@ -9,17 +9,18 @@
 
 namespace thicklens::testing {
 
-// How a star is seen: it looks the same at every scale.
+// Parameters of a view of a star, which looks the same at every scale.
 struct StarView {
-  double rotation_rad = 0, shift_x = 0, shift_y = 0;  // of its centre, from the image's
-  double blur_px = 0.6;                               // sigma of a Gaussian
+  // Of its centre, relative to that of the image
+  double rotation_rad = 0, shift_x = 0, shift_y = 0;
+  double blur_px = 0.6;  // sigma of a Gaussian
   double gain = 1, offset = 0;
   double slope = 0;  // relative change of the illumination per px, along x
   double noise = 0;
 };
 
-// A star of sinusoidal spokes that is known everywhere, without resampling: a round blur leaves
-// cos(spokes angle) as it is and multiplies it by a function of the radius alone.
+// A star of sinusoidal spokes that is known everywhere, without resampling: a round blur keeps
+// cos(spokes angle) and multiplies it by a function of the radius alone.
 class StarImage {
  public:
   explicit StarImage(int spokes) : spokes_(spokes) {}
@@ -49,7 +50,7 @@ class StarImage {
  private:
   static constexpr double kStepPx = 0.25;
 
-  // At steps of the radius: the mean of cos(spokes angle) about a point at angle 0, by a plain sum
+  // The mean of cos(spokes angle) about a point at angle 0 for steps of the radius, as a plain sum
   // over a Gaussian.
   std::vector<double> Contrasts(int size_px, double blur_px) const {
     constexpr int kReach = 16;

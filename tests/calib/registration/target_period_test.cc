@@ -20,8 +20,8 @@ namespace {
 
 using thicklens::testing::SweepCase;
 
-// A pattern in its own coordinates u, v (px), turned by `angle_deg`, under a lamp that falls off to
-// one side, with noise.
+// A pattern in its own coordinates u, v (px), rotated by `angle_deg`, under a lamp that is darker
+// on one side, with noise.
 using Pattern = std::function<double(double u, double v)>;
 cv::Mat Draw(cv::Size size, double angle_deg, const Pattern& pattern, double noise = 0.01) {
   const double c = std::cos(angle_deg * CV_PI / 180), s = std::sin(angle_deg * CV_PI / 180);
@@ -116,7 +116,7 @@ TEST(TargetPeriod, BrokenLinesDoNotHalveIt) {
 }
 
 TEST(TargetPeriod, SigmaIsThatOfRepeats) {
-  // The pull over noise of 30 draws: its rms lies near 1 if sigma means what it says.
+  // Errors divided by sigma over 30 draws of noise. Their rms is near 1 if sigma is right.
   double sum = 0;
   constexpr int kDraws = 30;
   for (int i = 0; i < kDraws; ++i) {
@@ -159,7 +159,7 @@ TEST(TargetPeriod, NothingOfWhatHasNone) {
 }
 
 TEST(TargetPeriod, WhatMayBeBothIsLeftOpen) {
-  // Two crossed cosines: a grid of which defocus has left the first lines, or a checkerboard.
+  // Two crossed cosines: a grid of which defocus has left only the first lines, or a checkerboard.
   const Pattern both = [](double u, double v) {
     return 0.5 + 0.1 * std::cos(2 * CV_PI * u / 20) + 0.1 * std::cos(2 * CV_PI * v / 20);
   };
@@ -174,8 +174,8 @@ TEST(TargetPeriod, LinesThatWanderHaveNone) {
 }
 
 TEST(TargetPeriod, FollowsTheMagnificationOfASimulatedCheckerboard) {
-  // m = f1 D/(f2 z) from the middle of the aperture, through focus and out of it; from the centre
-  // of perspective the same in the plane of focus.
+  // m = f1 D/(f2 z) from the middle of the aperture, in focus and out of it. From the centre of
+  // perspective the magnification is the same in the plane of focus.
   model::SweepSimulationOptions options = SweepCase("iii", 384, 1);
   options.target.kind = model::TargetKind::kCheckerboard;
   options.target.feature_size_mm = 1.5;
@@ -195,9 +195,9 @@ TEST(TargetPeriod, FollowsTheMagnificationOfASimulatedCheckerboard) {
   }
 }
 
-// A photographed grid of 5 mm, its lines broken, with a mark and labels in it. Known: the scale
-// goes as 1/(z + 106.2 mm) to 0.4 %; f = 3.6 mm and a pixel pitch about 6.45 um put d1 near 3.84
-// mm.
+// A photographed 5 mm grid with broken lines, a mark and labels. Known values: the scale is
+// proportional to 1/(z + 106.2 mm) to 0.4 %; f = 3.6 mm and a pixel pitch of about 6.45 um put d1
+// near 3.84 mm.
 TEST(TargetPeriod, OfAPhotographedGridIsItsFiveMillimetres) {
   const std::string folder = THICKLENS_SHARED_DATA_DIR "/picam_sweep/frames/";
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << folder << " is not here";

@@ -14,7 +14,7 @@ constexpr double kTilePx = 90;
 
 double Window(double t) { return std::pow(std::cos(3.14159265358979 * t / kTilePx), 4); }
 
-// What a tile sees of a displacement: the mean with its weight, summed pixel by pixel.
+// The displacement that a tile measures: the weighted mean, summed pixel by pixel.
 Eigen::Vector2d Seen(const Eigen::Vector2d& centre_px, const DisplacementField& field) {
   Eigen::Vector2d sum(0, 0);
   double total = 0;
@@ -116,17 +116,17 @@ TEST(FitDisplacement, StatedVariancesCoverTheScatter) {
 TEST(FitDisplacement, RefusesWhatDoesNotFixTheMap) {
   const auto tiles = Tiles(Truth(), 0.01, 3);
   EXPECT_FALSE(FitDisplacement({tiles.begin(), tiles.begin() + 5}, Moment()));
-  // Straight vertical edges alone: nothing along them.
+  // With vertical edges only, the shift along them is unknown.
   auto edges = tiles;
   for (TileShift& tile : edges) tile.information(1, 1) = 0;
   EXPECT_FALSE(FitDisplacement(edges, Moment()));
-  // All in one column.
+  // All tiles are in one column.
   auto column = tiles;
   for (TileShift& tile : column) tile.centre_px.x() = 20;
   EXPECT_FALSE(FitDisplacement(column, Moment()));
 }
 
-// Tiles that a shift and a turn moved, by the closed form of a rotation.
+// Tiles after a shift and a rotation, by the closed form of a rotation.
 std::vector<TileShift> TurnedTiles(const Eigen::Vector2d& shift_px, double turn_rad) {
   auto tiles = Tiles(DisplacementField(), 0, 1);
   for (TileShift& tile : tiles) {
@@ -145,7 +145,8 @@ TEST(FitRigid, FindsShiftAndTurn) {
   EXPECT_NEAR(found->turn_rad, 2e-3, 1e-8);
 }
 
-// Of a star's tiles each tells the shift across its spokes alone; together they tell both.
+// Each tile of a star determines only the shift across its spokes; together the tiles determine
+// both components.
 TEST(FitRigid, NeedsNoTileThatKnowsBothAxes) {
   const Eigen::Vector2d shift_px(-0.1, 0.4);
   auto tiles = TurnedTiles(shift_px, -1e-3);
@@ -153,7 +154,7 @@ TEST(FitRigid, NeedsNoTileThatKnowsBothAxes) {
     const Eigen::Vector2d along = tile.centre_px.normalized();
     const Eigen::Vector2d across(-along.y(), along.x());
     tile.information = across * across.transpose() * 1e4;
-    tile.shift_px += 0.7 * along;  // what it does not know
+    tile.shift_px += 0.7 * along;  // the component that it does not determine
   }
   const auto found = FitRigid(tiles);
   ASSERT_TRUE(found);
@@ -187,14 +188,15 @@ TEST(FitRigid, StatedErrorsCoverTheScatter) {
     const Eigen::Vector2d error = found->shift_px - Eigen::Vector2d(0.2, 0.1);
     square += error.dot(found->shift_covariance_px2.inverse() * error) / (2 * kRuns);
   }
-  EXPECT_LT(square, 0.8);  // as of FitDisplacement
+  EXPECT_LT(square, 0.8);  // for the same reason as in FitDisplacement
   EXPECT_GT(square, 0.35);
 }
 
 TEST(FitRigid, RefusesWhatDoesNotFixTheShift) {
   auto tiles = TurnedTiles({0.2, 0.1}, 0);
   EXPECT_FALSE(FitRigid({tiles.begin(), tiles.begin() + 5}));
-  for (TileShift& tile : tiles) tile.information(1, 1) = 0;  // all edges upright, in one row
+  // All edges are vertical and in one row
+  for (TileShift& tile : tiles) tile.information(1, 1) = 0;
   for (TileShift& tile : tiles) tile.centre_px.x() = 0;
   EXPECT_FALSE(FitRigid(tiles));
 }

@@ -10,19 +10,19 @@
 
 namespace thicklens::testing {
 
-// How an image of waves is seen.
+// Parameters of a view of an image of waves.
 struct View {
-  double scale = 1, rotation_rad = 0, shift_x = 0, shift_y = 0;  // about the image's centre
-  double stretch_x = 1;                                          // besides the scale, along x
-  double distortion = 0;  // k of x' = X (1 + k X^2), X from the image's centre, px^-2
+  double scale = 1, rotation_rad = 0, shift_x = 0, shift_y = 0;  // about the centre of the image
+  double stretch_x = 1;   // in addition to the scale, along x
+  double distortion = 0;  // k of x' = X (1 + k X^2), X from the centre of the image, px^-2
   double blur_px = 0;     // sigma of a Gaussian, applied exactly, wave by wave
-  double disc_px = 0;     // radius of a disc besides, as exactly
+  double disc_px = 0;     // radius of an additional disc, applied in the same way
   double gain = 1, offset = 0;
   double slope = 0;  // relative change of the illumination per px, along x
   double noise = 0;
 };
 
-// A texture that is known everywhere: a sum of waves, so that it can be turned, scaled, distorted
+// A texture that is known everywhere: a sum of waves, so that it can be rotated, scaled, distorted
 // and blurred in closed form, without resampling.
 class WaveImage {
  public:
@@ -54,7 +54,8 @@ class WaveImage {
     std::vector<double> row(static_cast<std::size_t>(size_px));
     for (int y = 0; y < size_px; ++y) {
       std::fill(row.begin(), row.end(), 0.4);
-      // Where the row's pixels look: back through the distortion by a fixed point, then the map.
+      // Positions that the pixels of the row show: the distortion is inverted by a fixed-point
+      // iteration, then the map.
       std::vector<double> px, py;
       for (int x = 0; x < size_px; ++x) {
         const double dx = x - centre, dy = y - centre;
@@ -77,7 +78,7 @@ class WaveImage {
           for (std::size_t x = 0; x < row.size(); ++x) row[x] += amplitudes[i] * std::cos(phase(x));
           continue;
         }
-        // Equal steps: turned on from pixel to pixel.
+        // The steps are equal, so the phase is rotated from pixel to pixel.
         std::complex<double> wave = amplitudes[i] * std::polar(1.0, phase(0));
         const std::complex<double> step = std::polar(1.0, phase(1) - phase(0));
         for (double& value : row) {

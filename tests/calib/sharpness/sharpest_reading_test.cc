@@ -12,7 +12,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// Sharpness that falls as the blur grows, with errors; the readings in no order.
+// Sharpness that decreases as the blur grows, with errors. The readings are in random order.
 std::vector<FrameMeasurement> Frames(double focus_mm, double first_mm, double step_mm, int count,
                                      double error, unsigned seed) {
   std::mt19937 random(seed);
@@ -60,7 +60,7 @@ TEST(SharpestReading, WhereItRisesToAnEndThereIsNone) {
   }
 }
 
-// Two measures of sharpness that peak apart: behind an aberrated lens neither is the right one.
+// Two measures of sharpness peak at different readings: behind an aberrated lens neither is right.
 TEST(SharpestReading, MeasuresThatDisagreeWidenTheError) {
   auto frames = Frames(110, 95, 0.25, 121, 0.001, 3);
   const double before_mm = FindSharpestReading(frames, All(frames)).reading_mm.sigma;
@@ -78,7 +78,7 @@ TEST(SharpestReading, FourFramesAreTooFew) {
   EXPECT_THAT(found.message, HasSubstr("4 of 4 frames passed the checks, 5 are needed"));
 }
 
-// A sweep whose light was refused has no frames, which says nothing about edges.
+// A sweep that was refused because of its light has no frames, which says nothing about edges.
 TEST(SharpestReading, SaysWhetherFramesOrEdgesAreMissing) {
   auto frames = Frames(110, 95, 1, 31, 0, 1);
   EXPECT_THAT(FindSharpestReading(frames, {}).message,

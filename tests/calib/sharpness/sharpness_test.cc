@@ -16,7 +16,7 @@ namespace {
 
 using thicklens::testing::DrawnEdge;
 
-// Flat, then linear over `width_px`, then flat; the slope along x.
+// Flat, then linear over `width_px`, then flat, with the slope along x.
 cv::Mat Ramp(double dark, double height, int width_px) {
   cv::Mat ramp(40, 120, CV_32F);
   for (int y = 0; y < ramp.rows; ++y) {
@@ -35,14 +35,14 @@ SharpnessOptions Above(double threshold) {
 }
 
 TEST(MeanEdgeSlope, OfARampIsItsHeightOverTheWidthThatSmoothingLeaves) {
-  // Smoothing by sigma 1 px reaches 5 px (its kernel's end) beyond each foot of the ramp, so the
-  // extrema stand width + 10 px apart.
+  // Smoothing by sigma 1 px extends 5 px (the end of its kernel) beyond each foot of the ramp, so
+  // the extrema are width + 10 px apart.
   for (const int width_px : {4, 8, 10, 20}) {
     for (const double height : {0.2, 0.5, -0.5}) {
       const SharpnessIndex index =
           MeanEdgeSlope(Ramp(height < 0 ? 0.8 : 0.1, height, width_px), Above(0.005));
-      EXPECT_GE(index.edge_count, 36) << width_px;  // one a row, less the border
-      // One pixel less where the last step of the foot is lost in rounding.
+      EXPECT_GE(index.edge_count, 36) << width_px;  // one per row, except at the border
+      // The distance is one pixel less if the last step of the foot is lost in rounding.
       EXPECT_GE(index.mean_edge_slope, std::abs(height) / (width_px + 10) - 1e-5) << width_px;
       EXPECT_LE(index.mean_edge_slope, std::abs(height) / (width_px + 8) + 1e-5) << width_px;
     }
@@ -50,7 +50,8 @@ TEST(MeanEdgeSlope, OfARampIsItsHeightOverTheWidthThatSmoothingLeaves) {
 }
 
 TEST(MeanEdgeSlope, FollowsTheGradientAcrossASlantedEdge) {
-  // The same edge upright and at 30 degrees: the distance is taken along the normal.
+  // The same edge is drawn vertically and at 30 degrees, because the distance is measured along the
+  // normal.
   const double upright = MeanEdgeSlope(DrawnEdge(96, 0, 2, 0.2, 0.7), Above(0.02)).mean_edge_slope;
   const double slanted = MeanEdgeSlope(DrawnEdge(96, 30, 2, 0.2, 0.7), Above(0.02)).mean_edge_slope;
   EXPECT_NEAR(slanted / upright, 1, 0.1);
@@ -76,11 +77,12 @@ TEST(MeanEdgeSlope, GrowsWithBrightnessWhichIsWhyTheRawIndexMisleads) {
 }
 
 TEST(MeanEdgeSlope, ThresholdIsTheCallersAndDoesNotAdaptToTheFrame) {
-  // Sigma 2 px, smoothed by 1: the steepest gradient is 0.5/sqrt(2 pi 5) = 0.089 (less the pixel).
+  // With sigma 2 px, smoothed by 1, the steepest gradient is 0.5/sqrt(2 pi 5) = 0.089 (reduced by
+  // the pixel).
   const cv::Mat edge = DrawnEdge(96, 5, 2, 0.2, 0.7);
   EXPECT_GT(MeanEdgeSlope(edge, Above(0.07)).edge_count, 50);
   EXPECT_EQ(MeanEdgeSlope(edge, Above(0.1)).edge_count, 0);
-  // Half the contrast misses a threshold that the whole one passed.
+  // Half the contrast is below a threshold that the whole contrast exceeds.
   EXPECT_EQ(MeanEdgeSlope(edge * 0.5, Above(0.07)).edge_count, 0);
 }
 
@@ -93,7 +95,7 @@ TEST(MeanEdgeSlope, IsNothingWithoutEdges) {
 TEST(MeanEdgeSlope, SearchEndsAtItsLimit) {
   SharpnessOptions near = Above(0.005);
   near.max_search_px = 3;
-  // Inside the ramp, 3 px each way: the ramp's own slope, however wide it is.
+  // Inside the ramp, 3 px each way, the slope is that of the ramp, whatever its width is.
   EXPECT_NEAR(MeanEdgeSlope(Ramp(0.1, 0.5, 40), near).mean_edge_slope, 0.5 / 40, 2e-4);
 }
 
@@ -104,7 +106,7 @@ SharpnessIndex PlainMeanEdgeSlope(const cv::Mat& grey, double threshold, int max
   const auto at = [&](double x, double y) {
     const int x0 = static_cast<int>(std::floor(x)), y0 = static_cast<int>(std::floor(y));
     const double fx = x - x0, fy = y - y0;
-    // On the last row or column the next one has no weight, and is not there to be read.
+    // On the last row or column the next one has no weight, and does not exist.
     const int x1 = std::min(x0 + 1, smoothed.cols - 1), y1 = std::min(y0 + 1, smoothed.rows - 1);
     return (1 - fy) * ((1 - fx) * smoothed.at<float>(y0, x0) + fx * smoothed.at<float>(y0, x1)) +
            fy * ((1 - fx) * smoothed.at<float>(y1, x0) + fx * smoothed.at<float>(y1, x1));
@@ -154,7 +156,7 @@ SharpnessIndex PlainMeanEdgeSlope(const cv::Mat& grey, double threshold, int max
 }
 
 TEST(MeanEdgeSlope, IsThatOfThePlainDefinitionOnATexture) {
-  // Smooth noise: edges in every direction and at the borders, walks of every length.
+  // Smooth noise has edges in every direction and at the borders, and walks of every length.
   for (const double sigma_px : {1.0, 2.5, 6.0}) {
     cv::Mat noise(97, 131, CV_32F);
     cv::RNG random(4);
@@ -166,7 +168,7 @@ TEST(MeanEdgeSlope, IsThatOfThePlainDefinitionOnATexture) {
       const SharpnessIndex found = MeanEdgeSlope(noise, options);
       const SharpnessIndex plain = PlainMeanEdgeSlope(noise, 0.004, reach_px);
       ASSERT_GT(plain.edge_count, 100) << sigma_px;
-      // A tie of two neighbours may go the other way in float.
+      // A tie of two neighbours may be resolved in the other way in float.
       EXPECT_NEAR(found.edge_count, plain.edge_count, 2) << sigma_px;
       EXPECT_NEAR(found.mean_edge_slope / plain.mean_edge_slope, 1, 1e-3) << sigma_px << reach_px;
     }
@@ -188,7 +190,7 @@ TEST(MeanEdgeSlopes, AreThoseOfEachThresholdAlone) {
   EXPECT_GT(together[1].edge_count, together[2].edge_count);
   EXPECT_EQ(together[3].edge_count, 0);
   EXPECT_TRUE(MeanEdgeSlopes(noise, {}, {}).empty());
-  // A frame divided by its mean.
+  // The frame is divided by its mean.
   const double mean = cv::mean(noise)[0];
   const SharpnessIndex normalised = MeanEdgeSlope(noise / mean, Above(0.05 / mean));
   EXPECT_NEAR(normalised.edge_count, together[2].edge_count, 2);
@@ -200,10 +202,10 @@ TEST(Quantile, IsTheValueOfItsRank) {
   cv::RNG random(6);
   random.fill(uniform, cv::RNG::UNIFORM, 0.0, 1.0);
   cv::Mat steep = uniform.clone();
-  cv::pow(uniform, 40, steep);  // nearly all of it nearly 0
+  cv::pow(uniform, 40, steep);  // nearly all values are nearly 0
   cv::Mat rare = cv::Mat::zeros(130, 111, CV_32F);
   rare.at<float>(64, 64) = 1;
-  cv::Mat tail = cv::Mat::zeros(130, 111, CV_32F);  // only where the sample does not look
+  cv::Mat tail = cv::Mat::zeros(130, 111, CV_32F);  // only where the sample has no pixels
   for (int y = 1; y < tail.rows; y += 4) tail.row(y).setTo(1);
   for (const cv::Mat& values :
        {uniform, steep, constant, rare, tail, cv::Mat(uniform.colRange(3, 90))}) {

@@ -87,7 +87,7 @@ TEST(MeasureSpectrum, IsTheFourierSumOverTheFramesOwnPixels) {
     ASSERT_EQ(spectrum->values.size(), static_cast<Eigen::Index>(modes.size()));
     for (std::size_t k = 0; k < modes.size(); ++k) {
       const Direct direct = DirectSum(grey, origin, c.place, c.window, modes[k]);
-      // Values are about 0.25/sqrt(pixels), 3e-3; floats over 5000 pixels.
+      // The values are about 0.25/sqrt(pixels), 3e-3, and are summed in float over 5000 pixels.
       EXPECT_LT(std::abs(spectrum->values[static_cast<Eigen::Index>(k)] - direct.value), 2e-7) << k;
       EXPECT_NEAR(spectrum->mean, direct.mean, 1e-6);
       EXPECT_NEAR(spectrum->noise_gain / direct.noise_gain, 1, 1e-5);
@@ -121,9 +121,9 @@ TEST(MeasureSpectrum, GivesAsManyValuesAsAsked) {
   EXPECT_EQ(none->values.size(), 0);
 }
 
-// A cosine of the target, averaged over each pixel's box (1/scale of target px wide) in closed
-// form: what comes out is the cosine itself, whatever the frame's scale: half its amplitude with
-// its phase at its own mode, and nothing two modes off, where the transform of the squared cosine
+// A cosine of the target, averaged over the box of each pixel (1/scale target px wide) in closed
+// form. The result is the cosine itself, whatever the scale of the frame is: half its amplitude
+// with its phase at its own mode, and 0 two modes off, where the transform of the squared cosine
 // has its first zero.
 TEST(MeasureSpectrum, APureCosineComesOutWithoutThePixelsBox) {
   const TargetWindow window{{1.5, -2}, {64, 64}};
@@ -145,12 +145,13 @@ TEST(MeasureSpectrum, APureCosineComesOutWithoutThePixelsBox) {
     const std::vector<Mode> modes = {mode, {12, -10}, {14, -8}, {4, 20}, {13, -8}};
     const auto spectrum = MeasureSpectrum(grey, origin, place, window, modes, modes.size());
     ASSERT_TRUE(spectrum);
-    // The sum over pixels is the integral but for a rest that falls with the window's size.
+    // The sum over pixels equals the integral except for a remainder that falls with the size of
+    // the window.
     const std::complex<double> expected = 0.5 * amplitude * std::polar(1.0, phase);
     EXPECT_LT(std::abs(spectrum->values[0] - expected), 2e-5) << scale;
     for (const int k : {1, 2, 3}) EXPECT_LT(std::abs(spectrum->values[k]), 2e-5) << k;
-    // Next to it the transform of the Hann window, -1/2 of its middle times the phase of its
-    // centre.
+    // The neighbouring mode is the transform of the Hann window: -1/2 of its middle times the phase
+    // of its centre.
     const std::complex<double> next =
         0.5 * expected * std::polar(1.0, -2 * kPi * window.centre_px.x() / window.size_px.x());
     const double box = Sinc(nu.x() / scale) / Sinc((nu.x() + 1 / window.size_px.x()) / scale);
@@ -191,7 +192,7 @@ TEST(MeasureSpectrum, NoiseGainIsTheScatterOfWhiteNoise) {
     }
   }
   EXPECT_NEAR(mean, kMean, 3e-4);
-  // 2000 exponential draws: 2.2 % each.
+  // 2000 exponential draws have an error of 2.2 % each.
   EXPECT_NEAR(power / (gain * kSigma * kSigma), 1, 0.08);
   EXPECT_NEAR(real / (gain * kSigma * kSigma), 1, 0.12);
 }
@@ -213,7 +214,7 @@ TEST(MeasureSpectrum, AWindowThatLeavesTheFrameGivesNothing) {
   EXPECT_TRUE(fits({1.12, {0, 0}}, window));
   EXPECT_FALSE(fits({1.2, {0, 0}}, window));
   EXPECT_FALSE(fits({}, {{0, 10}, {70, 50}}));
-  // All of the frame is still inside.
+  // The whole frame is still inside.
   EXPECT_TRUE(fits({}, {{0, 0}, {79, 59}}));
 }
 
@@ -251,7 +252,7 @@ TEST(ModesBetween, AreInOrderAndNoneIsDoubled) {
     EXPECT_TRUE(seen.insert({mode.jx, mode.jy}).second);
     EXPECT_FALSE(seen.count({-mode.jx, -mode.jy}));
   }
-  // None is missing: every second mode of the half plane.
+  // No mode is missing: the set is every second mode of the half plane.
   std::size_t expected = 0;
   for (int jx = 0; jx < 40; jx += 2) {
     for (int jy = -40; jy < 40; jy += 2) {

@@ -49,8 +49,8 @@ TEST(BlurTransfer, OfADiscIsItsOwnTimesTheFloors) {
   }
 }
 
-// Noise may push a disc's variance below 0: the function goes on smoothly, as the power series
-// sum (-x^2/4)^k/(k! (k + 1)!) does.
+// Noise may make the variance of a disc negative. The function continues smoothly there, as the
+// power series sum (-x^2/4)^k/(k! (k + 1)!) does.
 TEST(BlurTransfer, OfADiscGoesOnSmoothlyBelowZero) {
   RelativeBlurOptions options;
   options.psf = model::Psf::kDisc;
@@ -79,7 +79,7 @@ TEST(WindowLeakage, IsWhatTheWindowsEdgeDoes) {
     TextureScene scene;
     scene.psf = psf;
     scene.floor_px2 = 0;
-    scene.window = {{0, -1}, {156, 154}};  // nearly all of the frame
+    scene.window = {{0, -1}, {156, 154}};  // nearly the whole frame
     TextureFrame frame;
     scene.frames = {frame};
     const KnownTexture texture(4);
@@ -112,17 +112,18 @@ TEST(WindowLeakage, IsWhatTheWindowsEdgeDoes) {
         off += std::norm(table[i] - direct);
         ++count;
       }
-      // 1e-6: rounding of the floats, a twentieth of what the weakest noise does to a value.
+      // 1e-6 is the rounding of the floats, a twentieth of the effect of the weakest noise on a
+      // value.
       EXPECT_LT(std::sqrt(off / count), 0.05 * std::sqrt(leaked / count) + 1e-6) << sigma_px;
     }
-    // Fewer modes are the first of them.
+    // A smaller number of modes gives the first ones of a larger number.
     EXPECT_EQ((leakage.At(2, 10) - leakage.At(2, 40).head(10)).abs().maxCoeff(), 0);
   }
 }
 
 TEST(WindowLeakage, TakenOutItNoLongerBiasesTheBlur) {
   TextureScene scene = TextureSweep();
-  scene.seed = 3;  // of some textures little leaks
+  scene.seed = 3;  // some textures leak only a little
   const std::vector<cv::Mat> images = scene.Render();
   const RelativeBlur with = FitScene(scene, images, 1), without = FitScene(scene, images, 1, false);
   ASSERT_TRUE(with.done && without.done);
@@ -148,11 +149,11 @@ TEST(WindowLeakage, DoesNotDependOnThreads) {
   EXPECT_TRUE((table(1) == table(3)).all());
 }
 
-// ---- for the eye, and the choice of modes ----
+// ---- data for plots, and the selection of modes ----
 
 TEST(MeasuredTransfer, IsTheBlursOwn) {
   TextureScene scene = TextureSweep();
-  scene.frames[5].left_over_px = {1.1, -0.8};  // the fit's own shift is taken out
+  scene.frames[5].left_over_px = {1.1, -0.8};  // the shift of the fit itself is removed
   std::vector<cv::Mat> images = scene.Render();
   for (std::size_t i = 0; i < images.size(); ++i)
     images[i] = WithWhiteNoise(images[i], scene.pixel_noise, 30 + static_cast<unsigned>(i));
@@ -200,7 +201,7 @@ TEST(StrongestModes, KeepsTheStrongestOfEveryRing) {
   std::ptrdiff_t before = -1;
   for (const Mode& mode : kept) {
     const auto k = index(mode);
-    EXPECT_GT(k, before);  // in the order of |nu|
+    EXPECT_GT(k, before);  // sorted by |nu|
     before = k;
     EXPECT_GT(power[k], 0.1);
     is_kept[static_cast<std::size_t>(k)] = true;
@@ -212,7 +213,7 @@ TEST(StrongestModes, KeepsTheStrongestOfEveryRing) {
     if (is_kept[k]) continue;
     const auto r = static_cast<std::size_t>(ring(modes[k]));
     const double p = power[static_cast<Eigen::Index>(k)];
-    // Too weak, or its ring is full of stronger ones.
+    // A mode that was left out is too weak, or its ring contains only stronger ones.
     EXPECT_TRUE(!(p > 0.1) || (in_ring[r] == 9 && p <= weakest[r])) << k;
   }
   EXPECT_EQ(*std::max_element(in_ring.begin(), in_ring.end()), 9);

@@ -40,7 +40,7 @@ void ExpectRecovered(const TextureScene& scene, const RelativeBlur& fit, double 
         << "frame " << i;
     const double gain = frame.view.contrast / scene.frames[scene.reference].view.contrast;
     EXPECT_NEAR(fit.gains[row] / gain, 1, 0.01) << "frame " << i;
-    // A common shift is the texture's own.
+    // A common shift belongs to the texture.
     const Eigen::Vector2d shift = fit.shifts_px.col(row) - fit.shifts_px.col(r);
     EXPECT_LT((shift - frame.left_over_px).norm(), 0.03) << "frame " << i;
   }
@@ -58,14 +58,14 @@ TEST(FitRelativeBlur, RecoversGaussianBlurGainAndShift) {
 TEST(FitRelativeBlur, RecoversDiscs) {
   TextureScene scene = TextureSweep();
   scene.psf = model::Psf::kDisc;
-  // The reference's own disc is small: v = 0.1 px^2; one frame's is nearly nothing.
+  // The disc of the reference is small, v = 0.1 px^2; that of one frame is almost 0.
   scene.frames[4].variance_px2 = scene.floor_px2 / std::pow(scene.frames[4].view.scale, 2) + 0.002;
   const std::vector<cv::Mat> images = scene.Render();
   for (const double start_factor : {1.0, 1.3})
     ExpectRecovered(scene, FitScene(scene, images, start_factor), 0.003, 0.01);
 }
 
-// Gaussian blur fitted as a disc, and the other way round, lies farther off.
+// A Gaussian blur fitted as a disc has a larger misfit, and vice versa.
 TEST(FitRelativeBlur, MisfitTellsTheShape) {
   for (const model::Psf psf : {model::Psf::kGaussian, model::Psf::kDisc}) {
     TextureScene scene = TextureSweep();
@@ -93,7 +93,7 @@ TEST(FitRelativeBlur, MisfitTellsTheShape) {
 
 TEST(FitRelativeBlur, AFrameSharperThanTheReferenceIsReported) {
   TextureScene scene = TextureSweep();
-  scene.reference = 4;  // 0.7 px^2 beside 0.35
+  scene.reference = 4;  // 0.7 px^2 instead of 0.35
   const TextureFrame old_reference = scene.frames[3];
   scene.frames[4].view = {};
   scene.frames[4].left_over_px.setZero();
@@ -101,7 +101,7 @@ TEST(FitRelativeBlur, AFrameSharperThanTheReferenceIsReported) {
   ExpectRecovered(scene, FitScene(scene, scene.Render(), 1), 0.006, 0.01);
 }
 
-// An edge has power along one line of frequencies alone, and no shift along itself.
+// An edge has power along one line of frequencies only, and its shift along itself is undetermined.
 TEST(FitRelativeBlur, ALoneEdgeIsTextureEnough) {
   TextureScene scene;
   scene.origin = {79.5, 79.5};
@@ -160,8 +160,9 @@ TEST(FitRelativeBlur, TwoFramesAreTooFew) {
 
 // ---- covariance ----
 
-// Of independent noise with the variances that the fit found, by the whole problem's normal
-// equations, every value of T and every shift among the unknowns. Derivatives by differences.
+// The covariance for independent noise with the variances that the fit found, from the normal
+// equations of the whole problem, in which every value of T and every shift is unknown. Derivatives
+// are differences.
 Eigen::MatrixXd CovarianceByAllUnknowns(const TextureScene& scene, const RelativeBlur& fit,
                                         const std::vector<SpectrumSample>& samples,
                                         const std::vector<Mode>& modes) {
@@ -186,7 +187,7 @@ Eigen::MatrixXd CovarianceByAllUnknowns(const TextureScene& scene, const Relativ
     for (Eigen::Index k = 0; k < fit.modes_used[s]; ++k, row += 2) {
       const double box =
           BoxTransfer(modes[static_cast<std::size_t>(k)], scene.window, samples[s].scale);
-      // Of the real and of the imaginary part.
+      // The sigma of the real and of the imaginary part.
       const double sigma = std::sqrt(0.5 * fit.noise_ratio[i] * samples[s].spectrum.noise_gain) *
                            samples[s].pixel_noise / box;
       const auto put = [&](Eigen::Index column, std::complex<double> derivative) {
@@ -236,9 +237,10 @@ TEST(FitRelativeBlur, CovarianceIsThatOfTheWholeProblem) {
                         scene.Leakage(clean[3], samples[3], modes, 3.8), scene.Options());
     ASSERT_TRUE(fit.done);
     const Eigen::MatrixXd expected = CovarianceByAllUnknowns(scene, fit, samples, modes);
-    // Noise that neighbouring modes share widens it: by 1/36 for each of two neighbours, per axis.
+    // Noise that neighbouring modes share widens the covariance: by 1/36 for each of two
+    // neighbours, per axis.
     const double shared = std::pow(1 + 2.0 / 36, 2);
-    // The fit's noise of the last round but its value beside: a step of rounds is left.
+    // The noise is that of the last round but one, so a difference of one round is left.
     EXPECT_LT((fit.covariance - shared * expected).norm(), 0.1 * expected.norm());
     for (Eigen::Index i = 0; i < expected.rows(); ++i) {
       if (i != 3) {
@@ -248,7 +250,7 @@ TEST(FitRelativeBlur, CovarianceIsThatOfTheWholeProblem) {
   }
 }
 
-// Scatter of V over noise drawn anew against the covariance stated.
+// The scatter of V over new draws of noise is compared with the stated covariance.
 TEST(FitRelativeBlur, CovarianceIsTheScatterOverNoise) {
   constexpr int kRuns = 100;
   TextureScene scene = TextureSweep();
@@ -283,7 +285,7 @@ TEST(FitRelativeBlur, CovarianceIsTheScatterOverNoise) {
     EXPECT_NEAR(noise[i], 1, 0.1) << i;
     if (i == 3) continue;
     const double own = std::sqrt(stated(i, i) / scatter(i, i));
-    // 7 % of it is chance, of 100 runs.
+    // With 100 runs, chance contributes 7 %.
     EXPECT_NEAR(own, 1, 0.2) << i;
     ratio += own / static_cast<double>(n - 1);
     const double truth = scene.frames[static_cast<std::size_t>(i)].variance_px2;
@@ -296,7 +298,7 @@ TEST(FitRelativeBlur, CovarianceIsTheScatterOverNoise) {
     }
   }
   EXPECT_NEAR(ratio, 1, 0.1);
-  // What the reference's noise has in common in all of them.
+  // The noise of the reference contributes a common part to all frames.
   EXPECT_NEAR(common / common_stated, 1, 0.35);
   EXPECT_NEAR(misfit, 1, 0.05);
 }

@@ -57,7 +57,7 @@ TEST(PlanRegion, TheWindowIsWhatAllFramesSee) {
   ASSERT_TRUE(region);
   EXPECT_EQ(region->frames.size(), 9U);
   EXPECT_EQ(region->frames[region->reference], 4U);
-  // Its corners are inside every frame, and one frame's border stops it on each side.
+  // Its corners are inside every frame, and on each side it touches the border of one frame.
   const Eigen::Vector2d low = region->window.centre_px - 0.5 * region->window.size_px;
   const Eigen::Vector2d high = region->window.centre_px + 0.5 * region->window.size_px;
   Eigen::Vector2d least = {1e9, 1e9}, room = {1e9, 1e9};
@@ -87,7 +87,7 @@ TEST(PlanRegion, APartLiesWhereItIsAskedFor) {
             1e-9);
 }
 
-// Blurs from 0 upward, so many px apart; the reference is the sharpest.
+// Blurs from 0 upward in steps of `step_px`; the reference is the sharpest.
 std::vector<double> Blurs(int count, double step_px) {
   std::vector<double> variances;
   for (int i = 0; i < count; ++i) variances.push_back(0.4 + std::pow(step_px * i, 2));
@@ -95,7 +95,7 @@ std::vector<double> Blurs(int count, double step_px) {
 }
 
 TEST(PlanRegion, FramesTooBlurredForTheWindowAreDropped) {
-  // The window's smaller side is 149 px: 149/35 = 4.26 px of blur beyond the sharpest.
+  // The smaller side of the window is 149 px: 149/35 = 4.26 px of blur beyond the sharpest.
   const SpectralEstimatorSetup setup = Unread(Blurs(14, 0.4));
   const auto region = PlanRegion(setup, 1, {0, 0});
   ASSERT_TRUE(region);
@@ -109,11 +109,11 @@ TEST(PlanRegion, WhereTooFewWouldBeLeftMoreBlurIsAllowed) {
   const auto wide = PlanRegion(Unread(Blurs(14, 0.8)), 1, {0, 0});
   ASSERT_TRUE(wide);
   EXPECT_EQ(wide->frames.size(), 12U);
-  // Here 25 leaves 9, enough.
+  // Here a factor of 25 leaves 9 frames, which is enough.
   const auto middle = PlanRegion(Unread(Blurs(14, 0.7)), 1, {0, 0});
   ASSERT_TRUE(middle);
   EXPECT_EQ(middle->frames.size(), 9U);
-  // Of a short sweep all are wanted.
+  // Of a short sweep all frames are needed.
   const auto few = PlanRegion(Unread(Blurs(6, 1.8)), 1, {0, 0});
   ASSERT_TRUE(few);
   EXPECT_EQ(few->frames.size(), 6U);
@@ -123,14 +123,14 @@ TEST(PlanRegion, FewerThanFiveFramesAreNothing) {
   EXPECT_FALSE(PlanRegion(Unread(Blurs(12, 2.5)), 1, {0, 0}));
   EXPECT_TRUE(PlanRegion(Unread(Blurs(12, 2.2)), 1, {0, 0}));  // 9.3 px: 5 frames
   EXPECT_FALSE(PlanRegion(Unread(Blurs(4, 0.1)), 1, {0, 0}));
-  // A reference that is itself too blurred.
+  // The reference itself is too blurred.
   SpectralEstimatorSetup setup = Unread(Blurs(12, 1));
   setup.reference = 11;
   EXPECT_FALSE(PlanRegion(setup, 1, {0, 0}));
 }
 
-// One frame that shows next to nothing of the others' target must not take the window away from
-// all of them.
+// One frame that shows almost nothing of the target of the others must not make the window empty
+// for all.
 TEST(PlanRegion, AFrameThatSeesLittleIsDroppedRatherThanTheOthers) {
   SpectralEstimatorSetup setup = Unread(Blurs(14, 0.3));
   setup.frames[2].place.shift_px = {120, 0};
@@ -147,7 +147,7 @@ struct Rendered {
   std::shared_ptr<std::atomic<int>> ticks = std::make_shared<std::atomic<int>>(0);
 };
 
-// Nine frames of a known texture, the fifth the sharpest.
+// Nine frames of a known texture, of which the fifth is the sharpest.
 Rendered Render(double rotation_rad, double highest = 0.4, double noise = 0) {
   Rendered r;
   std::vector<double> variances;
@@ -200,7 +200,7 @@ TEST(MeasureRegions, GivesEveryFramesSpectrumInItsBand) {
     ASSERT_TRUE(direct);
     EXPECT_EQ((direct->values - sample.spectrum.values).abs().maxCoeff(), 0);
     EXPECT_EQ(direct->noise_gain, sample.spectrum.noise_gain);
-    // What a fit's band of 2 can want is there, what is lost in blur is not.
+    // The modes that a fit with a band of 2 may need are present; those lost in blur are not.
     if (frame.frame == 4) continue;
     const double added = frame.expected_variance_px2 - 0.35;
     for (std::size_t k = 0; k < region.modes.size(); ++k) {
@@ -217,7 +217,7 @@ TEST(MeasureRegions, GivesEveryFramesSpectrumInItsBand) {
 }
 
 TEST(MeasureRegions, ChoosesModesThatTheTextureHas) {
-  // Waves up to 0.15 cycles per px, and noise everywhere.
+  // Waves up to 0.15 cycles per px, and noise at all frequencies.
   Rendered r = Render(0, 0.15, 2e-3);
   for (EstimatorFrame& frame : r.setup.frames) frame.pixel_noise = 2e-3;
   const EstimatorRegion region = Measured(r.setup)[0];
@@ -225,7 +225,7 @@ TEST(MeasureRegions, ChoosesModesThatTheTextureHas) {
   std::size_t beyond = 0;
   for (const Mode& mode : region.modes)
     beyond += ModeFrequency(mode, region.window).norm() > 0.17 ? 1U : 0U;
-  // Chance alone lifts a few above four times the noise.
+  // Chance alone lifts a few modes above four times the noise.
   EXPECT_LT(static_cast<double>(beyond), 0.05 * static_cast<double>(region.modes.size()));
 }
 
@@ -241,7 +241,7 @@ TEST(MeasureRegions, DropsFramesThatDoNotSeeTheWindow) {
   EXPECT_EQ(regions[0].frames[regions[0].reference], 4U);
   ASSERT_EQ(regions[0].samples.size(), 7U);
   EXPECT_EQ(regions[0].samples[1].scale, r.setup.frames[2].place.scale);
-  // The smaller window is still seen by all.
+  // All frames still contain the smaller window.
   EXPECT_EQ(regions[1].frames.size(), 9U);
 }
 
@@ -256,7 +256,7 @@ TEST(MeasureRegions, DoesNotDependOnThreads) {
   EXPECT_TRUE((one.leakage.At(3, one.modes.size()) == three.leakage.At(3, one.modes.size())).all());
 }
 
-// V of every frame as the estimator finds it.
+// V of every frame as the blur estimator finds it, minus the truth.
 Eigen::VectorXd FoundErrors(const Rendered& r, const EstimatorRegion& region) {
   const RelativeBlur fit = FitRelativeBlur(region.samples, region.reference, region.window,
                                            region.modes, region.leakage, {});
@@ -272,7 +272,7 @@ TEST(MeasureRegions, GivesAFitWhatItNeeds) {
   EXPECT_LT(FoundErrors(r, Measured(r.setup)[0]).cwiseAbs().maxCoeff(), 0.02);
 }
 
-// Turned frames are turned back; left turned, they would look more blurred.
+// Rotated frames are rotated back. Otherwise they would look more blurred.
 TEST(MeasureRegions, TakesRotationOut) {
   for (const double rotation_rad : {0.012, -0.02}) {
     Rendered r = Render(rotation_rad);
@@ -288,7 +288,7 @@ TEST(MeasureRegions, LeavesAHairOfRotationInRatherThanResample) {
   const auto raw = MeasureSpectrum(r.images[0], r.setup.origin_px, r.setup.frames[0].place,
                                    region.window, region.modes, 20);
   ASSERT_TRUE(raw);
-  // The order of the sums aside.
+  // The order of the sums differs.
   EXPECT_LT((raw->values - region.samples[0].spectrum.values.head(20)).abs().maxCoeff(), 1e-8);
   EXPECT_LT(FoundErrors(r, region).cwiseAbs().maxCoeff(), 0.02);
 }

@@ -14,7 +14,7 @@
 
 namespace thicklens::testing {
 
-// A frame of a known texture: how it is seen, how it is blurred and what the registration says.
+// A frame of a known texture: its view, its blur and the result of its registration.
 struct TextureFrame {
   double variance_px2 = 0;  // V
   TextureView view;
@@ -30,7 +30,7 @@ struct TextureScene {
   double floor_px2 = 0.25;  // of a disc
   Eigen::Vector2d origin{79.2, 80.3};
   calib::TargetWindow window{{0.5, -0.7}, {128, 124}};
-  double pixel_noise = 1e-3;  // stated; added by Samples alone
+  double pixel_noise = 1e-3;  // stated; only Samples() adds it
   unsigned seed = 1;
 
   Transfer TransferOf(const TextureFrame& frame) const {
@@ -86,7 +86,7 @@ struct TextureScene {
   }
 };
 
-// Frames on both sides of a sharp one, with everything that is a nuisance.
+// Frames on both sides of a sharp one, with all nuisance effects.
 inline TextureScene TextureSweep() {
   TextureScene scene;
   const double scales[] = {1.12, 1.07, 1.03, 1, 0.97, 0.94, 0.9};

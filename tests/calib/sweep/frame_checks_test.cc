@@ -36,7 +36,7 @@ std::string ReasonFor(const cv::Mat& stored, double median_contrast = 0) {
   return RejectionReason(Measure(stored), median_contrast, {}).value_or("(none)");
 }
 
-// A frame of a texture as a camera with 8 bits stores it, near focus.
+// A frame of a texture near focus, as a camera with 8 bits stores it.
 cv::Mat Leaves(std::uint64_t seed, int bits = 8) {
   model::SweepSimulationOptions options = SweepCase("ii", 192, seed);
   options.frame_count = 1;
@@ -54,7 +54,7 @@ TEST(FrameChecks, AGoodFramePasses) {
 
 TEST(FrameChecks, ADarkFrameIsNamedDark) {
   EXPECT_THAT(ReasonFor(cv::Mat::zeros(128, 128, CV_8U)), StartsWith("dark: mean 0.000"));
-  // A whole image, 1/60 as bright.
+  // A whole image that is 1/60 as bright.
   cv::Mat dim;
   Leaves(1).convertTo(dim, CV_8U, 1.0 / 60);
   EXPECT_THAT(ReasonFor(dim), StartsWith("dark: "));
@@ -67,7 +67,7 @@ TEST(FrameChecks, SaturationAtFullScaleIsFound) {
   EXPECT_GT(s.saturated_fraction, 0.2);
   EXPECT_EQ(s.saturation_level, 255);
   EXPECT_THAT(ReasonFor(bright), HasSubstr("are clipped at 255"));
-  // The fraction is the clipped one.
+  // The reported fraction is the clipped one.
   const double clipped = cv::countNonZero(bright == 255) / static_cast<double>(bright.total());
   EXPECT_NEAR(s.saturated_fraction, clipped, 1e-9);
 }
@@ -109,7 +109,7 @@ TEST(FrameChecks, ABrightPlateauWithNoiseIsNoSaturation) {
   }
 }
 
-// Little noise leaves a bright plateau narrow; it is no clipping all the same.
+// With little noise, a bright plateau is narrow in the histogram. It is not clipped nevertheless.
 TEST(FrameChecks, ABrightPlateauWithLittleNoiseIsNoSaturation) {
   for (const int bits : {8, 16}) {
     for (const double full_well : {2e4, 1e5, 4e5}) {
@@ -141,7 +141,7 @@ TEST(FrameChecks, NoiseIsMeasuredAsItIs) {
   for (const double noise_levels : {2.0, 5.0}) {
     const cv::Mat noise =
         EncodedBytes(cv::Mat(192, 192, CV_32F, cv::Scalar(0.4)), noise_levels, 12);
-    // The 25th percentile of blocks lies a little below their mean; rounding adds 1/12.
+    // The 25th percentile of blocks is a little below their mean; rounding adds 1/12.
     EXPECT_NEAR(Measure(noise).noise_sigma * 255, std::sqrt(noise_levels * noise_levels + 1.0 / 12),
                 0.08 * noise_levels);
   }
@@ -170,7 +170,8 @@ TEST(FrameChecks, ShadingIsNoContrast) {
   EXPECT_LT(s.contrast, 0.25 * Measure(Leaves(1)).contrast);
 }
 
-// A texture from which `black` is subtracted before it is stored, as by a black level set too high.
+// A texture from which `black` is subtracted before it is stored, as if the black level were set
+// too high.
 cv::Mat Underexposed(std::uint64_t seed, double black, int depth = CV_8U) {
   cv::Mat dark;
   Leaves(seed, depth == CV_8U ? 8 : 16).convertTo(dark, depth, 1.6, -black);
@@ -188,7 +189,7 @@ TEST(FrameChecks, ATextureClippedAtBlackIsNamedBlack) {
   EXPECT_FALSE(s.black_is_one_side);
   EXPECT_THAT(ReasonFor(dark), AllOf(StartsWith("black: "), HasSubstr("are clipped at 0,")));
   EXPECT_THAT(ReasonFor(Underexposed(1, 150 * 257, CV_16U)), StartsWith("black: "));
-  // Stated to be an edge, it may be.
+  // The frame may be accepted if the target is stated to be an edge.
   QualityCheckOptions edge;
   edge.edge_target = true;
   EXPECT_FALSE(RejectionReason(s, 0, edge));
@@ -220,7 +221,7 @@ TEST(FrameChecks, AGoodFrameHasNoBlackAndADarkPlateauWithNoiseIsNone) {
 }
 
 TEST(FrameChecks, PlateausOfLittleNoiseAreClippedAtNeitherEnd) {
-  // Wherever between two encoded values the plateaus lie.
+  // The plateaus may be anywhere between two encoded values.
   for (const double noise_levels : {0.3, 0.45, 0.55, 0.7, 1.0}) {
     for (const double part : {0.0, 0.1, 0.3, 0.5, 0.6, 0.9}) {
       const cv::Mat edge = DrawnEdge(192, 5, 1, (40 + part) / 255, (180 + part) / 255);
@@ -252,7 +253,7 @@ TEST(FrameChecks, BlackOnBothSidesIsNoEdge) {
 }
 
 TEST(FrameChecks, ScatteredBlackIsNoEdgeWhereverItGathers) {
-  // Specks all over; specks in one half alone; a frame that is black but for a corner.
+  // The frames have specks everywhere, specks in one half only, or are black except for a corner.
   std::mt19937 random(9);
   cv::Mat all(192, 192, CV_8U, cv::Scalar(120)), half = all.clone(),
                                                  corner = cv::Mat::zeros(192, 192, CV_8U);
@@ -269,7 +270,7 @@ TEST(FrameChecks, ScatteredBlackIsNoEdgeWhereverItGathers) {
   }
 }
 
-// A grey image seen through a colour filter of 2 x 2 px.
+// A grey image behind a colour filter of 2 x 2 px.
 cv::Mat Mosaic(const cv::Mat& grey, double red, double green, double blue) {
   cv::Mat mosaic = grey.clone();
   const double gain[2][2] = {{red, green}, {green, blue}};
@@ -289,7 +290,7 @@ TEST(FrameChecks, ARawMosaicGetsTheAdviceToDevelopIt) {
     EXPECT_TRUE(Measure(mosaic).is_mosaic);
     EXPECT_THAT(ReasonFor(mosaic), StartsWith("raw mosaic: develop it first"));
   }
-  // Of a knife edge too, whose one half says nothing.
+  // This works for a knife edge, too, one half of which is uninformative.
   const cv::Mat edge = EncodedBytes(DrawnEdge(192, 5, 1, 0, 0.7), 1, 3);
   EXPECT_TRUE(Measure(Mosaic(edge, 0.5, 1, 0.6)).is_mosaic);
   cv::Mat words;
@@ -302,7 +303,7 @@ TEST(FrameChecks, TexturesNoiseAndSmallGainsAreNoMosaic) {
   EXPECT_FALSE(Measure(Mosaic(Leaves(1), 0.99, 1, 1)).is_mosaic);
   const cv::Mat plain = EncodedBytes(cv::Mat(192, 192, CV_32F, cv::Scalar(0.5)), 1, 8);
   EXPECT_FALSE(Measure(Mosaic(plain, 0.98, 1, 1)).is_mosaic);
-  // A part of the frame with a period of 2 px is a texture, however large a part.
+  // A part of the frame with a period of 2 px is a texture, whatever the size of the part.
   cv::Mat part = plain.clone();
   const cv::Rect most(0, 0, 192, 128);
   Mosaic(plain(most), 0.7, 1, 0.7).copyTo(part(most));
@@ -316,11 +317,12 @@ TEST(FrameChecks, TexturesNoiseAndSmallGainsAreNoMosaic) {
       squares.at<std::uint8_t>(y, x) = (x / 3 + y / 3) % 2 == 0 ? 40 : 200;
     }
   }
-  // As sharp as a lens makes them: of drawn squares a part lies at exactly half a cycle a pixel.
+  // The squares are blurred as by a lens, because a part of the power of drawn squares is at
+  // exactly half a cycle per pixel.
   cv::GaussianBlur(squares, squares, {}, 0.6);
   EXPECT_FALSE(Measure(noise).is_mosaic);
   EXPECT_FALSE(Measure(squares).is_mosaic);
-  // Developed, the same pixels in three channels are an image.
+  // The same pixels, developed to three channels, are an image.
   const cv::Mat mosaic = Mosaic(Leaves(1), 0.5, 1, 0.6);
   cv::Mat colour;
   cv::merge(std::vector<cv::Mat>{mosaic, mosaic, mosaic}, colour);
@@ -331,7 +333,7 @@ TEST(FrameChecks, TheHashDistinguishesImagesByEveryPixel) {
   const cv::Mat leaves = Leaves(1)(cv::Rect(0, 0, 189, 190)).clone();  // no multiple of 8 bytes
   const auto hash = [](const cv::Mat& stored) { return Measure(stored).content_hash; };
   EXPECT_EQ(hash(leaves), hash(leaves.clone()));
-  // The pixels count, not how they lie in memory.
+  // The fingerprint depends on the pixels, not on their layout in memory.
   cv::Mat larger;
   cv::copyMakeBorder(leaves, larger, 3, 3, 3, 3, cv::BORDER_CONSTANT, 17);
   EXPECT_EQ(hash(larger(cv::Rect(3, 3, 189, 190))), hash(leaves));
@@ -344,15 +346,15 @@ TEST(FrameChecks, TheHashDistinguishesImagesByEveryPixel) {
   EXPECT_NE(hash(leaves), hash(Leaves(2)(cv::Rect(0, 0, 189, 190))));
   EXPECT_NE(hash(cv::Mat(64, 32, CV_8U, cv::Scalar(9))),
             hash(cv::Mat(32, 64, CV_8U, cv::Scalar(9))));
-  cv::Mat swapped = leaves.clone();  // two rows change places
+  cv::Mat swapped = leaves.clone();  // two rows are exchanged
   leaves.row(10).copyTo(swapped.row(20));
   leaves.row(20).copyTo(swapped.row(10));
   EXPECT_NE(hash(swapped), hash(leaves));
 }
 
 TEST(FrameChecks, ContrastLeavesOutWhatAWideGaussianKeeps) {
-  // Against the plain definition, on a frame that is large enough to be shrunk for it: widths of
-  // 400/25 and 700/25 px, sizes that no block divides.
+  // The result is compared with the plain definition on a frame that is large enough to be reduced:
+  // widths of 400/25 and 700/25 px, and sizes that are not multiples of a block.
   for (const cv::Size size : {cv::Size(611, 401), cv::Size(702, 777)}) {
     cv::Mat grey(size, CV_32F);
     std::mt19937 random(3);

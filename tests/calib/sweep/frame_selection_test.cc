@@ -1,4 +1,4 @@
-// Which frames are thrown out, and in which words.
+// Which frames are excluded, and the text of the reasons.
 #include "calib/sweep/frame_selection.h"
 
 #include <gmock/gmock.h>
@@ -97,7 +97,7 @@ TEST(FrameSelection, ThrowsOutWhatFailsAndKeepsTheRest) {
   EXPECT_EQ(frames[3].rejection, "");
 }
 
-// A frame passes if any of the three shows the target.
+// A frame passes if any of the three measures shows the target.
 TEST(FrameSelection, WithoutEdgesContrastAndTextureTheTargetIsNotToBeSeen) {
   auto frames = GoodFrames(9);
   for (const std::size_t i : {1U, 2U, 3U, 4U}) {
@@ -171,7 +171,8 @@ TEST(ExposureAdvice, SpeaksWhenMostFramesAreBadlyExposed) {
   reject(0, 3, "dark: mean 0.003 of full scale");
   reject(3, 6, "black: 60 % of the pixels are clipped at 0");
   EXPECT_THAT(advice(), StartsWith("6 of 10 frames are under-exposed: raise"));
-  // Dark to the file and clear to the eye: the light need not be at fault where 16 bits are stored.
+  // The file is dark but the image is clear to the eye: with 16 bits stored, the light need not
+  // be at fault.
   for (FrameMeasurement& frame : frames) {
     frame.statistics.mean_encoded = 400.0 / 65535;
     frame.statistics.noise_sigma = 4.0 / 65535;

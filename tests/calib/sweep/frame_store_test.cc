@@ -21,7 +21,7 @@ using ::thicklens::testing::ErrorOf;
 
 constexpr int kWidth = 20, kHeight = 10;
 
-// Frames that are made as they are read, each with its own grey; reads are counted.
+// Frames that are made when they are read, each with its own grey. Reads are counted.
 struct CountedSweep {
   FocusSweep sweep;
   std::shared_ptr<std::vector<std::atomic<int>>> reads;
@@ -106,7 +106,7 @@ TEST(FrameStore, ThreadsGetTheirFramesAndTheLimitHolds) {
 }
 
 TEST(FrameStore, AFrameThatTwoReadAtOnceIsKeptOnce) {
-  // While it is read for one, it is asked for by another, who is served first.
+  // While the store reads a frame for one thread, another thread asks for it and is served first.
   CountedSweep counted(1);
   FrameStore* store = nullptr;
   auto read = counted.sweep.read_frame;
@@ -165,7 +165,7 @@ TEST(FrameStore, AFrameThatCannotBeReadIsTriedAgain) {
 }
 
 TEST(LinearGrey, EveryTransferCurveInTurnIsDecodedAsItsOwn) {
-  // The table of one camera must not serve another's frames.
+  // The table of one camera must not be used for frames of another.
   CountedSweep counted(1);
   for (const char* name : {"srgb", "linear", "gamma-2.2", "srgb", "linear"}) {
     for (const int depth : {CV_8U, CV_16U}) {

@@ -35,7 +35,7 @@ TEST(CompareChoices, NamesTheShapeThatMadeTheFrames) {
       const double wrong =
           made == model::Psf::kGaussian ? *evidence.disc_misfit : *evidence.gaussian_misfit;
       EXPECT_GT(wrong, 1.01 * right);
-      // The right shape has the right second moment, be it stated or the other one.
+      // The right shape has the right second moment, whether it is the stated one or the other.
       ASSERT_TRUE(evidence.other_psf);
       ExpectTrueVariances(m, evidence, made == stated ? Spectrum(evidence) : *evidence.other_psf,
                           0.05);
@@ -52,19 +52,20 @@ TEST(CompareChoices, HalfTheBandSaysTheSameLessWell) {
   ExpectTrueVariances(m, evidence, *evidence.narrow_band, 0.03);
   // The outermost frames lose most of their modes.
   EXPECT_GT(evidence.narrow_band->covariance(0, 0), 1.2 * Spectrum(evidence).covariance(0, 0));
-  // Nothing was thrown out: the samples stay.
+  // No frame was excluded, so the samples stay.
   const BlurEvidence before = m.Measure();
   EXPECT_TRUE(Spectrum(before).variances_px2 == Spectrum(evidence).variances_px2);
-  // So does what the window lets through, which is another for another shape.
+  // The leakage of the window stays as well; it differs between shapes.
   const std::size_t modes = before.region.modes.size();
   EXPECT_TRUE((before.region.leakage.At(2, modes) == evidence.region.leakage.At(2, modes)).all());
 }
 
-// As if the frame had never been measured: it must not have a say in the texture either.
+// The result is the same as if the frame had never been measured: it must not affect the texture
+// either.
 TEST(CompareChoices, WhatWasThrownOutHasNoSayInTheRest) {
   SimulatedSweep damaged = Leaves();
   damaged.stored = std::make_shared<std::vector<cv::Mat>>(*Leaves().stored);
-  // Another target: the next after those that the modes are chosen by.
+  // The other target is the next one after those by which the modes are selected.
   model::SweepSimulationOptions other =
       StillSweep(TargetKind::kDeadLeaves, kFieldPx, kFirstMm, kStepMm, kFrames);
   other.seed = 77;
@@ -106,7 +107,7 @@ TEST(CompareChoices, WhatWasThrownOutHasNoSayInTheRest) {
   EXPECT_EQ(evidence.other_psf->frames, Spectrum(evidence).frames);
 }
 
-// Everything is relative to the reference.
+// All samples are relative to the reference.
 TEST(CompareChoices, WithoutItsReferenceNothingIsCompared) {
   MeasuredSweep m = Measured(Leaves());
   BlurEvidence evidence = m.Measure();
@@ -136,7 +137,7 @@ TEST(CompareChoices, ExamplesAreTheNearestTheSharpestAndTheFarthest) {
   for (const auto direction : {model::BenchDirection::kAway, model::BenchDirection::kToward}) {
     SimulatedSweep simulated = Leaves();
     if (direction == model::BenchDirection::kToward) {
-      // The same images in another order, the scale running the other way.
+      // The same images in another order, with the scale running in the other direction.
       simulated.sweep.direction = direction;
       std::reverse(simulated.truth.frames.begin(), simulated.truth.frames.end());
       for (std::size_t i = 0; i < kFrames; ++i)
@@ -160,8 +161,8 @@ TEST(CompareChoices, ExamplesAreTheNearestTheSharpestAndTheFarthest) {
       ASSERT_EQ(example.measured.size(), n);
       ASSERT_EQ(example.gaussian.size(), n);
       ASSERT_EQ(example.disc.size(), n);
-      // Relative to the reference, by the truth: exp(-2 pi^2 (sigma^2 - sigma_r^2 s^2) nu^2), nu in
-      // cycles per px of the frame.
+      // The true transfer relative to the reference: exp(-2 pi^2 (sigma^2 - sigma_r^2 s^2) nu^2),
+      // nu in cycles per px of the frame.
       const auto frame = static_cast<std::size_t>(example.frame);
       const double s = m.simulated.TrueScale(frame, m.task->reference);
       const double added = m.TrueVariance(frame) - m.TrueVariance(m.task->reference) * s * s;

@@ -1,4 +1,4 @@
-// What the frames contradict is never believed with a small error: whole calibrations.
+// Whole calibrations: a result that the frames contradict never has a small stated error.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -98,7 +98,7 @@ TEST(Contradiction, ADiscThatIsStatedToBeAGaussianIsReported) {
   }
 }
 
-// And the shape that is right is not doubted.
+// The right shape is not doubted.
 TEST(Contradiction, NoneWhereAllIsWell) {
   for (const auto psf : {model::Psf::kGaussian, model::Psf::kDisc}) {
     for (const auto target : {model::TargetKind::kDeadLeaves, model::TargetKind::kKnifeEdge}) {
@@ -112,7 +112,7 @@ TEST(Contradiction, NoneWhereAllIsWell) {
   }
 }
 
-// Points of the first frame, mapped to the new reference and on to another frame.
+// Points of the first frame are mapped to the new reference and from there to another frame.
 TEST(ReferTo, ComposesTheRegistrations) {
   const auto make = [](double scale, double angle, double x, double y) {
     ScaleSample sample;

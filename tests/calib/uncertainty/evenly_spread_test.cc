@@ -28,7 +28,7 @@ TEST(EvenlySpread, NeverTakesMoreNorLeavesOutTheOneThatIsKept) {
         const std::vector<std::size_t> spread = EvenlySpread(count, kept, most);
         EXPECT_THAT(spread, Contains(kept));
         EXPECT_LE(spread.size(), most);
-        // Half of what was asked for at least: no step is wider than it must be.
+        // At least half of the requested number is returned: no step is wider than necessary.
         EXPECT_GE(2 * spread.size() + 1, std::min(count, most));
       }
     }

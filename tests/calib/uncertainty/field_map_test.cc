@@ -1,4 +1,4 @@
-// The map over the field against targets put together from sweeps at known depths.
+// The map over the field is compared with targets that are composed of sweeps at known depths.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -22,7 +22,7 @@ using thicklens::testing::SweepCase;
 
 constexpr int kSizePx = 256;
 
-// Case iii with the target `farther_mm` beyond where the readings say it is.
+// Case iii with the target `farther_mm` beyond its stated position.
 SimulatedSweep SweepAt(double farther_mm, double focus_shift_mm = 0) {
   model::SweepSimulationOptions options = SweepCase("iii", kSizePx, 3);
   options.target.kind = model::TargetKind::kWhiteNoise;
@@ -35,8 +35,8 @@ SimulatedSweep SweepAt(double farther_mm, double focus_shift_mm = 0) {
   return s;
 }
 
-// Every part of the field from a sweep of its own; `depth_at` gives how much farther the target
-// stands at a column.
+// Each part of the field is from a sweep of its own; `depth_at` returns how much farther the target
+// is at a column.
 template <typename DepthAt>
 SimulatedSweep InStrips(int strips, const DepthAt& depth_at) {
   SimulatedSweep whole = SweepAt(0);
@@ -80,7 +80,7 @@ TEST(FieldMap, IsLeftOutOnRequest) {
 TEST(FieldMap, SlowATiltIsMeasuredInDegrees) {
   constexpr double kTiltDeg = 8;
   const double mm_per_px = 400 * 0.006 / (12.5 * 400 / (400 - 12.5));
-  // Positive: the right side is nearer.
+  // Positive means that the right side is nearer.
   const SimulatedSweep s = InStrips(
       16, [&](double x_px) { return -x_px * mm_per_px * std::tan(kTiltDeg * CV_PI / 180); });
   const Calibration c = Calibrate(s.sweep, {});
@@ -91,8 +91,8 @@ TEST(FieldMap, SlowATiltIsMeasuredInDegrees) {
   EXPECT_THAT(c.warnings, Contains(HasSubstr("tilted")));
 }
 
-// The same by a target that is simulated as tilted, for a lens whose focus tells depths well: to
-// what the map itself says of its error.
+// The target is simulated with a tilt, for a lens whose focus determines depths well. The result
+// agrees within the stated error of the map.
 TEST(FieldMap, FindsTheTiltThatWasSimulated) {
   for (const double tilt_deg : {1.0, -2.0}) {
     SCOPED_TRACE(tilt_deg);
@@ -133,18 +133,18 @@ TEST(FieldMap, DepthsOfATargetInStepsAreParted) {
   ASSERT_TRUE(c.field.done) << c.field.message << c.reason;
   ASSERT_GE(c.field.clusters.size(), 2U);
   EXPECT_THAT(c.warnings, Contains(HasSubstr("not at one depth")));
-  // What stands farther than its reading says comes into focus at a smaller one.
+  // A part that is farther than its reading states is in focus at a smaller reading.
   const double truth = s.truth.focus_depth_mm;
   EXPECT_NEAR(c.field.clusters.front().focus_depth_mm.value, truth - kStepMm, 1.5);
   EXPECT_NEAR(c.field.clusters.back().focus_depth_mm.value, truth, 1.5);
-  // Both are in the interval.
+  // Both values are in the interval.
   ASSERT_TRUE(c.focus_depth_mm->systematic);
   EXPECT_LT(c.focus_depth_mm->systematic->x(), truth - kStepMm + 1.5);
   EXPECT_GT(c.focus_depth_mm->systematic->y(), truth - 1.5);
 }
 
 TEST(FieldMap, EachColourHasItsOwnFocus) {
-  // Red, green and blue come into focus at readings 3 mm apart.
+  // Red, green and blue are in focus at readings 3 mm apart.
   const double shifts_mm[] = {-3, 0, 3};
   SimulatedSweep s = SweepAt(0);
   std::vector<SimulatedSweep> colours;

@@ -18,8 +18,8 @@ using ::testing::HasSubstr;
 constexpr int kSize = 160;
 constexpr double kNoise = 5e-5;
 
-// An estimator of one frame, which shows a texture whose power falls with frequency through a
-// Gaussian of `blur_px`.
+// A blur estimator of one frame, which shows a texture whose power decreases with frequency through
+// a Gaussian of `blur_px`.
 struct OneFrame {
   SpectralEstimatorSetup estimator;
   EstimatorRegion region;
@@ -54,7 +54,8 @@ TEST(LargestBlurVariance, IsNotBelowTheBlurOfATextureWhosePowerFalls) {
 }
 
 TEST(LargestBlurVariance, IsLargeWhereTheTextureHasNoFineDetail) {
-  // Nothing above .06 cycles/px: a lens far softer than any could have taken it.
+  // There is no power above 0.06 cycles/px, so a lens far softer than any real one could have taken
+  // the frame.
   const auto bound =
       LargestBlurVariance(Photograph(0.4, 0.06).estimator, Photograph(0.4, 0.06).region);
   ASSERT_TRUE(bound);
@@ -80,7 +81,7 @@ TEST(ChooseFloor, TakesWhatIsStated) {
   EXPECT_DOUBLE_EQ(choice.variance_px2->value, 0.36);
   EXPECT_NEAR(choice.variance_px2->sigma, 0.0602, 1e-4);
   EXPECT_FALSE(choice.interval_px2);
-  // Of a floor that may be nothing at all, the error is that of the square.
+  // For a floor that may be 0, the error is that of the square.
   known.given_px = model::Estimate{0, 0.3};
   EXPECT_NEAR(ChooseFloor(known, evidence, &warnings).variance_px2->sigma, 0.1273, 1e-4);
   known = {};

@@ -1,4 +1,4 @@
-// Widening an interval afterwards, and the advice.
+// Later widening of an interval, and the advice that follows from it.
 #include "calib/uncertainty/systematic_advice.h"
 
 #include <gmock/gmock.h>
@@ -16,7 +16,7 @@ namespace {
 using ::testing::StartsWith;
 using thicklens::testing::BlurBench;
 
-// Results without anything systematic but what a test adds.
+// Results whose only systematic parts are those that a test adds.
 Calibration Plain(double zf_mm, double zf_sigma_mm, double zero_sigma_mm,
                   const model::ThickLens& lens) {
   Calibration c;
@@ -49,7 +49,7 @@ TEST(WidenFocus, AddsToBothIntervals) {
   EXPECT_THAT(c.advice, StartsWith("a jump is "));
 }
 
-// Nearer than the focal point there is no image: one hundredth beyond it d1 is rho + 101 f2.
+// Nearer than the focal point there is no image. One hundredth beyond it, d1 is rho + 101 f2.
 TEST(WidenFocus, StopsShortOfTheFocalPoint) {
   const model::ThickLens lens = BlurBench().lens;
   for (const double move_mm : {387.4, 390.0, 5000.0}) {
@@ -87,15 +87,16 @@ SystematicPart PartOfImageDistance(const std::string& name, double low_mm, doubl
   return part;
 }
 
-// The slope of d1 by hand, f1 f2/(zf - f1)^2 = 12.5 12.8/387.5^2 = 1.0656e-3: the noise of 0.4 mm
-// and the zero of 0.3 mm are each 3.92 times as wide in d1, 1.671e-3 and 1.253e-3 mm.
+// The slope of d1 by hand, f1 f2/(zf - f1)^2 = 12.5 12.8/387.5^2 = 1.0656e-3: the widths that the
+// noise of 0.4 mm and the zero of 0.3 mm have in d1 are each 3.92 times as large, 1.671e-3 and
+// 1.253e-3 mm.
 TEST(WidenFocus, TheAdviceNamesTheLargestShare) {
   struct Case {
-    double first_mm, second_mm;  // widths of two parts besides
-    double zero_mm;              // of the bench zero, of 0.5 mm in all
+    double first_mm, second_mm;  // widths of two additional parts
+    double zero_mm;              // part of the bench zero in the total of 0.5 mm
     const char* advice;
   };
-  // What WidenFocus adds itself is 2.131e-6 mm.
+  // WidenFocus itself adds 2.131e-6 mm.
   const Case cases[] = {
       {0.001, 0.004, 0.3, "second is 50 % of the error of d1: mend second"},
       {0.004, 0.001, 0.3, "first is 50 % of the error of d1: mend first"},
@@ -104,7 +105,7 @@ TEST(WidenFocus, TheAdviceNamesTheLargestShare) {
       {0.0017, 0.001, 0.3, "first is 30 % of the error of d1"},
       {0.0014, 0.001, 0.4, "the bench zero is 31 % of the error of d1: measure offset_mm"},
       {0.0018, 0.001, 0.4, "first is 31 % of the error of d1"},
-      // The zero's share is no larger than zf's whole error.
+      // The share of the zero is not larger than the whole error of zf.
       {0.001, 0.001, 7, "the bench zero is 51 % of the error of d1"},
   };
   const model::ThickLens lens = BlurBench().lens;
@@ -126,7 +127,7 @@ TEST(WidenFocus, TheAdviceNamesTheLargestShare) {
   }
 }
 
-// Not every caller has fitted a zero: what is not there has no share, and nothing is read of it.
+// Some callers have not fitted a zero. It has no share then, and no value of it is read.
 TEST(WidenFocus, WithoutAZeroItHasNoShare) {
   const model::ThickLens lens = BlurBench().lens;
   Calibration c = Plain(400, 0.5, 0, lens);

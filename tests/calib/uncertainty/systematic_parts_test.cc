@@ -20,7 +20,7 @@ using ::testing::HasSubstr;
 using ::testing::StartsWith;
 using thicklens::testing::BlurBench;
 
-// A bench, what its estimators said and the fit to it, as the pipeline has them at this step.
+// A bench, the samples of its blur estimators and the fit to them, as in the pipeline at this step.
 struct Solved {
   BlurBench bench;
   FocusSweep sweep;
@@ -50,7 +50,7 @@ struct Solved {
   }
 };
 
-// A texture whose floor is held at its true value.
+// A texture whose floor is fixed at its true value.
 Solved Texture(double noise, double error_px2 = 0.01, unsigned seed = 1,
                const BlurBench& bench = {}) {
   Solved s;
@@ -68,8 +68,8 @@ Solved Texture(double noise, double error_px2 = 0.01, unsigned seed = 1,
   return s;
 }
 
-// A floor that is off by dS0 moves zf by zf dS0/(A uf^2 - dS0), and kappa with
-// sqrt(A uf^2 - dS0) (zf - f1).
+// A floor that is wrong by dS0 moves zf by zf dS0/(A uf^2 - dS0), and kappa with sqrt(A uf^2 - dS0)
+// (zf - f1).
 TEST(AddSystematicParts, TheFloorsEndsMoveTheResultsAsDerived) {
   Solved s = Texture(0);
   const Eigen::Vector2d floor(0.05, 0.65);
@@ -88,7 +88,7 @@ TEST(AddSystematicParts, TheFloorsEndsMoveTheResultsAsDerived) {
         s.bench.ratio * std::sqrt(1 - off_px2 / curvature) * (zf + move_mm - f1) / (zf - f1);
     const bool rises = ratio > s.bench.ratio;
     EXPECT_NEAR(part->blur_ratio[rises ? 1 : 0], ratio - s.bench.ratio, 1e-5);
-    // d1 falls where zf rises.
+    // d1 decreases if zf increases.
     EXPECT_NEAR(part->image_distance_mm[1 - end],
                 model::ImageDistanceMm(s.bench.lens, zf + move_mm) -
                     model::ImageDistanceMm(s.bench.lens, zf),
@@ -101,7 +101,7 @@ TEST(AddSystematicParts, WithoutAnIntervalTheFloorIsNoPart) {
   Solved s = Texture(0);
   s.Add();
   EXPECT_FALSE(s.Part("lens floor"));
-  // What the estimator itself is good for concerns kappa alone.
+  // The limited accuracy of the blur estimator affects kappa only.
   ASSERT_TRUE(s.calibration.focus_depth_mm->systematic);
   EXPECT_NEAR((*s.calibration.focus_depth_mm->systematic)[0], s.bench.focus_mm, 1e-3);
   EXPECT_NEAR((*s.calibration.focus_depth_mm->systematic)[1], s.bench.focus_mm, 1e-3);
@@ -110,7 +110,7 @@ TEST(AddSystematicParts, WithoutAnIntervalTheFloorIsNoPart) {
   EXPECT_GT(kappa[1], s.bench.ratio);
 }
 
-// Every interval has its value inside, whatever moved it.
+// Every interval contains its value, whatever moved its ends.
 void ExpectOrdered(const Calibration& c) {
   for (const SystematicPart& part : c.systematic_parts) {
     for (const Eigen::Vector2d& ends :
@@ -126,8 +126,8 @@ void ExpectOrdered(const Calibration& c) {
   }
 }
 
-// zf follows from depths and blur alone; d1 = rho + f2 zf/(zf - f1),
-// kappa = sqrt(A uf^2) p (zf - f1)/(r f1).
+// zf follows from depths and blur alone; d1 = rho + f2 zf/(zf - f1), kappa = sqrt(A uf^2) p (zf -
+// f1)/(r f1).
 TEST(AddSystematicParts, StatedTolerancesMoveTheResultsAsTheFormulasSay) {
   struct Expected {
     const char* field;
@@ -170,13 +170,14 @@ TEST(AddSystematicParts, StatedTolerancesMoveTheResultsAsTheFormulasSay) {
   EXPECT_FALSE(s.Part("lens.name"));
   EXPECT_FALSE(s.Part("sensor.principal_point_px[0]"));
   ExpectOrdered(s.calibration);
-  // They add in quadrature, each way.
+  // The parts are added in quadrature, separately for each side.
   const Result& d1 = *s.calibration.image_distance_mm;
   EXPECT_NEAR(d1.systematic.value()[1] - d1.value, std::sqrt(squares), 0.01 * std::sqrt(squares));
   EXPECT_NEAR(d1.value - (*d1.systematic)[0], std::sqrt(squares), 0.01 * std::sqrt(squares));
 }
 
-// An interval's end is as likely as its middle: it adds, where the others add in quadrature.
+// The end of an interval is as likely as its middle, so the floor is added linearly, while the
+// others are added in quadrature.
 TEST(AddSystematicParts, TheFloorAddsAndTheRestGoesInQuadrature) {
   Solved s = Texture(0);
   s.sweep.camera.statements["lens.rear_focal_length_mm"] = {3e-4, false};
@@ -211,7 +212,7 @@ TEST(AddSystematicParts, AnotherShapeMovesTheDepthAlone) {
   s.evidence.other_psf = other.Relative(0.01, 1.2, &random);
   s.evidence.gaussian_misfit = 1.0;
   s.evidence.shape_dof = 1000;
-  // Worse by 20 in chi^2: its kappa is that of a shape that the blur does not have.
+  // chi^2 is larger by 20, so this kappa is that of a shape that the blur does not have.
   s.evidence.disc_misfit = 1.02;
   s.Add();
   const SystematicPart* part = s.Part("shape of the blur");
@@ -220,7 +221,7 @@ TEST(AddSystematicParts, AnotherShapeMovesTheDepthAlone) {
   EXPECT_EQ(part->blur_ratio.norm(), 0);
 }
 
-// A family that the frames do not rule out may be the right one.
+// A family that the frames do not exclude may be the right one.
 TEST(AddSystematicParts, AFamilyThatIsNotRuledOutMovesTheRatio) {
   Solved s = Texture(0);
   BlurBench other = s.bench;
@@ -326,7 +327,8 @@ TEST(FitSides, AgreeOnExactData) {
   EXPECT_TRUE(s.calibration.warnings.empty());
 }
 
-// Where one law holds on both sides, their difference is chance: its sigma is what they state.
+// If one law holds on both sides, their difference is due to chance and agrees with the stated
+// sigma.
 TEST(FitSides, DifferOnCleanDataByNoMoreThanChance) {
   for (const double reading_sigma_mm : {0.0, 0.1}) {
     SCOPED_TRACE(reading_sigma_mm);
@@ -352,7 +354,7 @@ TEST(FitSides, DifferOnCleanDataByNoMoreThanChance) {
   }
 }
 
-// Spherical aberration: the slope of the blur is another on each side.
+// Spherical aberration: the slope of the blur differs between the sides.
 TEST(FitSides, DisagreeWhereTwoModelsWereMixed) {
   Solved s = Texture(1, 0.02);
   BlurBench steeper = s.bench;
@@ -381,7 +383,7 @@ TEST(FitSides, DisagreeWhereTwoModelsWereMixed) {
 
 TEST(FitSides, SixFramesAreNeededOnASide) {
   BlurBench bench;
-  bench.first_mm = 385;  // five frames nearer than 400
+  bench.first_mm = 385;  // five frames are nearer than 400 mm
   bench.last_mm = 385 + 3.3 * 30;
   bench.reference = 4;
   Solved s = Texture(0, 0.01, 1, bench);

@@ -1,4 +1,4 @@
-// What the sides of focus say alone, and what becomes of their disagreement.
+// Results of each side of focus alone, and the effect of their disagreement.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -23,7 +23,7 @@ constexpr double kErrorPx2 = 0.01;
 
 // ---- the sides of focus ----
 
-// The standard deviations of (zf, kappa) of one side, floor and softness held.
+// The standard deviations of (zf, kappa) of one side with fixed floor and softness.
 Eigen::Vector2d SideSigmas(const BlurBench& bench, bool nearer) {
   LinearReference reference{kErrorPx2, false, 0, true};
   for (std::size_t i = 0; i < static_cast<std::size_t>(bench.count); ++i) {
@@ -34,7 +34,7 @@ Eigen::Vector2d SideSigmas(const BlurBench& bench, bool nearer) {
   return {std::sqrt(covariance(0, 0)) / slope, std::sqrt(covariance(1, 1))};
 }
 
-// No frame stands in the plane of focus.
+// No frame is in the plane of focus.
 BlurBench Asymmetric() {
   BlurBench bench = ExactBench();
   bench.first_mm = 342;
@@ -42,8 +42,8 @@ BlurBench Asymmetric() {
   return bench;
 }
 
-// Left free, the floor of a knife edge would take up what tells the sides apart, and each side
-// would know its focus several times worse.
+// If the floor of a knife edge were free, it would absorb the difference between the sides, and the
+// error of each side's focus would be several times larger.
 TEST(FitSides, AKnifeEdgesFloorIsHeldAtTheWholeSweeps) {
   FocusCase c = FocusCase(Asymmetric()).WithKnifeEdge(kErrorPx2);
   c.Solve();
@@ -57,10 +57,10 @@ TEST(FitSides, AKnifeEdgesFloorIsHeldAtTheWholeSweeps) {
   }
 }
 
-// The same of a texture's unknown constant.
+// The unknown constant of a texture is fixed for the same reason.
 TEST(FitSides, ATexturesConstantIsHeldAtTheWholeSweeps) {
   FocusCase c = FocusCase(Asymmetric()).WithTexture(kErrorPx2).WithTrueFloor();
-  // Independent errors, so that the reference's are the same.
+  // The errors are independent, so that those of the reference are the same.
   c.evidence.setup.estimators[0].covariance =
       Eigen::VectorXd::Constant(c.bench.count, kErrorPx2 * kErrorPx2).asDiagonal();
   c.Solve();
@@ -73,7 +73,7 @@ TEST(FitSides, ATexturesConstantIsHeldAtTheWholeSweeps) {
   }
 }
 
-// 12 of 31 frames stand nearer than 400 mm, whichever way the scale runs.
+// 12 of 31 frames are nearer than 400 mm, whichever way the scale runs.
 TEST(FitSides, NearerIsNearer) {
   for (const auto direction : {model::BenchDirection::kAway, model::BenchDirection::kToward}) {
     BlurBench bench = Asymmetric();
@@ -85,7 +85,7 @@ TEST(FitSides, NearerIsNearer) {
   }
 }
 
-// A bench zero that is off moves both alike.
+// An error of the bench zero moves both sides equally.
 TEST(FitSides, TheBenchZerosErrorIsNoDifferenceOfTheSides) {
   Calibration found[2];
   for (const bool is_known : {false, true}) {
@@ -100,7 +100,7 @@ TEST(FitSides, TheBenchZerosErrorIsNoDifferenceOfTheSides) {
   EXPECT_NEAR(found[0].farther.focus_depth_mm.sigma, found[1].farther.focus_depth_mm.sigma, 1e-4);
 }
 
-// Edges that were measured on one side alone say nothing of the other.
+// Edges that were measured on one side only are not used on the other.
 TEST(FitSides, AnEstimatorThatHasOneSideAloneIsLeftOutOnTheOther) {
   FocusCase c = FocusCase(Asymmetric()).WithKnifeEdge(kErrorPx2).WithTexture(kErrorPx2);
   BlurSamples& edges = c.evidence.setup.estimators[0];
@@ -115,7 +115,7 @@ TEST(FitSides, AnEstimatorThatHasOneSideAloneIsLeftOutOnTheOther) {
   EXPECT_NEAR(c.calibration.farther.focus_depth_mm.value, c.bench.focus_mm, 0.01);
 }
 
-// Frames are counted once, by the estimator that has most of them.
+// Frames are counted once, for the blur estimator that has most of them.
 TEST(FitSides, TheLargerEstimatorCountsTheFrames) {
   FocusCase c = FocusCase(Asymmetric()).WithTexture(kErrorPx2).WithKnifeEdge(kErrorPx2);
   BlurSamples& edges = c.evidence.setup.estimators[1];
@@ -129,7 +129,7 @@ TEST(FitSides, TheLargerEstimatorCountsTheFrames) {
 
 // ---- two sides that disagree ----
 
-// A solved texture whose sides are then said to be so many of their standard deviations apart.
+// A solved texture whose sides are then set to differ by so many of their standard deviations.
 FocusCase Apart(double sigmas) {
   FocusCase c = FocusCase(Asymmetric()).WithTexture(kErrorPx2).WithTrueFloor();
   c.Solve();

@@ -1,4 +1,4 @@
-// Systematic parts: against calibrating again, and how they add up.
+// Systematic parts are compared with new calibrations, and their sum is tested.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -17,7 +17,7 @@ using thicklens::testing::FocusCase;
 
 constexpr double kErrorPx2 = 0.01;
 
-// No frame stands in the plane of focus.
+// No frame is in the plane of focus.
 BlurBench Asymmetric() {
   BlurBench bench = ExactBench();
   bench.first_mm = 342;
@@ -31,7 +31,7 @@ TEST(AddSystematicParts, AToleranceIsWhatAnotherCameraFileWouldGive) {
   struct Field {
     const char* name;
     double tolerance;
-    double model::ThickLens::*of_lens;  // none: the pixel pitch
+    double model::ThickLens::*of_lens;  // null: the pixel pitch
   };
   const Field fields[] = {
       {"lens.front_focal_length_mm", 0.1, &model::ThickLens::front_focal_length_mm},
@@ -76,7 +76,7 @@ TEST(AddSystematicParts, AToleranceIsWhatAnotherCameraFileWouldGive) {
   }
 }
 
-// An end that is no lens is left out.
+// An end of the interval that is no valid lens is left out.
 TEST(AddSystematicParts, AToleranceBeyondZeroCountsOnOneSide) {
   FocusCase c = FocusCase().WithTexture(kErrorPx2).WithTrueFloor();
   c.sweep.camera.statements["lens.aperture_radius_mm"] = {5, false};  // of 4.46 mm
@@ -116,7 +116,7 @@ TEST(AddSystematicParts, TheFloorsEndsAreTwoMoreCalibrations) {
               low.calibration.image_distance_mm->value, 1e-6);
 }
 
-// Each estimator alone has to be reported the floor that the other measured.
+// Each blur estimator alone gets the floor that the other one measured.
 TEST(AddSystematicParts, ATextureAloneKeepsTheKnifeEdgesFloor) {
   BlurBench bench = Asymmetric();
   FocusCase c = FocusCase(bench).WithTexture(kErrorPx2);
@@ -136,7 +136,8 @@ TEST(AddSystematicParts, ATextureAloneKeepsTheKnifeEdgesFloor) {
 
 // ---- how parts add up ----
 
-// The estimators' own part of kappa, with the pitch's, in quadrature, each way.
+// The blur estimators' own part of kappa and that of the pitch are added in quadrature, separately
+// for each side.
 TEST(AddSystematicParts, TheEstimatorsOwnErrorIsInKappa) {
   FocusCase c = FocusCase().WithTexture(kErrorPx2).WithTrueFloor();
   c.sweep.camera.statements["sensor.pixel_pitch_mm"] = {0.004 * c.bench.pitch_mm, false};
@@ -166,7 +167,7 @@ TEST(AddSystematicParts, OnEachEndTheFloorAddsToTheRest) {
   EXPECT_NEAR(d1.systematic->y(), d1.value + floor->image_distance_mm.y() + rest_mm, 1e-6);
 }
 
-// Each end by what reaches to its side.
+// Each end is widened by the parts that extend to its side.
 TEST(AddSystematicParts, PartsThatMoveOneWayWidenOneEnd) {
   for (const double sign : {1.0, -1.0}) {
     FocusCase c = FocusCase().WithTexture(kErrorPx2).WithTrueFloor();

@@ -143,7 +143,7 @@ TEST(TimeModel, IsTheBestWithoutNegativeTerms) {
   }
 }
 
-// What plans have in common does not tell them apart, however noisy it is.
+// Costs that plans have in common do not distinguish them, however noisy the costs are.
 TEST(TimeModel, PlansDifferByWhatTheySolveAlone) {
   const std::vector<Workload> loads = Loads(15, 6);
   const PartLaws exact = SomeLaws();

@@ -12,7 +12,7 @@ namespace {
 
 using testing::TemporaryFolder;
 
-// A machine of which 1000 MiB are available to a process that holds 10.
+// A machine on which 1000 MiB are available to a process that holds 10 MiB.
 class MemoryAvailable : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -37,7 +37,7 @@ TEST_F(MemoryAvailable, AContainerHasLess) {
   EXPECT_DOUBLE_EQ(LimitMib(), 0.8 * 100 + 10);
 }
 
-// Else a container that has read much would seem to be full.
+// Otherwise a container that has read much would seem to be full.
 TEST_F(MemoryAvailable, FilesThatWereReadMakeRoom) {
   Put("sys/fs/cgroup/memory.max", "209715200\n");
   Put("sys/fs/cgroup/memory.current", "209715200\n");

@@ -94,8 +94,8 @@ TEST(OutputFile, LockOfAKilledRunIsGone) {
   EXPECT_THAT(folder.Entries(), ElementsAre("a.yaml"));
 }
 
-// Claim, drop and commit as fast as it goes: what stands at the target is always one whole content,
-// and never do two hold the same output.
+// Several threads claim, drop and commit as fast as they can. The target always has one complete
+// content, and two claimants never hold the same output.
 TEST(OutputFile, ManyClaimantsOneHolder) {
   const TemporaryFolder folder;
   std::atomic<int> holders{0}, most{0}, claims{0}, other_errors{0};
@@ -242,7 +242,7 @@ TEST(OutputFolder, ReplacesOnlyItsOwn) {
   EXPECT_THAT(folder.Entries(), ElementsAre("empty", "file", "own", "thesis"));
 }
 
-// A folder of ours into which somebody has put something.
+// An output folder of the program to which another program has added a file.
 TEST(OutputFolder, NamesWhatWouldBeLost) {
   TemporaryFolder folder;
   const std::vector<std::string> own = {kMarker, "frames"};
@@ -255,7 +255,7 @@ TEST(OutputFolder, NamesWhatWouldBeLost) {
   EXPECT_TRUE(fs::exists(folder / "out/notes.txt"));
 }
 
-// The same one folder deeper, where the own entries tell the names there.
+// The output is one folder deeper, and its own entries give the names there.
 TEST(OutputFolder, NamesWhatWouldBeLostOneFolderDeeper) {
   const std::vector<std::string> own = {kMarker, "views/view_[0-9].png", "views/view_[0-9].tiff"};
   const auto put_own = [](TemporaryFolder* folder) {
@@ -311,8 +311,7 @@ TEST(OutputFolder, WithoutCommitTheOldOneStays) {
   EXPECT_EQ(ContentOf(folder / "out/truth.yaml"), "old");
 }
 
-// The staging folder is taken away under the run's feet, so that the second of the two renames
-// fails.
+// The staging folder is removed during the run, so that the second of the two renames fails.
 TEST(OutputFolder, OldOneComesBackIfCommitFails) {
   const TemporaryFolder folder;
   folder.Put("out/truth.yaml", "old");
@@ -389,7 +388,7 @@ TEST(OutputFolder, VanishedMeanwhileIsAnError) {
                 AllOf(StartsWith(parent + "/out: "), HasSubstr(why)));
     EXPECT_FALSE(fs::exists(parent));
   }
-  // Somebody who made the folders again has not made what was in them.
+  // Another process that created the folders again has not created their content.
   fs::create_directory(parent);
   OutputFolder output(parent + "/out", "marker");
   const std::string staging = output.staging_path();
@@ -400,7 +399,7 @@ TEST(OutputFolder, VanishedMeanwhileIsAnError) {
     OutputFolder dropped = std::move(output);
     EXPECT_THAT(ErrorOf([&] { dropped.Commit(); }), HasSubstr(why));
   }
-  // What somebody else made there is not taken away.
+  // What another process created there is not removed.
   EXPECT_TRUE(fs::exists(staging));
 }
 
@@ -446,7 +445,7 @@ TEST(OutputFolder, IsThereAtEveryMomentWhileItIsReplaced) {
   EXPECT_EQ(missing, 0);
   EXPECT_GT(seen, 0);
   EXPECT_EQ(ReadWholeFile(path + "/marker"), "300");
-  // Nothing is left beside it.
+  // No other file is left in the folder.
   EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 3);
 }
 

@@ -18,7 +18,7 @@
 
 namespace thicklens::testing {
 
-// What the tests of output files and folders share.
+// Code that the tests of output files and folders share.
 
 // The file by which an output folder of these tests is recognised.
 inline constexpr char kMarker[] = "truth.yaml";
@@ -77,7 +77,7 @@ std::string TextOfChild(const Work& work) {
   if (outcome.rfind("skip: ", 0) == 0) GTEST_SKIP() << outcome.substr(6); \
   EXPECT_EQ(outcome, "")
 
-// For the text of a child: empty if the condition holds.
+// Text that a child process prints: empty if the condition holds.
 inline std::string Unless(bool condition, const std::string& text) {
   return condition ? "" : text + "; ";
 }

@@ -1,4 +1,4 @@
-// Where outputs go: links, permissions, mount points, folders that may not be written to.
+// Places of outputs: links, permissions, mount points, folders without permission to write.
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -88,7 +88,7 @@ TEST(OutputPlace, ALinkedFolderIsReplacedWhereItIs) {
   EXPECT_THAT(folder.Entries(), ElementsAre("disk", "out"));
 }
 
-// As `cp` does, and not by putting a file in the link's place.
+// `cp` refuses as well. The link must not be replaced by a file.
 TEST(OutputPlace, ALinkToNothingIsRefused) {
   const TemporaryFolder folder;
   fs::create_symlink("nothing", folder / "link");
@@ -274,7 +274,7 @@ TEST(OutputPlace, TheNextReplacementRemovesThePartsOfAKilledRun) {
   }
 }
 
-// A run that was killed before it replaced anything says nothing about whose the content is.
+// A run that was killed before it replaced anything does not say to whom the content belongs.
 TEST(OutputPlace, FilesThatAKilledRunDidNotTouchAreKept) {
   const TemporaryFolder folder;
   const std::string out = folder / "out";

@@ -57,7 +57,7 @@ TEST(ParallelFor, RunsAtTheSameTime) {
   EXPECT_EQ(inside, 2);
 }
 
-// Index 2 fails last of all, after 5 has failed: it is still the one that is reported.
+// Index 2 is the last to fail, after 5, but its exception is still the one that is rethrown.
 TEST(ParallelFor, RethrowsTheSmallestFailingIndexWhateverTheTiming) {
   for (int repeat = 0; repeat < 20; ++repeat) {
     std::atomic<bool> five_failed{false};

@@ -1,4 +1,4 @@
-// Iterations that led nowhere are no answer.
+// An iteration that diverged gives no answer.
 #include "thicklens/base/residual_guard.h"
 
 #include <gmock/gmock.h>

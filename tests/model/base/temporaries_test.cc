@@ -30,8 +30,8 @@ std::string NewFile(const std::string& path) {
   return path;
 }
 
-// A process in which outputs were abandoned can make none any more: each of these tests runs in one
-// of its own, which says by its exit code whether all was right.
+// A process in which outputs were abandoned cannot make any more. Therefore each of these tests
+// runs in a process of its own, whose exit code is the result.
 class AbandonOutputsTest : public ::testing::Test {
  protected:
   AbandonOutputsTest() { GTEST_FLAG_SET(death_test_style, "threadsafe"); }
@@ -103,7 +103,7 @@ TEST_F(AbandonOutputsTest, WhatIsKeptBeforeStaysAndAfterwardsNothingCanBeKept) {
   });
 }
 
-// Somebody else's file may have taken the name meanwhile.
+// A file of another process may have the same name in the meantime.
 TEST_F(AbandonOutputsTest, LeavesWhatIsNotWhatWasMadeThere) {
   EXPECT_RIGHT_IN_A_PROCESS([] {
     const testing::TemporaryFolder folder;
@@ -161,7 +161,7 @@ TEST_F(AbandonOutputsTest, WhatWasReplacedGoes) {
   });
 }
 
-// Another thread goes on writing into a staging folder.
+// Another thread continues to write into a staging folder.
 TEST_F(AbandonOutputsTest, AFolderThatStillGetsFilesGoesAsWell) {
   EXPECT_RIGHT_IN_A_PROCESS([] {
     const testing::TemporaryFolder folder;

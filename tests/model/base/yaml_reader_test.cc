@@ -150,7 +150,7 @@ TEST(YamlSchema, MissingOtherOrNoMap) {
   EXPECT_THAT(error("# nothing\n"), HasSubstr("f.yaml"));
   EXPECT_THAT(error(""), HasSubstr("f.yaml: one YAML document is expected"));
   EXPECT_THAT(error("a: 1\n---\nb: 2"), HasSubstr("one YAML document is expected, found more"));
-  // Where yaml-cpp would find documents without end.
+  // yaml-cpp would find documents without end here.
   EXPECT_THAT(error(","), HasSubstr("f.yaml:1:1: no valid YAML"));
   EXPECT_THAT(error("\n ]a: 1"), HasSubstr("f.yaml:2:2: no valid YAML"));
 }

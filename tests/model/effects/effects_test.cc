@@ -78,7 +78,7 @@ TEST(EffectsTest, ToleranceHasAUnit) {
   }
 }
 
-// The oracle of "displacement 0": rays of the source's two-plane parametrisation through both
+// The oracle of "displacement 0": rays of the paper's two-plane parametrisation through both
 // lenses, [S16].
 TEST(EffectsTest, ThinLensOfTheSameFocusPutsRaysInTheSamePlace) {
   const Camera camera = TheCamera();
@@ -106,7 +106,8 @@ TEST(EffectsTest, ThinLensOfTheSameFocusPutsRaysInTheSamePlace) {
             0);
 }
 
-// Against the mean of the public function over many rays of the Gaussian aperture.
+// The result is compared with the mean of the public function over many rays of the Gaussian
+// aperture.
 TEST(EffectsTest, FalloffIsTheMeanOverTheAperture) {
   const Camera camera = TheCamera();
   const double sigma_mm = 0.45 * camera.lens.aperture_radius_mm;
@@ -129,7 +130,7 @@ TEST(EffectsTest, FalloffIsTheMeanOverTheAperture) {
   EXPECT_NEAR(impact.amount, expected, 0.02 * expected);
   const double stored = 255 * (1 - TransferCurve::Srgb().Encode(1 - impact.amount));
   EXPECT_GE(impact.grey_levels, stored);
-  // In the plane of focus all rays of a position see the same.
+  // In the plane of focus all rays of a position meet the same point.
   EXPECT_LT(impact.grey_levels, 1.05 * stored);
 }
 
@@ -258,7 +259,7 @@ TEST(EffectsTest, BlurBoundHoldsForWavesAndEdges) {
 }
 
 TEST(EffectsTest, NothingWithoutACauseMatters) {
-  // In the plane of focus, on the axis, of one brightness.
+  // The place is in the plane of focus, on the axis, of uniform brightness.
   EffectSite place = PlaceAt(300, 250, 300);
   place.dark = place.bright = 0.4;
   place.jump = 0;
@@ -301,7 +302,8 @@ TEST(EffectsTest, VignettingNeedsUvOffTheAperture) {
   conditions.planes = LightFieldPlanes{0, 300};
   EXPECT_EQ(ImpactAt(Effect::kVignetting, conditions, corner, EffectSet::All()).amount, 0);
   conditions.planes = LightFieldPlanes{30, 270};
-  // The light of a Gaussian that the same one, displaced, does not have: summed.
+  // The share of a Gaussian's light that is outside the same Gaussian after a displacement, as a
+  // sum.
   const double s_mm = std::hypot(300, 250) * 300 / conditions.camera.focal_scale_px();
   const double wander = 30 * s_mm / 270 / (0.45 * conditions.camera.lens.aperture_radius_mm);
   double lost = 0;
@@ -348,7 +350,7 @@ TEST(EffectsTest, WhatIsLeftOutStaysWithinTheToleranceAllTogether) {
   EXPECT_EQ(last, EffectSet());
 }
 
-// Diffraction is there then with the floor as without it.
+// The diffraction is then simulated with and without a floor.
 TEST(EffectsTest, ALensFloorThatWasNotMeasuredIsNothing) {
   EffectConditions conditions = ConditionsOf(TheCamera());
   const EffectSite place = PlacesBetween(conditions.camera, 300, 300, false).front();
@@ -368,7 +370,7 @@ TEST(EffectsTest, ToleranceInPxJudgesDisplacements) {
   EXPECT_EQ(RequiredEffects(conditions, places, optics, EffectToleranceFromText("0.19px")), optics);
   EXPECT_EQ(RequiredEffects(conditions, places, optics, EffectToleranceFromText("0.21px")),
             EffectSet({Effect::kLensFloor}));
-  // What displaces nothing is judged by its grey levels.
+  // An effect that displaces nothing is compared by its grey levels.
   EffectConditions wide = conditions;
   wide.camera.lens.lens_thickness_mm = 20;
   wide.camera.calibration->image_distance_mm = Estimate{ImageDistanceMm(wide.camera.lens, 300), 0};

@@ -35,7 +35,7 @@ ImageChange Change(const EncodedValues& a, const EncodedValues& b) {
 
 TEST(ImageChangeTest, AShiftIsAShift) {
   for (const double shift_px : {0.01, 0.2}) {
-    // Central differences see sin(w)/w of the slope of a wave, w = 2 pi/16.
+    // Central differences give sin(w)/w of the slope of a wave, w = 2 pi/16.
     const double seen = std::sin(2 * kPi / 16) / (2 * kPi / 16);
     EXPECT_NEAR(Change(Waves(0, 0), Waves(shift_px, 0)).as_shift_px, shift_px / seen,
                 0.02 * shift_px);

@@ -33,8 +33,8 @@ Moments MomentsOf(const EncodedImage& image) {
   return {mean, std::sqrt(squares / static_cast<double>(image.values.size()) - mean * mean)};
 }
 
-// In the dark sRGB is 12.92 times as steep as in linear light, near white less than 1: noise added
-// to the light would differ by that.
+// In the dark, sRGB is 12.92 times as steep as linear light, and near white its slope is less than
+// 1. Noise added to the light would differ by that factor.
 TEST(ToEncodedWithNoise, AddsTheSameToDarkAndBright) {
   constexpr double kSigma = 1.0 / 255;
   for (const double stored : {0.04, 0.5, 0.95}) {
@@ -53,7 +53,7 @@ TEST(ToEncodedWithNoise, RoundsAfterTheNoiseIsAdded) {
   constexpr double kSigma = 0.3 / 255;
   const Moments moments = MomentsOf(ToEncodedWithNoise(Flat(static_cast<float>(kLevel / 255)),
                                                        TransferCurve::Linear(), 8, kSigma, 7));
-  // P(level + noise >= 100.5) = P(N >= 1/3), and beyond 101.5 never: 100 + .3694.
+  // P(level + noise >= 100.5) = P(N >= 1/3), and never beyond 101.5, so the mean is 100 + 0.3694.
   EXPECT_NEAR(moments.mean * 255, 100 + 0.36944, 5 * 0.4827 / kEdgePx);
 }
 

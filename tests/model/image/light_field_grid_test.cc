@@ -59,7 +59,7 @@ void ExpectNear(const Eigen::Vector2d& value, const Eigen::Vector2d& wanted) {
   EXPECT_NEAR(value.y(), wanted.y(), Tolerance(wanted.y()));
 }
 
-// The ray's height on Ap and its slope, from two points of it and nothing else.
+// Height of the ray on Ap, and its slope, computed only from two of its points.
 double HeightOnAperture(double st_mm, double uv_mm, const LightFieldPlanes& planes) {
   return uv_mm + planes.uv_depth_mm * (uv_mm - st_mm) / planes.plane_spacing_mm;
 }
@@ -158,7 +158,7 @@ TEST(LandingPoint, ScalingEveryLengthChangesNothingButTheUnit) {
       }
     }
   }
-  // The same camera in other units has the same image: disparity and slope are in pixels.
+  // The same camera in other units gives the same image: disparity and slope are in pixels.
   const Camera camera = BenchCamera();
   const LightFieldGrid grid = GridOnPlanes(camera, {100, 2000}, 7, 5);
   for (const double scale : {1e-3, 1e3}) {
@@ -195,7 +195,7 @@ TEST(Image, IsTheScenesWayUp) {
                            LandingPointMm(camera.lens, image_distance_mm, planes, ray));
   };
   ExpectNear(image_of({0, 0, 0, 0}), camera.sensor.principal_point_px);
-  // A point of the scene to the right and below is seen to the right and below.
+  // A point of the scene to the right and below appears to the right and below.
   const Eigen::Vector2d right_below = image_of({10, 4, 0, 0});
   const double focal_scale_px = DefocusScaleMm(camera.lens, image_distance_mm) / 0.006;
   ExpectNear(right_below,
@@ -228,7 +228,8 @@ TEST(Irradiance, AxialRayHasAllOfIt) {
   EXPECT_EQ(RelativeIrradiance(camera.lens, camera.image_distance_mm(), {0, 640}, {0, 0, 0, 0}), 1);
 }
 
-// For a thin lens in one medium the chief ray goes straight on: alpha = beta, so cos^4.
+// For a thin lens in one medium the chief ray is not deflected: alpha = beta, so the fall-off is
+// cos^4.
 TEST(Irradiance, ChiefRayOfAThinLensFallsByTheFourthPower) {
   const ThickLens thin{25, 25, 0, 5};
   const double image_distance_mm = ImageDistanceMm(thin, 500);
@@ -272,8 +273,8 @@ TEST(Transmission, DiscAndPinhole) {
   EXPECT_THROW(ApertureTransmission(Psf::kDisc, -1, 4, {0, 0}), Error);
 }
 
-// The claim of the sampling: a point out of focus, seen through the weighted samples, has exactly
-// the standard deviation kappa r_defocus. The landing points are those of the matrix trace.
+// The sampling claims that the image of a point out of focus through the weighted samples has
+// exactly the standard deviation kappa r_defocus. The landing points are those of the matrix trace.
 TEST(Samples, CarryTheCalibratedBlurForEveryNumberOfViews) {
   const double ratio = 0.451;
   const double radius_mm = 4.46;
@@ -316,7 +317,7 @@ TEST(Samples, StepAtSevenViews) {
   const ApertureSamples samples = SampleAperture(Psf::kGaussian, 0.5, 4, 7, 7);
   EXPECT_NEAR(samples.u_step_mm / (0.5 * 4), 0.648, 5e-4);
   EXPECT_NEAR(samples.u_step_mm, samples.v_step_mm, 1e-14);
-  // The spacing 4 kappa r/U of a first guess: 12 % less.
+  // The spacing 4 kappa r/U of a first guess would be 12 % less.
   EXPECT_NEAR((4.0 / 7) / (samples.u_step_mm / (0.5 * 4)), 0.88, 5e-3);
 }
 
@@ -391,8 +392,8 @@ TEST(GridOnPlanes, ViewsCrossTheApertureInTheSamples) {
       if (!(planes.uv_depth_mm < 640)) continue;
       const LightFieldGrid grid = GridOnPlanes(camera, planes, 6, 7);
       for (int k = 0; k + 1 < 6; ++k) {
-        // Of the rays of the point on the axis in focus: where they meet ST follows from (0, 0) at
-        // zf.
+        // The rays of the point on the axis in focus: their intersections with ST follow from (0,
+        // 0) at zf.
         const auto crossing_mm = [&](int view) {
           Ray ray = grid.RayAt(0, 0, view, view);
           const double share = (640 - planes.uv_depth_mm) / planes.plane_spacing_mm;
@@ -464,7 +465,7 @@ TEST(Slope, IsInfiniteOnTheUvPlaneAndSaysSo) {
   EXPECT_NEAR(SlopeOnGrid(grid, kInfinity), grid.u_step_mm / grid.s_step_mm, 1e-12);
 }
 
-// Near points move left as the view moves right: what the centre view shows at x stands at x - a d.
+// Near points move left as the view moves right: the point at x in the centre view is at x - a d.
 TEST(Disparity, IsTheShiftBetweenViews) {
   const MatrixLens oracle = MatrixLenses()[5];
   const Camera camera = CameraWith(oracle.AsThickLens(4.46), 640);
@@ -506,10 +507,10 @@ TEST(ApertureWeights, AreThoseOfTheNamedShape) {
 
 TEST(SampleAperture, AnyWeightsCarryTheCalibratedBlur) {
   Eigen::ArrayXXd weights = ApertureWeights(ApertureShape::kUniform, 5, 3);
-  weights(0, 0) = 0;  // a view that the photograph did not see
+  weights(0, 0) = 0;  // a view that does not contribute to the photograph
   weights /= weights.sum();
   const ApertureSamples samples = SampleAperture(weights, 0.45, 4);
-  // About their own middle, which that view's absence moves.
+  // The offsets are about their own middle, which the missing view moves.
   double middle = 0, moment = 0;
   for (int j = 0; j < 3; ++j) {
     for (int i = 0; i < 5; ++i) {

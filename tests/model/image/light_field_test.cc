@@ -22,7 +22,7 @@ using ::thicklens::testing::ErrorOf;
 
 constexpr int kS = 5, kT = 4, kU = 3, kV = 5;
 
-// A value that tells where it stands: channel, v, u, t, s as decimal digits.
+// A value that encodes its position: channel, v, u, t, s as decimal digits.
 float Digits(int channel, int l, int k, int t, int s) {
   return static_cast<float>(channel * 10000 + l * 1000 + k * 100 + t * 10 + s);
 }
@@ -131,7 +131,7 @@ TEST(InnerViews, AreThoseInTheMiddle) {
   ASSERT_EQ(inner.v_count, 3);
   for (int l = 0; l < 3; ++l)
     EXPECT_EQ(ViewImage(inner, 0, l).values, ViewImage(all, 1, l + 1).values);
-  // Their shares among themselves stay, and so do the places they were seen from.
+  // The ratios of the weights stay the same, and so do the positions of the views.
   EXPECT_NEAR(inner.weights(0, 0) / inner.weights(1, 0), all.weights(1, 1) / all.weights(2, 1),
               1e-14);
   EXPECT_NEAR(inner.weights.sum(), 1, 1e-14);

@@ -24,7 +24,7 @@ const std::vector<TransferCurve>& Curves() {
   return curves;
 }
 
-// Of both ways to store them, the first is the definition.
+// There are two ways to store the values. The first one is the definition.
 void ExpectTheSame(const std::vector<float>& light, const TransferCurve& curve, int bits) {
   const LinearImage image{static_cast<int>(light.size()), 1, 1, light};
   const EncodedImage expected = ToEncoded(image, curve, bits);
@@ -69,7 +69,7 @@ TEST(QuantisedLevels, AnyLightHasItsStoredLevel) {
                               -kInfinity,
                               std::numeric_limits<float>::min(),
                               std::numeric_limits<float>::denorm_min()};
-  // As many in each octave, and evenly.
+  // The same number in each octave, evenly distributed.
   std::uniform_real_distribution<float> octaves(-45, 1), even(0, 1.01F);
   for (int i = 0; i < 100000; ++i) {
     light.push_back(std::exp2(octaves(random)));

@@ -78,8 +78,8 @@ void ExpectSays(const std::string& message, const std::vector<std::string>& part
   }
 }
 
-// Where the chief ray through a pixel meets depth z: the traced lens says where a chief ray from
-// height 1 there lands, and a paraxial landing is proportional to the height.
+// The point at which the chief ray through a pixel meets depth z. The traced lens gives the landing
+// of a chief ray from height 1 there, and a paraxial landing is proportional to the height.
 Eigen::Vector2d ScenePointMm(const MatrixLens& oracle, const Camera& camera, int x, int y,
                              double depth_mm) {
   const double landing_of_one_mm = oracle.Landing(1, depth_mm, 0, camera.image_distance_mm());
@@ -135,7 +135,7 @@ TEST(MakeScene, DisparityIsTheShiftBetweenTracedViews) {
         map.values[i] = static_cast<float>((disparity_px - 0.125) / -2.5);
       }
       const Scene scene = MakeScene(camera, GreyImage(), map, convention, "disparity.pfm");
-      // A float near .05 has steps of 4e-9, which is 1e-4 of the smallest disparity used.
+      // A float near 0.05 has steps of 4e-9, which is 1e-4 of the smallest disparity used.
       for (std::size_t i = 0; i < kCount; ++i) {
         EXPECT_NEAR(scene.depth_mm[i], depth_mm[i], 3e-4 * depth_mm[i]);
       }
@@ -283,7 +283,7 @@ TEST(MakeScene, WrongUnitStopsWithTheNumbers) {
                          Convention(DepthKind::kZ, DepthUnitMm("mm")), "z.png");
              }),
              {"z.png", "0.4 to 1.5 mm", "median 0.6 mm", "front focal point at 12.5 mm"});
-  // The same with a room seen by a phone's lens, where the wrong depths are beyond f1 = 4 mm.
+  // A room photographed with a phone's lens, where the wrong depths are beyond f1 = 4 mm.
   const Camera phone = CameraFor({4, 4, 0, 1}, 3000);
   ExpectSays(MessageOf([&] {
                MakeScene(phone, GreyImage(), MapOf(4.5F),

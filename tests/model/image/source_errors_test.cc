@@ -1,5 +1,5 @@
-// Errors of the source (the supplement of Couillaud & Ziou) that can be shown with the camera and
-// its light field alone. Each test shows the claim fail, and what holds in its place.
+// Errors of the paper (the supplement of Couillaud & Ziou) that can be shown with the camera and
+// its light field alone. Each test shows that the claim fails, and what holds instead.
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
@@ -30,7 +30,7 @@ Camera SmallCamera() {
                              TestSensor(kImageSide, kImageSide, 0.006, {1.5, 1.5}));
 }
 
-// H, XY x STUV: each ray lands by [S16] and gives its weight to the nearest pixel (the unit
+// H, XY x STUV: each ray lands by [S16] and contributes its weight to the nearest pixel (the unit
 // impulse).
 Eigen::MatrixXd ProjectionMatrix(const Camera& camera, const LightFieldGrid& grid) {
   Eigen::MatrixXd h = Eigen::MatrixXd::Zero(
@@ -107,7 +107,7 @@ TEST(SourceErrors, DistinctRowsDoNotMakeIndependentColumns) {
   ASSERT_NE(counterexample.row(0), counterexample.row(1));
   EXPECT_TRUE((counterexample * Eigen::Vector3d(1, 1, -1)).isZero());
 
-  // Nor do they where there are enough rows.
+  // The columns are not independent either if there are enough rows.
   Eigen::Matrix<double, 4, 3> tall;
   tall << 1, 0, 1,  //
       0, 1, 1,      //
@@ -144,9 +144,10 @@ TEST(SourceErrors, AngleBehindTheLensIsMeasuredFromTheWrongPlane) {
     const double by_9 = CosBeta(lens, image_distance_mm, planes, ray);
     const double truth = traced_cos_beta(oracle);
     EXPECT_GT(std::abs(by_9 - truth), 1e-4);
-    // Crossed planes make D longer than d1, so that [S9] sees too steep a ray; else too flat a one.
+    // With crossed planes D is longer than d1, so that the ray of [S9] is too steep; otherwise it
+    // is too flat.
     EXPECT_EQ(by_9 < truth, lens.lens_thickness_mm < 0);
-    // The rear principal plane is what it lacks.
+    // The formula lacks the rear principal plane.
     const double rear_distance_mm = image_distance_mm - lens.lens_thickness_mm;
     const Eigen::Vector2d across_mm =
         LandingPointMm(lens, image_distance_mm, planes, ray) - ApertureCrossingMm(planes, ray);

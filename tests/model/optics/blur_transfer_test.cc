@@ -48,8 +48,8 @@ TEST(BlurTransferTest, GaussianIsTheFourierIntegralOfItsDensity) {
 TEST(BlurTransferTest, DiscIsTheFourierIntegralOfAUniformDisc) {
   for (const double radius : {0.4, 1.0, 6.5}) {
     for (const Frequency f : kFrequencies) {
-      // In polar coordinates: the midpoint rule round the circle, and along the radius in r^2, in
-      // which the disc's area is uniform.
+      // The integral is in polar coordinates: the midpoint rule is used along the circle, and along
+      // the radius in r^2, in which the area of the disc is uniform.
       constexpr int kAngles = 200, kRadii = 8000;
       double sum = 0;
       for (int i = 0; i < kRadii; ++i) {

@@ -117,7 +117,7 @@ TEST(ExplainCamera, SaysWhereTheThinLensHasNoPlaneOfFocus) {
   EXPECT_FALSE(known.thin.focus_depth_mm);
 }
 
-// Where both lenses part by the limit, by their own formulas.
+// The depth at which the two lenses differ by the limit follows from their formulas.
 TEST(ExplainCamera, SaysAtWhichDepthsThinIsAsGoodAsThick) {
   Camera camera = ThickCamera();
   // With rho = K (1 - f2/f1) both lenses are the same but for that; 0.01 mm are more.

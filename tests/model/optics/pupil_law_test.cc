@@ -86,7 +86,7 @@ TEST(PupilLaw, HasTheMomentsAndTheTransferFunctionOfItsRays) {
   }
 }
 
-// To the leading order in (sigma/d1)^2, of a far plane of focus.
+// The values hold to the leading order in (sigma/d1)^2 for a far plane of focus.
 TEST(PupilLaw, OfASmallApertureFollowsTheLeadingTerms) {
   const double sigma_mm = 0.2, d1_mm = 16;
   const double x = std::pow(sigma_mm / d1_mm, 2);
@@ -132,7 +132,8 @@ TEST(PupilLaw, BeyondItsReachADiscsTransferIsThatOfItsEdge) {
   }
 }
 
-// The size in the image goes as one over the distance from there, whatever the depth.
+// The size in the image is proportional to one over the distance from the centre of perspective,
+// whatever the depth is.
 TEST(PupilLaw, SeesFromTheCentreOfPerspective) {
   const double zf_mm = 400, d1_mm = ImageDistanceMm(kWide, zf_mm);
   for (const PupilLaw law : AllPupilLaws()) {
@@ -158,7 +159,8 @@ TEST(PupilLaw, NamesWhatItCannotDo) {
                 PupilProfile(PupilLaw::kSineCondition, {Psf::kGaussian, 100, 400, 16, 12});
               }),
               HasSubstr("100 mm"));
-  // The widest pupil has every law, and a wider one is seen from the same centre.
+  // All laws are defined for the widest pupil. A wider one has the same centre of perspective under
+  // each law.
   const double widest = kWidestPupil * ImageDistanceMm(kWide, 400) / kWide.aperture_radius_mm;
   for (const PupilLaw law : AllPupilLaws()) {
     for (const Psf psf : {Psf::kGaussian, Psf::kDisc}) {

@@ -54,7 +54,8 @@ INSTANTIATE_TEST_SUITE_P(Lenses, AgainstMatrixTrace, ::testing::ValuesIn(MatrixL
                            return name;
                          });
 
-// The lenses are of the sorts they claim to be, or the tests below would show less than they say.
+// Checks that the lenses are of the kinds that their names state. Otherwise the tests below would
+// cover less.
 TEST_P(AgainstMatrixTrace, LensIsOfItsSort) {
   std::string why;
   EXPECT_TRUE(lens().IsValid(&why)) << why;
@@ -87,7 +88,7 @@ TEST_P(AgainstMatrixTrace, MagnificationOfTheConjugate) {
   for (const double depth_in_f : kDepthsInFocalLengths) {
     const double depth_mm = depth_in_f * lens().front_focal_length_mm;
     const double image_distance_mm = oracle().ConjugateMm(depth_mm);
-    // Any ray will do there; one through the rim, so that it is not the chief ray's.
+    // Any ray can be used; a ray through the rim differs from the chief ray.
     const double traced = oracle().Landing(1, depth_mm, kApertureRadiusMm, image_distance_mm);
     EXPECT_NEAR(ChiefRayMagnification(lens(), image_distance_mm, depth_mm), traced, 1e-10);
     EXPECT_LT(traced, 0) << "the image is inverted";

@@ -356,7 +356,7 @@ TEST(ShippedCameras, AreReadAndFocusWhereTheySay) {
     const Camera camera = ReadCamera(file);
     EXPECT_THAT(file, EndsWith("/" + camera.name + ".yaml"));
     if (!camera.calibration) continue;
-    // Nobody measured a shipped camera.
+    // Shipped cameras were not measured.
     EXPECT_EQ(camera.calibration->evidence.method, "assumed");
     const double stated_mm = camera.calibration->evidence.focus_depth_mm.value().value;
     const ThickLens& lens = camera.lens;

@@ -1,4 +1,4 @@
-// The blur ratio of earlier camera files, against sums over the rays of an aperture.
+// The blur ratio of earlier camera files is compared with sums over the rays of an aperture.
 #include "model/schema/former_blur_ratio.h"
 
 #include <gmock/gmock.h>
@@ -102,13 +102,13 @@ TEST(FormerBlurRatio, IsConvertedWithItsErrorsAndANotice) {
   EXPECT_NEAR(covariance(0, 1) / (former.row(0) * slope).value(), 1, 1e-4);
   EXPECT_NEAR(camera.calibration->blur_ratio->sigma, std::sqrt(covariance(1, 1)), 1e-12);
   EXPECT_EQ(covariance(0, 0), 1e-6);
-  // What is written now is read as it stands.
+  // A file of the present version is read without conversion.
   const Camera again = ParseCamera(CameraToYaml(camera), "new.yaml");
   EXPECT_EQ(again.blur_ratio(), camera.blur_ratio());
   EXPECT_TRUE(again.notices.empty());
 }
 
-// They were ratios of the blur before.
+// These values were ratios of the blur in the earlier schema.
 TEST(FormerBlurRatio, OfTheRecipeAndAssumedOnesStay) {
   for (const std::string method : {"assumed", "source-recipe"}) {
     const Camera camera = ParseCamera(FormerFile(method), "old.yaml");

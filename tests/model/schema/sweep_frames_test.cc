@@ -73,7 +73,7 @@ TEST_F(SweepFolder, TableErrorsNameTheLine) {
 TEST_F(SweepFolder, FilesWithoutARowAreNamed) {
   EXPECT_THAT(ErrorOfTable("b.png,1\n"),
               AllOf(HasSubstr("a.png"), HasSubstr("no row"), HasSubstr("2 such")));
-  // Neither hidden files nor files that are no images.
+  // Hidden files and files that are not images are ignored.
   folder_.Put("._a.png");
   folder_.Put("notes.txt");
   ReadTable("a.png,1\nb.png,2\nc.png,3\n", "reading_sigma_mm: 0\n");
@@ -88,7 +88,7 @@ TEST_F(SweepFolder, TableInAnotherFolderAndUnits) {
   ASSERT_THAT(sweep.frames, SizeIs(1));
   EXPECT_EQ(sweep.frames[0].image, folder_ / "bench/frames/x.JPG");
   EXPECT_EQ(sweep.frames[0].reading_mm, 50.8);
-  // Without frames_dir: the table's folder, or the folders in it.
+  // Without frames_dir, names refer to the table's folder, or to the folders in it.
   EXPECT_EQ(Read("frames_csv: bench/r.csv\n").frames.at(0).image, folder_ / "bench/frames/x.JPG");
 
   const std::vector<std::pair<std::string, double>> units = {

@@ -105,7 +105,7 @@ std::vector<bool> Marked(std::vector<CalibrationRow> rows) {
 TEST(MarkFront, MarksWhatNoOtherRowBetters) {
   EXPECT_THAT(Marked({Row(1, 5), Row(2, 3), Row(3, 4), Row(4, 1), Row(4, 2), Row(5, 1)}),
               ElementsAre(true, true, false, true, false, false));
-  // Neither of two equal rows is better than the other.
+  // Of two equal rows, neither is marked as better.
   EXPECT_THAT(Marked({Row(1, 5), Row(1, 5)}), ElementsAre(true, true));
 }
 
@@ -115,7 +115,7 @@ TEST(MarkFront, LeavesOutWhatMostSweepsDidNotGive) {
   EXPECT_THAT(Marked({half, Row(1, 5)}), ElementsAre(false, true));
 }
 
-// A method that refuses what is hard has smaller errors in what it leaves.
+// A method that refuses difficult sweeps has smaller errors on the others.
 TEST(CalibrationRowsText, RowsOfFewerSweepsHaveATableOfTheirOwn) {
   const CalibrationRow all =
       MakeCalibrationRow("fit", 31, 64, {SolvedTrial(4, 1, 2), SolvedTrial(6, 1, 2)});
@@ -173,7 +173,7 @@ TEST(BenchSweep, TheFloorErrsAsItIsStated) {
     most_mm = std::max(most_mm, bench.truth.frames[0].depth_mm);
   }
   EXPECT_NEAR(std::sqrt(squares / kSweeps), 1, 0.15);
-  // And the plane of focus lies anywhere between two frames.
+  // The plane of focus may be anywhere between two frames.
   EXPECT_NEAR(least_mm, 284.5, 0.05);
   EXPECT_NEAR(most_mm, 285.5, 0.05);
 }
@@ -197,7 +197,7 @@ void ExpectCountsThatAddUp(const json& rows) {
   EXPECT_EQ(seen.size(), 16U);
 }
 
-// What no calibration is made from is a row that says so.
+// A sweep without a calibration has a row that states the refusal.
 void ExpectRefusalsToBeReported(const json& rows) {
   for (const json& row : rows) {
     const bool has_few_frames = row["frames"] == 4;
@@ -211,7 +211,7 @@ void ExpectRefusalsToBeReported(const json& rows) {
   }
 }
 
-// Of all frames and the larger field.
+// The first row of a method for all frames and the larger field.
 json FirstRowOf(const json& rows, const std::string& method) {
   for (const json& row : rows) {
     if (row["method"] == method && row["field_px"] == 192 && row["frames"] == 31) return row;
@@ -255,7 +255,7 @@ void ExpectTheRecipeToBeCheapAndWrong(const json& rows) {
   EXPECT_TRUE(peak["blur_ratio_error_percent"].is_null());
   EXPECT_EQ(peak["focus_depth_error_mm"]["covered_by_95_percent"]["trials"], 4);
   EXPECT_EQ(peak["seconds_of_sweeps"], source["seconds_of_sweeps"]);
-  // By a factor of ten, so that it does not depend on what else the machine does.
+  // The factor is ten, so that the test does not depend on the load of the machine.
   EXPECT_LT(source["seconds"], fit["seconds"]);
 }
 

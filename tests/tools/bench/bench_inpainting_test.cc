@@ -32,10 +32,11 @@ TEST(BenchInpaintingTest, JudgesAroundOcclusions) {
     EXPECT_EQ(own["fill"], "solver");
     EXPECT_EQ(telea["fill"], "telea");
     EXPECT_GT(telea["fill_seconds"].get<double>(), 0);
-    // What is hidden is worse than what is around it, that worse than the whole.
+    // Hidden pixels have larger errors than those around them, and these have larger errors than
+    // the whole.
     EXPECT_LT(own["psnr_occluded_db"].get<double>(), own["psnr_band_db"].get<double>());
     EXPECT_LT(own["psnr_band_db"].get<double>(), own["psnr_true_views_db"].get<double>());
-    // And nothing but that was changed.
+    // Nothing else changed.
     EXPECT_NE(telea["psnr_occluded_db"], own["psnr_occluded_db"]);
     EXPECT_GT(telea["psnr_occluded_db"].get<double>(), 8);
   }

@@ -65,7 +65,7 @@ TEST_F(BenchSourceTest, MeasuresTheFourTables) {
     EXPECT_EQ(row["seconds_of_runs"].size(), 1U);
     EXPECT_GT(row["seconds"].get<double>(), 0);
     EXPECT_TRUE(row["extrapolated_from"].is_null());
-    EXPECT_TRUE(row["published_seconds"].is_null());  // not an image of the source's size
+    EXPECT_TRUE(row["published_seconds"].is_null());  // the image does not have the paper's size
     if (row["table"] == 2) {
       EXPECT_GT(row["bandwidth_share"].get<double>(), 0);
       continue;
@@ -81,7 +81,7 @@ TEST_F(BenchSourceTest, MeasuresTheFourTables) {
   EXPECT_THAT(found[2], IsSupersetOf({"opencl", "cpu", "native"}));
   EXPECT_THAT(found[3], IsSupersetOf({"eigen", "cg", "bicgstab", "scene ridge", "grid", "dibr"}));
   EXPECT_THAT(found[4], IsSupersetOf({"thick", "thin"}));
-  // One system, solved by all: what differs is the time.
+  // All solvers solve one system, so they differ in time only.
   EXPECT_NEAR(psnr_db["cg"], psnr_db["eigen"], 0.1);
   EXPECT_NEAR(psnr_db["bicgstab"], psnr_db["eigen"], 0.1);
   EXPECT_GT(psnr_db["scene tv"], psnr_db["dibr"]);
@@ -94,7 +94,7 @@ TEST_F(BenchSourceTest, LargeImagesAreSampledAndSaySo) {
       Rows({"source", "--size", "160x160", "--views", "2", "--table", "1", "--device", "cpu"});
   ASSERT_GE(rows.size(), 2U);
   for (const auto& row : rows) {
-    // Every row is judged on the same four areas; what is extrapolated has keys of its own.
+    // Every row is scored on the same four areas. Extrapolated values have keys of their own.
     EXPECT_EQ(row["scored_area"], nlohmann::json({{"parts", 4}, {"size_px", {32, 32}}}));
     const bool is_whole = row["implementation"] == "scene tv";
     EXPECT_EQ(row["seconds"].is_null(), !is_whole);
@@ -133,7 +133,7 @@ TEST_F(BenchSourceTest, TakesAnImageOfOnesOwn) {
   for (const auto& row : rows) {
     tables.insert(row["table"].get<int>());
     EXPECT_EQ(row["image"], "mine");
-    EXPECT_TRUE(row["psnr_true_views_db"].is_null());  // nobody knows its true views
+    EXPECT_TRUE(row["psnr_true_views_db"].is_null());  // its true views are unknown
   }
   EXPECT_EQ(tables, (std::set<int>{1, 2, 3, 4}));
 }
@@ -160,7 +160,7 @@ TEST_F(BenchSourceTest, RefusesWhatCannotBeMeant) {
   EXPECT_THAT(refusal({"--depth-kind", "z"}), HasSubstr("--depth-kind"));
 }
 
-// What blocks take grows so fast with the views that fewer parts stand for the image.
+// The cost of blocks grows so fast with the number of views that fewer parts represent the image.
 TEST(BenchPartsTest, FewerPartsAreOfManyViewsAndStandForAsMuch) {
   SourceImage image;
   image.whole = MakeBenchScene(160, 192, 2, 2, 1, 1, {});
@@ -168,7 +168,8 @@ TEST(BenchPartsTest, FewerPartsAreOfManyViewsAndStandForAsMuch) {
     image.rects.clear();
     image.parts.clear();
     image.sample.reset();
-    image.views = views;  // of what is to be measured; the scene's own are enough for its parts
+    // Of the measurement; the scene's own number is sufficient for its parts
+    image.views = views;
     Cut(full, &image);
     double pixels = 0;
     for (const BenchScene& part : image.parts) {
@@ -181,10 +182,10 @@ TEST(BenchPartsTest, FewerPartsAreOfManyViewsAndStandForAsMuch) {
   EXPECT_EQ(image.sample->solved, 64);
   EXPECT_EQ(parts_with(5, false), 2U);
   EXPECT_EQ(image.sample->solved, 32);
-  // Of opposite quarters: they share no row and no column.
+  // The parts are in opposite quarters and share no row and no column.
   EXPECT_LE(image.rects[0].x + image.rects[0].width, image.rects[1].x);
   EXPECT_LE(image.rects[0].y + image.rects[0].height, image.rects[1].y);
-  // What compares lenses cuts parts of its own, and as many.
+  // The comparison of lenses cuts its own parts, and as many of them.
   std::vector<SourceContender> lenses;
   AddTable4(SourceBench(), image, &lenses);
   ASSERT_EQ(lenses.size(), 2U);
@@ -196,7 +197,7 @@ TEST(BenchPartsTest, FewerPartsAreOfManyViewsAndStandForAsMuch) {
   EXPECT_FALSE(image.sample);
 }
 
-// What table 4 takes for granted.
+// Table 4 assumes this.
 TEST(BenchSceneTest, ThinLensEquivalentHasTheSameGridAndDisparities) {
   model::Camera thick = BenchCamera(64, 64);
   const double focus_depth_mm = thick.focus_depth_mm();
@@ -267,7 +268,7 @@ TEST_F(BenchSourceTest, GammaTowardNothingLosesTheLightField) {
       ASSERT_TRUE(row["failure"].is_null());
       EXPECT_EQ(row["refused"], false);
       EXPECT_GT(row["psnr_true_views_db"].get<double>(), 30);
-    } else {  // as the source has it: no gamma helps
+    } else {  // as in the paper, no gamma is applied
       EXPECT_EQ(row["ridge"], 0);
       EXPECT_TRUE(!row["failure"].is_null() || row["refused"] == true);
     }

@@ -1,4 +1,4 @@
-// The table of thicklens bench solvers: what stands in one column is of the same area.
+// The table of thicklens bench solvers: all values of a column refer to the same area.
 #include "tools/bench/solvers_table.h"
 
 #include <gmock/gmock.h>
@@ -93,7 +93,7 @@ TEST(WholeTime, IsMeasuredOrExtrapolatedAndNeverBoth) {
   EXPECT_EQ(extrapolated.Json()["extrapolated_seconds_of_runs"], nlohmann::json({4}));
 }
 
-// What is judged of a whole estimate is what stands there in it.
+// The scored area of a whole estimate is the same part inside the whole.
 TEST(ScoredArea, OfAPartIsThatPartOfTheWholeWithoutItsBorder) {
   SampledImage image;
   image.whole = MakeBenchScene(160, 160, 3, 3, 4, 2, {});

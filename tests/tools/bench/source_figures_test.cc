@@ -9,7 +9,7 @@
 namespace thicklens::tools {
 namespace {
 
-// The speed-up factors that the source prints below each pair of rows: 3, 5, 7 views.
+// The speed-up factors that the paper prints below each pair of rows, for 3, 5 and 7 views.
 struct SpeedUps {
   char size;
   std::size_t image;
@@ -32,8 +32,8 @@ void ExpectSpeedUps(int table, const std::vector<SpeedUps>& printed, double roun
 }
 
 TEST(SourceFigures, SpeedUpsOfTable1AreThePrinted) {
-  // Two of the 24 are not what the seconds beside them make: K3's 0.13 at 3 x 3 is 0.1248, L3's
-  // 0.25 is 0.2446.
+  // Two of the 24 factors differ from the quotient of the printed seconds: K3's 0.13 at 3 x 3 is
+  // 0.1248, L3's 0.25 is 0.2446.
   ExpectSpeedUps(1,
                  {{'K', 0, {0.15, 0.75, 1.29}},
                   {'K', 1, {0.14, 0.74, 1.23}},
@@ -59,7 +59,8 @@ TEST(SourceFigures, SpeedUpsOfTable2AreThePrinted) {
                  0.05, 0.05);
 }
 
-// Section 7 of the source: "an average speed up factor of 1.23" at 7 x 7. Its own rows say 1.22.
+// Section 7 of the paper: "an average speed up factor of 1.23" at 7 x 7. The rows of its table give
+// 1.22.
 TEST(SourceFigures, MeanSpeedUpOfTable1IsNotWhatTheSourceSays) {
   double mean = 0;
   for (const char size : {'K', 'L'}) {
@@ -71,8 +72,8 @@ TEST(SourceFigures, MeanSpeedUpOfTable1IsNotWhatTheSourceSays) {
   EXPECT_LT(mean, 1.225);
 }
 
-// The direct solver of table 3 is the hybrid implementation of table 1; the source prints one of
-// the 24 times with another last digit (L2 at 5 x 5).
+// The direct solver of table 3 is the hybrid implementation of table 1; the paper prints one of the
+// 24 times with another last digit (L2 at 5 x 5).
 TEST(SourceFigures, DirectSolverOfTable3IsThatOfTable1) {
   for (const char size : {'K', 'L'}) {
     for (const int views : {3, 5, 7}) {
@@ -84,7 +85,7 @@ TEST(SourceFigures, DirectSolverOfTable3IsThatOfTable1) {
 }
 
 TEST(SourceFigures, IterationsGainOnDirectSolutionWithFewerViews) {
-  // What section 8 concludes from table 3.
+  // Section 8 draws these conclusions from table 3.
   for (const char size : {'K', 'L'}) {
     const auto ratio = [&](int views) {
       return MeanOf(*PublishedSeconds(3, "bicgstab", size, views)) /

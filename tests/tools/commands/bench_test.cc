@@ -26,7 +26,7 @@ TEST(BenchScene, BlursFromNothingToThreePixels) {
   EXPECT_EQ(scene.input.image.channels, 1);
   EXPECT_EQ(scene.truth.u_count, 5);
   EXPECT_EQ(scene.truth.v_count, 3);
-  // sigma per axis from the disparities: |d| times the weighted rms of the views' offsets.
+  // sigma per axis, from the disparities: |d| times the weighted rms of the views' offsets.
   double moment = 0;
   for (int k = 0; k < 5; ++k) moment += (k - 2) * (k - 2) * scene.input.weights.col(k).sum();
   double least = 1e9, most = 0;
@@ -77,8 +77,8 @@ TEST(Bench, MeasuresEverySolverOnTheSameScene) {
     EXPECT_EQ(row["size"], nlohmann::json({96, 80}));
     EXPECT_EQ(row["views"], nlohmann::json({3, 3}));
     EXPECT_EQ(row["threads"], 1);
-    // What is measured and what is extrapolated never has the same key, nor have PSNRs of the part
-    // that blocks solved and of the whole image.
+    // Measured and extrapolated values never have the same key, nor do PSNRs of the part that
+    // blocks solved and of the whole image.
     const bool is_sampled = row["solver"] == "blocks";
     const std::string time = is_sampled ? "extrapolated_seconds" : "seconds";
     EXPECT_GT(row[time].get<double>(), 0);

@@ -1,5 +1,5 @@
-// From a sweep to a camera to a photograph: the blur that the calibrated camera renders is the blur
-// that was simulated, whatever law the pupil followed.
+// From a sweep to a camera to a photograph: the calibrated camera renders the blur that was
+// simulated, whatever law the pupil followed.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -31,7 +31,7 @@ model::LightField SpotAt(const model::Camera& camera, int views, double depth_mm
     for (int k = 0; k < views; ++k) {
       for (int y = 0; y < field.t_count; ++y) {
         for (int x = 0; x < field.s_count; ++x) {
-          // What the centre view shows at x stands at x - a d in view a.
+          // The point at x in the centre view is at x - a d in view a.
           const Eigen::Vector2d beside(x - axis_px.x() + field.u_offset(k) * disparity_px,
                                        y - axis_px.y() + field.v_offset(l) * disparity_px);
           field.values.push_back(static_cast<float>(

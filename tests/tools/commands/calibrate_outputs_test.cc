@@ -1,4 +1,4 @@
-// What `thicklens calibrate --report` leaves on disk.
+// Files that `thicklens calibrate --report` leaves.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -89,7 +89,7 @@ TEST_F(CalibrateOutputs, FiguresLieBesideThePageAndAreReplaced) {
   EXPECT_FALSE(json.at("field").at("done").get<bool>());
 }
 
-// The field of so small an image may have no map; what tells is whether one was tried.
+// The field of so small an image may have no map. The output shows whether one was tried.
 TEST_F(CalibrateOutputs, NoFieldLeavesTheMapOut) {
   fs::create_directories(folder_ / "out");
   std::string message[2];

@@ -33,7 +33,7 @@ CameraDescription DataSheet() {
   return camera;
 }
 
-// A photograph of 32 x 24 px whose EXIF says what a test wants it to say.
+// A photograph of 32 x 24 px with the EXIF data that a test needs.
 std::string WritePhoto(const std::string& name, const Exiv2::ExifData& exif) {
   const std::string path = ::testing::TempDir() + "/" + name;
   model::EncodedImage image{32, 24, 1, 8, {}};

@@ -207,14 +207,14 @@ TEST_F(CameraVerifyTest, CasesWithoutAVerdictAreReported) {
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_EQ(json_["status"], "cannot-tell");
   EXPECT_THAT(result.err, HasSubstr("frames"));
-  // One that is too coarse for what is asked.
+  // This sweep is too coarse for the requested accuracy.
   result = Verify(*shared_ / "camera.yaml", Sweep(2), {"--needed-blur-px", "0.0001"});
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_EQ(json_["status"], "cannot-tell");
   EXPECT_GT(json_["smallest_detectable_blur_px"].get<double>(), 0.0001);
 }
 
-// An unknown bench zero leaves zf open; that is reported, with what closes it.
+// An unknown bench zero leaves zf undetermined. The message reports this and how to determine it.
 TEST_F(CameraVerifyTest, AnUnknownBenchZeroIsReported) {
   offset_mm_ = "unknown";
   const ProgramResult result = Verify(*shared_ / "camera.yaml", Sweep(2));

@@ -1,4 +1,4 @@
-// What all commands have in common.
+// Behaviour that all commands have in common.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -15,8 +15,8 @@
 namespace thicklens::tools {
 namespace {
 
-// Of a process in which a command is interrupted when its work is done: 0 if it ended well and
-// wrote its --json file, 1 if it was stopped and wrote nothing, else 2.
+// Exit code of a process in which a command is interrupted when its work is done: 0 if it ended
+// well and wrote its --json file, 1 if it was stopped and wrote nothing, otherwise 2.
 int EndOfACommand(bool is_written) {
   const thicklens::testing::TemporaryFolder folder;
   CommonOptions options;
@@ -44,7 +44,7 @@ class RunCommandTest : public ::testing::Test {
   const std::string style_ = GTEST_FLAG_GET(death_test_style);
 };
 
-// To say that nothing was written would not be true.
+// A message that nothing was written would be wrong.
 TEST_F(RunCommandTest, AnInterruptAfterTheOutputsAreInPlaceComesTooLate) {
   EXPECT_EXIT(std::_Exit(EndOfACommand(true)), ::testing::ExitedWithCode(0), "");
 }

@@ -122,7 +122,7 @@ double Texture(double x, double y, int channel) {
          40 * std::sin(0.23 * x - 0.31 * y + channel);
 }
 
-// The view at (a, b) of the texture: what stands at x in the middle stands at x - a d in it.
+// The view at (a, b) of the texture: the point at x in the middle is at x - a d in it.
 model::EncodedImage View(int a, int b, int channels = 3) {
   model::EncodedImage image{kWide, kHigh, channels, 8, {}};
   for (int y = 0; y < kHigh; ++y) {
@@ -144,7 +144,8 @@ model::EncodedImage Noisy(model::EncodedImage image, int amplitude, unsigned see
   return image;
 }
 
-// What the library says of two images; the protocol between file and score is the command's.
+// The scores of two images from the library. The protocol between file and score is that of the
+// command.
 estimator::ImageScores Direct(const model::EncodedImage& reference,
                               const model::EncodedImage& other, int border_px) {
   return estimator::CompareImages(model::EncodedValuesOf(reference), model::EncodedValuesOf(other),
@@ -171,7 +172,7 @@ class CompareProgram : public ::testing::Test {
     return folder_ / name;
   }
 
-  // The same views in the project's own layout.
+  // Writes the same views in the project's own layout.
   std::string PutOwn(const std::string& name, int n, int noise) const {
     io::LightFieldReading reading;
     reading.grid = kGrid;
@@ -201,7 +202,7 @@ class CompareProgram : public ::testing::Test {
     EXPECT_EQ(result.exit_code, 0) << result.err;
     return result.exit_code == 0 ? Json::parse(ContentOf(folder_ / "result.json")) : Json();
   }
-  // The one line of what must fail.
+  // Returns the one line of a command that must fail.
   std::string Failure(const Arguments& arguments, int exit_code = 1) const {
     const ProgramResult result = Run(arguments);
     EXPECT_EQ(result.exit_code, exit_code) << result.err;
@@ -267,7 +268,7 @@ TEST_F(CompareProgram, CropsImagesAlike) {
   const Json both = Summary({a, PutImage("b.png", noisy), "--crop", crop, "--border", "1"});
   EXPECT_EQ(both["psnr_db"], expected);
   EXPECT_EQ(both["size"], Json({30, 25}));
-  // What has the rectangle's size already is taken as it is.
+  // An image that already has the size of the rectangle is used as it is.
   const std::string cut = PutImage("cut.png", model::CropImage(noisy, rect));
   EXPECT_EQ(Summary({a, cut, "--crop", crop, "--border", "1"})["psnr_db"], expected);
   EXPECT_THAT(Failure({a, a, "--crop", "20,3,30,25"}),
@@ -345,7 +346,7 @@ TEST_F(CompareProgram, SaysWhatTheDisparityMeansByItsOptions) {
               HasSubstr("disparity"));
 }
 
-// With a camera, the disparity goes through millimetres and back to the steps of the grid.
+// With a camera, the disparity is converted to millimetres and back to the steps of the grid.
 TEST_F(CompareProgram, AsksWhatTheDepthMapOfACameraSays) {
   const model::Camera camera = WithMethod(
       TestCamera("small", WideLens(), TestSensor(kWide, kHigh, 0.006, {21.5, 17.5}), {16.3, 0}));

@@ -58,7 +58,7 @@ class DoctorTest : public ::testing::Test {
     arguments.insert(arguments.begin(), "doctor");
     return ChildProgram(arguments, scratch_.path(), 0).Wait();
   }
-  // What it writes as JSON; for the exit code that is due.
+  // Returns the JSON of the command, and expects the exit code.
   nlohmann::json Json(const std::string& device, int exit_code = 0) const {
     const std::string file = scratch_ / "doctor.json";
     const ProgramResult result = Run({"--device", device, "--json", file});
@@ -66,7 +66,7 @@ class DoctorTest : public ::testing::Test {
     return nlohmann::json::parse(ContentOf(file));
   }
 
-  // What must hold wherever no device can be used, for the reason that contains `why`.
+  // Expectations if no device can be used, for the reason that contains `why`.
   void ExpectNoDevice(const std::string& why) const {
     const nlohmann::json cpu = Json("cpu");
     EXPECT_EQ(cpu["status"], "ok");
@@ -98,7 +98,7 @@ class DoctorTest : public ::testing::Test {
   TemporaryFolder drivers_;
 };
 
-// PoCL's library as it is installed; empty if it is not.
+// Returns PoCL's library as installed, or an empty string if it is not.
 std::string PoclLibrary() {
   for (const char* folder : {"/usr/lib/x86_64-linux-gnu", "/usr/lib/aarch64-linux-gnu", "/usr/lib",
                              "/usr/lib64", "/usr/local/lib"}) {

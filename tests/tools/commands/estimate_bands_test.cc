@@ -98,7 +98,7 @@ TEST_F(EstimateBandsTest, GiveTheSameViewsInLessMemory) {
   EXPECT_GT(bands["bands"].get<int>(), 1);
   EXPECT_THAT(result.out, HasSubstr(std::to_string(bands["bands"].get<int>()) + " bands"));
   EXPECT_LE(bands["predicted_memory_mib"].get<double>(), limit);
-  if (!testing::kIsSanitized) {  // which holds back what was freed
+  if (!testing::kIsSanitized) {  // sanitizers keep freed memory
     EXPECT_LE(bands["peak_rss_mib"].get<double>(), limit);
   }
   EXPECT_EQ(bands["noise_sigma"], whole["noise_sigma"]);
@@ -135,8 +135,8 @@ TEST_F(EstimateBandsTest, TheForecastHoldsForTheShadingOfARelief) {
   }
 }
 
-// Rough depth hides, mixes and needs rows of its own; of many views the rays are what is large. It
-// is rough in one strip alone or everywhere, and there are few threads or many.
+// Rough depth hides and mixes pixels and needs rows of its own. With many views, the rays need most
+// of the memory. The depth is rough in one strip or everywhere, and there are few threads or many.
 TEST_F(EstimateBandsTest, TheForecastHoldsForRoughDepthAndManyViews) {
   if (testing::kIsSanitized) GTEST_SKIP() << "a sanitizer holds back what was freed";
   constexpr int kWidth = 160, kHeight = 400;
@@ -183,7 +183,7 @@ TEST_F(EstimateBandsTest, TheForecastHoldsForRoughDepthAndManyViews) {
 
 // A page shows all views, which are held for it; without one they never are.
 TEST_F(EstimateBandsTest, ViewsAreHeldForAPageOnly) {
-  // So many views that they are most of what is held.
+  // With so many views, they are most of the memory.
   *std::find(usual_.begin(), usual_.end(), "3x3") = "7x7";
   constexpr double kViewsMib = 7 * 7 * 3 * sizeof(float) * kW * kH / double{1 << 20};
   ASSERT_EQ(Run("streamed", {}).exit_code, 0);

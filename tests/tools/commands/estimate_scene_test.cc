@@ -143,7 +143,8 @@ TEST_F(EstimateSceneTest, WritesTheConfidenceOfEachRay) {
   constexpr double kRays = 9.0 * kColumns * kRows;
   EXPECT_NEAR(summary["rays"]["filled_in_share"], static_cast<double>(filled) / kRays, 1e-9);
   EXPECT_NEAR(summary["rays"]["visible_fraction"], static_cast<double>(whole) / kRays, 1e-9);
-  // One step to the right the strip stands one px to the left, the wall half a px to the right.
+  // In the view one step to the right, the strip is one px farther left, and the wall half a px
+  // farther right.
   const model::EncodedImage right = ConfidenceFile(Output(), 2, 1);
   const auto row = right.values.begin() + 32 * kColumns;
   EXPECT_EQ(row[50], 255);
@@ -241,7 +242,7 @@ TEST_F(EstimateSceneTest, TakesItsSettings) {
   EXPECT_EQ(summary["converged"], true);
   EXPECT_EQ(io::ReadLightField(Output(), {}).origin.prior, "patches");
   EXPECT_THAT(ContentOf(Report() + "/index.html"), HasSubstr("<td>patches</td>"));
-  // Below what numbers of 32 bit can reach.
+  // This tolerance is below the precision of 32-bit numbers.
   const Arguments exact = {"--prior", "gradient",         "--tolerance",
                            "1e-10",   "--max-iterations", "500"};
   EXPECT_EQ(Summary(With(With(Usual(), exact), {"--double"}))["converged"], true);
@@ -383,7 +384,7 @@ model::EncodedImage Bars(int width_px, int height_px) {
 }
 
 TEST_F(EstimateSceneTest, NamesAPatchWhoseDepthIsWrong) {
-  // The map says that one patch is far out of focus.
+  // In this map one patch is far out of focus.
   model::RawDepthMap map{256, 192, {}, false};
   for (int y = 0; y < 192; ++y) {
     for (int x = 0; x < 256; ++x) {
@@ -406,7 +407,7 @@ TEST_F(EstimateSceneTest, NamesAPatchWhoseDepthIsWrong) {
   }
   EXPECT_THAT(summary["warnings"].dump(),
               AllOf(HasSubstr("not explained"), HasSubstr("grey levels")));
-  // With the right depth there is nothing to name.
+  // With the right depth there is no message.
   map.values.assign(map.values.size(), 0.0F);
   folder_.Put("bars.pfm", io::EncodePfm(map));
   EXPECT_THAT(Summary(arguments)["residual_patches"], IsEmpty());
@@ -420,7 +421,7 @@ TEST_F(EstimateSceneTest, APhotographSharperThanItsDepthAllowsIsReported) {
                          "disparity",
                          "--views",
                          "5x5"};
-  // Everywhere alike, so that no patch stands out.
+  // The error is the same everywhere, so that no patch stands out.
   const json summary = Summary(arguments);
   EXPECT_GT(summary["unexplained_share"], 0.9);
   EXPECT_THAT(summary["warnings"].dump(), AllOf(HasSubstr("of the photograph is not explained"),

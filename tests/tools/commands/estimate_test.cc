@@ -91,7 +91,7 @@ class EstimateTest : public ::testing::Test {
     EXPECT_EQ(result.exit_code, 0) << result.err;
     return io::ReadLightField(Output(), {});
   }
-  // The one line of a refusal; nothing may be left where the light field would have been.
+  // Returns the one line of a refusal. No file may be left in the place of the light field.
   std::string Refusal(const Arguments& arguments, int exit_code = 1) const {
     const ProgramResult result = Run(arguments);
     EXPECT_EQ(result.exit_code, exit_code) << result.err;
@@ -287,7 +287,7 @@ TEST_F(EstimateTest, SettingsThatCannotBe) {
   }
 }
 
-// What is given and not used would leave a person with a wrong idea of the result.
+// An option that is given and ignored would mislead the user about the result.
 TEST_F(EstimateTest, NothingThatIsGivenIsLeftOutWithoutAWord) {
   const Arguments relative = AsDisparity(Image(), Disparity());
   EXPECT_THAT(Refusal(With(relative, {"--st-depth-mm", "700"}), 2), HasSubstr("--camera"));
@@ -324,7 +324,7 @@ TEST_F(EstimateTest, DisparityBeyondTheImage) {
   EXPECT_THAT(Refusal(With(AsDisparity(Image(), Disparity()), {"--disparity-scale", "1e6"})),
               AllOf(HasSubstr("depth.pfm"), HasSubstr("px per view step"), HasSubstr("36 px"),
                     HasSubstr("--disparity-scale")));
-  // By a camera it is a depth that none can be; the person gave none.
+  // The camera converts the disparity to an impossible depth, which the user did not give.
   EXPECT_THAT(Refusal(With(AsDisparity(Image(), Disparity()),
                            {"--camera", Camera(), "--disparity-scale", "1e6"})),
               AllOf(HasSubstr("depth.pfm"), HasSubstr("scale and offset of the disparity"),
@@ -347,7 +347,7 @@ TEST_F(EstimateTest, AFailingRunLeavesTheOlderLightField) {
 
 TEST_F(EstimateTest, TheMemoryLimitHolds) {
   if (thicklens::testing::kIsSanitized) GTEST_SKIP() << "the sanitizer needs memory of its own";
-  // The middle is flat and in focus: only the sides tell how much memory blocks need.
+  // The middle is flat and in focus, so only the sides determine how much memory blocks need.
   constexpr int kWide = 144;
   constexpr int kHigh = 96;
   model::EncodedImage image{kWide, kHigh, 1, 8, {}};
@@ -369,7 +369,8 @@ TEST_F(EstimateTest, TheMemoryLimitHolds) {
   for (const std::string solver : {"umfpack", "cholmod", "eigen", "bicgstab"}) {
     if (!estimator::IsBuiltIn(estimator::BlockSolverFromName(solver))) continue;
     SCOPED_TRACE(solver);
-    // As much as 16 px need binds, and is enough for them, whatever the program holds here.
+    // The memory that 16 px need is a real limit and sufficient for them, whatever else the program
+    // holds.
     const nlohmann::json free = summary_of({"--block-solver", solver});
     EXPECT_LE(free["peak_rss_mib"].get<double>(), free["predicted_memory_mib"].get<double>());
     const int limit_mib = static_cast<int>(free["predicted_memory_mib"].get<double>()) + 4;
@@ -552,7 +553,8 @@ TEST_F(ProtocolTest, RenderEstimateCompareAsWritten) {
   ASSERT_EQ(estimate.exit_code, 0) << estimate.err;
   const nlohmann::json result = Compare(
       With({data_, Output(), "--grid", "9", "--border", "20", "--dibr", photo, depth}, crop));
-  // Blocks amplify the noise and lose what leaves them: below the photograph warped by its depth.
+  // Blocks amplify the noise and lose the light that leaves them, so the result is worse than the
+  // photograph warped by its depth.
   EXPECT_GT(result["mean"]["psnr_db"].get<double>(), 37);
   EXPECT_GT(result["dibr"]["mean"]["psnr_db"].get<double>(), 42);
   EXPECT_EQ(result["per_view"].size(), 9u);
@@ -600,7 +602,7 @@ TEST_F(ProtocolTest, ASparseLightFieldSeenThroughAGaussianAperture) {
   };
   const double gaussian_db = above_warping({"--aperture-shape", "gaussian"});
   EXPECT_GT(gaussian_db, 1);
-  // What was assumed without a word before.
+  // This shape was formerly assumed without a message.
   EXPECT_GT(gaussian_db, above_warping({"--aperture-shape", "uniform"}) + 0.5);
 }
 

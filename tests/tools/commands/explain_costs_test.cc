@@ -1,4 +1,4 @@
-// thicklens explain: what effects cost, and the curve of blur with its error.
+// thicklens explain: the cost of effects, and the curve of blur with its error.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -56,7 +56,8 @@ TEST_F(ExplainCostsTest, BlurIsWhatAnImageCosts) {
   for (const nlohmann::json& effect : json.at("effects")) {
     const std::string name = effect.at("name").get<std::string>();
     SCOPED_TRACE(name);
-    // Hundreds of rays instead of a few; of what a bench has there is nothing in an image.
+    // The factor is hundreds of rays instead of a few. Effects of a bench do not occur in a
+    // image.
     if (name == "defocus") {
       EXPECT_GT(effect.at("cost_seconds").get<double>(), 0);
     } else if (name == "shot-noise" || name == "thickness") {

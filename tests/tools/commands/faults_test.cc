@@ -1,6 +1,6 @@
-// What happens around the program: it is killed or interrupted at any moment, runs twice at the
-// same time, has too little memory, and loses the folder that it writes to. What was there before
-// stays whole, what comes is whole, and nothing takes forever.
+// Faults around the program: it is killed or interrupted at any moment, runs twice at the same
+// time, has too little memory, or loses the folder to which it writes. Earlier files stay complete,
+// new files are complete, and no run takes forever.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -187,7 +187,7 @@ class Faults : public ::testing::Test {
       }
       ASSERT_EQ(whole.count(WithoutTimes(ContentsOf(job.output))), 1U);
     }
-    // What the killed left aside goes with the next run.
+    // The next run removes what the killed one left.
     EXPECT_GT(stopped, 0);
     for (const Arguments& way : job.ways) EXPECT_EQ(Run(way).exit_code, 0);
     EXPECT_EQ(whole.count(WithoutTimes(ContentsOf(job.output))), 1U);
@@ -249,8 +249,8 @@ TEST_F(Faults, TooLittleMemoryIsReportedAndRemovesNoFile) {
   if (testing::kIsSanitized) GTEST_SKIP() << "a sanitizer takes memory by the terabyte";
   const Job job = EstimateJob();
   ASSERT_EQ(Run(job.ways[0]).exit_code, 0);
-  // From what does not even hold the libraries to what does; whether the program gets as far as its
-  // own code is the system's.
+  // The limits start below the memory that the libraries need. The system decides whether the
+  // program reaches its own code.
   bool was_reported = false;
   for (int mebibytes = 80; mebibytes <= 520; mebibytes += 20) {
     SCOPED_TRACE(mebibytes);
@@ -300,7 +300,7 @@ TEST_F(Faults, AFileThatEndsTooEarlyIsReported) {
 
 class OpenClFaults : public Faults {
  protected:
-  // CALL:N:ERROR, see faults/opencl_faults.cc.
+  // The form is CALL:N:ERROR, see faults/opencl_faults.cc.
   ProgramRun RunWith(const std::string& fault, const Arguments& arguments) {
     Arguments words = {std::string("LD_PRELOAD=") + THICKLENS_OPENCL_FAULTS,
                        "THICKLENS_FAULT=" + fault, THICKLENS_PROGRAM};

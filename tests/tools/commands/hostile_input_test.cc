@@ -1,5 +1,5 @@
-// Every reader of a file, fed with what is not one: the corpus of tests/fuzz, which `./dev fuzz`
-// finds by looking for new ways through the code, and some changes of each of its files by chance.
+// Every reader of a file gets invalid files: the corpus of tests/fuzz, which `./dev fuzz` finds by
+// searching for new paths through the code, and some random changes of each of its files.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 using thicklens::testing::FuzzedReader;
 using thicklens::testing::FuzzedReaders;
 
-// What a file's name begins with that its reader must take.
+// The name of a file that its reader must accept begins with this.
 constexpr char kValid[] = "valid";
 
 std::map<std::string, std::string> CorpusOf(const std::string& reader) {
@@ -87,7 +87,7 @@ class Mutations {
   std::mt19937 engine_;
 };
 
-// The bytes as a C++ string, to be read by who has to find out.
+// Returns the bytes as a C++ string for the message of a failed test.
 std::string Shown(const std::string& bytes) {
   constexpr std::size_t kMax = 600;
   return ::testing::PrintToString(bytes.substr(0, kMax)) +
@@ -98,7 +98,7 @@ class HostileInput : public ::testing::TestWithParam<FuzzedReader> {
  protected:
   HostileInput() { thicklens::testing::PrepareFuzzFolder(folder_); }
 
-  // What the reader says; nothing but an Error may come out of it.
+  // Returns the message of the reader, which may throw nothing except an Error.
   std::string RefusalOf(const std::string& bytes, const std::string& name) {
     try {
       return thicklens::testing::Refusal(GetParam(), bytes, folder_);

@@ -1,4 +1,4 @@
-// Every command is stopped at moments by chance.
+// Every command is stopped at random moments.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -37,8 +37,8 @@ double SecondsBetween(std::chrono::steady_clock::time_point from,
   return std::chrono::duration<double>(to - from).count();
 }
 
-// How late the machine wakes a thread that has slept, at worst so far: on a busy one, all that
-// waits is late.
+// The largest delay so far with which the machine wakes a sleeping thread. On a busy machine all
+// waiting threads are delayed.
 class Lateness {
  public:
   Lateness() : thread_([this] { Watch(); }) {}
@@ -95,7 +95,7 @@ class InterruptMoments : public ::testing::Test {
     ASSERT_EQ(result.exit_code, 0) << result.err;
   }
 
-  // What the commands read.
+  // Makes the inputs of the commands.
   void MakeInputs() const {
     Succeed({"simulate", "image", Config("scenes/demo.yaml"), "-o", inputs_ / "image"});
     Succeed({"simulate", "light-field", Config("scenes/demo.yaml"), "--views", "3x3", "-o",
@@ -157,7 +157,7 @@ class InterruptMoments : public ::testing::Test {
 
   StoppedProgram::Settings Settings() const { return {scratch_.path(), temporary_.path(), {}}; }
 
-  // How long it takes; of what takes longer than that, as long.
+  // Measures the time of the whole command, up to a limit.
   void MeasureWhole(StoppedCommand* command) {
     constexpr double kMax_s = 5;
     const auto start = std::chrono::steady_clock::now();
@@ -237,7 +237,7 @@ TEST_F(InterruptMoments, EndEveryCommandWithinASecondSlow) {
     program.Send(signal);
     const StoppedProgram::End end = program.Wait();
     const double late_s = lateness.TakeWorst();
-    // Before it listens, the signal ends it as it ends any program.
+    // Until the program installs its handler, the signal ends it as it ends any program.
     if (end.exit_code == -1) {
       EXPECT_EQ(end.signal, signal) << end.err;
     }
@@ -248,7 +248,7 @@ TEST_F(InterruptMoments, EndEveryCommandWithinASecondSlow) {
     std::printf("%-22s %2d after %.2f s: exit %2d, %.3f s (CPU %.3f s; woken up to %.3f s late)\n",
                 command.name.c_str(), signal, wait_s, end.exit_code, end.seconds, end.cpu_seconds,
                 late_s);
-    // The CPU time after the signal does not depend on what else the machine does; the wall time
+    // The CPU time after the signal does not depend on the load of the machine; the elapsed time
     // does.
     EXPECT_LE(end.cpu_seconds, kThreadsOfCommand * kRequired_s);
     constexpr double kWakings = 20;
@@ -257,7 +257,7 @@ TEST_F(InterruptMoments, EndEveryCommandWithinASecondSlow) {
   std::sort(seconds.begin(), seconds.end());
   std::printf("of %zu: median %.3f s, longest %.3f s\n", seconds.size(),
               seconds[seconds.size() / 2], seconds.back());
-  // Else nothing would have been tried.
+  // Otherwise the test would have tested nothing.
   EXPECT_GT(interrupted, kMoments / 2);
 }
 

@@ -49,7 +49,7 @@ class PicamSweep : public ::testing::Test {
       EXPECT_GT(focus_mm, 52);
       EXPECT_LT(focus_mm, 64);
     }
-    // The peak of the sharpness is pulled to the near side; it says where about the focus is.
+    // The peak of the sharpness is shifted to the near side; it shows roughly where the focus is.
     EXPECT_NEAR(others.at("sharpness_peak").at("focus_depth_mm").at("value").get<double>(), 54, 8);
     // Below -95 mm the lens rests on the bed.
     std::vector<std::string> rejected;

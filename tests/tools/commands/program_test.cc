@@ -1,4 +1,4 @@
-// The built program as a person meets it: exit codes, messages, and what lies on disk afterwards.
+// The built program as a user sees it: exit codes, messages, and the files that it leaves.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -48,7 +48,7 @@ std::vector<std::string> LinesOf(const std::string& text) {
   return lines;
 }
 
-// The one error line without its prefix; anything else fails the test.
+// Returns the one error line without its prefix. Any other output fails the test.
 std::string ErrorLine(const ProgramResult& result) {
   std::string message;
   int errors = 0;
@@ -101,7 +101,7 @@ class ProgramTest : public ::testing::Test {
     fs::copy(*shared_ / "sweep", folder_ / "sweep", fs::copy_options::recursive);
     return folder_ / "sweep";
   }
-  // The same as a folder with a table: camera.yaml, frames/ and the table's path.
+  // Copies the sweep as a folder with a table: camera.yaml, frames/ and the path of the table.
   std::string CopyAsFolderWithTable() const {
     const std::string sweep = CopySweep();
     std::string rows = "file,reading\n";
@@ -114,13 +114,14 @@ class ProgramTest : public ::testing::Test {
   ProgramResult Run(const Arguments& arguments, long max_file_bytes = 0) const {
     return ChildProgram(arguments, scratch_.path(), max_file_bytes).Wait();
   }
-  // Runs what must fail with one line and exit code 1, and gives the line.
+  // Runs a command that must fail with one line and exit code 1, and returns the line.
   std::string Failure(const Arguments& arguments, long max_file_bytes = 0) const {
     const ProgramResult result = Run(arguments, max_file_bytes);
     EXPECT_EQ(result.exit_code, 1) << result.err;
     return ErrorLine(result);
   }
-  // The same for a calibration whose older output must stay as it is, and nothing come beside it.
+  // Does the same for a calibration whose older output must stay as it is and must remain the only
+  // one.
   std::string CalibrationFailure(Arguments arguments, long max_file_bytes = 0) const {
     const std::string older = "older content\n";
     const std::string output = folder_.Put("out/camera.yaml", older);

@@ -1,4 +1,4 @@
-// thicklens render as a person meets it.
+// thicklens render as a user runs it.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -81,7 +81,7 @@ class RenderTest : public ::testing::Test {
     return result.exit_code == 0 ? io::ToEncodedImage(io::ReadImageFile(out))
                                  : model::EncodedImage{};
   }
-  // The line of what must fail, with nothing written.
+  // Returns the line of a command that must fail and write nothing.
   std::string Failure(Arguments arguments, int exit_code = 1) const {
     const std::string older = "older content\n";
     const std::string out = folder_.Put("out/picture.png", older);
@@ -307,7 +307,7 @@ TEST_F(RenderTest, FocusInMillimetresIsFocusAtItsDisparity) {
   EXPECT_GT(RmsInside(Rendered({folder, "--focus", std::to_string(far_mm * 2)}), centre), 10);
 }
 
-// With other steps in v than in u, a disparity is that along u.
+// If the steps in v differ from those in u, a disparity is that along u.
 TEST_F(RenderTest, BothWaysToFocusAgreeWhereTheStepsDiffer) {
   model::LightField light_field = AtRandom(3, 5, 15);
   light_field.camera = WideCamera();
@@ -361,7 +361,7 @@ TEST_F(RenderTest, VignettingIsOnWithUvOffTheAperture) {
   EXPECT_EQ(description(),
             "photograph through the light field's own aperture; effects: thickness, defocus, "
             "aperture-shape, falloff");
-  // Its own weights are a Gaussian's.
+  // The weights of the light field itself are those of a Gaussian.
   EXPECT_EQ(usual, Rendered({folder, "--as-captured", "--aperture-shape", "gaussian"}).values);
 
   light_field.weights(0, 0) *= 1.1;
@@ -444,7 +444,7 @@ TEST_F(RenderTest, WrongUsageIsExitCode2) {
   EXPECT_EQ(Run({folder, "--as-captured"}).exit_code, 2);
 }
 
-// What it reads stays as it was, wherever the output is said to go.
+// The input stays unchanged, whatever the path of the output is.
 TEST_F(RenderTest, NothingIsWrittenIntoTheLightFieldItself) {
   const std::string ours = Write("lf", AtRandom(3, 3, 13));
   const std::string hci = folder_ / "hci";
@@ -476,7 +476,7 @@ TEST_F(RenderTest, NothingIsWrittenIntoTheLightFieldItself) {
   EXPECT_EQ(ContentOf(ours + "/views/view_00_00.tiff"), view);
   EXPECT_EQ(ContentOf(ours + "/inner/input_Cam000.png"), hci_view);
   EXPECT_FALSE(fs::exists(png));
-  // Beside it, with a name that begins alike.
+  // An output beside the light field, with a name that begins alike.
   EXPECT_EQ(Run({ours, "--as-captured", "-o", ours + "-photo.png"}).exit_code, 0);
 }
 

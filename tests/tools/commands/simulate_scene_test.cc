@@ -1,4 +1,4 @@
-// thicklens simulate image and simulate light-field as a person meets them.
+// thicklens simulate image and simulate light-field as a user runs them.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -58,7 +58,7 @@ class SimulateSceneTest : public ::testing::Test {
     const ProgramResult result = Run(arguments);
     EXPECT_EQ(result.exit_code, 0) << result.err;
   }
-  // Runs what must fail with one line and exit code 1, and gives the line.
+  // Runs a command that must fail with one line and exit code 1, and returns the line.
   std::string Failure(const Arguments& arguments) const {
     const ProgramResult result = Run(arguments);
     EXPECT_EQ(result.exit_code, 1);
@@ -126,7 +126,7 @@ TEST_F(SimulateSceneTest, EffectsAreChosenAndReported) {
   EXPECT_EQ(automatic[3]["name"], "falloff");
   EXPECT_FALSE(automatic[3]["on"]);
 
-  // The command line goes before the file.
+  // The command line overrides the file.
   const ProgramResult given =
       Run({"image", config, "-o", folder_ / "given", "--effects", "defocus,falloff", "--without",
            "defocus", "--json", folder_ / "given.json"});
@@ -302,7 +302,7 @@ TEST_F(SimulateSceneTest, RefusesInOneLineAndWritesNothing) {
     EXPECT_THAT(Failure({command, folder_ / "none.yaml", "-o", folder_ / "out"}),
                 HasSubstr("none.yaml"));
   }
-  // Somebody's own folder, and the other command's.
+  // A folder of another program, and one of the other command.
   const std::string good = folder_.Put("good.yaml", SceneConfig("rays_per_pixel: 16\n"));
   folder_.Put("mine/letter.txt", "dear");
   Succeed({"light-field", good, "-o", folder_ / "views", "--views", "1x1", "--quiet"});

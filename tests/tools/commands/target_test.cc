@@ -82,8 +82,8 @@ Drawn Draw(const model::TargetRequest& request, double dpi) {
   return drawn;
 }
 
-// Where the edge stands in every row of the patch's middle part, px from the patch's left side as
-// the page has it: the length that is dark.
+// Position of the edge in every row of the middle part of the patch, px from the left side of the
+// patch on the page: the dark length.
 struct EdgeLine {
   double angle_deg = 0;   // from the vertical, upper end to the right
   double centre_mm = 0;   // from the patch's left side, halfway up
@@ -137,7 +137,7 @@ TEST(TargetPng, ShowsAtEachPointTheForemostLeaf) {
         if (std::abs(beyond_px) < 1) plain = false;
         if (beyond_px > -1) continue;
         grey = leaf.grey;
-        plain = covered = true;  // what lies behind does not matter
+        plain = covered = true;  // the leaves behind do not matter
       }
       if (!plain) continue;
       ++compared;
@@ -209,7 +209,8 @@ TEST(TargetPng, HasPlainPlateausDarkOnTheLeftAndBrightOnTheRight) {
   EXPECT_GT(right.width, 0.4 * drawn.page.patch.width);
 }
 
-// Each line of the caption stands where the page says: ink above its baseline, none below the last.
+// Each line of the caption has its position on the page: ink above its baseline, none below the
+// last.
 TEST(TargetPng, ShowsTheCaption) {
   const Drawn drawn = Draw(SmallRequest(), 300);
   const model::TargetPage& page = drawn.page;
@@ -241,7 +242,7 @@ TEST(TargetPng, TwoTonesAreTwo) {
 }
 
 // Autocorrelation of a plane of numbers by the Fourier transform, padded so that nothing wraps
-// around, each lag over what overlaps; 1 at lag 0, which is at (0, 0).
+// around. Each lag is normalised by its overlap; lag 0, at (0, 0), is 1.
 cv::Mat Autocorrelation(const cv::Mat& image) {
   cv::Mat grey;
   image.convertTo(grey, CV_64F);
@@ -262,8 +263,8 @@ cv::Mat Autocorrelation(const cv::Mat& image) {
   return correlation / correlation.at<double>(0, 0);
 }
 
-// The highest correlation at lags from `from_px` to a third of the image, and the highest of them
-// that stands above all around it within `reach_px`.
+// The highest correlation at lags from `from_px` to a third of the image, and the highest one
+// that exceeds all others within `reach_px`.
 struct Peaks {
   double highest = 0;
   double second_peak = 0;
@@ -299,7 +300,7 @@ TEST(TargetPng, RepeatsNothing) {
   const Peaks found = PeaksBeyond(Autocorrelation(drawn.Part(above)), 10, 5);
   EXPECT_LT(found.second_peak, 0.2) << found.highest;
 
-  // What it would find if a quarter of the image were there three times.
+  // The result if a quarter of the image occurred three times.
   cv::Mat repeated = drawn.Part(above).clone();
   const cv::Rect quarter(0, 0, repeated.cols / 4, repeated.rows);
   repeated(quarter).copyTo(repeated(quarter + cv::Point(quarter.width, 0)));
@@ -356,7 +357,7 @@ TEST(TargetPdf, HasTrueScaleTheCaptionAndNoDate) {
   EXPECT_EQ(TargetPdf(page, model::DeadLeaves(page)), pdf);
 }
 
-// The program as a person meets it.
+// The program as a user runs it.
 class TargetProgram : public ::testing::Test {
  protected:
   ProgramResult Run(std::vector<std::string> arguments) const {

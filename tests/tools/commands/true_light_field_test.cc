@@ -1,4 +1,5 @@
-// H against a photograph that owes it nothing: the mean of the views of a rendered light field.
+// H is compared with a photograph that is independent of it: the mean of the views of a rendered
+// light field.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -35,7 +36,7 @@ class TrueLightFieldTest : public ::testing::TestWithParam<model::ApertureShape>
             {1, 1}};
   }
 
-  // Of encoded values, without the border of which H has to guess what lies beyond.
+  // PSNR of encoded values, without the border, beyond which H has to guess.
   double PsnrOf(const model::LinearImage& image, const model::LinearImage& reference) const {
     return estimator::CompareImages(model::EncodedValuesOf(reference, views_.transfer),
                                     model::EncodedValuesOf(image, views_.transfer), 20)
@@ -77,7 +78,7 @@ TEST_P(TrueLightFieldTest, ThroughHIsThePhotograph) {
     through.values[i % pixels * channels + i / pixels] = shown[i];
   }
   EXPECT_GE(PsnrOf(through, photograph), 54);
-  // What there was to explain.
+  // The difference that the light field has to explain.
   EXPECT_LT(PsnrOf(centre, photograph), 35);
 }
 INSTANTIATE_TEST_SUITE_P(Apertures, TrueLightFieldTest,

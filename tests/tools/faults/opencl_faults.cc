@@ -33,7 +33,7 @@ const Fault& TheFault() {
   return fault;
 }
 
-// What this call is to fail with; CL_SUCCESS: it is not.
+// The error with which this call is to fail, or CL_SUCCESS if it is not to fail.
 cl_int FaultOf(const char* call) {
   static std::atomic<int> calls{0};
   if (std::strcmp(call, TheFault().call) != 0) return CL_SUCCESS;
@@ -67,7 +67,7 @@ cl_int clEnqueueNDRangeKernel(cl_command_queue queue, cl_kernel kernel, cl_uint 
                                                           local, wait_count, wait, event);
 }
 
-// A device that is lost works no more: this one must not either when its loss is reported.
+// A lost device does not work any more, so this call must fail as well when the loss is reported.
 cl_int clFinish(cl_command_queue queue) {
   const cl_int result = Real<decltype(clFinish)>(__func__)(queue);
   if (const cl_int error = FaultOf(__func__)) return error;

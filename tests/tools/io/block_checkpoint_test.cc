@@ -1,4 +1,4 @@
-// Blocks that one run keeps and another finds; the program that goes on where it was interrupted.
+// Blocks that one run stores and another one finds, and runs that continue after an interruption.
 #include "thicklens/io/block_checkpoint.h"
 
 #include <gmock/gmock.h>
@@ -135,7 +135,7 @@ TEST_F(BlockCheckpointTest, WithoutABlockItHoldsNothing) {
   EXPECT_EQ(checkpoint.kept(), 1);
 }
 
-// Records with right hashes whose content is wrong: nobody but a person writes such.
+// Records with right hashes whose content is wrong, which only a person could write.
 TEST_F(BlockCheckpointTest, RecordsThatAreNoBlocksAreNotFound) {
   {
     BlockCheckpoint checkpoint(Path(), kVersion);

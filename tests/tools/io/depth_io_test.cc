@@ -70,7 +70,8 @@ TEST_F(DepthFile, PfmOfEitherByteOrderHasItsRowsBottomUp) {
   }
 }
 
-// A value may look like white space: only one such byte stands between the scale and the values.
+// A value may look like white space: there is exactly one such byte between the scale and the
+// values.
 TEST_F(DepthFile, PfmValuesMayBeginWithWhiteSpace) {
   EXPECT_THAT(Read(std::string("Pf\n1 1\n-1\n\x0A\x20\x0D\x40", 14)).values,
               ElementsAre(::testing::FloatNear(2.2051F, 1e-3F)));

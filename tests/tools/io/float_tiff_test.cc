@@ -25,8 +25,8 @@ model::LinearImage Noise(int width, int height, int channels) {
   return image;
 }
 
-// By another library. Sizes of one pixel, one row, several strips, and strips that do not divide
-// the height.
+// Another library reads the files. The sizes are one pixel, one row, several strips, and strips
+// that do not divide the height.
 TEST(FloatTiff, IsReadBackBitForBit) {
   TemporaryFolder folder;
   for (const int channels : {1, 3}) {

@@ -27,7 +27,7 @@ struct Case {
   std::vector<int> settings;
 };
 
-// What compresses best, by every way to write it.
+// Data that compress very well, in every format.
 const std::vector<Case>& Cases() {
   static const std::vector<Case> cases = {
       {".png", ImageFileKind::kPng, {cv::IMWRITE_PNG_COMPRESSION, 9}},
@@ -157,7 +157,7 @@ TEST(ImageFileKind, OtherKindsAreNotDecoded) {
   const std::string bmp = EncodedAs(Cases()[7], cv::Mat(4, 4, CV_8U, cv::Scalar(1)));
   EXPECT_TRUE(DecodeUnchanged(bmp, "x", {ImageFileKind::kPng}, &why).empty());
   EXPECT_FALSE(DecodeUnchanged(bmp, "x", {ImageFileKind::kBmp}, &why).empty());
-  // What OpenCV hands to GDAL and others.
+  // Files for which OpenCV uses GDAL and other libraries.
   for (const char* bytes : {"", "GIF89a", "\x0Aplain", "NITF02.10", "RIFF....WEBP", "P1["}) {
     EXPECT_FALSE(KindOfImage(bytes).has_value()) << bytes;
   }

@@ -55,7 +55,7 @@ INSTANTIATE_TEST_SUITE_P(ChannelsAndBits, PngRoundTrip,
                                            std::array<int, 2>{3, 8}, std::array<int, 2>{3, 16},
                                            std::array<int, 2>{4, 8}, std::array<int, 2>{4, 16}));
 
-// A round trip alone would not see red and blue exchanged twice: OpenCV's own order is BGR.
+// A round trip alone would not detect red and blue exchanged twice: OpenCV's own order is BGR.
 TEST(DecodeImage, GivesRedFirst) {
   const cv::Mat bgr(2, 2, CV_8UC3, cv::Scalar(10, 20, 30));
   const cv::Mat rgb = DecodeImage(Encoded(bgr, ".png"), "memory");
@@ -98,7 +98,7 @@ TEST(DecodeImage, RefusesFloats) {
               AllOf(HasSubstr("8 or 16 bits"), HasSubstr("32 bits, float")));
 }
 
-// Not in the words of what fails inside.
+// The message is not that of the function inside that fails.
 TEST(DecodeImage, SaysWhatIsExpectedOfABrokenFile) {
   for (const std::string extension : {".ppm", ".bmp"}) {
     std::string bytes = Encoded(cv::Mat(40, 40, CV_8UC3, cv::Scalar(1, 2, 3)), extension);

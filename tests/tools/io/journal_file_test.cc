@@ -1,4 +1,4 @@
-// A file of records: what is whole comes back, whatever happened to the rest.
+// A file of records: the complete records are read, whatever happened to the others.
 #include "thicklens/io/journal_file.h"
 
 #include <gmock/gmock.h>
@@ -104,7 +104,7 @@ TEST_F(JournalFileTest, ADamagedRecordIsLeftOut) {
     if (at >= hash && at + 1 != second) {
       EXPECT_THAT(records, ElementsAre("first", "third"));
       EXPECT_EQ(journal.bytes_left_out(), second + 7 - line);
-    } else {  // nothing says where the next one begins
+    } else {  // the start of the next record is unknown
       EXPECT_THAT(records, ElementsAre("first"));
       EXPECT_EQ(journal.bytes_left_out(), whole.size() - line);
     }

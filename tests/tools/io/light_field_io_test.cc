@@ -113,7 +113,7 @@ class LightFieldFolder : public ::testing::Test {
   TemporaryFolder folder_;
 };
 
-// The encoded level of what a view shows.
+// The encoded level of a point of a view.
 int LevelOf(const model::LightField& light_field, int k, int l) {
   const double light = model::ViewImage(light_field, k, l).values.front();
   return static_cast<int>(std::lround(255 * light_field.transfer.Encode(light)));
@@ -153,7 +153,7 @@ TEST_F(LightFieldFolder, BandsThatAreNoColoursAreNotWritten) {
   }
 }
 
-// A round trip alone would not see red and blue exchanged twice.
+// A round trip alone would not detect red and blue exchanged twice.
 TEST_F(LightFieldFolder, TiffHasRedFirst) {
   model::LightField light_field = model::MakeLightField(1, 1, 1, 1, 3);
   light_field.values = {0.25F, 0.5F, 0.75F};
@@ -336,7 +336,7 @@ double ParameterOf(const std::string& config, const std::string& key) {
   return 0;
 }
 
-// The benchmark's own formula from depth to disparity gives what the camera gives.
+// The benchmark's own formula from depth to disparity agrees with the camera.
 TEST_F(LightFieldFolder, HciParametersGiveTheCamerasDisparity) {
   const model::LightField light_field = WithCamera(3, 3);
   const std::string config = ContentOf(WriteHci(light_field) + "/parameters.cfg");
@@ -379,9 +379,9 @@ TEST_F(LightFieldFolder, TheGridIsNotGuessed) {
   const std::string folder = PutNumbered(Rectangle());
   EXPECT_THAT(Refusal(folder), AllOf(HasSubstr("6 views"), HasSubstr("--grid")));
   LightFieldReading reading;
-  reading.grid = 8;  // then 13 and 20 stand elsewhere
+  reading.grid = 8;  // 13 and 20 are at other positions then
   EXPECT_THAT(Refusal(folder, reading), HasSubstr("missing: input_Cam"));
-  // As many as a square, but not numbered like one.
+  // The number of views is a square, but their numbering is not that of a square.
   EXPECT_THAT(Refusal(PutNumbered({11, 12, 20, 21})), HasSubstr("--grid"));
   folder_.Put("numbered/parameters.cfg", "[extrinsics]\nnum_cams_x = nine\n");
   EXPECT_THAT(Refusal(folder), AllOf(HasSubstr("parameters.cfg:2"), HasSubstr("'nine'")));
@@ -412,7 +412,7 @@ TEST_F(LightFieldFolder, NamesTheHciViewThatDoesNotFit) {
   EXPECT_THAT(Refusal(folder), AllOf(HasSubstr("view (2, 1)"), HasSubstr("3x3"), HasSubstr("4x3")));
   PutView(5, 4, 3, 1);
   EXPECT_THAT(Refusal(folder), AllOf(HasSubstr("view (2, 1)"), HasSubstr("1 channel")));
-  PutView(5, 4, 3, 4);  // alpha says nothing about light
+  PutView(5, 4, 3, 4);  // alpha is not light
   EXPECT_EQ(LevelOf(ReadLightField(folder, {}), 2, 1), 5);
   const std::string png = ContentOf(folder + "/input_Cam005.png");
   folder_.Put("numbered/input_Cam005.png", png.substr(0, png.size() - 20));
@@ -446,7 +446,8 @@ TEST_F(LightFieldFolder, TheBenchmarksOwnFoldersAreNotReplaced) {
   EXPECT_THAT(ErrorOf([&] { ClaimHciFolder(ours); }), HasSubstr("notes.txt"));
 }
 
-// What the centre view shows at x stands at x - a d in the view a to the right, b likewise down.
+// The point at x in the centre view is at x - a d in the view a to the right, and likewise for b
+// down.
 void ExpectDisparitySign(const model::LightField& light_field, const model::RawDepthMap& map) {
   const int centre = light_field.u_count / 2;
   const auto difference = [&](int a, int b, double sign) {

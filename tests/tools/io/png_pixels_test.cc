@@ -20,7 +20,7 @@
 namespace thicklens::io {
 namespace {
 
-// Of a file that other programs may write.
+// A kind of file that other programs may write.
 struct PngKind {
   int colour_type = SPNG_COLOR_TYPE_GRAYSCALE;
   int bits = 8;
@@ -101,7 +101,7 @@ std::string RandomFile(const PngKind& kind, unsigned seed) {
   return {static_cast<const char*>(file.get()), size};
 }
 
-// By libpng, as OpenCV has it.
+// Decodes with libpng, through OpenCV.
 cv::Mat ByOpenCv(const std::string& bytes) {
   cv::Mat image =
       cv::imdecode(std::vector<unsigned char>(bytes.begin(), bytes.end()), cv::IMREAD_UNCHANGED);

@@ -1,4 +1,4 @@
-// thicklens estimate --aperture-of: which views there are, through which aperture, and who says so.
+// thicklens estimate --aperture-of: the views, their aperture, and the origin of both.
 #include "tools/options/estimate_aperture.h"
 
 #include <fmt/format.h>
@@ -70,7 +70,7 @@ class SparseApertureTest : public ::testing::Test {
     output.Commit();
     return folder;
   }
-  // The same in a folder of ours, which states the weights of `shape`.
+  // Writes the same views as a folder of the project, which states the weights of `shape`.
   std::string PutOwn(model::ApertureShape shape) const {
     const std::string folder = folder_ / ("own-" + model::ApertureShapeName(shape));
     model::LightField light_field = Views(true);
@@ -135,7 +135,7 @@ class SparseApertureTest : public ::testing::Test {
 model::LightField* SparseApertureTest::truth_ = nullptr;
 model::RawDepthMap* SparseApertureTest::map_ = nullptr;
 
-// Positions from --aperture-of, weights from --aperture-shape.
+// The positions are from --aperture-of, the weights from --aperture-shape.
 TEST_F(SparseApertureTest, AGaussianPhotographIsEstimatedByItsShape) {
   const std::string sparse = PutHci(true);
   const std::string photo = Photo(PutHci(false), "gaussian");
@@ -151,7 +151,7 @@ TEST_F(SparseApertureTest, AGaussianPhotographIsEstimatedByItsShape) {
   EXPECT_GT(right["mean"]["psnr_db"].get<double>(),
             right["dibr"]["mean"]["psnr_db"].get<double>() + 1);
 
-  // Without it a uniform one is assumed, which is reported, and is worse.
+  // Without the option a uniform aperture is assumed, which is reported and gives a worse result.
   const ProgramResult assumed = Estimate(photo, sparse, {});
   ASSERT_EQ(assumed.exit_code, 0) << assumed.err;
   EXPECT_THAT(assumed.err, AllOf(HasSubstr("sparse-hci"), HasSubstr("uniform one is assumed"),
@@ -169,7 +169,7 @@ TEST_F(SparseApertureTest, WhatTheFileStatesIsUsed) {
   EXPECT_THAT(result.err, Not(HasSubstr("assumed; --aperture-shape")));
   EXPECT_EQ(Json("est.json")["aperture"]["shape"], "gaussian");
   EXPECT_EQ(Json("est.json")["aperture"]["from"], "light-field");
-  // To say the same is no conflict.
+  // Repeating the same shape is no conflict.
   const ProgramResult same = Estimate(photo, own, {"--aperture-shape", "gaussian"});
   EXPECT_EQ(same.exit_code, 0) << same.err;
   EXPECT_EQ(Json("est.json")["aperture"]["from"], "option");

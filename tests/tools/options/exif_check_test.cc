@@ -1,4 +1,4 @@
-// A photograph's EXIF against the camera file that it is to be estimated with.
+// The EXIF data of a photograph are compared with the camera file for its estimate.
 #include "tools/options/exif_check.h"
 
 #include <gmock/gmock.h>
@@ -69,7 +69,7 @@ TEST(CompareExif, TheFocalLengthMayBeOffByItsRoundingAndTheStatedTolerance) {
   EXPECT_EQ(verdict(50.04, 0), "undecided");  // 0.005 of rounding
   EXPECT_EQ(verdict(50.04, 0.04), "agrees");
   EXPECT_EQ(verdict(49, 0.6), "agrees");       // a whole number: 0.5 of rounding
-  EXPECT_EQ(verdict(49, 0.4), "contradicts");  // beyond what is stated
+  EXPECT_EQ(verdict(49, 0.4), "contradicts");  // beyond the stated tolerance
   EXPECT_EQ(verdict(48.2, 1), "contradicts");  // 0.05 of rounding
   EXPECT_EQ(verdict(48, 0), "undecided");      // nothing is stated, and EXIF may be nominal
   EXPECT_EQ(verdict(35, 0), "contradicts");
@@ -143,7 +143,7 @@ TEST(CompareExif, ThePitchAndTheCropFactorAreThoseOfTheSensor) {
   exif.focal_length_35mm = 75;  // a sensor of APS-C
   EXPECT_EQ(VerdictOn("pixel pitch", exif), "contradicts");
   EXPECT_EQ(VerdictOn("crop factor", exif), "contradicts");
-  // Of a part of the sensor the equivalent says nothing.
+  // The equivalent focal length says nothing about a part of the sensor.
   EXPECT_EQ(VerdictOn("crop factor", exif, BenchLens(), {30, 20, true}), "");
 }
 

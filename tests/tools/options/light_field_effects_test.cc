@@ -1,4 +1,4 @@
-// --effects and --without of estimate and render: what is on is what was asked for or matters.
+// --effects and --without of estimate and render: the effects that are on were requested or matter.
 #include "tools/options/light_field_effects.h"
 
 #include <gmock/gmock.h>
@@ -54,7 +54,8 @@ TEST(LightFieldEffectsTest, AnEstimateTakesWhatMatters) {
   const EffectSet kept = {Effect::kDefocus, Effect::kOcclusion};
   EXPECT_EQ(Decided(kDefault, ThickCamera(0.2)), kept.With({Effect::kFalloff, Effect::kThickness}));
   EXPECT_EQ(Decided(kDefault, ThickCamera(0.001, 0.05)), kept);
-  // A small field: what a wide aperture does to the blur there is in the calibrated blur ratio.
+  // A small field: the effect of a wide aperture on the blur there is included in the calibrated
+  // blur ratio.
   EXPECT_EQ(Decided(kDefault, ThickCamera(0.001)), kept);
   EXPECT_EQ(Decided(Without("thickness"), ThickCamera(0.2)), kept.With({Effect::kFalloff}));
   EstimateOptions options;
@@ -87,8 +88,8 @@ TEST(LightFieldEffectsTest, WithoutACameraNothingIsKnownOfTheirImpact) {
               HasSubstr("--without: effect falloff is not available here"));
 }
 
-// What auto leaves out is within the tolerance as it is reported, too: there each is alone without,
-// while they are left out one after the other, which changes bounds by a little.
+// The effects that auto leaves out also meet the tolerance as reported. The report leaves each out
+// alone, while auto leaves them out one after the other, which changes the bounds a little.
 TEST(LightFieldEffectsTest, OmittedEffectsStayWithinTheReportedTolerance) {
   int left_out = 0;
   for (const double pitch_mm : {0.001, 0.003, 0.01, 0.03, 0.1}) {
@@ -145,7 +146,7 @@ TEST(LightFieldEffectsTest, TheThinLensEquivalentHasAFallOffOfItsOwn) {
       for (int l = 0; l < 5; ++l) {
         for (int k = 0; k < 5; ++k) {
           const double u_mm = (k - 2) * grid.u_step_mm, v_mm = (l - 2) * grid.v_step_mm;
-          // Of the point of the plane of focus that lands there, seen from (u, v).
+          // The irradiance of the point of the plane of focus that lands there, seen from (u, v).
           const auto irradiance = [&](double at_x_mm, double at_y_mm) {
             const double front =
                 std::hypot(at_x_mm * 800 / scale_mm - u_mm, at_y_mm * 800 / scale_mm - v_mm) / 800;

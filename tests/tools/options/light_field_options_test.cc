@@ -27,7 +27,7 @@ using thicklens::testing::ErrorOf;
 constexpr float kHole = std::numeric_limits<float>::quiet_NaN();
 constexpr int kMapWidth = 3, kMapHeight = 2;
 
-// What a UsageError says; another Error, or none, fails the test.
+// Returns the message of a UsageError; another Error, or none, fails the test.
 template <typename Call>
 std::string UsageErrorOf(const Call& call) {
   try {
@@ -124,7 +124,8 @@ TEST(PrepareDepth, WithoutACameraADisparityIsScaledAndFilled) {
   DepthOptions options = KindAndUnit("disparity", "");
   options.disparity_scale = 2;
   options.disparity_offset_px = -1;
-  // Around the hole 1 and 0 on the left, 3, -2 and .25 elsewhere: each a surface of its own.
+  // Around the hole there are 1 and 0 on the left, and 3, -2 and 0.25 elsewhere, each of which is a
+  // surface of its own.
   const PreparedDepth prepared = PrepareDepth(MapOf({1, kHole, 3, 0, -2, 0.25F}), "d.pfm", options,
                                               GreyImage(), nullptr, nullptr);
   EXPECT_THAT(prepared.disparity.disparity, ElementsAre(1, -5, 5, -1, -5, -0.5F));
@@ -157,7 +158,7 @@ TEST(PrepareDepth, TheMapIsNamedWhereItIsWrong) {
   }
 }
 
-// A UV plane in the scene: what is nearer has no disparity.
+// The UV plane is in the scene, so nearer points have no disparity.
 TEST(PrepareDepth, DepthsNearerThanTheUvPlaneAreRefused) {
   const model::Camera camera = MapCamera();
   const model::LightFieldGrid grid = model::GridOnPlanes(camera, {100, 1000}, 3, 3);
@@ -186,8 +187,8 @@ TEST(PrepareDepth, WithACameraADepthBecomesItsDisparity) {
   }
 }
 
-// Through the depth and back: a disparity per step of the grid's own views stays what it is, also
-// where u has one view.
+// A disparity per step of the grid's own views is converted to depth and back without a change,
+// also if u has one view.
 TEST(PrepareDepth, WithACameraADisparityIsPerViewStepOfItsGrid) {
   const model::Camera camera = MapCamera();
   const std::vector<float> disparity_px = {-0.5F, 0, 0.5F, 0.25F, 0.125F, -0.25F};

@@ -118,7 +118,7 @@ TEST(Profile, IsOfThisMachineIfAllOfItIs) {
   EXPECT_FALSE(IsFromHere(DefaultProfile(), DefaultProfile().threads));
 }
 
-// From files to files, on images so small that all takes seconds.
+// The measurement goes from files to files, on images so small that it takes seconds.
 TEST(MeasureProfile, GivesWhatEstimateCanChooseBy) {
   using Use = ProfileCase::Use;
   ProfileRun run;

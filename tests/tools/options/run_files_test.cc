@@ -256,7 +256,7 @@ TEST_F(RunFilesTest, TheOtherCommandsKeepTheirInputs) {
              {"report", (*this)("lf"), "--sweep", (*this)("sweep"), "--photo", image}, {"-o"});
 }
 
-// A run that is refused early knows not all of its inputs.
+// A run that is refused early does not know all of its inputs.
 TEST_F(RunFilesTest, ARefusalIsNotWrittenOverWhatIsNoSummary) {
   const std::string frame = (*this)("sweep/frames/frame_002.png");
   const std::string before = ContentOf(frame);
@@ -280,7 +280,7 @@ TEST_F(RunFilesTest, OutputsAreApart) {
                               (*this)("lf"), "--json", (*this)("lf/summary.json")});
   EXPECT_EQ(run.exit_code, 2);
   EXPECT_THAT(run.err, HasSubstr("lies in the output folder"));
-  // Beside the frames is a good place for what comes out of them.
+  // The folder of the frames is a good place for the results.
   Words beside = explain;
   beside.insert(beside.end(), {"--json", (*this)("sweep/explained.json")});
   EXPECT_EQ(Run(beside).exit_code, 0);

@@ -120,7 +120,7 @@ TEST_F(SweepInputTest, ThePeriodOfTheTargetComesThrough) {
   EXPECT_EQ(ReadSweepInput(arguments_).sweep.target_period_mm.value(), 5);
 }
 
-// Numbers of the camera that a result hangs on and that nobody vouches for are reported once.
+// Numbers of the camera that affect a result and have no stated tolerance are reported once.
 TEST_F(SweepInputTest, MissingTolerancesAreReportedUnlessTheTruthIsKnown) {
   Sweep("");
   const auto reported = [&] {

@@ -1,4 +1,5 @@
-// simulate --ablate as a person meets it, against the same by the program's other commands.
+// simulate --ablate as a user runs it, compared with the results of the program's other
+// commands.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -121,7 +122,7 @@ TEST_F(AblationTest, OfASceneIsWhatTheOtherCommandsFind) {
     if (model::FactsOf(model::EffectFromName(name)).random) {
       EXPECT_LE(image.at("rms_grey_levels").get<double>(), 1.1 * bound);
     } else if (name != "transfer-curve") {
-      // What a finite number of rays leaves open, at most four of its standard deviations.
+      // The sampling error of a finite number of rays, at most four of its standard deviations.
       EXPECT_LE(image.at("largest_grey_levels").get<double>(),
                 bound + 4 * part.at("sampling_error_grey_levels").get<double>());
     }
@@ -129,7 +130,7 @@ TEST_F(AblationTest, OfASceneIsWhatTheOtherCommandsFind) {
   }
   EXPECT_TRUE(RowOf(part, "shot-noise").at("absent").get<bool>());
   EXPECT_NEAR(RowOf(part, "read-noise").at("image").at("rms_grey_levels").get<double>(), 1.04,
-              0.05);  // with what the rounding makes of it
+              0.05);  // including the effect of rounding
   EXPECT_TRUE(RowOf(part, "read-noise").at("ignored_db").is_null());
 
   Succeed({"simulate", "image", scene, "-o", folder_ / "image", "--effects", "all"});
@@ -158,7 +159,7 @@ TEST_F(AblationTest, OfASweepIsWhatTheOtherCommandsFind) {
   Succeed({"simulate", "sweep", sweep, "-o", folder_ / "all", "--ablate", "--json",
            folder_ / "a.json"});
   const nlohmann::json part = JsonOf("a.json").at("ablation").at("sweep");
-  // Without blur there is nothing to calibrate, and the rest is reported all the same.
+  // Without blur there is nothing to calibrate, but the other values are reported nevertheless.
   EXPECT_THAT(RowOf(part, "defocus").at("refusal").get<std::string>(), Not(::testing::IsEmpty()));
   EXPECT_THAT(out_, AllOf(HasSubstr("Without defocus there is no calibration: "),
                           HasSubstr("refused  refused")));

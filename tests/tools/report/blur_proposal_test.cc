@@ -50,7 +50,7 @@ estimator::BlurCheck Checked() {
   return check;
 }
 
-// What is in focus then has the disparity -offset with the camera as it is.
+// A point in focus then has the disparity -offset with the present camera.
 TEST(BlurProposal, FocusIsWhereTheOffsetLeadsToNoDisparity) {
   const estimator::EstimateInput input = WithCamera();
   const model::Camera& camera = *input.camera;
@@ -109,7 +109,7 @@ TEST(BlurProposal, SpeaksOfTheMapWhereItHoldsDisparities) {
   estimator::EstimateInput input;
   input.weights = model::ApertureWeights(model::ApertureShape::kUniform, 5, 5);
   const BlurProposal proposal(check, input, depth);
-  // .5 (.02 v - 1.5) and .02 v - 1.5 + .25.
+  // 0.5 (0.02 v - 1.5) and 0.02 v - 1.5 + 0.25.
   EXPECT_THAT(proposal.Warning(),
               AllOf(HasSubstr("--disparity-scale 0.01 --disparity-offset -0.75"),
                     HasSubstr("--disparity-offset -1.25 ")));

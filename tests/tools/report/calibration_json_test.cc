@@ -88,7 +88,7 @@ TEST(CalibrationJson, WhatWasNotMeasuredIsNull) {
   out.erase("seconds");
   ExpectNoZeros(out, "");
   EXPECT_TRUE(out.at("frames")[0].at("statistics").is_null());
-  // Of a frame that was rejected as black, 0 was measured.
+  // For a frame that was rejected as black, the measured value is 0.
   made.calibration.frames[0].rejection = "dark: mean 0.000";
   out = CalibrationJson(made.sweep, made.calibration, nullptr, false);
   EXPECT_EQ(out.at("frames")[0].at("statistics").at("mean_encoded"), 0.0);

@@ -217,7 +217,7 @@ TEST(CalibrationReport, NamesWhatLimitsIt) {
   EXPECT_THAT(Page(made), HasSubstr("What limits it is statistical"));
   focus = {400, 1, Eigen::Vector2d(399, 401)};
   EXPECT_THAT(Page(made), HasSubstr("limit it alike"));
-  // Where the calibration itself advises, nothing more general stands beside it.
+  // If the calibration itself gives advice, no general advice is added.
   focus = {400, 0.1, Eigen::Vector2d(397, 402)};
   made.calibration.advice = "photograph a knife edge: +-2.9 mm would become +-0.4";
   const std::string html = Page(made);
@@ -255,7 +255,7 @@ TEST(CalibrationReport, SaysWhatTheFieldAndTheColoursDo) {
   EXPECT_THAT(html, HasSubstr("the camera file says gaussian"));
 }
 
-// The tiles stand where they lie in the image, and the colour is a function of their value.
+// The tiles have their positions in the image, and the colour is a function of their value.
 TEST(CalibrationReport, DrawsTheFieldAsItLies) {
   const MadeUpCalibration made = MakeUpCalibration(41, 320, 4);
   const XmlDocument document = ParseXml(Page(made));
@@ -306,7 +306,7 @@ TEST(CalibrationReport, ShowsRejectedFramesAndCountsTheRest) {
   EXPECT_EQ(images()[0].Attribute("width"), "220");
   EXPECT_EQ(images()[0].Attribute("height"), "165");
   EXPECT_THAT(images()[0].Attribute("src"), ::testing::StartsWith("data:image/jpeg;base64,"));
-  // Of 20 dark and one saturated frame, each kind is seen, and one has no image.
+  // There are 20 dark frames and a saturated one. Each kind is shown, and one frame has no image.
   for (int i = 10; i < 30; ++i) RejectFrame(i, "dark: mean 0.001", &made.calibration);
   RejectFrame(40, "saturated: 90 %", &made.calibration);
   EXPECT_EQ(images().size(), 12u);
@@ -349,7 +349,7 @@ TEST(CalibrationReport, ThumbnailsAreEncodedForTheScreen) {
   made.sweep.camera.sensor.transfer = model::TransferCurve::Srgb();
   EXPECT_THAT(page(), HasSubstr(shown(55)));
   made.sweep.camera.sensor.transfer = model::TransferCurve::Linear();
-  // By hand: 55/255 = .2157, 1.055 * .2157^(1/2.4) - .055 = .5020, * 255 = 128.
+  // By hand: 55/255 = 0.2157, 1.055 * 0.2157^(1/2.4) - 0.055 = 0.5020, * 255 = 128.
   EXPECT_THAT(page(), HasSubstr(shown(128)));
 }
 
@@ -385,13 +385,14 @@ TEST(CalibrationReport, MarksAssumedNumbers) {
 TEST(CalibrationReport, GivesErrorsAndCorrelations) {
   const std::string html = Page(MakeUpCalibration(41, 320, 4));
   EXPECT_THAT(html, HasSubstr(">+0.0003</td>"));  // d1
-  EXPECT_THAT(html, HasSubstr(">−6.5</td>"));     // zf of the source's recipe
+  EXPECT_THAT(html, HasSubstr(">−6.5</td>"));     // zf of the paper's recipe
   EXPECT_THAT(html, HasSubstr(">−0.710</td>"));   // d1 with the bench offset
   EXPECT_THAT(html, HasSubstr(">−0.550</td>"));
   EXPECT_THAT(Page(MakeUpCalibration(41, 320, 4), false), Not(HasSubstr("Errors against")));
 }
 
-// Where the tick labels of a plot say that numbers stand: value = from + per_px * position.
+// The positions of numbers according to the tick labels of a plot: value = from + per_px *
+// position.
 struct Scale {
   double from = 0, per_px = 0;
   double operator()(double px) const { return from + per_px * px; }
@@ -457,7 +458,7 @@ std::vector<std::pair<double, double>> PathPoints(std::string d) {
 // The drawn band against the scatter of the law over draws of its parameters.
 TEST(CalibrationReport, TheBandIsTheScatterOfTheModel) {
   MadeUpCalibration made = MakeUpCalibration(41, 320, 4);
-  made.calibration.covariance *= 9;  // to be seen beside the drawing's roundings
+  made.calibration.covariance *= 9;  // large enough to exceed the rounding of the drawing
   const XmlDocument document = ParseXml(Page(made, false));
   const int plot = PlotNamed(document, "blur");
   const Scale z_at = AxisScale(document, plot, "middle", "x", 0);
@@ -606,7 +607,7 @@ TEST(CalibrationReport, SaysWhereTheFramesLieOffTheModel) {
   const std::string widened =
       "The frames lie farther off the law than their errors (χ²/dof 2.5); the errors were widened";
   EXPECT_THAT(Page(made), HasSubstr(widened));
-  // Of few frames chance may do as much, and then nothing was widened.
+  // With few frames chance may do as much, and no widening is reported.
   made.calibration.blur.frames_used = 8;
   EXPECT_THAT(Page(made), HasSubstr("than their errors (χ²/dof 2.5)."));
 }
@@ -619,7 +620,7 @@ TEST(CalibrationReport, NoiseDoesNotFillTheColoursOfTheField) {
     tiles[i].focus_depth_mm = {400 + (i % 2 == 0 ? 0.1 : -0.1), i == 0 ? 0.031 : 0.21};
   const XmlDocument document = ParseXml(Page(made));
   const int plot = PlotNamed(document, "field");
-  // 400 +- 3 * .21: the tiles lie at (.63 -+ .1)/1.26 = .42 and .58 of the colours.
+  // 400 +- 3 * 0.21: the tiles are at (0.63 -+ 0.1)/1.26 = 0.42 and 0.58 of the colours.
   std::set<std::string> colours, words;
   for (const XmlElement& rect : document.Named("rect", plot))
     if (rect.Number("width") > 20 && !rect.Attribute("fill").empty())

@@ -1,4 +1,4 @@
-// What a refused calibration still tells: in the text, on the page and in the JSON.
+// Results that a refused calibration still reports: in the text, on the page and in the JSON.
 #include "tools/report/determined.h"
 
 #include <gmock/gmock.h>

@@ -184,7 +184,7 @@ class LightFieldPageTest : public ::testing::Test {
   LightFieldPageInput input_;
 };
 
-// The image of the <img> with that text for readers who cannot see it; RGB.
+// The image of the <img> with that alternative text; RGB.
 cv::Mat ImageFrom(const XmlDocument& document, const std::string& alt) {
   for (const XmlElement& image : document.Named("img")) {
     if (image.Attribute("alt") != alt) continue;
@@ -370,7 +370,7 @@ TEST_F(LightFieldPageTest, TheCameraInWords) {
   light_field_.camera->calibration->image_distance_mm->sigma = 0;
   EXPECT_THAT(Html(), AllOf(HasSubstr("d1 = 16.216\u00A0mm"), HasSubstr("assumed, not measured"),
                             Not(HasSubstr("calibrated from"))));
-  // Nothing is said of frames where there are none.
+  // If there are no frames, they are not mentioned.
   light_field_.camera->calibration->evidence.frames_used = 0;
   light_field_.camera->calibration->evidence.method = "simulated";
   EXPECT_THAT(Html(), AllOf(HasSubstr("(of a simulated camera: true, not measured)."),
@@ -389,7 +389,7 @@ TEST_F(LightFieldPageTest, TheRunInWords) {
   GiveAll();
   EXPECT_THAT(Html(), HasSubstr("by the solver blocks (6\u00A0blocks of 16\u00A0px) in "
                                 "13.2\u00A0s with at most 346\u00A0MiB of memory."));
-  // Without the record, the light field's own file says less.
+  // Without the record, less is known from the file of the light field itself.
   input_.estimate.reset();
   light_field_.origin.block_px = 24;
   light_field_.origin.seconds = 7.5;
@@ -444,7 +444,7 @@ TEST_F(LightFieldPageTest, OneColumnOrOneViewIsShownToo) {
   EXPECT_THAT(Html(), HasSubstr(">1\u00A0view<"));
 }
 
-// What is shown of the views: their light, encoded, and the difference to the truth.
+// The images of the views show their encoded light, and the difference to the truth.
 TEST_F(LightFieldPageTest, ImagesShowTheLightField) {
   GiveAll();
   const model::TransferCurve srgb = model::TransferCurve::Srgb();
@@ -565,7 +565,8 @@ TEST_F(LightFieldPageTest, TheResidualIsSigned) {
 TEST_F(LightFieldPageTest, TheConfidenceHasItsShares) {
   estimator::SceneMaps maps = Maps();
   input_.maps = &maps;
-  // Rows: 12 of 24 seen, 6 blurred, 3 partly seen, 3 filled in (of these one blurred as well).
+  // The rows are: 12 of 24 visible, 6 blurred, 3 partly visible, 3 filled in (one of these blurred
+  // as well).
   for (std::size_t i = 0; i < maps.occluded_fraction.size(); ++i) {
     const std::size_t y = i / kAcrossPx;
     maps.blur_sigma_px[i] = y < 6 || y == 23 ? 3.5F : 2.5F;
@@ -725,7 +726,7 @@ TEST_F(ReportProgram, WritesThePageAndItsSections) {
   EXPECT_EQ(ParseXml(html).error, "");
   EXPECT_THAT(html, HasSubstr("from 400 to 440 mm"));
   const cv::Mat photo = ImageFrom(ParseXml(html), "The photograph through the whole aperture");
-  EXPECT_EQ(photo.channels(), 3);  // its alpha says nothing about light
+  EXPECT_EQ(photo.channels(), 3);  // its alpha is not light
   EXPECT_EQ(photo.ptr<unsigned char>(0)[0], 100);
 }
 
@@ -736,7 +737,7 @@ TEST_F(ReportProgram, CropsAllAlikeButNotWhatIsCropped) {
   const ProgramResult result = Run({estimate, "--truth", truth, "--photo",
                                     PutPhoto(kAcrossPx, kDownPx, 3), "--crop", "4,2,30,20"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
-  // The same views: the differences are grey everywhere.
+  // The views are the same, so the differences are grey everywhere.
   const XmlDocument document = ParseXml(ContentOf(page_));
   const cv::Mat difference = ImageFrom(document, "difference × 32, u 0, v 1");
   EXPECT_EQ(difference.size(), cv::Size(30, 20));

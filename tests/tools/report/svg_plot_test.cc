@@ -35,7 +35,7 @@ Plot PlotOf(std::vector<double> x, std::vector<double> y) {
   return plot;
 }
 
-// The circles of the data; the legend's own stands first.
+// The circles of the data; the first one in the file is that of the legend.
 std::vector<XmlElement> DataCircles(const XmlDocument& document) {
   std::vector<XmlElement> circles = document.Named("circle");
   if (!circles.empty()) circles.erase(circles.begin());
@@ -121,7 +121,7 @@ TEST(SvgPlot, PutsPointsWhereTheyBelong) {
   ASSERT_EQ(document.error, "");
   const std::vector<XmlElement> circles = DataCircles(document);
   ASSERT_EQ(circles.size(), 3u);
-  // The tick labels say where a number stands: x labels are centred, y labels end at the axis.
+  // The tick labels give the position of a number: x labels are centred, y labels end at the axis.
   double x_of_2 = 0, y_of_20 = 0;
   for (const XmlElement& text : document.Named("text")) {
     if (text.text == "2.0" && text.Attribute("text-anchor") == "middle") x_of_2 = text.Number("x");
@@ -140,7 +140,7 @@ TEST(SvgPlot, LogarithmicAxesPutEqualRatiosEquallyFar) {
   const XmlDocument document = ParseXml(SvgPlot(plot));
   ASSERT_EQ(document.error, "");
   const std::vector<XmlElement> circles = DataCircles(document);
-  ASSERT_EQ(circles.size(), 3u);  // what is not above 0 is left out
+  ASSERT_EQ(circles.size(), 3u);  // values that are not above 0 are left out
   for (const char* place : {"cx", "cy"}) {
     const double first = circles[1].Number(place) - circles[0].Number(place);
     EXPECT_NEAR(circles[2].Number(place) - circles[1].Number(place), first, 0.11) << place;
@@ -246,7 +246,7 @@ TEST(SvgPlot, TickLabelsDoNotTouch) {
   }
 }
 
-// The entries of the legend stand apart and inside the drawing.
+// The entries of the legend are separate and inside the drawing.
 TEST(SvgPlot, LegendEntriesDoNotTouch) {
   Plot plot = PlotOf({0, 1}, {0, 1});
   for (int i = 0; i < 9; ++i)
@@ -262,7 +262,7 @@ TEST(SvgPlot, LegendEntriesDoNotTouch) {
   }
 }
 
-// A band stands between its curves and is broken where one of them is not known.
+// A band lies between its curves and is interrupted where one of them is unknown.
 TEST(SvgPlot, DrawsABandAsAClosedArea) {
   Plot plot = PlotOf({0, 10}, {0, 10});
   plot.x_axis.range = plot.y_axis.range = {{0, 10}};

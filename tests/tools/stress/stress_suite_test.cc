@@ -1,4 +1,5 @@
-// The table of hard cases, one test for each row; and that its judge would see what is wrong.
+// The table of hard cases with one test for each row, and tests that the judge detects wrong
+// outcomes.
 #include "tools/stress/stress_suite.h"
 
 #include <gmock/gmock.h>
@@ -29,7 +30,7 @@
 
 namespace thicklens::tools {
 
-// By GoogleTest, where it names a parameter.
+// GoogleTest prints this as the name of a parameter.
 void PrintTo(const StressCase& hard, std::ostream* out) { *out << hard.name; }
 
 namespace {
@@ -41,9 +42,8 @@ using ::testing::HasSubstr;
 // Sanitizers and busy machines take longer than a person would wait.
 constexpr double kLimitSeconds = 100;
 
-// Of each solver one way in each precision and on each device that it has one for, and of the
-// blocks a direct and an iterative one: all ways are for `doctor --hard-cases`, which takes
-// minutes.
+// One way of each solver in each precision and on each device for which it has one, and for blocks
+// a direct and an iterative one. All ways are tested by `doctor --hard-cases`, which takes minutes.
 const Capabilities& ThisMachine() {
   static const Capabilities capabilities = [] {
     Capabilities found = ExamineCapabilities();
@@ -86,7 +86,7 @@ TEST(StressCases, AreSixtyAtLeastAndNoneTwice) {
   EXPECT_GE(names.size(), 60U);
 }
 
-// What a command that is made up comes to.
+// Returns the outcome of a synthetic command.
 StressOutcome OutcomeOf(const StressRun& run, double limit_seconds = kLimitSeconds) {
   const thicklens::testing::TemporaryFolder folder;
   StressCase hard;
@@ -109,7 +109,7 @@ TEST(StressCaseJudge, SeesErrorsThatAreTooLarge) {
   EXPECT_THAT(OutcomeOf(EstimateOf(shape, {}, ErrorIs(2, 1))).measured,
               HasSubstr("error 2, more than 1"));
   EXPECT_FALSE(OutcomeOf(EstimateOf(shape, {}, ErrorIs(std::nan(""), 1))).as_required);
-  // What is asked for is not what the views are.
+  // The views do not have the requested form.
   EXPECT_FALSE(OutcomeOf(EstimateOf(shape, {}, ViewsAreAll(shape, 0.5, 0.1))).as_required);
   StressImage other = shape;
   other.channels = 3;

@@ -16,7 +16,7 @@
 namespace thicklens::tools {
 namespace {
 
-// Only what is allowed between fork and exec.
+// Uses only functions that are allowed between fork and exec.
 void RedirectTo(const char* path, int descriptor) {
   const int file = ::open(path, O_WRONLY | O_CREAT | O_TRUNC, 0666);
   ::dup2(file, descriptor);
@@ -36,7 +36,8 @@ ChildProgram::ChildProgram(const std::vector<std::string>& arguments,
   pid_ = ::fork();
   if (pid_ < 0) throw std::runtime_error("no child process could be started");
   if (pid_ > 0) return;
-  // Who runs the tests in the background may have them ignored, and so would the program.
+  // If the tests run in the background, these signals may be ignored, and the program would inherit
+  // that.
   for (const int signal : {SIGINT, SIGHUP}) ::signal(signal, SIG_DFL);
   RedirectTo(out_path_.c_str(), STDOUT_FILENO);
   RedirectTo(err_path_.c_str(), STDERR_FILENO);

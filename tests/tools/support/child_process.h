@@ -21,7 +21,7 @@ struct ProgramResult {
 // The program thicklens as a child with its own stdout and stderr.
 class ChildProgram {
  public:
-  // `max_file_bytes` > 0 limits what it can write, as a full disk does.
+  // `max_file_bytes` > 0 limits how much the program can write, as a full disk does.
   ChildProgram(const std::vector<std::string>& arguments, const std::string& scratch_folder,
                long max_file_bytes);
   ChildProgram(const ChildProgram&) = delete;
@@ -43,7 +43,7 @@ class ChildProgram {
 // Runs the program with --quiet. The test fails if the program does.
 void MakeWithProgram(std::vector<std::string> arguments);
 
-// What fixtures of `thicklens estimate` have in common: folders of their own, and an output there.
+// The common part of fixtures of `thicklens estimate`: folders of their own, and an output there.
 class EstimateCommand {
  protected:
   using Words = std::vector<std::string>;
@@ -51,9 +51,9 @@ class EstimateCommand {
   std::string Output() const { return folder_ / "lf"; }
   static Words With(Words arguments, const Words& more);
   ProgramResult Run(Words arguments) const;
-  // What --json writes of a run that must succeed.
+  // Returns the JSON of a run that must succeed.
   nlohmann::json Summary(const Words& arguments, ProgramResult* result = nullptr) const;
-  // What a run says that must end with the exit code and without output.
+  // Returns the message of a run that must end with the exit code and without output.
   std::string Refusal(const Words& arguments, int exit_code) const;
 
   thicklens::testing::TemporaryFolder folder_;

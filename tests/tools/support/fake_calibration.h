@@ -21,7 +21,7 @@ namespace made_up {
 inline constexpr double kFocusMm = 400, kKappa = 0.45, kFloorPx = 0.5, kOffsetMm = 12.34;
 using Normal = std::normal_distribution<double>;
 
-// One side's fit, off by so much of what is usual.
+// The fit of one side, which differs from the typical values by this much.
 inline calib::SideFit Side(double off_mm, int frames) {
   calib::SideFit side;
   side.done = true;
@@ -81,7 +81,7 @@ inline calib::BlurExample Example(int frame, double added_sigma_px, std::mt19937
   return example;
 }
 
-// All that a calibration may say beyond its results.
+// Adds all details that a calibration may report beyond its results.
 inline void AddDetails(calib::Calibration* calibration) {
   calib::Calibration& c = *calibration;
   std::mt19937 generator(8);
@@ -129,8 +129,8 @@ inline void AddDetails(calib::Calibration* calibration) {
 
 }  // namespace made_up
 
-// A sweep and what a calibration of it could look like, filled by the laws and seeded noise:
-// nothing is measured here. Depths are offset + reading, the truth that of the camera below.
+// A sweep and a possible calibration of it, computed from the laws and seeded noise: nothing is
+// measured. Depths are offset + reading; the truth is that of the camera below.
 struct MadeUpCalibration {
   calib::FocusSweep sweep;
   calib::Calibration calibration;
@@ -213,7 +213,7 @@ inline MadeUpCalibration MakeUpCalibration(int frame_count, double first_depth_m
   c.sharpness.sigma_mm = 1.3;
   c.sharpness.reference_depth_mm = kFocusMm;
   // ln of the index above to second order in x = z0/z - 1: the blur is sigma = B |x|, so that
-  // ln(.3/sqrt(S0 + .4^2 + B^2 x^2)) = ln(.3/sqrt(.41)) - B^2 x^2/(2 * .41).
+  // ln(0.3/sqrt(S0 + 0.4^2 + B^2 x^2)) = ln(0.3/sqrt(0.41)) - B^2 x^2/(2 * 0.41).
   const double b_px = kKappa * 4.46 * k_mm / kFocusMm / 0.006;
   c.sharpness.log_parabola = {std::log(0.3 / std::sqrt(0.41)), 0, -b_px * b_px / 0.82};
   c.sharpness.from_depth_mm = 385;
@@ -238,7 +238,7 @@ inline MadeUpCalibration MakeUpCalibration(int frame_count, double first_depth_m
   return made;
 }
 
-// What remains where no more was found than the results: no sides, field, colours, examples, parts.
+// Leaves only the results: no sides, field, colours, examples, parts.
 inline void RemoveDetails(calib::Calibration* calibration) {
   calib::Calibration& c = *calibration;
   c.source.sharpest_normalised_frame = -1;
@@ -260,7 +260,7 @@ inline void RemoveDetails(calib::Calibration* calibration) {
     frame.image_scale_sigma = frame.reading_error_mm = frame.reading_error_sigma_mm = 0;
 }
 
-// What the quality checks leave of a frame: its statistics and the reason.
+// Leaves only what the quality checks keep of a frame: its statistics and the reason.
 inline void RejectFrame(int index, const std::string& reason, calib::Calibration* calibration) {
   calib::FrameMeasurement& old = calibration->frames[static_cast<std::size_t>(index)];
   calib::FrameMeasurement frame;
@@ -273,7 +273,7 @@ inline void RejectFrame(int index, const std::string& reason, calib::Calibration
   --calibration->frames_used;
 }
 
-// The same sweep when nothing came of it.
+// The same sweep with a refused calibration.
 inline void RefuseAll(const std::string& reason, calib::Calibration* calibration) {
   calib::Calibration refused;
   refused.reason = reason;

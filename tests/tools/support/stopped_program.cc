@@ -53,7 +53,7 @@ StoppedProgram::StoppedProgram(const std::vector<std::string>& arguments, const 
   for (const int signal : kSignals) {
     const auto& ignored = settings.ignored;
     const bool is_ignored = std::find(ignored.begin(), ignored.end(), signal) != ignored.end();
-    // A shell ignores SIGINT for what it starts in the background.
+    // A shell ignores SIGINT for programs that it starts in the background.
     before.push_back(std::signal(signal, is_ignored ? SIG_IGN : SIG_DFL));
   }
   pid_ = ::fork();

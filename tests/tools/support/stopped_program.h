@@ -13,7 +13,7 @@ class StoppedProgram {
  public:
   struct Settings {
     std::string scratch_folder;    // stdout and stderr go to files there
-    std::string temporary_folder;  // its TMPDIR; empty: this process's
+    std::string temporary_folder;  // TMPDIR of the program; empty: that of this process
     std::vector<int> ignored;      // signals that are ignored at its start
     int stdout_fd = -1;            // instead of the file
     int stderr_fd = -1;

@@ -14,7 +14,7 @@ struct XmlElement {
   std::string name;
   std::map<std::string, std::string> attributes;
   std::string text;          // its own, without its children's
-  std::string parent_class;  // the class of the element it stands in
+  std::string parent_class;  // class of the parent element
   int plot = -1;             // which <svg> of the document it is in
 
   std::string Attribute(const std::string& key) const {

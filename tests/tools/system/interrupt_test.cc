@@ -66,7 +66,7 @@ TEST_F(InterruptTest, EachSignalEndsWhatDoesNotLookAtIt) {
     EXPECT_EQ(end.exit_code, 1);
     EXPECT_THAT(end.err, EndsWith("thicklens: error: interrupted; nothing was written\n"));
     EXPECT_THAT(folder_.Entries(), IsEmpty());
-    // Not before loops had their time to look.
+    // It does not end before loops have had the time to check.
     EXPECT_GE(end.seconds, kGraceSeconds);
   }
 }
@@ -102,7 +102,7 @@ TEST_F(InterruptTest, ASecondSignalEndsItAtOnce) {
   EXPECT_LT(least_s, kGraceSeconds);
 }
 
-// As `nohup` asks for.
+// This is the behaviour that `nohup` requests.
 TEST_F(InterruptTest, AHangUpThatIsIgnoredAtTheStartStaysIgnored) {
   StoppedProgram::Settings settings{scratch_.path(), "", {SIGHUP}};
   StoppedProgram program(ExplainAtLength({"--json", folder_ / "out.json"}), settings);

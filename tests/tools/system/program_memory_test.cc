@@ -1,4 +1,4 @@
-// Whether the heap is asked for in huge pages, as the kernel tells it.
+// The kernel reports that the heap uses huge pages.
 #include "tools/system/program_memory.h"
 
 #include <gtest/gtest.h>
@@ -23,7 +23,7 @@ namespace {
 
 constexpr std::size_t kMib = std::size_t{1} << 20;
 
-// Of the kernel's list of mappings: the flags of the one that holds the place.
+// The flags of the mapping that contains the address, from the kernel's list.
 std::string FlagsOfMappingAt(const void* place) {
   const auto at = reinterpret_cast<std::uintptr_t>(place);
   std::ifstream file("/proc/self/smaps");
@@ -49,7 +49,7 @@ class ProgramMemory : public ::testing::Test {
     KeepFreedMemory();
   }
 
-  // But for the front of the heap, which was there before.
+  // Expects huge pages except at the front of the heap, which existed before.
   static void ExpectHugePages(std::size_t bytes) {
     const auto piece = std::make_unique<char[]>(bytes);
     for (const std::size_t at : {kMib, bytes / 2, bytes - 1}) {
@@ -60,7 +60,7 @@ class ProgramMemory : public ::testing::Test {
 
 TEST_F(ProgramMemory, IsAskedForInHugePages) {
   ExpectHugePages(48 * kMib);   // of the heap
-  ExpectHugePages(4 * kMib);    // of what is left of it
+  ExpectHugePages(4 * kMib);    // in the rest of the heap
   ExpectHugePages(100 * kMib);  // on its own
 }
 

@@ -1,4 +1,5 @@
-// Nothing is loaded from the current folder, and a closed standard descriptor stays nobody's file.
+// Nothing is loaded from the current folder, and no file gets the number of a closed standard
+// descriptor.
 #include "tools/system/trusted_environment.h"
 
 #include <gmock/gmock.h>
@@ -68,7 +69,7 @@ TEST(TrustedEnvironment, PathsThatAreNotAbsoluteAreLeftOut) {
   EXPECT_EQ(VariableOf("OPENCL_LAYERS"), "libnot-here.so");
 }
 
-// PoCL would take /tmp/pocl, where every user may lay code that it then loads.
+// PoCL would use /tmp/pocl, where every user may place code that it then loads.
 TEST(TrustedEnvironment, CompiledKernelsAreNotSharedWithOtherUsers) {
   const SetVariable home("HOME", nullptr), cache("XDG_CACHE_HOME", nullptr),
       pocl("POCL_CACHE_DIR", nullptr);
@@ -77,7 +78,7 @@ TEST(TrustedEnvironment, CompiledKernelsAreNotSharedWithOtherUsers) {
   EXPECT_THAT(VariableOf("POCL_CACHE_DIR"), ::testing::Not(HasSubstr("/tmp/pocl")));
 }
 
-// A file of a library's name that is none stops the loader wherever it is looked at.
+// A file with the name of a library that is not a library stops the loader wherever it looks at it.
 TEST(TrustedEnvironment, LibrariesOfTheCurrentFolderAreNotLoaded) {
   const TemporaryFolder folder;
   for (const char* name : {"libcsv.so.3", "libfmt.so.9", "libOpenCL.so.1", "libpocl.so.2",
@@ -90,7 +91,7 @@ TEST(TrustedEnvironment, LibrariesOfTheCurrentFolderAreNotLoaded) {
   EXPECT_THAT(run.out, HasSubstr("JPEG"));
 }
 
-// The library of decoders is looked for by this program's search path alone.
+// The library of decoders is searched only by the search path of the program.
 TEST(TrustedEnvironment, DecodersAreNotFoundByARelativeSearchPath) {
   const TemporaryFolder folder;
   folder.Put("thicklens_opencv_codecs.so", "no library");
@@ -123,7 +124,8 @@ INSTANTIATE_TEST_SUITE_P(TrustedEnvironment, ClosedDescriptors,
 
 TEST(TrustedEnvironment, ClosedDescriptorsAreTheNullDevice) {
   const TemporaryFolder folder;
-  // Looked at until it runs: before, the shell's own descriptors are closed.
+  // The process is examined only when the program runs, because before that the shell's descriptors
+  // are closed.
   const std::string command =
       ShellCommand({THICKLENS_PROGRAM, "bench", "solvers", "--size", "2048x2048", "--quiet"}) +
       " <&- >&- 2>&- & for i in 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15; do sleep 0.3; "

@@ -97,7 +97,8 @@ TEST(HeightFieldSceneTest, LevelMapWithAnImageIsThePlaneWithIt) {
     EXPECT_LT(LargestDifference(plane.RenderView({3, -2}, kRun), sheet.RenderView({3, -2}, kRun)),
               1e-4);
   }
-  // What it shows in focus are the image's pixels, but for what its mirrored sides bring in.
+  // The image in focus equals the pixels of the image, except for the effect of its mirrored
+  // sides.
   for (int i = 0; i < 3 * kWidth * kHeight; ++i) {
     const Eigen::Vector2d at(i / 3 % kWidth, i / 3 / kWidth);
     pixels.texture.values[static_cast<std::size_t>(i)] = static_cast<float>(
@@ -148,7 +149,7 @@ TEST(HeightFieldSceneTest, SlantedMapShowsTheSineWhereItsPlaneIsMet) {
       }
     }
   }
-  // The same with all rays of the photograph, with and without occlusion.
+  // The same comparison with all rays of the photograph, with and without occlusion.
   EffectSet on = {Effect::kDefocus, Effect::kPixelBox, Effect::kOcclusion};
   for (int i = 0; i < 2; ++i, on = on.Without({Effect::kOcclusion})) {
     const LinearImage image =
@@ -169,7 +170,7 @@ TEST(HeightFieldSceneTest, SlantedMapShowsTheSineWhereItsPlaneIsMet) {
   }
 }
 
-// Of two surfaces that cross the nearer one is seen, whether they are planes or maps.
+// If two surfaces cross, the nearer one is visible, whether they are planes or maps.
 TEST(HeightFieldSceneTest, MixesWithPlanes) {
   const Camera camera = MacroScene::Camera(kWidth, kHeight, Psf::kGaussian);
   SceneLayer slanted = MacroScene::Uniform(MacroScene::DepthOf(-1), 0.2);
@@ -206,7 +207,7 @@ TEST(HeightFieldSceneTest, MixesWithPlanes) {
   }
 }
 
-// A step of depth, on both of whose sides something else is painted.
+// A step of depth whose two sides are painted differently.
 LayerPixels StepOf(double left_mm, double right_mm) {
   LayerPixels pixels;
   pixels.depth = MapOf([&](int x, int) { return x < kWidth / 2 ? left_mm : right_mm; });
@@ -217,8 +218,9 @@ LayerPixels StepOf(double left_mm, double right_mm) {
   return pixels;
 }
 
-// Far left, near right: near the middle of the image rays from the left of the aperture see more
-// of the near side, as of a plane in front, up to what is stretched between two pixels.
+// The left side is far and the right side near. Near the middle of the image, rays from the left
+// of the aperture meet more of the near side, as for a plane in front, except for the surface that
+// is stretched between two pixels.
 TEST(HeightFieldSceneTest, NearSideOfAStepHidesTheFarOne) {
   const Camera camera = MacroScene::Camera(kWidth, kHeight, Psf::kGaussian);
   const double near_mm = MacroScene::DepthOf(2), far_mm = MacroScene::DepthOf(-2);
@@ -232,8 +234,8 @@ TEST(HeightFieldSceneTest, NearSideOfAStepHidesTheFarOne) {
   const LinearImage right = sheet.RenderView({2 * sigma_mm, 0}, kRun);
   const double edge = (kWidth - 1) / 2.0;
   for (int x = 8; x < kWidth - 8; ++x) {
-    // x = x' - A V: the near side begins at edge + 4 seen from the left, and at edge - 4 from the
-    // right, where it hides the far one, which would end at edge + 4.
+    // x = x' - A V: the near side begins at edge + 4 as seen from the left, and at edge - 4 from
+    // the right, where it hides the far one, which would end at edge + 4.
     if (x > edge + 4.6) {
       EXPECT_GT(left.at(x, 18, 0), 0.8F) << x;
     }
@@ -259,7 +261,7 @@ TEST(HeightFieldSceneTest, DepthIsTheMap) {
                 .RenderDepth()
                 .values,
             pixels.depth.values);
-  // In cm along the chief ray.
+  // The depth is in cm along the chief ray.
   RawDepthMap range = pixels.depth;
   for (int i = 0; i < kWidth * kHeight; ++i) {
     const Eigen::Vector2d slope =
@@ -331,7 +333,7 @@ TEST(HeightFieldSceneTest, WhatAutoLeavesOutIsWithinTheTolerance) {
     EXPECT_LT(255 * LargestDifference(all.RenderNoiseless(kRun), some.RenderNoiseless(kRun)),
               0.5 + 0.15)
         << JoinedNames(left);
-    // Each by itself changes no more than its bound, but for what 600 rays leave open.
+    // Each effect alone changes no more than its bound, except for the sampling error of 600 rays.
     if (seed > 6) continue;
     for (const LargestEffectImpact& finding : all.effects().findings) {
       if (FactsOf(finding.effect).random || finding.effect == Effect::kQuantisation) continue;
@@ -349,7 +351,7 @@ TEST(HeightFieldSceneTest, WhatAutoLeavesOutIsWithinTheTolerance) {
   EXPECT_LT(without_occlusion, 9);
 }
 
-// The set of rays that blocks ask for leaves no more error than is reported.
+// The error of the set of rays that blocks request is not larger than stated.
 TEST(HeightFieldSceneTest, SamplingErrorIsAsStated) {
   for (const unsigned seed : {3U, 4U, 5U, 9U}) {
     LayerPixels pixels;

@@ -17,7 +17,7 @@ constexpr double kScalePx = 12000, kFocusMm = 400;
 
 double DepthOfShift(double shift) { return 1 / (1 / kFocusMm + shift / kScalePx); }
 
-// Of shifts from -1 to 1 px per mm: waves, steps and as much noise as `roughness` says.
+// Depths with shifts from -1 to 1 px per mm: waves, steps and noise in proportion to `roughness`.
 std::vector<float> RandomDepths(unsigned seed, double roughness) {
   RandomDraws draws(seed, RandomDraws::Purpose::kTexture, 0);
   const double x_wave = draws.Uniform() - 0.5, y_wave = draws.Uniform() - 0.5;
@@ -76,7 +76,8 @@ TEST(HeightFieldTest, HoldsTheShiftsOfItsDepths) {
   }
 }
 
-// Against a march along the ray in steps of a thousandth of a px, in both directions.
+// The result is compared with a march along the ray in steps of a thousandth of a px, in both
+// directions.
 TEST(HeightFieldTest, RaysMeetWhatAMarchMeets) {
   int rays = 0, missed_by_march = 0, several = 0;
   for (unsigned seed = 1; seed <= 12; ++seed) {
@@ -92,7 +93,7 @@ TEST(HeightFieldTest, RaysMeetWhatAMarchMeets) {
         return BilinearShift(depths, at.x(), at.y()) - shift;
       };
       const double step = 1e-3 / std::max(ray.aperture_mm.norm(), 1e-3);
-      // Every root lies within the bounds.
+      // Every root is within the bounds.
       int roots = 0;
       double first = -2, last = 2;
       for (double shift = 2; shift > -2; shift -= step) {
@@ -114,7 +115,7 @@ TEST(HeightFieldTest, RaysMeetWhatAMarchMeets) {
       EXPECT_GE(nearest, first - step - 1e-9);
       EXPECT_LE(farthest, last + step + 1e-9);
       if (nearest > first + 1e-9 || farthest < last - 1e-9) ++missed_by_march;
-      // From a shift between, the next root in the direction of the crossing.
+      // From a shift between two roots, the next root in the direction of the crossing is found.
       const double middle = field.ShiftAt(ray.position_px);
       const ValueRange wide = {-2, 2};
       const double near_middle =
@@ -163,7 +164,7 @@ TEST(HeightFieldTest, SlopesAndBendsAreBounded) {
   }
 }
 
-// What lies beyond the last pixels continues as there, as far as a ray may go.
+// The surface beyond the last pixels continues with their depth, as far as a ray may go.
 TEST(HeightFieldTest, BeyondTheMapItIsAsAtItsEnd) {
   std::vector<float> depths(kWidth * kHeight, static_cast<float>(DepthOfShift(0.5)));
   for (int y = 0; y < kHeight; ++y) {

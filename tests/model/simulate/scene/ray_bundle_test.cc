@@ -59,7 +59,7 @@ class RayBundleTest : public ::testing::Test {
     }
   }
 
-  // The ray of the bundle, without it.
+  // The ray of the bundle, computed without the bundle.
   SceneRay RayOf(const Eigen::Vector2d& centre_px, std::size_t ray) const {
     return geometry_.RayAt(centre_px + offsets_px_[ray], apertures_mm_[ray]);
   }
@@ -127,7 +127,7 @@ TEST_F(RayBundleTest, ShowsWhatEachRayAndTheMiddleOfTheApertureShow) {
       }
     }
   }
-  // What lies within 1e-4 px of an edge may be on its other side.
+  // A ray within 1e-4 px of an edge may be on either side.
   EXPECT_LE(unlike, rays / 5000);
   EXPECT_GT(others, rays / 200);
   EXPECT_GT(*std::min_element(seen.begin(), seen.end()), rays / 50);

@@ -1,4 +1,5 @@
-// Effects of simulated images: what is left out matters no more than its bound says.
+// Effects of simulated images: leaving an effect out changes the image by no more than its
+// bound.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -60,8 +61,8 @@ SceneSimulationOptions RandomScene(unsigned seed) {
                                  TextureKind::kCheckerboard, TextureKind::kEdge,
                                  TextureKind::kSiemensStar};
     layer.texture.kind = kinds[pick(7)];
-    // Where a slant is stretched toward its horizon, a sine may have no period to show; every ray
-    // must meet the plane.
+    // A slant that is stretched toward its horizon may leave a sine without a visible period. Every
+    // ray must meet the plane.
     if (pick(3) == 0 && layer.texture.kind != TextureKind::kSine) {
       const double steepest =
           std::min(pick(4) == 0 ? 5 : 0.5, 0.2 * camera.focal_scale_px() / 1800);
@@ -108,10 +109,11 @@ double LargestChange(const LinearImage& a, const LinearImage& b, const SceneSimu
 }
 
 const SceneRun kRun{1, {}};
-// What many rays leave open, grey levels.
+// Sampling error of many rays, grey levels.
 constexpr double kSampling = 0.15;
 
-// The same with many times as many rays: a few more or less on one side of an edge do not count.
+// The change with many times as many rays, so that a few rays more or less on one side of an edge
+// do not count.
 double CarefulChange(SceneSimulationOptions a, SceneSimulationOptions b) {
   a.rays_per_pixel *= 20;
   b.rays_per_pixel = a.rays_per_pixel;
@@ -127,7 +129,7 @@ void BoundsHold(unsigned first_seed, int scenes) {
     SceneSimulationOptions options = RandomScene(seed);
     SCOPED_TRACE(seed);
     options.effects.base = EffectSelectionOptions::Base::kAll;
-    // What the user leaves out changes what the rest matters.
+    // Effects that the user leaves out change the impact of the others.
     const std::vector<Effect> effects = ImageEffects().Effects();
     if (seed % 2 == 0) options.effects.without = {effects[seed / 2 % effects.size()]};
     const SceneSimulator all(options, {});
@@ -178,8 +180,8 @@ class SceneEffectsSlowTest : public ::testing::TestWithParam<unsigned> {};
 TEST_P(SceneEffectsSlowTest, BoundsHoldOverManyScenes) { BoundsHold(1000 * GetParam(), 50); }
 INSTANTIATE_TEST_SUITE_P(Tenths, SceneEffectsSlowTest, ::testing::Range(1U, 11U));
 
-// Against many times as many rays: rms of the encoded values. A law of what is usual; of two
-// hundred scenes five pass it, by up to 1.6.
+// The result is compared with many times as many rays: rms of the encoded values. The law describes
+// usual scenes; five of two hundred scenes exceed it, by up to a factor of 1.6.
 TEST(SceneEffectsTest, SamplingErrorIsWithinWhatIsStated) {
   double worst = 0;
   for (unsigned seed = 40; seed < 60; ++seed) {
@@ -239,7 +241,7 @@ TEST(SceneEffectsTest, ViewsKeepWhatOnlyThePhotographDoesNotNeed) {
   EXPECT_TRUE(SceneSimulator(options, {}).effects_of_views().empty());
 }
 
-// Of flat images as they are stored, each noise alone.
+// Each noise alone is measured in flat images as they are stored.
 TEST(SceneEffectsTest, NoiseHasTheStandardDeviationOfItsBound) {
   for (const TransferCurve& curve :
        {TransferCurve::Linear(), TransferCurve::Srgb(), TransferCurve::Gamma(2.2)}) {
@@ -273,7 +275,7 @@ TEST(SceneEffectsTest, NoiseHasTheStandardDeviationOfItsBound) {
   }
 }
 
-// What is left out takes its part of the work with it, and what is stored follows.
+// An effect that is left out takes no time, and the encoded values change accordingly.
 TEST(SceneEffectsTest, EffectsCanBeLeftOutOneByOne) {
   SceneSimulationOptions options = RandomScene(3);
   options.bits = 8;

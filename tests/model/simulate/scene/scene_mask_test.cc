@@ -73,7 +73,8 @@ TEST(ImageBoundsTest, HoldWhatIsInTheRegionAndNotMuchMore) {
       const double size = std::pow(40, draws.Uniform()) - 1;
       region.high_px = region.low_px + size * Eigen::Vector2d(draws.Uniform(), draws.Uniform());
       const ValueRange found = bounds.Over(region);
-      // Within what pixels a third of the region farther away have, of blocks of 4 px.
+      // The bounds must lie within the values of a larger region. Its margin allows for the blocks
+      // of 4 px.
       const double margin = 5 + size / 2 + 4;
       ValueRange widest = {std::numeric_limits<double>::infinity(),
                            -std::numeric_limits<double>::infinity()};
@@ -204,8 +205,9 @@ SceneSimulationOptions CardScene(const Eigen::Vector2d& slope) {
   return options;
 }
 
-// Half of the values between the outermost pixels inside and the next: straight borders; but a
-// corner of a bilinear contour is cut off, and what rays near it show is not compared.
+// The mask has half of its value between the outermost pixels inside and the next ones, so that the
+// borders are straight. A corner of a bilinear contour is cut off, and pixels near it are not
+// compared.
 TEST(SceneMaskTest, RectangleAsAMaskGivesTheImageOfTheOutline) {
   for (const Eigen::Vector2d& slope : {Eigen::Vector2d(0, 0), Eigen::Vector2d(-0.4, 0.3)}) {
     for (const bool occlusion : {true, false}) {

@@ -1,5 +1,5 @@
-// Simulated images against what can be written down without a simulator: transfer functions,
-// areas of apertures behind an edge, the light of a scene.
+// Simulated images are compared with formulas that need no simulator: transfer functions, areas
+// of apertures behind an edge, the light of a scene.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -41,9 +41,10 @@ Misfit MisfitOf(const LinearImage& image, const Light& light) {
   return misfit;
 }
 
-// The sampler is a quadrature whose error against the transfer function falls with the rays, and
-// stays within what is stated of it. With the most rays that there may be it is a
-// hundred-thousandth: what must be exact to a millionth is tested on views and on frames of sweeps.
+// The sampler is a quadrature. Its error relative to the transfer function decreases with the
+// number of rays and stays within the stated error. With the largest number of rays it is a
+// hundred-thousandth. Values that must be exact to a millionth are tested on views and on frames of
+// sweeps.
 TEST(SceneOraclesTest, SinesComeCloserToTheTransferFunctionAsTheLawOfTheSamplingSays) {
   constexpr double kPeriodPx = 9, kAngleDeg = 33, kSigmaPx = 2;
   const Eigen::Vector2d f = MacroScene::Direction(kAngleDeg) / kPeriodPx;
@@ -115,9 +116,9 @@ TEST(SceneOraclesTest, EdgesSpreadAsTheSharesOfTheirBlurSay) {
   }
 }
 
-// A half-plane out of focus before a sine in focus, whose points a pixel's rays all meet: what the
-// pixel sees of it is the share of the aperture that is not behind the edge, a circular segment of
-// the disc. The edge, a disc of huge radius, stands askew and off every symmetry of the rays.
+// A half-plane out of focus before a sine in focus, where all rays of a pixel meet in one point.
+// The pixel receives the share of the aperture that is not behind the edge, a circular segment of
+// the disc. The edge, a disc of huge radius, is oblique and off every symmetry of the rays.
 TEST(SceneOraclesTest, AnOccludersEdgeHidesItsShareOfTheAperture) {
   constexpr double kFarPx = 1e7, kEdgeAtPx = 0.37, kLight = 0.9;
   for (const Psf psf : {Psf::kGaussian, Psf::kDisc}) {

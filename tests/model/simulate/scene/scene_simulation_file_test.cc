@@ -193,7 +193,7 @@ TEST_F(SceneSimulationFileTest, TruthReplacesWhatItNamesInTheCalibration) {
   EXPECT_EQ(replaced.camera.calibration->blur_floor_px->value, 0.7);
   EXPECT_EQ(replaced.camera.calibration->evidence.method, "simulated");
   EXPECT_TRUE(replaced.camera.calibration->covariance_order.empty());
-  // What `simulate image` writes can be read.
+  // The output of `simulate image` can be read.
   const Camera again = ParseCamera(CameraToYaml(replaced.camera), "camera.yaml");
   EXPECT_EQ(again.blur_ratio(), 0.5);
 }

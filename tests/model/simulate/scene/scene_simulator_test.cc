@@ -109,7 +109,7 @@ double LargestDifference(const LinearImage& a, const LinearImage& b) {
 
 TEST(SceneSimulatorTest, UniformSceneGivesAUniformImage) {
   for (const Psf psf : {Psf::kGaussian, Psf::kDisc}) {
-    // In front and behind look alike where both have the same light.
+    // Points in front of focus and behind it look alike if both have the same light.
     const SceneSimulator simulator(
         SceneOf(MacroScene::Camera(20, 16, psf, 0.5),
                 {MacroScene::Uniform(310, 0.4),
@@ -218,8 +218,8 @@ TEST(SceneSimulatorTest, SixHundredRaysAreEnough) {
 
 TEST(SceneSimulatorTest, EdgeIsAsWideAsTheBlurOfTheNearerLayer) {
   const double near_mm = DepthOfShift(2.5);
-  // Right half: x > 20.3 in the image. Bright in front of dark, then the other way round in
-  // depth: a blurred background does not soften the edge of what is in focus.
+  // The right half is x > 20.3 in the image. It is bright in front of dark, then behind it: a
+  // blurred background does not soften the edge of an object in focus.
   for (const bool focused : {false, true}) {
     const double front_mm = focused ? kFocusMm : near_mm;
     const double back_mm = focused ? 306 : kFocusMm;
@@ -249,7 +249,7 @@ TEST(SceneSimulatorTest, ViewsOfAFrontoParallelPlaneAreDisplacedByTheDisparity) 
     const Eigen::Vector2d f = Eigen::Vector2d(std::cos(kPi / 6), std::sin(kPi / 6)) / 16;
     for (int l = 0; l < 3; ++l) {
       for (int k = 0; k < 4; ++k) {
-        // View (a, b) at x shows what the centre view shows at x + (a, b) d.
+        // View (a, b) shows at x the point of the centre view at x + (a, b) d.
         const Eigen::Vector2d shift_px =
             ShiftPxPerMm(depth_mm) *
             Eigen::Vector2d((k - 1.5) * grid.u_step_mm, (l - 1.0) * grid.v_step_mm);
@@ -282,8 +282,8 @@ TEST(SceneSimulatorTest, WholeShiftsRepeatTheCentreViewOfATexture) {
   EXPECT_GT(change / (22 * 27), 0.02);
 }
 
-// A lamp in the gloss of a plane in focus moves as what stands at the depth of its mirror image, is
-// blurred as that, and is seen in the layer alone.
+// A lamp that is reflected by the gloss of a plane in focus moves and is blurred like an object at
+// the depth of its mirror image, and is visible in that layer only.
 TEST(SceneSimulatorTest, GlossShowsItsLampAtTheDepthOfTheMirrorImage) {
   const double image_depth_mm = DepthOfShift(-1.5);
   SceneLayer glossy = WithRectangle(MacroScene::Uniform(kFocusMm, 0.25), 19.5, 19.5, 34, 34);
@@ -448,8 +448,8 @@ TEST(SceneSimulatorTest, DiscAndMillimetresDescribeTheSamePart) {
   EXPECT_NEAR(y_sum / area, 15.6 + 0.9 * ShiftPxPerMm(depth_mm), 0.01);
 }
 
-// What the aperture adds up: the photograph is the mean of the views over it. Occlusions, a slant
-// and the lens floor included.
+// The photograph is the mean of the views over the aperture. This includes occlusions, a slant and
+// the lens floor.
 TEST(SceneSimulatorTest, PhotographIsTheMeanOfItsViews) {
   SceneLayer back = Leaves(304, 2);
   back.plane.slope = {1, -2};

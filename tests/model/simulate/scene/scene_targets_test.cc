@@ -19,7 +19,7 @@ using thicklens::testing::ErrorOf;
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kPixelMm = 0.02;
 
-// What is seen: a square, its middle off the axis.
+// The visible region is a square whose middle is off the axis.
 TextureRequest SquareRequest(double side_px, double largest_px_of_layer = 1) {
   TextureRequest request;
   request.pixel_mm = kPixelMm;
@@ -57,7 +57,7 @@ TEST(SceneTargetsTest, EdgeIsTheSumOfAGaussianAcrossALineThroughTheMiddle) {
     for (const double along_px : {-20.0, 0.0, 7.0}) {
       const Eigen::Array3d light = LightAt(texture, std::hypot(across_px, along_px),
                                            95 + std::atan2(along_px, across_px) * 180 / kPi);
-      // What a normal distribution has below it, from dark to bright.
+      // The cumulative normal distribution, from dark to bright.
       const double below = std::erfc(-across_px / (1.7 * std::sqrt(2.0))) / 2;
       const Eigen::Array3d expected = options.colour.array() * (0.2 + 1.6 * below);
       EXPECT_LT((light - expected).abs().maxCoeff(), 1e-6) << across_px << " " << along_px;
@@ -95,7 +95,7 @@ TEST(SceneTargetsTest, StarHasItsSectorsAroundTheMiddleAndIsGreyWhereTheyAreTooF
           << sector << " " << radius_px;
       EXPECT_NEAR(LightAt(texture, radius_px, sector * 15)(1), 0.5, 0.01) << sector;
     }
-    // Half a cycle per px is reached where 24 sectors go round 24 px.
+    // The frequency is half a cycle per px where 24 sectors cover a circle of 24 px.
     EXPECT_NEAR(LightAt(texture, 2.5, middle_deg)(1), 0.5, 0.01);
   }
   // Twelve times round at a quarter of a cycle per px much is left; within the limit, 3.8 px,

@@ -84,7 +84,7 @@ TEST(SceneTextureTest, HasItsColourForItsMeanAndRepeats) {
       mean += light.head<3>().cast<double>() / (120 * 120);
       least = std::min(least, static_cast<double>(light(0)));
       most = std::max(most, static_cast<double>(light(0)));
-      // Without saturation the channels differ by their colour alone.
+      // Without saturation the channels differ by their colour only.
       EXPECT_NEAR(light(0) / 0.6f, light(1) / 0.3f, 2e-3f);
       EXPECT_NEAR(light(0) / 0.6f, light(2) / 0.1f, 2e-3f);
       EXPECT_TRUE(texture.At(1e9 + i, -1e9).isFinite().all());

@@ -28,7 +28,7 @@ cv::Mat RandomSamples(int rows, int columns) {
   return samples;
 }
 
-// Of a Gaussian, at the square of a frequency.
+// Transfer of a Gaussian at the square of a frequency.
 double GaussianOracle(double sigma, double f_square) {
   return std::exp(-2 * kPi * kPi * sigma * sigma * f_square);
 }

@@ -22,7 +22,7 @@ PupilOptics With(Psf psf) {
   return optics;
 }
 
-// A wave keeps its phase and loses the contrast that the transfer function says.
+// A wave keeps its phase, and its contrast is multiplied by the transfer function.
 TEST(PupilLawBlur, WavesHaveTheContrastOfTheProfile) {
   constexpr int kSize = 64;
   for (const Psf psf : {Psf::kGaussian, Psf::kDisc}) {

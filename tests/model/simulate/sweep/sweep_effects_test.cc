@@ -85,13 +85,13 @@ TEST(SweepEffectsTest, EachIsSwitchedAlone) {
     if (of_light.Has(effect)) {
       EXPECT_GT(change, 1e-5);
     } else {
-      EXPECT_EQ(change, 0);  // those of what is stored
+      EXPECT_EQ(change, 0);  // differences of the encoded values
     }
   }
 }
 
-// A frame in the plane of focus shows the same of the target without the effects that would widen
-// what frames see of it.
+// A frame in the plane of focus shows the same part of the target, also without the effects that
+// would increase the part of the target that frames need.
 TEST(SweepEffectsTest, TheTargetStaysTheSameWithoutThem) {
   SweepSimulationOptions options = With({Effect::kPixelBox, Effect::kMagnification,
                                          Effect::kDefocus, Effect::kLensFloor, Effect::kDrift});
@@ -106,7 +106,7 @@ TEST(SweepEffectsTest, TheTargetStaysTheSameWithoutThem) {
   }
 }
 
-// What is read adds to the electrons that came, and does not change how many did.
+// Read noise is added to the electrons and does not change their number.
 TEST(SweepEffectsTest, EachNoiseHasDrawsOfItsOwn) {
   SweepSimulationOptions options = With({Effect::kShotNoise, Effect::kReadNoise});
   options.bits = 16;
@@ -129,7 +129,7 @@ TEST(SweepEffectsTest, EachNoiseHasDrawsOfItsOwn) {
               : options.read_noise_electrons / options.full_well_electrons;
       squares += std::pow((both.values[i] - one.values[i]) / 65535.0 / other_sd, 2);
     }
-    // 19200 pixels: a standard error of .5 %.
+    // 19200 pixels give a standard error of 0.5 %.
     EXPECT_NEAR(std::sqrt(squares / static_cast<double>(both.values.size())), 1, 0.02);
   }
 }
@@ -162,7 +162,7 @@ TEST(SweepEffectsTest, FalloffIsThatOfTheChiefRayOfAPinhole) {
   }
 }
 
-// Of the whole aperture: a mean over rays, drawn.
+// The fall-off of the whole aperture is compared with a mean over random rays.
 TEST(SweepEffectsTest, FalloffOfTheApertureIsTheMeanOfItsRays) {
   SweepSimulationOptions options = With({Effect::kDefocus, Effect::kApertureShape,
                                          Effect::kPixelBox, Effect::kThickness, Effect::kFalloff});
@@ -185,7 +185,7 @@ TEST(SweepEffectsTest, FalloffOfTheApertureIsTheMeanOfItsRays) {
         const Eigen::Vector2d unit((2 * i + 1.0) / kSide - 1, (2 * j + 1.0) / kSide - 1);
         if (unit.norm() > 1) continue;
         const Eigen::Vector2d at_mm = radius_mm * unit;
-        // From the point of the plane of focus at -X to the aperture.
+        // The ray goes from the point of the plane of focus at -X to the aperture.
         const Eigen::Vector2d focus_mm = landing_mm * kFocusMm / scale_mm;
         const double front = (focus_mm - at_mm).norm() / kFocusMm;
         const double behind = (landing_mm + at_mm).norm() / camera.image_distance_mm();
@@ -244,13 +244,13 @@ TEST(SweepEffectsTest, AutoHasAll) {
   options.effects.without = {Effect::kDrift};
   const SweepSimulator simulator(options, {});
   EXPECT_EQ(simulator.effects().on, SweepEffects().Without({Effect::kDrift}));
-  // The record names what was left out, and how much it would have changed at most.
+  // The record names the effects that were left out, and how much they would have changed at most.
   EXPECT_THAT(simulator.truth().effects.left_out_grey_levels,
               ElementsAre(Pair(EffectName(Effect::kDrift), Gt(1))));
 }
 
-// A point's rays, drawn and weighted one by one by [S12], against an edge at f/1.4: how wide the
-// blur is, where it lies and how bright it is, beside the axis and on it.
+// The rays of a point are drawn and weighted one by one by [S12], and compared with an edge at
+// f/1.4: the width of the blur, its position and its brightness, off the axis and on it.
 TEST(SweepEffectsTest, FalloffWeightsTheRaysOfABlurredEdge) {
   for (const Psf psf : {Psf::kGaussian, Psf::kDisc}) {
     for (const double depth_mm : {240.0, 400.0}) {

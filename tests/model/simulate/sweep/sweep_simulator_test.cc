@@ -124,7 +124,8 @@ TEST(SweepSimulatorTest, EdgeHasItsTwoGreysSlantAndPlace) {
   EXPECT_NEAR(image.at(0, 40, 0), 0.2, 1e-6);
   EXPECT_NEAR(image.at(100, 40, 0), 0.6, 1e-6);
   EXPECT_NEAR(image.at(50, 40, 0), 0.4, 1e-6);
-  // 10 degrees from the vertical: 30 rows up it stands 30 tan 10 px = 5.29 px further right.
+  // The edge is 10 degrees from the vertical, so 30 rows up it is 30 tan 10 px = 5.29 px further
+  // right.
   EXPECT_LT(image.at(55, 10, 0), 0.4);
   EXPECT_GT(image.at(56, 10, 0), 0.4);
   EXPECT_LT(image.at(44, 70, 0), 0.4);
@@ -379,7 +380,7 @@ TEST(SweepSimulatorTest, DriftHasItsDeviationOnBothAxesAndScalesWithTheImage) {
   for (std::size_t i = 0; i < right.size(); ++i) product += right[i] * down[i] / 800;
   EXPECT_NEAR(product, 0, 4.5 * 2.25 / std::sqrt(800.0));
 
-  // The same displacement on the target looks smaller from farther.
+  // The same displacement on the target appears smaller from a larger distance.
   SweepSimulationOptions options = StillOptions(301, 3, 330);
   options.target.kind = TargetKind::kKnifeEdge;
   options.target.edge_angle_deg = 0;

@@ -52,8 +52,8 @@ TEST(SweepTargetTest, EveryTextureHasTheMeanOneAndNoNegativeLight) {
 
 TEST(SweepTargetTest, DeadLeavesHaveEveryGreyOfTheContrast) {
   const TargetTile tile = Tile(TargetKind::kDeadLeaves, 0.6, 0);
-  // Uniform greys in [0.4, 1.6]: standard deviation 1.2/sqrt(12); the count of leaves is large but
-  // the large ones weigh most.
+  // Uniform greys in [0.4, 1.6] have the standard deviation 1.2/sqrt(12). The number of leaves is
+  // large, but the large ones dominate.
   cv::Scalar mean, deviation;
   cv::meanStdDev(tile.samples, mean, deviation);
   EXPECT_NEAR(deviation[0], 1.2 / std::sqrt(12.0), 0.05);

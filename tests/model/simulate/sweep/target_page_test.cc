@@ -76,8 +76,8 @@ TEST(LayOutTarget, KeepsEverythingOnTheSheetAndApart) {
   }
 }
 
-// At 512 px over the field the edge has what an edge meter needs: 60 px of length, 30 px of
-// plateau.
+// At 512 px over the field the edge is large enough for an edge estimator: 60 px of length, 30 px
+// of plateau.
 TEST(LayOutTarget, MakesTheEdgeLargeEnoughToBeMeasured) {
   for (const CameraView& view :
        {MadeUpView(512, 512, 0.25), MadeUpView(512, 384, 0.25), MadeUpView(384, 512, 0.25)}) {
@@ -157,8 +157,8 @@ TEST(LayOutTarget, FeaturesThatDoNotSuitTheCameraAreReported) {
   EXPECT_THAT(LayOutTarget(request).choice, HasSubstr("4.0 px of the image at 1000 mm)"));
 }
 
-// In focus m = f1/(zf - f1), whatever f2 and the thickness; the distance that a refusal names is
-// one that is accepted.
+// In focus m = f1/(zf - f1), whatever f2 and the thickness are. The distance that a refusal names
+// is one that is accepted.
 TEST(ViewOfTarget, IsWhatAThickLensSeesInFocus) {
   Camera camera;
   camera.lens = {50, 52, 4, 10};

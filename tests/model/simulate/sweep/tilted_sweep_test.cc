@@ -46,7 +46,8 @@ double Largest(const LinearImage& a, const LinearImage& b) {
   return largest;
 }
 
-// Where a ray through the middle of the aperture meets the plane, by stepping along it.
+// The point at which a ray through the middle of the aperture meets the plane is found by stepping
+// along the ray.
 TEST(TiltedTargetTest, IsWhereChiefRaysMeetThePlane) {
   const double tilt_rad = 0.4, depth_mm = 200, scale_px = 900;
   const TiltedTarget target(tilt_rad, depth_mm, scale_px);
@@ -93,8 +94,8 @@ TEST(TiltedSweepTest, ATiltOfNothingIsNone) {
   }
 }
 
-// The scene simulator traces rays and knows planes of any slope. It paints by X and Y, the sweep by
-// the distance along the target.
+// The scene simulator traces rays and supports planes of any slope. It paints by X and Y, the sweep
+// by the distance along the target.
 TEST(TiltedSweepTest, ShowsAnEdgeAsRaysDo) {
   for (const double tilt_deg : {25.0, -40.0}) {
     for (const double edge_deg : {8.0, 55.0}) {
@@ -133,8 +134,8 @@ TEST(TiltedSweepTest, ShowsAnEdgeAsRaysDo) {
       scene.layers = {plane, behind};
       const LinearImage rays = SceneSimulator(scene, {}).RenderNoiseless({2, {}});
 
-      // The depth that changes within a pixel's blur is left out by the sweep, and what 3000 rays
-      // leave by the scene.
+      // The sweep neglects the change of depth within the blur of a pixel, and the scene has the
+      // sampling error of 3000 rays.
       double largest = 0, squares = 0;
       for (std::size_t i = 0; i < found.values.size(); ++i) {
         const double error = static_cast<double>(found.values[i] - rays.values[3 * i]);
@@ -143,7 +144,7 @@ TEST(TiltedSweepTest, ShowsAnEdgeAsRaysDo) {
       }
       EXPECT_LT(largest, 0.004);
       EXPECT_LT(std::sqrt(squares / static_cast<double>(found.values.size())), 6e-4);
-      // Without tilt it is another image.
+      // Without tilt the image is different.
       sweep.effects.without.Add(Effect::kTilt);
       EXPECT_GT(Largest(SweepSimulator(sweep, {}).RenderNoiseless(0), found), 0.02);
     }
@@ -165,7 +166,7 @@ TEST(TiltedSweepTest, TheLampIsNearerToTheNearSide) {
   }
 }
 
-// What is told of each effect's impact holds of every frame, whatever the tilt.
+// The stated impact of each effect holds for every frame, whatever the tilt is.
 TEST(TiltedSweepTest, EffectsKeepToTheirBounds) {
   for (const double tilt_deg : {0.0, 5.0, -30.0}) {
     for (const double first_mm : {290.0, 330.0}) {
@@ -175,7 +176,7 @@ TEST(TiltedSweepTest, EffectsKeepToTheirBounds) {
       const EffectSet all = {Effect::kDefocus,     Effect::kApertureShape, Effect::kFalloff,
                              Effect::kPixelBox,    Effect::kLensFloor,     Effect::kMagnification,
                              Effect::kLampFalloff, Effect::kTilt};
-      // Without blur the geometry is all that is left.
+      // Without blur only the geometry is left.
       for (const EffectSet& given : {all, all.Without({Effect::kDefocus, Effect::kApertureShape}),
                                      EffectSet{Effect::kMagnification, Effect::kTilt}}) {
         options.effects.given = given;

@@ -20,13 +20,13 @@ using thicklens::testing::ShareBelow;
 
 constexpr double kPi = 3.14159265358979323846;
 
-// Of an edge that blur of both kinds has softened, x behind it.
+// The light at x behind an edge that blurs of both kinds have softened.
 double SoftEdge(Psf psf, double x, double defocus_px, double gaussian_px) {
   if (psf == Psf::kGaussian) return GaussianShare(x, std::hypot(defocus_px, gaussian_px));
   if (!(gaussian_px > 0) || !(defocus_px > 0)) {
     return ShareBelow(defocus_px > 0 ? psf : Psf::kGaussian, x, std::max(defocus_px, gaussian_px));
   }
-  // Over the disc's chords: x = R sin(phi) has the weight 2/pi cos^2(phi).
+  // The integral is over the chords of the disc: x = R sin(phi) has the weight 2/pi cos^2(phi).
   double sum = 0;
   constexpr int kSteps = 96;
   for (int i = 0; i < kSteps; ++i) {
@@ -59,7 +59,7 @@ TEST(TransferOraclesTest, FramesOfAnEdgeAreExactToAMillionth) {
         for (int y = 0; y < 9; y += 4) {
           for (int x = 0; x < 49; ++x) {
             const double across_px = direction.dot(Eigen::Vector2d(x, y) - edge_px);
-            // Where only the pixel softens an edge of a disc, its ends have kinks.
+            // If only the pixel softens the edge of a disc, its ends have kinks.
             const double share = MeanOverPixel(
                 [&](double dy) {
                   return MeanOverPixel(
