@@ -41,7 +41,7 @@ namespace {
 // A folder with this file was written by this program, which may replace it.
 constexpr char kImageMarker[] = "truth.yaml";
 
-const std::string kSimulate = "simulate ";
+constexpr char kSimulate[] = "simulate ";
 constexpr char kImageCommand[] = "image";
 
 struct SceneOptions {
@@ -282,7 +282,7 @@ void AddSimulateSceneCommands(CLI::App* simulate, CommandAction* action) {
   const std::string now = kImageCommand;
   AddImageCommand(simulate, now, action);
   for (const std::string& former : FormerNames(NameKind::kCommand, kSimulate + now)) {
-    AddImageCommand(simulate, former.substr(kSimulate.size()), action);
+    AddImageCommand(simulate, former.substr(std::string(kSimulate).size()), action);
   }
 
   const auto views = std::make_shared<SceneOptions>();

@@ -127,9 +127,9 @@ TEST_P(DeprecatedOnCommandLine, IsNotInTheHelp) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, DeprecatedOnCommandLine, ::testing::ValuesIn(NamesOfCommandLine()),
-                         [](const auto& info) {
+                         [](const auto& tested) {
                            std::string name;
-                           for (const char letter : info.param) {
+                           for (const char letter : tested.param) {
                              if (letter >= 'a' && letter <= 'z') name += letter;
                            }
                            return name;

@@ -11,7 +11,6 @@
 
 #include "support/error_message.h"
 #include "support/temporary_folder.h"
-#include "thicklens/base/input_file.h"
 #include "tools/report/estimate_records.h"
 #include "tools/stress/stress_case.h"
 #include "tools/stress/stress_suite.h"
@@ -48,7 +47,7 @@ std::string OnOneLine(const std::string& text) {
 }
 
 std::string SectionOf(const std::string& file, const std::string& heading) {
-  const std::string text = ReadWholeFile(std::string(THICKLENS_SOURCE_DIR) + "/" + file);
+  const std::string text = ContentOf(std::string(THICKLENS_SOURCE_DIR) + "/" + file);
   const std::size_t begin = text.find("\n" + heading + "\n");
   if (begin == std::string::npos) return "";
   return text.substr(begin, text.find("\n#", begin + heading.size()) - begin);
