@@ -39,9 +39,9 @@ std::string WritePhoto(const std::string& name, const Exiv2::ExifData& exif) {
   model::EncodedImage image{32, 24, 1, 8, {}};
   image.values.assign(32 * 24, 128);
   WriteFileAtomically(path, io::EncodePng(image));
-  const auto image = Exiv2::ImageFactory::open(path);
-  image->setExifData(exif);
-  image->writeMetadata();
+  const auto file = Exiv2::ImageFactory::open(path);
+  file->setExifData(exif);
+  file->writeMetadata();
   return path;
 }
 

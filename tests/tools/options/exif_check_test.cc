@@ -189,12 +189,12 @@ class EstimateExifTest : public ::testing::Test {
     cv::randu(image, 60, 200);
     cv::imencode(fs::path(name).extension().string(), image, bytes);
     const std::string path = folder_.Put(name, {bytes.begin(), bytes.end()});
-    const auto image = Exiv2::ImageFactory::open(path);
-    image->readMetadata();
-    Exiv2::ExifData all = image->exifData();  // the tags that make a TIFF file
+    const auto file = Exiv2::ImageFactory::open(path);
+    file->readMetadata();
+    Exiv2::ExifData all = file->exifData();  // the tags that make a TIFF file
     for (const auto& entry : exif) all[entry.key()] = entry.value();
-    image->setExifData(all);
-    image->writeMetadata();
+    file->setExifData(all);
+    file->writeMetadata();
     return path;
   }
   ProgramResult Estimate(const std::string& photo, const Arguments& more = {}) const {
