@@ -227,7 +227,7 @@ TEST(Profile, IsRefusedByNameOfFileAndField) {
     changed[json::json_pointer(pointer)] = value;
     return refusal(changed);
   };
-  EXPECT_THAT(refusal("text"), HasSubstr("profile.json: is no JSON object"));
+  EXPECT_THAT(refusal("text"), HasSubstr("profile.json: is not a JSON object"));
   EXPECT_THAT(with("/schema", "other"), HasSubstr("schema: 'thicklens/estimate-profile/5'"));
   EXPECT_THAT(with("/threads", 0), HasSubstr("threads: a whole number from 1 to"));
   EXPECT_THAT(with("/threads", 10'000'000'000), HasSubstr("threads: a whole number from 1 to"));

@@ -818,7 +818,7 @@ TEST_F(ReportProgram, RefusesFilesThatDoNotFit) {
     ExpectRefused(
         {estimate, "--comparison",
          folder_.Put("c.json", fmt::format("{{{}, \"mean\": {{\"psnr_db\": 30}}}}", area))},
-        {"c.json: it compares", "3x3 of 40x24 px"});
+        {"c.json: it compares", "3x3 views of 40x24 px"});
   }
 }
 
