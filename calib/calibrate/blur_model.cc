@@ -15,7 +15,7 @@ bool HasBlur(const FrameMeasurement& frame) { return frame.blur_sigma_error_px >
 
 namespace {
 
-// Whether a sensor there sees a focus at all.
+// Returns whether a sensor at this distance can have an object in focus.
 bool IsImageDistance(const FocusSweep& sweep, double image_distance_mm) {
   const model::ThickLens& lens = sweep.camera.lens;
   return image_distance_mm - lens.lens_thickness_mm >= lens.rear_focal_length_mm;
@@ -81,9 +81,9 @@ double BlurModel::SlopePxPerMm(double depth_mm) const {
          sweep_->camera.sensor.pixel_pitch_mm / sigma_px;
 }
 
-// Derivatives of sigma, besides that along z, through which the offset acts (derived here, [D88]):
-// by kappa kappa q^2/sigma, by the floor floor/sigma, by d1 kappa^2 q dq/dD / sigma with dc/dD =
-// (f1 - z)/(f2 z).
+// Derivatives of sigma, in addition to the one along z, through which the offset acts (derived
+// here, [D88]): kappa q^2/sigma by kappa, floor/sigma by the floor, and kappa^2 q dq/dD / sigma by
+// d1, with dc/dD = (f1 - z)/(f2 z).
 std::optional<double> BlurModel::SigmaErrorPx(double depth_mm) const {
   const double sigma_px = SigmaPx(depth_mm);
   if (!covariance_ || !(sigma_px > 0)) return std::nullopt;
@@ -144,8 +144,8 @@ double BlurModel::SignedDefocusPx(double depth_mm) const {
          sweep_->camera.sensor.pixel_pitch_mm;
 }
 
-// Weighted mean of sigma^2 - (kappa r_defocus/p)^2: the floor that best continues the fit where it
-// gives none of its own. var(sigma^2) = (2 sigma)^2 var(sigma).
+// Weighted mean of sigma^2 - (kappa r_defocus/p)^2: the floor that best continues the fit if the
+// fit has none of its own. var(sigma^2) = (2 sigma)^2 var(sigma).
 double BlurModel::FloorSquaredFromFrames(const Calibration& calibration) const {
   double sum = 0, weight_sum = 0;
   for (const FrameMeasurement& frame : calibration.frames) {

@@ -7,7 +7,7 @@
 namespace thicklens::model {
 namespace {
 
-// Rms of the slopes, of full scale per px, of what is the rounding of a flat image.
+// Rms of the slopes, in full scale per px, that the rounding of a flat image causes.
 constexpr double kFlat = 1e-4;
 
 }  // namespace
@@ -22,7 +22,7 @@ double ImageChangeAccumulator::Add(const EncodedValues& reference, const Encoded
   squares_ += squares;
   count_ += reference.values.size();
 
-  // Central differences, along both axes.
+  // Central differences along both axes.
   const auto channels = static_cast<std::size_t>(reference.channels);
   const auto row = static_cast<std::size_t>(reference.width_px) * channels;
   const auto square_of = [&](std::size_t at, std::size_t step) {

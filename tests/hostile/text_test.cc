@@ -206,11 +206,11 @@ THICKLENS_SITUATION(HostileText, ADamagedProfile,
     return changed.replace(begin, end - begin, "\"" + key + "\": " + value);
   };
   const std::vector<std::pair<std::string, std::string>> damaged = {
-      {shipped.substr(0, shipped.size() / 2), "no JSON object"},
-      {Repeated("[", 100000), "no JSON object"},
-      {Repeated("{\"a\":", 100000), "no JSON object"},
-      {"[1, 2]", "no JSON object"},
-      {with("probe_seconds", "NaN"), "no JSON object"},
+      {shipped.substr(0, shipped.size() / 2), "not a JSON object"},
+      {Repeated("[", 100000), "not a JSON object"},
+      {Repeated("{\"a\":", 100000), "not a JSON object"},
+      {"[1, 2]", "not a JSON object"},
+      {with("probe_seconds", "NaN"), "not a JSON object"},
       {with("probe_seconds", "1e999"), "profile.json"},
       {with("probe_seconds", "-1"), "probe_seconds"},
       {with("threads", "\"many\""), "threads"},

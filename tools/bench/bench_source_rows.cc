@@ -43,10 +43,9 @@ std::string Heading(int table) {
              "residual\nrecomputed), then the whole image at once; one thread each, except "
              "ViennaCL, which\nselects an OpenCL device itself";
     default:
-      return "Table 4. Thick against thin lens, focused on the same plane: the image formed "
-             "again\n"
-             "from the estimate (what the source measured), and what that does not see, the true\n"
-             "views";
+      return "Table 4. Thick against thin lens, focused on the same plane: the image computed "
+             "again\nfrom the estimate (the paper's measure), and the true views, which this "
+             "measure does not use";
   }
 }
 

@@ -145,7 +145,7 @@ void AddTable1(const SourceBench& bench, const SourceImage& image,
   }
   add("cpu", 1, bench.processor.get());
   if (bench.threads > 1) add("cpu, all threads", bench.threads, bench.processor.get());
-  // With the same numbers of threads as the rows above.
+  // Adds the default solver with the same numbers of threads as the rows above.
   for (const int threads : std::set<int>{1, bench.threads}) {
     for (LightFieldSolver& solver : WholeImageSolvers(threads)) {
       if (NameOf(solver) != "scene tv") continue;

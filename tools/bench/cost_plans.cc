@@ -31,7 +31,7 @@ class PlanList {
   std::vector<estimator::EstimatePlan> plans_;
 };
 
-// From a tolerance that hardly solves anything to one below the resolution of float.
+// The tolerances range from one that hardly solves anything to one below the resolution of float.
 const std::vector<double>& Tolerances() {
   static const std::vector<double> tolerances = {0.1, 0.01, 0.001, 1e-4, 1e-6};
   return tolerances;

@@ -73,7 +73,7 @@ std::optional<std::string> DifferentApertures(const std::string& path,
   const auto shape = estimator::ShapeOfWeights(light_field);
   const auto other_shape = estimator::ShapeOfWeights(other);
   if (!shape || !other_shape) return std::nullopt;
-  // With few views, several shapes may give the same weights.
+  // Several shapes may give the same weights if there are few views.
   const Eigen::ArrayXXd one = ShapeOfPresentViews(*shape, light_field);
   const Eigen::ArrayXXd two = ShapeOfPresentViews(*other_shape, other);
   if (one.rows() == two.rows() && one.cols() == two.cols() &&

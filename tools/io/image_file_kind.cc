@@ -303,7 +303,8 @@ std::optional<ImageFileKind> KindOfImage(const std::string& bytes) {
   }
   if (StartsWith(bytes, "\x76\x2F\x31\x01")) return ImageFileKind::kExr;
   if (StartsWith(bytes, "BM")) return ImageFileKind::kBmp;
-  // As strict as OpenCV, which otherwise would try other decoders, one of which ends the program.
+  // This test is as strict as OpenCV, which otherwise would try other decoders, one of which ends
+  // the program.
   const bool is_pnm = bytes.size() > 2 && bytes[0] == 'P' && bytes[1] >= '1' && bytes[1] <= '6' &&
                       std::isspace(static_cast<unsigned char>(bytes[2])) != 0;
   if (is_pnm) return ImageFileKind::kPnm;

@@ -21,10 +21,10 @@ namespace {
 
 constexpr int kColumns = 3;
 constexpr int kLongestEdgePx = 640;
-// What nobody sees in an image of 8 bits.
+// A change that is invisible in an image of 8 bits.
 constexpr double kSeenGreyLevels = 0.5;
 
-// Of the absolute values all but the largest hundredth.
+// Returns the largest absolute value, without the largest hundredth.
 double RangeOf(const std::vector<float>& values) {
   std::vector<float> sizes(values.size());
   std::transform(values.begin(), values.end(), sizes.begin(),
@@ -66,7 +66,7 @@ std::string ImageCell(const model::EncodedImage& image) {
       "the image with all effects");
 }
 
-// A cell as print has it.
+// Formats a cell typographically.
 std::string TypesetCell(const std::string& cell) {
   if (cell == "-") return "–";
   if (cell.rfind("+-", 0) == 0) return "±" + cell.substr(2);
@@ -100,7 +100,7 @@ std::string TableHtml(const Ablation& ablation) {
   return html;
 }
 
-// What a person asks of the table.
+// Answers the main questions about the table.
 std::string Verdict(const Ablation& ablation) {
   const std::vector<AblationRow> rows = RowsOf(ablation);
   std::string seen, unseen;
@@ -112,9 +112,9 @@ std::string Verdict(const Ablation& ablation) {
   }
   std::string html =
       fmt::format("<div class=\"verdict plain\">\n<p class=\"outcome\">{}</p>\n",
-                  EscapeXml(seen.empty() ? "No effect is seen here" : "Seen here: " + seen));
+                  EscapeXml(seen.empty() ? "No effect is visible here" : "Visible here: " + seen));
   if (!unseen.empty()) {
-    html += fmt::format("<p>Nowhere more than half a grey level: {}.</p>\n", EscapeXml(unseen));
+    html += fmt::format("<p>At most half a grey level everywhere: {}.</p>\n", EscapeXml(unseen));
   }
   if (ablation.scene) {
     const model::AblatedSceneEffect* worst = nullptr;
@@ -124,10 +124,12 @@ std::string Verdict(const Ablation& ablation) {
       }
     }
     html += fmt::format(
-        "<p>The estimated views are at {:.2f} dB.{}</p>\n", ablation.scene->light_field_psnr_db,
+        "<p>The PSNR of the estimated views is {:.2f} dB.{}</p>\n",
+        ablation.scene->light_field_psnr_db,
         worst == nullptr
             ? ""
-            : TrueMinus(fmt::format(" Of what an estimate can ignore, {} matters most: {:+.2f} dB.",
+            : TrueMinus(fmt::format(" Of the effects that an estimate can ignore, {} has the "
+                                    "largest impact: {:+.2f} dB.",
                                     model::EffectName(worst->effect), *worst->ignored_db)));
   }
   if (ablation.sweep) {
@@ -144,7 +146,8 @@ std::string Verdict(const Ablation& ablation) {
         });
     if (most != sweep.effects.end() && moved_mm(*most) > 0) {
       html += fmt::format(
-          "<p>The calibrated d1 is moved most by {}: {:.2g} µm, beside a standard error of {:.2g} "
+          "<p>The largest change of the calibrated d1 is by {}: {:.2g} µm, with a standard error "
+          "of {:.2g} "
           "µm.</p>\n",
           model::EffectName(most->effect), 1000 * moved_mm(*most),
           1000 * sweep.calibration.image_distance_sigma_mm);
@@ -171,8 +174,8 @@ std::string AblationPage(const Ablation& ablation, const std::string& name,
   html += Verdict(ablation);
   html += Section("table", "All effects", TableHtml(ablation));
   const std::string caption =
-      "Without the effect less with it, mean of the channels; mid grey is no change, each has a "
-      "scale of its own.";
+      "The image without the effect minus the one with it, mean of the channels; mid grey means "
+      "no change, and each map has its own scale.";
   if (ablation.scene) {
     html += Section("image", "In the image",
                     Differences(ablation.scene->effects, ImageCell(ablation.scene->image),

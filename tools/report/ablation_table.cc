@@ -17,7 +17,7 @@ double RatioPercent(const model::SweepAblation& sweep, const model::CalibratedVa
   return 100 * (values.blur_ratio / sweep.calibration.blur_ratio - 1);
 }
 
-// Three digits, but nothing beyond a thousandth.
+// Three digits, but no value below a thousandth.
 std::string Amount(double value) {
   if (value == 0) return "0";
   if (!std::isfinite(value)) return kNone;
@@ -172,7 +172,7 @@ std::string AlignedText(const AblationTable& table) {
   std::string groups = fmt::format("{:<{}}", "", kNameWidth);
   std::string names = fmt::format("{:<{}}", "without", kNameWidth);
   std::vector<std::size_t> widths;
-  std::size_t group_end = 0;  // where the last group's columns end
+  std::size_t group_end = 0;  // the end of the last group's columns
   for (std::size_t i = 0; i < table.columns.size(); ++i) {
     const AblationTable::Column& column = table.columns[i];
     std::size_t width = column.name.size();
@@ -199,7 +199,7 @@ std::string AlignedText(const AblationTable& table) {
   return text;
 }
 
-// A field of a table for programs: all digits, nothing for what there is not.
+// A field of the CSV table: all digits, or empty if there is no value.
 std::string Field(const std::optional<double>& value) {
   return value && std::isfinite(*value) ? fmt::format(",{}", *value) : ",";
 }
@@ -252,46 +252,48 @@ AblationTable TableOf(const Ablation& ablation) {
 
 std::vector<std::string> AblationNotes(const Ablation& ablation) {
   std::vector<std::string> notes = {
-      "Each line is the simulation without that effect against the one with all.",
-      fmt::format("In {}, encoded values, 255 at full scale: the rms and the largest change, its "
-                  "PSNR, the shift of the whole image that would change it as much, and the bound "
-                  "by which --effects auto keeps or leaves the effect (noise: its standard "
-                  "deviation).",
-                  ablation.scene ? "the image" : "all frames together")};
+      "Each line compares the simulation without that effect with the one with all effects.",
+      fmt::format(
+          "In {}, encoded values, 255 at full scale: the rms and the largest change, its PSNR, the "
+          "shift of the whole image that would change it as much, and the bound that --effects "
+          "auto uses to keep or leave out the effect (noise: its standard "
+          "deviation).",
+          ablation.scene ? "the image" : "all frames together")};
   if (ablation.scene) {
     const model::SceneAblation& scene = *ablation.scene;
-    notes.push_back(fmt::format(
-        "Views: how much better the {}x{} views estimated from the image are against the true "
-        "ones where the effect is not in the world; ignored: where it is in the image and the "
-        "estimate is made without it.",
-        scene.u_count, scene.v_count));
+    notes.push_back(
+        fmt::format("Views: gain of the {}x{} views estimated from the image, against the true "
+                    "ones, if the effect does not exist; ignored: if the image has the effect "
+                    "and the estimate ignores it.",
+                    scene.u_count, scene.v_count));
     if (scene.sampling_error_grey_levels > 0) {
-      notes.push_back(fmt::format(
-          "Rays leave about {:.2g} grey levels rms open where they leave the most: changes below "
-          "that may be theirs.",
-          scene.sampling_error_grey_levels));
+      notes.push_back(
+          fmt::format("The sampling by rays has an error of up to about {:.2g} grey levels rms: "
+                      "smaller changes may be due to it.",
+                      scene.sampling_error_grey_levels));
     }
   }
   if (ablation.sweep) {
     const model::SweepAblation& sweep = *ablation.sweep;
     notes.push_back(fmt::format(
-        "Calibration from {} frames: d1 = {:.6g} +- {:.2g} mm (truth {:.6g}), kappa = "
-        "{:.5g} +- {:.2g} (truth {:.5g}); below, how far they move.",
+        "Calibration from {} frames: d1 = {:.6g} +- {:.2g} mm (truth {:.6g}), kappa = {:.5g} +- "
+        "{:.2g} (truth {:.5g}); the table lists their changes.",
         sweep.frames, sweep.calibration.image_distance_mm,
         sweep.calibration.image_distance_sigma_mm, sweep.true_image_distance_mm,
         sweep.calibration.blur_ratio, sweep.calibration.blur_ratio_sigma, sweep.true_blur_ratio));
     for (const model::AblatedSweepEffect& effect : sweep.effects) {
       if (effect.absent || effect.calibration) continue;
-      notes.push_back(fmt::format("Without {} there is no calibration: {}.",
+      notes.push_back(fmt::format("Without {} the calibration fails: {}.",
                                   model::EffectName(effect.effect), effect.refusal));
     }
   }
   if (ablation.scene && ablation.sweep) {
-    notes.emplace_back("*: not in the image of a scene; as in the frames of the sweep.");
+    notes.emplace_back(
+        "*: absent from the image of a scene; the values are for the frames of the sweep.");
   }
   notes.emplace_back(
-      "Seconds are of one run without the effect; the run with all effects came first, before "
-      "which nothing was in memory.");
+      "Seconds are for one run without the effect; the run with all effects came first, when "
+      "nothing was in memory yet.");
   return notes;
 }
 

@@ -60,8 +60,8 @@ std::string BlurProposal::NarrowerBlur() const {
                 "smaller",
                 narrower_ratio_, blur_ratio_);
   return fmt::format("a blur at most about {:.2g} times as wide{} ({}) leaves {:.0f} % of that",
-                     scale, check_.narrower_blur_at_end ? ", the least that was tried" : "", change,
-                     100 * check_.narrower_blur->unexplained);
+                     scale, check_.narrower_blur_at_end ? ", the smallest that was tried" : "",
+                     change, 100 * check_.narrower_blur->unexplained);
 }
 
 std::string BlurProposal::OtherFocus() const {
@@ -81,17 +81,16 @@ std::string BlurProposal::OtherFocus() const {
 std::string BlurProposal::Warning() const {
   if (!check_.narrower_blur && !check_.other_focus) return "";
   std::string text = fmt::format(
-      "the photograph is sharper than camera and depth say: {} of {} blocks are not explained "
-      "beyond "
-      "their noise; ",
+      "the photograph is sharper than camera and depth predict: {} of {} blocks are not explained "
+      "beyond their noise; ",
       check_.unexplained_blocks, check_.blocks);
   if (check_.narrower_blur) text += NarrowerBlur();
   if (check_.narrower_blur && check_.other_focus) text += "; ";
   if (check_.other_focus) text += OtherFocus();
   if (check_.narrower_blur && check_.other_focus) {
-    text += "; which of the two it is, the photograph does not tell";
+    text += "; the photograph does not show which of the two is right";
   }
-  return text + "; nothing of this was applied";
+  return text + "; none of this was applied";
 }
 
 std::string BlurProposal::Summary() const {

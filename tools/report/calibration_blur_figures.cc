@@ -19,12 +19,12 @@ using calib::FrameMeasurement;
 constexpr int kCurveSteps = 400;
 constexpr double kBandSigmas = 2;
 
-// The frames' blur, by what became of them in the fit.
+// The blur of the frames, grouped by their use in the fit.
 struct BlurPoints {
   PlotSeries fitted = Points("in the fit", Ink::kFit, Mark::kDot);
   PlotSeries doubted = Points("down-weighted", Ink::kFit, Mark::kRing);
   PlotSeries left_out = Points("left out", Ink::kData, Mark::kCross);
-  PlotSeries zhuo_sim = Points("source's estimator (Zhuo-Sim)", Ink::kMuted, Mark::kDiamond);
+  PlotSeries zhuo_sim = Points("paper's estimator (Zhuo-Sim)", Ink::kMuted, Mark::kDiamond);
   PlotSeries fitted_residuals = Points("", Ink::kFit, Mark::kDot);
   PlotSeries doubted_residuals = Points("", Ink::kFit, Mark::kRing);
   std::vector<double> xs;
@@ -86,7 +86,8 @@ PlotSeries SideCurve(std::string label, Stroke stroke, const calib::BlurModel& l
   return series;
 }
 
-// From the first frame to the last, and to a focus not far outside the sweep.
+// Returns the range from the first frame to the last, extended to a focus that is not far outside
+// the sweep.
 std::pair<double, double> XRange(const std::vector<double>& xs,
                                  const std::vector<PlotLine>& focus_lines) {
   const auto [lo, hi] = std::minmax_element(xs.begin(), xs.end());
@@ -107,21 +108,21 @@ void AddModels(const FocusSweep& sweep, const Calibration& calibration,
     plot->bands.push_back(ModelBand(*law, curve));
   }
   if (const auto side = calib::BlurModel::OfSide(sweep, calibration, calibration.nearer))
-    plot->series.push_back(SideCurve("nearer side alone", Stroke::kSolid, *side, x_range));
+    plot->series.push_back(SideCurve("nearer side only", Stroke::kSolid, *side, x_range));
   if (const auto side = calib::BlurModel::OfSide(sweep, calibration, calibration.farther))
-    plot->series.push_back(SideCurve("farther side alone", Stroke::kDashed, *side, x_range));
+    plot->series.push_back(SideCurve("farther side only", Stroke::kDashed, *side, x_range));
 }
 
 std::string BlurCaption(const std::optional<calib::BlurModel>& law) {
   if (!law)
-    return "No law was fitted to these points: look for a smallest blur with frames on both sides "
-           "of it.";
+    return "No law was fitted to these points: the smallest blur should have frames on both sides.";
   std::string caption =
-      "A good sweep shows its smallest blur inside the sweep and both arms on the fitted curve; "
-      "rings were down-weighted and crosses left out";
+      "A good sweep has its smallest blur inside the sweep and both arms on the fitted curve; "
+      "frames marked by rings were down-weighted, and those marked by crosses were left out";
   if (law->floor_from_frames())
     caption +=
-        ", and the height of the curve's bottom is taken from the points, since the floor was not "
+        ", and the height of the curve's bottom is estimated from the points, since the floor was "
+        "not "
         "determined";
   return caption + ".";
 }
@@ -141,12 +142,13 @@ ReportFigure ResidualFigure(const calib::BlurFit& fit, BlurPoints points, const 
   plot.lines = {Level(0), Level(2), Level(-2)};
   plot.series = {std::move(points.fitted_residuals), std::move(points.doubted_residuals)};
   const std::string widened = Typeset(AsSentence(WidenedLine(fit)));
-  return FigureOf({plot},
-                  "Nearly all points should scatter between the dotted lines without a trend; a "
-                  "bow says that lens and law differ, one far point that its reading or its frame "
-                  "is bad (each residual is in units of its standard deviation, from blur and "
-                  "reading)." +
-                      (widened.empty() ? "" : " " + widened));
+  return FigureOf(
+      {plot},
+      "Nearly all points should scatter between the dotted lines without a trend; a bow means that "
+      "lens and model differ, and a single outlier that its reading or its frame is bad (each "
+      "residual is in units of its standard deviation, from blur and "
+      "reading)." +
+          (widened.empty() ? "" : " " + widened));
 }
 
 }  // namespace
@@ -186,7 +188,7 @@ ReportFigure ReadingErrorFigure(const FocusSweep& sweep, const Calibration& cali
   for (const FrameMeasurement& frame : calibration.frames) {
     if (!(frame.reading_error_sigma_mm > 0) || !frame.rejection.empty()) continue;
     AddPoint(&errors, abscissa.Of(frame), frame.reading_error_mm,
-             PointName(frame, abscissa, "reading off by [mm]", frame.reading_error_mm));
+             PointName(frame, abscissa, "reading error [mm]", frame.reading_error_mm));
     errors.y_error.push_back(frame.reading_error_sigma_mm);
   }
   if (errors.x.size() < 2) return {};
@@ -194,7 +196,7 @@ ReportFigure ReadingErrorFigure(const FocusSweep& sweep, const Calibration& cali
   plot.id = "reading-errors";
   plot.title = "Errors of the bench readings";
   plot.x_axis.label = abscissa.label;
-  plot.y_axis.label = "written − believed [mm]";
+  plot.y_axis.label = "written − fitted [mm]";
   plot.height_px = 210;
   plot.lines = {Level(0)};
   const double stated_mm = sweep.reading_sigma_mm;
@@ -202,7 +204,7 @@ ReportFigure ReadingErrorFigure(const FocusSweep& sweep, const Calibration& cali
     for (const double sign : {-1.0, 1.0}) plot.lines.push_back(Level(sign * 2 * stated_mm));
   plot.series = {std::move(errors)};
   std::string caption =
-      "How far each written reading lies from the one that the fit believes, with its standard "
+      "Difference of each written reading from the one that the fit estimates, with its standard "
       "deviation";
   if (stated_mm > 0)
     caption += fmt::format(
@@ -210,7 +212,7 @@ ReportFigure ReadingErrorFigure(const FocusSweep& sweep, const Calibration& cali
         "{:.2g} mm",
         stated_mm);
   return FigureOf({plot},
-                  caption + ". A step is a slipped clamp, a trend a scale in another unit.");
+                  caption + ". A step means a slipped clamp, a trend a scale in another unit.");
 }
 
 }  // namespace thicklens::tools

@@ -20,7 +20,7 @@ constexpr double kWidthPx = 860;
 constexpr double kLeftPx = 64, kTopPx = 12;
 constexpr double kWidestTilePx = 116;
 constexpr double kLineHeightPx = 15;
-// Where along the colours white words give way to dark ones.
+// The position along the colours from which the text is dark instead of white.
 constexpr double kDarkWordsFrom = 0.45;
 
 struct Layout {
@@ -29,7 +29,7 @@ struct Layout {
   double Y(int row) const { return kTopPx + row * tile_height_px; }
 };
 
-// The tiles in the shape that they have in the image, but not too flat for the words.
+// The tiles have the shape that they have in the image, but are not too flat for their text.
 Layout LayoutOf(const FieldMap& field) {
   Layout layout;
   layout.tile_width_px = std::min(kWidestTilePx, (kWidthPx - kLeftPx) / field.columns);
@@ -56,7 +56,7 @@ ColourRange RangeOf(const FieldMap& field) {
   return range;
 }
 
-// The median standard deviation of the tiles; 0 where none has one.
+// The median standard deviation of the tiles; 0 if none has one.
 double MedianSigmaMm(const FieldMap& field) {
   std::vector<double> sigmas_mm;
   for (const FieldTile& tile : field.tiles)
@@ -68,7 +68,7 @@ double MedianSigmaMm(const FieldMap& field) {
   return *middle;
 }
 
-// The range of the colours: wide enough that noise alone does not run through all of them.
+// Widens the range of the colours, so that noise does not use all of them.
 ColourRange WideEnough(ColourRange range, double sigma_mm) {
   constexpr double kMinSigmas = 3;  // on each side of the middle
   const double middle = (range.lo + range.hi) / 2;
@@ -135,7 +135,7 @@ std::string Margins(const FieldMap& field, const Layout& layout) {
   return svg;
 }
 
-// The colours from the nearest to the farthest.
+// The colours, from the nearest to the farthest.
 std::string ColourBar(const ColourRange& range, double top) {
   constexpr int kSteps = 40;
   constexpr double kStepPx = 6, kHeightPx = 10;
@@ -166,9 +166,8 @@ ReportFigure FieldFigure(const FieldMap& field) {
   const double width_px = std::max(layout.X(field.columns) + 8, kLeftPx + 420);
   std::string svg = fmt::format(
       "<svg class=\"plot\" viewBox=\"0 0 {0:.0f} {1:.0f}\" width=\"{0:.0f}\" height=\"{1:.0f}\" "
-      "role=\"img\" aria-labelledby=\"field-title\">\n<title id=\"field-title\">Depth of focus "
-      "over "
-      "the field, {2} to {3} mm</title>\n",
+      "role=\"img\" aria-labelledby=\"field-title\">\n<title id=\"field-title\">In-focus distance "
+      "over the field, {2} to {3} mm</title>\n",
       width_px, bar_top + 18, RoundedTo(range.lo, (range.hi - range.lo) / 20),
       RoundedTo(range.hi, (range.hi - range.lo) / 20));
   for (std::size_t i = 0; i < field.tiles.size(); ++i)
@@ -177,10 +176,10 @@ ReportFigure FieldFigure(const FieldMap& field) {
   if (colours.hi > colours.lo) svg += ColourBar(colours, bar_top);
   svg += "</svg>\n";
   return {{{"field", svg}},
-          "Depth of focus zf [mm] of each part of the image fitted alone, with its standard "
-          "deviation. One side brighter than the other: the target is tilted; bright or dark from "
-          "the centre outward: the field is curved. The colours span at least ± 3 of the median "
-          "standard deviation.",
+          "In-focus distance zf [mm], fitted separately for each part of the image, with its "
+          "standard deviation. One side brighter than the other: the target is tilted; brightness "
+          "changing from the centre outward: the field is curved. The colours span at least ± 3 "
+          "median standard deviations.",
           false};
 }
 

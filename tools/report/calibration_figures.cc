@@ -22,7 +22,7 @@ constexpr int kExampleWidthPx = 290;
 constexpr int kExampleHeightPx = 250;
 constexpr std::size_t kMaxExamples = 3;
 
-// The plane of focus that the normalised index picks, if it is another frame's than the raw one's.
+// Adds the plane of focus of the normalised index, if its frame differs from that of the raw index.
 void AddNormalisedSharpest(const calib::SourceRecipe& source, Plot* plot) {
   if (!source.done || source.sharpest_normalised_frame < 0 ||
       source.sharpest_normalised_frame == source.sharpest_frame)
@@ -32,7 +32,7 @@ void AddNormalisedSharpest(const calib::SourceRecipe& source, Plot* plot) {
        Ink::kPeak, Stroke::kDotted, true, source.normalised_focus_depth_mm});
 }
 
-// 1/scale against the reading and, where there is a law, what each reading is off it.
+// 1/scale against the reading and, if there is a model, the residual of each reading.
 struct ScalePoints {
   PlotSeries fitted = Points("in the fit", Ink::kFit, Mark::kDot);
   PlotSeries left_out = Points("left out", Ink::kData, Mark::kCross);
@@ -59,7 +59,7 @@ ScalePoints ScalePointsOf(const FocusSweep& sweep, const Calibration& calibratio
     const double model_reading_mm =
         sign * (scale.reference_depth_mm * inverse - scale.line_zero_mm());
     const double residual_mm = frame.reading_mm - model_reading_mm;
-    name += fmt::format(", reading off by {:+.2g} mm", residual_mm);
+    name += fmt::format(", reading error {:+.2g} mm", residual_mm);
     AddPoint(series, frame.reading_mm, inverse, name);
     PlotSeries* residuals =
         frame.in_scale_fit ? &points.fitted_residuals : &points.left_out_residuals;
@@ -84,10 +84,10 @@ ReportFigure ScaleWithoutModel(const calib::ScaleModel& scale, ScalePoints point
   points.left_out.label.clear();
   Plot plot = ScalePlot();
   plot.series = {std::move(points.fitted), std::move(points.left_out)};
-  std::string caption = "No bench zero follows from the image scale";
+  std::string caption = "The image scale does not determine the bench zero";
   if (scale.kind != calib::ScaleKind::kUnknown)
-    caption += fmt::format("; it goes with the reading {}", ScaleKindWords(scale.kind));
-  return FigureOf({plot}, caption + ". With one, the points lie on a straight line.");
+    caption += fmt::format("; its dependence on the reading: {}", ScaleKindWords(scale.kind));
+  return FigureOf({plot}, caption + ". If it did, the points would lie on a straight line.");
 }
 
 std::string ShortenedName(const std::string& image) {
@@ -178,10 +178,10 @@ ReportFigure SharpnessFigure(const Calibration& calibration, const std::vector<R
   }
   return FigureOf(
       {plot},
-      "Look for one clear peak with frames on both sides of it; where the raw sharpness "
-      "(rings) peaks elsewhere than the normalised one (dots), the lamp's falling "
-      "brightness has pulled it. An index in image pixels is also pulled by the image scale, "
-      "which changes along the sweep, so that both may peak elsewhere than the fit.");
+      "There should be one clear peak with frames on both sides; if the raw sharpness (rings) "
+      "peaks elsewhere than the normalised one (dots), the falling brightness of the lamp has "
+      "shifted it. An index in image pixels is also shifted by the image scale, which changes "
+      "along the sweep, so that both may peak elsewhere than the fit.");
 }
 
 ReportFigure ScaleFigure(const FocusSweep& sweep, const Calibration& calibration) {
@@ -211,7 +211,7 @@ ReportFigure ScaleFigure(const FocusSweep& sweep, const Calibration& calibration
                                       RoundedTo(zero_reading_mm, scale.offset_mm.sigma),
                                       RoundedSigma(scale.offset_mm.sigma))),
                 zero_reading_mm, 0}};
-  // Room below zero for the note.
+  // Room for the note below zero.
   const double top = std::max(law_at(range.first), law_at(range.second));
   law.y_axis.range = {-0.14 * top, 1.05 * top};
 
@@ -225,8 +225,8 @@ ReportFigure ScaleFigure(const FocusSweep& sweep, const Calibration& calibration
   residuals.series = {std::move(points.fitted_residuals), std::move(points.left_out_residuals)};
   return FigureOf({law, residuals},
                   "All points should lie on one straight line, which reaches zero where the target "
-                  "would touch the aperture plane Ap; below, a single point off zero is a wrong "
-                  "reading, and a bow a camera whose scale does not follow 1/z.");
+                  "would touch the aperture plane Ap; below, a single point off zero means a wrong "
+                  "reading, and a bow means that the scale does not follow 1/z.");
 }
 
 ReportFigure ExampleFigure(const Calibration& calibration) {
@@ -243,12 +243,12 @@ ReportFigure ExampleFigure(const Calibration& calibration) {
   }
   if (plots.empty()) return {};
   ReportFigure figure = FigureOf(
-      plots, edges ? "Edges as they were measured, with the fits: the points should follow a "
-                     "curve from the dark side to the bright one without overshoot (a sharpened "
-                     "or compressed image has one)."
-                   : "How much of each spatial frequency is left against the sharpest frame, with "
-                     "the fits: the points should fall along a curve; a floor that they do not "
-                     "leave is noise.");
+      plots,
+      edges
+          ? "Edges as measured, with the fits: the points should follow a curve from the dark side "
+            "to the bright one without overshoot (a sharpened or compressed image has one)."
+          : "Remaining contrast at each spatial frequency, relative to the sharpest frame, with "
+            "the fits: the points should fall along a curve; a constant floor is noise.");
   figure.beside = true;
   return figure;
 }

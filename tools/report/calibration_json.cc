@@ -25,7 +25,7 @@ json NumberOrNull(const std::optional<double>& value) {
   return value ? NumberOrNull(*value) : json(nullptr);
 }
 
-// An estimator that did not run leaves 0, which no estimator measures.
+// An estimator that did not run leaves 0, which is never a measured value.
 json Measured(double value) { return value == 0 ? json(nullptr) : NumberOrNull(value); }
 
 json ResultJson(const std::optional<calib::Result>& result) {
@@ -37,7 +37,7 @@ json ResultJson(const std::optional<calib::Result>& result) {
   return out;
 }
 
-// A value of the source's recipe, which has no error estimate.
+// A value of the paper's recipe, which has no error estimate.
 json SourceResultJson(const std::optional<double>& value) {
   if (!value || !std::isfinite(*value)) return nullptr;
   return {{"value", *value}, {"sigma", nullptr}, {"systematic", nullptr}};
@@ -71,10 +71,10 @@ json TextJson(const std::string& text) {
   return text.empty() ? json(nullptr) : json(PrintableUtf8(text));
 }
 
-// Of a step that was done; else there is nothing to count.
+// The count of a step that was done; null otherwise.
 json Count(bool done, int count) { return done ? json(count) : json(nullptr); }
 
-// No frame that was opened has all of these at 0 and passes.
+// A frame that was opened has at least one of these above 0, or was rejected.
 bool IsMeasured(const calib::FrameMeasurement& frame) {
   const calib::FrameStatistics& s = frame.statistics;
   return !frame.rejection.empty() || s.mean_encoded != 0 || s.contrast != 0 || s.noise_sigma != 0;
@@ -90,7 +90,7 @@ json StatisticsJson(const calib::FrameStatistics& statistics) {
           {"saturation_level", NumberOrNull(statistics.saturation_level)}};
 }
 
-// Frame by frame what the figures show. `law` may be null.
+// The values that the figures show, for one frame. `law` may be null.
 json FrameJson(const calib::FrameMeasurement& frame, const calib::BlurModel* law) {
   const bool has_blur = frame.blur_sigma_error_px != 0;
   const bool has_edges = frame.edge_count > 0 || frame.mean_edge_slope != 0;
@@ -295,7 +295,7 @@ json ExamplesJson(const calib::Calibration& calibration) {
   return out;
 }
 
-// What the fit alone says, the results apart.
+// The values of the fit only, without the combined results.
 json FitJson(const calib::Calibration& calibration) {
   const bool done = calibration.blur.done;
   return {{"chi2_per_dof", done ? NumberOrNull(calibration.blur.chi2_per_dof) : json(nullptr)},

@@ -72,7 +72,7 @@ Abscissa AbscissaOf(const Calibration& calibration) {
     ++depths;
   }
   if (depths >= 2 && hi > lo) return {true, "object depth z from Ap [mm]"};
-  return {false, "bench reading b [mm] (no depths: the bench zero is not known)"};
+  return {false, "bench reading b [mm] (no depths: the bench zero is unknown)"};
 }
 
 std::string PointName(const FrameMeasurement& frame, const Abscissa& abscissa,
@@ -92,7 +92,7 @@ std::vector<PlotLine> FocusLines(const std::vector<ResultRow>& rows) {
       lines.push_back(
           {fmt::format("zf, {}: {} mm", who, RoundedTo(zf_mm, sd)), ink, stroke, true, zf_mm});
     };
-    if (row.source) add("source's recipe", Ink::kSource, Stroke::kDotted, *row.source, sigma);
+    if (row.source) add("paper's recipe", Ink::kSource, Stroke::kDotted, *row.source, sigma);
     if (row.peak)
       add("sharpness peak", Ink::kPeak, Stroke::kDashed, row.peak->value, row.peak->sigma);
     if (row.fit) add("blur fit", Ink::kFit, Stroke::kSolid, row.fit->value, sigma);

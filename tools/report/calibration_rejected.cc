@@ -21,8 +21,8 @@ using calib::FocusSweep;
 using calib::FrameMeasurement;
 
 constexpr std::size_t kMaxThumbnails = 12;
-constexpr std::size_t kMaxRuns = 12;  // of one kind in the table
-constexpr int kThumbnailPx = 220;     // longest edge
+constexpr std::size_t kMaxRuns = 12;  // for one kind in the table
+constexpr int kThumbnailPx = 220;     // the longest edge
 
 std::string GroupRows(const Calibration& calibration, const calib::RejectionGroup& group) {
   const std::vector<std::string> details = TextsOfRuns(calibration.frames, group);
@@ -48,7 +48,7 @@ std::string GroupsTable(const Calibration& calibration,
                         const std::vector<calib::RejectionGroup>& groups) {
   std::string html =
       "<div class=\"wide\"><table>\n<thead><tr><th>reason</th><th class=\"number\">how many</th>"
-      "<th>frames</th><th>in each</th></tr></thead>\n<tbody>\n";
+      "<th>frames</th><th>details</th></tr></thead>\n<tbody>\n";
   for (const calib::RejectionGroup& group : groups) html += GroupRows(calibration, group);
   return html + "</tbody></table></div>\n";
 }
@@ -79,7 +79,8 @@ std::vector<int> FramesOf(const calib::RejectionGroup& group) {
   return frames;
 }
 
-// The first of every kind, then the second of every kind, and so on: each kind of damage is seen.
+// Takes the first frame of every kind, then the second of every kind, and so on, so that each kind
+// of damage is shown.
 std::vector<std::size_t> ChosenForShow(const std::vector<calib::RejectionGroup>& groups) {
   std::vector<std::size_t> chosen;
   for (std::size_t turn = 0;; ++turn) {
@@ -95,7 +96,7 @@ std::vector<std::size_t> ChosenForShow(const std::vector<calib::RejectionGroup>&
   return chosen;
 }
 
-// Shrunk and encoded as a screen expects it.
+// Shrinks the frame and encodes it for a screen.
 cv::Mat Thumbnail(const cv::Mat& stored, const model::TransferCurve& transfer) {
   cv::Mat shown = ShownImage(stored);
   const int longest = std::max(shown.cols, shown.rows);
@@ -140,7 +141,8 @@ std::string Thumbnails(const FocusSweep& sweep, const Calibration& calibration,
   return html;
 }
 
-// Frames that passed the quality checks and still say nothing of the blur, by reason.
+// Lists the frames that passed the quality checks but give no information about the blur, by
+// reason.
 std::string NotInFit(const Calibration& calibration) {
   std::map<std::string, calib::RejectionGroup> groups;
   int count = 0;
@@ -156,9 +158,9 @@ std::string NotInFit(const Calibration& calibration) {
     ++count;
   }
   if (count == 0) return "";
-  std::string html =
-      fmt::format("<p>{} more {} the quality checks and {} nothing of the blur:</p>\n<ul>\n", count,
-                  count == 1 ? "frame passed" : "frames passed", count == 1 ? "says" : "say");
+  std::string html = fmt::format(
+      "<p>{} more {} the quality checks but {} no information about the blur:</p>\n<ul>\n", count,
+      count == 1 ? "frame passed" : "frames passed", count == 1 ? "gives" : "give");
   for (const auto& [reason, group] : groups) {
     std::vector<std::string> names;
     for (const calib::RejectionRun& run : group.runs)

@@ -18,7 +18,7 @@ using calib::FocusSweep;
 
 constexpr char kFigureFolder[] = "figures";
 
-// The figures in the order in which they are added, numbered.
+// Numbers the figures in the order in which they are added.
 class Figures {
  public:
   void Add(ReportFigure figure) {
@@ -36,7 +36,7 @@ class Figures {
                          figure.beside ? "</div>\n" : "", number, EscapeXml(figure.caption));
   }
 
-  // What was added since the last call.
+  // Returns the HTML that was added since the last call.
   std::string TakeHtml() { return std::exchange(html_, ""); }
   const std::string& captions() const { return captions_; }
   std::vector<ReportFile> TakeFiles() { return std::move(files_); }
@@ -52,7 +52,8 @@ std::string AssumedWords(const model::Camera& camera) {
   const std::vector<std::string> fields = model::AssumedFields(camera);
   if (fields.empty()) return "";
   return fmt::format(
-      "<p>Assumed in the camera file, neither published by the maker nor measured: {}.</p>\n",
+      "<p>Assumed in the camera file, neither published by the manufacturer nor measured: "
+      "{}.</p>\n",
       EscapeXml(fmt::format("{}", fmt::join(fields, ", "))));
 }
 
@@ -73,8 +74,8 @@ std::string HowItWasMade(const FocusSweep& sweep, const Calibration& calibration
                          const ReportOrigin& origin) {
   const model::Camera& camera = sweep.camera;
   std::string html =
-      "<h2>How it was made</h2>\n<div class=\"wide\"><table>\n<thead><tr><th>given of the "
-      "camera</th><th class=\"number\">value</th><th>tolerance</th></tr></thead>\n<tbody>\n";
+      "<h2>How it was made</h2>\n<div class=\"wide\"><table>\n<thead><tr><th>given camera "
+      "parameter</th><th class=\"number\">value</th><th>tolerance</th></tr></thead>\n<tbody>\n";
   html += CameraRow(camera, "front focal length f1 [mm]", "lens.front_focal_length_mm",
                     camera.lens.front_focal_length_mm);
   html += CameraRow(camera, "rear focal length f2 [mm]", "lens.rear_focal_length_mm",
@@ -108,7 +109,7 @@ std::string HowItWasMade(const FocusSweep& sweep, const Calibration& calibration
   }
   item(sweep.offset_mm ? fmt::format("Bench offset given: {:.6g} ± {:.3g} mm.",
                                      sweep.offset_mm->value, sweep.offset_mm->sigma)
-                       : std::string("Bench offset not given: taken from the image scale."));
+                       : std::string("Bench offset not given: estimated from the image scale."));
   if (sweep.floor.given_px)
     item(fmt::format("Blur floor given: {:.4g} ± {:.3g} px.", sweep.floor.given_px->value,
                      sweep.floor.given_px->sigma));

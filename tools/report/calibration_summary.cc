@@ -23,7 +23,7 @@ std::optional<std::string> ImageOf(const calib::Calibration& calibration, int in
   return PrintableUtf8(calibration.frames[static_cast<std::size_t>(index)].image);
 }
 
-// A table of text: the first column to the left, the others to the right, two spaces between.
+// A table of text with the first column aligned left, the others right, and two spaces between.
 std::string AlignedTable(const std::vector<std::vector<std::string>>& rows) {
   std::vector<std::size_t> widths;
   for (const std::vector<std::string>& row : rows) {
@@ -42,9 +42,9 @@ std::string AlignedTable(const std::vector<std::vector<std::string>>& rows) {
 
 std::string ResultTable(const std::vector<ResultRow>& results, bool has_truth) {
   std::vector<std::vector<std::string>> rows;
-  rows.push_back({"", "source's recipe", "fit +- sigma", "systematic interval"});
+  rows.push_back({"", "paper's recipe", "fit +- sigma", "systematic interval"});
   if (has_truth)
-    for (const char* name : {"truth", "fit - truth", "source - truth"})
+    for (const char* name : {"truth", "fit - truth", "paper - truth"})
       rows.back().emplace_back(name);
   for (const ResultRow& result : results) {
     const double sigma = result.fit ? result.fit->sigma : 0;
@@ -55,7 +55,7 @@ std::string ResultTable(const std::vector<ResultRow>& results, bool has_truth) {
         result.unit.empty() ? result.label : fmt::format("{} [{}]", result.label, result.unit),
         rounded(result.source), "-", "-"};
     if (result.fit) {
-      // Without a sigma it was not fitted: given, or taken for granted within the interval.
+      // A value without a sigma was not fitted: it was given, or assumed within the interval.
       row[2] = !std::isfinite(result.fit->value) ? std::string("not determined")
                : UsableSigma(sigma) ? fmt::format("{} +- {}", RoundedTo(result.fit->value, sigma),
                                                   RoundedSigma(sigma))
@@ -73,7 +73,7 @@ std::string ResultTable(const std::vector<ResultRow>& results, bool has_truth) {
         const bool is_within =
             interval && interval->x() <= *result.truth && *result.truth <= interval->y();
         error = SignedRoundedTo(off, sigma);
-        // sigma is the statistical part alone.
+        // sigma is only the statistical part.
         if (is_within && std::abs(off) > 2 * sigma) {
           error += " (within the interval)";
         } else if (UsableSigma(sigma)) {
@@ -108,10 +108,10 @@ std::string SecondaryLines(const calib::Calibration& calibration,
   const calib::SourceRecipe& source = calibration.source;
   text +=
       source.done
-          ? fmt::format("source's recipe: sharpest frame {}, blur ratio from {} frames{}\n",
+          ? fmt::format("paper's recipe: sharpest frame {}, blur ratio from {} frames{}\n",
                         FrameName(ImageOf(calibration, source.sharpest_frame).value_or("unknown")),
                         source.ratio_frames, NormalisedSharpest(calibration))
-          : fmt::format("source's recipe: none, {}\n", PrintableUtf8(source.message));
+          : fmt::format("paper's recipe: none, {}\n", PrintableUtf8(source.message));
   for (const ResultRow& row : rows) {
     if (row.key != "focus_depth_mm") continue;
     if (!row.peak) {
@@ -131,13 +131,14 @@ std::string SecondaryLines(const calib::Calibration& calibration,
   AddLine("focus", FocusReadingLine(calibration), &text);
   const calib::ScaleModel& scale = calibration.scale;
   if (!scale.done) AddLine("image scale", ScaleChangeLine(scale), &text);
-  text += scale.done
-              ? fmt::format(
-                    "image scale: bench offset {} +- {} mm, readings {:.2g} mm rms about the law, "
-                    "{} frames\n",
-                    RoundedTo(scale.offset_mm.value, scale.offset_mm.sigma),
-                    RoundedSigma(scale.offset_mm.sigma), scale.reading_rms_mm, scale.frames_used)
-              : fmt::format("image scale: no law, {}\n", PrintableUtf8(scale.message));
+  text +=
+      scale.done
+          ? fmt::format(
+                "image scale: bench offset {} +- {} mm, residual of the readings {:.2g} mm rms, "
+                "{} frames\n",
+                RoundedTo(scale.offset_mm.value, scale.offset_mm.sigma),
+                RoundedSigma(scale.offset_mm.sigma), scale.reading_rms_mm, scale.frames_used)
+          : fmt::format("image scale: no model, {}\n", PrintableUtf8(scale.message));
   const calib::BlurFit& blur = calibration.blur;
   AddLine("image scale", DistortionLine(scale), &text);
   AddLine("magnification", MagnificationLine(calibration), &text);
@@ -152,7 +153,7 @@ std::string SecondaryLines(const calib::Calibration& calibration,
   return text;
 }
 
-// What the frames say beyond the results: shape of the blur, sides, field, colours.
+// The additional findings of the frames: shape of the blur, sides, field, colours.
 std::string DetailLines(const calib::FocusSweep& sweep, const calib::Calibration& calibration) {
   std::string text;
   AddLine("blur shape", ShapeLine(sweep, calibration.blur), &text);
@@ -182,7 +183,8 @@ std::vector<ResultRow> ResultRows(const calib::Calibration& calibration,
   std::vector<ResultRow> rows(5);
   rows[0] = {
       "image_distance_mm", "image distance d1", "mm", calibration.image_distance_mm, {}, {}, {}};
-  rows[1] = {"focus_depth_mm", "depth of focus zf", "mm", calibration.focus_depth_mm, {}, {}, {}};
+  rows[1] = {
+      "focus_depth_mm", "in-focus distance zf", "mm", calibration.focus_depth_mm, {}, {}, {}};
   rows[2] = {"blur_ratio", "blur ratio kappa", "", calibration.blur_ratio, {}, {}, {}};
   rows[3] = {"blur_floor_px", "blur floor", "px", calibration.blur_floor_px, {}, {}, {}};
   rows[4] = {"bench_offset_mm", "bench offset", "mm", calibration.bench_offset_mm, {}, {}, {}};
@@ -223,8 +225,8 @@ std::string CalibrationText(const calib::FocusSweep& sweep, const calib::Calibra
                     [](const calib::FrameMeasurement& frame) { return !frame.not_in_fit.empty(); });
   if (not_in_fit > 0) {
     text += fmt::format(
-        "  {} more say nothing of the blur: too strongly blurred or too far off in scale for the "
-        "part of the target that all frames share\n",
+        "  {} more give no information about the blur: too strongly blurred, or too different in "
+        "scale, for the part of the target that all frames share\n",
         not_in_fit);
   }
   text += RejectionLines(calibration.frames) + '\n';

@@ -21,7 +21,7 @@ constexpr char kNone[] = "–";
 constexpr char kWasNotRun[] = "not run";
 constexpr char kTableEnd[] = "</tbody></table></div>\n";
 
-// A column's head; a number's stands to the right.
+// The head of a column; heads of numbers are aligned right.
 struct TableColumn {
   const char* name;
   bool is_number = true;
@@ -49,7 +49,7 @@ std::string ErrorsTable(const std::vector<ResultRow>& rows) {
                                  {"truth"},
                                  {"blur fit"},
                                  {"in standard deviations"},
-                                 {"source's recipe"},
+                                 {"paper's recipe"},
                                  {"sharpness peak"}});
   for (const ResultRow& row : rows) {
     if (!row.truth) continue;
@@ -69,11 +69,11 @@ std::string ErrorsTable(const std::vector<ResultRow>& rows) {
   return html + kTableEnd;
 }
 
-// One other way to the depth of focus.
+// Another method for the in-focus distance.
 struct Way {
   std::string name;
   bool done = false;
-  std::string remark;  // of one that was not done: why
+  std::string remark;  // the reason, if it was not done
   std::optional<model::Estimate> focus_depth_mm, blur_ratio;
 };
 
@@ -94,7 +94,7 @@ Way SideWay(const std::string& name, const calib::SideFit& side) {
 std::vector<Way> OtherWays(const Calibration& calibration) {
   std::vector<Way> ways;
   const calib::SourceRecipe& source = calibration.source;
-  Way raw{"sharpest frame, raw (source's recipe)", source.done, source.message, {}, {}};
+  Way raw{"sharpest frame, raw (paper's recipe)", source.done, source.message, {}, {}};
   if (source.done) {
     raw.remark = fmt::format("{}; κ from {} frames",
                              NameOfFrame(calibration, source.sharpest_frame), source.ratio_frames);
@@ -115,11 +115,11 @@ std::vector<Way> OtherWays(const Calibration& calibration) {
     parabola.focus_depth_mm = model::Estimate{peak.focus_depth_mm, peak.sigma_mm};
   }
   ways.push_back(parabola);
-  ways.push_back(SideWay("blur, nearer side alone", calibration.nearer));
-  ways.push_back(SideWay("blur, farther side alone", calibration.farther));
+  ways.push_back(SideWay("blur, nearer side only", calibration.nearer));
+  ways.push_back(SideWay("blur, farther side only", calibration.farther));
   for (const calib::ChannelFocus& channel : calibration.channels) {
     Way way{
-        fmt::format("blur, {} channel alone", channel.name), channel.done, channel.message, {}, {}};
+        fmt::format("blur, {} channel only", channel.name), channel.done, channel.message, {}, {}};
     if (channel.done) {
       way.remark.clear();
       way.focus_depth_mm = channel.focus_depth_mm;
@@ -138,7 +138,7 @@ std::string EstimateCell(const std::optional<model::Estimate>& estimate, double 
 
 double SigmaOf(const std::optional<calib::Result>& result) { return result ? result->sigma : 0; }
 
-// How far it lies from the fit, with the digits of the larger error.
+// The difference from the fit, with the digits of the larger error.
 std::string ApartCell(const std::optional<model::Estimate>& focus_mm,
                       const std::optional<calib::Result>& fit) {
   if (!focus_mm || !fit || !std::isfinite(fit->value)) return TableCell(kNone);
@@ -190,7 +190,7 @@ std::string ResultsSection(const std::vector<ResultRow>& rows, bool has_truth) {
   std::string html = "<h2>Results</h2>\n" + TableBegin({{"quantity", false},
                                                         {"blur fit ± statistical"},
                                                         {"systematic interval"},
-                                                        {"source's recipe"},
+                                                        {"paper's recipe"},
                                                         {"sharpness peak"}});
   for (const ResultRow& row : rows) {
     const double sigma = row.fit ? row.fit->sigma : 0;
@@ -206,9 +206,8 @@ std::string ResultsSection(const std::vector<ResultRow>& rows, bool has_truth) {
   html += kTableEnd;
   html +=
       "<p class=\"soft\">Statistical: one standard deviation from noise, readings and the bench "
-      "zero. "
-      "Systematic: the interval that what the table below lists leaves open, taken together. The "
-      "source's recipe has no error estimate.</p>\n";
+      "zero. Systematic: the interval that the causes in the table below allow together. The "
+      "paper's recipe has no error estimate.</p>\n";
   return html + (has_truth ? ErrorsTable(rows) : "");
 }
 
@@ -216,12 +215,10 @@ std::string SystematicSection(const FocusSweep& sweep, const Calibration& calibr
                               bool has_truth) {
   if (calibration.systematic_parts.empty()) return "";
   const std::string missing = has_truth ? "" : MissingTolerancesLine(sweep.camera);
-  std::string html = "<h2>Where the systematic error comes from</h2>\n" +
-                     TableBegin({{"because of", false},
-                                 {"zf [mm]"},
-                                 {"d1 [mm]"},
-                                 {"κ"},
-                                 {"what would shrink it", false}});
+  std::string html =
+      "<h2>Where the systematic error comes from</h2>\n" +
+      TableBegin(
+          {{"cause", false}, {"zf [mm]"}, {"d1 [mm]"}, {"κ"}, {"what would reduce it", false}});
   for (const calib::SystematicPart& part : calibration.systematic_parts) {
     html += RowHead(part.name);
     for (const Eigen::Vector2d& range :
@@ -230,7 +227,7 @@ std::string SystematicSection(const FocusSweep& sweep, const Calibration& calibr
     html += TableCell(Typeset(part.remedy), "words") + "</tr>\n";
   }
   return html + kTableEnd +
-         "<p class=\"soft\">How far each result may lie from its value because of it, largest "
+         "<p class=\"soft\">Largest change of each result due to the cause, largest "
          "first.</p>\n" +
          (missing.empty() ? "" : fmt::format("<p>{}</p>\n", EscapeXml(AsSentence(missing))));
 }
@@ -253,19 +250,20 @@ std::string OtherWaysSection(const Calibration& calibration, const std::vector<R
              ApartCell(way.focus_depth_mm, zf) + EstimateCell(way.blur_ratio, SigmaOf(kappa)) +
              TableCell(way.remark, "soft") + "</tr>\n";
   }
-  say("law of the image scale", calibration.scale.done, calibration.scale.message);
+  say("model of the image scale", calibration.scale.done, calibration.scale.message);
   say("blur fit", calibration.blur.done, calibration.blur.message);
   std::string html;
   if (!table.empty())
-    html += TableBegin({{"way", false}, {"zf [mm]"}, {"from the fit [mm]"}, {"κ"}, {"", false}}) +
-            table + kTableEnd;
+    html +=
+        TableBegin({{"method", false}, {"zf [mm]"}, {"from the fit [mm]"}, {"κ"}, {"", false}}) +
+        table + kTableEnd;
   for (const std::string& line :
        {MagnificationLine(calibration), DistortionLine(calibration.scale)})
     if (!line.empty())
       html += fmt::format("<p class=\"soft\">From the image scale: {}.</p>\n",
                           EscapeXml(Typeset(line)));
   if (!missing.empty()) html += "<p>Without a result:</p>\n<ul>\n" + missing + "</ul>\n";
-  return html.empty() ? "" : "<h2>The same by other ways</h2>\n" + html;
+  return html.empty() ? "" : "<h2>Results of other methods</h2>\n" + html;
 }
 
 std::string FieldWords(const Calibration& calibration) {

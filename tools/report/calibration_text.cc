@@ -14,7 +14,7 @@ namespace {
 
 using model::Estimate;
 
-// Further from zero than its error explains.
+// Returns whether a value differs from zero by more than its error explains.
 bool IsSeen(const Estimate& estimate) { return std::abs(estimate.value) > 2 * estimate.sigma; }
 
 std::string Signed(const Estimate& estimate, const std::string& unit) {
@@ -24,7 +24,7 @@ std::string Signed(const Estimate& estimate, const std::string& unit) {
 std::string TiltLine(const Estimate& tilt, const char* axis, const char* positive,
                      const char* negative) {
   return fmt::format("tilt about the {} axis {} ({})", axis, Signed(tilt, "deg"),
-                     !IsSeen(tilt)    ? "none beyond its error"
+                     !IsSeen(tilt)    ? "not significant"
                      : tilt.value > 0 ? positive
                                       : negative);
 }
@@ -37,7 +37,7 @@ std::string ClusterLine(const std::vector<calib::DepthCluster>& clusters) {
         fmt::format("{} ({} tile{})",
                     WithError(cluster.focus_depth_mm.value, cluster.focus_depth_mm.sigma, "mm"),
                     cluster.tiles, cluster.tiles == 1 ? "" : "s"));
-  return fmt::format("parts of the field come into focus at {} different readings: zf = {}",
+  return fmt::format("parts of the field are in focus at {} different readings: zf = {}",
                      clusters.size(), fmt::join(depths, ", "));
 }
 
@@ -60,14 +60,13 @@ std::string ScaleKindName(calib::ScaleKind kind) {
 std::string ScaleKindWords(calib::ScaleKind kind) {
   switch (kind) {
     case calib::ScaleKind::kInverseDepth:
-      return "as 1/z: a camera whose pupil stands still";
+      return "as 1/z: a camera whose pupil does not move";
     case calib::ScaleKind::kConstant:
       return "constant: the lens is telecentric, the sensor moves, the frames were aligned, or one "
              "image was repeated";
     case calib::ScaleKind::kReversed:
-      return "as 1/z with the readings the other way: check the direction of the scale, and "
-             "whether "
-             "the target moved and not the lens";
+      return "as 1/z with reversed readings: check the direction of the scale, and whether the "
+             "target moved and not the lens";
     case calib::ScaleKind::kUnknown:
       break;
   }
@@ -103,7 +102,7 @@ std::string ChannelLine(const std::vector<calib::ChannelFocus>& channels) {
   return fmt::format("{}", fmt::join(parts, ", "));
 }
 
-// The sides share no frame, so their errors are independent but for the bench zero, which moves
+// The sides share no frame, so their errors are independent except for the bench zero, which shifts
 // both alike: the hypotenuse is the upper bound.
 std::optional<Estimate> SidesApartMm(const calib::Calibration& calibration) {
   const calib::SideFit& nearer = calibration.nearer;
@@ -135,7 +134,7 @@ std::string ShapeLine(const calib::FocusSweep& sweep, const calib::BlurFit& blur
                   disc ? *blur.disc_misfit : *blur.gaussian_misfit,
                   disc ? *blur.gaussian_misfit : *blur.disc_misfit);
   if (blur.better_psf != sweep.camera.psf)
-    line += fmt::format("; the camera file says {}", model::PsfName(sweep.camera.psf));
+    line += fmt::format("; the camera file states {}", model::PsfName(sweep.camera.psf));
   return line;
 }
 
@@ -148,7 +147,7 @@ std::string MagnificationLine(const calib::Calibration& calibration) {
                   check.period_mm, check.period_px, WithError(d1.value, d1.sigma, "mm"));
   if (calibration.image_distance_mm && std::isfinite(calibration.image_distance_mm->value)) {
     const double apart = d1.value / calibration.image_distance_mm->value - 1;
-    line += fmt::format(", {:+.2f} % from that of focus", 100 * apart);
+    line += fmt::format(", {:+.2f} % from that of the focus fit", 100 * apart);
   }
   return line;
 }
@@ -159,7 +158,7 @@ std::string DistortionLine(const calib::ScaleModel& scale) {
                          100 * scale.distortion_at_corner->sigma};
   return fmt::format("radial distortion {} of the image height at the corner ({})",
                      Signed(percent, "%"),
-                     !IsSeen(percent)    ? "none beyond its error"
+                     !IsSeen(percent)    ? "not significant"
                      : percent.value > 0 ? "pincushion"
                                          : "barrel");
 }
@@ -173,24 +172,24 @@ std::string OutsideLine(const calib::BlurFit& blur) {
 std::string WorstKnownLine(const calib::BlurFit& blur) {
   constexpr double kWorthReporting = 0.5;
   if (blur.weak_direction.empty() || std::abs(blur.weak_correlation) < kWorthReporting) return "";
-  return "known worst: " + blur.weak_direction;
+  return "least certain: " + blur.weak_direction;
 }
 
 std::string WidenedLine(const calib::BlurFit& blur) {
   constexpr double kWorthReporting = 2;
-  // Chance alone reaches this with few frames, and the fit widens nothing for chance.
+  // With few frames chance alone reaches this, and the fit does not widen its errors for chance.
   constexpr double kBeyondChance = 3.5;
   constexpr int kManyFrames = 20;
   if (!blur.done || !(blur.chi2_per_dof > kWorthReporting)) return "";
   const bool widened = blur.chi2_per_dof > kBeyondChance || blur.frames_used >= kManyFrames;
-  return fmt::format("the frames lie farther off the law than their errors (chi2/dof {:.3g}){}",
-                     blur.chi2_per_dof, widened ? "; the errors were widened for it" : "");
+  return fmt::format("the residuals of the frames exceed their errors (chi2/dof {:.3g}){}",
+                     blur.chi2_per_dof, widened ? "; the errors were widened accordingly" : "");
 }
 
 std::string PartRange(const Eigen::Vector2d& range) {
   if (!range.allFinite()) return "-";
   const double largest = range.cwiseAbs().maxCoeff();
-  if (!(largest > 5e-6)) return "0";  // nothing that any of the units could show
+  if (!(largest > 5e-6)) return "0";  // too small to show in any of the units
   return fmt::format("{} .. {}", SignedRoundedTo(range.x(), largest),
                      SignedRoundedTo(range.y(), largest));
 }

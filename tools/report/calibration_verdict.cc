@@ -15,7 +15,7 @@ namespace {
 using calib::Calibration;
 using calib::FocusSweep;
 
-// Of the sigma of the depth of focus: from here on the bench zero's is most of it.
+// The share of the sigma of the in-focus distance from which the bench zero counts as dominant.
 constexpr double kDominantShare = 0.7;
 
 std::string Paragraph(const std::string& text) {
@@ -29,7 +29,7 @@ std::string FoundInWords(const Calibration& calibration) {
         fmt::format("image distance d1 = {} mm", WithSigma(*calibration.image_distance_mm)));
   if (calibration.focus_depth_mm)
     found.push_back(
-        fmt::format("depth of focus zf = {} mm", WithSigma(*calibration.focus_depth_mm)));
+        fmt::format("in-focus distance zf = {} mm", WithSigma(*calibration.focus_depth_mm)));
   if (calibration.blur_ratio)
     found.push_back(fmt::format("blur ratio κ = {}", WithSigma(*calibration.blur_ratio)));
   if (found.empty()) return "";
@@ -40,8 +40,8 @@ std::string FoundInWords(const Calibration& calibration) {
                                            : "");
 }
 
-// What limits the depth of focus, noise or the systematic interval, in words; and what would help,
-// unless the calibration itself advises.
+// Describes what limits the accuracy of the in-focus distance, noise or the systematic interval,
+// and what would help, unless the calibration itself gives advice.
 std::string LimitInWords(const FocusSweep& sweep, const Calibration& calibration) {
   if (!calibration.focus_depth_mm) return "";
   const calib::Result& focus = *calibration.focus_depth_mm;
@@ -50,29 +50,30 @@ std::string LimitInWords(const FocusSweep& sweep, const Calibration& calibration
       std::max(focus.systematic->y() - focus.value, focus.value - focus.systematic->x());
   const bool zero_dominates = calibration.bench_offset_mm &&
                               calibration.bench_offset_mm->sigma > kDominantShare * focus.sigma;
-  const std::string numbers =
-      fmt::format("{} ±{} mm of the depth of focus open, the systematic interval up to {:.2g} mm.",
-                  zero_dominates ? "the bench zero leaves" : "noise and readings leave",
-                  RoundedSigma(focus.sigma), half_mm);
+  const std::string numbers = fmt::format(
+      "{} an uncertainty of ±{} mm in the in-focus distance, the systematic interval one of up to "
+      "{:.2g} mm.",
+      zero_dominates ? "the bench zero leaves" : "noise and readings leave",
+      RoundedSigma(focus.sigma), half_mm);
   std::string text, help;
   if (half_mm > 2 * focus.sigma) {
-    text = "What limits it is systematic: ";
+    text = "Systematic errors dominate: ";
     help = fmt::format(
         " More frames would not help; {}both sides of focus and tighter tolerances would.",
         sweep.floor.given_px ? "" : "a blur floor measured on a knife edge, ");
   } else if (half_mm < 0.5 * focus.sigma) {
-    text = "What limits it is statistical: ";
+    text = "Statistical errors dominate: ";
     help = zero_dominates ? " Measuring offset_mm, or a longer sweep, would help."
                           : " More frames, more light or better readings would help.";
   } else {
-    text = zero_dominates ? "Bench zero and systematic errors limit it alike: "
-                          : "Noise and systematic errors limit it alike: ";
+    text = zero_dominates ? "Bench zero and systematic errors contribute alike: "
+                          : "Noise and systematic errors contribute alike: ";
   }
   return text + numbers + (calibration.advice.empty() ? help : "");
 }
 
-// What does not hang on the bench zero or the camera: the first that most people want to know, and
-// all that there is where the rest is refused.
+// Describes what does not depend on the bench zero or the camera: most users want to know it first,
+// and it is the only result if everything else is refused.
 std::string DeterminedInWords(const Calibration& calibration) {
   std::string html;
   const auto add = [&html](const std::string& about, const std::string& line) {

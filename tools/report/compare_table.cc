@@ -54,7 +54,7 @@ std::size_t CountIdentical(const LightFieldScores& scores) {
                     [](const ViewScores& view) { return IsIdentical(view.scores); }));
 }
 
-// Views that the means of PSNR are over, as CompareLightFields takes them.
+// The number of views in the means of PSNR, as CompareLightFields counts them.
 std::size_t ViewsInPsnrMean(const LightFieldScores& scores) {
   std::size_t own = 0, both = 0;
   for (const ViewScores& view : scores.views) {
@@ -112,7 +112,7 @@ std::string LightFieldScoresText(const LightFieldScores& scores, const model::Li
   }
   if (scores.dibr_mean && ViewsInPsnrMean(scores) < views - CountIdentical(scores)) {
     text += fmt::format(
-        "means of PSNR, with and without DIBR: of the {} of {} views that differ from the "
+        "means of PSNR, with and without DIBR, are over the {} of {} views that differ from the "
         "reference in both\n",
         ViewsInPsnrMean(scores), views);
   }

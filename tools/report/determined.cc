@@ -13,7 +13,7 @@
 namespace thicklens::tools {
 namespace {
 
-constexpr std::size_t kReportedCauses = 4;  // of one symptom in the text; the rest is in the JSON
+constexpr std::size_t kReportedCauses = 4;  // for one symptom in the text; the rest is in the JSON
 
 nlohmann::json FiniteNumber(double value) {
   return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);
@@ -47,7 +47,7 @@ std::string SharpestLine(const calib::Calibration& calibration) {
 std::string FocusReadingLine(const calib::Calibration& calibration) {
   if (!calibration.focus_reading_mm) return "";
   return fmt::format(
-      "reading {}, by the blur; the error of the bench zero is not in it",
+      "reading {}, from the blur, without the error of the bench zero",
       WithError(calibration.focus_reading_mm->value, calibration.focus_reading_mm->sigma, "mm"));
 }
 
@@ -57,7 +57,7 @@ std::string ScaleChangeLine(const calib::ScaleModel& scale) {
   const bool is_seen = std::abs(change.value) > 4 * change.sigma;
   return fmt::format("1/scale changes by {} over the sweep: {}",
                      SignedWithError(100 * change.value, 100 * change.sigma, "%"),
-                     !is_seen           ? "none beyond its error"
+                     !is_seen           ? "not significant"
                      : change.value > 0 ? "the target looks smaller at larger readings"
                                         : "the target looks larger at larger readings");
 }
@@ -69,7 +69,7 @@ std::vector<std::string> DiagnosisLines(const calib::Calibration& calibration) {
     for (std::size_t i = 0; i < std::min(diagnosis.causes.size(), kReportedCauses); ++i)
       causes.push_back(fmt::format("{} (chi2 {:.3g}{})", diagnosis.causes[i].cause,
                                    diagnosis.causes[i].chi2, i < diagnosis.named ? ", named" : ""));
-    causes.push_back(fmt::format("nothing at all (chi2 {:.3g})", diagnosis.chi2_of_none));
+    causes.push_back(fmt::format("no cause (chi2 {:.3g})", diagnosis.chi2_of_none));
     lines.push_back(fmt::format("{}: {}", diagnosis.symptom, fmt::join(causes, "; ")));
   }
   return lines;

@@ -67,14 +67,14 @@ bool TakesPrefix(std::string_view prefix, std::string_view* text) {
   return true;
 }
 
-// An image that carries its data, of the two kinds that a report has.
+// Returns whether an image carries its data, in one of the two formats that a report uses.
 bool IsInlineImage(std::string_view source) {
   return (TakesPrefix("data:image/png;base64,", &source) ||
           TakesPrefix("data:image/jpeg;base64,", &source)) &&
          IsMadeOf(source, "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/=");
 }
 
-// Attributes through which something could be loaded hold nothing but what a report writes there.
+// Returns whether an attribute that could load something contains only what a report writes there.
 bool IsHarmless(const std::string& key, std::string_view value) {
   if (key == "src") return IsInlineImage(value);
   if (key == "fill") return TakesPrefix("#", &value) && IsMadeOf(value, "0123456789abcdef");
@@ -84,13 +84,13 @@ bool IsHarmless(const std::string& key, std::string_view value) {
   return is_width && IsMadeOf(value.substr(0, value.size() - 2), "0123456789");
 }
 
-// References to characters, as EscapeXml writes them.
+// Recognises character references as EscapeXml writes them.
 bool IsReference(std::string_view text) {
   static const std::set<std::string_view> known = {"&amp;", "&lt;", "&gt;", "&quot;", "&#39;"};
   return known.count(text) > 0;
 }
 
-// Reads the markup from its beginning to its end and writes it anew.
+// Reads the markup from its beginning to its end and writes it again.
 class Inliner {
  public:
   Inliner(std::string_view markup, const std::string& name) : markup_(markup), name_(name) {}
@@ -109,15 +109,15 @@ class Inliner {
 
  private:
   [[noreturn]] void Refuse(const std::string& why) const {
-    throw Error(fmt::format("{}: no page of `thicklens calibrate --report`: {}", name_,
+    throw Error(fmt::format("{}: not a page of `thicklens calibrate --report`: {}", name_,
                             PrintableUtf8(why)));
   }
 
-  // Text and values of attributes: printable UTF-8 and no reference but the usual.
+  // Checks text and attribute values: printable UTF-8, with no references except the usual ones.
   std::string CheckedText(std::string_view text) const {
     std::string lines;
     for (char c : text) lines += c == '\n' ? ' ' : c;
-    if (PrintableUtf8(lines) != lines) Refuse("a text in it is no UTF-8");
+    if (PrintableUtf8(lines) != lines) Refuse("a text in it is not UTF-8");
     for (std::size_t i = text.find('&'); i != text.npos; i = text.find('&', i + 1)) {
       const std::size_t end = text.find(';', i);
       if (end == text.npos || !IsReference(text.substr(i, end - i + 1))) Refuse("a stray '&'");
@@ -196,7 +196,7 @@ class Inliner {
     return true;
   }
 
-  // Ids, and what points at them, with the prefix.
+  // Puts the prefix in front of ids, and of references to them.
   std::string Referring(const std::string& element, const std::string& key,
                         const std::string& value) const {
     if (key == "id" || key == "aria-labelledby") return kIdPrefix + value;
@@ -224,7 +224,7 @@ std::string InlinedCalibrationReport(const std::string& html, const std::string&
   const std::size_t end = html.rfind(kEnd);
   if (begin == html.npos || end == html.npos || end < begin) {
     throw Error(fmt::format(
-        "{}: no page of `thicklens calibrate --report`: there is no <main> in it", name));
+        "{}: not a page of `thicklens calibrate --report`: there is no <main> in it", name));
   }
   const std::size_t from = begin + sizeof(kBegin) - 1;
   return Inliner(std::string_view(html).substr(from, end - from), name).Run();

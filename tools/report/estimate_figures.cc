@@ -23,7 +23,7 @@ constexpr int kMosaicPx = 1780;
 constexpr int kMosaicGapPx = 2;
 constexpr double kLevelsOfFigure = 255;
 
-// What is known of a pixel; of several, the one that stands last here.
+// The confidence of a pixel; if several apply, the last one here counts.
 enum class Confidence : std::size_t { kSeen, kPartlyVisible, kBlurred, kFilledIn };
 struct ConfidenceLook {
   const char* words;
@@ -31,7 +31,7 @@ struct ConfidenceLook {
 };
 const std::array<ConfidenceLook, 4>& ConfidenceLooks() {
   static const std::array<ConfidenceLook, 4> looks = {{
-      {"seen: all that the aperture sees, the centre view shows", {150, 150, 150}},
+      {"seen: the centre view shows everything that the aperture sees", {150, 150, 150}},
       {"partly seen: some rays come past an edge or the border", {240, 178, 58}},
       {"too blurred for fine detail", {66, 135, 245}},
       {"filled in: most rays come past an edge or the border", {217, 48, 37}},
@@ -52,8 +52,8 @@ std::string Css(const std::array<std::uint8_t, 3>& colour) {
   return fmt::format("#{:02x}{:02x}{:02x}", colour[0], colour[1], colour[2]);
 }
 
-// The residual that the map shows as white (and black, if negative), in encoded values: a round
-// number of grey levels below which 99 of 100 pixels are.
+// Returns the residual that the map shows as white (or black, if negative), in encoded values: a
+// round number of grey levels that 99 of 100 pixels do not exceed.
 double ResidualRange(const std::vector<float>& residual) {
   std::vector<float> sizes;
   sizes.reserve(residual.size());
@@ -66,7 +66,7 @@ double ResidualRange(const std::vector<float>& residual) {
   return 1;
 }
 
-// The photograph in dim grey, tinted by what is known of each pixel.
+// The photograph in dim grey, tinted by the confidence of each pixel.
 cv::Mat ConfidenceMap(const LightFieldPageInput& input, const std::vector<Confidence>& known) {
   constexpr double kTint = 0.6;
   const int width_px = input.light_field->s_count, height_px = input.light_field->t_count;
@@ -125,14 +125,13 @@ std::string ResidualFigure(const LightFieldPageInput& input) {
                     return Css({grey, grey, grey});
                   });
   std::string caption =
-      "The light field put through the aperture again, less the photograph, in encoded values "
-      "(mean "
-      "of the channels). Grey is no difference, bright what the estimate has too much. Noise alone "
-      "should be left; where outlines or patches stand out, the depth or the blur is wrong. Too "
-      "little blur fits and does not show here.";
+      "The photograph computed from the light field minus the real photograph, in encoded values "
+      "(mean of the channels). Grey means no difference, bright means that the estimate is too "
+      "bright. Only noise should remain; visible outlines or patches mean that the depth or the "
+      "blur is wrong. A blur that is too narrow fits as well and does not show here.";
   if (input.estimate && input.estimate->residual_rms && input.estimate->noise_sigma) {
     caption += fmt::format(
-        " Its rms is {:.2f} grey levels, the photograph's noise {:.2f} per "
+        " Its rms is {:.2f} grey levels, the noise of the photograph {:.2f} per "
         "channel.",
         kLevelsOfFigure * *input.estimate->residual_rms,
         kLevelsOfFigure * *input.estimate->noise_sigma);
@@ -141,7 +140,7 @@ std::string ResidualFigure(const LightFieldPageInput& input) {
       fmt::format("<div class=\"images\" style=\"--columns: 1\"><div>{}{}</div></div>\n",
                   EmbeddedImage(shown, "Residual of the photograph", Packing::kExact, PlacePx(1)),
                   scale),
-      "What is not explained", caption);
+      "Residual of the photograph", caption);
 }
 
 std::string ConfidenceFigure(const LightFieldPageInput& input) {
@@ -157,18 +156,17 @@ std::string ConfidenceFigure(const LightFieldPageInput& input) {
       Grid(1, Cell(EmbeddedImage(map, "Confidence of the estimate", Packing::kSmall, PlacePx(1)),
                    "")) +
           ConfidenceLegend(known),
-      "How far to trust it",
-      fmt::format(
-          "Shares are of the photograph's pixels; the summary's are of all rays of the views. What "
-          "the centre view does not show is made up from the background beside it. Where the blur "
-          "has a sigma of more than {:g} px, no more than a twentieth of details finer "
-          "than 8 px is left in the photograph.",
-          estimator::kUnresolvedBlurSigmaPx));
+      "Confidence of the estimate",
+      fmt::format("Shares refer to the photograph's pixels, those of the summary to all rays of "
+                  "the views. Areas that the centre view does not show are filled from the "
+                  "background beside them. Where the blur has a sigma of more than {:g} px, the "
+                  "photograph contains at most a twentieth of details finer than 8 px.",
+                  estimator::kUnresolvedBlurSigmaPx));
 }
 
 std::string MosaicFigure(const LightFieldPageInput& input) {
   const model::LightField& light_field = *input.light_field;
-  // Each is shrunk before, so that a large light field is not held twice.
+  // Each view is shrunk first, so that a large light field is not kept twice.
   const int view_px =
       std::max(1, kMosaicPx / std::max(light_field.u_count, light_field.v_count) - kMosaicGapPx);
   cv::Mat mosaic;
@@ -188,9 +186,9 @@ std::string MosaicFigure(const LightFieldPageInput& input) {
       Grid(1, Cell(EmbeddedImage(mosaic, "Mosaic of the views", Packing::kSmall, PlacePx(1)), "")),
       "The views",
       fmt::format("All {} × {} views side by side, each as a pinhole at that place of the aperture "
-                  "would see the scene: u counts from left to right, v from top to bottom. Going "
-                  "right, what is nearer than the plane of focus moves left and what is farther "
-                  "moves right. Every view should be sharp at all depths.",
+                  "would see the scene: u counts from left to right, v from top to bottom. From "
+                  "left to right, points nearer than the plane of focus move left, and farther "
+                  "ones move right. Every view should be sharp at all depths.",
                   light_field.u_count, light_field.v_count));
 }
 

@@ -17,7 +17,7 @@ namespace {
 
 using nlohmann::json;
 
-// Views, pixels and blocks beyond this are no light field's.
+// Larger counts of views, pixels and blocks do not occur in a light field.
 constexpr int kMaxCount = 100000000;
 constexpr int kMaxViews = 1000;  // per axis
 
@@ -28,7 +28,7 @@ std::string Shown(const json& value) {
   return text;
 }
 
-// The members of one JSON object; messages name the file and the way to the member.
+// The members of one JSON object; messages name the file and the path of the member.
 class Fields {
  public:
   Fields(const json& object, std::string where, std::string prefix)
@@ -130,7 +130,8 @@ class Fields {
 
 json ParseJson(const std::string& text, const std::string& path, const std::string& kind) {
   json parsed = json::parse(text, nullptr, false);
-  if (parsed.is_discarded()) throw Error(fmt::format("{}: no JSON; {} is expected", path, kind));
+  if (parsed.is_discarded())
+    throw Error(fmt::format("{}: not a JSON file; {} is expected", path, kind));
   if (!parsed.is_object()) {
     throw Error(
         fmt::format("{}: an object is expected, as in {}; found {}", path, kind, Shown(parsed)));
@@ -139,7 +140,7 @@ json ParseJson(const std::string& text, const std::string& path, const std::stri
   return parsed;
 }
 
-// A run that was refused left no results.
+// Throws Error for a run that was refused, because it has no results.
 void RequireResults(const json& parsed, const char* key, const std::string& path,
                     const std::string& kind) {
   if (parsed.contains(key) && !parsed.at(key).is_null()) return;
@@ -173,7 +174,7 @@ EstimateRecord ReadEstimateRecord(const std::string& path) {
 }
 
 EstimateRecord ParseEstimateRecord(const std::string& text, const std::string& name) {
-  const std::string kind = "what `thicklens estimate --json` writes";
+  const std::string kind = "the output of `thicklens estimate --json`";
   const json parsed = ParseJson(text, name, kind);
   RequireResults(parsed, "solver", name, kind);
   const Fields fields(parsed, name, "");
@@ -216,7 +217,8 @@ EstimateRecord ParseEstimateRecord(const std::string& text, const std::string& n
 }
 
 ComparisonRecord ReadComparisonRecord(const std::string& path) {
-  const std::string kind = "what `thicklens compare TRUE_LF LF --json` writes of two light fields";
+  const std::string kind =
+      "the output of `thicklens compare TRUE_LF LF --json` for two light fields";
   const json parsed = ParseJson(ReadTextFile(path), path, kind);
   RequireResults(parsed, "mean", path, kind);
   const Fields fields(parsed, path, "");

@@ -75,7 +75,7 @@ void AddScene(const EstimateOptions& options, const EstimateOutcome& outcome, js
 void AddBlocks(const EstimateOutcome& outcome, json* out) {
   const estimator::BlockSummary& blocks = *outcome.blocks;
   const model::LightFieldOrigin& origin = outcome.light_field.origin;
-  // A direct solver has no iterations, and an iterative one no factor.
+  // A direct solver has no iterations, and an iterative one no factorisation.
   json iterations, converged, rcond_min;
   if (blocks.rcond_min) {
     rcond_min = *blocks.rcond_min;
@@ -134,7 +134,7 @@ json InpaintingJson(const EstimateOutcome& outcome) {
           {"seconds", outcome.inpainting->seconds}};
 }
 
-// How the iterations of a solver ended; a direct solver has none.
+// The end of a solver's iterations; a direct solver has none.
 struct Iterations {
   int count = 0;
   bool converged = false;
@@ -153,7 +153,7 @@ std::optional<Iterations> IterationsOf(const EstimateOutcome& outcome) {
 std::string NotConverged(const Iterations& iterations) {
   return fmt::format(
       "not converged: the relative residual is {:.1e} after {} iterations; allow more "
-      "(--max-iterations), or ask for less (--tolerance)",
+      "(--max-iterations), or a larger residual (--tolerance)",
       iterations.relative_residual, iterations.count);
 }
 
@@ -178,7 +178,7 @@ std::string SolverText(const json& summary, const EstimateOutcome& outcome) {
   }
   const estimator::SceneSummary& scene = *outcome.scene;
   return fmt::format("solver       scene: {}\n", scene.message) +
-         fmt::format("image      noise {:.2f} grey levels, explained to {:.2f} (rms)\n",
+         fmt::format("image      noise {:.2f} grey levels, residual {:.2f} (rms)\n",
                      kEightBitLevels * scene.noise_sigma, kEightBitLevels * scene.residual_rms);
 }
 
@@ -193,7 +193,7 @@ std::string AccuracyText(const EstimateOutcome& outcome) {
                      iterations.converged ? "" : ", not converged");
 }
 
-// What the samples of the aperture carry of the calibrated blur.
+// The share of the calibrated blur that the samples of the aperture represent.
 json ApertureBlurJson(const std::optional<estimator::ApertureBlur>& blur) {
   if (!blur) return nullptr;
   return {
@@ -214,9 +214,8 @@ std::string ApertureBlurText(const estimator::ApertureBlur& blur) {
 
 std::string ConfidenceText(const estimator::ConfidenceShares& of_rays) {
   return fmt::format(
-      "rays         {:.1f} % seen, {:.1f} % seen in part, {:.1f} % blurred too strongly for "
-      "details, "
-      "{:.1f} % filled in\n",
+      "rays         {:.1f} % seen, {:.1f} % partly seen, {:.1f} % too blurred for details, {:.1f} "
+      "% filled in\n",
       100 * of_rays.visible, 100 * of_rays.partly_visible, 100 * of_rays.blurred,
       100 * of_rays.filled_in);
 }
@@ -264,7 +263,7 @@ std::vector<std::string> EstimateWarnings(const EstimateOptions& options,
   constexpr double kMaxHoles = 0.5;
   if (HoleShare(prepared) > kMaxHoles) {
     warnings.push_back(fmt::format(
-        "{}: {} of its {} values are no depth: what stands there is guessed from the "
+        "{}: {} of its {} values are not depths: these areas are guessed from the "
         "others",
         options.depth_path, prepared.depth.holes, prepared.input.disparity.disparity.size()));
   }
@@ -279,12 +278,12 @@ std::vector<std::string> EstimateWarnings(const EstimateOptions& options,
       outcome.depth_noise_left_px ? outcome.depth_noise_left_px : outcome.depth_noise_px;
   if (noise_px && *noise_px > estimator::kLargestDepthNoisePx) {
     warnings.push_back(fmt::format(
-        "{}: the depth has a noise of about {:.2f} px of disparity per view step{}, above {:g} px "
+        "{}: the depth has a noise of about {:.2f} px of disparity per view step{}; above {:g} px "
         "it costs more than the estimate gains; {}",
         options.depth_path, *noise_px, outcome.depth_noise_left_px ? " after smoothing" : "",
         estimator::kLargestDepthNoisePx,
         outcome.depth_noise_left_px ? "better depth is needed"
-                                    : "without --keep-depth-noise it is smoothed"));
+                                    : "without --keep-depth-noise it would be smoothed"));
   }
   const auto iterations = IterationsOf(outcome);
   if (iterations && !iterations->converged) warnings.push_back(NotConverged(*iterations));
@@ -298,21 +297,21 @@ std::vector<std::string> EstimateWarnings(const EstimateOptions& options,
         kEightBitLevels * outcome.scene->noise_sigma));
   }
   if (outcome.unexplained_share && *outcome.unexplained_share > estimator::kMaxUnexplained) {
-    warnings.push_back(fmt::format(
-        "{:.0f} % of the photograph is not explained beyond its noise of {:.1f} grey levels: most "
-        "likely it is sharper than this depth and aperture say; {}",
-        100 * *outcome.unexplained_share, kEightBitLevels * outcome.scene->noise_sigma,
-        options.camera_path.empty() || options.depth.kind == "disparity"
-            ? "are --disparity-scale and --disparity-offset right?"
-            : "are the depth's unit, and the camera's aperture and focus, right?"));
+    warnings.push_back(
+        fmt::format("{:.0f} % of the photograph is not explained beyond its noise of {:.1f} grey "
+                    "levels: most likely it is sharper than depth and aperture predict; {}",
+                    100 * *outcome.unexplained_share, kEightBitLevels * outcome.scene->noise_sigma,
+                    options.camera_path.empty() || options.depth.kind == "disparity"
+                        ? "are --disparity-scale and --disparity-offset right?"
+                        : "are the depth's unit, and the camera's aperture and focus, right?"));
   }
   constexpr double kUnexplained = 1.5;  // times the noise
   if (outcome.scene && !outcome.unexplained_share &&
       outcome.scene->residual_rms > kUnexplained * outcome.scene->noise_sigma) {
     warnings.push_back(fmt::format(
-        "the photograph is explained to {:.1f} grey levels (noise: {:.1f}), and hardly any of it "
-        "is seen by the whole aperture: it is wide for an image of {} x {} px, or the depth is "
-        "rough; whether that is right cannot be determined",
+        "the photograph has a residual of {:.1f} grey levels (noise: {:.1f}), and the whole "
+        "aperture sees hardly any part of it: the aperture is wide for an image of {} x {} px, or "
+        "the depth is rough; which of them is unknown",
         kEightBitLevels * outcome.scene->residual_rms, kEightBitLevels * outcome.scene->noise_sigma,
         prepared.input.disparity.width_px, prepared.input.disparity.height_px));
   }
@@ -406,13 +405,13 @@ std::string EstimateText(const PreparedEstimate& prepared, const EstimateOutcome
       seconds.total, seconds.setup,
       outcome.blur ? fmt::format("blur check {:.2f}, ", seconds.blur_check) : "", seconds.solve,
       seconds.views, seconds.files);
-  text += fmt::format("memory       {:.0f} MiB at most ({:.0f} forecast)\n",
+  text += fmt::format("memory       {:.0f} MiB at most ({:.0f} predicted)\n",
                       summary["peak_rss_mib"].get<double>(),
                       summary["predicted_memory_mib"].get<double>());
   if (outcome.clipped_fraction > 0) {
     text += fmt::format(
-        "clipped      {:.2f} % of the values, by the views' files (--format tiff "
-        "keeps them)\n",
+        "clipped      {:.2f} % of the values in the files of the views (--format tiff keeps "
+        "them)\n",
         100 * outcome.clipped_fraction);
   }
   return text;

@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kPoints = 241;
 constexpr double kStandardErrors = 2;
-// Beyond this ratio of depths a curve by depth is all at its near end.
+// For a larger ratio of depths, a curve over depth is compressed at its near end.
 constexpr double kFarRatio = 4;
 
 PlotSeries Curve(const std::string& label, Ink ink, Stroke stroke) {

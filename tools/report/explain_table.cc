@@ -28,7 +28,7 @@ std::string HeadText(const model::Explanation& known) {
       with_sigma(known.image_distance_mm, known.image_distance_sigma_mm),
       DepthText(known.focus_depth_mm), with_sigma(known.blur_ratio, known.blur_ratio_sigma),
       known.blur_floor_px ? fmt::format("{:.4g} px", *known.blur_floor_px)
-                          : "unknown, taken as 0 below");
+                          : "unknown, assumed to be 0 below");
 }
 
 std::string TableText(const model::Explanation& known) {
@@ -46,7 +46,7 @@ std::string TableText(const model::Explanation& known) {
                         row.sigma_px, row.magnification, row.thin_blur_radius_px);
   }
   return text +
-         "sigma: per axis, of defocus and lens floor together, without the pixel's own box\n\n";
+         "sigma: per axis, of defocus and lens floor together, without the box of the pixel\n\n";
 }
 
 std::string DepthOfFieldText(const model::Explanation& known) {
@@ -63,12 +63,11 @@ std::string DepthOfFieldText(const model::Explanation& known) {
 
 std::string ThinText(const model::Explanation& known) {
   const model::ThinComparison& thin = known.thin;
-  if (thin.same_lens) return "thick against thin: this lens is a thin one (f1 = f2, thickness 0)\n";
+  if (thin.same_lens) return "thick against thin: this lens is thin (f1 = f2, thickness 0)\n";
   return fmt::format(
       "thick against thin (f1 = f2 = the front focal length, thickness 0)\n"
-      "  same plane of focus: blur and image positions are the same; only cos(beta), the fall "
-      "of\n"
-      "  brightness toward the corners, differs, because the image distance does\n"
+      "  same plane of focus: blur and image positions are the same; only cos(beta), the "
+      "fall-off\n  toward the corners, differs, because the image distance differs\n"
       "  same image distance: plane of focus {}; image scale {:+.4f} %, which is {:+.3f} px at "
       "the\n"
       "  farthest corner; its blur radius is in the last column\n"

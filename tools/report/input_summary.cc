@@ -15,7 +15,7 @@
 namespace thicklens::tools {
 namespace {
 
-// Depths of the nearest and the farthest frame, where the offset is known.
+// Returns the depths of the nearest and the farthest frame, if the offset is known.
 std::optional<std::pair<double, double>> DepthRangeMm(const SweepInput& input,
                                                       const Understanding& found) {
   if (!input.sweep.offset_mm) return std::nullopt;
@@ -57,7 +57,7 @@ std::string BenchText(const SweepInput& input, const Understanding& found) {
       input.sweep.reading_sigma_mm, model::BenchDirectionName(input.sweep.direction),
       EstimateText(input.sweep.offset_mm, "mm"),
       depths ? fmt::format("{:.6g} to {:.6g} mm from the aperture", depths->first, depths->second)
-             : "follow from the offset, which is to be found from the image scale");
+             : "unknown until the offset is estimated from the image scale");
 }
 
 }  // namespace

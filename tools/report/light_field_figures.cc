@@ -19,19 +19,19 @@
 namespace thicklens::tools {
 namespace {
 
-// Longest edges of the images in the page. Twice what a page of 940 px shows, where that does not
-// make it too heavy.
+// The longest edges of the images in the page: twice what a page of 940 px shows, unless the page
+// would be too large.
 constexpr int kThumbnailPx = 240;
 constexpr int kTriplePx = 512;
 constexpr int kPhotoPx = 640;
 constexpr int kRefocusPx = 400;
 constexpr int kEpipolarPx = 1000;
-constexpr int kMaxThumbnailViews = 5;  // per axis, as thumbnails
+constexpr int kMaxThumbnailViews = 5;  // per axis, shown as thumbnails
 constexpr int kRefocusDepths = 5;
-// Of the depths, how many of the nearest and of the farthest are outliers.
+// The share of the nearest and of the farthest depths that count as outliers.
 constexpr double kOutliers = 0.01;
 
-// Up to `at_most` of `count` indices, evenly chosen, with both ends.
+// Chooses up to `at_most` of `count` indices evenly, including both ends.
 std::vector<int> EvenlyChosen(int count, int at_most) {
   std::vector<int> chosen;
   const int shown = std::min(count, at_most);
@@ -57,7 +57,7 @@ std::vector<float> SortedKnown(const PageDepth& depth) {
   return known;
 }
 
-// The values between the outliers; `known` is sorted and not empty.
+// Returns the range of the values without the outliers; `known` is sorted and not empty.
 std::pair<double, double> UsualRange(const std::vector<float>& known) {
   const double last = static_cast<double>(known.size() - 1);
   const auto at = [&](double share) {
@@ -77,7 +77,7 @@ std::string DepthCell(const PageDepth& depth, bool zero_in_focus, std::string* c
       scale = ColourScale("depth", range.lo, range.hi, DepthUnit(depth),
                           [&range](double value) { return MapColourCss(range.Position(value)); });
     }
-    *caption += TrueMinus(fmt::format(" Its depth goes from {:.4g} to {:.4g} {}; bright is near.",
+    *caption += TrueMinus(fmt::format(" Its depth ranges from {:.4g} to {:.4g} {}; bright is near.",
                                       known.front(), known.back(), DepthUnit(depth)));
     if (!depth.in_mm) {
       *caption += zero_in_focus ? " Zero disparity is the plane of focus."
@@ -107,7 +107,7 @@ std::string ViewThumbnails(const LightFieldPageInput& input) {
   for (int l : rows) {
     for (int k : columns) {
       if (!light_field.IsPresent(k, l)) {
-        cells += Cell("", fmt::format("{}: not there", ViewName(k, l)));
+        cells += Cell("", fmt::format("{}: missing", ViewName(k, l)));
         continue;
       }
       const cv::Mat shown = ShownImage(model::ViewImage(light_field, k, l), kThumbnailPx);
@@ -130,12 +130,12 @@ std::string ViewThumbnails(const LightFieldPageInput& input) {
                 "left to right, v from top to bottom.",
                 shown, all);
   caption +=
-      " Going right, what is nearer than the plane of focus moves left and what is farther moves "
+      " From left to right, points nearer than the plane of focus move left, and farther ones move "
       "right. Every view should be sharp at all depths.";
   return Figure(Grid(static_cast<int>(columns.size()), cells, "views"), "The views", caption);
 }
 
-// Three views that lie far apart: along u in the middle row, or along v if there is one column.
+// Three views far apart: along u in the middle row, or along v if there is only one column.
 struct ViewIndex {
   int k = 0, l = 0;
 };
@@ -181,8 +181,8 @@ std::string LargeViews(const LightFieldPageInput& input) {
           : "uppermost, the middle and the lowest view of the middle column";
   if (input.truth == nullptr) {
     return Figure(Grid(columns, cells), "Across the aperture",
-                  fmt::format("The {}, larger. Compare where the edges of near "
-                              "and far things stand, and look for ghosts beside them.",
+                  fmt::format("The {}, larger. Compare the positions of the edges of near and far "
+                              "objects, and look for ghosts beside them.",
                               direction));
   }
   for (std::size_t i = 0; i < views.size(); ++i) add(pairs[i].second, "truth", views[i]);
@@ -193,17 +193,15 @@ std::string LargeViews(const LightFieldPageInput& input) {
   }
   return Figure(
       Grid(columns, cells), "Estimate, truth and their difference",
-      fmt::format(
-          "The {}. Above the estimate, below it the true view, and at "
-          "the bottom the difference (estimate less truth, of the values shown, amplified {} "
-          "times): grey is no difference. Look for outlines, which are edges that are "
-          "misplaced or blurred, and for patches beside near things, which the photograph "
-          "does not show.",
-          direction, gain));
+      fmt::format("The {}. The estimate is at the top, the true view below it, and at the bottom "
+                  "the difference (estimate minus truth, of the values shown, amplified {} times): "
+                  "grey means no difference. Outlines mean misplaced or blurred edges, and patches "
+                  "beside near objects are areas that the photograph does not show.",
+                  direction, gain));
 }
 
-// How often each row of an epipolar image is repeated, so that all of it is about as high as a
-// thumbnail where the page shows it.
+// How often each row of an epipolar image is repeated, so that the image is about as high as a
+// thumbnail on the page.
 int EpipolarRepeat(const model::LightField& light_field) {
   constexpr double kHeightPx = 130;
   const double zoom =
@@ -211,7 +209,7 @@ int EpipolarRepeat(const model::LightField& light_field) {
   return std::max(1, static_cast<int>(std::lround(kHeightPx / zoom / light_field.u_count)));
 }
 
-// Three rows that divide the height in four, as far as there are so many.
+// Three rows that divide the height into four parts, if there are that many.
 std::vector<int> EpipolarRows(const model::LightField& light_field) {
   std::vector<int> rows;
   for (int i = 1; i <= 3; ++i) {
@@ -226,7 +224,7 @@ struct RefocusPlane {
   std::string label;
 };
 
-// From near to far, evenly spaced in disparity.
+// Returns planes from near to far, evenly spaced in disparity.
 std::vector<RefocusPlane> RefocusPlanes(const LightFieldPageInput& input) {
   std::vector<RefocusPlane> planes;
   if (!input.depth) return planes;
@@ -277,12 +275,12 @@ std::string SweepFigure(const LightFieldPageInput& input) {
   const cv::Mat& first = sweep.shots.front().image;
   return Figure(
       Grid(columns, cells, "strip"), "The target at several distances",
-      fmt::format("{} of the {} frames of {} from near to far, with their bench readings; of each "
-                  "the {} × {} px in "
-                  "the middle. The texture should become sharp and blur again: {}how fast it "
-                  "blurs gives the blur ratio, where it is sharpest the image distance.",
-                  sweep.shots.size(), sweep.frame_count, PrintableUtf8(sweep.name), first.cols,
-                  first.rows, focus_is_known ? "sharpest near the frame marked focus; " : ""));
+      fmt::format(
+          "{} of the {} frames of {} from near to far, with their bench readings, each showing the "
+          "{} × {} px in the middle. The texture should become sharp and blur again: {}the rate of "
+          "blurring determines the blur ratio, and the sharpest position the image distance.",
+          sweep.shots.size(), sweep.frame_count, PrintableUtf8(sweep.name), first.cols, first.rows,
+          focus_is_known ? "sharpest near the frame marked focus; " : ""));
 }
 
 std::string ImageAndDepthFigure(const LightFieldPageInput& input) {
@@ -294,7 +292,7 @@ std::string ImageAndDepthFigure(const LightFieldPageInput& input) {
         "");
     title = "The photograph";
     caption =
-        "All that is known of the light: sharp in the plane of focus, blurred nearer and farther.";
+        "All available data on the light: sharp in the plane of focus, blurred nearer and farther.";
   }
   if (input.depth) {
     title += input.photo ? " and its depth" : "The depth of the photograph";
@@ -331,9 +329,9 @@ std::string EpipolarFigure(const LightFieldPageInput& input) {
       Grid(1, cells), "Epipolar images",
       fmt::format(
           "{} of the {} views with v = {}, one above the other, the leftmost view at the top. "
-          "Every point of the scene draws a line: upright in the plane of focus, "
-          "leaning to the left on its way down if it is nearer, to the right if it is farther. "
-          "Look for lines that stay sharp and unbroken from the first view to the last{}.",
+          "Every point of the scene draws a line: vertical in the plane of focus, leaning to the "
+          "left on its way down if it is nearer, to the right if it is farther. The lines should "
+          "stay sharp and unbroken from the first view to the last{}.",
           rows, light_field.u_count, l, input.truth == nullptr ? "" : "; the true ones below do"));
 }
 
@@ -353,9 +351,9 @@ std::string RefocusFigure(const LightFieldPageInput& input) {
   }
   return Figure(
       Grid(columns, cells, "strip"), "Focus moved after the exposure",
-      fmt::format("The views, shifted and averaged so that things {} come together, from near to "
-                  "far. In each image another part should be sharp; doubled contours elsewhere "
-                  "mean that the views are too few for so much blur.",
+      fmt::format("The views, shifted and averaged so that points {} coincide, from near to far. "
+                  "In each image another part should be sharp; doubled contours elsewhere mean "
+                  "that there are too few views for so much blur.",
                   input.depth->in_mm ? "at the depth below each image"
                                      : "of the disparity below each image (per view step)"));
 }

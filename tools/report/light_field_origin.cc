@@ -9,7 +9,7 @@
 namespace thicklens::tools {
 
 bool IsEstimated(const LightFieldPageInput& input) {
-  // Without what filled its occluded rays: "scene" of "scene+telea".
+  // The solver without the method that filled its occluded rays: "scene" of "scene+telea".
   const std::string& whole = input.light_field->origin.method;
   const std::string method = whole.substr(0, whole.find('+'));
   return input.estimate || method == "scene" || method == "blocks" || method == "functional" ||
@@ -24,7 +24,8 @@ std::string Counted(int count, const std::string& what) {
 
 namespace {
 
-// What made the light field: the record of the run if there is one, else the light field's file.
+// Returns the origin of the light field: the record of the run if there is one, otherwise the light
+// field's file.
 EstimateRecord Origin(const LightFieldPageInput& input) {
   if (input.estimate) return *input.estimate;
   const model::LightField& light_field = *input.light_field;
@@ -70,7 +71,7 @@ std::string Seconds(const EstimateRecord& record) {
   return text;
 }
 
-// All solvers but that of the scene have one prior, which their ridge mu tells.
+// All solvers except scene have one prior, which their ridge mu determines.
 bool RidgeTellsPrior(const EstimateRecord& record) {
   return record.ridge && record.prior == "ridge";
 }

@@ -22,7 +22,7 @@ namespace thicklens::tools {
 namespace {
 
 constexpr char kNone[] = "–";
-// Differences below are what rounding alone makes.
+// Smaller differences are due to rounding.
 constexpr double kAlikeDb = 0.005;
 
 std::string Paragraph(const std::string& text) {
@@ -50,10 +50,10 @@ std::string WithSigma(const model::Estimate& estimate) {
                      RoundedSigma(estimate.sigma));
 }
 
-// What the calibrated values rest on.
+// Describes the evidence for the calibrated values.
 std::string EvidenceInWords(const model::Evidence& evidence) {
   if (evidence.method == "assumed") return " (assumed, not measured)";
-  if (evidence.method == "simulated") return " (of a simulated camera: true, not measured)";
+  if (evidence.method == "simulated") return " (true values of a simulated camera, not measured)";
   if (evidence.frames_used > 0)
     return fmt::format(" (calibrated from {})", Counted(evidence.frames_used, "frame"));
   return evidence.method.empty() ? "" : fmt::format(" (by {})", PrintableUtf8(evidence.method));
@@ -104,8 +104,8 @@ std::string QualityInWords(const LightFieldPageInput& input) {
   text += ".";
   if (!comparison.dibr_mean) return text;
   text += fmt::format(
-      " The plain alternative, the photograph warped to each view by its depth (DIBR), reaches "
-      "{}\u00A0dB in the mean: {}",
+      " The baseline, depth-image-based rendering (DIBR: the photograph warped to each view by its "
+      "depth), reaches {}\u00A0dB in the mean: {}",
       Psnr(comparison.dibr_mean->psnr_db),
       DibrAgainst(comparison.dibr_mean->psnr_db, comparison.mean.psnr_db));
   if (comparison.dibr_centre && comparison.centre)
@@ -194,12 +194,13 @@ std::string ScoresTable(const ComparisonRecord& comparison) {
              "</tbody></table></div>\n<p class=\"soft\">Against the true views{}, on stored "
              "values. PSNR, ",
              area) +
-         "SSIM and the MACADE stand-in (agreement of edge directions; the definition of MACADE "
-         "itself could not be had): higher is better. ΔE94, the difference of colours as seen: "
-         "lower is better. DIBR is the photograph warped to each view by its depth.</p>\n";
+         "SSIM and the MACADE stand-in (edge-orientation similarity, an approximation of MACADE, "
+         "whose definition is not available): higher is better. ΔE94, the perceived colour "
+         "difference: lower is better. DIBR is the photograph warped to each view by its "
+         "depth.</p>\n";
 }
 
-// Black or white, whichever is read more easily on the colour.
+// Returns black or white, whichever is easier to read on the colour.
 std::string InkOn(double position) {
   const auto colour = MapColour(position);
   const double luma = 0.2126 * colour[0] + 0.7152 * colour[1] + 0.0722 * colour[2];
@@ -250,8 +251,8 @@ std::string HeatTable(const std::vector<ViewRecord>& views) {
   for (int u = 0; u <= u_last; ++u) html += fmt::format("<th>u {}</th>", u);
   html += "</tr></thead>\n<tbody>\n" + rows + "</tbody></table></div>\n<p class=\"soft\">";
   html +=
-      "Where the views lie in the aperture; yellow is best. Views far from the centre see what "
-      "the photograph does not and are expected to be worse.";
+      "The table shows the positions of the views in the aperture; yellow is best. Views far from "
+      "the centre show areas that the photograph does not and are expected to be worse.";
   if (judged > 0)
     html += worse > 0 ? fmt::format(" ▾ marks the {} of {} where DIBR is better.", worse, judged)
                       : std::string(" DIBR is better in none of them.");
@@ -289,13 +290,13 @@ LightFieldPage MakeLightFieldPage(const LightFieldPageInput& input) {
   add("calibration", "",
       input.calibration.empty() ? ""
                                 : "<div class=\"inlined\">\n" + input.calibration + "</div>\n");
-  add("image", "What the estimate starts from", ImageAndDepthFigure(input));
-  add("residual", "What the estimate leaves", ResidualFigure(input));
-  add("confidence", "What is known and what is made up", ConfidenceFigure(input));
+  add("image", "Input of the estimate", ImageAndDepthFigure(input));
+  add("residual", "Residual", ResidualFigure(input));
+  add("confidence", "Observed and filled-in areas", ConfidenceFigure(input));
   add("views", "The views", ViewFigures(input));
   add("epipolar", "The scene points as lines", EpipolarFigure(input));
   add("refocus", "Refocused", RefocusFigure(input));
-  add("numbers", "How good it is", Numbers(input));
+  add("numbers", "Accuracy", Numbers(input));
   add("how", "How it was made", HowItWasMade(input));
   page.html += "</main>\n</body>\n</html>\n";
   return page;

@@ -20,7 +20,7 @@ namespace thicklens::tools {
 namespace {
 
 constexpr int kJpegQuality = 90;
-// Below so many px JPEG saves little and its blocks would show.
+// In smaller images JPEG saves little and its blocks would be visible.
 constexpr int kSmallestJpegPx = 160 * 160;
 constexpr double kMidGrey = 128;
 constexpr int kHatchPx = 4;
@@ -38,7 +38,7 @@ std::uint8_t Level(double value) {
   return static_cast<std::uint8_t>(std::lround(std::clamp(value, 0.0, 255.0)));
 }
 
-// The sample that stands for pixel (x, y) of a map shown at that size.
+// Returns the sample that represents pixel (x, y) of a map shown at that size.
 float SampleFor(const std::vector<float>& values, int width_px, int height_px, cv::Size size, int x,
                 int y) {
   const int from_x = static_cast<int>((x + 0.5) * width_px / size.width);

@@ -18,7 +18,7 @@ std::vector<double> NiceTicks(double lo, double hi, int at_most) {
     const double first = std::ceil(lo / step - 1e-9);
     const double last = std::floor(hi / step + 1e-9);
     if (last - first + 1 > at_most) continue;
-    // Multiples of the step, not a running sum: zero comes out as zero.
+    // Multiples of the step, not a running sum, so that zero is exactly zero.
     for (int i = 0; i <= static_cast<int>(last - first); ++i) ticks.push_back((first + i) * step);
     return ticks;
   }

@@ -11,8 +11,8 @@
 namespace thicklens::tools {
 namespace {
 
-constexpr std::size_t kMaxRuns = 6;      // of one kind in the text
-constexpr std::size_t kLongEnding = 20;  // characters that are worth leaving out
+constexpr std::size_t kMaxRuns = 6;      // for one kind in the text
+constexpr std::size_t kLongEnding = 20;  // the minimum number of characters worth leaving out
 constexpr char kLeftOut[] = "...";
 
 std::string Reason(const std::string& kind, const std::string& detail) {
@@ -30,8 +30,9 @@ std::size_t CommonEnding(const std::string& a, const std::string& b) {
   return common;
 }
 
-// Of what differs in a group: how many characters at the end are the same in all, whole words
-// alone and without the first of them, which may be a unit. 0 if they are not worth leaving out.
+// Returns how many characters at the end of the details of a group are the same in all of them,
+// counting whole words only and not the first of them, which may be a unit. Returns 0 if they are
+// not worth leaving out.
 std::size_t CommonEnding(const calib::RejectionGroup& group) {
   const std::string& first = group.runs.front().detail;
   std::size_t common = first.size();
@@ -60,9 +61,9 @@ std::string GroupLines(const std::vector<calib::FrameMeasurement>& frames,
     text += fmt::format("    {}\n", PrintableUtf8(Reason(RunName(frames, run), details[i])));
     told += run.count();
   }
-  if (told < group.frames) {
+  if (reported < group.frames) {
     text +=
-        fmt::format("    and {} more, which --report and --json name each\n", group.frames - told);
+        fmt::format("    and {} more, which --report and --json list\n", group.frames - reported);
   }
   return text;
 }

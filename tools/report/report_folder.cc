@@ -12,14 +12,14 @@ namespace fs = std::filesystem;
 
 ReportFolder::ReportFolder(const std::string& path) : path_(path) {
   std::error_code failure;
-  if (path == "-") throw Error("-: a report cannot go to standard output; name a folder");
+  if (path == "-") throw Error("-: a report cannot be written to standard output; name a folder");
   if (path.empty() || fs::exists(path, failure)) return;
-  bool is_new = false;  // somebody else may make it at the same moment
+  bool is_new = false;  // another process may create it at the same moment
   made_ = Temporary(
       [&] {
         is_new = fs::create_directory(path, failure);
         if (failure)
-          throw Error(fmt::format("{}: the folder cannot be made: {}", path, failure.message()));
+          throw Error(fmt::format("{}: the folder cannot be created: {}", path, failure.message()));
         return path;
       },
       Abandon::kIfEmpty);

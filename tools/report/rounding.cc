@@ -8,8 +8,8 @@
 namespace thicklens::tools {
 namespace {
 
-// Decimals that show two digits of sigma; the exponent is taken after rounding, so that 0.0996 is
-// 0.10 with two decimals.
+// Returns the number of decimals that show two digits of sigma; the exponent is determined after
+// rounding, so that 0.0996 becomes 0.10 with two decimals.
 int DecimalsOf(double sigma) {
   const int exponent = std::stoi(fmt::format("{:.1e}", sigma).substr(4));
   return std::clamp(1 - exponent, 0, 12);
@@ -23,7 +23,7 @@ std::string RoundedTo(double value, double sigma) {
   if (!std::isfinite(value)) return fmt::format("{}", value);
   std::string text = UsableSigma(sigma) ? fmt::format("{:.{}f}", value, DecimalsOf(sigma))
                                         : fmt::format("{:.5g}", value);
-  // No "-0.00": the sign of what is rounded away says nothing.
+  // Avoids "-0.00": the sign of a value that is rounded away has no meaning.
   if (text[0] == '-' && text.find_first_of("123456789") == std::string::npos) text.erase(0, 1);
   return text;
 }

@@ -15,7 +15,7 @@ namespace thicklens::tools {
 namespace {
 
 constexpr double kFontPx = 12;
-// Wide enough for the widest of the usual system fonts, so that nothing overlaps in any of them.
+// Wide enough for the widest of the common system fonts, so that nothing overlaps in any of them.
 constexpr double kCharWidthPx = 7.2;
 constexpr double kLegendRowPx = 20;
 
@@ -89,7 +89,7 @@ struct Interval {
   bool Holds(double value) const { return value >= lo && value <= hi; }
 };
 
-// Half the data's span is as far as a line or an error bar may stretch the plot.
+// A line or an error bar may extend the plot by at most this share of the data's span.
 constexpr double kStretch = 0.5;
 
 Interval Padded(Interval range) {
@@ -129,7 +129,8 @@ Interval RangeOf(const Plot& plot, bool horizontal) {
   return Padded(range);
 }
 
-// A plot whose logarithmic axes show logarithms, so that all that draws it need not know of them.
+// Replaces values on logarithmic axes by their logarithms, so that the drawing code need not
+// distinguish.
 Plot WithLogarithms(Plot plot) {
   const auto logarithm = [](double value) {
     return value > 0 ? std::log10(value) : std::numeric_limits<double>::quiet_NaN();
@@ -145,7 +146,7 @@ Plot WithLogarithms(Plot plot) {
     }
     for (PlotSeries& series : plot.series) {
       if (!is_x) {
-        // What the bar reaches upward; downward it would reach farther.
+        // The upward reach of the bar; the downward one would be longer.
         for (std::size_t i = 0; i < std::min(series.y_error.size(), series.y.size()); ++i) {
           series.y_error[i] = logarithm(1 + series.y_error[i] / series.y[i]);
         }
@@ -171,7 +172,7 @@ Plot WithLogarithms(Plot plot) {
   return plot;
 }
 
-// Where a tick is, as drawn, and what stands beside it.
+// The drawn position of a tick, and its label.
 struct Tick {
   double at = 0;
   std::string label;
@@ -193,7 +194,7 @@ std::vector<Tick> TicksOf(const PlotAxis& axis, const Interval& range, int at_mo
   return ticks;
 }
 
-// The drawing area and how numbers map into it.
+// The drawing area, and the mapping of numbers to it.
 struct Frame {
   double left = 0, right = 0, top = 0, bottom = 0;
   Interval x, y;
@@ -230,7 +231,7 @@ std::vector<LegendEntry> LegendOf(const Plot& plot, const Interval& x, const Int
 
 double EntryWidthPx(const LegendEntry& entry) { return 30 + TextWidthPx(entry.label) + 14; }
 
-// Breaks the legend into rows that fit; returns the entries' places relative to the first.
+// Breaks the legend into rows that fit; returns the positions of the entries relative to the first.
 std::vector<std::pair<double, int>> LegendPlaces(const std::vector<LegendEntry>& entries,
                                                  double width_px) {
   std::vector<std::pair<double, int>> places;
@@ -305,7 +306,8 @@ void AppendPolyline(const PlotSeries& series, const Frame& frame, std::string* s
       pen_down = false;
       continue;
     }
-    // Far outside the frame a coordinate serves the slope alone; renderers dislike huge ones.
+    // Far outside the frame a coordinate only determines the slope; renderers have problems with
+    // huge ones.
     const double y = std::clamp(frame.Y(series.y[i]), -1e4, 1e4);
     path += fmt::format("{}{:.2f} {:.2f}", pen_down ? 'L' : 'M', frame.X(series.x[i]), y);
     pen_down = true;
@@ -315,8 +317,8 @@ void AppendPolyline(const PlotSeries& series, const Frame& frame, std::string* s
                         DashOf(series.stroke));
 }
 
-// From left to right along the upper curve and back along the lower one. A point where either is
-// not finite ends the area, and the next begins another.
+// Goes from left to right along the upper curve and back along the lower one. A point where either
+// is not finite ends the area, and the next point begins another.
 void AppendBand(const PlotBand& band, const Frame& frame, std::string* svg) {
   const std::size_t count = std::min({band.x.size(), band.lo.size(), band.hi.size()});
   const auto point = [&](std::size_t i, double y) {
@@ -340,7 +342,7 @@ void AppendBand(const PlotBand& band, const Frame& frame, std::string* svg) {
   if (!path.empty()) *svg += fmt::format("<path class=\"band\" d=\"{}\"/>", path);
 }
 
-// A triangle at the edge that a point lies beyond.
+// A triangle at the edge beyond which a point lies.
 std::string BeyondMark(double x, double edge_y, bool upward) {
   const int rise = upward ? -6 : 6;
   return fmt::format("<path class=\"open\" d=\"M{:.1f} {:.1f}l3.5 {}l3.5 {}z\"/>", x - 3.5,
@@ -393,7 +395,8 @@ std::string SvgPlot(const Plot& given) {
   frame.right = plot.width_px - 14;
 
   const std::vector<LegendEntry> legend = LegendOf(plot, frame.x, frame.y);
-  // The legend's rows decide the height, the height the ticks, their labels the left margin.
+  // The rows of the legend determine the height, the height the ticks, and their labels the left
+  // margin.
   const double legend_left = 30;
   const double heading_px = plot.heading.empty() ? 0 : 20;
   const std::vector<std::pair<double, int>> places =
@@ -402,7 +405,8 @@ std::string SvgPlot(const Plot& given) {
   frame.bottom = plot.height_px - 46;
   const std::vector<Tick> y_ticks =
       TicksOf(plot.y_axis, frame.y, std::max(2, static_cast<int>((frame.bottom - frame.top) / 26)));
-  // Room for four characters at least: figures below each other then mostly share their left edge.
+  // Room for at least four characters, so that figures below each other mostly share their left
+  // edge.
   double label_width = 4 * kCharWidthPx;
   for (const Tick& tick : y_ticks) label_width = std::max(label_width, TextWidthPx(tick.label));
   frame.left = 26 + label_width + 8;

@@ -12,7 +12,8 @@ struct Colour {
   const char* dark;
 };
 
-// After Okabe and Ito, told apart by colour-blind readers; lighter ones on dark paper.
+// Colours by Okabe and Ito, which colour-blind readers can distinguish; lighter ones on a dark
+// background.
 constexpr Colour kColours[] = {
     {"--fit", "#0072b2", "#56b4e9"},   {"--source", "#d55e00", "#f08c3a"},
     {"--peak", "#008a64", "#35c79c"},  {"--data", "#4a4f57", "#ccd1d8"},
@@ -45,7 +46,8 @@ std::string Declarations(const char* Colour::*shade) {
   return text + " }\n";
 }
 
-// The rules with the colours themselves: many programs that show an SVG file know no variables.
+// The rules with the colours inserted, because many programs that show SVG files do not support
+// variables.
 std::string Resolved(std::string rules, const char* Colour::*shade) {
   for (const Colour& colour : kColours) {
     const std::string reference = std::string("var(") + colour.name + ")";

@@ -1,5 +1,5 @@
-// PDF and PNG through cairo, which draws both the same way. SVG is written here: cairo's would be
-// several times as long, with the text as outlines.
+// PDF and PNG are drawn through cairo, which draws both the same way. SVG is written here: cairo's
+// file would be several times as long, with the text as outlines.
 #include "tools/report/target_drawing.h"
 
 #include <cairo-pdf.h>
@@ -26,7 +26,7 @@ constexpr double kPointsPerMm = 72 / 25.4;
 constexpr double kInchesPerMetre = 1 / 0.0254;
 constexpr double kMmPerMetre = 1000;
 constexpr double kMaxDrawingPixels = 150e6;
-constexpr int kLongestSidePx = 32767;  // of an image in cairo
+constexpr int kLongestSidePx = 32767;  // the limit of cairo
 constexpr double kMinFeaturePx = 2;
 constexpr double kFullGrey = 255;
 constexpr int kLeavesPerLook = 4096;
@@ -97,7 +97,7 @@ void DrawEdge(const model::TargetPage& page, cairo_t* context) {
 
 void DrawCaption(const model::TargetPage& page, cairo_antialias_t antialias, cairo_t* context) {
   FillRectangle(page.bar, 0, context);
-  // Letters lie where the page says, not where a screen's pixels would like them.
+  // Letters are placed exactly as the page states, and not aligned to the pixels of a screen.
   const FontOptions options(cairo_font_options_create());
   cairo_font_options_set_hint_style(options.get(), CAIRO_HINT_STYLE_NONE);
   cairo_font_options_set_hint_metrics(options.get(), CAIRO_HINT_METRICS_OFF);
@@ -113,7 +113,7 @@ void DrawCaption(const model::TargetPage& page, cairo_antialias_t antialias, cai
   }
 }
 
-// Everything, in mm, on a surface that has `units_per_mm`.
+// Draws everything, in mm, on a surface with `units_per_mm`.
 void DrawPage(const model::TargetPage& page, const std::vector<model::TargetLeaf>& leaves,
               double units_per_mm, cairo_surface_t* surface) {
   const Context context(cairo_create(surface));
@@ -203,14 +203,14 @@ PngSize TargetPngSize(const model::TargetPage& page, double dots_per_inch) {
       !(height_px <= kLongestSidePx)) {
     throw Error(fmt::format(
         "{:g} x {:g} mm at {:g} dpi are {:.0f} x {:.0f} px, more than {:g} million or than {} in a "
-        "row: take a smaller --dpi or --size, or write a PDF, which has no px",
+        "row: choose a smaller --dpi or --size, or write a PDF, which has no px",
         page.width_mm, page.height_mm, dots_per_inch, width_px, height_px, kMaxDrawingPixels / 1e6,
         kLongestSidePx));
   }
   const double feature_px = page.feature_mm * pixels_per_metre / kMmPerMetre;
   if (!(feature_px >= kMinFeaturePx)) {
     throw Error(
-        fmt::format("features of {:g} mm are {:.2f} px at {:g} dpi, below {:g}: take a larger "
+        fmt::format("features of {:g} mm are {:.2f} px at {:g} dpi, below {:g}: choose a larger "
                     "--dpi or --feature-mm, or write a PDF, which has no px",
                     page.feature_mm, feature_px, dots_per_inch, kMinFeaturePx));
   }
@@ -233,7 +233,8 @@ std::string TargetPng(const model::TargetPage& page, const std::vector<model::Ta
     image.values.reserve(width * static_cast<std::size_t>(size.height_px));
     for (std::size_t y = 0; y < static_cast<std::size_t>(size.height_px); ++y) {
       ThrowIfCancelled();
-      // A px of RGB24 is a word of 32 bits with blue in its lowest byte; all colours are alike.
+      // A px of RGB24 is a word of 32 bits with blue in its lowest byte; all three colours are
+      // equal.
       const auto* row = reinterpret_cast<const std::uint32_t*>(bytes + y * stride);
       for (std::size_t x = 0; x < width; ++x)
         image.values.push_back(static_cast<std::uint16_t>(row[x] & 0xFFU));

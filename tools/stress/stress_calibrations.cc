@@ -1,4 +1,4 @@
-// What is hard about calibrating: sweeps that are short, one-sided, damaged or wrongly described.
+// Hard cases of calibration: sweeps that are short, one-sided, damaged or wrongly described.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -19,11 +19,12 @@ namespace {
 namespace fs = std::filesystem;
 using Frames = std::vector<model::EncodedImage>;
 
-// What d1 may be off by: two thirds of what a depth of field of half a pixel leaves open, .4 mm.
+// The limit of the error of d1: two thirds of what a depth of field of half a pixel leaves
+// undetermined, 0.4 mm.
 constexpr double kMaxUm = 10;
 const char kTruth[] =
-    "d1, zf and kappa within 4 standard errors of the truth (beside the systematic interval), d1 "
-    "within 10 um";
+    "d1, zf and kappa within 4 standard errors of the truth (in addition to the systematic "
+    "interval), d1 within 10 um";
 
 using Outcome = std::function<Requirement(const model::SweepTruth&)>;
 Outcome Truth(double most_um = kMaxUm) {
@@ -61,10 +62,12 @@ StressSweep Described(std::function<void(model::SweepFile*)> describe) {
   return sweep;
 }
 
-// So many frames about the plane of focus, over the same depths as the usual sweep.
+// Returns a sweep of `count` frames around the plane of focus, over the same depths as the usual
+// sweep.
 StressSweep OfFrames(int count) {
   return Simulated([count](model::SweepSimulationOptions* simulation) {
-    // The outermost frames still show some texture: none of so few can be spared.
+    // The outermost frames must still show some texture, because none of so few frames can be
+    // spared.
     constexpr double kPart = 0.85;
     const double whole_mm = simulation->step_mm * (simulation->frame_count - 1);
     const double length_mm = kPart * whole_mm;
@@ -88,19 +91,20 @@ std::vector<StressCase> Frames2To5() {
                              : count == 3 ? "three-frames"
                                           : "four-frames";
     cases.push_back(
-        Sweep(name, "not more readings than unknowns: nothing would be left to check them",
-              "refused: how many frames there are, and how many are needed", OfFrames(count),
+        Sweep(name, "not more readings than unknowns: nothing would remain to check them",
+              "refused: the number of frames, and the number that is needed", OfFrames(count),
               Refusal({"at least 5 frames", "has " + std::to_string(count)})));
   }
-  cases.push_back(Sweep("five-frames", "one more than unknowns", kTruth, OfFrames(5), Truth()));
+  cases.push_back(
+      Sweep("five-frames", "one reading more than unknowns", kTruth, OfFrames(5), Truth()));
   return cases;
 }
 
 std::vector<StressCase> Focus() {
   std::vector<StressCase> cases;
-  cases.push_back(Sweep("focus-at-first-frame", "one side of the plane of focus alone is seen",
+  cases.push_back(Sweep("focus-at-first-frame", "only one side of the plane of focus is seen",
                         kTruth, BeginningAt(300), Truth()));
-  cases.push_back(Sweep("focus-at-last-frame", "one side of the plane of focus alone is seen",
+  cases.push_back(Sweep("focus-at-last-frame", "only one side of the plane of focus is seen",
                         kTruth, BeginningAt(270), Truth()));
   cases.push_back(Sweep("focus-a-little-before-the-sweep",
                         "the plane of focus is 5 mm nearer than any frame",
@@ -110,17 +114,16 @@ std::vector<StressCase> Focus() {
                         "the plane of focus is 5 mm beyond any frame",
                         "d1, zf and kappa within 4 standard errors of the truth, d1 within 20 um",
                         BeginningAt(265), Truth(20)));
-  cases.push_back(
-      Sweep("focus-far-before-the-sweep",
-            "the plane of focus is 10 mm nearer than any frame: too few frames are sharp "
-            "enough to tell where it is",
-            "refused: that the focus is outside, and on which side", BeginningAt(310),
-            Refusal({"sharpness is monotone", "nearer"})));
-  cases.push_back(Sweep("focus-far-behind-the-sweep",
-                        "the plane of focus is 10 mm beyond any frame: too few frames are sharp "
-                        "enough to tell where it is",
-                        "refused: that the focus is outside, and on which side", BeginningAt(260),
-                        Refusal({"sharpness is monotone", "farther"})));
+  cases.push_back(Sweep("focus-far-before-the-sweep",
+                        "the plane of focus is 10 mm nearer than any frame: too few frames are "
+                        "sharp enough to locate it",
+                        "refused: the focus is outside, and on which side", BeginningAt(310),
+                        Refusal({"sharpness is monotone", "nearer"})));
+  cases.push_back(Sweep(
+      "focus-far-behind-the-sweep",
+      "the plane of focus is 10 mm beyond any frame: too few frames are sharp enough to locate it",
+      "refused: the focus is outside, and on which side", BeginningAt(260),
+      Refusal({"sharpness is monotone", "farther"})));
   return cases;
 }
 
@@ -130,36 +133,34 @@ void Swap(model::SweepFile* file, std::size_t a, std::size_t b) {
 
 std::vector<StressCase> Readings() {
   std::vector<StressCase> cases;
-  cases.push_back(Sweep("readings-all-equal", "nothing moved, the file says",
-                        "refused: that the readings are equal",
-                        Described([](model::SweepFile* file) {
+  cases.push_back(Sweep("readings-all-equal", "according to the file nothing moved",
+                        "refused: the readings are equal", Described([](model::SweepFile* file) {
                           for (model::SweepFrame& frame : file->frames) frame.reading_mm = 300;
                         }),
                         Refusal({"at least 5 different readings", "300"})));
   cases.push_back(Sweep("readings-reversed", "the bench scale is read from the wrong end",
-                        "refused: that image scale and readings run against each other",
+                        "refused: image scale and readings run in opposite directions",
                         Described([](model::SweepFile* file) {
                           for (std::size_t i = 0, j = file->frames.size() - 1; i < j; ++i, --j) {
                             Swap(file, i, j);
                           }
                         }),
                         Refusal({"direction", "toward"})));
-  cases.push_back(Sweep("readings-in-centimetres",
-                        "all readings are a tenth of what they should be",
-                        "refused: that the readings contradict the image scale or the camera",
+  cases.push_back(Sweep("readings-in-centimetres", "all readings are a tenth of the correct ones",
+                        "refused: the readings contradict the image scale or the camera",
                         Described([](model::SweepFile* file) {
                           for (model::SweepFrame& frame : file->frames) frame.reading_mm /= 10;
                         }),
                         Refusal({"image scale", "are the readings in mm?"})));
-  cases.push_back(Sweep("readings-in-micrometres",
-                        "all readings are a thousand times what they should be",
-                        "refused: that the readings contradict the image scale",
-                        Described([](model::SweepFile* file) {
-                          for (model::SweepFrame& frame : file->frames) frame.reading_mm *= 1000;
-                        }),
-                        Refusal({"blur ratio", "unit of the readings"})));
-  cases.push_back(Sweep("two-readings-swapped", "frames 8 and 20 have each other's reading", kTruth,
-                        Described([](model::SweepFile* file) { Swap(file, 8, 20); }), Truth()));
+  cases.push_back(Sweep(
+      "readings-in-micrometres", "all readings are a thousand times the correct ones",
+      "refused: the readings contradict the image scale", Described([](model::SweepFile* file) {
+        for (model::SweepFrame& frame : file->frames) frame.reading_mm *= 1000;
+      }),
+      Refusal({"blur ratio", "unit of the readings"})));
+  cases.push_back(Sweep("two-readings-swapped", "the readings of frames 8 and 20 are swapped",
+                        kTruth, Described([](model::SweepFile* file) { Swap(file, 8, 20); }),
+                        Truth()));
   cases.push_back(Sweep("one-reading-off", "frame 20 is off by three steps", kTruth,
                         Described([](model::SweepFile* file) { file->frames[20].reading_mm += 3; }),
                         Truth()));
@@ -170,7 +171,7 @@ void Fill(model::EncodedImage* frame, std::uint16_t value) {
   std::fill(frame->values.begin(), frame->values.end(), value);
 }
 
-// A box of so many pixels along the rows.
+// Averages over so many pixels along the rows.
 void Smear(model::EncodedImage* frame, int length_px) {
   const std::vector<std::uint16_t> sharp = frame->values;
   for (int y = 0; y < frame->height_px; ++y) {
@@ -193,7 +194,7 @@ void TurnAround(model::EncodedImage* frame) {
 std::vector<StressCase> Damages() {
   std::vector<StressCase> cases;
   cases.push_back(Sweep("one-image-thirty-one-times", "the shutter fired, the bench did not move",
-                        "refused: that the frames are the same image, or do not change",
+                        "refused: the frames are the same image, or do not change",
                         Damaged([](Frames* frames) {
                           for (std::size_t i = 1; i < frames->size(); ++i) {
                             (*frames)[i] = frames->front();
@@ -201,14 +202,14 @@ std::vector<StressCase> Damages() {
                         }),
                         Refusal({"one image was repeated"})));
   cases.push_back(Sweep("all-frames-blank", "a target without texture",
-                        "refused: that the frames show no texture", Damaged([](Frames* frames) {
+                        "refused: the frames show no texture", Damaged([](Frames* frames) {
                           for (model::EncodedImage& frame : *frames) Fill(&frame, 128);
                         }),
                         Refusal({"no texture above the noise"})));
   for (const bool black : {true, false}) {
     cases.push_back(Sweep(black ? "all-frames-black" : "all-frames-white",
-                          black ? "the cap was on" : "the exposure was far too long",
-                          "refused: that no frame can be used", Damaged([black](Frames* frames) {
+                          black ? "the lens cap was on" : "the exposure was far too long",
+                          "refused: no frame can be used", Damaged([black](Frames* frames) {
                             for (model::EncodedImage& frame : *frames)
                               Fill(&frame, black ? 0 : 255);
                           }),
@@ -221,14 +222,14 @@ std::vector<StressCase> Damages() {
                           Fill(&(*frames)[22], 128);
                         }),
                         Truth()));
-  cases.push_back(Sweep("smeared-frame", "somebody hit the bench: 15 px of smear near focus",
+  cases.push_back(Sweep("smeared-frame", "the bench was hit: 15 px of motion blur near focus",
                         kTruth, Damaged([](Frames* frames) { Smear(&(*frames)[18], 15); }),
                         Truth()));
   cases.push_back(Sweep("rotated-frame", "one frame is upside down", kTruth,
                         Damaged([](Frames* frames) { TurnAround(&(*frames)[12]); }), Truth()));
   cases.push_back(Sweep("tilted-target",
-                        "the target leans by 10 degrees: every column has a depth of its own",
-                        kTruth, Simulated([](model::SweepSimulationOptions* simulation) {
+                        "the target leans by 10 degrees: every column has another depth", kTruth,
+                        Simulated([](model::SweepSimulationOptions* simulation) {
                           simulation->target.tilt_deg = 10;
                         }),
                         Truth()));
@@ -238,8 +239,8 @@ std::vector<StressCase> Damages() {
                           simulation->read_noise_electrons = 12;
                         }),
                         Truth()));
-  cases.push_back(Sweep("noise-alone", "no target at all",
-                        "refused: that the frames show no texture", Damaged([](Frames* frames) {
+  cases.push_back(Sweep("noise-alone", "no target at all", "refused: the frames show no texture",
+                        Damaged([](Frames* frames) {
                           std::mt19937 engine(5);
                           for (model::EncodedImage& frame : *frames) {
                             for (std::uint16_t& value : frame.values) {
@@ -268,9 +269,9 @@ std::vector<StressCase> Optics() {
     };
     cases.push_back(Sweep(
         wrong_mm < 50 ? "focal-length-too-short" : "focal-length-too-long",
-        "the camera file says 35 or 70 mm, the lens has 50: no texture shows that, kappa takes "
-        "it up",
-        "told: the blur ratio is not what apertures give, and a wrong focal length looks like "
+        "the camera file states 35 or 70 mm, but the lens has 50 mm: no texture shows that, and "
+        "kappa absorbs it",
+        "a warning: the blur ratio is not one of an aperture, and a wrong focal length looks like "
         "this",
         wrong_lens, [](const model::SweepTruth&) {
           return Warned({"blur ratio", "focal length", "target_period_mm"});
@@ -280,10 +281,10 @@ std::vector<StressCase> Optics() {
     simulation->step_mm = 0.01;
     simulation->first_depth_mm = 299.85;
   });
-  cases.push_back(Sweep("no-defocus",
-                        "all frames lie within .15 mm of the plane of focus, readings "
-                        "are good to .07 mm",
-                        kTruth, at_focus, Truth()));
+  cases.push_back(
+      Sweep("no-defocus",
+            "all frames lie within 0.15 mm of the plane of focus, readings are accurate to 0.07 mm",
+            kTruth, at_focus, Truth()));
   return cases;
 }
 

@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 
 constexpr char kSummaryFile[] = "summary.json";
 
-// The lines of what a run printed to stderr that tell its failure.
+// Returns the lines on stderr that report the failure of a run.
 std::vector<std::string> ErrorLines(const std::string& err) {
   std::vector<std::string> found;
   std::istringstream lines(err);
@@ -47,7 +47,7 @@ Judgement JudgeRefusal(const Requirement& required, const ProgramRun& run, const
   }
   for (const std::string& word : required.words) {
     if (errors.front().find(word) == std::string::npos) {
-      return {false, fmt::format("refused without saying '{}': {}", word, errors.front()), {}};
+      return {false, fmt::format("refused without the text '{}': {}", word, errors.front()), {}};
     }
   }
   std::error_code unreachable;
@@ -64,11 +64,11 @@ Judgement JudgeSolution(const Requirement& required, const ProgramRun& run, cons
     return {false, "refused: " + (errors.empty() ? run.err : errors.front()), {}};
   }
   if (summary.value("status", "") == "refused") {
-    return {false, "done, but its summary says refused", {}};
+    return {false, "done, but its summary states that it was refused", {}};
   }
   try {
     const double error = required.error(folder, summary);
-    // Not a number is not right either.
+    // NaN counts as wrong, too.
     if (!(error <= required.limit)) {
       return {false, fmt::format("error {:.2g}, more than {:g}", error, required.limit), error};
     }
@@ -80,7 +80,7 @@ Judgement JudgeSolution(const Requirement& required, const ProgramRun& run, cons
   }
 }
 
-// What the run says about itself; not an object where there is nothing to be read.
+// Returns the summary of the run; not a JSON object if there is none to read.
 nlohmann::json SummaryOf(const fs::path& folder) {
   std::error_code unreachable;
   const fs::path file = folder / kSummaryFile;
@@ -88,7 +88,7 @@ nlohmann::json SummaryOf(const fs::path& folder) {
   return nlohmann::json::parse(ReadWholeFile(file.string()), nullptr, false);
 }
 
-// Whether a run that may be refused was, with one of the reasons that it may have.
+// Returns whether a run that may be refused was refused with one of the allowed reasons.
 bool IsOtherRefusal(const Requirement& required, const ProgramRun& run) {
   if (run.exit_code == 0) return false;
   for (const std::string& line : ErrorLines(run.err)) {
@@ -101,26 +101,26 @@ bool IsOtherRefusal(const Requirement& required, const ProgramRun& run) {
 
 Judgement Judge(const StressRun& hard, const ProgramRun& run, const fs::path& folder,
                 double limit_seconds) {
-  if (run.timed_out) return {false, fmt::format("not done after {:g} s", limit_seconds), {}};
+  if (run.timed_out) return {false, fmt::format("not finished after {:g} s", limit_seconds), {}};
   if (run.signal != 0) return {false, fmt::format("crashed by signal {}", run.signal), {}};
   if (run.exit_code < 0 || run.exit_code > 2) {
     return {false, fmt::format("exit code {}: {}", run.exit_code, run.err), {}};
   }
   const nlohmann::json summary = SummaryOf(folder);
   if (hard.required.refused || IsOtherRefusal(hard.required, run)) {
-    // Wrong usage is reported before there is a summary.
+    // Wrong usage is reported before a summary exists.
     if (run.exit_code == 1 && (!summary.is_object() || summary.value("status", "") != "refused")) {
-      return {false, "refused, but its summary does not say so", {}};
+      return {false, "refused, but its summary does not state that", {}};
     }
     return JudgeRefusal(hard.required, run, hard.output.empty() ? "" : folder / hard.output);
   }
   if (run.exit_code == 0 && !summary.is_object()) {
-    return {false, "its summary is no JSON object", {}};
+    return {false, "its summary is not a JSON object", {}};
   }
   return JudgeSolution(hard.required, run, folder, summary);
 }
 
-// Out of the way of the next run, and there to be looked at.
+// Moves the output out of the way of the next run, so that it can be examined later.
 void PutAside(const StressRun& run, std::size_t number, const fs::path& folder) {
   const fs::path aside = folder / fmt::format("run-{:02}", number);
   std::error_code ignored;

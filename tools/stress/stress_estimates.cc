@@ -1,4 +1,4 @@
-// What is hard about estimating: settings, numbers of views and strengths of blur.
+// Hard cases of estimates: settings, numbers of views and strengths of blur.
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -16,12 +16,12 @@ namespace {
 namespace fs = std::filesystem;
 using Arguments = std::vector<std::string>;
 
-// Of a plane so blurred that its photograph, merely warped, would be off by more than kSolved.
+// The disparity of a plane with so much blur that the merely warped photograph differs by more than
+// kSolved.
 constexpr double kDisparityPx = 1.5;
 constexpr double kSolved = 0.03;
 const char kSolvedText[] =
-    "views off the true ones by .03 of full scale at most, rms, 8 px at the "
-    "border aside";
+    "views differ from the true ones by at most 0.03 of full scale, rms, without a border of 8 px";
 
 ViewOf PlaneViews() { return SlantedSurface(Waves, kDisparityPx, 0); }
 
@@ -36,7 +36,8 @@ StressCase Estimator(
   return {"estimator/" + std::move(name), std::move(why), std::move(required), std::move(prepare)};
 }
 
-// A plane with one more setting, by the ways that have it; `outcome` says what each comes to.
+// A plane with one more setting, solved in every way that has it; `outcome` states the requirement
+// of each.
 StressCase WithSetting(std::string name, std::string why, std::string required,
                        const Arguments& setting, const std::function<bool(const Way&)>& has_it,
                        const std::function<Requirement(const Way&)>& outcome) {
@@ -55,16 +56,15 @@ StressCase WithSetting(std::string name, std::string why, std::string required,
                    });
 }
 
-// Where what comes out depends on the solver: solved; or solved as far as it goes and told in
-// `status: partial`; or refused because iterations led nowhere or blocks are singular. In no case
-// is there a light field that leaves the image's range.
+// The result depends on the solver: solved; or solved as far as possible with `status: partial`; or
+// refused because the iterations diverged or blocks are singular. In no case may a light field
+// leave the range of the image.
 StressCase Either(std::string name, std::string why, const Arguments& setting,
                   const std::function<bool(const Way&)>& has_it, double limit) {
   return WithSetting(
       std::move(name), std::move(why),
-      "no view leaves the range of the image's values by more than a stated part of "
-      "it; where the iterations did not converge the summary is partial and says so; "
-      "or refused by its residual or rcond",
+      "no view leaves the range of the image's values by more than a stated part of it; if the "
+      "iterations did not converge, the summary is partial; or refused by its residual or rcond",
       setting, has_it, [limit](const Way&) {
         return SolvedOrReported(StressImage(), limit, PlaneViews(), kSolved);
       });
@@ -77,7 +77,7 @@ bool IsIterativeBlocks(const Way& way) { return way.solver == "blocks" && way.is
 Requirement SolvedPlane(const Way&) {
   return ViewsAre(StressImage(), PlaneViews(), kTruthBorderPx, kSolved);
 }
-// Without links between its rays a point hardly gains on the warped image.
+// Without links between its rays a point is hardly better than the warped image.
 Requirement HardlyBetterThanWarped(const Way&) {
   return ViewsAre(StressImage(), PlaneViews(), kTruthBorderPx, 0.045);
 }
@@ -85,17 +85,17 @@ Requirement Within(double limit) { return ViewsWithinImage(StressImage(), limit)
 
 std::vector<StressCase> Gammas() {
   std::vector<StressCase> cases;
-  cases.push_back(WithSetting("gamma-0", "nothing but the ridge joins the rays of a point",
+  cases.push_back(WithSetting("gamma-0", "only the ridge links the rays of a point",
                               "refused: gamma, and that it must be above 0", {"--gamma", "0"},
                               IsSmooth, [](const Way&) { return Refused({"gamma is 0"}); }));
-  cases.push_back(WithSetting("gamma-negative", "the functional has no least value",
+  cases.push_back(WithSetting("gamma-negative", "the functional has no minimum",
                               "refused: gamma, and that it must be above 0", {"--gamma", "-1"},
                               IsSmooth, [](const Way&) { return Refused({"gamma is -1"}); }));
   for (const char* gamma : {"1e-12", "1e-6", "1e-3"}) {
     cases.push_back(WithSetting(
         std::string("gamma-") + gamma,
-        "the rays of a point are nearly free of each other, or nearly one",
-        "views no farther off the true ones than .045 of full scale, what the warped image is",
+        "the rays of a point are nearly independent, or nearly equal",
+        "views differ from the true ones by less than 0.045 of full scale, like the warped image",
         {"--gamma", gamma}, IsSmooth, HardlyBetterThanWarped));
   }
   cases.push_back(WithSetting(
@@ -104,7 +104,7 @@ std::vector<StressCase> Gammas() {
       SolvedPlane));
   cases.push_back(Either("gamma-1e3-iterative-blocks", "the condition is 1e6 and more",
                          {"--gamma", "1e3"}, IsIterativeBlocks, 2));
-  // Iterations that cannot get there say so, or are refused; what they give must stay bounded.
+  // Iterations that cannot converge must report it or be refused; their result must stay bounded.
   cases.push_back(Either("gamma-1e6",
                          "smoothness outweighs the photograph a million times: the "
                          "condition is that of gamma over the ridge",
@@ -114,7 +114,7 @@ std::vector<StressCase> Gammas() {
   cases.push_back(WithSetting("gamma-1e12-direct",
                               "the factors of singular blocks are noise, "
                               "however small their residual",
-                              "refused: rcond, and what it must be", {"--gamma", "1e12"}, IsDirect,
+                              "refused: rcond, and its limit", {"--gamma", "1e12"}, IsDirect,
                               [](const Way&) {
                                 return Refused({"rcond", "1e-12", "ridge"});
                               }));
@@ -123,13 +123,11 @@ std::vector<StressCase> Gammas() {
 
 std::vector<StressCase> Ridges() {
   std::vector<StressCase> cases;
-  cases.push_back(WithSetting("ridge-0-direct",
-                              "without a ridge the system is singular: the source's "
-                              "own case",
-                              "refused: rcond, and what it must be", {"--ridge", "0"}, IsDirect,
-                              [](const Way&) {
-                                return Refused({"rcond", "1e-12", "ridge"});
-                              }));
+  cases.push_back(
+      WithSetting("ridge-0-direct", "without a ridge the system is singular: the case of the paper",
+                  "refused: rcond, and its limit", {"--ridge", "0"}, IsDirect, [](const Way&) {
+                    return Refused({"rcond", "1e-12", "ridge"});
+                  }));
   cases.push_back(WithSetting(
       "ridge-0-whole-image", "without a ridge the system is singular",
       "refused: the ridge, and that it must be above 0", {"--ridge", "0"},
@@ -139,12 +137,12 @@ std::vector<StressCase> Ridges() {
       }));
   cases.push_back(Either("ridge-0-iterative", "iterations on a singular system", {"--ridge", "0"},
                          IsIterativeBlocks, 0.6));
-  cases.push_back(WithSetting("ridge-negative", "the functional has no least value",
+  cases.push_back(WithSetting("ridge-negative", "the functional has no minimum",
                               "refused: the ridge, and that it must not be below 0",
                               {"--ridge", "-1"}, IsSmooth,
                               [](const Way&) { return Refused({"ridge is -1"}); }));
   cases.push_back(WithSetting("ridge-1e-14-direct", "the condition is 1e13 and more",
-                              "refused: rcond, and what it must be", {"--ridge", "1e-14"}, IsDirect,
+                              "refused: rcond, and its limit", {"--ridge", "1e-14"}, IsDirect,
                               [](const Way&) {
                                 return Refused({"rcond", "1e-12", "ridge"});
                               }));
@@ -153,10 +151,10 @@ std::vector<StressCase> Ridges() {
       [](const Way& way) { return IsSmooth(way) && way.is_iterative; }, 1.5));
   cases.push_back(Either("ridge-1e-8", "the condition is 1e8: beyond float", {"--ridge", "1e-8"},
                          IsSmooth, 1.5));
-  // All that is left is the photograph, warped.
+  // Only the warped photograph remains.
   cases.push_back(
-      WithSetting("ridge-1e2", "the ridge outweighs all else: the answer is the start",
-                  "no view leaves the range of the image's values by more than .05 of it",
+      WithSetting("ridge-1e2", "the ridge outweighs everything: the answer is the starting point",
+                  "no view leaves the range of the image's values by more than 0.05 of it",
                   {"--ridge", "1e2"}, IsSmooth, [](const Way&) { return Within(0.05); }));
   return cases;
 }
@@ -171,7 +169,8 @@ StressImage WithViews(int u_count, int v_count) {
 StressCase Views(const std::string& name, const std::string& why, const StressImage& shape,
                  double disparity_px) {
   return Estimator(
-      name, why, "views off the true ones by .03 of full scale at most, rms, the border aside",
+      name, why,
+      "views differ from the true ones by at most 0.03 of full scale, rms, without the border",
       [=](const fs::path& folder, const Capabilities& capabilities) {
         const ViewOf view = SlantedSurface(Waves, disparity_px, 0);
         WriteMeanOfViews(folder, shape, view);
@@ -183,21 +182,21 @@ StressCase Views(const std::string& name, const std::string& why, const StressIm
 std::vector<StressCase> NumbersOfViews() {
   std::vector<StressCase> cases;
   cases.push_back(Estimator("views-1x1", "one view is the photograph itself",
-                            "refused: it must be two views at least",
+                            "refused: at least two views are needed",
                             [](const fs::path& folder, const Capabilities& capabilities) {
                               const StressImage shape = WithViews(1, 1);
                               WritePlane(folder, shape);
                               return ByEveryWay(shape, capabilities, {},
                                                 Refused({"--views", "1x1", "at least two views"}));
                             }));
-  cases.push_back(Views("views-2x2", "no view is the centre", WithViews(2, 2), 2.5));
-  cases.push_back(Views("views-1x5", "no blur across", WithViews(1, 5), 1));
+  cases.push_back(Views("views-2x2", "no view is in the centre", WithViews(2, 2), 2.5));
+  cases.push_back(Views("views-1x5", "no blur in the horizontal direction", WithViews(1, 5), 1));
   cases.push_back(Views("views-3x7", "few views across, many down", WithViews(3, 7), 0.8));
   StressImage small = WithViews(15, 15);
   small.width_px = 22;
   small.height_px = 20;
-  StressCase many = Views("views-15x15", "225 unknowns a pixel", small, 0.25);
-  // Blocks of the usual size would be factors of gigabytes.
+  StressCase many = Views("views-15x15", "225 unknowns per pixel", small, 0.25);
+  // Blocks of the default size would have factors of gigabytes.
   many.prepare = [prepare = many.prepare](const fs::path& folder,
                                           const Capabilities& capabilities) {
     std::vector<StressRun> runs = prepare(folder, capabilities);
@@ -213,7 +212,8 @@ std::vector<StressCase> NumbersOfViews() {
   return cases;
 }
 
-// A plane so blurred that little of it is left: bounded, or refused where rays leave the image.
+// A plane so blurred that little of it is left: the result is bounded, or refused if rays leave the
+// image.
 StressCase Blurred(const std::string& name, double sigma_px, int size_px) {
   StressImage shape;
   shape.width_px = shape.height_px = size_px;
@@ -221,17 +221,18 @@ StressCase Blurred(const std::string& name, double sigma_px, int size_px) {
   return Estimator(
       name,
       "the blur has a sigma of " + std::to_string(static_cast<int>(sigma_px)) + " px on " +
-          std::to_string(size_px) + " px: hardly a frequency is left",
-      "views off the true ones by .25 of full scale at most, rms, and within ten times the range "
-      "of what "
-      "is left of the image; or it is said that the iterations did not converge",
+          std::to_string(size_px) + " px: hardly any frequency remains",
+      "views differ from the true ones by at most 0.25 of full scale, rms, and stay within ten "
+      "times the range of what remains of the image; or a report that the iterations did not "
+      "converge",
       [=](const fs::path& folder, const Capabilities& capabilities) {
         const ViewOf view = SlantedSurface(Waves, disparity_px, 0);
         WriteMeanOfViews(folder, shape, view);
         WriteDepth(folder, shape, [=](int, int) { return disparity_px; });
         std::vector<StressRun> runs;
         for (const Way& way : EveryWay(capabilities)) {
-          // Blocks factor what they link: hours, and no light field to speak of.
+          // Blocks factor everything that they link: this takes hours and gives no useful light
+          // field.
           if (way.solver == "blocks") continue;
           runs.push_back(EstimateOf(shape, way.arguments, SolvedOrReported(shape, 10, view, 0.25)));
         }
@@ -245,8 +246,8 @@ std::vector<StressCase> Blurs() {
   cases.push_back(Blurred("blur-of-20-px", 20, 96));
   cases.push_back(Blurred("blur-of-60-px", 60, 128));
   cases.push_back(
-      Estimator("blur-beyond-the-image", "views move by more than the image is large",
-                "refused: the largest disparity, and what it must be",
+      Estimator("blur-beyond-the-image", "views move by more than the size of the image",
+                "refused: the largest disparity, and its limit",
                 [](const fs::path& folder, const Capabilities& capabilities) {
                   const StressImage shape;
                   WriteImage(folder, shape, Waves);
@@ -263,21 +264,21 @@ std::vector<StressCase> Settings() {
   std::vector<StressCase> cases;
   cases.push_back(
       WithSetting("blocks-of-one-pixel", "no two rays of a point are in one block",
-                  "no view leaves the range of the image's values by more than .6 of it",
+                  "no view leaves the range of the image's values by more than 0.6 of it",
                   {"--block-px", "1"}, IsBlocks, [](const Way&) { return Within(0.6); }));
   cases.push_back(WithSetting("blocks-not-dividing", "blocks of 7 px on 40 x 30", kSolvedText,
                               {"--block-px", "7"}, IsBlocks, SolvedPlane));
   cases.push_back(WithSetting("blocks-larger-than-the-image", "one block of 100 px on 40 x 30",
                               kSolvedText, {"--block-px", "100"}, IsBlocks, SolvedPlane));
   cases.push_back(WithSetting("tolerance-0", "no iteration reaches it",
-                              "refused: the tolerance, and what it must be", {"--tolerance", "0"},
+                              "refused: the tolerance, and its range", {"--tolerance", "0"},
                               IsIterative, [](const Way&) {
                                 return Refused({"--tolerance", "above 0", "found 0"});
                               }));
-  cases.push_back(Either("tolerance-1e-16", "beyond every precision", {"--tolerance", "1e-16"},
+  cases.push_back(Either("tolerance-1e-16", "below every precision", {"--tolerance", "1e-16"},
                          IsIterative, 0.6));
-  cases.push_back(Either("one-iteration", "nothing converges in one", {"--max-iterations", "1"},
-                         IsIterative, 1));
+  cases.push_back(Either("one-iteration", "nothing converges in one iteration",
+                         {"--max-iterations", "1"}, IsIterative, 1));
   return cases;
 }
 

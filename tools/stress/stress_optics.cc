@@ -1,4 +1,4 @@
-// What is hard about optics: cameras and depths near the ends of what can be.
+// Hard cases of optics: cameras and depths near the limits of what is possible.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -22,7 +22,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What a camera file says; written as text, so that what cannot be gets there, too.
+// The content of a camera file. The fields are texts, so that impossible values can be written,
+// too.
 struct StressCamera {
   double front_focal_length_mm = 12.5, rear_focal_length_mm = 12.8, lens_thickness_mm = 3;
   double aperture_radius_mm = 4.46, pixel_pitch_mm = 0.006;
@@ -59,8 +60,8 @@ void WriteCamera(const fs::path& folder, const StressCamera& camera,
                   camera.principal_x_px, camera.image_distance_mm, camera.blur_ratio));
 }
 
-// The oracle: the ray from the point on the axis at that depth through the rim of the aperture,
-// refracted by the matrix of a lens between two media, height on the sensor; in long double.
+// The oracle: the height on the sensor of the ray from the point on the axis at that depth through
+// the rim of the aperture, refracted by the matrix of a lens between two media; in long double.
 double TracedBlurRadiusMm(const StressCamera& camera, double depth_mm) {
   const long double height = camera.aperture_radius_mm;
   const long double slope = std::isinf(depth_mm) ? 0.0L : height / depth_mm;
@@ -71,15 +72,15 @@ double TracedBlurRadiusMm(const StressCamera& camera, double depth_mm) {
   return static_cast<double>(std::abs(height + rear_distance * after));
 }
 
-// The plane of focus that is reported, relative; what the rounding of d1 and rho leaves open is
-// none.
+// Returns the relative error of the reported plane of focus, without the part that the rounding of
+// d1 and rho explains.
 double FocusError(const StressCamera& camera, const nlohmann::json& focus_depth_mm) {
   const long double rear_distance =
       static_cast<long double>(camera.image_distance_mm) - camera.lens_thickness_mm;
   const long double beyond = rear_distance - camera.rear_focal_length_mm;
   const auto open = static_cast<double>(
       std::abs(4 * std::numeric_limits<double>::epsilon() * camera.image_distance_mm / beyond));
-  // Rounding decides whether it is at infinity, or only very far.
+  // Rounding decides whether it is at infinity or only very far.
   constexpr double kVeryFarMm = 1e12;
   if (!(open < 1)) {
     return focus_depth_mm.is_number() && !(focus_depth_mm.get<double>() > kVeryFarMm) ? 1 : 0;
@@ -89,23 +90,23 @@ double FocusError(const StressCamera& camera, const nlohmann::json& focus_depth_
   return std::max(0.0, std::abs(focus_depth_mm.get<double>() / truth - 1) - open);
 }
 
-// `explain` between two depths, its blur radii against the ray trace: the largest difference, each
-// over its own radius or the aperture's, whichever is larger; and the plane of focus against [S13]
-// in long double, over what rounding of D makes of it.
+// Runs `explain` between two depths. Its blur radii are compared with the ray trace: the largest
+// difference counts, each divided by the larger of its own radius and the aperture's. The plane of
+// focus is compared with [S13] in long double, relative to the effect of rounding D.
 StressRun ExplainBetween(const StressCamera& camera, const std::string& depths,
                          const std::string& file = kCameraFile) {
   StressRun run;
   run.arguments = {"explain", file, "--depth-range", depths, "--steps", "5"};
   run.required = Solved(
       [camera](const fs::path&, const nlohmann::json& summary) {
-        if (summary.at("depths").size() != 5) throw Error("five depths were asked for");
+        if (summary.at("depths").size() != 5) throw Error("five depths were requested");
         double most = 0;
         for (const nlohmann::json& row : summary["depths"]) {
           const double depth_mm =
               row.at("depth_mm").is_null() ? HUGE_VAL : row["depth_mm"].get<double>();
           const double traced_mm = TracedBlurRadiusMm(camera, depth_mm);
           const auto given_mm = row.at("blur_radius_mm").get<double>();
-          if (!std::isfinite(given_mm)) throw Error("a blur radius is no number");
+          if (!std::isfinite(given_mm)) throw Error("a blur radius is not finite");
           most = std::max(most, std::abs(given_mm - traced_mm) /
                                     std::max(traced_mm, camera.aperture_radius_mm));
         }
@@ -129,9 +130,9 @@ StressCase Optics(
 }
 
 const char kTraced[] =
-    "the blur radii and the plane of focus of explain are those of a traced ray, to 1e-9";
+    "the blur radii and the plane of focus of explain equal those of a traced ray, to 1e-9";
 
-// One camera, or several, explained between the same depths.
+// Explains one camera, or several, between the same depths.
 StressCase Explained(std::string name, std::string why, const std::vector<StressCamera>& cameras,
                      const std::vector<std::string>& depths) {
   return Optics(std::move(name), std::move(why), kTraced,
@@ -172,13 +173,13 @@ std::vector<StressCase> Lenses() {
     at_infinity.push_back(
         Changed([&](StressCamera* camera) { camera->image_distance_mm = 15.8 + beyond_mm; }));
   }
-  cases.push_back(Explained("focus-at-infinity",
-                            "D - f2 is 1e-3 to 1e-12 mm, and 0: the plane of "
-                            "focus is at up to infinity",
-                            at_infinity, {"500:2000", "500:inf"}));
+  cases.push_back(
+      Explained("focus-at-infinity",
+                "D - f2 is 1e-3 to 1e-12 mm, and 0: the plane of focus is as far as infinity",
+                at_infinity, {"500:2000", "500:inf"}));
   cases.push_back(
       CameraRefused("sensor-before-every-image", "D < f2: no depth is in focus",
-                    "refused: the file, the field, and what it must be",
+                    "refused: the file, the field, and its limit",
                     Changed([](StressCamera* camera) { camera->image_distance_mm = 15.7; }),
                     {"camera.yaml:", "image_distance_mm", "15.8", "15.7"}));
   cases.push_back(Explained("object-at-front-focus",
@@ -212,8 +213,7 @@ std::vector<StressCase> Lenses() {
                              })},
                             usual));
   cases.push_back(Explained("thickness-nearly-image-distance",
-                            "rho = 15.9 of d1 = 15.91 mm: hardly "
-                            "anything is left behind the lens",
+                            "rho = 15.9 of d1 = 15.91 mm: hardly anything remains behind the lens",
                             {Changed([](StressCamera* camera) {
                               camera->lens_thickness_mm = 15.9;
                               camera->rear_focal_length_mm = 0.01;
@@ -223,11 +223,10 @@ std::vector<StressCase> Lenses() {
   cases.push_back(Explained(
       "pinhole", "aperture radius 1e-12 mm: no blur",
       {Changed([](StressCamera* camera) { camera->aperture_radius_mm = 1e-12; })}, usual));
-  cases.push_back(
-      CameraRefused("no-aperture", "aperture radius 0: no light",
-                    "refused: the file, the field, and what it must be",
-                    Changed([](StressCamera* camera) { camera->aperture_radius_mm = 0; }),
-                    {"camera.yaml:", "aperture_radius_mm", "> 0"}));
+  cases.push_back(CameraRefused(
+      "no-aperture", "aperture radius 0: no light", "refused: the file, the field, and its limit",
+      Changed([](StressCamera* camera) { camera->aperture_radius_mm = 0; }),
+      {"camera.yaml:", "aperture_radius_mm", "> 0"}));
   cases.push_back(Explained("lengths-times-a-millionth", "all lengths times 1e-6",
                             {StressCamera().Scaled(1e-6)}, {"5e-4:2e-3"}));
   cases.push_back(Explained("lengths-times-a-million", "all lengths times 1e6",
@@ -240,11 +239,11 @@ const StressImage& Shape() {
   return shape;
 }
 
-// A plane at one depth as the camera sees it: sigma = kappa r c/p along each axis, which the views'
-// places carry, 2/3 of a step squared with three equal weights.
+// The disparity of a plane at one depth for this camera: sigma = kappa r c/p along each axis equals
+// the spread of the views' places, 2/3 of a step squared with three equal weights.
 double DisparityPx(const StressCamera& camera, double depth_mm) {
   const double rear_mm = camera.image_distance_mm - camera.lens_thickness_mm;
-  // Infinite where the rear distance is the focal length.
+  // Infinite if the rear distance is the focal length.
   const double beyond_mm = rear_mm - camera.rear_focal_length_mm;
   const double focus_mm =
       beyond_mm > 0 ? camera.front_focal_length_mm * rear_mm / beyond_mm : HUGE_VAL;
@@ -257,7 +256,7 @@ std::vector<std::string> WithCamera() {
   return {"--camera", kCameraFile, "--aperture-shape", "uniform", "--without", "falloff"};
 }
 
-// `estimate` of depth in mm, by the scene solver and its rivals.
+// Runs `estimate` with depth in mm, with the scene solver and its alternatives.
 std::vector<StressRun> EstimatesOfDepth(const std::vector<std::string>& more,
                                         const Requirement& required) {
   std::vector<StressRun> runs;
@@ -274,28 +273,27 @@ std::vector<StressRun> EstimatesOfDepth(const std::vector<std::string>& more,
   return runs;
 }
 
-// Where ST is not the plane of focus, views are moved by what a point on ST is blurred by.
+// If ST is not the plane of focus, the views are shifted by the blur of a point on ST.
 StressCase EstimatedPlane(std::string name, std::string why, const StressCamera& camera,
                           double depth_mm, double limit, std::optional<double> st_depth_mm = {}) {
-  return Optics(
-      std::move(name), std::move(why),
-      fmt::format(
-          "views off the true ones by {:g} of full scale at most, rms, 8 px at the border aside",
-          limit),
-      [=](const fs::path& folder, const Capabilities&) {
-        const double disparity_px = DisparityPx(camera, depth_mm);
-        WriteCamera(folder, camera);
-        WriteMeanOfViews(folder, Shape(), SlantedSurface(Waves, disparity_px, 0));
-        WriteDepth(folder, Shape(), [&](int, int) { return depth_mm; });
-        std::vector<std::string> more;
-        double st_disparity_px = 0;
-        if (st_depth_mm) {
-          more = {"--st-depth-mm", fmt::format("{}", *st_depth_mm)};
-          st_disparity_px = DisparityPx(camera, *st_depth_mm);
-        }
-        const ViewOf view = SlantedSurface(Waves, disparity_px - st_disparity_px, 0);
-        return EstimatesOfDepth(more, ViewsAre(Shape(), view, kTruthBorderPx, limit));
-      });
+  return Optics(std::move(name), std::move(why),
+                fmt::format("views differ from the true ones by at most {:g} of full scale, rms, "
+                            "without a border of 8 px",
+                            limit),
+                [=](const fs::path& folder, const Capabilities&) {
+                  const double disparity_px = DisparityPx(camera, depth_mm);
+                  WriteCamera(folder, camera);
+                  WriteMeanOfViews(folder, Shape(), SlantedSurface(Waves, disparity_px, 0));
+                  WriteDepth(folder, Shape(), [&](int, int) { return depth_mm; });
+                  std::vector<std::string> more;
+                  double st_disparity_px = 0;
+                  if (st_depth_mm) {
+                    more = {"--st-depth-mm", fmt::format("{}", *st_depth_mm)};
+                    st_disparity_px = DisparityPx(camera, *st_depth_mm);
+                  }
+                  const ViewOf view = SlantedSurface(Waves, disparity_px - st_disparity_px, 0);
+                  return EstimatesOfDepth(more, ViewsAre(Shape(), view, kTruthBorderPx, limit));
+                });
 }
 
 StressCase EstimateRefused(std::string name, std::string why, std::string required,
@@ -317,7 +315,7 @@ std::vector<StressCase> Estimates() {
                                  900, 0.025));
   cases.push_back(EstimatedPlane("estimate-in-focus", "the scene lies in the plane of focus", usual,
                                  12.5 * 12.94 / (12.94 - 12.8), 0.005));
-  cases.push_back(EstimatedPlane("estimate-no-blur-ratio", "kappa is 0: all views are one",
+  cases.push_back(EstimatedPlane("estimate-no-blur-ratio", "kappa is 0: all views are equal",
                                  Changed([](StressCamera* camera) { camera->blur_ratio = 0; }), 900,
                                  0.005));
   cases.push_back(EstimatedPlane("estimate-hardly-a-blur-ratio", "kappa is 1e-12",
@@ -342,7 +340,7 @@ std::vector<StressCase> Estimates() {
                                  2000, 0.01, 1000));
   cases.push_back(EstimateRefused(
       "estimate-focus-at-infinity-without-planes", "no plane of focus for ST, and none is given",
-      "refused: that planes must be given",
+      "refused: planes must be given",
       Changed([](StressCamera* camera) { camera->image_distance_mm = 15.8; }), 900,
       {"camera.yaml", "focused at infinity", "--st-depth-mm"}));
   cases.push_back(EstimateRefused("estimate-depth-within-front-focus", "z < f1: no real image",
@@ -363,7 +361,7 @@ std::vector<StressCase> Estimates() {
   return cases;
 }
 
-// `simulate light-field` of a plane, UV at another depth.
+// Runs `simulate light-field` for a plane, with UV at another depth.
 StressCase Planes(std::string name, std::string why, std::string required, double uv_depth_mm,
                   double plane_depth_mm, const std::vector<std::string>& refusal,
                   bool all_views_alike = false) {
@@ -395,14 +393,15 @@ StressCase Planes(std::string name, std::string why, std::string required, doubl
 std::vector<StressCase> LightFieldPlanes() {
   const double focus_mm = 12.5 * 12.94 / (12.94 - 12.8);
   std::vector<StressCase> cases;
-  cases.push_back(Planes("uv-on-the-aperture", "zl = 0: (8) is infinite there, ours is not",
-                         "all views are numbers", 0, 900, {}));
+  cases.push_back(Planes("uv-on-the-aperture",
+                         "zl = 0: (8) is infinite there, the formula used here is not",
+                         "all views are finite", 0, 900, {}));
   cases.push_back(Planes("object-on-st", "z = zl + d0: the slope of its rays is 0",
-                         "all views are alike, to 2e-4 of full scale", 0, focus_mm, {}, true));
+                         "all views are equal to 2e-4 of full scale", 0, focus_mm, {}, true));
   cases.push_back(Planes("object-on-uv",
                          "z = zl: the slope of its rays is infinite, each view sees "
                          "one point of it",
-                         "all views are numbers", 50, 50, {}));
+                         "all views are finite", 50, 50, {}));
   cases.push_back(Planes("planes-nearly-one", "d0 is 1e-9 mm", "refused: zl and the focus depth",
                          focus_mm - 1e-9, 900, {"uv_depth_mm"}));
   cases.push_back(Planes("uv-behind-focus",

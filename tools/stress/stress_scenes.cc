@@ -1,4 +1,4 @@
-// What is hard about scenes and images: each by every way to a light field.
+// Hard cases of scenes and images, each with every way to a light field.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 
 constexpr double kHole = std::numeric_limits<double>::quiet_NaN();
 
-// A case that is run by every way on one image.
+// A case that runs every way on one image.
 StressCase ByAll(std::string name, std::string why, std::string required, const StressImage& shape,
                  std::function<void(const fs::path&)> write, const Requirement& outcome) {
   StressCase hard;
@@ -32,15 +32,15 @@ StressCase ByAll(std::string name, std::string why, std::string required, const 
   return hard;
 }
 
-// A surface of known views.
+// A surface whose views are known.
 StressCase Surface(std::string name, std::string why, const StressImage& shape, double disparity_px,
                    double slope, double limit, const std::function<bool(int, int)>& is_hole = {}) {
   const ViewOf view = SlantedSurface(Waves, disparity_px, slope);
   return ByAll(
       std::move(name), std::move(why),
-      fmt::format(
-          "views off the true ones by {:g} of full scale at most, rms, 8 px at the border aside",
-          limit),
+      fmt::format("views differ from the true ones by at most {:g} of full scale, rms, without a "
+                  "border of 8 px",
+                  limit),
       shape,
       [=](const fs::path& folder) {
         WriteMeanOfViews(folder, shape, view);
@@ -51,8 +51,8 @@ StressCase Surface(std::string name, std::string why, const StressImage& shape, 
       ViewsAre(shape, view, kTruthBorderPx, limit));
 }
 
-// An image and a depth that no light field explains well: nothing may blow up. The source's
-// functional takes all contrast for detail that was blurred; its ridge alone holds it.
+// An image and a depth that no light field explains well: the result must stay bounded. The
+// paper's functional takes all contrast for detail that was blurred; only its ridge bounds it.
 StressCase Bounded(std::string name, std::string why, const StressImage& shape,
                    const Radiance& image, const DisparityOf& disparity, double limit,
                    double limit_of_source) {
@@ -61,7 +61,7 @@ StressCase Bounded(std::string name, std::string why, const StressImage& shape,
   hard.why = std::move(why);
   hard.required = fmt::format(
       "no view leaves the range of the image's values by more than {:g} of it (scene), {:g} (the "
-      "source's functional, by blocks or not)",
+      "paper's functional, by blocks or not)",
       limit, limit_of_source);
   hard.prepare = [=](const fs::path& folder, const Capabilities& capabilities) {
     WriteImage(folder, shape, image);
@@ -80,7 +80,7 @@ StressCase Bounded(std::string name, std::string why, const StressImage& shape,
 StressCase Uniform(std::string name, std::string why, double radiance) {
   const StressImage shape;
   return ByAll(
-      std::move(name), std::move(why), "every ray has the image's value, to .001 of full scale",
+      std::move(name), std::move(why), "every ray has the image's value, to 0.001 of full scale",
       shape,
       [=](const fs::path& folder) {
         WriteImage(folder, shape, [=](double, double) { return radiance; });
@@ -91,7 +91,7 @@ StressCase Uniform(std::string name, std::string why, double radiance) {
 
 Radiance Noise() {
   return [](double x, double y) {
-    // A value of its own for each pixel, the same on every machine.
+    // Each pixel has its own value, the same on every machine.
     std::mt19937 engine(static_cast<unsigned>(1000 * y + x));
     engine.discard(3);
     return static_cast<double>(engine()) / 4294967295.0;
@@ -119,7 +119,7 @@ std::vector<StressCase> Depths() {
                           [](int x, int y) { return x == 20 && y == 15; }));
   cases.push_back(Surface("hole-of-a-third", "depth is missing in a third of the image", usual, 1.5,
                           0, 0.03, [](int x, int) { return x > 12 && x < 26; }));
-  cases.push_back(Surface("one-valid-pixel", "depth is known in one pixel alone", usual, 1.5, 0,
+  cases.push_back(Surface("one-valid-pixel", "depth is known in one pixel only", usual, 1.5, 0,
                           0.03, [](int x, int y) { return x != 20 || y != 15; }));
   cases.push_back(ByAll(
       "all-holes", "no depth is known", "refused: the depth map has no valid value", usual,
@@ -135,17 +135,17 @@ std::vector<StressCase> Images() {
   const StressImage usual;
   const DisparityOf slanted = [](int x, int) { return 0.04 * x - 0.8; };
   std::vector<StressCase> cases;
-  cases.push_back(Uniform("uniform", "nothing tells one depth from another", 0.5));
+  cases.push_back(Uniform("uniform", "the depths cannot be distinguished", 0.5));
   cases.push_back(Uniform("black", "no light: every relative error divides by 0", 0));
-  cases.push_back(Uniform("white", "all is saturated", 1));
+  cases.push_back(Uniform("white", "everything is saturated", 1));
   cases.push_back(Bounded(
       "half-saturated", "half of the image is cut off at full scale", usual,
       [](double x, double y) { return 2 * Waves(x, y); }, slanted, 0.2, 0.5));
   cases.push_back(Bounded(
-      "checkerboard-at-nyquist", "black and white by turns: no blur could have left it", usual,
+      "checkerboard-at-nyquist", "alternating black and white: no blur could have left it", usual,
       [](double x, double y) { return static_cast<int>(x + y) % 2 == 0 ? 0.9 : 0.1; }, slanted, 1,
       10));
-  cases.push_back(Bounded("noise-alone", "nothing of the image fits its depth", usual, Noise(),
+  cases.push_back(Bounded("noise-alone", "no part of the image fits its depth", usual, Noise(),
                           slanted, 0.4, 10));
   cases.push_back(Bounded(
       "one-bright-pixel", "a point of light where blur should be", usual,
@@ -178,8 +178,8 @@ std::vector<StressCase> Sizes() {
       Surface("colour-16-bit", "three channels of 16 bits", Sized(40, 30, 3), 1.5, 0, 0.03));
   cases.push_back(Surface("colour-8-bit", "three channels of 8 bits: rounding is noise",
                           Sized(40, 30, 3, 8), 1.5, 0, 0.03));
-  cases.push_back(Surface("alpha", "four channels, the last of which is no light", Sized(40, 30, 4),
-                          1.5, 0, 0.03));
+  cases.push_back(Surface("alpha", "four channels, the last of which is not light",
+                          Sized(40, 30, 4), 1.5, 0, 0.03));
   return cases;
 }
 

@@ -1,4 +1,5 @@
-// thicklens doctor --hard-cases: whether what is hard is solved or refused as it should be, here.
+// thicklens doctor --hard-cases: stress tests, in which difficult inputs must be solved or rejected
+// on this machine.
 #include "tools/stress/stress_suite.h"
 
 #include <fmt/format.h>
@@ -27,7 +28,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Of one command: the slowest takes a few seconds, on a machine that is busy some more.
+// The limit for one command: the slowest takes a few seconds, and longer on a busy machine.
 constexpr double kLimitSeconds = 120;
 
 bool IsChosen(const StressCase& hard, const std::string& only) {
@@ -43,13 +44,12 @@ std::vector<StressCase> ChosenCases(const std::string& only) {
   std::vector<std::string> names;
   for (const StressCase& hard : all) names.push_back(hard.name);
   throw UsageError(
-      fmt::format("--only: there is no hard case or group '{}'; there are optics, scene, "
-                  "estimator, calibration, "
-                  "and in them {}",
+      fmt::format("--only: there is no hard case or group '{}'; the groups are optics, scene, "
+                  "estimator, calibration, and their cases {}",
                   only, fmt::join(names, ", ")));
 }
 
-// Where the files of all cases go.
+// The place for the files of all cases.
 class Workplace {
  public:
   explicit Workplace(const std::string& keep_folder) {
@@ -63,11 +63,10 @@ class Workplace {
     std::error_code failure;
     fs::create_directories(root_, failure);
     if (failure) {
-      throw Error(fmt::format("{}: cannot be made: {}", keep_folder, failure.message()));
+      throw Error(fmt::format("{}: cannot be created: {}", keep_folder, failure.message()));
     }
     if (!fs::is_empty(root_, failure) || failure) {
-      throw Error(
-          fmt::format("{}: is not empty; --keep needs a folder that is new or empty", keep_folder));
+      throw Error(fmt::format("{}: is not empty; --keep needs a new or empty folder", keep_folder));
     }
   }
   fs::path FolderOf(const StressCase& hard) const {
@@ -75,11 +74,11 @@ class Workplace {
     std::error_code failure;
     fs::create_directories(folder, failure);
     if (failure) {
-      throw Error(fmt::format("{}: cannot be made: {}", folder.string(), failure.message()));
+      throw Error(fmt::format("{}: cannot be created: {}", folder.string(), failure.message()));
     }
     return folder;
   }
-  // What is not kept is gone before the next case.
+  // Files that are not kept are removed before the next case.
   void Leave(const fs::path& folder) const {
     std::error_code ignored;
     if (temporary_) fs::remove_all(folder, ignored);
@@ -165,7 +164,7 @@ Capabilities ExamineCapabilities() {
   } catch (const Interrupted&) {
     throw;
   } catch (const Error&) {
-    // None, or one without numbers of 64 bits.
+    // There is none, or one without double precision.
   }
   return capabilities;
 }
@@ -199,11 +198,11 @@ CommandResult RunStressCases(const StressSuiteOptions& options, const CommonOpti
   }
   const std::string text = fmt::format(
       "{} of {} as required, {} commands in {:.0f} s{}\n"
-      "run one again, with its commands and files: thicklens doctor --hard-cases --only NAME "
-      "--keep "
-      "DIR\n(the commands are run in DIR/NAME, what each wrote is in run-NN there)\n",
+      "to repeat a case and keep its commands and files: thicklens doctor --hard-cases --only NAME "
+      "--keep DIR\n(the commands run in DIR/NAME, and the files that each wrote are in run-NN "
+      "there)\n",
       static_cast<int>(cases.size()) - failures, cases.size(), commands, seconds,
-      capabilities.opencl ? "" : ", nothing on OpenCL: there is no device that works");
+      capabilities.opencl ? "" : ", nothing on OpenCL: no device works");
   PrintResult(common, text);
   const std::string refusal = failed.empty() ? "" : "not as required: " + failed;
   return {{{"status", failures == 0 ? "ok" : "refused"},

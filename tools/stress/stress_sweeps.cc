@@ -24,7 +24,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kFieldPx = 192;
-// Standard errors within which the truth has to lie: by chance one of 16000 values does not.
+// The number of standard errors within which the truth must lie; by chance one of 16000 values does
+// not.
 constexpr double kMaxSigmas = 4;
 
 double OffInSigmas(const nlohmann::json& summary, const char* name, double truth) {
@@ -116,7 +117,7 @@ Requirement Warned(const std::vector<std::string>& words) {
             return 0.0;
           }
         }
-        throw Error("no warning says " + fmt::format("{}", fmt::join(words, ", ")) + ": " +
+        throw Error("no warning contains " + fmt::format("{}", fmt::join(words, ", ")) + ": " +
                     summary["warnings"].dump());
       },
       0);

@@ -26,12 +26,13 @@ namespace fs = std::filesystem;
 
 constexpr double kTwoPi = 6.283185307179586;
 constexpr char kOutput[] = "views";
-// Blur and views move light, and lose of it what leaves the image.
+// Blur and views move light, and the part that leaves the image is lost.
 constexpr double kMaxLightLost = 0.1;
 
 int ColourChannels(const StressImage& shape) { return shape.channels == 4 ? 3 : shape.channels; }
 
-// The estimate, if all of it is numbers and it is as large as it was asked for.
+// Reads the estimate, and requires that all its values are finite and that its size is the
+// requested one.
 model::LightField ReadViews(const fs::path& folder, const StressImage& shape) {
   model::LightField views = io::ReadLightField((folder / kOutput).string(), {});
   if (views.s_count != shape.width_px || views.t_count != shape.height_px ||
@@ -43,7 +44,7 @@ model::LightField ReadViews(const fs::path& folder, const StressImage& shape) {
   }
   const auto broken = std::find_if(views.values.begin(), views.values.end(),
                                    [](float value) { return !std::isfinite(value); });
-  if (broken != views.values.end()) throw Error("values of the views are no numbers");
+  if (broken != views.values.end()) throw Error("values of the views are not finite");
   return views;
 }
 
@@ -177,7 +178,7 @@ Requirement ViewsWithinImage(const StressImage& shape, double limit) {
         if (!(std::abs(sum - light) <= kMaxLightLost * light)) {
           throw Error(fmt::format("the views have {:.2g} of the photograph's light", sum / light));
         }
-        // An image without contrast has its level for a range.
+        // The range of an image without contrast is its level.
         return beyond / (high > low ? high - low : std::max(high, 1 / full));
       },
       limit);
@@ -272,7 +273,7 @@ std::vector<Way> EveryWay(const Capabilities& capabilities) {
     }
   }
   for (const estimator::BlockSolver solver : estimator::BuiltInBlockSolvers()) {
-    // ViennaCL looks for devices by itself.
+    // ViennaCL selects a device by itself.
     const bool has_own_device = solver == estimator::BlockSolver::kViennaCl;
     if (has_own_device && !capabilities.opencl) continue;
     const bool is_default = solver == estimator::DefaultBlockSolver();

@@ -13,7 +13,7 @@ namespace {
 constexpr int kPatchWidthPx = 96, kPatchHeightPx = 64;
 constexpr int kRounds = 5;
 constexpr double kFarthestMm = 1e6;
-// Of the image's time; what is less is lost in what one run differs from the next.
+// A share of the image's time; smaller costs are lost in the differences between runs.
 constexpr double kMeasurable = 0.05;
 
 SceneLayer Leaves(double depth_mm) {
@@ -41,7 +41,7 @@ SceneSimulationOptions PatchOf(const Camera& camera, const DepthRange& range,
   return patch;
 }
 
-// Of the processor, which says more than the clock where others have it, too.
+// Processor time, which is more reliable than wall time if other programs run.
 double SecondsOf(const SceneSimulationOptions& patch) {
   const std::clock_t start = std::clock();
   const SceneSimulator simulator(patch, {}, 1);
@@ -72,7 +72,7 @@ EffectCosts MeasureEffectCosts(const Camera& camera, const DepthRange& range,
       effects.push_back(finding.effect);
     }
   }
-  // First that with those that are on, then that with each effect the other way round.
+  // First the run with the effects that are on, then a run with each effect switched.
   std::vector<std::vector<double>> seconds(effects.size() + 1);
   for (int round = 0; round < kRounds; ++round) {
     for (std::size_t i = 0; i <= effects.size(); ++i) {

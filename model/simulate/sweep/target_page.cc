@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-// Measures of a sheet 210 mm or more wide; smaller sheets have them in proportion.
+// Measures for a sheet at least 210 mm wide; smaller sheets have proportional ones.
 constexpr double kFullSheetMm = 210;
 constexpr double kMarginMm = 15;
 constexpr double kCaptionHeightMm = 27;
@@ -22,18 +22,18 @@ constexpr double kBarGapMm = 5;
 constexpr double kBarHeightMm = 3;
 constexpr double kTextGapMm = 5;
 constexpr double kTextSizeMm = 3.2;
-// Wider than the mean letter of any common sans serif font, in text sizes.
+// Wider than the mean letter of any common sans serif font in text sizes.
 constexpr double kLetterWidth = 0.6;
 
-// The pattern over the field, so that a frame somewhat farther away, or beside the middle, still
-// sees nothing else.
+// The ratio of the pattern to the field, so that a frame that is somewhat farther away, or off the
+// middle, still shows only the pattern.
 constexpr double kOverfill = 1.15;
-// Part of the field's width and height that the patch takes: of its area each plateau is then 4 %,
-// so that a frame is not given up as clipped because of one of them alone; a long pattern has no
-// longer patch than this, so that an edge that leans leaves a plateau on both sides.
+// The part of the field's width and height that the patch takes. Each plateau then covers 4 % of
+// the area, so that a plateau alone does not make a frame count as clipped. The patch of a long
+// pattern is not longer, so that a slanted edge leaves a plateau on both sides.
 constexpr double kPatchPart = 0.28;
 constexpr double kLongestPatch = 1.5;
-// Smaller features than these are lost in the pixels; with larger ones the texture gets scarce.
+// Smaller features are lost in the pixels; with larger ones the texture becomes sparse.
 constexpr double kFinestFeaturePx = 2;
 constexpr double kFeaturePx = 3;
 constexpr double kMaxFeaturePx = 6;
@@ -47,7 +47,7 @@ double RoundToTwoDigits(double value) {
   return std::round(value / unit) * unit;
 }
 
-// Whole tenths, as the caption writes them. The slack keeps 185.9 from becoming 185.8.
+// Rounds down to tenths, as the caption writes them. The slack keeps 185.9 from becoming 185.8.
 double FloorToTenths(double value_mm) { return std::floor(value_mm * 10 + 1e-6) / 10; }
 double CeilToTenths(double value_mm) { return std::ceil(value_mm * 10 - 1e-6) / 10; }
 
@@ -55,7 +55,7 @@ double SheetScale(const SheetSize& sheet) {
   return std::min(1.0, std::min(sheet.width_mm, sheet.height_mm) / kFullSheetMm);
 }
 
-// What margins and caption leave to the pattern.
+// Returns the area that margins and caption leave to the pattern.
 SheetRectangle FreeArea(const SheetSize& sheet) {
   const double margin_mm = kMarginMm * SheetScale(sheet);
   const double caption_mm = kCaptionHeightMm * SheetScale(sheet);
@@ -72,7 +72,7 @@ SheetSize Turned(SheetSize sheet) {
   return sheet;
 }
 
-// The sheet, turned if that is allowed and only then holds the field with its overfill.
+// Returns the sheet, rotated if that is allowed and the field with its margin fits only then.
 SheetSize SheetFor(const SheetSize& sheet, const std::optional<CameraView>& view) {
   if (!view) return sheet;
   const double width_mm = CeilToTenths(kOverfill * view->width_mm);
@@ -82,8 +82,8 @@ SheetSize SheetFor(const SheetSize& sheet, const std::optional<CameraView>& view
   const SheetRectangle free = FreeArea(sheet);
   throw Error(fmt::format(
       "the camera sees {:.1f} x {:.1f} mm at {:g} mm; a pattern of {:.1f} x {:.1f} mm, which "
-      "overfills this by 15 %, does not fit the sheet of {:g} x {:g} mm ({:.1f} x {:.1f} mm are "
-      "free): take a larger sheet (--size) or a shorter distance",
+      "is 15 % larger, does not fit the sheet of {:g} x {:g} mm ({:.1f} x {:.1f} mm are "
+      "free): choose a larger sheet (--size) or a shorter distance",
       view->width_mm, view->height_mm, view->distance_mm, width_mm, height_mm, sheet.width_mm,
       sheet.height_mm, free.width, free.height));
 }
@@ -122,7 +122,7 @@ Feature GivenFeature(double feature_mm, const TargetRequest& request) {
   if (!(feature_mm >= request.finest_mm)) {
     throw Error(
         fmt::format("smallest feature: {:g} mm is below the {:g} mm that the print method "
-                    "resolves: take a larger --feature-mm, or print more finely and say so with "
+                    "resolves: choose a larger --feature-mm, or state a finer print method with "
                     "--finest-mm",
                     feature_mm, request.finest_mm));
   }
@@ -134,23 +134,23 @@ Feature GivenFeature(double feature_mm, const TargetRequest& request) {
   return {feature_mm, why};
 }
 
-// Three px, or what the print method resolves if that is not above six.
+// Three px, or the smallest feature that the print method resolves if that is not above six px.
 Feature FeatureForCamera(const CameraView& view, double finest_mm) {
   const double best_mm = RoundToTwoDigits(kFeaturePx * view.px_mm);
   if (best_mm >= finest_mm) {
     return {best_mm, InPixels(best_mm, view) + ", where 2 to 6 px are best"};
   }
   if (finest_mm <= kMaxFeaturePx * view.px_mm) {
-    return {finest_mm, InPixels(finest_mm, view) + ", the finest that is printed"};
+    return {finest_mm, InPixels(finest_mm, view) + ", the finest that can be printed"};
   }
   // The distance from which the finest printed feature is at most six px of pitch p: in the plane
-  // of focus m = f1/(zf - f1), from [S13], so that zf >= f1 (1 + feature/(6 p)) [D47], and with
-  // px_mm = p/m at the distance asked for: zf - f1 grows as px_mm does.
+  // of focus m = f1/(zf - f1), from [S13], so that zf >= f1 (1 + feature/(6 p)) [D47]. With px_mm =
+  // p/m at the requested distance, zf - f1 is proportional to px_mm.
   const double farther_mm = view.focal_length_mm + (view.distance_mm - view.focal_length_mm) *
                                                        finest_mm / (kMaxFeaturePx * view.px_mm);
   throw Error(
       fmt::format("features of 2 to 6 px at {:g} mm measure {:.2g} to {:.2g} mm on the target, "
-                  "below the {:g} mm that the print method resolves: take a larger distance "
+                  "below the {:g} mm that the print method resolves: choose a larger distance "
                   "({:.0f} mm or more) or a finer print method (--finest-mm)",
                   view.distance_mm, kFinestFeaturePx * view.px_mm, kMaxFeaturePx * view.px_mm,
                   finest_mm, std::ceil(farther_mm)));
@@ -162,9 +162,9 @@ Feature ChooseFeature(const TargetRequest& request, const SheetRectangle& patter
   const double part_mm =
       RoundToTwoDigits(std::min(pattern.width, pattern.height) / kFeaturesAcross);
   if (part_mm >= request.finest_mm) {
-    return {part_mm, "1/360 of the pattern's shorter side, no camera being given"};
+    return {part_mm, "1/360 of the pattern's shorter side, because no camera is given"};
   }
-  return {request.finest_mm, "the finest that is printed, no camera being given"};
+  return {request.finest_mm, "the finest that can be printed, because no camera is given"};
 }
 
 void RequirePossibleTexture(const SheetRectangle& pattern, double feature_mm) {
@@ -177,8 +177,8 @@ void RequirePossibleTexture(const SheetRectangle& pattern, double feature_mm) {
   }
   if (!(pattern.width * pattern.height / (feature_mm * feature_mm) <= kMaxFeatures)) {
     throw Error(
-        fmt::format("a pattern of {:.1f} x {:.1f} mm with features of {:g} mm would hold more than "
-                    "{:g} million of them: take a larger --feature-mm or a smaller --size",
+        fmt::format("a pattern of {:.1f} x {:.1f} mm with features of {:g} mm would contain more "
+                    "than {:g} million of them: choose a larger --feature-mm or a smaller --size",
                     pattern.width, pattern.height, feature_mm, kMaxFeatures / 1e6));
   }
 }
@@ -250,9 +250,9 @@ TargetPage LayOutTarget(const TargetRequest& request) {
   page.choice =
       fmt::format("smallest feature {:g} mm ({}); pattern {:.1f} x {:.1f} mm ({})", feature.size_mm,
                   feature.why, page.pattern.width, page.pattern.height,
-                  request.view ? fmt::format("the field of {:.1f} x {:.1f} mm and 15 %",
+                  request.view ? fmt::format("the field of {:.1f} x {:.1f} mm plus 15 %",
                                              request.view->width_mm, request.view->height_mm)
-                               : "what the sheet holds");
+                               : "the free area of the sheet");
   AddCaption(sheet, request.view, &page);
   return page;
 }

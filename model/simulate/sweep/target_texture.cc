@@ -11,15 +11,15 @@
 namespace thicklens::model {
 namespace {
 
-constexpr double kLargestLeaf = 0.1;  // radius, of the pattern's shorter side
+constexpr double kLargestLeaf = 0.1;  // radius relative to the pattern's shorter side
 constexpr double kSamplesPerFeature = 6;
 constexpr double kOpenAtEnd = 1e-3;
 constexpr int kDarkestGrey = 51;     // 0.2 of full scale
 constexpr int kBrightestGrey = 230;  // 0.9
 constexpr int kTriesPerLook = 4096;
 
-// Uniform in [0, 1), from the upper 53 bits; the standard fixes the engine's numbers but not those
-// of its distributions.
+// Uniform in [0, 1), from the upper 53 bits; the standard specifies the numbers of the engine but
+// not those of its distributions.
 class Draws {
  public:
   explicit Draws(std::uint64_t seed) : engine_(seed) {}
@@ -29,8 +29,8 @@ class Draws {
   std::mt19937_64 engine_;
 };
 
-// Which points of a fine grid over the pattern are still open when leaves are laid from the front
-// backward.
+// Tracks which points of a fine grid over the pattern are still uncovered while leaves are laid
+// from the front backward.
 class Openings {
  public:
   Openings(const SheetRectangle& pattern, double spacing_mm)
@@ -43,7 +43,7 @@ class Openings {
 
   double OpenPart() const { return static_cast<double>(left_) / static_cast<double>(open_.size()); }
 
-  // Each closes what it covers and tells whether any of it was open.
+  // Covers the points of an area, and returns whether any of them was still uncovered.
   bool Close(const SheetRectangle& area) {
     bool was_open = false;
     for (int row = FirstRow(area.y); row <= LastRow(area.y + area.height); ++row)
@@ -64,7 +64,7 @@ class Openings {
   }
 
  private:
-  // Grid points lie at the middle of their cells.
+  // Grid points lie in the middle of their cells.
   int FirstAt(double from_mm) const {
     return std::max(0, static_cast<int>(std::ceil(from_mm / spacing_mm_ - 0.5)));
   }
@@ -121,7 +121,7 @@ std::vector<TargetLeaf> DeadLeaves(const TargetPage& page) {
     // function of the density ~ r^-3 between rmin and rmax, derived here [D46].
     TargetLeaf leaf;
     leaf.radius_mm = 1 / std::sqrt(small_term - draws.Uniform() * (small_term - large_term));
-    // Also from beyond the sides, so that the texture there is as in the middle.
+    // Leaves also start beyond the sides, so that the texture there equals that in the middle.
     leaf.x_mm = pattern.x - largest_mm + draws.Uniform() * (pattern.width + 2 * largest_mm);
     leaf.y_mm = pattern.y - largest_mm + draws.Uniform() * (pattern.height + 2 * largest_mm);
     leaf.grey = DrawGrey(page.two_tone, &draws);

@@ -109,7 +109,7 @@ TEST_F(BenchSourceTest, LargeImagesAreSampledAndSaySo) {
     EXPECT_NE(row["implementation"], "opencl");
   }
   EXPECT_THAT(result_.out, HasSubstr("64 of 100 of 160x160 with 2x2 views; --full runs all"));
-  EXPECT_THAT(result_.out, HasSubstr("160x160, 2 x 2 views: scores are of 4 areas of 32 x 32 px"));
+  EXPECT_THAT(result_.out, HasSubstr("160x160, 2 x 2 views: scores are for 4 areas of 32 x 32 px"));
   EXPECT_THAT(result_.err, HasSubstr("rows with OpenCL are left out"));
 }
 

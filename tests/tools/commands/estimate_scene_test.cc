@@ -442,14 +442,14 @@ TEST_F(EstimateSceneTest, HolesAreReportedWithTheirShare) {
   EXPECT_EQ(summary["holes_filled"], 320);
   EXPECT_NEAR(summary["holes_share"].get<double>(), 0.052, 5e-4);
   EXPECT_THAT(result.out, HasSubstr("320 px, filled along the surfaces around them (5.2 %)"));
-  EXPECT_THAT(result.err, Not(HasSubstr("are no depth")));
+  EXPECT_THAT(result.err, Not(HasSubstr("are not depths")));
 
   const std::string nearly_none = Depth([](int x, int y) {
     return x == 20 && y == 20 ? 0.4 : std::numeric_limits<double>::quiet_NaN();
   });
   Summary({Image(), nearly_none, "--depth-kind", "disparity", "--views", "3x3"}, &result);
   EXPECT_THAT(result.out, HasSubstr("(99.9 %)"));
-  EXPECT_THAT(result.err, AllOf(HasSubstr("depth.pfm"), HasSubstr("are no depth")));
+  EXPECT_THAT(result.err, AllOf(HasSubstr("depth.pfm"), HasSubstr("are not depths")));
 }
 
 TEST_F(EstimateSceneTest, TheReportShowsEachFigureOnce) {

@@ -161,7 +161,7 @@ TEST_F(AblationTest, OfASweepIsWhatTheOtherCommandsFind) {
   const nlohmann::json part = JsonOf("a.json").at("ablation").at("sweep");
   // Without blur there is nothing to calibrate, but the other values are reported nevertheless.
   EXPECT_THAT(RowOf(part, "defocus").at("refusal").get<std::string>(), Not(::testing::IsEmpty()));
-  EXPECT_THAT(out_, AllOf(HasSubstr("Without defocus there is no calibration: "),
+  EXPECT_THAT(out_, AllOf(HasSubstr("Without defocus the calibration fails: "),
                           HasSubstr("refused  refused")));
   EXPECT_EQ(part.at("effects").size(), model::SweepEffects().Effects().size());
   const auto calibrated = [&](const Arguments& of_simulation) {

@@ -84,7 +84,7 @@ TEST(BlurProposal, SpeaksOfTheCameraWhereDepthIsADepth) {
   EXPECT_THAT(blur.Warning(),
               AllOf(HasSubstr("7 of 20 blocks"), HasSubstr("0.5 times"),
                     HasSubstr("blur_ratio of 0.225 instead of 0.45"), HasSubstr("leaves 10 %"),
-                    HasSubstr("nothing of this was applied"), Not(HasSubstr("plane of focus"))));
+                    HasSubstr("none of this was applied"), Not(HasSubstr("plane of focus"))));
   EXPECT_DOUBLE_EQ(blur.Json().at("proposal").at("narrower_blur").at("blur_ratio").get<double>(),
                    0.225);
   EXPECT_FALSE(blur.Json().at("proposal").contains("other_focus"));
@@ -94,7 +94,7 @@ TEST(BlurProposal, SpeaksOfTheCameraWhereDepthIsADepth) {
   const BlurProposal both(check, input, Depth("range"));
   EXPECT_THAT(both.Warning(),
               AllOf(HasSubstr("plane of focus at"), HasSubstr("instead of 800 mm"),
-                    HasSubstr("-0.3 px"), HasSubstr("the photograph does not tell")));
+                    HasSubstr("-0.3 px"), HasSubstr("the photograph does not show")));
   EXPECT_EQ(both.Json().at("proposal").at("other_focus").at("focus_depth_mm"),
             FocusDepthForOffsetMm(input, -0.3));
 }

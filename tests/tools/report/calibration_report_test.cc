@@ -78,7 +78,7 @@ TEST(CalibrationReport, WithoutDetailsLeavesTheirPartsOut) {
     EXPECT_THAT(html, Not(HasSubstr(absent)));
   EXPECT_THAT(html, Not(HasSubstr("not run")));
   made.calibration.nearer.message = "3 frames; 5 are needed";
-  EXPECT_THAT(Page(made), HasSubstr("<li>blur, nearer side alone: 3 frames; 5 are needed</li>"));
+  EXPECT_THAT(Page(made), HasSubstr("<li>blur, nearer side only: 3 frames; 5 are needed</li>"));
 }
 
 TEST(CalibrationReport, EscapesNamesFromOutside) {
@@ -156,9 +156,9 @@ TEST(CalibrationReport, PartialResultKeepsTheFiguresItHas) {
   const XmlDocument document = ParseXml(html);
   ASSERT_EQ(document.error, "");
   EXPECT_EQ(document.Named("svg").size(), 4u);
-  EXPECT_THAT(html, HasSubstr("it goes with the reading constant: the lens is telecentric"));
+  EXPECT_THAT(html, HasSubstr("its dependence on the reading: constant: the lens is telecentric"));
   EXPECT_THAT(html, HasSubstr("Partly calibrated: the blur floor is not determined"));
-  EXPECT_THAT(html, HasSubstr("is taken from the points"));
+  EXPECT_THAT(html, HasSubstr("is estimated from the points"));
 }
 
 // A floor of which only an interval is known has no value; the law is drawn all the same.
@@ -170,7 +170,7 @@ TEST(CalibrationReport, AnIntervalForTheFloorKeepsTheFittedCurve) {
   made.calibration.blur_floor_px = calib::Result{kNan, kNan, Eigen::Vector2d(0, 0.7)};
   const std::string html = Page(made, false);
   ASSERT_EQ(ParseXml(html).error, "");
-  EXPECT_THAT(html, HasSubstr("is taken from the points"));
+  EXPECT_THAT(html, HasSubstr("is estimated from the points"));
   EXPECT_THAT(html, HasSubstr("not determined"));
   EXPECT_THAT(Page(made), Not(HasSubstr("nan")));
   EXPECT_EQ(ParseXml(html).Named("path").size(), ParseXml(without).Named("path").size());
@@ -209,14 +209,14 @@ TEST(CalibrationReport, NamesWhatLimitsIt) {
   RemoveDetails(&made.calibration);
   calib::Result& focus = *made.calibration.focus_depth_mm;
   focus = {400, 0.1, Eigen::Vector2d(397, 402)};
-  EXPECT_THAT(Page(made), HasSubstr("What limits it is systematic"));
+  EXPECT_THAT(Page(made), HasSubstr("Systematic errors dominate"));
   EXPECT_THAT(Page(made), HasSubstr("knife edge"));
   made.sweep.floor.given_px = model::Estimate{0.5, 0.01};
   EXPECT_THAT(Page(made), Not(HasSubstr("knife edge")));
   focus = {400, 3, Eigen::Vector2d(399, 401)};
-  EXPECT_THAT(Page(made), HasSubstr("What limits it is statistical"));
+  EXPECT_THAT(Page(made), HasSubstr("Statistical errors dominate"));
   focus = {400, 1, Eigen::Vector2d(399, 401)};
-  EXPECT_THAT(Page(made), HasSubstr("limit it alike"));
+  EXPECT_THAT(Page(made), HasSubstr("contribute alike"));
   // If the calibration itself gives advice, no general advice is added.
   focus = {400, 0.1, Eigen::Vector2d(397, 402)};
   made.calibration.advice = "photograph a knife edge: +-2.9 mm would become +-0.4";
@@ -240,7 +240,7 @@ TEST(CalibrationReport, SaysWhatTheFieldAndTheColoursDo) {
   std::string html = Page(made);
   for (const char* words :
        {"tilt about the vertical axis +1.210 ± 0.090° (the target",
-        "tilt about the horizontal axis −0.050 ± 0.080° (none beyond its error)",
+        "tilt about the horizontal axis −0.050 ± 0.080° (not significant)",
         "<li>curvature −1.83 ± 0.21 mm", "astigmatism +0.42 ± 0.11 mm", "blue 401.44 ± 0.12 mm",
         "(pincushion)", "A Gaussian describes the frames better than a disc"})
     EXPECT_THAT(html, HasSubstr(words));
@@ -252,7 +252,7 @@ TEST(CalibrationReport, SaysWhatTheFieldAndTheColoursDo) {
   EXPECT_THAT(html, HasSubstr("2 different readings: zf = 398.00 ± 0.20 mm (12 tiles), "
                               "405.00 ± 0.30 mm (1 tile)"));
   EXPECT_THAT(html, HasSubstr("A disc describes the frames better than a Gaussian"));
-  EXPECT_THAT(html, HasSubstr("the camera file says gaussian"));
+  EXPECT_THAT(html, HasSubstr("the camera file states gaussian"));
 }
 
 // The tiles have their positions in the image, and the colour is a function of their value.
@@ -540,10 +540,12 @@ TEST(CalibrationReport, NamesTheBenchZeroWhereItIsMostOfTheError) {
   RemoveDetails(&made.calibration);
   *made.calibration.focus_depth_mm = {400, 0.57, Eigen::Vector2d(399.9, 400.1)};
   made.calibration.bench_offset_mm->sigma = 0.56;
-  EXPECT_THAT(Page(made), HasSubstr("What limits it is statistical: the bench zero leaves ±0.57"));
+  EXPECT_THAT(
+      Page(made),
+      HasSubstr("Statistical errors dominate: the bench zero leaves an uncertainty of ±0.57"));
   EXPECT_THAT(Page(made), Not(HasSubstr("noise and readings leave")));
   made.calibration.bench_offset_mm->sigma = 0.3;
-  EXPECT_THAT(Page(made), HasSubstr("What limits it is statistical: noise and readings leave"));
+  EXPECT_THAT(Page(made), HasSubstr("Statistical errors dominate: noise and readings leave"));
 }
 
 TEST(CalibrationReport, SaysWhichTolerancesAreMissing) {
@@ -564,14 +566,15 @@ TEST(CalibrationReport, SaysWhichTolerancesAreMissing) {
 
 TEST(CalibrationReport, AccountsForFramesThatAreNotInTheFit) {
   MadeUpCalibration made = MakeUpCalibration(31, 300, 8);
-  EXPECT_THAT(Page(made), Not(HasSubstr("nothing of the blur")));
+  EXPECT_THAT(Page(made), Not(HasSubstr("no information about the blur")));
   for (const std::size_t i : {3u, 4u, 5u, 9u})
     made.calibration.frames[i].not_in_fit = "too strongly blurred";
   made.calibration.frames[20].not_in_fit = "not registered";
   const std::string html = Page(made);
   ASSERT_EQ(ParseXml(html).error, "");
-  EXPECT_THAT(html,
-              HasSubstr("5 more frames passed the quality checks and say nothing of the blur:"));
+  EXPECT_THAT(
+      html,
+      HasSubstr("5 more frames passed the quality checks but give no information about the blur:"));
   EXPECT_THAT(html, HasSubstr("too strongly blurred (4): frame_003.png … frame_005.png (3 frames), "
                               "frame_009.png</li>"));
   EXPECT_THAT(html, HasSubstr("not registered (1): frame_020.png</li>"));
@@ -602,14 +605,14 @@ TEST(CalibrationReport, SaysWhatWasNotStatedOfTheReadings) {
 
 TEST(CalibrationReport, SaysWhereTheFramesLieOffTheModel) {
   MadeUpCalibration made = MakeUpCalibration(31, 300, 8);
-  EXPECT_THAT(Page(made), Not(HasSubstr("farther off the law")));
+  EXPECT_THAT(Page(made), Not(HasSubstr("exceed their errors")));
   made.calibration.blur.chi2_per_dof = 2.5;
   const std::string widened =
-      "The frames lie farther off the law than their errors (χ²/dof 2.5); the errors were widened";
+      "The residuals of the frames exceed their errors (χ²/dof 2.5); the errors were widened";
   EXPECT_THAT(Page(made), HasSubstr(widened));
   // With few frames chance may do as much, and no widening is reported.
   made.calibration.blur.frames_used = 8;
-  EXPECT_THAT(Page(made), HasSubstr("than their errors (χ²/dof 2.5)."));
+  EXPECT_THAT(Page(made), HasSubstr("exceed their errors (χ²/dof 2.5)."));
 }
 
 // Tiles that differ by noise alone stay near the middle of the colours, all with as many digits.

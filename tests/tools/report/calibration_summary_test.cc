@@ -57,7 +57,7 @@ TEST(CalibrationText, PutsBothMethodsBesideTheTruth) {
   EXPECT_THAT(d1, HasSubstr("+0.0003 (+0.2 sigma)"));
   EXPECT_THAT(d1, HasSubstr("16.2199"));  // 3 + 12.8 * 393.5/381
   EXPECT_THAT(d1, HasSubstr("+0.0070"));
-  const std::string focus = LineWith(text, "depth of focus zf [mm]");
+  const std::string focus = LineWith(text, "in-focus distance zf [mm]");
   EXPECT_THAT(focus, HasSubstr("393.5"));
   EXPECT_THAT(focus, HasSubstr("-6.5"));
   EXPECT_THAT(LineWith(text, "blur ratio kappa"), HasSubstr("0.4512 +- 0.0021"));
@@ -83,7 +83,7 @@ TEST(CalibrationText, AlignsItsColumns) {
   const MadeUpCalibration made = MakeUpCalibration(41, 320, 4);
   const std::string text = CalibrationText(made.sweep, made.calibration, &made.truth);
   const std::size_t width = LineWith(text, "systematic interval").size();
-  for (const char* row : {"image distance d1", "depth of focus zf [mm]", "blur ratio kappa",
+  for (const char* row : {"image distance d1", "in-focus distance zf [mm]", "blur ratio kappa",
                           "blur floor [px]", "bench offset [mm]"})
     EXPECT_EQ(LineWith(text, row).size(), width) << row;
 }
@@ -112,7 +112,7 @@ TEST(CalibrationText, RejectedFramesHaveTheirReasons) {
 TEST(CalibrationText, DetailsTakeFewLines) {
   MadeUpCalibration made = MakeUpCalibration(41, 320, 4);
   const std::string text = CalibrationText(made.sweep, made.calibration, &made.truth);
-  EXPECT_THAT(LineWith(text, "source's recipe: "),
+  EXPECT_THAT(LineWith(text, "paper's recipe: "),
               HasSubstr("over mean grey frame_020.png, at 399.9"));
   EXPECT_THAT(LineWith(text, "magnification: "),
               HasSubstr("5 mm is 26.481 px in the image: d1 = 16.100 +- 0.050 mm, -0.70 %"));

@@ -44,11 +44,11 @@ TEST(Determined, ARefusalReportsItInTheText) {
       CalibrationText(made.sweep, made.calibration, nullptr),
       AllOf(HasSubstr("sharpest: reading 110.03 +- 0.11 mm, by 5 frames; frame_012.png is the "
                       "sharpest\n"),
-            HasSubstr("focus: reading 109.99841 +- 0.00040 mm, by the blur"),
+            HasSubstr("focus: reading 109.99841 +- 0.00040 mm, from the blur"),
             HasSubstr("image scale: 1/scale changes by +10.10 +- 0.10 % over the sweep: the target "
                       "looks smaller at larger readings\n"),
             HasSubstr("compared: the image scale against the readings: the lens moves (chi2 20, "
-                      "named); the target moves (chi2 60); nothing at all (chi2 500)\n")));
+                      "named); the target moves (chi2 60); no cause (chi2 500)\n")));
 }
 
 TEST(Determined, ARefusalReportsItOnThePage) {

@@ -87,7 +87,7 @@ TEST(InlinedReport, IdsGetAPrefixAndAreStillFound) {
 
 TEST(InlinedReport, RefusesWhatIsNoReport) {
   EXPECT_THAT(ErrorOf([] { InlinedCalibrationReport("{\"a\": 1}", "r.html"); }),
-              StartsWith("r.html: no page of `thicklens calibrate --report`"));
+              StartsWith("r.html: not a page of `thicklens calibrate --report`"));
   EXPECT_THAT(ErrorOf([] { InlinedCalibrationReport("</main><main>", "r.html"); }),
               HasSubstr("<main>"));
 }

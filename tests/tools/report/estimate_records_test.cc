@@ -134,8 +134,10 @@ TEST_F(Records, ComparisonIsRead) {
 
 TEST_F(Records, BrokenFilesAreReportedInOneLine) {
   for (const char* text : {"", "{", "{\"solver\": ", "\x89PNG\r\n", "nonsense"}) {
-    EXPECT_THAT(EstimateError(text), AllOf(HasSubstr("r.json: no JSON"), Not(HasSubstr("\n"))));
-    EXPECT_THAT(ComparisonError(text), AllOf(HasSubstr("r.json: no JSON"), Not(HasSubstr("\n"))));
+    EXPECT_THAT(EstimateError(text),
+                AllOf(HasSubstr("r.json: not a JSON file"), Not(HasSubstr("\n"))));
+    EXPECT_THAT(ComparisonError(text),
+                AllOf(HasSubstr("r.json: not a JSON file"), Not(HasSubstr("\n"))));
   }
   EXPECT_THAT(EstimateError("[1, 2]"), HasSubstr("an object is expected"));
   EXPECT_THAT(ErrorOf([&] { ReadEstimateRecord(folder_ / "missing.json"); }),
@@ -146,7 +148,7 @@ TEST_F(Records, FilesOfOtherCommandsAreReported) {
   EXPECT_THAT(EstimateError(kComparison),
               AllOf(HasSubstr("'solver' is missing"), HasSubstr("`thicklens estimate --json`")));
   EXPECT_THAT(ComparisonError(kEstimate),
-              AllOf(HasSubstr("'mean' is missing"), HasSubstr("of two light fields")));
+              AllOf(HasSubstr("'mean' is missing"), HasSubstr("for two light fields")));
   // Two images compared.
   EXPECT_THAT(ComparisonError(R"({"psnr_db": 30, "ssim": 0.9})"), HasSubstr("'mean' is missing"));
 }

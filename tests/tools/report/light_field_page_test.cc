@@ -242,7 +242,7 @@ TEST_F(LightFieldPageTest, SaysOnlyWhatItWasGiven) {
   GiveDepth();
   EXPECT_THAT(Page().sections,
               ElementsAre("summary", "image", "views", "epipolar", "refocus", "how"));
-  EXPECT_THAT(Html(), Not(HasSubstr("All that is known of the light")));
+  EXPECT_THAT(Html(), Not(HasSubstr("All available data on the light")));
   GiveAll();
   EXPECT_THAT(Page().sections, ElementsAre("summary", "sweep", "calibration", "image", "views",
                                            "epipolar", "refocus", "numbers", "how"));
@@ -373,7 +373,7 @@ TEST_F(LightFieldPageTest, TheCameraInWords) {
   // If there are no frames, they are not mentioned.
   light_field_.camera->calibration->evidence.frames_used = 0;
   light_field_.camera->calibration->evidence.method = "simulated";
-  EXPECT_THAT(Html(), AllOf(HasSubstr("(of a simulated camera: true, not measured)."),
+  EXPECT_THAT(Html(), AllOf(HasSubstr("(true values of a simulated camera, not measured)."),
                             Not(HasSubstr("frame"))));
   light_field_.camera->calibration->evidence.method = "by<hand>";
   EXPECT_THAT(Html(), AllOf(HasSubstr("(by by&lt;hand&gt;)."), Not(HasSubstr("frame"))));
@@ -428,7 +428,7 @@ TEST_F(LightFieldPageTest, MissingViewsAreNamedAndNotCounted) {
   std::fill_n(light_field_.values.begin(), light_field_.view_size(), 0.0F);
   const std::string html = Html();
   EXPECT_THAT(html, HasSubstr("7\u00A0views from one photograph"));
-  EXPECT_THAT(html, HasSubstr("u 0, v 0: not there"));
+  EXPECT_THAT(html, HasSubstr("u 0, v 0: missing"));
   EXPECT_THAT(html, Not(HasSubstr("estimate, u 0, v 1")));
   EXPECT_THAT(html, HasSubstr("estimate, u 2, v 1"));
 }
@@ -804,8 +804,8 @@ TEST_F(ReportProgram, RefusesFilesThatDoNotFit) {
   ExpectRefused({estimate, "--truth", Write(Relative(2, 3), "true")}, {"true: "});
   ExpectRefused({estimate, "--sweep", folder_ / "nowhere"}, {"nowhere"});
   ExpectRefused({estimate, "--calibration", folder_.Put("r.html", "<main><script/></main>")},
-                {"r.html: no page of `thicklens calibrate --report`"});
-  ExpectRefused({estimate, "--estimate", folder_.Put("e.json", "{]")}, {"e.json: no JSON"});
+                {"r.html: not a page of `thicklens calibrate --report`"});
+  ExpectRefused({estimate, "--estimate", folder_.Put("e.json", "{]")}, {"e.json: not a JSON file"});
   ExpectRefused({estimate, "--comparison", folder_.Put("c.json", "{\"status\": \"ok\"}")},
                 {"c.json: 'mean' is missing"});
   ExpectRefused(
@@ -838,7 +838,7 @@ TEST_F(ReportProgram, RefusalsStandInTheJson) {
                 {"e.json"});
   const nlohmann::json json = nlohmann::json::parse(ContentOf(folder_ / "r.json"));
   EXPECT_EQ(json["status"], "refused");
-  EXPECT_THAT(json["reason"].get<std::string>(), HasSubstr("e.json: no JSON"));
+  EXPECT_THAT(json["reason"].get<std::string>(), HasSubstr("e.json: not a JSON file"));
 }
 
 TEST_F(ReportProgram, CommandLinesThatCannotBeMeant) {

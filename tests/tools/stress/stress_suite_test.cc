@@ -123,7 +123,7 @@ TEST(StressCaseJudge, SeesWhatIsNotRefused) {
   const std::vector<std::string> impossible = {"--solver", "grid", "--gamma", "0"};
   EXPECT_TRUE(OutcomeOf(EstimateOf(shape, impossible, Refused({"gamma"}))).as_required);
   EXPECT_THAT(OutcomeOf(EstimateOf(shape, impossible, Refused({"lambda"}))).measured,
-              HasSubstr("refused without saying 'lambda'"));
+              HasSubstr("refused without the text 'lambda'"));
   EXPECT_THAT(OutcomeOf(EstimateOf(shape, impossible, ErrorIs(0, 1))).measured,
               AllOf(HasSubstr("refused: "), HasSubstr("gamma")));
   Requirement either = ErrorIs(0, 1);
@@ -137,7 +137,7 @@ TEST(StressCaseJudge, SeesWhatHangs) {
   const StressImage shape;
   const StressOutcome outcome = OutcomeOf(EstimateOf(shape, {}, ErrorIs(0, 1)), 1e-6);
   EXPECT_FALSE(outcome.as_required);
-  EXPECT_THAT(outcome.measured, HasSubstr("not done after"));
+  EXPECT_THAT(outcome.measured, HasSubstr("not finished after"));
 }
 
 // Views as an estimate would have left them.

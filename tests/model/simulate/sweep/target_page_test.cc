@@ -101,7 +101,7 @@ TEST(LayOutTarget, OverfillsTheFieldOfACamera) {
   EXPECT_NEAR(page.pattern.height, 1.15 * 96, 0.1);
   EXPECT_DOUBLE_EQ(page.feature_mm, 0.6);
   EXPECT_THAT(page.choice, AllOf(HasSubstr("0.6 mm (3.0 px"), HasSubstr("2 to 6 px"),
-                                 HasSubstr("128.0 x 96.0 mm and 15 %")));
+                                 HasSubstr("128.0 x 96.0 mm plus 15 %")));
   EXPECT_THAT(page.caption.back(), HasSubstr("sees 128.0 x 96.0 mm at 1000 mm"));
 }
 
