@@ -165,7 +165,7 @@ std::string FindingsText(const Findings& findings) {
   text += fmt::format("blas           {}\n", PrintableUtf8(findings.blas));
   text += fmt::format("block solvers  {} (default {})\n", Joined(findings.block_solvers),
                       estimator::BlockSolverName(estimator::DefaultBlockSolver()));
-  text += fmt::format("images       {}\n", findings.image_files);
+  text += fmt::format("images         {}\n", findings.image_files);
   text += SurveyText(findings);
   if (!findings.used.empty()) {
     text += fmt::format("used           {}: {}\n               {}\n", findings.used,

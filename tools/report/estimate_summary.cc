@@ -178,7 +178,7 @@ std::string SolverText(const json& summary, const EstimateOutcome& outcome) {
   }
   const estimator::SceneSummary& scene = *outcome.scene;
   return fmt::format("solver       scene: {}\n", scene.message) +
-         fmt::format("image      noise {:.2f} grey levels, residual {:.2f} (rms)\n",
+         fmt::format("image        noise {:.2f} grey levels, residual {:.2f} (rms)\n",
                      kEightBitLevels * scene.noise_sigma, kEightBitLevels * scene.residual_rms);
 }
 

@@ -55,11 +55,11 @@ std::string GroupLines(const std::vector<calib::FrameMeasurement>& frames,
   }
   std::string text = fmt::format("  {} ({} frames):\n", PrintableUtf8(group.kind), group.frames);
   const std::vector<std::string> details = TextsOfRuns(frames, group);
-  int told = 0;
+  int reported = 0;
   for (std::size_t i = 0; i < std::min(group.runs.size(), kMaxRuns); ++i) {
     const calib::RejectionRun& run = group.runs[i];
     text += fmt::format("    {}\n", PrintableUtf8(Reason(RunName(frames, run), details[i])));
-    told += run.count();
+    reported += run.count();
   }
   if (reported < group.frames) {
     text +=
