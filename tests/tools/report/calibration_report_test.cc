@@ -589,9 +589,9 @@ TEST(CalibrationReport, TheWorstKnownValueIsNamedOnlyWhereItIsInformative) {
     made.calibration.blur.weak_correlation = correlation;
     return Page(made);
   };
-  EXPECT_THAT(page_with(0.05), Not(HasSubstr("Known worst")));
-  EXPECT_THAT(page_with(-0.49), Not(HasSubstr("Known worst")));
-  EXPECT_THAT(page_with(-0.93), HasSubstr("Known worst: a with b"));
+  EXPECT_THAT(page_with(0.05), Not(HasSubstr("Least certain")));
+  EXPECT_THAT(page_with(-0.49), Not(HasSubstr("Least certain")));
+  EXPECT_THAT(page_with(-0.93), HasSubstr("Least certain: a with b"));
 }
 
 TEST(CalibrationReport, SaysWhatWasNotStatedOfTheReadings) {

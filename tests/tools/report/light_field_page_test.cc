@@ -558,8 +558,8 @@ TEST_F(LightFieldPageTest, TheResidualIsSigned) {
   input_.estimate = Estimate();
   input_.estimate->residual_rms = 1.5 / 255;
   input_.estimate->noise_sigma = 1.25 / 255;
-  EXPECT_THAT(Html(),
-              AllOf(HasSubstr("Its rms is 1.50 grey levels"), HasSubstr("noise 1.25 per channel")));
+  EXPECT_THAT(Html(), AllOf(HasSubstr("Its rms is 1.50 grey levels"),
+                            HasSubstr("noise of the photograph 1.25 per channel")));
 }
 
 TEST_F(LightFieldPageTest, TheConfidenceHasItsShares) {
@@ -573,7 +573,7 @@ TEST_F(LightFieldPageTest, TheConfidenceHasItsShares) {
     maps.occluded_fraction[i] = y >= 21 ? 0.75F : y >= 18 ? 0.25F : 0.005F;
   }
   const std::string html = Html();
-  EXPECT_THAT(html, AllOf(HasSubstr("the centre view shows (50.0 %)"),
+  EXPECT_THAT(html, AllOf(HasSubstr("that the aperture sees (50.0 %)"),
                           HasSubstr("some rays come past an edge or the border (12.5 %)"),
                           HasSubstr("for fine detail (25.0 %)"),
                           HasSubstr("most rays come past an edge or the border (12.5 %)")));
