@@ -74,7 +74,7 @@ TEST(CalibrationReport, WithoutDetailsLeavesTheirPartsOut) {
   EXPECT_EQ(document.Named("svg").size(), 5u);
   EXPECT_EQ(document.Named("figcaption").size(), 4u);
   for (const char* absent : {"Over the field", "Where the systematic error", "What to do next",
-                             "Known worst", "red channel", "sharpest frame, over mean grey"})
+                             "Least certain", "red channel", "sharpest frame, over mean grey"})
     EXPECT_THAT(html, Not(HasSubstr(absent)));
   EXPECT_THAT(html, Not(HasSubstr("not run")));
   made.calibration.nearer.message = "3 frames; 5 are needed";
