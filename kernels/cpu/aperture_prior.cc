@@ -10,11 +10,11 @@
 #include "thicklens/base/error.h"
 #include "thicklens/base/index.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/base/pi.h"
 
 namespace thicklens::kernels {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr std::size_t kPacket = AperturePrior<float>::kPacket;
 // Number of points for one call of ParallelFor's work.
 constexpr std::size_t kChunk = 256 * kPacket;

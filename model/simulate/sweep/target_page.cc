@@ -7,12 +7,11 @@
 #include <utility>
 
 #include "thicklens/base/error.h"
+#include "thicklens/base/pi.h"
 #include "thicklens/model/thick_lens.h"
 
 namespace thicklens::model {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 // Measures for a sheet at least 210 mm wide; smaller sheets have proportional ones.
 constexpr double kFullSheetMm = 210;

@@ -16,9 +16,9 @@
 
 namespace thicklens {
 
-// The version of the library with which the program runs, for example "0.1.0". It is written into
-// camera files and light fields. It differs from THICKLENS_VERSION_STRING if the shared library was
-// replaced after the program was compiled.
+// The version of the library with which the program is linked, for example "0.1.0". It is written
+// into camera files and light fields. It differs from THICKLENS_VERSION_STRING if the program was
+// compiled with the headers of another version.
 THICKLENS_EXPORT std::string LibraryVersion();
 
 }  // namespace thicklens
