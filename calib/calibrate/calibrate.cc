@@ -114,7 +114,7 @@ class Calibrator {
 
   void EndBeforeFit() {
     result_.outcome = Outcome::kPartial;
-    result_.reason = "the blur was not to be fitted";
+    result_.reason = "the fit of the blur was not requested";
   }
 
   // The reason of a refusal is often only the consequence of a simpler cause.
@@ -124,7 +124,7 @@ class Calibrator {
     if (result_.outcome != Outcome::kRefused) {
       if (!exposure.empty())
         result_.warnings.insert(result_.warnings.begin(),
-                                exposure + "; the results come from the others alone");
+                                exposure + "; the results come from the other frames alone");
       return;
     }
     for (const std::string& cause :
@@ -133,7 +133,8 @@ class Calibrator {
           RegistrationAdvice(sweep_, result_.frames, used(), result_.scale, result_.structure)}) {
       if (cause.empty()) continue;
       // No advice is given on what is missing because of the light.
-      result_.reason = cause == exposure ? cause : cause + "; as it is, " + result_.reason;
+      result_.reason =
+          cause == exposure ? cause : cause + "; the immediate reason is: " + result_.reason;
       return;
     }
   }
@@ -273,12 +274,13 @@ class Calibrator {
   void WarnOfBands(std::size_t registered) {
     if (!result_.structure.HasBands() || !result_.scale.done) return;
     const std::size_t frames = used().size();
-    result_.warnings.push_back(fmt::format(
-        "only {} of {} frames could be registered: {}{}", registered, frames,
-        BandsInWords(result_.structure),
-        BandsExplain(result_.structure, frames - registered, frames)
-            ? ""
-            : "; so many are not explained by that: others may show another part of the target"));
+    result_.warnings.push_back(
+        fmt::format("only {} of {} frames could be registered: {}{}", registered, frames,
+                    BandsInWords(result_.structure),
+                    BandsExplain(result_.structure, frames - registered, frames)
+                        ? ""
+                        : "; this does not explain so many missing frames: some may show another "
+                          "part of the target"));
   }
 
   // Takes the given bench zero and the readings as they are.
@@ -398,8 +400,8 @@ class Calibrator {
     if (!sweep_.offset_mm && result_.scale.done) {
       const Eigen::Vector2d& offsets_mm = result_.scale.offset_of_pupil_laws_mm;
       WidenByTrials("pupil law",
-                    "measure offset_mm: a zero from the image scale depends on how the light "
-                    "spreads over the pupil",
+                    "measure offset_mm: a bench zero from the image scale depends on how the light "
+                    "is distributed over the pupil",
                     WithOffsets(setup, {offsets_mm.x(), offsets_mm.y()}), fit, &result_);
     }
     if (conflicting_offset_mm_) {
@@ -412,7 +414,7 @@ class Calibrator {
                     &result_);
     }
     if (slip_) {
-      WidenByTrials("jump of the readings", "find what slipped, or take the sweep again",
+      WidenByTrials("jump of the readings", "find the part that slipped, or take the sweep again",
                     WithoutReadingStep(sweep_, setup, *slip_, scales_, reference_, result_), fit,
                     &result_);
     }

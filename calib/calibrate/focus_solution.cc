@@ -123,8 +123,8 @@ class Solution {
   void WarnOfMisfit() {
     if (!(fit_.chi2_per_dof > kLargeMisfit) || !(fit_.error_factor > 1)) return;
     result_.warnings.push_back(
-        fmt::format("the frames lie farther off the blur law than their errors say (chi2/dof "
-                    "{:.3g}), which were widened for it: {}",
+        fmt::format("the frames deviate from the blur law by more than their errors (chi2/dof "
+                    "{:.3g}), which were widened accordingly: {}",
                     fit_.chi2_per_dof, CausesOfMisfit(sweep_, evidence_, result_)));
   }
 
@@ -177,8 +177,8 @@ class Solution {
     }
     if (light.size() > 3) names += fmt::format(" and {} more", light.size() - 3);
     result_.warnings.push_back(
-        fmt::format("{} of {} frames follow the laws badly and weigh less: {}", light.size(),
-                    result_.blur.frames_used, names));
+        fmt::format("{} of {} frames do not follow the laws well and have less weight: {}",
+                    light.size(), result_.blur.frames_used, names));
   }
 
   void FillValues() {
@@ -219,8 +219,7 @@ class Solution {
     if (!(kappa > 3 * own_kappa_sigma)) {
       result_.focus_reading_mm.reset();
       Refuse(fmt::format(
-          "the blur does not change over the sweep by more than its errors, whatever the bench "
-          "zero "
+          "the blur does not change over the sweep by more than its errors, for any bench zero "
           "(kappa would be {:.2g} +- {:.2g}): move the target farther from focus on both sides",
           kappa, own_kappa_sigma));
       return false;
@@ -228,8 +227,8 @@ class Solution {
     if (!(own_zf_sigma < 0.5 * (farthest - nearest))) {
       result_.focus_reading_mm.reset();
       Refuse(
-          fmt::format("the depth of focus is not fixed by the blur: {:.1f} +- {:.1f} mm in a "
-                      "sweep from {:.1f} to {:.1f} mm, with the bench zero held",
+          fmt::format("the blur does not determine the depth of focus: {:.1f} +- {:.1f} mm in a "
+                      "sweep from {:.1f} to {:.1f} mm, with the bench zero held fixed",
                       zf, own_zf_sigma, nearest, farthest));
       return false;
     }
@@ -239,25 +238,25 @@ class Solution {
     }
     if (outside_mm > 0 && !(own_zf_sigma < StepMm())) {
       Refuse(
-          fmt::format("sharpness is monotone: the focus lies {} than the sweep ({:.1f} to "
-                      "{:.1f} mm), about {:.0f} +- {:.0f} mm; extend the sweep that way",
+          fmt::format("sharpness is monotone: the focus lies {} than the sweep ({:.1f} to {:.1f} "
+                      "mm), at about {:.0f} +- {:.0f} mm; extend the sweep in this direction",
                       side, nearest, farthest, zf, std::max(zf_sigma, own_zf_sigma)));
       return false;
     }
     if (!(kappa >= kSmallestRatio && kappa <= kLargestRatio)) {
-      Refuse(fmt::format(
-          "the blur ratio would have to be {:.{}f}, which no lens has ({} to {}): check "
-          "focal lengths, aperture radius, pixel pitch and the unit of the readings, and "
-          "that the target moved and not the lens",
-          kappa, kappa < 0.1 ? 4 : 2, kSmallestRatio, kLargestRatio));
+      Refuse(
+          fmt::format("the blur ratio would have to be {:.{}f}, which no lens has ({} to {}): "
+                      "check focal lengths, aperture radius, pixel pitch and the unit of the "
+                      "readings, and that the target moved and not the lens",
+                      kappa, kappa < 0.1 ? 4 : 2, kSmallestRatio, kLargestRatio));
       return false;
     }
     if (!(kappa >= kLowRatio && kappa <= kHighRatio)) {
-      result_.warnings.push_back(fmt::format(
-          "a blur ratio of {:.3f} is unusual (the full aperture gives .5): a wrong focal "
-          "length, aperture radius or pixel pitch looks like this; state "
-          "target_period_mm of a grid to check them",
-          kappa));
+      result_.warnings.push_back(
+          fmt::format("a blur ratio of {:.3f} is unusual (the full aperture gives 0.5): a wrong "
+                      "focal length, aperture radius or pixel pitch has this effect; photograph a "
+                      "grid and state its target_period_mm to check them",
+                      kappa));
     }
     result_.blur.outside_mm = outside_mm;
     if (outside_mm > 0) {
@@ -277,13 +276,12 @@ class Solution {
             ? fmt::format("offset_mm is stated as {:.4g} +- {:.2g} mm", zero_mm.value,
                           zero_mm.sigma)
             : fmt::format(
-                  "the sweep is {:.3g} mm long at a depth of {:.4g} mm, too short for its "
-                  "image scale to fix the bench zero ({:.4g} +- {:.2g} mm)",
+                  "the sweep is {:.3g} mm long at a depth of {:.4g} mm, too short for its image "
+                  "scale to determine the bench zero ({:.4g} +- {:.2g} mm)",
                   farthest_mm - nearest_mm, fit_.values[kFocusDepth], zero_mm.value, zero_mm.sigma);
     return fmt::format(
         "the bench zero is not known well enough: {}, so that the depth of focus is {:.1f} +- "
-        "{:.1f} mm. Where focus lies in the sweep is known: at the reading {:.6g} +- {:.2g} mm. "
-        "State offset_mm{}",
+        "{:.1f} mm. The reading at focus is known: {:.6g} +- {:.2g} mm. State offset_mm{}",
         from, fit_.values[kFocusDepth], result_.focus_depth_mm->sigma,
         result_.focus_reading_mm->value, result_.focus_reading_mm->sigma,
         sweep_.offset_mm ? " more exactly" : "");
@@ -337,9 +335,9 @@ class Solution {
       FrameMeasurement& frame = Frame(f);
       if (frame.in_blur_fit || !frame.rejection.empty()) continue;
       frame.not_in_fit = frame.image_scale
-                             ? "too strongly blurred, or too far off in scale, for the "
+                             ? "it is blurred too strongly, or its scale differs too much, for the "
                                "part of the target that all frames share"
-                             : "could be neither registered, nor does it show edges";
+                             : "it could not be registered and shows no edges";
     }
   }
 
@@ -348,7 +346,7 @@ class Solution {
     result_.reason.clear();
     if (!result_.blur.undetermined.empty()) {
       result_.outcome = Outcome::kPartial;
-      result_.reason = "the data do not fix blur_floor_px; it is not written";
+      result_.reason = "the data do not determine blur_floor_px, which is therefore not written";
     }
   }
 

@@ -118,9 +118,10 @@ class Verifier {
          : floor_is_stated ? "the sweep states it and does not measure it"
                            : "");
     Take(kOffset, stored_.bench_offset_mm, found_.bench_offset_mm, 0,
-         sweep_.offset_mm      ? "the sweep states it and does not measure it"
-         : options_.same_bench ? ""
-                               : "it is the camera's place on the bench, which may be another");
+         sweep_.offset_mm ? "the sweep states it and does not measure it"
+         : options_.same_bench
+             ? ""
+             : "it describes the position of the camera on the bench, which may have changed");
   }
 
   std::vector<ComparedParameter*> Counted() {
@@ -153,8 +154,8 @@ class Verifier {
     Eigen::LLT<Eigen::MatrixXd> factor(correlation);
     if (factor.info() != Eigen::Success) {
       result_.warnings.emplace_back(
-          "the covariance matrices of the stored and the new calibration make no possible one "
-          "together: the parameters are taken as independent");
+          "the sum of the covariance matrices of the stored and the new calibration is not "
+          "positive definite: the parameters are treated as independent");
       factor.compute(Eigen::MatrixXd::Identity(count, count));
     }
     result_.degrees_of_freedom = static_cast<int>(count);
@@ -184,7 +185,8 @@ class Verifier {
     }
     if (names.empty()) return;
     result_.warnings.push_back(
-        fmt::format("the stored calibration (method '{}') states no error of {}: taken as exact",
+        fmt::format("the stored calibration (method '{}') states no error of {}: these values are "
+                    "treated as exact",
                     stored_.evidence.method, names));
   }
 
@@ -198,13 +200,12 @@ class Verifier {
     const double d1_sigma = found_.image_distance_mm ? found_.image_distance_mm->sigma : 0;
     if (!(offset_sigma > 0) || !(d1_sigma > 0)) return;
     result_.warnings.push_back(fmt::format(
-        "the bench zero is unknown, found to +- {:.3g} mm: it leaves zf open by +- {:.3g} mm "
-        "(correlation of d1 and bench zero {:.2f}){}",
+        "the bench zero is not stated, and the sweep determines it to +- {:.3g} mm only: the error "
+        "of zf is therefore +- {:.3g} mm (correlation of d1 and bench zero {:.2f}){}",
         offset_sigma, focus->found.sigma, covariance / (d1_sigma * offset_sigma),
-        options_.same_bench
-            ? "; the stored bench zero is compared too"
-            : "; if the camera stands as it did (--same-bench), or with a measured offset_mm, a "
-              "smaller change shows"));
+        options_.same_bench ? "; the stored bench zero is compared, too"
+                            : "; if the camera has not moved on the bench (--same-bench), or if "
+                              "offset_mm is measured, a smaller change can be detected"));
   }
 
   // A change of d1 adds to the blur sigma(z) = kappa r |c(z)|/p, where
@@ -240,7 +241,8 @@ class Verifier {
     if (result_.p_value < options_.significance) {
       result_.verdict = Verdict::kDoesNotHold;
       result_.reason = fmt::format(
-          "chi-square {:.1f} of {} parameter(s), which chance exceeds with probability {:.2g}: {}",
+          "chi-square {:.1f} for {} parameter(s), which chance exceeds with a probability of "
+          "{:.2g}: {}",
           result_.chi_square, result_.degrees_of_freedom, result_.p_value, Deviations());
       return;
     }
@@ -267,23 +269,21 @@ class Verifier {
   // Returns the reason why agreement would prove nothing; empty if it is meaningful.
   std::string TooCoarse(const ComparedParameter* d1, const ComparedParameter* kappa) const {
     if (d1 == nullptr || !d1->counted) {
-      return "the sweep does not determine image_distance_mm, of which a calibration consists "
-             "first of all";
+      return "the sweep does not determine image_distance_mm, the main parameter of a calibration";
     }
     if (!(result_.detectable_blur_px <= options_.needed_blur_px)) {
       return fmt::format(
-          "it agrees, but only a change of image_distance_mm of {:.3g} mm or more would show, "
-          "which "
-          "changes the blur by {:.3g} px of sigma; {:g} px are needed: take more frames, on both "
-          "sides of focus",
+          "the calibrations agree, but only a change of image_distance_mm of {:.3g} mm or more "
+          "could be detected, which changes sigma of the blur by {:.3g} px; a change of {:g} px "
+          "must be detectable: take more frames, on both sides of focus",
           d1->smallest_detectable, result_.detectable_blur_px, options_.needed_blur_px);
     }
     if (kappa != nullptr && kappa->counted &&
         !(kappa->smallest_detectable <= options_.needed_blur_ratio * kappa->stored.value)) {
       return fmt::format(
-          "it agrees, but only a change of blur_ratio of {:.3g} or more would show; {:.3g} ({:g} "
-          "%) "
-          "is needed: take frames farther from focus",
+          "the calibrations agree, but only a change of blur_ratio of {:.3g} or more could be "
+          "detected; a change of {:.3g} ({:g} %) must be detectable: take frames farther from "
+          "focus",
           kappa->smallest_detectable, options_.needed_blur_ratio * kappa->stored.value,
           100 * options_.needed_blur_ratio);
     }
@@ -324,7 +324,8 @@ Verification VerifyCalibration(const model::Camera& stored, const FocusSweep& sw
   std::string why;
   if (!options.IsValid(&why)) throw Error(why);
   if (!stored.calibration) {
-    throw Error(fmt::format("camera '{}' has no calibration that could be verified", stored.name));
+    throw Error(
+        fmt::format("camera '{}' has no calibration to verify: calibrate it first", stored.name));
   }
   return Verifier(stored, sweep, found, options).Run();
 }

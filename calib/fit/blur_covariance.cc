@@ -62,7 +62,7 @@ std::optional<Eigen::MatrixXd> FillCovariance(const BlurJacobian& jacobian,
                          static_cast<double>(jacobian.values.cols() + jacobian.eliminated) -
                          jacobian.lost_weight;
   if (!(freedom > 0.5)) {
-    result->message = "too few frames fit the blur law to tell its errors";
+    result->message = "too few frames follow the blur law to estimate its errors";
     return std::nullopt;
   }
   result->chi2_per_dof = jacobian.residuals.squaredNorm() / freedom;
@@ -74,7 +74,7 @@ std::optional<Eigen::MatrixXd> FillCovariance(const BlurJacobian& jacobian,
   const Eigen::VectorXd& singular = svd.singularValues();
   if (!(singular.tail<1>()[0] > kMinSingular * singular[0])) {
     NameWeak(jacobian.free, svd.matrixV().rightCols<1>(), &result->weak_direction);
-    result->message = "the data do not tell apart: " + result->weak_direction;
+    result->message = "the data do not distinguish: " + result->weak_direction;
     return std::nullopt;
   }
   const Eigen::MatrixXd half =

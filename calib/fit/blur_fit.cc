@@ -93,7 +93,7 @@ class Fit {
         setup_.estimators.begin(), setup_.estimators.end(),
         [](const auto& a, const auto& b) { return a.frames.size() < b.frames.size(); });
     if (largest == setup_.estimators.end() || largest->frames.size() < 4) {
-      return Fail(fmt::format("blur was measured on {} frames, at least 4 are needed",
+      return Fail(fmt::format("blur was measured on {} frames, but at least 4 are needed",
                               largest == setup_.estimators.end() ? 0 : largest->frames.size()));
     }
     return StartFromParabola(*largest);

@@ -189,7 +189,7 @@ class Measurement {
       std::optional<EstimatorRegion> region =
           PlanRegion(evidence_.spectral, kWholeField, Eigen::Vector2d::Zero());
       if (!region) {
-        NoteNoSpectrum("too few frames see enough of the same target");
+        NoteNoSpectrum("too few frames show enough of the same target");
         return;
       }
       std::vector<EstimatorRegion> regions = {std::move(*region)};
@@ -323,8 +323,9 @@ FittedRegion FitRegion(EstimatorRegion region, const RelativeBlurOptions& option
     if (empty.empty()) return {std::move(region), std::move(blur)};
     if (region.frames.size() - empty.size() < kMinFrames) {
       blur.done = false;
-      blur.message = fmt::format("the texture of {} frames is lost in blur or noise; {} are left",
-                                 empty.size(), region.frames.size() - empty.size());
+      blur.message =
+          fmt::format("the texture of {} frames is lost in blur or noise; only {} frames are left",
+                      empty.size(), region.frames.size() - empty.size());
       return {std::move(region), std::move(blur)};
     }
     region = PartOf(

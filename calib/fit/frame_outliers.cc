@@ -37,7 +37,8 @@ class Outliers {
     for (const BlurSamples& estimator : evidence_.setup.estimators)
       most = std::max(most, estimator.frames.size());
     if (most >= kMinFrames) return std::nullopt;
-    return fmt::format("the blur of {} frames follows one law, {} are needed", most, kMinFrames);
+    return fmt::format("the blur of only {} frames follows one law, but {} frames are needed", most,
+                       kMinFrames);
   }
 
  private:
@@ -56,8 +57,8 @@ class Outliers {
       const double ratio = evidence_.frame_noise_ratios[f] / typical;
       if (!(ratio > kScatterOfDamage)) continue;
       Frame(f).rejection = fmt::format(
-          "does not show what the others show: its spectrum lies {:.0f} times farther off than "
-          "theirs (smeared, shifted within the exposure, something in front of the target, or so "
+          "does not show what the others show: its spectrum deviates {:.0f} times more than theirs "
+          "(the frame is smeared, the target moved during the exposure or was covered, or it is so "
           "far out of focus that the blur law does not hold)",
           std::sqrt(ratio));
     }
@@ -87,9 +88,9 @@ class Outliers {
           errors_mm.push_back(sign_ * (depths[i] - depth_mm));
       }
       if (!errors_mm.empty()) frame.reading_error_mm = errors_mm.front();
-      frame.rejection =
-          fmt::format("{}: its blur lies {:.0f} standard deviations off the others' law",
-                      InWords(errors_mm), std::abs(off));
+      frame.rejection = fmt::format(
+          "{}: its blur deviates by {:.0f} standard deviations from the law of the other frames",
+          InWords(errors_mm), std::abs(off));
     }
   }
 

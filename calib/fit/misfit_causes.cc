@@ -50,11 +50,13 @@ std::string CausesOfMisfit(const FocusSweep& sweep, const BlurEvidence& evidence
   const auto& other = is_gaussian ? evidence.disc_misfit : evidence.gaussian_misfit;
   if (!stated || !other || !(*other > kClearlyBetter * *stated))
     causes.emplace_back("another shape of the blur");
-  std::string words = fmt::format("{} or {} do that, and this sweep does not tell these apart",
-                                  fmt::join(causes.begin(), causes.end() - 1, ", "), causes.back());
+  std::string words =
+      fmt::format("{} or {} may be the cause, and this sweep does not distinguish these causes",
+                  fmt::join(causes.begin(), causes.end() - 1, ", "), causes.back());
   if (readings_are_as_stated)
-    words += fmt::format(" (the readings do not: they scatter by {:.2g} mm about the image scale)",
-                         scale.reading_rms_mm);
+    words += fmt::format(
+        " (the readings are not the cause: they scatter by only {:.2g} mm about the image scale)",
+        scale.reading_rms_mm);
   return words;
 }
 
@@ -69,9 +71,10 @@ std::string AstigmatismInWords(const Calibration& calibration) {
   if (!IsAstigmatic(calibration)) return "";
   const model::Estimate& astigmatism = *calibration.field.astigmatism_mm;
   return fmt::format(
-      "the blur along x is least {:.3g} +- {:.2g} mm {} than the blur along y: astigmatism of the "
-      "lens, or a texture of other depths along x than along y (turn the target by 90 degrees: the "
-      "lens's stays). One blur law does not describe both, and zf lies between them",
+      "the blur along x is smallest at a depth {:.3g} +- {:.2g} mm {} than the blur along y: the "
+      "lens is astigmatic, or the texture along x has other depths than the texture along y (turn "
+      "the target by 90 degrees: only an effect of the lens stays the same). One blur law does not "
+      "describe both directions, and zf lies between their depths",
       std::abs(astigmatism.value), astigmatism.sigma, astigmatism.value < 0 ? "nearer" : "farther");
 }
 

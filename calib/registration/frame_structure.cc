@@ -401,9 +401,9 @@ bool BandsExplain(const FrameStructureFinding& structure, std::size_t missing, s
 std::string BandsInWords(const FrameStructureFinding& structure) {
   if (!structure.HasBands()) return "";
   return fmt::format(
-      "whole {0} brighten together by {1:.2g} % (standard deviation), in each frame in another "
-      "place: the lamp flickers under a rolling shutter; expose for whole periods of the lamp, "
-      "or use a steady one",
+      "whole {0} brighten together by {1:.2g} % (standard deviation), at another place in each "
+      "frame: the lamp flickers under a rolling shutter; expose for whole periods of the lamp, or "
+      "use a steady lamp",
       structure.bands_are_columns ? "columns" : "rows", 100 * structure.bands->value);
 }
 

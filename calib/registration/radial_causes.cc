@@ -31,9 +31,8 @@ Diagnosis Compare(const model::Estimate& distortion, const FrameStructureFinding
   if (!FixedStructureIsExcluded(structure)) diagnosis.causes.push_back({kFixedStructureShifts, 0});
   SortCauses(&diagnosis);
   diagnosis.separates =
-      "a flat target and frames divided by a photograph of an evenly lit white sheet leave the "
-      "lens "
-      "alone";
+      "with a flat target and frames divided by a photograph of an evenly lit white sheet, only "
+      "the lens remains as the cause";
   return diagnosis;
 }
 
@@ -42,30 +41,30 @@ std::string OcclusionText(const FrameStructureFinding& structure) {
   const bool vignetting = !VignettingIsExcluded(structure);
   const bool fixed = !FixedStructureIsExcluded(structure);
   if (!vignetting && !fixed) return "";
-  return fmt::format(". {} would do the same, and this sweep does not show whether there is any",
-                     vignetting && fixed
-                         ? "Vignetting, or structure that stays on the sensor (dust),"
-                     : vignetting ? "Vignetting"
-                                  : "Structure that stays on the sensor (dust)");
+  return fmt::format(
+      ". {} would have the same effect, and this sweep does not show whether this is present",
+      vignetting && fixed ? "Vignetting, or structure that stays on the sensor (dust),"
+      : vignetting        ? "Vignetting"
+                          : "Structure that stays on the sensor (dust)");
 }
 
 std::string CausesInWords(const Diagnosis& diagnosis, const FrameStructureFinding& structure) {
   const std::string seen = StructureInWords(structure);
   if (!seen.empty()) {
     return fmt::format(
-        "{}. That draws the registrations in the same way. If it is not the cause, {}", seen,
+        "{}. This displaces the registrations in the same way. If it is not the cause, {}", seen,
         diagnosis.Names(kLensDistorts)
             ? "the lens distorts (undistort the images), or the target is not flat"
             : "the target is not flat: no lens distorts so much");
   }
   const std::string hidden = OcclusionText(structure);
   if (!diagnosis.Names(kLensDistorts)) {
-    return "no lens distorts so much: the target is not flat (what is nearer moves more), or the "
-           "frames do not show one and the same target; photograph a flat one" +
+    return "no lens distorts so much: the target is not flat (nearer parts move more), or the "
+           "frames do not all show the same target; photograph a flat target" +
            hidden;
   }
-  return "the lens distorts, or the target is not flat (what is nearer moves more), which look "
-         "alike; a flat target tells them apart. If it is flat, undistort the images" +
+  return "the lens distorts, or the target is not flat (nearer parts move more); these look alike, "
+         "and a flat target distinguishes them. If the target is flat, undistort the images" +
          hidden;
 }
 
@@ -82,16 +81,15 @@ std::optional<std::string> CheckDistortion(Calibration* calibration) {
   const model::Estimate& distortion = *calibration->scale.distortion_at_corner;
   Diagnosis diagnosis = Compare(distortion, calibration->structure);
   const std::string found = fmt::format(
-      "the frames lie against one another as distorted images do, {:+.1f} +- {:.1f} % at the "
-      "corner ({}): {}",
+      "the frames are displaced against one another like distorted images, {:+.1f} +- {:.1f} % at "
+      "the corner ({}): {}",
       100 * distortion.value, 100 * distortion.sigma,
       distortion.value > 0 ? "pincushion" : "barrel",
       CausesInWords(diagnosis, calibration->structure));
   calibration->diagnoses.push_back(std::move(diagnosis));
   if (std::abs(distortion.value) > kGross) return found;
-  calibration->warnings.push_back(found +
-                                  ". Depth and blur are those of an undistorted camera and a flat "
-                                  "target");
+  calibration->warnings.push_back(
+      found + ". The depth and the blur assume an undistorted camera and a flat target");
   return std::nullopt;
 }
 
@@ -107,22 +105,20 @@ std::string NonlinearityText(const ScaleNonlinearity& nonlinearity,
   const std::string causes =
       seen.empty()
           ? std::string(
-                "The rail's scale is not linear, the images are distorted, the target is not "
-                "flat, "
-                "or "
-                "the lens breathes; these look alike. A rail of known steps (a micrometer screw) "
-                "tells "
-                "the first of them from the others") +
+                "The rail's scale is not linear, the images are distorted, the target is not flat, "
+                "or the lens breathes; these look alike. A rail of known steps (a micrometer "
+                "screw) distinguishes the first of these causes from the others") +
                 OcclusionText(calibration.structure)
           : fmt::format(
-                "{}{}. That draws the image scale. If it is not the cause, the rail's scale is not "
-                "linear, the images are distorted, the target is not flat, or the lens breathes",
+                "{}{}. This biases the image scale. If it is not the cause, the rail's scale is "
+                "not linear, the images are distorted, the target is not flat, or the lens "
+                "breathes",
                 static_cast<char>(std::toupper(seen[0])), seen.substr(1));
   return fmt::format(
-      "the readings bend against the image scale: in the middle of the sweep they lie {:+.2f} +- "
-      "{:.2f} mm off the straight line through its ends. {}. A bench zero from the image scale is "
-      "then less certain than its error says: the farther half of the sweep alone puts it {:+.1f} "
-      "mm from where the nearer half does",
+      "the readings bend against the image scale: in the middle of the sweep they deviate by "
+      "{:+.2f} +- {:.2f} mm from the straight line through its ends. {}. A bench zero from the "
+      "image scale is then less certain than its stated error: the bench zero from the farther "
+      "half of the sweep differs by {:+.1f} mm from that of the nearer half",
       nonlinearity.bow_mm.value, nonlinearity.bow_mm.sigma, causes, nonlinearity.zero_spread_mm);
 }
 

@@ -101,15 +101,15 @@ std::string RegistrationAdvice(const FocusSweep& sweep, const std::vector<FrameM
   // Among the structures found, only strong bands are known to prevent the registration of frames.
   const std::string seen = StructureInWords(structure);
   constexpr char kNeeded[] =
-      "every frame must show the same part of the target, sharp enough to be recognised. If it is "
-      "a lone edge, which shows no image scale, state target: knife-edge or printed-edge; if the "
-      "images look torn or scrambled, their files were decoded wrongly";
+      "every frame must show the same part of the target, sharp enough to be recognised. If the "
+      "target is a lone edge, which shows no image scale, state target: knife-edge or "
+      "printed-edge; if the images look torn or scrambled, their files were decoded wrongly";
   return fmt::format("only {} of {} frames could be registered to one another{}", registered,
                      used.size(),
                      seen.empty() ? fmt::format(": {}", kNeeded)
                      : BandsExplain(structure, used.size() - registered, used.size())
                          ? fmt::format(": {}", BandsInWords(structure))
-                         : fmt::format(": {}. If that is not the cause: {}", seen, kNeeded));
+                         : fmt::format(": {}. If this is not the cause: {}", seen, kNeeded));
 }
 
 void ForgetScales(const FocusSweep& sweep, std::vector<ScaleSample>* samples, ScaleModel* law) {
@@ -119,13 +119,13 @@ void ForgetScales(const FocusSweep& sweep, std::vector<ScaleSample>* samples, Sc
   samples->erase(std::remove_if(samples->begin(), samples->end(), is_other), samples->end());
   law->contradicts_readings = false;
   law->message = "a lone edge shows no image scale";
-  if (sweep.offset_mm) law->message += ": offset_mm is taken as given";
+  if (sweep.offset_mm) law->message += ": the given offset_mm is used unchecked";
 }
 
 std::string ReasonOfUnknownOffset(const ScaleModel& law) {
-  return fmt::format("offset_mm is unknown and was not found: {}; {}", law.message,
+  return fmt::format("offset_mm is not stated and could not be determined: {}; {}", law.message,
                      law.shows_no_scale ? "state offset_mm, or use a texture"
-                                        : "to do without the image scale, state offset_mm");
+                                        : "to calibrate without the image scale, state offset_mm");
 }
 
 std::optional<std::string> ReasonAgainstScales(const FocusSweep& sweep,
@@ -136,7 +136,7 @@ std::optional<std::string> ReasonAgainstScales(const FocusSweep& sweep,
   for (const std::size_t i : used) different.insert(frames[i].statistics.content_hash);
   if (used.size() > 2 && different.size() < std::max<std::size_t>(2, used.size() / 4)) {
     return fmt::format(
-        "one image was repeated: {} frames hold only {} different images (image scale: {})",
+        "one image was repeated: {} frames contain only {} different images (image scale: {})",
         used.size(), different.size(), law.message);
   }
   if (law.kind == ScaleKind::kReversed || law.contradicts_readings) return law.message;
@@ -153,8 +153,8 @@ void RejectWrongReadings(const FocusSweep& sweep, const std::vector<ScaleSample>
     if (!frame.rejection.empty()) continue;
     frame.reading_error_mm = one.error_mm;
     frame.rejection = fmt::format(
-        "reading off by {:.1f} mm, or frame damaged: its image scale is "
-        "that of reading {:.1f} mm",
+        "reading off by {:.1f} mm, or frame damaged: its image scale belongs to the reading {:.1f} "
+        "mm",
         one.error_mm, frame.reading_mm - one.error_mm);
     if (const auto other = SwappedWith(one, wrong, sweep))
       frame.rejection += fmt::format("; swapped with {}", FileName((*frames)[*other].image));
@@ -171,7 +171,7 @@ void RejectUnregistered(const std::vector<ScaleSample>& samples,
   const auto missing = static_cast<std::size_t>(std::count_if(
       used.begin(), used.end(), [&](std::size_t i) { return registered.count(i) == 0; }));
   std::string why = "it shows another part of the target, or too little of it to be recognised";
-  const std::string bands = "its rows or columns brighten in bands of their own";
+  const std::string bands = "its rows or columns brighten in bands that other frames do not have";
   if (BandsExplain(structure, missing, used.size())) {
     why = bands;
   } else if (structure.HasBands()) {
@@ -179,8 +179,9 @@ void RejectUnregistered(const std::vector<ScaleSample>& samples,
   }
   for (const std::size_t i : used) {
     if (registered.count(i) > 0) continue;
-    (*frames)[i].rejection = fmt::format("cannot be registered: to {}, the sharpest frame; {}",
-                                         FileName((*frames)[reference].image), why);
+    (*frames)[i].rejection =
+        fmt::format("cannot be registered: to {}, the sharpest frame, because {}",
+                    FileName((*frames)[reference].image), why);
   }
 }
 

@@ -252,14 +252,14 @@ std::string LensMovesReason(const FocusSweep& sweep, const ScaleCauses& causes) 
   const bool is_in_front = depth_mm > f1_mm;
   std::string evidence;
   if (causes.chi2_target - causes.chi2_lens >= Diagnosis::kDecisive) {
-    evidence =
-        fmt::format("it is linear in the reading (chi2 {:.0f}), and 1/scale is not (chi2 {:.0f})",
-                    causes.chi2_lens, causes.chi2_target);
+    evidence = fmt::format(
+        "the scale is linear in the reading (chi2 {:.0f}), and 1/scale is not (chi2 {:.0f})",
+        causes.chi2_lens, causes.chi2_target);
   }
   if (causes.blur_slope) {
     evidence += fmt::format(
-        "{}the blur grows with it as behind a lens that moves (blur ratio about {:.2g}); a target "
-        "that moves would {}",
+        "{}the blur grows with the scale as it does behind a lens that moves (blur ratio about "
+        "{:.2g}); a target that moves would {}",
         evidence.empty() ? "" : ", and ", causes.blur_slope->RatioOfMovingLens(sweep.camera),
         is_in_front ? fmt::format("need a blur ratio of {:.2g}",
                                   causes.blur_slope->RatioOfMovingTarget(sweep.camera, depth_mm))
@@ -269,8 +269,7 @@ std::string LensMovesReason(const FocusSweep& sweep, const ScaleCauses& causes) 
   }
   if (evidence.empty()) {
     evidence = fmt::format(
-        "as that of a target that moves, it would put the target at {:.3g} mm, nearer than the "
-        "focal length",
+        "if the target moved, the scale would put it at {:.3g} mm, nearer than the focal length",
         depth_mm);
   }
   std::string meaning;
@@ -289,14 +288,13 @@ std::string LensMovesReason(const FocusSweep& sweep, const ScaleCauses& causes) 
   return fmt::format(
       "the image scale follows the lens, not the target: {}. This is a sweep of the focus ring, of "
       "a focus motor or of the sensor; move the target (or the whole camera) along the axis and "
-      "leave the focus as it is{}",
+      "leave the focus unchanged{}",
       evidence, meaning);
 }
 
 std::string NotDistinguished() {
-  return "Scale and blur do not tell these apart: look at what moved (in a sweep with the focus "
-         "ring "
-         "or a focus motor the lens does, and the target has to be moved instead)";
+  return "Scale and blur do not distinguish these causes: check what moved (in a sweep with the "
+         "focus ring or a focus motor the lens moves, and the target must be moved instead)";
 }
 
 }  // namespace
@@ -322,8 +320,9 @@ std::optional<std::string> ReasonOfScaleCauses(const FocusSweep& sweep, const Sc
   if (!is_reversed) return std::nullopt;
   if (!is_explained) {
     return law.message +
-           "; but neither that, nor another unit of the readings, nor a lens that moves explains "
-           "how the blur goes with the scale: check focal length, aperture radius and pixel pitch";
+           "; but neither this, nor another unit of the readings, nor a lens that moves explains "
+           "how the blur changes with the scale: check focal length, aperture radius and pixel "
+           "pitch";
   }
   if (causes.unit) {
     return fmt::format("{}; and the readings are not in mm. {}", law.message,
@@ -341,8 +340,8 @@ std::string UnitThatFits(const FocusSweep& sweep, const ScaleCauses& causes) {
   const auto with = [&](const ReadingUnit& unit) {
     const double depth_mm = unit.millimetres * causes.reference_depth_mm;
     return fmt::format(
-        "With readings in {} it is at about {:.3g} mm and the blur ratio about {:.2g}", unit.name,
-        depth_mm, causes.blur_slope->RatioOfMovingTarget(sweep.camera, depth_mm));
+        "With readings in {} the target is at about {:.3g} mm and the blur ratio is about {:.2g}",
+        unit.name, depth_mm, causes.blur_slope->RatioOfMovingTarget(sweep.camera, depth_mm));
   };
   std::string words = with(*causes.unit);
   for (const ReadingUnit& unit : causes.other_units) words += ". " + with(unit);
@@ -368,22 +367,22 @@ std::string UnitAdvice(const FocusSweep& sweep, const std::vector<FrameMeasureme
         *farthest < f1_mm
             ? fmt::format("nearer than the focal length ({:.3g} mm), where no image forms", f1_mm)
             : fmt::format(
-                  "where the blur would need a blur ratio of {:.2g}",
+                  "where the blur would require a blur ratio of {:.2g}",
                   causes.blur_slope->RatioOfMovingTarget(sweep.camera, causes.reference_depth_mm));
-    return fmt::format("{}, {}: are the readings in mm? {}", placed, contradiction,
+    return fmt::format("{}, {}: check that the readings are in mm. {}", placed, contradiction,
                        UnitThatFits(sweep, causes));
   }
   if (*nearest < f1_mm && !causes.ReadingsMayBeRight()) {
     return fmt::format(
-        "{}, nearer than the focal length ({:.3g} mm), where no image forms: are the readings in "
-        "mm, and is the focal length right?",
+        "{}, nearer than the focal length ({:.3g} mm), where no image forms: check that the "
+        "readings are in mm, and check the focal length",
         placed, f1_mm);
   }
   // The blur may confirm that the target is so near: magnifications above 1 are not unusual.
   if (!(*farthest < 2 * f1_mm) || (causes.blur_slope && causes.ReadingsMayBeRight())) return "";
   return fmt::format(
-      "{}, less than two focal lengths ({:.3g} mm), where the image is larger than the target: are "
-      "the readings in mm? If the image is indeed larger than life, they may be",
+      "{}, less than two focal lengths ({:.3g} mm), where the image is larger than the target: "
+      "check that the readings are in mm, unless the image is indeed larger than life",
       placed, 2 * f1_mm);
 }
 
@@ -402,10 +401,11 @@ std::string ConstantScaleWarning(const FocusSweep& sweep, const std::vector<Scal
   const double expected = most_mm / least_mm - 1;
   if (!(expected > 4 * (high / low - 1))) return "";
   return fmt::format(
-      "the image scale does not change with the reading, although offset_mm says by {:.2g} %: the "
-      "frames were aligned (brought to one scale by a focus stacker), the lens is telecentric, or "
-      "the sensor moves. These look alike; the frames as the camera stored them would tell. The "
-      "blur law of a telecentric lens is taken, which holds for aligned frames too",
+      "the image scale does not change with the reading, although it should change by {:.2g} % "
+      "according to offset_mm: the frames were aligned (brought to one scale by a focus stacker), "
+      "the lens is telecentric, or the sensor moves. These look alike; the frames as the camera "
+      "stored them would distinguish them. The blur law of a telecentric lens is used, which also "
+      "holds for aligned frames",
       100 * expected);
 }
 

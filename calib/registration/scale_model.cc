@@ -298,16 +298,15 @@ class ModelFinder {
     } else if (!is_close) {
       result->message = fmt::format(
           "readings and image scales scatter by {:.2g} mm about their law, {:.0f} % of the "
-          "readings' "
-          "range: too much to find the bench zero from it (readings worse than stated, or scales "
-          "of a "
-          "small or faint texture)",
+          "readings' range: too much to determine the bench zero (the readings are worse than "
+          "stated, or the texture is small or faint)",
           sigma_mm, 100 * sigma_mm / range_mm_);
     }
     if (!AreEnough(following) || !is_close) {
       if (is_close && AreEnough(CountFollowing(law, own_sign, sigma_mm))) {
         result->message += fmt::format(
-            "; if the readings are only good to about {:.2g} mm, state reading_sigma_mm", sigma_mm);
+            "; if the readings are only accurate to about {:.2g} mm, state reading_sigma_mm",
+            sigma_mm);
       }
     } else if (line_.slope * model::DirectionSign(direction_) > 0) {
       result->kind = ScaleKind::kInverseDepth;
@@ -352,12 +351,12 @@ class ModelFinder {
       result->kind = ScaleKind::kConstant;
       result->message =
           "the image scale does not change with the reading (a telecentric lens, a moving sensor, "
-          "frames that were aligned, or one image repeated): the bench zero cannot be found from "
-          "it";
+          "frames that were aligned, or one image repeated): it does not determine the bench "
+          "zero";
     } else {
       result->message = fmt::format(
-          "the readings span {:.3g} mm, too little to tell how the image scale goes with them (it "
-          "changes by {:.2g} +- {:.2g} %): state offset_mm, or extend the sweep",
+          "the readings span {:.3g} mm, too little to determine how the image scale changes with "
+          "them (by {:.2g} +- {:.2g} %): state offset_mm, or extend the sweep",
           range_mm_, 100 * change, 100 * change_sigma);
     }
   }
@@ -377,8 +376,8 @@ class ModelFinder {
     if (static_cast<double>(following) < kSortedFollowing * static_cast<double>(points_.size()))
       return "";
     return fmt::format(
-        "; in another order {} of them would: the readings belong to other frames of the sweep (a "
-        "table sorted otherwise)",
+        "; in another order {} of them would agree: the readings belong to other frames of the "
+        "sweep (the table is sorted differently)",
         following == points_.size() ? "all" : std::to_string(following));
   }
 
@@ -442,15 +441,15 @@ ScaleModel FitScaleModel(const std::vector<ScaleSample>& samples, int reference_
     result.shows_no_scale = true;
     result.message =
         "the target looks the same at every scale (spokes from one point), so that its image scale "
-        "tells nothing";
+        "cannot be measured";
     return result;
   }
   std::set<double> readings;
   for (const ScaleSample& s : samples) readings.insert(s.reading_mm);
   if (readings.size() < kMinSamples) {
-    result.message = fmt::format("the image scale could be measured on {} frames, {} are needed{}",
-                                 readings.size(), kMinSamples,
-                                 readings.size() < samples.size() ? " at different readings" : "");
+    result.message = fmt::format(
+        "the image scale could be measured on {} frames only, but {} are needed{}", readings.size(),
+        kMinSamples, readings.size() < samples.size() ? " at different readings" : "");
     return result;
   }
   ModelFinder finder(samples, reading_sigma_mm, direction);

@@ -98,11 +98,12 @@ SharpestReading FindSharpestReading(const std::vector<FrameMeasurement>& frames,
       frames, used, [](const FrameMeasurement& frame) { return frame.normalised_edge_slope; });
   if (samples.size() < kMinFrames) {
     result.message = used.size() < kMinFrames
-                         ? fmt::format("{} of {} frames passed the checks, {} are needed",
+                         ? fmt::format("{} of {} frames passed the checks, but {} are needed",
                                        used.size(), frames.size(), kMinFrames)
-                     : samples.empty() ? "no edges were measured in the frames"
-                                       : fmt::format("{} of {} frames have edges, {} are needed",
-                                                     samples.size(), used.size(), kMinFrames);
+                     : samples.empty()
+                         ? "no edges were measured in the frames"
+                         : fmt::format("{} of {} frames have edges, but {} are needed",
+                                       samples.size(), used.size(), kMinFrames);
     return result;
   }
   const std::size_t top = TopOf(samples);

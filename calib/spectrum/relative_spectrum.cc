@@ -64,7 +64,8 @@ class Fit {
 
   RelativeBlur Run() {
     if (samples_.size() < 3) {
-      result_.message = fmt::format("spectra of {} frames, at least 3 are needed", samples_.size());
+      result_.message = fmt::format("spectra were measured on {} frames, but at least 3 are needed",
+                                    samples_.size());
       return result_;
     }
     // The band, the leakage and the noise depend on the fitted blur; three rounds are enough to
@@ -382,7 +383,7 @@ class Fit {
     scaled.diagonal().array() += 1e-12;
     const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> factor(scaled);  // in place
     if (factor.info() != Eigen::Success) {
-      result_.message = "the spectra do not tell the blur of every frame";
+      result_.message = "the spectra do not determine the blur of every frame";
       return false;
     }
     FillTails(Evaluate(state_), gradient, [&](const Eigen::VectorXd& of) -> Eigen::VectorXd {

@@ -94,9 +94,9 @@ bool FocusSweep::IsValid(std::string* why) const {
   }
   if (roi.width > 0 && (roi.x < 0 || roi.y < 0 || roi.x + roi.width > camera.sensor.width_px ||
                         roi.y + roi.height > camera.sensor.height_px || roi.height <= 0)) {
-    return Fail(
-        why, fmt::format("roi_px [{}, {}, {}, {}] leaves the sensor of {} x {} px", roi.x, roi.y,
-                         roi.width, roi.height, camera.sensor.width_px, camera.sensor.height_px));
+    return Fail(why, fmt::format("roi_px [{}, {}, {}, {}] is not inside the sensor of {} x {} px",
+                                 roi.x, roi.y, roi.width, roi.height, camera.sensor.width_px,
+                                 camera.sensor.height_px));
   }
   return true;
 }
@@ -120,8 +120,10 @@ cv::Mat RegionOf(const cv::Mat& stored, const FocusSweep& sweep, std::size_t ind
   const model::Sensor& sensor = sweep.camera.sensor;
   const std::string& name = sweep.frames[index].image;
   if (stored.cols != sensor.width_px || stored.rows != sensor.height_px) {
-    throw Error(fmt::format("{}: the image is {} x {} px, the camera's sensor {} x {} px", name,
-                            stored.cols, stored.rows, sensor.width_px, sensor.height_px));
+    throw Error(
+        fmt::format("{}: the image has {} x {} px, but the camera's sensor has {} x {} px: the "
+                    "sizes must be equal",
+                    name, stored.cols, stored.rows, sensor.width_px, sensor.height_px));
   }
   if (stored.depth() != CV_8U && stored.depth() != CV_16U) {
     throw Error(fmt::format("{}: images of 8 or 16 bits a channel are expected", name));
@@ -152,8 +154,9 @@ cv::Mat LinearChannel(const cv::Mat& stored, const FocusSweep& sweep, std::size_
   const cv::Mat region = RegionOf(stored, sweep, index);
   const int colours = region.channels() == 4 ? 3 : region.channels();
   if (channel < 0 || channel >= colours) {
-    throw Error(fmt::format("{}: channel {} is asked for; the image has {}, counted from 0",
-                            sweep.frames[index].image, channel, colours));
+    throw Error(
+        fmt::format("{}: channel {} is requested, but the image has {} channel(s), counted from 0",
+                    sweep.frames[index].image, channel, colours));
   }
   const bool bytes = region.depth() == CV_8U;
   const auto decode = DecodeTableOf(sweep.camera.sensor.transfer, bytes ? 256 : 65536);

@@ -219,8 +219,9 @@ FrameStatistics MeasureFrame(const cv::Mat& stored, const cv::Mat& linear_grey) 
 std::optional<std::string> RejectionReason(const FrameStatistics& frame, double median_contrast,
                                            const QualityCheckOptions& options) {
   if (!(frame.mean_encoded >= options.min_mean_encoded)) {
-    return fmt::format("{}: mean {:.4f} of full scale, at least {:.4f} is needed: expose longer",
-                       kKindDark, frame.mean_encoded, options.min_mean_encoded);
+    return fmt::format(
+        "{}: the mean is {:.4f} of full scale, but at least {:.4f} is needed: expose longer",
+        kKindDark, frame.mean_encoded, options.min_mean_encoded);
   }
   if (frame.is_mosaic) {
     return "raw mosaic: develop it first (the pixels of a colour filter stand side by side in one "
@@ -228,7 +229,7 @@ std::optional<std::string> RejectionReason(const FrameStatistics& frame, double 
   }
   if (!(frame.saturated_fraction <= options.max_saturated_fraction)) {
     return fmt::format(
-        "{}: {:.0f} % of the pixels are clipped at {:.0f}, at most {:.0f} % may: lower the "
+        "{}: {:.0f} % of the pixels are clipped at {:.0f}, but at most {:.0f} % may be: lower the "
         "exposure",
         kKindSaturated, 100 * frame.saturated_fraction, frame.saturation_level,
         100 * options.max_saturated_fraction);
@@ -236,10 +237,8 @@ std::optional<std::string> RejectionReason(const FrameStatistics& frame, double 
   if (!options.edge_target && !frame.black_is_one_side &&
       !(frame.black_fraction <= options.max_black_fraction)) {
     return fmt::format(
-        "{}: {:.0f} % of the pixels are clipped at {:.0f}, at most {:.0f} % may unless the target "
-        "is "
-        "an "
-        "edge: expose longer or lower the camera's black level",
+        "{}: {:.0f} % of the pixels are clipped at {:.0f}, but at most {:.0f} % may be unless the "
+        "target is an edge: expose longer or lower the camera's black level",
         kKindBlack, 100 * frame.black_fraction, frame.black_level,
         100 * options.max_black_fraction);
   }
@@ -249,13 +248,14 @@ std::optional<std::string> RejectionReason(const FrameStatistics& frame, double 
   if (!(frame.top_gradient > options.min_gradient_to_noise * noise_gradient) &&
       !(frame.coarse_texture > options.min_coarse_texture)) {
     return fmt::format(
-        "no texture above the noise: steepest gradients {:.1f} x the noise's, {:.1f} is needed",
+        "no texture above the noise: the steepest gradients are {:.1f} x those of the noise, but "
+        "{:.1f} x is needed",
         noise_gradient > 0 ? frame.top_gradient / noise_gradient : 0.0,
         options.min_gradient_to_noise);
   }
   if (!(frame.contrast >= options.min_relative_contrast * median_contrast)) {
-    return fmt::format("blank: contrast {:.4f} against the sweep's median {:.4f}", frame.contrast,
-                       median_contrast);
+    return fmt::format("blank: the contrast is {:.4f}, but the median of the sweep is {:.4f}",
+                       frame.contrast, median_contrast);
   }
   return std::nullopt;
 }

@@ -62,8 +62,8 @@ std::optional<std::string> FrameSelection::KeepThoseWithEdges() {
         frame.statistics.coarse_texture >= kClearTexture)
       return std::nullopt;
     return fmt::format(
-        "no edges: {} above {:.0f} % of the sweep's steepest, contrast {:.3f} against a median "
-        "of {:.3f}",
+        "no edges: only {} edges exceed {:.0f} % of the sweep's steepest edges, and the contrast "
+        "is {:.3f} where the median is {:.3f}",
         frame.edge_count, 100 * kEdgeThreshold, frame.statistics.contrast, median_contrast);
   });
 }
@@ -73,8 +73,8 @@ std::optional<std::string> FrameSelection::KeepPossibleDepths(double bench_offse
   return KeepOnly([&](const FrameMeasurement& frame) -> std::optional<std::string> {
     if (frame.depth_mm > front_focal_length_mm) return std::nullopt;
     return fmt::format(
-        "impossible depth: {:.3f} mm with the bench zero at {:.3f} mm, nearer than the front focal "
-        "point ({} mm): check offset_mm, direction and units",
+        "impossible depth: {:.3f} mm with the bench zero at {:.3f} mm is nearer than the front "
+        "focal point ({} mm): check offset_mm, direction and units",
         frame.depth_mm, bench_offset_mm, front_focal_length_mm);
   });
 }
@@ -116,7 +116,7 @@ std::string FrameSelection::TooFewUsable(std::size_t distinct_readings) const {
     if (kind.frames++ == 0) kind.first = i;
   }
   const std::string counts =
-      fmt::format("{} of {} frames can be used{}, {} are needed", used_.size(), frames_.size(),
+      fmt::format("{} of {} frames can be used{}, but {} are needed", used_.size(), frames_.size(),
                   distinct_readings == used_.size()
                       ? ""
                       : fmt::format(" at {} different readings", distinct_readings),
@@ -161,10 +161,9 @@ std::string ExposureAdvice(const std::vector<FrameMeasurement>& frames,
   if (2 * under > frames.size() && 2 * clear > under && Median(means) * kSixteenBits > 100 &&
       have_16_bits()) {
     return fmt::format(
-        "{} of {} frames are dark in their files (on the average {:.0f} of 65535), but their "
-        "texture "
-        "stands clear of the noise: values of 10 or 12 bits that were stored in 16 without being "
-        "scaled, or under-exposed; scale the values up, or raise the exposure",
+        "{} of {} frames are dark in their files (on average {:.0f} of 65535), but their texture "
+        "is clearly above the noise: values of 10 or 12 bits were stored in 16 bits without "
+        "scaling, or the frames are under-exposed; scale the values up, or raise the exposure",
         under, frames.size(), kSixteenBits * Median(means));
   }
   if (2 * under > frames.size())
@@ -181,8 +180,8 @@ std::string RegionAdvice(const FocusSweep& sweep) {
   if (RegionSidePx(sweep) >= kSmallestTextureRegionPx) return "";
   const cv::Size size = RegionSize(sweep);
   return fmt::format(
-      "the {} is {} x {} px: an edge needs at least {} px on each side, a texture {}, and {} or "
-      "more are better",
+      "the {} has {} x {} px: an edge requires at least {} px on each side, a texture at least {} "
+      "px, and {} px or more are better",
       sweep.roi.width > 0 ? "region of interest (roi_px)" : "image", size.width, size.height,
       kSmallestRegionPx, kSmallestTextureRegionPx, kAmpleRegionPx);
 }

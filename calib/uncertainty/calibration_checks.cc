@@ -50,12 +50,12 @@ OffsetCheck CheckGivenOffset(const FocusSweep& sweep, const std::string& unit_th
   const double sigma_mm = std::hypot(law.offset_mm.sigma, sweep.offset_mm->sigma);
   if (!(std::abs(apart_mm) > 3 * sigma_mm + 1e-3 * law.reference_depth_mm)) return check;
   const std::string found = fmt::format(
-      "the image scale puts the bench zero at {:.2f} +- {:.2f} mm, {:+.2f} mm from "
-      "the given one",
+      "the image scale puts the bench zero at {:.2f} +- {:.2f} mm, {:+.2f} mm from the given bench "
+      "zero",
       given_mm + apart_mm, law.offset_mm.sigma, apart_mm);
   if (std::abs(apart_mm) > kGrossOffset * law.reference_depth_mm &&
       std::abs(apart_mm) > 5 * sigma_mm) {
-    check.refusal = found + ": check offset_mm, and that it and the readings are in mm";
+    check.refusal = found + ": check offset_mm, and that both offset_mm and the readings are in mm";
     if (!unit_that_fits.empty()) *check.refusal += " (" + unit_that_fits + ")";
     return check;
   }
@@ -119,7 +119,8 @@ void CheckMagnification(const FocusSweep& sweep, std::size_t reference, const cv
   const std::optional<PeriodEstimate> period = MeasurePeriodPx(grey);
   if (!period) {
     calibration->warnings.emplace_back(
-        "target_period_mm is stated, but the sharpest frame shows no period to compare with");
+        "target_period_mm is stated, but the sharpest frame shows no periodic texture to compare "
+        "it with");
     return;
   }
   const MagnificationCheck check = DistanceFromPeriod(
@@ -128,11 +129,12 @@ void CheckMagnification(const FocusSweep& sweep, std::size_t reference, const cv
   const Result& focus = *calibration->image_distance_mm;
   const double apart_mm = check.image_distance_mm.value - focus.value;
   if (std::abs(apart_mm) > 3 * std::hypot(check.image_distance_mm.sigma, focus.sigma)) {
-    calibration->warnings.push_back(fmt::format(
-        "the image scale of the target puts d1 at {:.4g} +- {:.2g} mm, {:+.1f} % from the focus: "
-        "focal length, pixel pitch, target_period_mm or the readings are off by as much",
-        check.image_distance_mm.value, check.image_distance_mm.sigma,
-        100 * apart_mm / focus.value));
+    calibration->warnings.push_back(
+        fmt::format("the image scale of the target puts d1 at {:.4g} +- {:.2g} mm, which differs "
+                    "by {:+.1f} % from the value by the focus: focal length, pixel pitch, "
+                    "target_period_mm or the readings are wrong by this amount",
+                    check.image_distance_mm.value, check.image_distance_mm.sigma,
+                    100 * apart_mm / focus.value));
   }
 }
 

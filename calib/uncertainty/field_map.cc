@@ -43,7 +43,7 @@ class Field {
   void Run() {
     FieldMap& map = result_.field;
     if (evidence_.spectrum < 0 || setup_.frames.size() < 5) {
-      map.message = "the field needs a texture all over it";
+      map.message = "the target must have texture over the whole field";
       return;
     }
     setup_.read_grey = [this](std::size_t frame) { return store_.Grey(frame); };
@@ -101,7 +101,7 @@ class Field {
   std::optional<model::Estimate> FocusOf(const EstimatorRegion& region,
                                          std::string* message) const {
     if (region.frames.size() < 5 || region.modes.size() < 8) {
-      *message = "too little texture, or too few frames see it";
+      *message = "it has too little texture, or too few frames show it";
       return std::nullopt;
     }
     const FittedRegion fitted =
@@ -145,13 +145,13 @@ class Field {
           tile_of.push_back(map.tiles.size());
           regions.push_back(std::move(*region));
         } else {
-          tile.message = "too few frames see this part";
+          tile.message = "too few frames show this part";
         }
         map.tiles.push_back(tile);
       }
     }
     if (regions.empty()) {
-      map.message = "too few frames see the same parts of the target";
+      map.message = "too few frames show the same parts of the target";
       return;
     }
     MeasureRegions(setup_, &regions);
@@ -169,7 +169,7 @@ class Field {
     }
     map.done = fitted.size() >= kMinTiles;
     map.message = map.done ? "done"
-                           : fmt::format("{} parts of the field could be fitted, {} are needed",
+                           : fmt::format("{} parts of the field could be fitted, but {} are needed",
                                          fitted.size(), kMinTiles);
     if (map.done) DescribeSurface(fitted);
   }
@@ -279,9 +279,10 @@ class Field {
         map.clusters.back().focus_depth_mm.value - map.clusters.front().focus_depth_mm.value;
     result_.warnings.push_back(
         AstigmatismExplains(spread_mm, result_)
-            ? fmt::format("parts of the field come into focus at {}: the astigmatism is as large, "
-                          "and does that where the texture runs another way; or the target is not "
-                          "at one depth. A target of even texture in all directions tells",
+            ? fmt::format("parts of the field come into focus at {}: the astigmatism is as large "
+                          "and has this effect if the direction of the texture varies; or the "
+                          "target is not at one depth. A target with the same texture in all "
+                          "directions distinguishes these causes",
                           depths)
             : fmt::format("the target is not at one depth; parts of the field come into focus at "
                           "{}: restrict roi_px to one of them",

@@ -59,24 +59,24 @@ Eigen::Vector2d UnknownFloor(const BlurEvidence& evidence, std::vector<std::stri
   if (const std::optional<double> softness_px2 = EdgeSoftness(evidence)) {
     // The interval is from none of the edge's softness to all of it.
     warnings->push_back(fmt::format(
-        "the edges are {:.2f} px soft at focus; how much of it is the lens and how much the "
-        "target is not known: photograph a knife edge, or state blur_floor_px",
+        "the edges have a blur of {:.2f} px at focus; the shares of the lens and of the target in "
+        "it are not known: photograph a knife edge, or state blur_floor_px",
         std::sqrt(*softness_px2)));
     return {0, *softness_px2};
   }
   double to_px = kUnknownFloorToPx;
-  std::string why = "a softer lens is not";
+  std::string why = "but not those of a softer lens";
   if (evidence.spectrum >= 0) {
     const std::optional<double> bound = LargestBlurVariance(evidence.spectral, evidence.region);
     const double bound_px = bound ? std::sqrt(std::max(0.0, *bound)) : kSoftestLensPx;
     if (bound_px > to_px) {
       to_px = std::min(bound_px, kSoftestLensPx);
-      why = "the texture, which shows little fine detail, does not exclude a lens as soft as that";
+      why = "because the texture, which shows little fine detail, does not exclude so soft a lens";
     }
   }
   warnings->push_back(
-      fmt::format("the lens floor cannot be found from this target; {} to {:.1f} px is allowed "
-                  "for, {}: measure it on a knife edge, or state blur_floor_px",
+      fmt::format("this target does not determine the lens floor; values from {} to {:.1f} px are "
+                  "allowed for, {}: measure the floor on a knife edge, or state blur_floor_px",
                   kUnknownFloorFromPx, to_px, why));
   return {kUnknownFloorFromPx * kUnknownFloorFromPx, to_px * to_px};
 }

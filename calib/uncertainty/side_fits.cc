@@ -53,7 +53,8 @@ SideFit FitSide(const BlurEvidence& evidence, const BlurFitResult& fit, bool nea
   const std::optional<BlurFitSetup> setup = SideOf(evidence, fit, nearer, &frames);
   side.frames_used = static_cast<int>(frames);
   if (!setup) {
-    side.message = fmt::format("{} frames on this side, {} are needed", frames, kMinOnASide);
+    side.message =
+        fmt::format("{} frames are on this side, but {} are needed", frames, kMinOnASide);
     return side;
   }
   const BlurFitResult alone = FitBlur(*setup, &fit);

@@ -48,12 +48,13 @@ void SortAndAdvise(Calibration* calibration) {
                                       share(worst_mm), parts.front().remedy);
   } else if (zero_mm > noise_mm) {
     calibration->advice = fmt::format(
-        "the bench zero is {:.0f} % of the error of d1: measure offset_mm, or sweep over "
-        "a longer range so that the image scale shows it better",
+        "the bench zero is {:.0f} % of the error of d1: measure offset_mm, or sweep over a longer "
+        "range so that the image scale determines it better",
         share(zero_mm));
   } else {
     calibration->advice = fmt::format(
-        "noise and readings are {:.0f} % of the error of d1: more frames, or a finer bench scale",
+        "noise and readings are {:.0f} % of the error of d1: take more frames, or use a finer "
+        "bench scale",
         share(noise_mm));
   }
 }
@@ -91,8 +92,8 @@ void WidenByTrials(const std::string& name, const std::string& remedy,
     const BlurFitResult trial = FitBlur(setup, &fit);
     if (!trial.done) {
       calibration->warnings.push_back(
-          fmt::format("{}: how far it moves the results could not be fitted, and the intervals do "
-                      "not hold it ({})",
+          fmt::format("{}: the fit of its effect on the results failed, and the intervals do not "
+                      "include it ({})",
                       name, trial.message));
       continue;
     }

@@ -50,7 +50,7 @@ class Parts {
     SystematicPart own;
     own.name = "blur estimator";
     own.blur_ratio = kEstimatorRatioError * fit_.values[kBlurRatio] * Eigen::Vector2d(-1, 1);
-    own.remedy = "nothing: it is what the estimator itself is good for";
+    own.remedy = "no remedy: this is the accuracy of the blur estimator itself";
     result_.systematic_parts.push_back(own);
     SetIntervals(floor);
     SortAndAdvise(&result_);
@@ -93,7 +93,7 @@ class Parts {
     if (!nearer.done || !farther.done) {
       result_.warnings.push_back(
           fmt::format("the two sides of focus cannot be compared (nearer: {}; farther: {}): a lens "
-                      "that blurs differently on them would not be noticed",
+                      "that blurs differently on the two sides would not be noticed",
                       SideInWords(nearer), SideInWords(farther)));
       return;
     }
@@ -108,8 +108,8 @@ class Parts {
     SystematicPart part;
     part.name = "side of focus";
     part.remedy =
-        "use frames closer to focus: one blur law does not describe both sides (spherical "
-        "aberration, a wrong sensor.transfer or light that changes along the bench do that)";
+        "use frames closer to focus: one blur law does not describe both sides (possible causes "
+        "are spherical aberration, a wrong sensor.transfer, or light that changes along the bench)";
     for (const SideFit* side : {&nearer, &farther}) {
       BlurFitResult as_fit;
       as_fit.done = true;
@@ -148,7 +148,7 @@ class Parts {
     if (!trial) return;
     SystematicPart part;
     part.name = "frequency band";
-    part.remedy = "a target with finer texture, or steps closer to focus";
+    part.remedy = "use a target with finer texture, or steps closer to focus";
     Include(*trial, &part);
     result_.systematic_parts.push_back(part);
   }
@@ -188,10 +188,10 @@ class Parts {
     part.name = kShapePart;
     const bool is_right = OtherShapeIsRight(*trial);
     const model::Psf other = OtherPsf(sweep_.camera.psf);
-    part.remedy =
-        is_right || evidence_.better_psf != sweep_.camera.psf
-            ? fmt::format("state psf: {} in the camera file: it fits better", model::PsfName(other))
-            : std::string("nothing: the shape that the camera file states fits better");
+    part.remedy = is_right || evidence_.better_psf != sweep_.camera.psf
+                      ? fmt::format("state psf: {} in the camera file: this shape fits better",
+                                    model::PsfName(other))
+                      : std::string("no remedy: the shape that the camera file states fits better");
     Include(*trial, &part);
     if (!is_right && OtherShapeIsRuledOut()) part.blur_ratio.setZero();
     result_.systematic_parts.push_back(part);
@@ -214,7 +214,8 @@ class Parts {
     SystematicPart part;
     part.name = "tails of the blur";
     part.remedy =
-        "a smaller aperture: of a wide one the light's spread over the pupil is known too little";
+        "use a smaller aperture: the distribution of light over the pupil of a wide aperture is "
+        "not known well enough";
     if (const auto range = TailsLeft(sweep_.camera.psf, fit_, evidence_)) {
       for (const double tails : {range->x(), range->y()}) {
         if (tails == 0) continue;

@@ -38,7 +38,7 @@ std::string NameOf(void* library, const std::string& file) {
   if (Find<void()>("ATL_dgemm", library) != nullptr) name = "ATLAS";
   if (Find<void()>("MKL_Get_Version", library) != nullptr) name = "MKL";
   if (Find<void()>("openblas_get_config") != nullptr) {
-    name += ", which comes before the OpenBLAS that is loaded as well";
+    name += ", which takes precedence over the OpenBLAS that is also loaded";
   }
   return name;
 }

@@ -22,9 +22,8 @@ bool BlockOptions::IsValid(std::string* why) const {
   };
   if (gamma == 0) {
     return fail(
-        "gamma is 0: then nothing but the ridge says how the rays of a scene point belong "
-        "together, "
-        "and the light field does not follow the scene's geometry; it must be > 0");
+        "gamma is 0: it must be > 0, because otherwise only the ridge relates the rays of a scene "
+        "point, and the light field does not follow the scene's geometry");
   }
   if (!(gamma > 0) || !std::isfinite(gamma)) {
     return fail(fmt::format("gamma is {}: it must be finite and > 0", gamma));

@@ -218,10 +218,10 @@ int ChooseBlockPx(const BlockOptions& options, const model::LinearImage& image,
   *bytes = BytesUpTo(limit, first_px, std::min(kFirstLookPx, first_px), &forecast);
   if (*bytes > limit) {
     throw Error(fmt::format(
-        "memory limit {:.0f} MiB: blocks of {} px need {:.0f} MiB in all, if not more; the limit "
-        "must be at least that{}",
+        "memory limit {:.0f} MiB: blocks of {} px need {:.0f} MiB or more in total; the limit must "
+        "be at least as large{}",
         *options.memory_limit_mib, first_px, std::ceil(*bytes / kBytesPerMib),
-        options.block_px ? ", or the blocks smaller" : ", or the views or threads fewer"));
+        options.block_px ? ", or use smaller blocks" : ", or use fewer views or threads"));
   }
   if (options.block_px) return first_px;
   int block_px = first_px;
@@ -290,12 +290,11 @@ SolvedBlock SolveBlock(const BlockSystem& system, const BlockOptions& options,
             0,
             0};
   if (report.rcond && !IsSolvable(*report.rcond, options)) {
-    throw Error(fmt::format(
-        "{}: its system is singular, or so nearly that the light field would be noise however "
-        "small "
-        "the residual: rcond is {:.2g}, and must be at least {:.2g}; a larger ridge (now {:.3g}) "
-        "helps",
-        NameOf(rect), *report.rcond, options.rcond_min, options.ridge.value_or(0)));
+    throw Error(
+        fmt::format("{}: its system is singular, or so close to singular that the light field "
+                    "would be noise even with a small residual: rcond is {:.2g}, but it must be at "
+                    "least {:.2g}; use a larger ridge (now {:.3g})",
+                    NameOf(rect), *report.rcond, options.rcond_min, options.ridge.value_or(0)));
   }
   for (std::size_t channel = 0; channel < system.right_sides.size(); ++channel) {
     const std::vector<double>& right = system.right_sides[channel];
@@ -489,7 +488,8 @@ model::LightField EstimateByBlocks(const EstimateInput& input, const BlockOption
   }
   if (iterative) {
     RequireProgress("blocks by " + BlockSolverName(options.solver), summary->relative_residual,
-                    summary->iterations, "allow more, a smaller gamma or a larger ridge");
+                    summary->iterations,
+                    "allow more iterations, or use a smaller gamma or a larger ridge");
   }
   summary->converged = !iterative || summary->relative_residual <= options.tolerance;
   summary->solve_seconds = SecondsSince(solve_start);

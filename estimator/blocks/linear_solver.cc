@@ -27,11 +27,11 @@ constexpr SolverName kNames[] = {
   if (solver == BlockSolver::kViennaCl) {
     throw Error(
         "block solver \"viennacl\": this program was built without ViennaCL "
-        "(THICKLENS_WITH_VIENNACL=OFF); bicgstab is the same method on the processor");
+        "(THICKLENS_WITH_VIENNACL=OFF); use bicgstab, the same method on the processor");
   }
   throw Error(
       fmt::format("block solver \"{}\": this program was built without the GPL parts of "
-                  "SuiteSparse (THICKLENS_WITH_GPL=OFF); eigen is there",
+                  "SuiteSparse (THICKLENS_WITH_GPL=OFF); use eigen",
                   BlockSolverName(solver)));
 }
 
@@ -98,10 +98,10 @@ std::unique_ptr<LinearSolver> NewLinearSolver(BlockSolver solver, bool symmetric
   if (!IsBuiltIn(solver)) RefuseMissing(solver);
   if (!symmetric && (solver == BlockSolver::kCholmod || solver == BlockSolver::kCg)) {
     throw Error(
-        fmt::format("block solver \"{}\": the source's stencil makes a system that is not "
-                    "symmetric, {}; umfpack, eigen or bicgstab can",
+        fmt::format("block solver \"{}\": the stencil of the paper makes a system that is not "
+                    "symmetric, {}; use umfpack, eigen or bicgstab",
                     BlockSolverName(solver),
-                    solver == BlockSolver::kCholmod ? "which a Cholesky factor cannot solve"
+                    solver == BlockSolver::kCholmod ? "which a Cholesky factorisation cannot solve"
                                                     : "which conjugate gradients cannot solve"));
   }
   switch (solver) {

@@ -70,7 +70,7 @@ SmoothedDepth SmoothDepth(const DisparityMap& map, double noise_px, int threads)
     throw Error(fmt::format("noise of the depth is {} px per view step: it must be > 0", noise_px));
   }
   for (const float disparity : map.disparity) {
-    if (std::isnan(disparity)) throw Error("the disparity has holes: they must be filled before");
+    if (std::isnan(disparity)) throw Error("the disparity has holes: they must be filled first");
   }
   const double step = map.step.cwiseAbs().maxCoeff();
   const auto tolerance = static_cast<float>(kSameSurface * noise_px / step);

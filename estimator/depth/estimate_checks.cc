@@ -70,7 +70,7 @@ std::vector<ResidualPatch> MeasurePatches(const std::vector<float>& residual,
       static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px);
   if (residual.size() != pixels || occluded_fraction.size() != pixels) {
     throw Error(fmt::format(
-        "residual and occluded_fraction have {} and {} values: they must have {}, one a pixel",
+        "residual and occluded_fraction have {} and {} values: each must have {}, one per pixel",
         residual.size(), occluded_fraction.size(), pixels));
   }
   std::vector<ResidualPatch> patches;

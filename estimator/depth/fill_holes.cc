@@ -134,17 +134,17 @@ void CheckSizes(const DisparityMap& map, const model::LinearImage& image) {
   const std::size_t pixels = Index(map.width_px) * Index(map.height_px);
   if (map.width_px < 1 || map.height_px < 1 || map.disparity.size() != pixels) {
     throw Error(
-        fmt::format("disparity map: {} values for {}x{} px: the count must be the product, "
-                    "and not 0",
+        fmt::format("disparity map: {} values for {}x{} px: the count must be the product of these "
+                    "numbers, and not 0",
                     map.disparity.size(), map.width_px, map.height_px));
   }
   if (image.width_px != map.width_px || image.height_px != map.height_px || image.channels < 1 ||
       image.values.size() != pixels * Index(image.channels)) {
-    throw Error(fmt::format(
-        "disparity map: it is {}x{} px, the image {}x{} px in {} channel(s) with {} values: the "
-        "sizes must be equal",
-        map.width_px, map.height_px, image.width_px, image.height_px, image.channels,
-        image.values.size()));
+    throw Error(
+        fmt::format("disparity map: it has {}x{} px, but the image has {}x{} px in {} channel(s) "
+                    "with {} values: the sizes must be equal",
+                    map.width_px, map.height_px, image.width_px, image.height_px, image.channels,
+                    image.values.size()));
   }
   const auto bad = std::find_if_not(image.values.begin(), image.values.end(),
                                     [](float value) { return std::isfinite(value); });
@@ -202,8 +202,8 @@ DisparityMap FillHoles(const DisparityMap& map, const model::LinearImage& image,
   if (filled != nullptr) *filled = holes;
   if (holes == map.disparity.size()) {
     throw Error(
-        fmt::format("disparity map: all of its {} values are holes: there is nothing to "
-                    "fill them from",
+        fmt::format("disparity map: all of its {} values are holes: at least one must be a "
+                    "disparity, from which they can be filled",
                     holes));
   }
   if (holes > 0) Fill(map, image, holes, at_infinity, &full);

@@ -64,10 +64,10 @@ void StartRun(const std::string& solver, const EstimateInput& input,
 
 void RequireMemory(const FunctionalOptions& options, double bytes) {
   if (!options.memory_limit_mib || bytes <= *options.memory_limit_mib * kBytesPerMib) return;
-  throw Error(fmt::format(
-      "memory limit {:.0f} MiB: all rays of the image at once need {:.0f} MiB; the limit must be "
-      "at least that, or the views fewer, or the image smaller",
-      *options.memory_limit_mib, std::ceil(bytes / kBytesPerMib)));
+  throw Error(
+      fmt::format("memory limit {:.0f} MiB: all rays of the image together need {:.0f} MiB; the "
+                  "limit must be at least as large, or use fewer views or a smaller image",
+                  *options.memory_limit_mib, std::ceil(bytes / kBytesPerMib)));
 }
 
 void FillOrigin(const std::string& method, const FunctionalSummary& summary, bool falloff,
@@ -84,8 +84,9 @@ void FillOrigin(const std::string& method, const FunctionalSummary& summary, boo
 
 void EndRun(const std::string& solver, const FunctionalOptions& options,
             FunctionalSummary* summary) {
-  RequireProgress(solver, summary->relative_residual, summary->iterations,
-                  "allow more, a smaller gamma, a larger ridge or double precision");
+  RequireProgress(
+      solver, summary->relative_residual, summary->iterations,
+      "allow more iterations, or use a smaller gamma, a larger ridge or double precision");
   summary->converged = summary->relative_residual <= options.tolerance;
   summary->message = MessageOf(options, *summary);
 }

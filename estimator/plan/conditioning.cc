@@ -29,10 +29,10 @@ using Eigen::Index;
 void RequireFew(double unknowns) {
   constexpr double kMax = 4000;
   if (unknowns <= kMax) return;
-  throw Error(fmt::format(
-      "conditioning: {:.0f} unknowns: a dense system may have {:.0f} at most; a smaller image or "
-      "fewer views are needed",
-      unknowns, kMax));
+  throw Error(
+      fmt::format("conditioning: the system has {:.0f} unknowns: a dense system may have at most "
+                  "{:.0f}; use a smaller image or fewer views",
+                  unknowns, kMax));
 }
 
 // Solves a system in that precision and returns the relative error of the solution.

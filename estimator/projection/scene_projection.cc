@@ -217,11 +217,10 @@ DisparityMap PhotographDisparity(const DisparityMap& on_grid,
   for (int other = 0; other < 2; ++other) {
     const double expected = offset * step[other];
     if (std::abs(expected - landing_step_px[other]) <= 1e-6 * (1 + std::abs(expected))) continue;
-    throw Error(
-        fmt::format("light field: its rays land {:.6g} px beside their samples per view across and "
-                    "{:.6g} down, "
-                    "where steps of {:.6g} and {:.6g} ask for the same ratio",
-                    landing_step_px.x(), landing_step_px.y(), step.x(), step.y()));
+    throw Error(fmt::format(
+        "light field: per view its rays land {:.6g} px (x) and {:.6g} px (y) from their samples: "
+        "the ratio of these must be that of the steps, {:.6g} and {:.6g}",
+        landing_step_px.x(), landing_step_px.y(), step.x(), step.y()));
   }
   for (float& d : map.disparity) d = static_cast<float>(d - offset);
   return map;

@@ -22,9 +22,9 @@ constexpr double kStepTolerance = 0.05;
 void RequireEqual(const std::string& what, const std::string& reference, const std::string& other,
                   const std::string& cure) {
   if (reference == other) return;
-  throw Error(
-      fmt::format("{}: the reference has {}, the other light field {}: they must be equal{}", what,
-                  reference, other, cure));
+  throw Error(fmt::format(
+      "{}: the reference has {}, but the other light field has {}: these must be equal{}", what,
+      reference, other, cure));
 }
 
 void RequireSameViewpoints(const model::LightField& reference, const model::LightField& other) {
@@ -38,9 +38,9 @@ void RequireSameViewpoints(const model::LightField& reference, const model::Ligh
     if (counts[axis] == 1 || std::abs(a_mm - b_mm) <= kStepTolerance * std::max(a_mm, b_mm))
       continue;
     throw Error(
-        fmt::format("views in {}: they are {:.6g} mm apart in the reference and {:.6g} mm in the "
-                    "other light field: within {:g} % they must be the same, or other viewpoints "
-                    "are compared",
+        fmt::format("views in {}: their distance is {:.6g} mm in the reference and {:.6g} mm in "
+                    "the other light field: these must agree within {:g} %, because otherwise "
+                    "different viewpoints are compared",
                     axis == 0 ? "u" : "v", a_mm, b_mm, 100 * kStepTolerance));
   }
 }
@@ -56,7 +56,7 @@ void RequireComparable(const model::LightField& reference, const model::LightFie
     return fmt::format("{} channel(s)", light_field.channels);
   };
   RequireEqual("number of views", counts(reference), counts(other),
-               " (--views takes inner ones of both)");
+               " (--views selects inner views of both)");
   RequireEqual("size of the views", size(reference), size(other), "");
   RequireEqual("channels", channels(reference), channels(other), "");
   RequireSameViewpoints(reference, other);
@@ -66,17 +66,17 @@ void RequireFitting(const model::LightField& reference, const DibrInput& dibr) {
   const model::LinearImage& photograph = dibr.photograph;
   if (photograph.width_px != reference.s_count || photograph.height_px != reference.t_count ||
       photograph.channels != reference.channels) {
-    throw Error(fmt::format(
-        "photograph: it has {}x{} px in {} channel(s), the views {}x{} px in {}: they must be "
-        "equal",
-        photograph.width_px, photograph.height_px, photograph.channels, reference.s_count,
-        reference.t_count, reference.channels));
+    throw Error(
+        fmt::format("photograph: it has {}x{} px in {} channel(s), but the views have {}x{} px in "
+                    "{} channel(s): these must be equal",
+                    photograph.width_px, photograph.height_px, photograph.channels,
+                    reference.s_count, reference.t_count, reference.channels));
   }
   if (dibr.disparity.width_px != reference.s_count ||
       dibr.disparity.height_px != reference.t_count) {
-    throw Error(fmt::format("disparity: it has {}x{} px, the views {}x{} px: they must be equal",
-                            dibr.disparity.width_px, dibr.disparity.height_px, reference.s_count,
-                            reference.t_count));
+    throw Error(fmt::format(
+        "disparity: it has {}x{} px, but the views have {}x{} px: the sizes must be equal",
+        dibr.disparity.width_px, dibr.disparity.height_px, reference.s_count, reference.t_count));
   }
 }
 
@@ -191,7 +191,8 @@ LightFieldScores CompareLightFields(const model::LightField& reference,
       if (reference.IsPresent(k, l) && other.IsPresent(k, l)) common.emplace_back(k, l);
     }
   }
-  if (common.empty()) throw Error("the two light fields have no view in common");
+  if (common.empty())
+    throw Error("the two light fields have no view in common: at least one is needed");
 
   std::optional<DibrViews> dibr_views;
   if (dibr) dibr_views.emplace(*dibr);

@@ -39,8 +39,7 @@ void RequireComplete(const std::string& name, const model::EncodedValues& image)
                             static_cast<std::size_t>(std::max(0, image.channels));
   if (count == 0 || (image.channels != 1 && image.channels != 3) || image.values.size() != count) {
     throw Error(
-        fmt::format("{}: {} values for {}: a grey or RGB image with all its values is "
-                    "expected",
+        fmt::format("{}: {} values for {}: a grey or RGB image with all its values is expected",
                     name, image.values.size(), SizeText(image)));
   }
 }
@@ -55,7 +54,7 @@ cv::Rect Inside(int width_px, int height_px, int border_px) {
 void RequireBorder(int width_px, int height_px, int border_px) {
   const int largest_px = (std::min(width_px, height_px) - 1) / 2;
   if (border_px >= 0 && border_px <= largest_px) return;
-  throw Error(fmt::format("border of {} px: of {}x{} px it must leave something: 0 to {} px",
+  throw Error(fmt::format("border of {} px: for a size of {}x{} px it must be from 0 to {} px",
                           border_px, width_px, height_px, largest_px));
 }
 
@@ -210,7 +209,7 @@ ImageScores CompareImages(const model::EncodedValues& reference, const model::En
   RequireComplete("other image", other);
   if (reference.width_px != other.width_px || reference.height_px != other.height_px ||
       reference.channels != other.channels) {
-    throw Error(fmt::format("the reference has {}, the other image {}: they must be equal",
+    throw Error(fmt::format("the reference has {}, but the other image has {}: these must be equal",
                             SizeText(reference), SizeText(other)));
   }
   RequireBorder(reference.width_px, reference.height_px, border_px);

@@ -175,8 +175,8 @@ void InpaintOccludedRays(const DisparityMap& map, const InpaintOptions& options,
   CheckLightField(*light_field);
   if (map.width_px != light_field->s_count || map.height_px != light_field->t_count) {
     throw Error(
-        fmt::format("inpainting: the disparity map has {}x{} px, the views {}x{}: they "
-                    "must be equal",
+        fmt::format("inpainting: the disparity map has {}x{} px, but the views have {}x{} px: the "
+                    "sizes must be equal",
                     map.width_px, map.height_px, light_field->s_count, light_field->t_count));
   }
   const auto start = Clock::now();
@@ -216,8 +216,8 @@ void InpaintOccludedRays(const DisparityMap& map, const InpaintOptions& options,
   }
   summary->seconds = SecondsSince(start);
   summary->message = fmt::format(
-      "{} rays of occluded background: {} filled in {} views by Telea's method, {} carried to "
-      "others",
+      "{} rays of occluded background: {} filled in {} views by Telea's method, {} copied to other "
+      "views",
       summary->holes, summary->filled, summary->views_visited, summary->carried);
 }
 

@@ -147,7 +147,7 @@ model::LinearImage Refocus(const model::LightField& light_field, double disparit
 Eigen::Vector2d DisparityAtDepthPx(const model::LightField& light_field, double depth_mm) {
   if (!light_field.grid) {
     throw Error(fmt::format(
-        "depth {} mm: this light field has no camera; its planes are named by their disparity",
+        "depth {} mm: this light field has no camera; state a disparity instead of a depth",
         depth_mm));
   }
   model::LightFieldGrid exchanged = *light_field.grid;

@@ -23,7 +23,7 @@ Eigen::ArrayXXd PresentWeights(const model::LightField& light_field,
                             light_field.v_count));
   }
   if (!(weights >= 0).all() || !weights.allFinite()) {
-    throw Error("weights of the views: they must be finite and >= 0");
+    throw Error("weights of the views: each must be finite and >= 0");
   }
   Eigen::ArrayXXd present = weights;
   for (int l = 0; l < light_field.v_count; ++l) {
@@ -32,7 +32,7 @@ Eigen::ArrayXXd PresentWeights(const model::LightField& light_field,
     }
   }
   if (!(present.sum() > 0)) {
-    throw Error("weights of the views: no view that is present has a weight > 0");
+    throw Error("weights of the views: at least one view that is present must have a weight > 0");
   }
   return present;
 }

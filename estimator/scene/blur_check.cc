@@ -135,16 +135,19 @@ void ToPhotographPx(BlurCheck* check) {
 
 std::string MessageOf(const BlurCheck& check) {
   if (check.blocks == 0) {
-    return "no block tells anything of its blur: all are in focus, or look past edges of the depth";
+    return "no block provides information about its blur: all blocks are in focus or contain depth "
+           "edges";
   }
-  const std::string blocks = fmt::format("{} of {} blocks are not explained by noise",
-                                         check.unexplained_blocks, check.blocks);
+  const std::string blocks =
+      fmt::format("noise does not explain {} of {} blocks", check.unexplained_blocks, check.blocks);
   if (check.trials.size() <= 1) {
     return fmt::format(
-        "{}: nothing speaks for a narrower blur; that it is too narrow would not show", blocks);
+        "{}: the photograph does not indicate a narrower blur; a blur that is already too narrow "
+        "cannot be detected",
+        blocks);
   }
   if (!check.narrower_blur && !check.other_focus) {
-    return fmt::format("{}, and no narrower blur and no other focus explains them", blocks);
+    return fmt::format("{}, and neither a narrower blur nor another focus explains them", blocks);
   }
   return blocks;
 }
@@ -171,7 +174,7 @@ BlurCheck CheckBlur(const EstimateInput& input, const BlurCheckOptions& options)
   const double spread = SpreadOf(input.weights);
   BlurCheck check;
   if (!(spread > 0)) {
-    check.message = "one view has no blur that could be checked";
+    check.message = "a light field of one view has no blur to check";
     return check;
   }
   const int threads = ResolveThreads(options.threads);
@@ -182,7 +185,7 @@ BlurCheck CheckBlur(const EstimateInput& input, const BlurCheckOptions& options)
   const std::optional<double> noise = EncodedNoiseSigma(looked.image, input.transfer);
   check.noise_sigma = std::max(noise.value_or(kDefaultNoise), kMinNoise);
   if (!noise) {
-    check.message = "no part of the photograph tells its noise: the blur cannot be checked";
+    check.message = "no part of the photograph shows its noise: the blur cannot be checked";
     check.seconds = SecondsSince(start);
     return check;
   }

@@ -40,11 +40,11 @@ class JoinedSummary {
 
   // Throws Error if the iterations made no progress.
   void Fill(const SceneOptions& options, SceneSummary* summary) const {
-    RequireProgress(
-        "scene", relative_residual_, iterations_,
-        options.strength_rule == StrengthRule::kGiven
-            ? fmt::format("allow more, or give another strength than {:g}", options.strength)
-            : "allow more");
+    RequireProgress("scene", relative_residual_, iterations_,
+                    options.strength_rule == StrengthRule::kGiven
+                        ? fmt::format("allow more iterations, or use another strength than {:g}",
+                                      options.strength)
+                        : "allow more");
     summary->strength = strength_;
     summary->iterations = iterations_;
     summary->reweightings = reweightings_;
@@ -135,8 +135,8 @@ int SceneBandRun<Real>::BandsFor(const ProjectionBytes& per_pixel) const {
     needed = std::min(needed, bytes);
   }
   throw Error(fmt::format(
-      "memory limit {:.0f} MiB: in any number of bands {:.0f} MiB are needed; the limit must be at "
-      "least that, or the views or threads fewer, or the image smaller",
+      "memory limit {:.0f} MiB: with any number of bands {:.0f} MiB are needed; the limit must be "
+      "at least as large, or use fewer views or threads, or a smaller image",
       *options_.memory_limit_mib, std::ceil(needed / kBytesPerMib)));
 }
 

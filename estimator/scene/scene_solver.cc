@@ -34,7 +34,7 @@ std::string MessageOf(const SceneOptions& options, const SceneSummary& summary, 
                     summary.relative_residual, options.tolerance_or_usual());
   }
   if (!noise_known && options.strength_rule != StrengthRule::kGiven) {
-    message += "; no part of the photograph tells its noise: 1/255 is assumed";
+    message += "; no part of the photograph shows its noise: 1/255 is assumed";
   }
   return message;
 }
@@ -123,10 +123,9 @@ model::LightField Estimate(const EstimateInput& input, const SceneOptions& optio
   std::string why;
   if (!options.IsValid(&why)) throw Error("scene solver: " + why);
   if (options.double_precision && backend != nullptr && !backend->has_double()) {
-    throw Error(
-        fmt::format("device {}: it has no double, which double precision asks for; the device must "
-                    "be cpu, or the precision float",
-                    backend->name()));
+    throw Error(fmt::format(
+        "device {}: it does not support double precision; use the device cpu, or single precision",
+        backend->name()));
   }
   CheckInput(input);
   *summary = SceneSummary();

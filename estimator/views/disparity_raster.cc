@@ -35,13 +35,13 @@ void CheckMap(const DisparityMap& map) {
   if (map.width_px < 1 || map.height_px < 1 ||
       map.disparity.size() != Index(map.width_px) * Index(map.height_px)) {
     throw Error(
-        fmt::format("disparity map: {} values for {}x{} px: the count must be the product, "
-                    "and not 0",
+        fmt::format("disparity map: {} values for {}x{} px: the count must be the product of these "
+                    "numbers, and not 0",
                     map.disparity.size(), map.width_px, map.height_px));
   }
   if (!std::all_of(map.disparity.begin(), map.disparity.end(),
                    [](float d) { return std::isfinite(d); })) {
-    throw Error("disparity map: it has holes: they must be filled before a view is rendered");
+    throw Error("disparity map: it has holes, which must be filled before a view is rendered");
   }
 }
 

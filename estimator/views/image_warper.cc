@@ -21,16 +21,17 @@ void CheckImage(const model::LinearImage& image) {
       image.values.size() !=
           Index(image.width_px) * Index(image.height_px) * Index(image.channels)) {
     throw Error(
-        fmt::format("image: {} values for {}x{} px in {} channels: the count must be the "
-                    "product, and not 0",
+        fmt::format("image: {} values for {}x{} px in {} channels: the count must be the product "
+                    "of these numbers, and not 0",
                     image.values.size(), image.width_px, image.height_px, image.channels));
   }
 }
 
 void CheckSameSize(const char* what, int width_px, int height_px, const DisparityMap& map) {
   if (width_px == map.width_px && height_px == map.height_px) return;
-  throw Error(fmt::format("{} is {}x{} px, the disparity {}x{} px: the sizes must be equal", what,
-                          width_px, height_px, map.width_px, map.height_px));
+  throw Error(
+      fmt::format("{} has {}x{} px, but the disparity has {}x{} px: the sizes must be equal", what,
+                  width_px, height_px, map.width_px, map.height_px));
 }
 
 // Throws Error if the sizes differ.

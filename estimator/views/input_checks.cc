@@ -32,20 +32,23 @@ void CheckImage(const model::LinearImage& image) {
   if (image.width_px < 1 || image.height_px < 1 ||
       image.values.size() !=
           Index(image.width_px) * Index(image.height_px) * Index(image.channels)) {
-    Fail(fmt::format("the image is {}x{} px with {} values", image.width_px, image.height_px,
-                     image.values.size()));
+    Fail(
+        fmt::format("the image has {}x{} px and {} values: the count of values must be the "
+                    "product of its size and its channels, and not 0",
+                    image.width_px, image.height_px, image.values.size()));
   }
   for (std::size_t i = 0; i < image.values.size(); ++i) {
     if (std::isfinite(image.values[i])) continue;
     const std::size_t pixel = i / Index(image.channels);
-    Fail(fmt::format("the image has values that are not finite: {} at ({}, {})", image.values[i],
-                     pixel % Index(image.width_px), pixel / Index(image.width_px)));
+    Fail(fmt::format("the image has the value {} at ({}, {}): every value must be finite",
+                     image.values[i], pixel % Index(image.width_px),
+                     pixel / Index(image.width_px)));
   }
 }
 
 void CheckDisparity(const DisparityMap& map, const model::LinearImage& image) {
   if (map.width_px != image.width_px || map.height_px != image.height_px) {
-    Fail(fmt::format("the depth is {}x{} px, the image {}x{} px: the sizes must be equal",
+    Fail(fmt::format("the depth has {}x{} px, but the image has {}x{} px: the sizes must be equal",
                      map.width_px, map.height_px, image.width_px, image.height_px));
   }
   if (!std::all_of(map.disparity.begin(), map.disparity.end(),
@@ -57,7 +60,7 @@ void CheckDisparity(const DisparityMap& map, const model::LinearImage& image) {
   if (!(widest_px <= size_px)) {
     Fail(
         fmt::format("the largest disparity is {:.4g} px per view step: it must be at most the "
-                    "image's size, {} px; is its scale right?",
+                    "image's size, {} px; check its scale",
                     widest_px, size_px));
   }
 }
@@ -75,8 +78,7 @@ void CheckWeights(const Eigen::ArrayXXd& weights) {
     }
   }
   if (!(std::abs(weights.sum() - 1) < 1e-6)) {
-    Fail(fmt::format("the weights of the views sum to {}: they must be >= 0 with sum 1",
-                     weights.sum()));
+    Fail(fmt::format("the weights of the views have the sum {}: it must be 1", weights.sum()));
   }
 }
 
@@ -88,21 +90,21 @@ void CheckInput(const EstimateInput& input) {
   CheckDisparity(input.disparity, image);
   CheckWeights(input.weights);
   if (input.grid.has_value() != input.camera.has_value()) {
-    Fail("a camera and a grid come together");
+    Fail("either the camera or the grid is missing: both or neither must be given");
   }
   if (input.grid && input.grid->planes.uv_depth_mm != 0) {
-    Fail(fmt::format(
-        "the UV plane lies at depth {} mm: it must be the aperture (0), where a view has one "
-        "transmission for all its rays",
-        input.grid->planes.uv_depth_mm));
+    Fail(
+        fmt::format("the UV plane lies at the depth {} mm: it must be 0, the aperture, where a "
+                    "view has one transmission for all its rays",
+                    input.grid->planes.uv_depth_mm));
   }
   if (input.grid &&
       (input.grid->s_count != image.width_px || input.grid->t_count != image.height_px ||
        input.grid->u_count != input.weights.cols() ||
        input.grid->v_count != input.weights.rows())) {
     Fail(fmt::format(
-        "the grid has {}x{} samples and {}x{} views, the image {}x{} px and the "
-        "weights {}x{}: they must be equal",
+        "the grid has {}x{} samples and {}x{} views, but the image has {}x{} px and there are "
+        "{}x{} weights: the counts must be equal",
         input.grid->s_count, input.grid->t_count, input.grid->u_count, input.grid->v_count,
         image.width_px, image.height_px, input.weights.cols(), input.weights.rows()));
   }

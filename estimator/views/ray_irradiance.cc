@@ -121,8 +121,7 @@ void CheckViewWeights(const model::LightFieldGrid& grid, const Eigen::ArrayXXd& 
   }
   if (!(weights >= 0).all() || !(weights.sum() > 0)) {
     throw Error(
-        fmt::format("weights of the views: their sum is {}: they must be >= 0, one of them "
-                    "> 0",
+        fmt::format("weights of the views: their sum is {}: each must be >= 0 and at least one > 0",
                     weights.sum()));
   }
 }

@@ -18,8 +18,8 @@ void CheckCount(const char* what, int width_px, int height_px, int channels, std
   if (width_px < 1 || height_px < 1 || channels < 1 ||
       count != Index(width_px) * Index(height_px) * Index(channels)) {
     throw Error(
-        fmt::format("{}: {} values for {}x{} px in {} channels: the count must be the product, "
-                    "and not 0",
+        fmt::format("{}: {} values for {}x{} px in {} channels: the count must be the product of "
+                    "these numbers, and not 0",
                     what, count, width_px, height_px, channels));
   }
 }
@@ -47,9 +47,9 @@ DisparityMap DisparityOnGrid(const model::LightFieldGrid& grid, const std::vecto
       continue;
     }
     if (!(z_mm > grid.planes.uv_depth_mm)) {
-      throw Error(
-          fmt::format("depth map: a depth is {} mm: every one must be beyond the UV plane, > {} mm",
-                      z_mm, grid.planes.uv_depth_mm));
+      throw Error(fmt::format(
+          "depth map: a depth is {} mm: every depth must be beyond the UV plane, > {} mm", z_mm,
+          grid.planes.uv_depth_mm));
     }
     map.disparity.push_back(static_cast<float>(-model::SlopeOnGrid(per_mm, z_mm)));
   }
@@ -79,9 +79,10 @@ DisparityMap DisparityFromMap(const model::RawDepthMap& map, double scale, doubl
     all_holes = all_holes && hole;
   }
   if (all_holes) {
-    throw Error(
-        fmt::format("disparity map: all of its {} values are holes{}", map.values.size(),
-                    map.integer ? " (0 in an integer map, or not finite)" : " (not finite)"));
+    throw Error(fmt::format(
+        "disparity map: all of its {} values are holes{}: at least one must be a disparity",
+        map.values.size(),
+        map.integer ? " (0 in an integer map, or not finite)" : " (not finite)"));
   }
   return disparity;
 }

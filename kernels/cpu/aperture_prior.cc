@@ -207,8 +207,8 @@ template <typename Real>
 AperturePrior<Real>::AperturePrior(int u_count, int v_count, double gamma, double mu)
     : u_count_(u_count), v_count_(v_count) {
   if (std::max(u_count, v_count) > kMaxSamples) {
-    throw Error(fmt::format("views are {}x{}: there may be at most {} across and down", u_count,
-                            v_count, kMaxSamples));
+    throw Error(fmt::format("views are {}x{}: each count must be at most {}", u_count, v_count,
+                            kMaxSamples));
   }
   across_ = TransformOf<Real>(u_count);
   down_ = TransformOf<Real>(v_count);

@@ -27,14 +27,15 @@ void CheckBlockAt(const VaryingFilter<Real>& filter, int row, int column, std::s
       const Real value = filter.coefficients[at];
       const int x = column * kFilterBlockPx + i;
       const auto place = [&] {
-        return fmt::format("filter: coefficients: of pixel ({}, {}) the one for n = {} is {}", x,
-                           row, n, value);
+        return fmt::format("filter: coefficients: the coefficient n = {} of pixel ({}, {}) is {}",
+                           n, x, row, value);
       };
       if (!std::isfinite(value)) throw Error(place() + ": it must be finite");
       const std::int64_t source = (across ? x : row) + n;
       if ((x >= filter.width_px || source < 0 || source >= end) && value != 0) {
-        throw Error(fmt::format("{}: it must be 0, as it is outside of the image of {} x {} pixels",
-                                place(), filter.width_px, filter.height_px));
+        throw Error(
+            fmt::format("{}: it must be 0, because it is outside the image of {} x {} pixels",
+                        place(), filter.width_px, filter.height_px));
       }
     }
   }
@@ -72,9 +73,10 @@ void Check(const VaryingFilter<Real>& filter) {
     }
     const std::size_t end = filter.start[block] + Index(2 * radius + 1) * Index(kFilterBlockPx);
     if (filter.start[block + 1] != end) {
-      throw Error(fmt::format(
-          "filter: start of block {} is {}: it must be {}, as the block before has radius {}",
-          block + 1, filter.start[block + 1], end, radius));
+      throw Error(
+          fmt::format("filter: start of block {} is {}: it must be {}, because the previous block "
+                      "has radius {}",
+                      block + 1, filter.start[block + 1], end, radius));
     }
   });
   CheckSize("filter: coefficients", filter.coefficients.size(), filter.start.back());
@@ -94,15 +96,17 @@ void Check(const PixelCsr<Real>& rows) {
   std::int64_t before = -1;
   for (const std::int32_t pixel : rows.pixel) {
     if (!(pixel > before && pixel < rows.pixels)) {
-      throw Error(fmt::format("rows: pixel has {} after {}: it must ascend from 0 to at most {}",
-                              pixel, before, rows.pixels - 1));
+      throw Error(
+          fmt::format("rows: pixel: {} follows {}: the list must ascend from 0 to at most {}",
+                      pixel, before, rows.pixels - 1));
     }
     before = pixel;
   }
   CheckStart("rows: start", rows.start, rows.pixel.size(), [&](std::size_t row) {
     if (!(rows.start[row + 1] >= rows.start[row])) {
-      throw Error(fmt::format("rows: start of row {} is {}: it must be at least the one before, {}",
-                              row + 1, rows.start[row + 1], rows.start[row]));
+      throw Error(
+          fmt::format("rows: start of row {} is {}: it must be at least the previous start, {}",
+                      row + 1, rows.start[row + 1], rows.start[row]));
     }
   });
   CheckSize("rows: index", rows.index.size(), Index(rows.start.back()));

@@ -117,11 +117,11 @@ std::shared_ptr<Backend> OpenBackend(const DeviceRequest& request, std::string* 
   if (backend != nullptr) return backend;
   const std::string why = fmt::format("{}", fmt::join(problems, "; "));
   if (request.kind == DeviceRequest::Kind::kOpenCl) {
-    throw Error(fmt::format("device '{}' cannot be used: {} (device cpu needs no OpenCL)",
+    throw Error(fmt::format("device '{}' cannot be used: {} (the device cpu does not need OpenCL)",
                             RequestText(request), why));
   }
   if (notice != nullptr) {
-    *notice = "no OpenCL device can be used, so C++ code computes: " + why;
+    *notice = "no OpenCL device can be used, so the C++ code on the processor is used: " + why;
   }
   return std::make_shared<ReferenceBackend>();
 }

@@ -106,7 +106,7 @@ std::vector<DeviceDescription> Candidates(const DeviceSurvey& survey, const Devi
     }
   }
   if (!any_allowed && !survey.devices.empty()) {
-    problems->push_back("there is no such device; there are: " + ListOf(survey.devices));
+    problems->push_back("there is no such device; the devices are: " + ListOf(survey.devices));
   }
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const auto& a, const auto& b) { return Score(a) > Score(b); });

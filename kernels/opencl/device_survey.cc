@@ -104,21 +104,22 @@ bool IsNewEnough(const std::string& version) {
 }
 
 std::string ProblemOf(const cl::Device& device, const DeviceDescription& known) {
-  if (device.getInfo<CL_DEVICE_AVAILABLE>() == CL_FALSE) return "the driver says: not available";
+  if (device.getInfo<CL_DEVICE_AVAILABLE>() == CL_FALSE)
+    return "its driver reports that it is not available";
   if (device.getInfo<CL_DEVICE_COMPILER_AVAILABLE>() == CL_FALSE) {
     return "its driver has no compiler";
   }
   if (!IsNewEnough(known.version)) {
-    return fmt::format("it is of {}; {}.{} or later is needed", known.version, kMinMajor,
+    return fmt::format("it supports {}; {}.{} or later is needed", known.version, kMinMajor,
                        kMinMinor);
   }
   if (known.max_allocation_bytes < kMinAllocationBytes) {
-    return fmt::format("its largest buffer has {} bytes; {} are needed", known.max_allocation_bytes,
-                       kMinAllocationBytes);
+    return fmt::format("its largest buffer has {} bytes; at least {} are needed",
+                       known.max_allocation_bytes, kMinAllocationBytes);
   }
   if (known.max_work_group < kMinWorkGroup) {
-    return fmt::format("its largest work group has {} items; {} are needed", known.max_work_group,
-                       kMinWorkGroup);
+    return fmt::format("its largest work group has {} items; at least {} are needed",
+                       known.max_work_group, kMinWorkGroup);
   }
   return "";
 }
@@ -154,17 +155,17 @@ std::string VendorsText() {
 
 std::string NoPlatformAdvice(int error) {
   return fmt::format(
-      "no OpenCL driver could be loaded ({}): install one (pocl-opencl-icd is one for every "
+      "no OpenCL driver could be loaded ({}): install one (pocl-opencl-icd works on every "
       "processor), or correct the .icd files in {}",
       OpenClErrorText(error), VendorsText());
 }
 
 std::string NoDeviceAdvice(int error, const std::string& platform_name) {
-  std::string advice = "is its hardware there, and may this user open it?";
+  std::string advice = "check that its hardware is present and that this user may open it";
   if (platform_name == "Portable Computing Language") {
     const std::string cache = Environment("POCL_CACHE_DIR");
-    advice = fmt::format("is PoCL's cache folder writable? It is {}",
-                         cache.empty() ? "~/.cache/pocl, unless POCL_CACHE_DIR names another"
+    advice = fmt::format("check that PoCL's cache folder is writable: {}",
+                         cache.empty() ? "~/.cache/pocl, unless POCL_CACHE_DIR names another folder"
                                        : "POCL_CACHE_DIR=" + cache);
   }
   return fmt::format("no device ({}): {}", OpenClErrorText(error), advice);
@@ -262,10 +263,10 @@ DeviceSurvey SurveyWith(const ListDevices& list, double limit_s, const StopCheck
     reader.Read(outcome.reported);
     if (outcome.failure.empty()) return survey;
     if (reader.platform() < first_platform) {
-      survey.problems.push_back(fmt::format(
-          "OpenCL: loading the drivers {}; is one of them installed twice or broken? Remove its "
-          ".icd file from {}",
-          outcome.failure, VendorsText()));
+      survey.problems.push_back(
+          fmt::format("OpenCL: loading the drivers {}; if one of them is installed twice or "
+                      "broken, remove its .icd file from {}",
+                      outcome.failure, VendorsText()));
       return survey;
     }
     survey.problems.push_back(PlatformLabel(reader.platform(), reader.platform_name()) +

@@ -69,8 +69,8 @@ std::string TryDevice(int platform, int device, const std::vector<EmbeddedFile>&
       BuildProgram(*opened, files, "double");
     }
   } catch (const cl::Error& failure) {
-    return fmt::format("device opencl:{}:{}: a small kernel does not run: {}: {}", platform, device,
-                       failure.what(), OpenClErrorText(failure.err()));
+    return fmt::format("device opencl:{}:{}: a small kernel cannot be run: {}: {}", platform,
+                       device, failure.what(), OpenClErrorText(failure.err()));
   } catch (const Interrupted&) {
     throw;
   } catch (const Error& failure) {
@@ -94,7 +94,7 @@ std::string TryDeviceOnce(int platform, int device, const StopCheck& stop) {
         kChildLimitS, stop);
     problem = OneLine(outcome.reported);
     if (!outcome.failure.empty()) {
-      problem = fmt::format("device opencl:{}:{}: its driver {} when a small kernel was tried",
+      problem = fmt::format("device opencl:{}:{}: its driver {} while it ran a small kernel",
                             platform, device, outcome.failure);
     }
   }

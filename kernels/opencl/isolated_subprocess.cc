@@ -33,7 +33,8 @@ class Pipe {
  public:
   Pipe() {
     if (::pipe2(ends_, O_CLOEXEC) != 0) {
-      throw Error(fmt::format("a pipe to a child process: {}", std::strerror(errno)));
+      throw Error(
+          fmt::format("a pipe to a child process cannot be created: {}", std::strerror(errno)));
     }
   }
   Pipe(const Pipe&) = delete;
@@ -133,7 +134,8 @@ class Child {
     const pid_t ended = ::waitpid(pid_, &status_, WNOHANG);
     if (ended < 0 && errno != EINTR) {
       ended_ = true;
-      throw Error(fmt::format("a child process: {}", std::strerror(errno)));
+      throw Error(
+          fmt::format("the end of a child process cannot be awaited: {}", std::strerror(errno)));
     }
     ended_ = ended == pid_;
     return ended_;
@@ -213,7 +215,8 @@ SubprocessOutcome RunInSubprocess(const std::function<void(const SubprocessRepor
   Pipe chatter;
   const pid_t parent = ::getpid();
   const pid_t pid = ::fork();
-  if (pid < 0) throw Error(fmt::format("a child process: {}", std::strerror(errno)));
+  if (pid < 0)
+    throw Error(fmt::format("a child process cannot be started: {}", std::strerror(errno)));
   if (pid == 0) BeChild(work, parent, reported.write_end(), chatter.write_end());
   Child child(pid);
   reported.CloseWriteEnd();
@@ -227,7 +230,7 @@ SubprocessOutcome RunInSubprocess(const std::function<void(const SubprocessRepor
       in_time ? HowItEnded(child.status()) : fmt::format("did not end within {:g} s", limit_s);
   const std::string last_line = LastLine(printed);
   if (!outcome.failure.empty() && !last_line.empty()) {
-    outcome.failure += ", its last words: " + last_line;
+    outcome.failure += "; the last line of its output: " + last_line;
   }
   return outcome;
 }

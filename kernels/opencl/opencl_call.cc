@@ -73,8 +73,8 @@ OpenClQueue::Entry& OpenClQueue::EntryOf(const std::string& kernel) {
 void OpenClQueue::CheckAllocation(const std::string& what, std::size_t bytes) const {
   if (bytes > max_allocation_bytes_) {
     throw Error(
-        fmt::format("device {}: {}: {} bytes are needed, and it allows {} in one piece; "
-                    "--device cpu computes it",
+        fmt::format("device {}: {}: {} bytes are needed, but the device allows at most {} in one "
+                    "buffer; use --device cpu",
                     device_->name, what, bytes, max_allocation_bytes_));
   }
 }

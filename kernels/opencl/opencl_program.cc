@@ -153,7 +153,7 @@ cl::Program BuildProgram(const OpenClDevice& device, const std::vector<EmbeddedF
                          const std::string& real) {
   const bool is_double = real == "double";
   if (is_double && !device.has_double) {
-    throw Error(fmt::format("device {}: it has no double", device.name));
+    throw Error(fmt::format("device {}: it does not support double precision", device.name));
   }
   std::string source;
   if (device.has_double) source += "#pragma OPENCL EXTENSION cl_khr_fp64 : enable\n";

@@ -86,8 +86,8 @@ void CheckRays(const BlockGeometry& block, Splat splat, const std::vector<std::i
       static_cast<std::size_t>(RaySlots(block, splat)) * static_cast<std::size_t>(block.pixels()));
   for (const std::int32_t ray : rays) {
     if (ray < -1 || ray >= block.rays()) {
-      throw Error(fmt::format("list of rays: {} is none of the block's: it must be -1 to {}", ray,
-                              block.rays() - 1));
+      throw Error(fmt::format("list of rays: {} is not a ray of the block: it must be -1 to {}",
+                              ray, block.rays() - 1));
     }
   }
 }
@@ -130,14 +130,14 @@ void CheckAddition(const WholeShape& whole, const BlockGeometry& block, int chan
   CheckRayNumbers(block, 1);
   if (block.s_count != whole.s_count || block.t_count != whole.t_count ||
       block.u_count != whole.u_count || block.v_count != whole.v_count) {
-    throw Error(fmt::format(
-        "block of a light field of {} x {} x {} x {} is added to one of {} x {} x {} x {}: they "
-        "must be equal",
-        block.s_count, block.t_count, block.u_count, block.v_count, whole.s_count, whole.t_count,
-        whole.u_count, whole.v_count));
+    throw Error(
+        fmt::format("a block of a light field of {} x {} x {} x {} is added to a light field of {} "
+                    "x {} x {} x {}: these sizes must be equal",
+                    block.s_count, block.t_count, block.u_count, block.v_count, whole.s_count,
+                    whole.t_count, whole.u_count, whole.v_count));
   }
   if (channel < 0 || channel >= whole.channels) {
-    throw Error(fmt::format("block is added to channel {}: it must be 0 to {}", channel,
+    throw Error(fmt::format("a block is added to channel {}: it must be 0 to {}", channel,
                             whole.channels - 1));
   }
   CheckSize("block's rays", rays, static_cast<std::size_t>(block.rays()));

@@ -143,7 +143,7 @@ class ReferenceWarp : public ViewWarp {
 
 void CheckCount(const char* what, const std::vector<float>* numbers, std::size_t count) {
   if (numbers != nullptr && numbers->size() == count) return;
-  throw Error(fmt::format("{}: {} numbers: there must be {}", what,
+  throw Error(fmt::format("{}: it has {} numbers: it must have {}", what,
                           numbers == nullptr ? 0 : numbers->size(), count));
 }
 
@@ -167,10 +167,10 @@ void CheckBoundarySamples(const std::vector<BoundarySample>& boundary, std::size
   std::int32_t before = -1;  // otherwise two items of a device would write one sample
   for (const BoundarySample& one : boundary) {
     if (one.index <= before || Index(one.index) >= pixels) {
-      throw Error(
-          fmt::format("boundary sample of a view has the index {} after {}: indices must grow "
-                      "from 0 to {} at most",
-                      one.index, before, pixels - 1));
+      throw Error(fmt::format(
+          "boundary sample of a view has the index {} after {}: indices must ascend from "
+          "0 to at most {}",
+          one.index, before, pixels - 1));
     }
     before = one.index;
     if (one.share >= 0 && one.share <= 1) continue;
@@ -187,7 +187,11 @@ void CheckView(const SurfaceImage& image, const ViewSources& view) {
     if (std::isfinite(shift)) continue;
     throw Error(fmt::format("shift of a view is {}: it must be finite", shift));
   }
-  if (view.occluded == nullptr) throw Error("occluded samples of a view: there must be a list");
+  if (view.occluded == nullptr)
+    throw Error(
+        "occluded samples of a view: the list is missing: an empty list is expected if no sample "
+        "is "
+        "hidden");
   for (const OccludedSample& occluded : *view.occluded) {
     if (!(occluded.index >= 0 && Index(occluded.index) < PixelsOf(image))) {
       throw Error(fmt::format("occluded sample of a view has the index {}: it must be 0 to {}",
@@ -197,8 +201,8 @@ void CheckView(const SurfaceImage& image, const ViewSources& view) {
     const float seen = (*view.disparity)[Index(occluded.index)];
     if (std::isnan(seen)) continue;
     throw Error(
-        fmt::format("occluded sample {} of a view is of disparity {} among those that are "
-                    "seen: it must be NaN there",
+        fmt::format("occluded sample {} of a view has the disparity {} in the list of visible "
+                    "samples: it must be NaN there",
                     occluded.index, seen));
   }
   if (view.boundary != nullptr) CheckBoundarySamples(*view.boundary, PixelsOf(image));

@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 
 Error WouldBeLost(const std::string& shown, const std::string& name) {
   return Error(
-      fmt::format("{}: this folder also holds '{}', which would be lost; move it away or choose "
+      fmt::format("{}: this folder also contains '{}', which would be lost; move it away or choose "
                   "another name",
                   shown, name));
 }
@@ -36,7 +36,7 @@ std::vector<fs::path> Entries(const fs::path& folder, const std::string& shown) 
     entries.push_back(entry->path());
   if (failure == std::errc::not_enough_memory) throw std::bad_alloc();
   if (failure) {
-    throw Error(fmt::format("{}: cannot be written: what it holds cannot be read: {}", shown,
+    throw Error(fmt::format("{}: cannot be written, because its content cannot be read: {}", shown,
                             failure.message()));
   }
   return entries;
@@ -79,19 +79,18 @@ void FolderContent::RequireReplaceable(const fs::path& folder, const std::string
   const fs::file_status status = fs::symlink_status(folder, ignored);
   if (!fs::exists(status)) return;
   if (!fs::is_directory(status))
-    throw Error(fmt::format("{}: is no folder any more; a folder is expected", shown));
+    throw Error(fmt::format("{}: is no longer a folder; a folder is expected", shown));
   const std::vector<fs::path> entries = in_place ? EntriesInPlace(folder) : Entries(folder, shown);
   if (!entries.empty() && !without_marker && !fs::exists(folder / marker_file, ignored)) {
-    throw Error(
-        fmt::format("{}: this folder holds other files (no {} in it) and is not replaced; choose "
-                    "another name",
-                    shown, marker_file));
+    throw Error(fmt::format(
+        "{}: this folder contains other files (but no {}) and is not replaced; choose another name",
+        shown, marker_file));
   }
   for (const fs::path& entry : entries) {
     const std::string name = entry.filename().string();
     if (IsMountPoint(entry)) {
       throw Error(
-          fmt::format("{}: holds '{}', where another file system is mounted, and cannot be "
+          fmt::format("{}: contains '{}', where another file system is mounted, and cannot be "
                       "replaced; choose another name",
                       shown, name));
     }

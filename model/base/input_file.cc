@@ -41,11 +41,10 @@ void RequireRegular(const std::string& path, mode_t mode) {
   if (S_ISREG(mode)) return;
   const std::string kind = KindOfFile(mode);
   if (S_ISFIFO(mode) && IsDescriptor(path)) {
-    throw Error(
-        fmt::format("{}: is a pipe, as a process substitution <(...) or a pipeline makes one; "
-                    "inputs are read more than once, so a regular file is expected: write the "
-                    "data to a file first",
-                    path));
+    throw Error(fmt::format(
+        "{}: is a pipe, such as a process substitution <(...) or a pipeline creates; inputs are "
+        "read more than once, so a regular file is expected: write the data to a file first",
+        path));
   }
   throw Error(
       fmt::format("{}: is {}; a {}file is expected", path, kind, S_ISDIR(mode) ? "" : "regular "));
@@ -112,7 +111,7 @@ std::string KindOfFile(unsigned mode) {
   if (S_ISCHR(mode)) return "a character device";
   if (S_ISBLK(mode)) return "a block device";
   if (S_ISLNK(mode)) return "a symbolic link";
-  return "no ordinary file";
+  return "not an ordinary file";
 }
 
 void RequireRegularFile(const std::string& path) { RequireRegular(path, StatusOf(path).st_mode); }

@@ -23,14 +23,14 @@ std::optional<double> NumberBehind(const std::string& name, const std::string& p
   return std::nullopt;
 }
 
-// Of a line "NAME:  1234 kB".
+// The number of a line "NAME:  1234 kB" of the file, MiB; absent without such a line.
 std::optional<double> Mebibytes(const std::string& path, const std::string& name) {
   const std::optional<double> kib = NumberBehind(name + ":", path);
   if (!kib) return std::nullopt;
   return *kib / 1024;
 }
 
-// A file that holds one number of bytes; absent where it says "max".
+// The number of bytes that the file contains; absent if it contains "max".
 std::optional<double> BytesIn(const std::string& path) {
   std::ifstream file(path);
   double bytes = 0;
@@ -38,9 +38,9 @@ std::optional<double> BytesIn(const std::string& path) {
   return std::nullopt;
 }
 
-// What the control group of the process leaves of its limit, MiB; version 2 or 1 of the interface.
-// A container sees its own group at the root. Files that are kept from reading count as used, but
-// make room where it is needed.
+// The memory that the control group of the process has left of its limit, MiB; version 2 or 1 of
+// the interface. A container sees its own group at the root. Files that are kept from reading count
+// as used, but make room where it is needed.
 std::optional<double> LeftOfControlGroupMib(const std::string& root) {
   const std::string base = root + "/sys/fs/cgroup";
   std::vector<std::string> folders = {base, base + "/memory"};

@@ -175,10 +175,9 @@ OutputPart::OutputPart(const fs::path& folder, const std::string& stem, PartKind
     if (failure == std::errc::no_such_file_or_directory) failure.clear();
     if (failure == std::errc::not_enough_memory) throw std::bad_alloc();
     if (failure) {
-      throw Error(
-          fmt::format("{}: cannot be written: {}, which an earlier run left, cannot be "
-                      "removed: {}",
-                      shown, path, failure.message()));
+      throw Error(fmt::format(
+          "{}: cannot be written: {}, which an earlier run left behind, cannot be removed: {}",
+          shown, path, failure.message()));
     }
   }
   constexpr int kMaxTries = 100;
@@ -209,8 +208,10 @@ OutputPart::OutputPart(const fs::path& folder, const std::string& stem, PartKind
       throw CannotBeWritten(shown, error);
     }
   }
-  throw Error(fmt::format(
-      "{}: cannot be written: what is made beside it is removed again and again", shown));
+  throw Error(
+      fmt::format("{}: cannot be written: another process repeatedly removes the temporary file or "
+                  "folder beside it",
+                  shown));
 }
 
 OutputPart::~OutputPart() {
@@ -225,9 +226,10 @@ OutputPart::~OutputPart() {
 
 void OutputPart::RequireThere(const std::string& shown) const {
   if (IsNamed(fd_, path_)) return;
-  throw Error(fmt::format(
-      "{}: cannot be written: {}, where it is made, was removed or renamed by somebody else", shown,
-      path_));
+  throw Error(
+      fmt::format("{}: cannot be written: its temporary file or folder {} was removed or renamed "
+                  "by another process",
+                  shown, path_));
 }
 
 void OutputPart::Release() {

@@ -32,8 +32,8 @@ void RequireName(const std::string& path, const std::string& what) {
   if (path.empty()) throw Error(fmt::format("the name of the output {} is empty", what));
   if (path != "-") return;
   throw Error(
-      fmt::format("-: this output cannot go to standard output; the name of a {} is expected (./- "
-                  "for one of this name)",
+      fmt::format("-: this output cannot be written to standard output; the name of a {} is "
+                  "expected (write ./- if its name is '-')",
                   what));
 }
 
@@ -56,10 +56,10 @@ fs::path Followed(const std::string& path, const fs::path& target) {
   const fs::path followed = fs::canonical(target, failure);
   if (!failure) return followed;
   std::error_code ignored;
-  throw Error(fmt::format(
-      "{}: is a symbolic link to {}, which cannot be reached ({}); remove the link or make what it "
-      "points at",
-      path, fs::read_symlink(target, ignored).string(), failure.message()));
+  throw Error(
+      fmt::format("{}: is a symbolic link to {}, which cannot be reached ({}); remove the link or "
+                  "create its target",
+                  path, fs::read_symlink(target, ignored).string(), failure.message()));
 }
 
 void RequireParentFolder(const std::string& path, const fs::path& target) {
@@ -68,7 +68,7 @@ void RequireParentFolder(const std::string& path, const fs::path& target) {
   const fs::file_status status = fs::status(parent, failure);
   if (fs::is_directory(status)) return;
   if (fs::exists(status)) {
-    throw Error(fmt::format("{}: {} is no folder", path, parent.string()));
+    throw Error(fmt::format("{}: {} is not a folder", path, parent.string()));
   }
   if (failure && failure != std::errc::no_such_file_or_directory)
     throw Error(fmt::format("{}: cannot be written: {}", path, failure.message()));
@@ -138,7 +138,8 @@ OutputTarget FolderTarget(const std::string& path) {
   RequireName(path, "folder");
   const fs::path named = WithoutTrailingSlash(path);
   if (!named.has_filename() || named.filename() == "." || named.filename() == "..")
-    throw Error(fmt::format("{}: a folder of its own is expected, by name", path));
+    throw Error(fmt::format(
+        "{}: the name of a folder for this output alone is expected, not '/', '.' or '..'", path));
   OutputTarget result = Located(path, named);
   if (result.older && !S_ISDIR(result.older->st_mode)) {
     throw Error(fmt::format("{}: is {}; a folder is expected", result.target.string(),

@@ -11,8 +11,8 @@ void RequireProgress(const std::string& solver, double relative_residual, int it
   constexpr double kLost = 10;
   if (relative_residual < kLost) return;
   throw Error(
-      fmt::format("{}: the iterations led nowhere: after {} of them the relative residual is "
-                  "{:.2g}, and must be below {:g}; {}",
+      fmt::format("{}: the iterations diverged: after {} of them the relative residual is {:.2g}, "
+                  "but it must be below {:g}; {}",
                   solver, iterations, relative_residual, kLost, advice));
 }
 

@@ -118,7 +118,7 @@ void RequireNoNul(const std::string& text, const std::string& source_name) {
   const std::size_t at = text.find('\0');
   if (at == std::string::npos || is_wide()) return;
   const auto end = text.begin() + static_cast<std::ptrdiff_t>(at);
-  throw Error(fmt::format("{}:{}: a NUL byte, which no text has; a YAML file is expected",
+  throw Error(fmt::format("{}:{}: a NUL byte, which no text file contains; a YAML file is expected",
                           source_name, 1 + std::count(text.begin(), end, '\n')));
 }
 
@@ -133,8 +133,8 @@ void RequireOneDocument(const std::string& text, const std::string& source_name)
   if (has_one && !has_two) return;
   const std::vector<YAML::Mark>& marks = documents.marks();
   if (has_two && marks.size() == 2 && marks[0].pos == marks[1].pos) {
-    throw Error(fmt::format("{}:{}:{}: no valid YAML: nothing can begin like this", source_name,
-                            marks[0].line + 1, marks[0].column + 1));
+    throw Error(fmt::format("{}:{}:{}: not valid YAML: a document cannot begin with this character",
+                            source_name, marks[0].line + 1, marks[0].column + 1));
   }
   throw Error(fmt::format("{}: one YAML document is expected, found {}", source_name,
                           has_two ? "more" : "none"));
@@ -159,7 +159,7 @@ YamlNode YamlNode::Parse(const std::string& text, const std::string& source_name
     impl->source = source_name;
     return YamlNode(impl);
   } catch (const YAML::Exception& e) {
-    throw Error(fmt::format("{}:{}:{}: no valid YAML: {}", source_name, e.mark.line + 1,
+    throw Error(fmt::format("{}:{}:{}: not valid YAML: {}", source_name, e.mark.line + 1,
                             e.mark.column + 1, e.msg));
   }
 }
@@ -206,7 +206,7 @@ void YamlNode::RequireKeys(const std::vector<std::string>& allowed,
           fmt::format("unknown key '{}'; {}", Shown(name), SuggestionFor(name, allowed)));
     }
     if (!seen.insert(name).second)
-      throw key.ErrorHere(fmt::format("key '{}' stands here twice", Shown(name)));
+      throw key.ErrorHere(fmt::format("key '{}' is given twice", Shown(name)));
   }
 }
 
@@ -337,7 +337,7 @@ bool YamlNode::Boolean() const { return OneOf({"true", "false"}) == "true"; }
 
 std::string YamlNode::Text() const {
   if (!IsScalar() || impl_->node.Scalar().empty()) {
-    throw ErrorHere(fmt::format("a text is expected, found {}", KindOf(impl_->node)));
+    throw ErrorHere(fmt::format("text is expected, found {}", KindOf(impl_->node)));
   }
   return impl_->node.Scalar();
 }

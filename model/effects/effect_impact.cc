@@ -71,7 +71,8 @@ bool MattersMore(const EffectImpact& a, const EffectImpact& b) {
 void CheckEffects(const EffectConditions& conditions, const std::vector<EffectSite>& places) {
   std::string why;
   if (!conditions.IsValid(&why)) throw Error("effects: " + why);
-  if (places.empty()) throw Error("effects: there is no place to look at: at least one is needed");
+  if (places.empty())
+    throw Error("effects: the list of places is empty: at least one place is needed");
 }
 
 LargestEffectImpact FindImpact(Effect effect, const EffectConditions& conditions,
@@ -107,10 +108,9 @@ bool EffectConditions::IsValid(std::string* why) const {
   }
   if (planes && (!std::isfinite(planes->uv_depth_mm) || planes->plane_spacing_mm == 0 ||
                  !std::isfinite(planes->plane_spacing_mm))) {
-    return Fail(why,
-                fmt::format("planes: UV at {} mm, ST {} mm beyond it: both must be finite, and the "
-                            "planes not the same",
-                            planes->uv_depth_mm, planes->plane_spacing_mm));
+    return Fail(why, fmt::format("planes: UV at {} mm, ST {} mm beyond it: both numbers must be "
+                                 "finite, and the planes must differ",
+                                 planes->uv_depth_mm, planes->plane_spacing_mm));
   }
   if (!(bits >= 1 && bits <= 32)) {
     return Fail(why, fmt::format("bits is {}: it must be from 1 to 32", bits));
@@ -161,8 +161,8 @@ std::vector<EffectSite> PlacesBetween(const Camera& camera, double near_mm, doub
                                       bool occlusion) {
   if (!(near_mm > 0) || !(far_mm >= near_mm) || !std::isfinite(near_mm)) {
     throw Error(
-        fmt::format("depths from {} to {} mm: they must be > 0, the first finite and not "
-                    "beyond the second",
+        fmt::format("depths from {} to {} mm: both must be > 0, and the first must be finite and "
+                    "at most the second",
                     near_mm, far_mm));
   }
   constexpr int kSteps = 33;

@@ -160,8 +160,8 @@ EffectSelection SelectEffects(const EffectSelectionOptions& choice,
   CheckEffects(conditions, places);
   const EffectSet foreign = choice.given.With(choice.without).Without(of_model);
   if (!foreign.empty()) {
-    throw Error(fmt::format("effect {} is not one of this image's: it has {}", JoinedNames(foreign),
-                            JoinedNames(of_model)));
+    throw Error(fmt::format("effect {} does not apply to this image: its effects are {}",
+                            JoinedNames(foreign), JoinedNames(of_model)));
   }
   EffectSelection decision;
   // The effects that the user excludes are not part of the image in which the rest is assessed.

@@ -19,15 +19,15 @@ std::string WeightComplaint(const LightField& light_field) {
   const Eigen::ArrayXXd& weights = light_field.weights;
   if (weights.rows() != light_field.v_count || weights.cols() != light_field.u_count) {
     return fmt::format(
-        "weights: {} rows of {} for {}x{} views: one row is needed for each v, with "
-        "a number for each u",
+        "weights: {} rows of {} numbers for {}x{} views: one row is needed for each v, with one "
+        "number for each u",
         weights.rows(), weights.cols(), light_field.u_count, light_field.v_count);
   }
   for (Eigen::Index l = 0; l < weights.rows(); ++l) {
     for (Eigen::Index k = 0; k < weights.cols(); ++k) {
       if (!(weights(l, k) >= 0) || !std::isfinite(weights(l, k))) {
-        return fmt::format("weights: that of view ({}, {}) is {}: it must be finite and >= 0", k, l,
-                           weights(l, k));
+        return fmt::format("weights: the weight of view ({}, {}) is {}: it must be finite and >= 0",
+                           k, l, weights(l, k));
       }
     }
   }
@@ -40,8 +40,9 @@ std::string WeightComplaint(const LightField& light_field) {
 // Returns the error of the grid and the camera, or an empty text if they are valid.
 std::string GridComplaint(const LightField& light_field) {
   if (light_field.grid.has_value() != light_field.camera.has_value()) {
-    return light_field.grid ? "grid: there is one, but no camera: both or none are needed"
-                            : "camera: there is one, but no grid: both or none are needed";
+    return light_field.grid
+               ? "grid: a grid is given without a camera: both or neither must be given"
+               : "camera: a camera is given without a grid: both or neither must be given";
   }
   if (!light_field.grid) return "";
   const LightFieldGrid& grid = *light_field.grid;
@@ -50,15 +51,16 @@ std::string GridComplaint(const LightField& light_field) {
   if (grid.s_count != light_field.s_count || grid.t_count != light_field.t_count ||
       grid.u_count != light_field.u_count || grid.v_count != light_field.v_count) {
     return fmt::format(
-        "grid: it has {}x{} views of {}x{} samples, the light field {}x{} of {}x{}: the counts "
-        "must be equal",
+        "grid: it has {}x{} views of {}x{} samples, but the light field has {}x{} views of {}x{} "
+        "samples: the counts must be equal",
         grid.u_count, grid.v_count, grid.s_count, grid.t_count, light_field.u_count,
         light_field.v_count, light_field.s_count, light_field.t_count);
   }
   const Sensor& sensor = light_field.camera->sensor;
   if (sensor.width_px != light_field.s_count || sensor.height_px != light_field.t_count) {
-    return fmt::format("camera: its sensor has {}x{} px, a view {}x{}: the sizes must be equal",
-                       sensor.width_px, sensor.height_px, light_field.s_count, light_field.t_count);
+    return fmt::format(
+        "camera: its sensor has {}x{} px, but a view has {}x{} px: the sizes must be equal",
+        sensor.width_px, sensor.height_px, light_field.s_count, light_field.t_count);
   }
   return "";
 }
@@ -79,19 +81,21 @@ std::string Complaint(const LightField& light_field) {
   }
   const std::size_t expected = light_field.ViewStart(light_field.channels, 0, 0);
   if (light_field.values.size() != expected) {
-    return fmt::format("values: {} for {}x{} views of {}x{} samples in {} channels: {} are needed",
-                       light_field.values.size(), light_field.u_count, light_field.v_count,
-                       light_field.s_count, light_field.t_count, light_field.channels, expected);
+    return fmt::format(
+        "values: {} values for {}x{} views of {}x{} samples in {} channels: {} are needed",
+        light_field.values.size(), light_field.u_count, light_field.v_count, light_field.s_count,
+        light_field.t_count, light_field.channels, expected);
   }
   const auto views = static_cast<std::size_t>(light_field.u_count * light_field.v_count);
   if (!light_field.present.empty()) {
     if (light_field.present.size() != views) {
-      return fmt::format("present: {} entries for {} views: one for each view, or none, is needed",
-                         light_field.present.size(), views);
+      return fmt::format(
+          "present: {} entries for {} views: there must be one entry for each view, or none at all",
+          light_field.present.size(), views);
     }
     if (std::none_of(light_field.present.begin(), light_field.present.end(),
                      [](bool there) { return there; })) {
-      return "present: no view is";
+      return "present: no view is present: at least one is needed";
     }
   }
   if (!light_field.landing_step_px.allFinite()) {
@@ -104,17 +108,17 @@ std::string Complaint(const LightField& light_field) {
 
 void RequireView(const LightField& light_field, int k, int l) {
   if (k >= 0 && k < light_field.u_count && l >= 0 && l < light_field.v_count) return;
-  throw Error(fmt::format("view ({}, {}) is outside: u must be from 0 to {}, v from 0 to {}", k, l,
-                          light_field.u_count - 1, light_field.v_count - 1));
+  throw Error(fmt::format("view ({}, {}) does not exist: u must be from 0 to {}, v from 0 to {}", k,
+                          l, light_field.u_count - 1, light_field.v_count - 1));
 }
 
 // Index of the first of the `inner` central views of `all`.
 int FirstInner(const char* name, int inner, int all) {
   if (inner < 1 || inner > all || (all - inner) % 2 != 0) {
-    throw Error(fmt::format(
-        "{} inner views in {} of {}: the count must be from 1 to {}, and {} like theirs, or the "
-        "middle would move",
-        inner, name, all, all, all % 2 == 0 ? "even" : "odd"));
+    throw Error(
+        fmt::format("{} inner views in {} of {}: the count must be from 1 to {}, and {} like the "
+                    "count of all views, so that the middle stays the same",
+                    inner, name, all, all, all % 2 == 0 ? "even" : "odd"));
   }
   return (all - inner) / 2;
 }
@@ -128,12 +132,14 @@ void RequireInside(const std::string& what, const PixelRect& rect, int width_px,
   if (inside) return;
   const bool may_fit =
       rect.width >= 1 && rect.height >= 1 && rect.width <= width_px && rect.height <= height_px;
-  const std::string right = may_fit ? fmt::format("of that size x may be from 0 to {}, y to {}",
-                                                  width_px - rect.width, height_px - rect.height)
-                                    : "its sides must be at least 1 px, and not longer than that";
-  throw Error(
-      fmt::format("the rectangle {},{},{},{} (x, y, width, height) leaves the {} of {}x{} px: {}",
-                  rect.x, rect.y, rect.width, rect.height, what, width_px, height_px, right));
+  const std::string right =
+      may_fit ? fmt::format("with this size, x must be from 0 to {} and y from 0 to {}",
+                            width_px - rect.width, height_px - rect.height)
+              : fmt::format("its width must be from 1 to {} and its height from 1 to {}", width_px,
+                            height_px);
+  throw Error(fmt::format(
+      "the rectangle {},{},{},{} (x, y, width, height) is not inside the {} of {}x{} px: {}",
+      rect.x, rect.y, rect.width, rect.height, what, width_px, height_px, right));
 }
 
 // Cuts the rectangle out of rows of `width_px` pixels of `channels` values each.
@@ -212,11 +218,11 @@ void SetView(LightField* light_field, int k, int l, const LinearImage& image) {
   const auto channels = static_cast<std::size_t>(light_field->channels);
   if (image.width_px != light_field->s_count || image.height_px != light_field->t_count ||
       image.channels != light_field->channels || image.values.size() != pixels * channels) {
-    throw Error(fmt::format(
-        "view ({}, {}): the image has {}x{} px in {} channels, the light field {}x{} in {}: they "
-        "must be equal",
-        k, l, image.width_px, image.height_px, image.channels, light_field->s_count,
-        light_field->t_count, light_field->channels));
+    throw Error(
+        fmt::format("view ({}, {}): the image has {}x{} px in {} channels, but the light field "
+                    "has views of {}x{} px in {} channels: these must be equal",
+                    k, l, image.width_px, image.height_px, image.channels, light_field->s_count,
+                    light_field->t_count, light_field->channels));
   }
   for (int channel = 0; channel < light_field->channels; ++channel) {
     float* plane = light_field->values.data() + light_field->ViewStart(channel, k, l);
@@ -239,8 +245,9 @@ LightField InnerViews(const LightField& light_field, int u_count, int v_count) {
   }
   inner.weights = light_field.weights.block(first_l, first_k, v_count, u_count);
   if (!(inner.weights.sum() > 0)) {
-    throw Error(fmt::format("the {}x{} inner views have no weight: they are no light field",
-                            u_count, v_count));
+    throw Error(
+        fmt::format("the {}x{} inner views all have the weight 0: at least one weight must be > 0",
+                    u_count, v_count));
   }
   inner.weights /= inner.weights.sum();
   inner.present.clear();

@@ -80,10 +80,10 @@ Eigen::Vector2d LandingPointByNodalPointsMm(const ThickLens& lens, double image_
                                             const LightFieldPlanes& planes, const Ray& ray) {
   const double focus_depth_mm = FocusDepthMm(lens, image_distance_mm);
   if (std::isinf(focus_depth_mm)) {
-    throw Error(fmt::format(
-        "image_distance_mm is {}: the lens is focused at infinity, where (15) has no crossing with "
-        "the plane of focus; (16) is to be used",
-        image_distance_mm));
+    throw Error(
+        fmt::format("image_distance_mm is {}: the lens is focused at infinity, where equation (15) "
+                    "has no crossing with the plane of focus; use equation (16)",
+                    image_distance_mm));
   }
   const double sensor_to_nodal_mm = image_distance_mm - RearNodalDistanceMm(lens);
   const double object_to_nodal_mm = focus_depth_mm - FrontNodalDepthMm(lens);
@@ -100,8 +100,8 @@ Eigen::Vector2d ApertureCrossingMm(const LightFieldPlanes& planes, const Ray& ra
 Eigen::Vector2d PositionAtDepthMm(const LightFieldPlanes& planes, const Ray& ray, double depth_mm) {
   CheckPlanes(planes);
   if (!std::isfinite(depth_mm)) {
-    throw Error(
-        fmt::format("depth_mm is {}: a ray has a position at finite depths only", depth_mm));
+    throw Error(fmt::format(
+        "depth_mm is {}: it must be finite, because a ray has no position at infinity", depth_mm));
   }
   const double st_share = (depth_mm - planes.uv_depth_mm) / planes.plane_spacing_mm;
   const double uv_share =
@@ -215,8 +215,9 @@ ApertureSamples SampleAperture(const Eigen::ArrayXXd& weights, double blur_ratio
         fmt::format("aperture_radius_mm is {}: it must be finite and >= 0", aperture_radius_mm));
   }
   if (weights.size() == 0 || !(weights >= 0).all() || !(std::abs(weights.sum() - 1) < 1e-9)) {
-    throw Error(fmt::format("aperture weights: their sum is {}: they must be >= 0 with sum 1",
-                            weights.size() == 0 ? 0.0 : weights.sum()));
+    throw Error(
+        fmt::format("aperture weights: their sum is {}: each must be >= 0 and the sum must be 1",
+                    weights.size() == 0 ? 0.0 : weights.sum()));
   }
 
   ApertureSamples samples;
@@ -303,10 +304,10 @@ Eigen::Vector2d ApertureStepsMm(const LightFieldGrid& grid, const Camera& camera
 LightFieldGrid DefaultGrid(const Camera& camera, int u_count, int v_count) {
   const double focus_depth_mm = FocusDepthMm(camera.lens, camera.image_distance_mm());
   if (std::isinf(focus_depth_mm)) {
-    throw Error(fmt::format(
-        "camera '{}': it is focused at infinity, where the default grid would have its ST plane; "
-        "planes at finite depths must be given",
-        camera.name));
+    throw Error(
+        fmt::format("camera '{}': it is focused at infinity, where the default grid would place "
+                    "its ST plane; planes at finite depths must be given",
+                    camera.name));
   }
   return GridOnPlanes(camera, {0, focus_depth_mm}, u_count, v_count);
 }
@@ -354,7 +355,8 @@ LightFieldGrid GridOnPlanes(const Camera& camera, const LightFieldPlanes& planes
 
   std::string why;
   if (!grid.IsValid(&why)) {
-    throw Error(fmt::format("camera '{}': it has no light-field grid: {}", camera.name, why));
+    throw Error(fmt::format("camera '{}': no light-field grid can be derived from it: {}",
+                            camera.name, why));
   }
   return grid;
 }
@@ -364,10 +366,10 @@ LightFieldGrid GridOnPlanes(const Camera& camera, const LightFieldPlanes& planes
 double SlopeOnGrid(const LightFieldGrid& grid, double depth_mm) {
   const double from_uv_mm = depth_mm - grid.planes.uv_depth_mm;
   if (!(depth_mm > 0) || from_uv_mm == 0) {
-    throw Error(fmt::format(
-        "depth_mm is {}: it must be > 0 and not that of the UV plane, {} mm, where the slope is "
-        "infinite",
-        depth_mm, grid.planes.uv_depth_mm));
+    throw Error(
+        fmt::format("depth_mm is {}: it must be > 0 and differ from the depth of the UV plane, {} "
+                    "mm, where the slope is infinite",
+                    depth_mm, grid.planes.uv_depth_mm));
   }
   return (1 - grid.planes.plane_spacing_mm / from_uv_mm) * grid.u_step_mm / grid.s_step_mm;
 }

@@ -32,15 +32,15 @@ void CheckSize(const std::string& what, int width_px, int height_px, int channel
   if (width_px < 1 || height_px < 1 || channels < 1 ||
       count != CountOf(width_px, height_px, channels)) {
     throw Error(
-        fmt::format("{}: {} values for {}x{} px in {} channels: the count must be the "
-                    "product, and not 0",
+        fmt::format("{}: {} values for {}x{} px in {} channels: the count must be the product of "
+                    "these numbers, and not 0",
                     what, count, width_px, height_px, channels));
   }
 }
 
 void CheckBits(int bits) {
   if (bits != 8 && bits != 16) {
-    throw Error(fmt::format("image: {} bits a value: it must be 8 or 16", bits));
+    throw Error(fmt::format("image: {} bits per value: it must be 8 or 16", bits));
   }
 }
 
@@ -88,9 +88,10 @@ void CheckConvention(const DepthConvention& convention, const std::string& depth
                             convention.disparity_offset_px));
   }
   if (!(convention.aperture_step_mm > 0) || !std::isfinite(convention.aperture_step_mm)) {
-    throw Error(fmt::format(
-        "{}: aperture_step_mm is {}: a disparity needs the step between views on the aperture, > 0",
-        depth_name, convention.aperture_step_mm));
+    throw Error(
+        fmt::format("{}: aperture_step_mm is {}: a disparity requires the step between views on "
+                    "the aperture, which must be > 0",
+                    depth_name, convention.aperture_step_mm));
   }
 }
 
@@ -178,7 +179,7 @@ void CheckPlausible(const Camera& camera, const DepthStatistics& depth,
   const double front_focal_length_mm = camera.lens.front_focal_length_mm;
   if (!(depth.min_mm > front_focal_length_mm)) {
     throw Error(
-        fmt::format("{}: they must be beyond the camera's front focal point at {:.6g} mm; {}",
+        fmt::format("{}: all depths must be beyond the camera's front focal point at {:.6g} mm; {}",
                     found, front_focal_length_mm, doubt));
   }
   if (!camera.calibration || !camera.calibration->image_distance_mm) return;
@@ -305,9 +306,9 @@ Scene MakeScene(const Camera& camera, LinearImage image, const RawDepthMap& map,
   CheckSize("image", image.width_px, image.height_px, image.channels, image.values.size());
   CheckSize(depth_name, map.width_px, map.height_px, 1, map.values.size());
   if (map.width_px != image.width_px || map.height_px != image.height_px) {
-    throw Error(fmt::format("{}: it is {}x{} px, the image {}x{} px: the sizes must be equal",
-                            depth_name, map.width_px, map.height_px, image.width_px,
-                            image.height_px));
+    throw Error(
+        fmt::format("{}: it has {}x{} px, but the image has {}x{} px: the sizes must be equal",
+                    depth_name, map.width_px, map.height_px, image.width_px, image.height_px));
   }
   CheckConvention(convention, depth_name);
 
@@ -332,13 +333,14 @@ Scene MakeScene(const Camera& camera, LinearImage image, const RawDepthMap& map,
   }
   scene.depth = StatisticsOf(scene.depth_mm);
   if (scene.depth.valid == 0) {
-    throw Error(fmt::format("{}: none of its {} values is a depth: all are holes", depth_name,
-                            map.values.size()));
+    throw Error(fmt::format("{}: all of its {} values are holes: at least one must be a depth",
+                            depth_name, map.values.size()));
   }
   CheckPlausible(camera, scene.depth, depth_name,
                  convention.kind == DepthKind::kDisparity
-                     ? "are scale and offset of the disparity right, or is the map a depth?"
-                     : "is the unit right?");
+                     ? "check the scale and the offset of the disparity, and that the map does not "
+                       "contain depths"
+                     : "check the unit");
   scene.image = std::move(image);
   return scene;
 }

@@ -168,10 +168,10 @@ double TransmissionSigmaMm(const Law& law, double sigma_mm) {
   }
   const double found_mm = std::sqrt(law.Of(transmission_mm).second_moment);
   if (std::abs(found_mm - sigma_mm) <= 1e-12 * sigma_mm) return transmission_mm;
-  throw Error(fmt::format(
-      "pupil law: no aperture has a blur of sigma {} mm at this distance; the aperture must be "
-      "smaller against the image distance",
-      sigma_mm));
+  throw Error(
+      fmt::format("pupil law: no aperture has a blur of sigma {} mm at this distance; the aperture "
+                  "must be smaller relative to the image distance",
+                  sigma_mm));
 }
 
 }  // namespace

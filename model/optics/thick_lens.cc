@@ -19,8 +19,8 @@ double RearDistanceMm(const ThickLens& lens, double image_distance_mm) {
   const double rear_distance_mm = image_distance_mm - lens.lens_thickness_mm;
   if (!(rear_distance_mm > 0) || !std::isfinite(rear_distance_mm)) {
     throw Error(
-        fmt::format("image_distance_mm is {}: with lens_thickness_mm {} it must be finite and "
-                    "above it, so that the sensor is behind the rear principal plane",
+        fmt::format("image_distance_mm is {}: it must be finite and above lens_thickness_mm, {}, "
+                    "so that the sensor is behind the rear principal plane",
                     image_distance_mm, lens.lens_thickness_mm));
   }
   return rear_distance_mm;
@@ -91,7 +91,7 @@ double FocusDepthMm(const ThickLens& lens, double image_distance_mm) {
   if (!(extension_mm > 0)) {
     throw Error(
         fmt::format("image_distance_mm is {}: it must be at least {}, lens_thickness_mm plus "
-                    "rear_focal_length_mm, because nothing comes to a focus on a nearer sensor",
+                    "rear_focal_length_mm, because no object is in focus on a nearer sensor",
                     image_distance_mm, lens.lens_thickness_mm + lens.rear_focal_length_mm));
   }
   return lens.front_focal_length_mm * (rear_distance_mm / extension_mm);

@@ -92,7 +92,7 @@ void ReadCovariance(const YamlNode& node, CameraCalibration* calibration) {
     const std::string parameter =
         name.OneOf({"image_distance_mm", "blur_ratio", "blur_floor_px", "bench_offset_mm"});
     if (std::find(order.begin(), order.end(), parameter) != order.end())
-      throw name.ErrorHere(fmt::format("'{}' stands in this list twice", parameter));
+      throw name.ErrorHere(fmt::format("'{}' is listed twice", parameter));
     order.push_back(parameter);
   }
   const std::size_t n = calibration->covariance_order.size();

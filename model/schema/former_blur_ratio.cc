@@ -86,9 +86,9 @@ void ConvertFormerBlurRatio(Camera* camera) {
   if (!(kappa.value > 0)) return;
   if (!std::isfinite(zf_mm)) {
     camera->notices.push_back(fmt::format(
-        "camera '{}': its file is of an earlier schema, in which blur_ratio {:.5g} was that of the "
-        "aperture before fall-off; focused at infinity it cannot be converted and is taken as that "
-        "of the blur. Calibrate again",
+        "camera '{}': its file has an earlier schema, in which blur_ratio {:.5g} described the "
+        "aperture before fall-off; it cannot be converted for a camera focused at infinity and is "
+        "used as the ratio of the blur itself. Calibrate again",
         camera->name, kappa.value));
     return;
   }
@@ -118,9 +118,9 @@ void ConvertFormerBlurRatio(Camera* camera) {
     if (distance < count) kappa.sigma = std::sqrt(calibration.covariance(ratio, ratio));
   }
   camera->notices.push_back(fmt::format(
-      "camera '{}': its file is of an earlier schema, in which blur_ratio {:.5g} was that of the "
+      "camera '{}': its file has an earlier schema, in which blur_ratio {:.5g} described the "
       "aperture before fall-off; it was converted to {:.5g}, the ratio of the blur itself. "
-      "Calibrate again, or write the camera anew, to store it so",
+      "Calibrate again, or write the camera file again, to store the converted ratio",
       camera->name, kappa.value, converted));
   kappa.value = converted;
 }

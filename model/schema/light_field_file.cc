@@ -61,12 +61,12 @@ void ReadMissingViews(const YamlNode& node, LightField* light_field) {
     const int l = place[1].Integer(0, light_field->v_count - 1);
     const auto index = static_cast<std::size_t>(l * light_field->u_count + k);
     if (!light_field->present[index])
-      throw view.ErrorHere(fmt::format("view ({}, {}) stands in this list twice", k, l));
+      throw view.ErrorHere(fmt::format("view ({}, {}) is listed twice", k, l));
     light_field->present[index] = false;
     ++missing;
   }
   if (missing == 0) light_field->present.clear();
-  if (missing == views) throw node.ErrorHere("all views are missing: one at least is needed");
+  if (missing == views) throw node.ErrorHere("all views are missing: at least one is needed");
 }
 
 void ReadGrid(const YamlNode& root, LightField* light_field) {
@@ -108,7 +108,7 @@ void ReadCameraAndGrid(const YamlNode& root, LightFieldDescription* description)
   }
   for (const char* key : {"planes", "steps", "st_origin_index"}) {
     if (const auto node = root.Find(key))
-      throw node->ErrorHere("means nothing without a camera: 'camera' is missing");
+      throw node->ErrorHere("this key requires a camera, but 'camera' is missing");
   }
 }
 

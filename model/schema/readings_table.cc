@@ -61,8 +61,9 @@ std::vector<ReadingRow> ReadReadingsTable(const std::string& path) {
   if (text.rfind("\xEF\xBB\xBF", 0) == 0) text.erase(0, 3);  // a spreadsheet's byte order mark
   if (const std::size_t nul = text.find('\0'); nul != std::string::npos) {
     const auto end = text.begin() + static_cast<std::ptrdiff_t>(nul);
-    throw Error(fmt::format("{}:{}: a NUL byte; a table is text in UTF-8", path,
-                            1 + std::count(text.begin(), end, '\n')));
+    throw Error(
+        fmt::format("{}:{}: a NUL byte, which no text file contains; a table in UTF-8 is expected",
+                    path, 1 + std::count(text.begin(), end, '\n')));
   }
   csv_parser parser;
   if (csv_init(&parser, CSV_STRICT | CSV_STRICT_FINI | CSV_APPEND_NULL) != 0)
@@ -85,7 +86,7 @@ std::vector<ReadingRow> ReadReadingsTable(const std::string& path) {
   csv_free(&parser);
   if (!well_formed)
     throw Error(
-        fmt::format("{}:{}: no valid CSV row (a quotation mark out of place?)", path, table.line));
+        fmt::format("{}:{}: not a valid CSV row; check its quotation marks", path, table.line));
 
   std::vector<ReadingRow> readings;
   std::map<std::string, int> line_of;
@@ -106,12 +107,13 @@ std::vector<ReadingRow> ReadReadingsTable(const std::string& path) {
       throw Error(fmt::format("{}:{}: the name of the file is missing", path, line));
     const auto [known, added] = line_of.emplace(row[0], line);
     if (!added) {
-      throw Error(fmt::format("{}:{}: '{}' has a reading already in line {}", path, line, row[0],
+      throw Error(fmt::format("{}:{}: '{}' already has a reading in line {}", path, line, row[0],
                               known->second));
     }
     readings.push_back({line, row[0], *reading});
   }
-  if (readings.empty()) throw Error(fmt::format("{}: no rows with a file and a reading", path));
+  if (readings.empty())
+    throw Error(fmt::format("{}: no row has a file and a reading; at least one is expected", path));
   return readings;
 }
 

@@ -44,7 +44,7 @@ void ReadFloor(const YamlNode& root, SweepFile* sweep) {
   const auto file = node->Find("from_calibration");
   if (is_interval + is_value + file.has_value() != 1) {
     throw node->ErrorHere(
-        "one of {value, sigma}, {from, to} and {from_calibration} is expected, not a mixture");
+        "exactly one of {value, sigma}, {from, to} and {from_calibration} is expected");
   }
   if (file) {
     const std::string place = file->ErrorHere("").what();
@@ -70,14 +70,13 @@ void NoteOrderAndRepeats(const SweepFile& sweep, std::vector<std::string>* notic
   if (!sorted) notices->push_back("the readings are not in order; they are used as they are");
   const std::set<double> distinct(readings.begin(), readings.end());
   if (distinct.size() < readings.size()) {
-    notices->push_back(fmt::format("{} frames share their reading with another",
+    notices->push_back(fmt::format("{} frames have the same reading as another frame",
                                    readings.size() - distinct.size()));
   }
   if (!sweep.reading_sigma_stated) {
     notices->push_back(
-        "reading_sigma_mm is not stated: the scatter about the law of image scale stands for it, "
-        "or 0 where "
-        "there is none");
+        "reading_sigma_mm is not stated: the scatter about the law of image scale is used instead, "
+        "or 0 without such a law");
   }
 }
 
@@ -118,7 +117,7 @@ SweepFile ReadSweep(const std::string& path, std::vector<std::string>* notices) 
   if (const auto unit = root.Find("readings_unit")) {
     mm_per_unit = MillimetresPer(unit->OneOf({"mm", "um", "cm", "m", "in"}));
     if (mm_per_unit != 1 && root.Has("frames")) {
-      throw unit->ErrorHere("'frames' states reading_mm; another unit goes with 'frames_csv'");
+      throw unit->ErrorHere("'frames' states reading_mm; only 'frames_csv' may use another unit");
     }
   }
   if (const auto sigma = root.Find("reading_sigma_mm")) {

@@ -21,21 +21,21 @@ void TakeFloorOfCalibration(const std::string& camera_path, const std::string& p
   }
   if (!camera.calibration) {
     throw Error(fmt::format(
-        "{}{} holds no calibration: a camera that thicklens calibrate has written is expected",
+        "{}{} contains no calibration: a camera that thicklens calibrate has written is expected",
         place, camera_path));
   }
   const std::string& method = camera.calibration->evidence.method;
   if (method == "assumed" || method == "source-recipe") {
-    throw Error(fmt::format(
-        "{}{}: calibration.evidence.method is '{}', which measures no floor: calibrate on a sweep "
-        "of a knife edge",
-        place, camera_path, method));
+    throw Error(
+        fmt::format("{}{}: calibration.evidence.method is '{}', which does not measure the blur "
+                    "floor: calibrate on a sweep of a knife edge",
+                    place, camera_path, method));
   }
   if (!camera.calibration->blur_floor_px) {
-    throw Error(fmt::format(
-        "{}{} holds no calibration.blur_floor_px: its sweep did not determine the floor, one of a "
-        "knife edge does",
-        place, camera_path));
+    throw Error(
+        fmt::format("{}{} contains no calibration.blur_floor_px, because its sweep did not "
+                    "determine the floor: calibrate on a sweep of a knife edge",
+                    place, camera_path));
   }
   sweep->floor = {};
   sweep->floor.given_px = *camera.calibration->blur_floor_px;
@@ -48,10 +48,10 @@ void RequireFloorOfCamera(const SweepFile& sweep, const Camera& camera) {
   const auto require_same = [&](const char* field, double theirs, double ours) {
     // Both files may contain the same number with different digits.
     if (std::abs(theirs - ours) <= 1e-6 * std::max(std::abs(theirs), std::abs(ours))) return;
-    throw Error(fmt::format(
-        "{}{} has {} {}, the camera '{}' of this sweep {}: a blur floor holds for one lens, "
-        "aperture and pixel pitch",
-        origin.place, origin.camera_path, field, theirs, camera.name, ours));
+    throw Error(
+        fmt::format("{}{} has {} {}, but the camera '{}' of this sweep has {}: a blur floor is "
+                    "valid only for the same lens, aperture and pixel pitch",
+                    origin.place, origin.camera_path, field, theirs, camera.name, ours));
   };
   const ThickLens& a = origin.lens;
   const ThickLens& b = camera.lens;

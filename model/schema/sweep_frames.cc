@@ -56,7 +56,8 @@ std::vector<std::string> FilesMatching(const YamlNode& node) {
 // name the folder that contains both the table and "frames/".
 std::vector<std::string> ImagesIn(const std::string& folder) {
   std::error_code failure;
-  if (!fs::is_directory(folder, failure)) throw Error(fmt::format("{}: no such folder", folder));
+  if (!fs::is_directory(folder, failure))
+    throw Error(fmt::format("{}: the folder does not exist", folder));
   fs::directory_iterator entries(folder, failure);
   if (failure) throw Error(fmt::format("{}: cannot be read: {}", folder, failure.message()));
   std::vector<std::string> here, below;
@@ -106,15 +107,15 @@ std::vector<SweepFrame> JoinRowsAndFiles(const std::vector<ReadingRow>& rows,
       }
       const auto other = std::find_if(match + 1, files.end(), same_name);
       if (other != files.end()) {
-        throw Error(fmt::format("{}:{}: '{}' may be {} or {}; name its folder too", table, row.line,
-                                row.file, *match, *other));
+        throw Error(fmt::format("{}:{}: '{}' may be {} or {}; write the name of its folder, too",
+                                table, row.line, row.file, *match, *other));
       }
       path = fs::path(*match).lexically_normal().string();
     }
     RequireFrame(path, fmt::format("{}:{}: ", table, row.line));
     if (!used.insert(path).second) {
       throw Error(
-          fmt::format("{}:{}: the file '{}' has a reading already", table, row.line, row.file));
+          fmt::format("{}:{}: the file '{}' already has a reading", table, row.line, row.file));
     }
     frames.push_back({path, row.reading * mm_per_unit});
   }
@@ -155,7 +156,8 @@ std::vector<SweepFrame> ReadSweepFrames(const YamlNode& root, double mm_per_unit
   }
   for (const char* key : {"frames_dir", "frames_glob"}) {
     if (const auto extra = root.Find(key))
-      throw extra->ErrorHere("goes with 'frames_csv'; the paths in 'frames' are complete");
+      throw extra->ErrorHere(
+          "this key applies only to 'frames_csv'; the paths in 'frames' are complete");
   }
   std::vector<SweepFrame> frames;
   std::set<std::string> images;
@@ -172,10 +174,10 @@ std::vector<SweepFrame> ReadSweepFrames(const YamlNode& root, double mm_per_unit
       throw image.ErrorHere(error.what());
     }
     if (!images.insert(path).second)
-      throw image.ErrorHere(fmt::format("'{}' stands in this list twice", image.Text()));
+      throw image.ErrorHere(fmt::format("'{}' is listed twice", image.Text()));
     frames.push_back({path, node.At("reading_mm").Number()});
   }
-  if (frames.empty()) throw root.At("frames").ErrorHere("a frame at least is expected");
+  if (frames.empty()) throw root.At("frames").ErrorHere("at least one frame is expected");
   return frames;
 }
 

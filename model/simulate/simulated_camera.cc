@@ -12,7 +12,7 @@ bool IsSimulatable(const Camera& camera, std::string* why) {
   std::string inner;
   if (!camera.IsValid(&inner)) return Fail(why, "camera: " + inner);
   const auto missing = [&](const char* field) {
-    return Fail(why, fmt::format("camera '{}': {} is missing: a simulation needs it as the truth",
+    return Fail(why, fmt::format("camera '{}': {} is missing: a simulation needs its true value",
                                  camera.name, field));
   };
   if (!camera.calibration || !camera.calibration->image_distance_mm) {

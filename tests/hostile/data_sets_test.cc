@@ -30,7 +30,7 @@ THICKLENS_SITUATION(
     HostileDataSets, ALightFieldThatNamesFilesElsewhere,
     "The description of a light field names as its camera `../../../etc/passwd`, "
     "`/etc/passwd`, or a link to it",
-    "Refused with the line and without opening it, or, of the link, with its name") {
+    "Refused with the line and without opening the file; the link is refused with its name") {
   ExpectDone(Shell(Estimate("with-camera")), {"new with-camera"});
   fs::remove_all(Work("lf"));
   fs::rename(Work("with-camera"), Work("lf"));
@@ -52,8 +52,8 @@ THICKLENS_SITUATION(
 THICKLENS_SITUATION(HostileDataSets, ViewsThatAreLinksElsewhere,
                     "Views of a light field are links to an image elsewhere, to `/etc/passwd` and "
                     "to a file that may not be read",
-                    "An image is read; all else is refused by the view, and nothing of it is "
-                    "shown") {
+                    "An image is read; everything else is refused with the name of the view, and "
+                    "its content is not shown") {
   const std::string view = Work("lf/views/view_00_01.png");
   fs::rename(view, Work("elsewhere.png"));
   fs::create_symlink("../../elsewhere.png", view);
@@ -105,10 +105,10 @@ THICKLENS_SITUATION(HostileDataSets, AnOlderOutputWithLinksInIt,
   }
 }
 
-THICKLENS_SITUATION(HostileDataSets, LibrariesInTheCurrentFolder,
-                    "The current folder holds libraries with the names of those that the program "
-                    "loads",
-                    "They are not loaded") {
+THICKLENS_SITUATION(
+    HostileDataSets, LibrariesInTheCurrentFolder,
+    "The current folder contains libraries with the names of libraries that the program loads",
+    "They are not loaded") {
   const Outcome needed = Shell("LD_TRACE_LOADED_OBJECTS=1 \"$T\"; readelf -d \"$T\" 2>/dev/null");
   ASSERT_THAT(needed.out, HasSubstr("libcsv.so"));
   // A file that is not a library stops any program that tries to load it.
@@ -124,11 +124,10 @@ THICKLENS_SITUATION(HostileDataSets, LibrariesInTheCurrentFolder,
              {"new a.pgm", "new traps/thicklens_opencv_codecs.so"});
 }
 
-THICKLENS_SITUATION(
-    HostileDataSets, SettingsInTheCurrentFolder,
-    "The current folder holds profiles, and XDG_CONFIG_HOME, HOME, XDG_CACHE_HOME or "
-    "POCL_CACHE_DIR is relative",
-    "No profile and no compiled kernel is read from there or written there") {
+THICKLENS_SITUATION(HostileDataSets, SettingsInTheCurrentFolder,
+                    "The current folder contains profiles, and XDG_CONFIG_HOME, HOME, "
+                    "XDG_CACHE_HOME or POCL_CACHE_DIR is relative",
+                    "No profile and no compiled kernel is read from there or written there") {
   for (const char* folder : {"thicklens", ".config/thicklens"})
     Put(std::string(folder) + "/profile.json", "a trap");
   for (const char* variables : {"XDG_CONFIG_HOME=.", "XDG_CONFIG_HOME= HOME=."}) {

@@ -80,9 +80,9 @@ class HostileDisk : public HostileTest {
 };
 
 THICKLENS_SITUATION(HostileDisk, ADiskThatIsTooSmall,
-                    "Outputs go to a disk of 1, 2, 3, ... pages, up to one that holds them",
+                    "Outputs go to a disk of 1, 2, 3, ... pages, up to a disk that is large enough",
                     "Refused with the output's name and the reason, and each output is complete or "
-                    "absent; or done, and all of it is there") {
+                    "absent; or done, and every output is complete") {
   SKIP_WITHOUT_MOUNTS();
   GrowDisk("nr_blocks=", 1, 40);
 }
@@ -164,12 +164,12 @@ class HostileWrites : public HostileTest {
   }
 };
 
-THICKLENS_SITUATION(HostileWrites, EachCallThatWritesFailsInTurn,
-                    "Of the calls that create, write, sync or rename the first, the second, ... "
-                    "and all after it fail, for want of space, over the quota, or by an error of "
-                    "the disk",
-                    "Refused with the output's name and the reason, the older output stays whole "
-                    "and nothing is left beside it; never an exit code of 0 without all of it") {
+THICKLENS_SITUATION(
+    HostileWrites, EachCallThatWritesFailsInTurn,
+    "The first, the second, ... of the calls that create, write, sync or rename fails, and so do "
+    "all later ones: no space is left, the quota is exceeded, or the disk has an error",
+    "Refused with the output's name and the reason, the older output stays whole and nothing is "
+    "left beside it; never an exit code of 0 without the complete output") {
   fs::create_directory(Work("disk"));
   FailEachCall(Explain("disk/new"), ENOSPC, "No space left on device");
   FailEachCall(Explain("disk/new"), EDQUOT, "Disk quota exceeded");

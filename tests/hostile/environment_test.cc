@@ -40,7 +40,7 @@ class HostileEnvironment : public HostileTest {
 
 THICKLENS_SITUATION(HostileEnvironment, NoneAtAll,
                     "The environment is empty; HOME is not set; PATH is empty",
-                    "The result is the same as else") {
+                    "The result is the same as usual") {
   ExpectNoDifference({"PATH=", "HOME=/nonexistent", "HOME= XDG_CACHE_HOME= XDG_CONFIG_HOME="});
   for (const char* start : {"env -i ", "env -u HOME -u PATH -u USER "})
     ExpectDone(Shell(start + Explain("new.json") + "; rm new.json"), {});
@@ -48,7 +48,7 @@ THICKLENS_SITUATION(HostileEnvironment, NoneAtAll,
 
 THICKLENS_SITUATION(HostileEnvironment, TemporaryFolders,
                     "TMPDIR does not exist, is a file, may not be written, is relative or empty",
-                    "Commands that need none are done; those that do refuse it by its name; "
+                    "Commands that do not need it succeed; the others refuse it with its name; "
                     "nothing is left in the current folder") {
   Put("file", "");
   for (const char* folder : {"/nonexistent", "file", "/proc", ".", "relative", "''"}) {
@@ -62,9 +62,10 @@ THICKLENS_SITUATION(HostileEnvironment, TemporaryFolders,
   }
 }
 
-THICKLENS_SITUATION(HostileEnvironment, ADecimalComma,
-                    "LC_ALL is de_DE, which has decimal commas and dots between thousands",
-                    "Numbers in all outputs have points; inputs with points are read") {
+THICKLENS_SITUATION(
+    HostileEnvironment, ADecimalComma,
+    "LC_ALL is de_DE, which has decimal commas and dots between thousands",
+    "Numbers in all outputs have decimal points; inputs with decimal points are read") {
   const Outcome made =
       Shell("mkdir ../locales && localedef -i de_DE -f UTF-8 ../locales/de_DE.UTF-8");
   const std::string set = "LOCPATH=" + Quoted(Beside("locales")) + " LC_ALL=de_DE.UTF-8";
@@ -83,7 +84,7 @@ THICKLENS_SITUATION(HostileEnvironment, ADecimalComma,
 
 THICKLENS_SITUATION(HostileEnvironment, LocalesThatAreNone,
                     "LC_ALL, LANG and LANGUAGE name no locale, a path, a format, or are very long",
-                    "The result is the same as else") {
+                    "The result is the same as usual") {
   ExpectNoDifference({"LC_ALL=xx_YY.nope", "LC_ALL=../../../../etc", "LANG=%s%n",
                       "LC_ALL=" + std::string(10000, 'x'), "LC_ALL=tr_TR.UTF-8 LANGUAGE=tr"});
 }
@@ -108,11 +109,11 @@ THICKLENS_SITUATION(HostileEnvironment, TimeZones,
   }
 }
 
-THICKLENS_SITUATION(HostileEnvironment, SettingsOfOpenMpAndBlas,
-                    "OMP_NUM_THREADS is -1, 0, 1000000 or no number, OMP_STACKSIZE 1k or 100G, "
-                    "OMP_THREAD_LIMIT 1, OPENBLAS_NUM_THREADS 0, -5 or 1000000, GOMP_CPU_AFFINITY "
-                    "999",
-                    "The result is the same as else") {
+THICKLENS_SITUATION(
+    HostileEnvironment, SettingsOfOpenMpAndBlas,
+    "OMP_NUM_THREADS is -1, 0, 1000000 or not a number, OMP_STACKSIZE 1k or 100G, OMP_THREAD_LIMIT "
+    "1, OPENBLAS_NUM_THREADS 0, -5 or 1000000, GOMP_CPU_AFFINITY 999",
+    "The result is the same as usual") {
   ExpectNoDifference({"OMP_NUM_THREADS=-1", "OMP_NUM_THREADS=0", "OMP_NUM_THREADS=1000000",
                       "OMP_NUM_THREADS=many", "OMP_STACKSIZE=1k", "OMP_STACKSIZE=100G",
                       "OMP_THREAD_LIMIT=1", "OMP_DYNAMIC=true OMP_NESTED=true OMP_SCHEDULE=odd",
@@ -121,10 +122,11 @@ THICKLENS_SITUATION(HostileEnvironment, SettingsOfOpenMpAndBlas,
                       "GOMP_CPU_AFFINITY=999"});
 }
 
-THICKLENS_SITUATION(HostileEnvironment, SettingsOfOpenCl,
-                    "POCL_CACHE_DIR is `/dev/null`, a file or the current folder, POCL_DEVICES and "
-                    "OCL_ICD_VENDORS name what is not there",
-                    "The result is the same as else, and nothing comes into the current folder") {
+THICKLENS_SITUATION(
+    HostileEnvironment, SettingsOfOpenCl,
+    "POCL_CACHE_DIR is `/dev/null`, a file or the current folder, POCL_DEVICES and OCL_ICD_VENDORS "
+    "name things that do not exist",
+    "The result is the same as usual, and nothing is created in the current folder") {
   ExpectNoDifference({"POCL_CACHE_DIR=/dev/null", "POCL_CACHE_DIR=$PWD/camera.yaml",
                       "POCL_DEVICES=none", "OCL_ICD_VENDORS=/nonexistent",
                       "OCL_ICD_FILENAMES=none.so", "CL_CONFIG_USE_VECTORIZER=maybe"});
@@ -133,7 +135,7 @@ THICKLENS_SITUATION(HostileEnvironment, SettingsOfOpenCl,
 THICKLENS_SITUATION(HostileEnvironment, SettingsOfOpenCv,
                     "OPENCV_DUMP_ERRORS, OPENCV_IO_MAX_IMAGE_PIXELS and others have values that "
                     "OpenCV refuses, OPENCV_TRACE is on, limits are 1",
-                    "The result is the same as else, and no file of OpenCV comes") {
+                    "The result is the same as usual, and OpenCV creates no file") {
   ExpectNoDifference({"OPENCV_DUMP_ERRORS=odd", "OPENCV_DUMP_CONFIG=odd", "OPENCV_TRACE=1",
                       "OPENCV_TRACE=odd", "OPENCV_BUFFER_AREA_ALWAYS_SAFE=odd",
                       "OPENCV_IO_MAX_IMAGE_PIXELS=odd", "OPENCV_IO_MAX_IMAGE_PIXELS=1",
@@ -145,7 +147,7 @@ THICKLENS_SITUATION(HostileEnvironment, SettingsOfOpenCv,
 
 THICKLENS_SITUATION(HostileEnvironment, SettingsOfOtherLibraries,
                     "Variables of glog, the C library's allocator and TIFF have absurd values",
-                    "The result is the same as else, and no log comes") {
+                    "The result is the same as usual, and no log is written") {
   ExpectNoDifference({"GLOG_minloglevel=-7 GLOG_v=9 GLOG_logtostderr=odd", "GLOG_log_dir=$PWD",
                       "MALLOC_ARENA_MAX=-1 MALLOC_PERTURB_=165 MALLOC_CHECK_=odd",
                       "COLUMNS=0 TERM= NO_COLOR= CLICOLOR_FORCE=1"});

@@ -50,11 +50,11 @@ THICKLENS_SITUATION(HostileImages, HeadersThatAnnounceTwoToThe31Pixels,
   }
 }
 
-THICKLENS_SITUATION(HostileImages, DecompressionBombs,
-                    "A PNG and a TIFF file of 400 kB hold 20,000 x 20,000 black pixels, where "
-                    "memory is limited to 1.2 GB",
-                    "Refused before it is unpacked, with the file, its size in pixels and the "
-                    "memory that there is") {
+THICKLENS_SITUATION(
+    HostileImages, DecompressionBombs,
+    "A PNG and a TIFF file of 400 kB contain 20,000 x 20,000 black pixels, where memory is limited "
+    "to 1.2 GB",
+    "Refused before it is unpacked, with the file, its size in pixels and the available memory") {
   if (testing::kIsSanitized) GTEST_SKIP() << "a sanitizer takes memory by the terabyte";
   constexpr int kSidePx = 20000;
   const std::string png_rows = DeflatedZeros(std::size_t{kSidePx} * (kSidePx + 1));
@@ -69,7 +69,7 @@ THICKLENS_SITUATION(HostileImages, DecompressionBombs,
 THICKLENS_SITUATION(HostileImages, TextsThatUnpackWithoutEnd,
                     "A PNG of 24 x 16 pixels has a colour profile and a text that unpack to 1 GB "
                     "each, and 100,000 texts",
-                    "The image is read; they are not unpacked") {
+                    "The image is read; these texts are not unpacked") {
   const std::string pixels = Deflated(std::string(16 * 25, '\1'));
   const std::string unpacked = DeflatedZeros(std::size_t{1} << 30);
   std::string many;

@@ -201,8 +201,8 @@ THICKLENS_SITUATION(HostileInputs, AFileThatMayNotBeRead,
 }
 
 THICKLENS_SITUATION(HostileInputs, AProcessSubstitution,
-                    "An input is `/dev/stdin` behind a pipe, as a process substitution is",
-                    "Refused with its name, whether or not anything comes; no output") {
+                    "An input is `/dev/stdin` behind a pipe, like a process substitution",
+                    "Refused with its name, whether or not data arrive; no output") {
   for (const char* from : {"cat camera.yaml | ", "sleep 3 | "}) {
     for (const char* command :
          {"\"$T\" explain /dev/stdin --depth-range 290:310",

@@ -40,7 +40,7 @@ class HostileLimits : public HostileTest {
 
 THICKLENS_SITUATION(HostileLimits, Memory, "`ulimit -v` allows from 60 to 400 MB",
                     "Done, or refused as out of memory (by the loader or OpenMP where there is too "
-                    "little for them); the output is whole or absent") {
+                    "little for them); the output is complete or absent") {
   MakeSweep();
   for (const std::string& script : {Estimate("new"), Calibrate("new"), Render("new")}) {
     for (int megabytes = 60; megabytes <= 400; megabytes += 68) {
@@ -68,8 +68,8 @@ THICKLENS_SITUATION(HostileLimits, OpenFiles, "`ulimit -n` allows 3, 4, 5, ... 1
 
 THICKLENS_SITUATION(HostileLimits, Threads,
                     "`ulimit -u` allows an ordinary user 1, 2, 3 ... processes and threads, and "
-                    "more threads are asked for",
-                    "Done with those that there are, or refused with the reason") {
+                    "more threads are requested",
+                    "Done with the available threads, or refused with the reason") {
   MakeSweep();
   std::string why_not;
   const std::string user = AsOrdinaryUser(&why_not);
@@ -91,8 +91,7 @@ THICKLENS_SITUATION(HostileLimits, Threads,
 }
 
 THICKLENS_SITUATION(HostileLimits, ProcessorTime,
-                    "`ulimit -t` (the limit that warns) allows 1 second for a command that takes "
-                    "longer",
+                    "`ulimit -t` (the soft limit) allows 1 second for a command that takes longer",
                     "Ends with an exit code above 0; the older output stays whole, nothing is left "
                     "beside it") {
   Put("long.yaml",
@@ -109,8 +108,9 @@ THICKLENS_SITUATION(HostileLimits, ProcessorTime,
   EXPECT_THAT(outcome.changes, ::testing::IsEmpty());
 }
 
-THICKLENS_SITUATION(HostileLimits, Stack, "`ulimit -s` allows 64 to 1,024 KiB, or no end of it",
-                    "Done, or refused with the limit and what is needed; never a fault of memory") {
+THICKLENS_SITUATION(
+    HostileLimits, Stack, "`ulimit -s` allows 64 to 1,024 KiB, or is unlimited",
+    "Done, or refused with the limit and the size that is needed; never a segmentation fault") {
   MakeSweep();
   for (const std::string& script : {Render("new"), Estimate("new"), Calibrate("new")}) {
     for (const char* kibibytes : {"64", "128", "256", "512", "1024", "unlimited"}) {

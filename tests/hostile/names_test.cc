@@ -24,10 +24,11 @@ THICKLENS_SITUATION(HostileNames, ANewlineIsShownInOneLine,
   ExpectDone(Shell(Explain(Quoted(name))), {"new " + name});
 }
 
-THICKLENS_SITUATION(HostileNames, ControlCharactersDoNotReachTheTerminal,
-                    "Names of files, of a camera, values in YAML and cells of a table hold escape "
-                    "sequences, tabs and bells",
-                    "What the program prints holds no control character but newlines") {
+THICKLENS_SITUATION(
+    HostileNames, ControlCharactersDoNotReachTheTerminal,
+    "File names, a camera name, YAML values and table cells contain escape sequences, tabs and "
+    "bells",
+    "The text that the program prints contains no control characters except newlines") {
   const std::string sequence = "\x1b]0;title\x07\x1b[2J";
   ExpectRefused(Shell("\"$T\" explain " + Quoted(sequence) + " --depth-range 290:310"), 1,
                 {"title", "No such file"});
@@ -54,7 +55,7 @@ THICKLENS_SITUATION(HostileNames, ControlCharactersDoNotReachTheTerminal,
 THICKLENS_SITUATION(HostileNames, QuotesBlanksAndDollarSigns,
                     "Names with blanks, quotation marks, backslashes, `$(...)` and backquotes are "
                     "inputs and outputs",
-                    "The command is done; nothing is run and no other file comes") {
+                    "The command succeeds; nothing else is run and no other file appears") {
   const std::string name = " a'b\"c \\ $(touch run) `touch run` ; touch run & *?[x] ~ #";
   ExpectDone(Shell("cp camera.yaml " + Quoted(name)), {"new " + name});
   const std::string output = name + ".json";
@@ -65,19 +66,18 @@ THICKLENS_SITUATION(HostileNames, QuotesBlanksAndDollarSigns,
   EXPECT_TRUE(std::filesystem::exists(Work(name + " lf/lightfield.yaml")));
 }
 
-THICKLENS_SITUATION(
-    HostileNames, ALeadingDash,
-    "Names begin with a dash: behind `--` as inputs, behind `=` and `./` as outputs",
-    "The command is done") {
+THICKLENS_SITUATION(HostileNames, ALeadingDash,
+                    "Names begin with a dash: inputs after `--`, outputs after `=` and `./`",
+                    "The command succeeds") {
   ExpectDone(Shell("cp camera.yaml ./-camera.yaml; \"$T\" explain --depth-range 290:310 --quiet "
                    "--json=-a.json -- -camera.yaml"),
              {"new -a.json", "new -camera.yaml"});
   ExpectDone(Shell(Explain("./--quiet")), {"new --quiet"});
 }
 
-THICKLENS_SITUATION(HostileNames, BytesThatAreNoUtf8, "Names hold bytes that are no UTF-8",
-                    "Inputs are read and outputs get just that name; messages and JSON are UTF-8 "
-                    "with a replacement character") {
+THICKLENS_SITUATION(HostileNames, BytesThatAreNoUtf8, "Names contain bytes that are not UTF-8",
+                    "Inputs are read and outputs get exactly that name; messages and JSON are "
+                    "UTF-8 with a replacement character") {
   const std::string name = "\xff\xfe\xc3(";
   ExpectDone(Shell("cp camera.yaml " + Quoted(name) + "; \"$T\" explain " + Quoted(name) +
                    " --depth-range 290:310 --quiet --json " + Quoted(name + ".json")),
@@ -91,7 +91,7 @@ THICKLENS_SITUATION(HostileNames, BytesThatAreNoUtf8, "Names hold bytes that are
   }
 }
 
-THICKLENS_SITUATION(HostileNames, PercentSignsAndBraces, "Names hold `%s`, `%n`, `{}` and `{0}`",
+THICKLENS_SITUATION(HostileNames, PercentSignsAndBraces, "Names contain `%s`, `%n`, `{}` and `{0}`",
                     "They are shown and used as they are") {
   const std::string name = "%s%n%99999999d{}{0:>99999999}";
   ExpectRefused(Shell("\"$T\" explain " + Quoted(name) + " --depth-range 290:310"), 1, {name});
@@ -112,7 +112,7 @@ THICKLENS_SITUATION(HostileNames, ANameOf255Bytes,
 
 THICKLENS_SITUATION(HostileNames, ANameOf256Bytes,
                     "The name of an input or output is longer than a name may be",
-                    "Refused before any work, with the reason of the system") {
+                    "Refused before any work, with the reason that the system gives") {
   const std::string name(256, 'n');
   ExpectRefused(Shell(Explain(name)), 1, {name, "name too long"});
   ExpectRefused(Shell(Estimate(name)), 1, {name, "name too long"});
@@ -164,8 +164,8 @@ THICKLENS_SITUATION(HostileNames, AWorkingFolderThatIsGone,
 }
 
 THICKLENS_SITUATION(HostileNames, AnEmptyName,
-                    "A name is empty, as a variable of the shell is that was never set",
-                    "Refused as wrong usage or by the name of the option; nothing is written") {
+                    "A name is empty, like a shell variable that was never set",
+                    "Refused as wrong usage or with the name of the option; nothing is written") {
   const std::vector<std::string> scripts = {
       Explain("''"),
       Estimate("''"),

@@ -45,7 +45,7 @@ class HostileOutputs : public HostileTest {
 
 THICKLENS_SITUATION(HostileOutputs, AFolderThatMayNotBeWritten,
                     "The output's folder is read-only, or belongs to another user",
-                    "Refused before any work with the output's name; nothing comes") {
+                    "Refused before any work with the output's name; nothing is created") {
   std::string why_not;
   fs::create_directory(Work("closed"));
   const std::string user = AsOrdinaryUser(&why_not);
@@ -93,7 +93,7 @@ THICKLENS_SITUATION(HostileOutputs, AReadOnlyFileSystem,
 
 THICKLENS_SITUATION(HostileOutputs, DevicesPipesAndSockets,
                     "The output is `/dev/full`, `/dev/null`, a named pipe or a socket",
-                    "Refused with its name, at once; it stays what it is") {
+                    "Refused with its name, at once; it stays unchanged") {
   ASSERT_EQ(::mkfifo(Work("pipe").c_str(), 0666), 0);
   const int socket = ::socket(AF_UNIX, SOCK_STREAM, 0);
   sockaddr_un address{};
@@ -105,9 +105,9 @@ THICKLENS_SITUATION(HostileOutputs, DevicesPipesAndSockets,
   ::close(socket);
 }
 
-THICKLENS_SITUATION(HostileOutputs, ADanglingLink, "The output is a link to nothing",
-                    "As `cp` does: refused with its name; the link stays, and what it names does "
-                    "not come") {
+THICKLENS_SITUATION(
+    HostileOutputs, ADanglingLink, "The output is a link to nothing",
+    "Refused with its name, as `cp` does; the link stays, and its target is not created") {
   fs::create_symlink("nothing", Work("dangling"));
   ExpectEachRefused(ToAny("dangling"), "dangling");
 }
@@ -120,9 +120,9 @@ THICKLENS_SITUATION(HostileOutputs, ALoopOfLinks, "The output is a link that lea
 }
 
 THICKLENS_SITUATION(HostileOutputs, PlacesThatAreNone,
-                    "The output lies below a file, in a folder that is not there, or is `.`, `..`, "
-                    "`/`, the folder of the inputs, or a folder in place of a file",
-                    "Refused with its name; nothing comes") {
+                    "The output lies below a file, in a folder that does not exist, or is `.`, "
+                    "`..`, `/`, the folder of the inputs, or a folder in place of a file",
+                    "Refused with its name; nothing is created") {
   for (const std::string name : {"picture.png/new", "none/new", ".", "..", "/"})
     ExpectEachRefused(ToAny(name), name);
   for (const std::string name : {"lf", "lf/"}) ExpectEachRefused(ToFile(name), name);
@@ -154,7 +154,7 @@ THICKLENS_SITUATION(HostileOutputs, AnInputUnderAnotherName,
 }
 
 THICKLENS_SITUATION(HostileOutputs, AMountPoint,
-                    "The output folder is an empty mount point, as of `docker run -v`",
+                    "The output folder is an empty mount point, such as that of `docker run -v`",
                     "The output is written into it, complete") {
   SKIP_WITHOUT_MOUNTS();
   fs::create_directory(Work("mount"));
@@ -170,11 +170,11 @@ THICKLENS_SITUATION(HostileOutputs, AMountPoint,
   }
 }
 
-THICKLENS_SITUATION(HostileOutputs, AFolderThatIsReplacedDuringTheRun,
-                    "The folder that the output is to lie in is renamed while the command works, "
-                    "and another one takes its name",
-                    "Done in one of the two folders, or refused; no file is left incomplete, and "
-                    "none of the new folder's is touched") {
+THICKLENS_SITUATION(
+    HostileOutputs, AFolderThatIsReplacedDuringTheRun,
+    "The folder of the output is renamed while the command runs, and another folder takes its name",
+    "Done in one of the two folders, or refused; no file is left incomplete, and no file of the "
+    "new folder is touched") {
   fs::create_directory(Work("out"));
   const Outcome outcome = Shell(
       "\"$T\" simulate sweep recipe.yaml --quiet -o out/new & p=$!; i=0; while [ -z \"$(ls -A "
@@ -197,8 +197,8 @@ THICKLENS_SITUATION(HostileOutputs, AFolderThatIsReplacedDuringTheRun,
 
 THICKLENS_SITUATION(HostileOutputs, TwoRunsOnOneOutput,
                     "Two runs write the same file, and the same folder, at the same time",
-                    "One is done at least; the other is done or refused by the output's name; what "
-                    "lies there is whole") {
+                    "At least one succeeds; the other succeeds or is refused with the output's "
+                    "name; the output is complete") {
   for (const std::string& script : {Explain("new"), Estimate("new")}) {
     SCOPED_TRACE(script);
     fs::remove_all(Work("new"));
@@ -236,7 +236,7 @@ THICKLENS_SITUATION(HostileOutputs, PermissionsThatTheUserWants,
 }
 
 THICKLENS_SITUATION(HostileOutputs, NoPermissionsAtAll,
-                    "umask is 0777, so that the user may not open what they make",
+                    "umask is 0777, so that users may not open the files that they create",
                     "Refused with the output's name, or done; nothing is left beside it") {
   std::string why_not;
   const std::string user = AsOrdinaryUser(&why_not);

@@ -56,10 +56,10 @@ class HostileProcess : public HostileTest {
   }
 };
 
-THICKLENS_SITUATION(HostileProcess, ClosedDescriptors,
-                    "Standard input, output and error are closed at the start, in each combination",
-                    "The outputs are those of a usual run, byte for byte; nothing that is reported "
-                    "gets into them") {
+THICKLENS_SITUATION(
+    HostileProcess, ClosedDescriptors,
+    "Standard input, output and error are closed at the start, in each combination",
+    "The outputs are those of a usual run, byte for byte; no message gets into them") {
   ASSERT_EQ(Shell(Explain("usual.json")).exit_code, 0);
   const std::string usual = testing::ContentOf(Work("usual.json"));
   for (int closed = 0; closed < 8; ++closed) {
@@ -83,11 +83,11 @@ THICKLENS_SITUATION(HostileProcess, ClosedDescriptors,
   }
 }
 
-THICKLENS_SITUATION(HostileProcess, AReaderThatGoesAway,
-                    "Standard output, or standard error, is a pipe whose reader is gone (`| head "
-                    "-1`), with SIGPIPE as usual or ignored",
-                    "The outputs are complete, the exit code is that of the work, and nothing is "
-                    "left") {
+THICKLENS_SITUATION(
+    HostileProcess, AReaderThatGoesAway,
+    "Standard output, or standard error, is a pipe whose reader is gone (`| head "
+    "-1`), with SIGPIPE as usual or ignored",
+    "The outputs are complete, the exit code is the usual one, and nothing is left") {
   for (const char* trap : {"", "trap '' PIPE; "}) {
     for (const char* to : {"", "2>&1 >/dev/null"}) {
       SCOPED_TRACE(std::string(trap) + to);
@@ -105,8 +105,8 @@ THICKLENS_SITUATION(HostileProcess, AReaderThatGoesAway,
 }
 
 THICKLENS_SITUATION(
-    HostileProcess, NoRoomForWhatIsPrinted, "Standard output is `/dev/full`; standard error is",
-    "Results that cannot be printed are an error; what cannot be determined is none") {
+    HostileProcess, NoRoomForWhatIsPrinted, "Standard output, or standard error, is `/dev/full`",
+    "Results that cannot be printed are an error; messages that cannot be printed are not") {
   if (!fs::exists("/dev/full")) GTEST_SKIP() << "there is no /dev/full here";
   ExpectRefused(Shell("\"$T\" explain camera.yaml --depth-range 290:310 > /dev/full"), 1,
                 {"standard output cannot be written", "No space left"});
@@ -128,10 +128,10 @@ THICKLENS_SITUATION(HostileProcess, SighupAtAnyStage,
   StopEverywhere("HUP");
 }
 
-THICKLENS_SITUATION(HostileProcess, SignalsThatAreIgnored,
-                    "SIGHUP, or SIGINT, is ignored at the start, as `nohup` and a shell's `&` have "
-                    "it, and comes",
-                    "The command goes on and is done") {
+THICKLENS_SITUATION(
+    HostileProcess, SignalsThatAreIgnored,
+    "SIGHUP, or SIGINT, is ignored at the start, as by `nohup` and a shell's `&`, and is sent",
+    "The command continues and succeeds") {
   MakeSweep();
   for (const char* signal : {"HUP", "INT"}) {
     SCOPED_TRACE(signal);
@@ -144,7 +144,7 @@ THICKLENS_SITUATION(HostileProcess, SignalsThatAreIgnored,
 }
 
 THICKLENS_SITUATION(HostileProcess, ASystemWithoutProc,
-                    "`/proc` and `/sys` are empty, as in a bare chroot", "The commands are done") {
+                    "`/proc` and `/sys` are empty, as in a bare chroot", "The commands succeed") {
   SKIP_WITHOUT_MOUNTS();
   MakeSweep();
   for (const std::string& script :
@@ -158,10 +158,10 @@ THICKLENS_SITUATION(HostileProcess, ASystemWithoutProc,
   }
 }
 
-THICKLENS_SITUATION(HostileProcess, OneProcessor,
-                    "The process may use one processor of the machine only, and 64 threads are "
-                    "asked for",
-                    "The result is the same as else") {
+THICKLENS_SITUATION(
+    HostileProcess, OneProcessor,
+    "The process may use one processor of the machine only, and 64 threads are requested",
+    "The result is the same as usual") {
   ASSERT_EQ(Shell("command -v taskset").exit_code, 0);
   ExpectDone(Shell(Estimate("usual")), {"new usual"});
   ExpectDone(Shell("cpu=$(taskset -cp $$ | sed 's/.*: //; s/[-,].*//'); taskset -c $cpu sh -c " +

@@ -45,7 +45,7 @@ class HostileText : public HostileTest {
 
 THICKLENS_SITUATION(HostileText, AliasesThatMultiply,
                     "A YAML file has eleven lists, each of ten aliases of the one before",
-                    "Refused by the key or value, at once and with little memory") {
+                    "Refused with the key or value, at once and with little memory") {
   std::string bomb = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n";
   for (int i = 1; i < 12; ++i) {
     const std::string alias = "*a" + std::to_string(i - 1);
@@ -68,7 +68,7 @@ THICKLENS_SITUATION(HostileText, NestingWithoutEnd,
 }
 
 THICKLENS_SITUATION(HostileText, AnAnchorThatHoldsItself,
-                    "A YAML list holds an alias of itself, and a map one of itself",
+                    "A YAML list contains an alias of itself, and so does a map",
                     "Refused with the field; no endless loop") {
   ExpectCameraRefused(
       CameraWith("principal_point_px: [11.5, 7.5]", "principal_point_px: &p [*p, *p]"),
@@ -76,7 +76,7 @@ THICKLENS_SITUATION(HostileText, AnAnchorThatHoldsItself,
   ExpectCameraRefused("&r\n" + Camera() + "x: *r\n", {"unknown key 'x'"});
 }
 
-THICKLENS_SITUATION(HostileText, ANulByte, "A YAML file and a table hold NUL bytes",
+THICKLENS_SITUATION(HostileText, ANulByte, "A YAML file and a table contain NUL bytes",
                     "Refused with the file and the line") {
   ExpectCameraRefused(CameraWith("small", std::string("sm\0all", 6)), {"hostile.yaml:2", "NUL"});
   ExpectCameraRefused(Camera() + std::string(3, '\0'), {"NUL"});
@@ -98,7 +98,7 @@ THICKLENS_SITUATION(HostileText, AByteOrderMarkAndCarriageReturns,
 }
 
 THICKLENS_SITUATION(HostileText, Utf16, "A YAML file is UTF-16 with a byte order mark",
-                    "Read as YAML says it") {
+                    "Read as YAML defines it") {
   for (const bool is_big : {false, true}) {
     std::string wide = is_big ? "\xFE\xFF" : "\xFF\xFE";
     for (const char c : Camera()) wide += is_big ? std::string({'\0', c}) : std::string({c, '\0'});
@@ -127,8 +127,8 @@ THICKLENS_SITUATION(HostileText, ValuesOfAMegabyte,
 }
 
 THICKLENS_SITUATION(HostileText, AHundredThousandKeys,
-                    "A YAML map has 100,000 keys, one document of 100,000, or 50,000 anchors",
-                    "Refused by the first that is wrong, within seconds") {
+                    "A YAML file has a map of 100,000 keys, 100,000 documents, or 50,000 anchors",
+                    "Refused at the first error, within seconds") {
   std::string keys, anchors;
   for (int i = 0; i < 100000; ++i) keys += "k" + std::to_string(i) + ": 1\n";
   for (int i = 0; i < 50000; ++i) {
@@ -137,15 +137,15 @@ THICKLENS_SITUATION(HostileText, AHundredThousandKeys,
   }
   ExpectCameraRefused(Camera() + keys, {"unknown key 'k0'"});
   ExpectCameraRefused(Camera() + anchors, {"unknown key 'k0'"});
-  ExpectCameraRefused(Camera() + Repeated("psf: gaussian\n", 50000), {"'psf' stands here twice"});
+  ExpectCameraRefused(Camera() + Repeated("psf: gaussian\n", 50000), {"'psf' is given twice"});
   ExpectCameraRefused(Repeated("---\n", 100000), {"one YAML document"});
 }
 
-THICKLENS_SITUATION(HostileText, ATableLineOfAMegabyte,
-                    "A table has a line of a million characters: one cell, one number, one quoted "
-                    "cell that does not end, half a million columns",
-                    "Refused with the line and the beginning of the cell; columns behind the "
-                    "second are not read") {
+THICKLENS_SITUATION(
+    HostileText, ATableLineOfAMegabyte,
+    "A table has a line of a million characters: one cell, one number, one quoted "
+    "cell that does not end, half a million columns",
+    "Refused with the line and the beginning of the cell; columns after the second are not read") {
   const std::string big(1000000, '9');
   ExpectRefused(CalibrateTable("file,reading\na.png,1\n" + big + ",3\n"), 1,
                 {"table.csv:3", "999"});
@@ -158,8 +158,8 @@ THICKLENS_SITUATION(HostileText, ATableLineOfAMegabyte,
 }
 
 THICKLENS_SITUATION(HostileText, ATableOfAHundredThousandFrames,
-                    "A table names 100,000 frames, all of which are there (through links)",
-                    "A dry run understands it, within seconds") {
+                    "A table names 100,000 frames, all of which exist (as links)",
+                    "A dry run reads it within seconds") {
   fs::create_directories(Work("frames/all"));
   constexpr int kSide = 317;
   std::string rows = "file,reading\n";
@@ -181,8 +181,8 @@ THICKLENS_SITUATION(HostileText, ATableOfAHundredThousandFrames,
 }
 
 THICKLENS_SITUATION(HostileText, ASweepFileOfAHundredThousandFrames,
-                    "A sweep's YAML file lists 100,000 frames, none of which is there",
-                    "Refused by the first, within seconds") {
+                    "A sweep's YAML file lists 100,000 frames, none of which exists",
+                    "Refused at the first, within seconds") {
   std::string sweep = "schema: thicklens/sweep/1\ncamera: camera.yaml\nframes:\n";
   for (int i = 0; i < 100000; ++i) {
     sweep += "  - {image: f" + std::to_string(i) + ".png, reading_mm: " + std::to_string(i) + "}\n";
@@ -240,9 +240,10 @@ THICKLENS_SITUATION(HostileText, NumbersThatAreNone,
   }
 }
 
-THICKLENS_SITUATION(HostileText, NumbersBeyondMeasure,
-                    "Each number of a camera in turn is 1e308, -1e308, 1e-308, 1e29 or 1e-29",
-                    "Refused with the field and the value, or taken and every result is a number") {
+THICKLENS_SITUATION(
+    HostileText, NumbersBeyondMeasure,
+    "Each number of a camera in turn is 1e308, -1e308, 1e-308, 1e29 or 1e-29",
+    "Refused with the field and the value, or accepted, and then every result is a number") {
   const std::vector<std::pair<std::string, std::string>> fields = {
       {"front_focal_length_mm", "50"}, {"rear_focal_length_mm", "50"},
       {"lens_thickness_mm", "0"},      {"aperture_radius_mm", "8.9286"},

@@ -151,7 +151,7 @@ std::vector<StressCase> Readings() {
                         Described([](model::SweepFile* file) {
                           for (model::SweepFrame& frame : file->frames) frame.reading_mm /= 10;
                         }),
-                        Refusal({"image scale", "are the readings in mm?"})));
+                        Refusal({"image scale", "that the readings are in mm"})));
   cases.push_back(Sweep(
       "readings-in-micrometres", "all readings are a thousand times the correct ones",
       "refused: the readings contradict the image scale", Described([](model::SweepFile* file) {

@@ -205,7 +205,7 @@ Requirement SolvedOrReported(const StressImage& shape, double limit, const ViewO
     }
     return within(folder, summary);
   };
-  required.or_refused_with = {"the iterations led nowhere", "rcond is"};
+  required.or_refused_with = {"the iterations diverged", "rcond is"};
   return required;
 }
 

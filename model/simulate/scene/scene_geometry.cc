@@ -201,8 +201,8 @@ void SceneGeometry::CheckPlane(const std::string& place, const PlaneOptions& pla
     const double above = plane.depth_mm + plane.slope.dot(ray.aperture_mm);
     if (below > 0 && above > focal_mm_ * below) continue;
     throw Error(fmt::format(
-        "{}: its plane, depth_mm {} and slope [{}, {}], is not met by every ray of the image "
-        "farther than the lens's front focal length {} mm: less slope or more depth is needed",
+        "{}: some rays of the image do not meet its plane, depth_mm {} and slope [{}, {}], "
+        "beyond the lens's front focal length {} mm: a smaller slope or a larger depth is needed",
         place, plane.depth_mm, plane.slope.x(), plane.slope.y(), focal_mm_));
   }
 }

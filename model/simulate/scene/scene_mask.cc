@@ -17,12 +17,13 @@ const LinearImage& Checked(const LinearImage& image, int width_px, int height_px
                            const std::string& name) {
   if (image.width_px < 1 || image.height_px < 1) throw Error(name + " is empty");
   if (image.channels != 1) {
-    throw Error(
-        fmt::format("{} has {} channels: a mask is a grey image of one", name, image.channels));
+    throw Error(fmt::format("{} has {} channels: a mask must be a grey image with 1 channel", name,
+                            image.channels));
   }
   if (image.width_px != width_px || image.height_px != height_px) {
-    throw Error(fmt::format("{} is {}x{} px, the scene's image {}x{} px: the sizes must be equal",
-                            name, image.width_px, image.height_px, width_px, height_px));
+    throw Error(
+        fmt::format("{} has {}x{} px, but the scene's image has {}x{} px: the sizes must be equal",
+                    name, image.width_px, image.height_px, width_px, height_px));
   }
   return image;
 }

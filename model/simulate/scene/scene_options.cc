@@ -30,8 +30,9 @@ std::string TextureComplaint(const TextureOptions& texture) {
     return fmt::format("texture.saturation is {}: it must be from 0 to 1", texture.saturation);
   }
   if (!(texture.feature_size_px >= 0) || !std::isfinite(texture.feature_size_px)) {
-    return fmt::format("texture.feature_size_px is {}: it must be > 0, or 0 to have it chosen",
-                       texture.feature_size_px);
+    return fmt::format(
+        "texture.feature_size_px is {}: it must be > 0, or 0 for a size chosen by the program",
+        texture.feature_size_px);
   }
   if (!std::isfinite(texture.angle_deg)) {
     return fmt::format("texture.angle_deg is {}: it must be finite", texture.angle_deg);
@@ -42,7 +43,8 @@ std::string TextureComplaint(const TextureOptions& texture) {
 std::string OutlineComplaint(const OutlineOptions& outline) {
   using Shape = OutlineOptions::Shape;
   if (outline.shape == Shape::kMask && outline.unit != OutlineOptions::Unit::kPx) {
-    return "outline: a mask is given in mm: it is one of the image, in px";
+    return "outline: a mask is given in mm: it must be in px, because it covers the pixels of the "
+           "image";
   }
   if (!outline.centre.allFinite()) {
     return fmt::format("outline: its centre is [{}, {}]: it must be finite", outline.centre.x(),
@@ -81,7 +83,8 @@ std::string DepthComplaint(const SceneLayer& layer) {
     return "depth.kind is disparity: it must be z or range";
   }
   if (layer.outline.shape != OutlineOptions::Shape::kWhole) {
-    return "outline: a layer with a depth map is whole and has none";
+    return "outline: it is given for a layer with a depth map, which covers the whole image and "
+           "must not have an outline";
   }
   return "";
 }
@@ -147,9 +150,10 @@ bool SceneSimulationOptions::IsValid(std::string* why) const {
     has_whole_layer |= layers[i].outline.shape == OutlineOptions::Shape::kWhole;
   }
   if (!has_whole_layer) {
-    return Fail(why, fmt::format("layers: none of {} is without an outline: every pixel must see "
-                                 "something, so a background is needed",
-                                 layers.size()));
+    return Fail(why,
+                fmt::format("layers: none of the {} is without an outline: at least one such layer "
+                            "is needed as a background, so that every pixel sees a surface",
+                            layers.size()));
   }
   if (!(rays_per_pixel >= 16 && rays_per_pixel <= 100000)) {
     return Fail(why,

@@ -68,8 +68,8 @@ OutlineOptions ReadOutline(const YamlNode& node) {
   const std::string other = in_mm ? "_px" : "_mm";
   for (const char* key : {"centre", "size", "radius"}) {
     if (const auto wrong = node.Find(key + other)) {
-      throw wrong->ErrorHere(
-          fmt::format("the outline is given in {}: this must be {}{}", unit.substr(1), key, unit));
+      throw wrong->ErrorHere(fmt::format("the outline is given in {}: this key must be {}{}",
+                                         unit.substr(1), key, unit));
     }
   }
   outline.unit = in_mm ? OutlineOptions::Unit::kMm : OutlineOptions::Unit::kPx;
@@ -77,10 +77,9 @@ OutlineOptions ReadOutline(const YamlNode& node) {
   const auto size = node.Find("size" + unit);
   const auto radius = node.Find("radius" + unit);
   if (size.has_value() == radius.has_value()) {
-    throw node.ErrorHere(
-        fmt::format("one of size{0} (a rectangle) and radius{0} (a disc) is "
-                    "needed, found {1}",
-                    unit, size ? "both" : "none"));
+    throw node.ErrorHere(fmt::format(
+        "exactly one of size{0} (a rectangle) and radius{0} (a disc) is expected, found {1}", unit,
+        size ? "both" : "none"));
   }
   if (size) {
     outline.shape = OutlineOptions::Shape::kRectangle;
@@ -156,7 +155,8 @@ SceneLayer ReadLayer(const YamlNode& node, std::vector<std::string>* notices) {
   if (const auto name = node.Find("name")) layer.name = name->Text();
   if (const auto depth = node.Find("depth")) {
     if (const auto plane = node.Find("plane")) {
-      throw plane->ErrorHere("the layer has a depth map: one of plane and depth is right");
+      throw plane->ErrorHere(
+          "the layer also has 'depth': either 'plane' or 'depth' is expected, not both");
     }
     layer.depth = ReadDepth(*depth);
   } else {

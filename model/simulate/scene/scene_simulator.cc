@@ -153,8 +153,9 @@ struct SceneSimulator::Impl {
     if (corner.wander_mm_per_px == 0 || farthest_mm <= reach_mm) return;
     throw Error(fmt::format(
         "uv_depth_mm is {}: rays of the outermost views would cross the aperture {:.4g} mm from "
-        "its middle, more than {:g} standard deviations (kappa r) of {:.4g} mm, as far as textures "
-        "are drawn: UV nearer to the aperture (0) or fewer views are needed",
+        "its middle, more than {:g} standard deviations (kappa r) of {:.4g} mm, but textures are "
+        "not drawn for rays beyond that: a UV plane nearer to the aperture (0) or fewer views are "
+        "needed",
         grid.planes.uv_depth_mm, farthest_mm, kDrawnDeviations, geometry.aperture_sigma_mm()));
   }
 

@@ -59,9 +59,10 @@ double FeaturePx(const TextureOptions& options) {
   const double size_px = options.feature_size_px;
   if (size_px == 0) return range.chosen_px;
   if (!(size_px >= range.smallest_px && size_px <= range.largest_px)) {
-    throw Error(fmt::format(
-        "texture.feature_size_px is {}: of {} it must be from {} to {}, or 0 to have it chosen",
-        size_px, TextureKindName(options.kind), range.smallest_px, range.largest_px));
+    throw Error(
+        fmt::format("texture.feature_size_px is {}: for {} it must be from {} to {}, or 0 for a "
+                    "size chosen by the program",
+                    size_px, TextureKindName(options.kind), range.smallest_px, range.largest_px));
   }
   return size_px;
 }
@@ -370,11 +371,11 @@ void SceneTexture::SetWave(const TextureOptions& options, const TextureRequest& 
   if (is_edge_ && size_mm == 0) size_mm = least_mm;
   // A chosen value, or one given to the last digit, must not fail because of rounding.
   if (!(size_mm >= least_mm * (1 - 1e-12))) {
-    throw Error(fmt::format(
-        "texture.feature_size_px is {}: the {} must be at least {:.4g} here, {} of the layer's "
-        "largest px",
-        size_mm / request.pixel_mm, is_edge_ ? "sigma of an edge" : "period of a sine",
-        least_mm / request.pixel_mm, is_edge_ ? "one" : "two"));
+    throw Error(
+        fmt::format("texture.feature_size_px is {}: the {} must be at least {:.4g} in this layer, "
+                    "{} of its largest px",
+                    size_mm / request.pixel_mm, is_edge_ ? "sigma of an edge" : "period of a sine",
+                    least_mm / request.pixel_mm, is_edge_ ? "one" : "two"));
   }
   wave_ = (is_edge_ ? 1 / (std::sqrt(2.0) * size_mm) : 2 * kPi / size_mm) * direction;
   edge_at_ = wave_.dot(request.centre_mm);

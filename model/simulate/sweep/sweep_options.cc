@@ -22,9 +22,11 @@ bool IsValidTarget(const TargetOptions& target, std::string* why) {
                                  target.contrast));
   }
   if (!(target.feature_size_mm >= 0) || !std::isfinite(target.feature_size_mm)) {
-    return Fail(why, fmt::format("target.feature_size_mm is {}: it must be > 0, or 0 to have it "
-                                 "chosen",
-                                 target.feature_size_mm));
+    return Fail(
+        why,
+        fmt::format(
+            "target.feature_size_mm is {}: it must be > 0, or 0 for a size chosen by the program",
+            target.feature_size_mm));
   }
   if (!(std::abs(target.edge_angle_deg) <= 90)) {
     return Fail(why, fmt::format("target.edge_angle_deg is {}: it must be between -90 and 90",
@@ -50,9 +52,10 @@ bool IsWhollyVisible(const Camera& camera, double tilt_deg, std::string* why) {
   const double least =
       std::min(target.Nearness(-0.5 - axis_px), target.Nearness(sensor.width_px - 0.5 - axis_px));
   if (least >= kMinNearness) return true;
-  return Fail(why, fmt::format("target.tilt_deg is {}: a side of the image would look past the "
-                               "target, or at more than five times its depth",
-                               tilt_deg));
+  return Fail(why,
+              fmt::format("target.tilt_deg is {}: one side of the image would miss the target, or "
+                          "see it at more than five times its depth: a tilt nearer to 0 is needed",
+                          tilt_deg));
 }
 
 }  // namespace
@@ -91,9 +94,9 @@ EffectSet SweepEffects() {
 bool SweepSimulationOptions::IsValid(std::string* why) const {
   if (!IsSimulatable(camera, why) || !IsValidTarget(target, why)) return false;
   if (!camera.calibration->blur_floor_px) {
-    return Fail(why, fmt::format("camera '{}': blur_floor_px is missing: a simulation needs it as "
-                                 "the truth",
-                                 camera.name));
+    return Fail(
+        why, fmt::format("camera '{}': blur_floor_px is missing: a simulation needs its true value",
+                         camera.name));
   }
   if (!IsWhollyVisible(camera, target.tilt_deg, why)) return false;
   if (!(frame_count >= 1 && frame_count <= 100000)) {

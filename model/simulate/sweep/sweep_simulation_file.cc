@@ -26,7 +26,7 @@ void ReadTruth(const YamlNode& node, Camera* camera) {
   CameraCalibration& calibration = *camera->calibration;
   const auto distance = node.Find("image_distance_mm");
   if (distance && node.Find("focus_depth_mm")) {
-    throw distance->ErrorHere("focus_depth_mm says the same: give one of them");
+    throw distance->ErrorHere("focus_depth_mm states the same quantity: give only one of them");
   }
   if (distance) calibration.image_distance_mm = Estimate{distance->PositiveNumber(), 0};
   ReadTruthValues(node, camera->lens, &calibration);
@@ -55,12 +55,12 @@ TargetOptions ReadTarget(const YamlNode& node, std::vector<std::string>* notices
   ReadNumber(node, "tilt_deg", &target.tilt_deg);
   if (const auto image = node.Find(RenamedImage(), notices)) {
     if (target.kind != TargetKind::kImage) {
-      throw image->ErrorHere("only a target of the kind 'image' has one, found kind '" +
+      throw image->ErrorHere("this key is only for a target of the kind 'image', found kind '" +
                              TargetKindName(target.kind) + "'");
     }
     target.image_path = node.ResolvePath(image->Text());
   } else if (target.kind == TargetKind::kImage) {
-    throw kind.ErrorHere("the kind 'image' needs the image's path in target.image");
+    throw kind.ErrorHere("the kind 'image' requires the image's path in target.image");
   }
   return target;
 }

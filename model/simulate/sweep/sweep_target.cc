@@ -34,10 +34,10 @@ double FeatureSizeMm(const TargetOptions& options, double chosen_mm, double smal
   if (!(options.feature_size_mm > 0)) return std::max(chosen_mm, smallest_mm);
   const double size_mm = options.feature_size_mm;
   if (!(size_mm >= smallest_mm && size_mm <= largest_mm)) {
-    throw Error(fmt::format(
-        "target.feature_size_mm is {}: in this field it must be between {:.4g} and {:.4g}, or 0 "
-        "to have it chosen",
-        size_mm, smallest_mm, largest_mm));
+    throw Error(
+        fmt::format("target.feature_size_mm is {}: in this field of view it must be between {:.4g} "
+                    "and {:.4g}, or 0 for a size chosen by the program",
+                    size_mm, smallest_mm, largest_mm));
   }
   return size_mm;
 }
@@ -250,8 +250,8 @@ TargetTile DrawImage(const TargetOptions& options, const TileRequest& request,
     }
   }
   if (!(cv::mean(samples)[0] > 0)) {
-    throw Error(
-        fmt::format("target.image '{}' is black: it must show something", options.image_path));
+    throw Error(fmt::format("target.image '{}' is black: some of its values must be > 0",
+                            options.image_path));
   }
   return canvas.Finish();
 }

@@ -91,7 +91,7 @@ TEST(Calibrate, TheSourcesRecipeAndThePeakNeedNoFit) {
   options.fit_blur = false;
   const Calibration alone = Calibrate(good.sweep, options);
   EXPECT_EQ(alone.outcome, Outcome::kPartial);
-  EXPECT_EQ(alone.reason, "the blur was not to be fitted");
+  EXPECT_EQ(alone.reason, "the fit of the blur was not requested");
   ASSERT_TRUE(alone.source.done && alone.sharpness.done);
   EXPECT_EQ(alone.source.focus_depth_mm, whole.source.focus_depth_mm);
   EXPECT_EQ(alone.source.blur_ratio, whole.source.blur_ratio);
@@ -144,7 +144,7 @@ TEST(Calibrate, ADarkSweepIsNamedDark) {
 TEST(Calibrate, AFrameOfAnotherSizeIsAnErrorThatNamesIt) {
   SimulatedSweep s = Good();
   s.frame(7) = cv::Mat(kSizePx, kSizePx + 1, CV_8U, cv::Scalar(100));
-  EXPECT_THAT(ErrorOf([&] { Calibrated(s); }), HasSubstr("frame-7: the image is 161 x 160 px"));
+  EXPECT_THAT(ErrorOf([&] { Calibrated(s); }), HasSubstr("frame-7: the image has 161 x 160 px"));
 }
 
 TEST(Calibrate, AReversedDirectionIsRefusedByItsName) {

@@ -34,7 +34,7 @@ Calibration Found() {
   c.frames[0].rejection = "dark: mean 1";
   c.frames[1].image = "/bench/day 1/b.png";
   c.frames[2].image = "c.png";
-  c.frames[2].not_in_fit = "too strongly blurred";
+  c.frames[2].not_in_fit = "blurred too strongly";
   c.frames[3].image = "../d.png";
   c.frames[3].rejection = "blank";
   return c;

@@ -63,7 +63,8 @@ TEST(SolveFocus, FourFramesAreTooFewAndFiveAreNot) {
     FocusCase c = FocusCase(bench).WithTexture(0.01).WithTrueFloor();
     c.Solve();
     if (count == 4) {
-      ExpectRefused(c.calibration, "the blur of 4 frames follows one law, 5 are needed");
+      ExpectRefused(c.calibration,
+                    "the blur of only 4 frames follows one law, but 5 frames are needed");
     } else {
       EXPECT_EQ(c.calibration.outcome, Outcome::kOk) << c.calibration.reason;
     }
@@ -141,8 +142,9 @@ TEST(SolveFocus, AFocusThatTheBlurDoesNotFixIsRefused) {
   const FocusCase c = Solved(bench, ErrorFor(bench, kFocusDepth, 1.1 * half_mm));
   // If the blur ratio is even less certain, it is the stated reason.
   EXPECT_EQ(c.calibration.outcome, Outcome::kRefused);
-  EXPECT_THAT(c.calibration.reason, AnyOf(HasSubstr("the depth of focus is not fixed by the blur"),
-                                          HasSubstr("the blur does not change over the sweep")));
+  EXPECT_THAT(c.calibration.reason,
+              AnyOf(HasSubstr("the blur does not determine the depth of focus"),
+                    HasSubstr("the blur does not change over the sweep")));
   EXPECT_FALSE(c.calibration.focus_reading_mm) << "it is not determined";
 }
 

@@ -233,7 +233,7 @@ TEST(SolveFocus, AnUnknownFloorIsUpToASoftLens) {
   ExpectInterval(c, 0, 3, 1e-12);
   EXPECT_NEAR(c.calibration.focus_depth_mm->value, FocusWithFloor(c.bench, 4.5), 1e-2);
   EXPECT_THAT(c.calibration.warnings,
-              ElementsAre(AllOf(HasSubstr("cannot be found from this target"),
+              ElementsAre(AllOf(HasSubstr("this target does not determine the lens floor"),
                                 HasSubstr("0 to 3.0 px"), HasSubstr("state blur_floor_px"))));
 }
 
@@ -245,7 +245,7 @@ TEST(SolveFocus, PrintedEdgesBoundTheFloor) {
   c.Solve();
   ExpectInterval(c, 0, 0.8, 0.02);  // the ink is fitted as if it were lens blur
   EXPECT_THAT(c.calibration.warnings,
-              ElementsAre(AllOf(HasSubstr("px soft at focus"), HasSubstr("knife edge"))));
+              ElementsAre(AllOf(HasSubstr("px at focus"), HasSubstr("knife edge"))));
   const Eigen::Vector2d& zf = *c.calibration.focus_depth_mm->systematic;
   EXPECT_LT(zf.x(), c.bench.focus_mm - 0.2);
   EXPECT_GT(zf.y(), c.bench.focus_mm + 0.2);
@@ -263,7 +263,7 @@ TEST(SolveFocus, EdgesOfATextureBoundTheFloor) {
   c.evidence.unstated_edges->variances_px2[2] += 5;
   c.Solve();
   ExpectInterval(c, 0, 0.8, 0.02);
-  EXPECT_THAT(c.calibration.warnings, ElementsAre(HasSubstr("px soft at focus")));
+  EXPECT_THAT(c.calibration.warnings, ElementsAre(HasSubstr("px at focus")));
   EXPECT_EQ(c.calibration.blur.estimator, "relative spectrum");
 }
 
@@ -293,7 +293,7 @@ TEST(SolveFocus, EdgesOfATextureWithoutSoftnessAreNoBoundEither) {
   c.evidence.unstated_edges = c.bench.Absolute(kErrorPx2, -0.6, &c.random);
   c.Solve();
   EXPECT_EQ(c.calibration.outcome, Outcome::kPartial);
-  EXPECT_THAT(c.calibration.warnings, ElementsAre(HasSubstr("is allowed for")));
+  EXPECT_THAT(c.calibration.warnings, ElementsAre(HasSubstr("are allowed for")));
 }
 
 // ---- the bench zero ----

@@ -73,7 +73,7 @@ TEST(Exposure, AResultFromTheFewGoodFramesSaysSo) {
   ASSERT_FALSE(c.warnings.empty());
   EXPECT_THAT(c.warnings.front(),
               AllOf(HasSubstr("of 41 frames are over-exposed: lower the exposure"),
-                    HasSubstr("the results come from the others alone")));
+                    HasSubstr("the results come from the other frames alone")));
 }
 
 TEST(Exposure, ADarkSweepGetsTheAdviceToRaiseIt) {
@@ -109,7 +109,7 @@ TEST(Unit, ReadingsInInchesAreAskedAbout) {
   const Calibration c = CalibrateWithoutMap(s);
   EXPECT_EQ(c.outcome, Outcome::kRefused);
   EXPECT_THAT(c.reason, AllOf(StartsWith("the image scale puts the target at "),
-                              HasSubstr("are the readings in mm?")));
+                              HasSubstr("that the readings are in mm")));
 }
 
 TEST(Region, TooSmallForAnythingIsRefusedBeforeItIsMeasured) {
@@ -117,7 +117,7 @@ TEST(Region, TooSmallForAnythingIsRefusedBeforeItIsMeasured) {
   s.sweep.roi = {60, 60, 80, 23};
   const Calibration c = CalibrateWithoutMap(s);
   EXPECT_EQ(c.outcome, Outcome::kRefused);
-  EXPECT_THAT(c.reason, StartsWith("the region of interest (roi_px) is 80 x 23 px"));
+  EXPECT_THAT(c.reason, StartsWith("the region of interest (roi_px) has 80 x 23 px"));
   EXPECT_EQ(c.frames[0].statistics.mean_encoded, 0);
 }
 
@@ -126,7 +126,8 @@ TEST(Region, TooSmallForATextureIsNamedAsTheCause) {
   s.sweep.roi = {60, 60, 40, 40};
   const Calibration c = CalibrateWithoutMap(s);
   EXPECT_EQ(c.outcome, Outcome::kRefused);
-  EXPECT_THAT(c.reason, StartsWith("the region of interest (roi_px) is 40 x 40 px: an edge needs"));
+  EXPECT_THAT(c.reason,
+              StartsWith("the region of interest (roi_px) has 40 x 40 px: an edge requires"));
 }
 
 TEST(Region, ASmallOneThatIsEnoughIsLeftAlone) {

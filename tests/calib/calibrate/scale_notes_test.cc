@@ -47,7 +47,8 @@ TEST(LoneEdge, ItsMissingScaleIsANoteNotAWarning) {
   const Calibration c = CalibrateWithoutMap(s);
   EXPECT_EQ(c.outcome, Outcome::kOk) << c.reason;
   EXPECT_FALSE(c.scale.done);
-  EXPECT_EQ(c.scale.message, "a lone edge shows no image scale: offset_mm is taken as given");
+  EXPECT_EQ(c.scale.message,
+            "a lone edge shows no image scale: the given offset_mm is used unchecked");
   EXPECT_THAT(c.warnings, Not(Contains(HasSubstr("offset_mm"))));
 }
 
@@ -99,8 +100,8 @@ TEST(BentModel, IsWarnedOfWithItsSize) {
         return text.find("readings bend against the image scale") != std::string::npos;
       });
   ASSERT_NE(warning, c.warnings.end());
-  EXPECT_THAT(*warning, AllOf(HasSubstr("they lie -0."), HasSubstr("less certain")));
-  const std::string before = "they lie ";
+  EXPECT_THAT(*warning, AllOf(HasSubstr("they deviate by -0."), HasSubstr("less certain")));
+  const std::string before = "they deviate by ";
   EXPECT_NEAR(std::stod(warning->substr(warning->find(before) + before.size())), -0.8, 0.2);
 }
 

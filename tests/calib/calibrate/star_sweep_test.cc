@@ -94,7 +94,7 @@ TEST(StarSweep, WithoutAnOffsetItSaysWhatToDo) {
   const Calibration c = CalibrateWithoutMap(s);
   EXPECT_EQ(c.outcome, Outcome::kRefused);
   EXPECT_FALSE(c.focus_depth_mm);
-  EXPECT_THAT(c.reason, HasSubstr("offset_mm is unknown"));
+  EXPECT_THAT(c.reason, HasSubstr("offset_mm is not stated"));
   EXPECT_THAT(c.reason, HasSubstr("looks the same at every scale"));
   EXPECT_THAT(c.reason, HasSubstr("state offset_mm, or use a texture"));
 }

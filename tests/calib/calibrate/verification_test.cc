@@ -85,7 +85,7 @@ TEST(VerifyCalibration, AddsTheVariancesOfBoth) {
   // zf moves in the opposite direction to d1, by as many sigmas except for the curvature of [S13].
   EXPECT_NEAR(Named(result, "focus_depth_mm").deviation(), -0.8, 0.01);
   ASSERT_THAT(result.warnings, SizeIs(1));
-  EXPECT_THAT(result.warnings[0], HasSubstr("blur_ratio: taken as exact"));
+  EXPECT_THAT(result.warnings[0], HasSubstr("blur_ratio: these values are treated as exact"));
 }
 
 TEST(VerifyCalibration, AChangeOfFiveSigmaIsFound) {
@@ -132,7 +132,8 @@ TEST(VerifyCalibration, TheBenchZeroIsComparedWhereTheCameraHasNotMoved) {
   found.covariance = matrix;
   const Verification moved = VerifyCalibration(stored, {}, found, {});
   EXPECT_NEAR(moved.chi_square, 1, 1e-8);
-  EXPECT_THAT(Named(moved, "bench_offset_mm").why_not_counted, HasSubstr("place on the bench"));
+  EXPECT_THAT(Named(moved, "bench_offset_mm").why_not_counted,
+              HasSubstr("position of the camera on the bench"));
   VerificationOptions options;
   options.same_bench = true;
   const Verification same = VerifyCalibration(stored, {}, found, options);
@@ -196,7 +197,7 @@ TEST(VerifyCalibration, WhatWouldNotShowAChangeCannotTell) {
   const double px_per_mm = kRatio * (50 / 5.6) * (1 - 50.0 / 300) / (50 * 0.0045);
   const double detectable = Named(coarse, "image_distance_mm").smallest_detectable;
   EXPECT_NEAR(coarse.detectable_blur_px, px_per_mm * detectable, 1e-6);
-  EXPECT_THAT(coarse.reason, HasSubstr("0.5 px are needed"));
+  EXPECT_THAT(coarse.reason, HasSubstr("a change of 0.5 px must be detectable"));
   const Verification ratio = VerifyCalibration(StoredCamera(0.001, 0.001), {},
                                                FoundCalibration(kD1Mm, 0.001, kRatio, 0.05), {});
   EXPECT_EQ(ratio.verdict, Verdict::kUndetermined);

@@ -23,7 +23,7 @@ TEST(FitBlur, TheFloorOfATextureIsNamedAsUndetermined) {
   setup.floor_variance_px2.reset();
   const BlurFitResult fit = FitBlur(setup);
   EXPECT_FALSE(fit.done);
-  EXPECT_THAT(fit.message, HasSubstr("the data do not tell apart"));
+  EXPECT_THAT(fit.message, HasSubstr("the data do not distinguish"));
   EXPECT_THAT(fit.weak_direction, HasSubstr("blur_floor_px"));
 }
 
@@ -43,7 +43,7 @@ TEST(FitBlur, TwoDepthsDoNotFixThreeParameters) {
   start.values = {bench.focus_mm, bench.ratio, bench.floor_px2, bench.offset_mm};
   const BlurFitResult fit = FitBlur(setup, &start);
   EXPECT_FALSE(fit.done);
-  EXPECT_THAT(fit.message, HasSubstr("tell apart"));
+  EXPECT_THAT(fit.message, HasSubstr("do not distinguish"));
   EXPECT_NE(fit.weak_direction, "");
 }
 
@@ -66,7 +66,7 @@ TEST(FitBlur, FewerThanFourFramesAreRefused) {
   std::mt19937 random(1);
   const BlurFitResult fit = FitBlur(WithEdge(bench, 0.02, &random));
   EXPECT_FALSE(fit.done);
-  EXPECT_THAT(fit.message, HasSubstr("3 frames, at least 4"));
+  EXPECT_THAT(fit.message, HasSubstr("3 frames, but at least 4"));
   EXPECT_FALSE(FitBlur({}).done);
 }
 

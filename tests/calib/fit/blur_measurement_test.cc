@@ -219,7 +219,7 @@ TEST(MeasureBlur, FewerThanFiveRegisteredFramesAreReported) {
   const BlurEvidence evidence = m.Measure();
   EXPECT_THAT(evidence.setup.estimators, IsEmpty());
   EXPECT_EQ(evidence.spectrum, -1);
-  EXPECT_THAT(evidence.message, HasSubstr("too few frames see enough of the same target"));
+  EXPECT_THAT(evidence.message, HasSubstr("too few frames show enough of the same target"));
 }
 
 TEST(MeasureBlur, FramesThatDoNotOverlapAreReported) {
@@ -228,7 +228,7 @@ TEST(MeasureBlur, FramesThatDoNotOverlapAreReported) {
     m.task->scales[i].registration.shift_px.x() = 90.0 * static_cast<double>(i);
   const BlurEvidence evidence = m.Measure();
   EXPECT_THAT(evidence.setup.estimators, IsEmpty());
-  EXPECT_THAT(evidence.message, HasSubstr("too few frames see enough of the same target"));
+  EXPECT_THAT(evidence.message, HasSubstr("too few frames show enough of the same target"));
 }
 
 // The reference is far out of focus itself, so that the window is too small for its blur.
@@ -241,7 +241,7 @@ TEST(MeasureBlur, ABlurredReferenceIsNoReference) {
         m.simulated.truth.frames[0].depth_mm / m.simulated.truth.frames[sample.frame].depth_mm;
   const BlurEvidence evidence = m.Measure();
   EXPECT_THAT(evidence.setup.estimators, IsEmpty());
-  EXPECT_THAT(evidence.message, HasSubstr("too few frames see enough of the same target"));
+  EXPECT_THAT(evidence.message, HasSubstr("too few frames show enough of the same target"));
 }
 
 TEST(MeasureBlur, ABlankTargetShowsTooLittleTexture) {

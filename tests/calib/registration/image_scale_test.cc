@@ -226,7 +226,7 @@ TEST(FitScaleModel, CoarseReadingsGetTheAdviceToStateTheirError) {
   for (unsigned seed = 1; seed <= 20; ++seed) {
     const auto samples = Samples(20, BenchDirection::kAway, 31, kSigmaMm, seed);
     const ScaleModel law = FitScaleModel(samples, 15, 0, BenchDirection::kAway);
-    const std::string before = "if the readings are only good to about ";
+    const std::string before = "if the readings are only accurate to about ";
     const auto at = law.message.find(before);
     if (at == std::string::npos) continue;
     ++reported;
@@ -276,7 +276,7 @@ TEST(FitScaleModel, TooShortARangeDeterminesNothing) {
   const ScaleModel law = FitScaleModel(samples, 4, 0.001, BenchDirection::kAway);
   EXPECT_FALSE(law.done);
   EXPECT_EQ(law.kind, ScaleKind::kUnknown);
-  EXPECT_THAT(law.message, HasSubstr("too little to tell"));
+  EXPECT_THAT(law.message, HasSubstr("too little to determine"));
   EXPECT_THAT(law.message, EndsWith("extend the sweep"));
   // Without the errors the law is found.
   for (ScaleSample& s : samples) {
@@ -326,7 +326,7 @@ TEST(FitScaleModel, RefusesFewerThanFive) {
   const ScaleModel law =
       FitScaleModel(Samples(0, BenchDirection::kAway, 4, 0, 1), 2, 0.05, BenchDirection::kAway);
   EXPECT_FALSE(law.done);
-  EXPECT_THAT(law.message, HasSubstr("measured on 4 frames, 5 are needed"));
+  EXPECT_THAT(law.message, HasSubstr("measured on 4 frames only, but 5 are needed"));
   EXPECT_TRUE(
       FitScaleModel(Samples(0, BenchDirection::kAway, 5, 0, 1), 2, 0.05, BenchDirection::kAway)
           .done);

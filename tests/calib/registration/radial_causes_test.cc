@@ -42,7 +42,7 @@ TEST(CheckDistortion, NamesLensAndTargetWhereNothingElseIsSeen) {
   EXPECT_THAT(c.warnings[0],
               AllOf(HasSubstr("+2.0 +- 0.1 % at the corner (pincushion)"),
                     HasSubstr("the lens distorts, or the target is not flat"),
-                    HasSubstr("a flat target tells them apart"), Not(HasSubstr("vignetting"))));
+                    HasSubstr("a flat target distinguishes them"), Not(HasSubstr("vignetting"))));
   ASSERT_EQ(c.diagnoses.size(), 1U);
   EXPECT_TRUE(c.diagnoses[0].Names(kLensDistorts) && c.diagnoses[0].Names(kTargetIsNotFlat));
   EXPECT_FALSE(c.diagnoses[0].Names(kVignettingShifts) ||
@@ -55,8 +55,8 @@ TEST(CheckDistortion, WhatIsNotExcludedIsNamedToo) {
   c.structure.vignetting->sigma = 0.2;
   EXPECT_FALSE(CheckDistortion(&c));
   EXPECT_TRUE(c.diagnoses.at(0).Names(kVignettingShifts));
-  EXPECT_THAT(c.warnings.at(0), HasSubstr("Vignetting would do the same, and this sweep does not "
-                                          "show whether there is any"));
+  EXPECT_THAT(c.warnings.at(0), HasSubstr("Vignetting would have the same effect, and this sweep "
+                                          "does not show whether this is present"));
 }
 
 TEST(CheckDistortion, RefusesWhatCannotBeAllowedFor) {

@@ -95,7 +95,7 @@ TEST(RejectWrongReadings, NamesAShiftedReadingWithItsAmount) {
       EXPECT_NEAR(bench.frames[7].reading_error_mm, error_mm, 0.2);
       const std::string amount = error_mm > 0 ? "off by 2." : "off by -12.";
       EXPECT_THAT(bench.frames[7].rejection, AllOf(HasSubstr(amount), Not(HasSubstr("swapped"))));
-      const std::string before = "that of reading ";
+      const std::string before = "belongs to the reading ";
       const auto at = bench.frames[7].rejection.find(before);
       ASSERT_NE(at, std::string::npos);
       EXPECT_NEAR(std::stod(bench.frames[7].rejection.substr(at + before.size())), right_mm, 0.2);
@@ -223,7 +223,7 @@ TEST(ReasonAgainstScales, AConstantScaleNeedsTheBenchZero) {
   bench.law.message = "the image scale does not change";
   const auto reason = bench.Reason();
   ASSERT_TRUE(reason);
-  EXPECT_THAT(*reason, AllOf(HasSubstr("offset_mm is unknown"), HasSubstr("does not change")));
+  EXPECT_THAT(*reason, AllOf(HasSubstr("offset_mm is not stated"), HasSubstr("does not change")));
   EXPECT_THAT(*reason, HasSubstr("state offset_mm"));
   bench.sweep.offset_mm = model::Estimate{30, 0.1};
   EXPECT_FALSE(bench.Reason());
@@ -240,7 +240,7 @@ TEST(ReasonOfUnknownOffset, TheReasonHasAdvice) {
   Bench bench;
   bench.law.message = "the image scale does not change";
   EXPECT_EQ(ReasonOfUnknownOffset(bench.law),
-            "offset_mm is unknown and was not found: the image scale does not change; to do "
+            "offset_mm is not stated and was not found: the image scale does not change; to do "
             "without the image scale, state offset_mm");
   EXPECT_THAT(ReasonOfUnknownOffset(StarModel()),
               AllOf(HasSubstr("looks the same at every scale"),
@@ -267,10 +267,10 @@ TEST(RegistrationAdvice, ReportsWhereFewRegisterAndNoModelIsFound) {
       << "such bands keep most frames from being registered";
   bench.structure.bands = model::Estimate{0.05, 0.005};
   EXPECT_THAT(advice(), AllOf(HasSubstr("whole rows brighten together by 5 %"),
-                              HasSubstr("If that is not the cause: every frame must show")));
+                              HasSubstr("If this is not the cause: every frame must show")));
   bench.structure.bands.reset();
   bench.structure.vignetting = model::Estimate{-0.3, 0.01};
-  EXPECT_THAT(advice(), AllOf(HasSubstr("vignetting"), HasSubstr("If that is not the cause")));
+  EXPECT_THAT(advice(), AllOf(HasSubstr("vignetting"), HasSubstr("If this is not the cause")));
   bench.structure = {};
   bench.sweep.target = model::SweepTarget::kKnifeEdge;
   EXPECT_EQ(advice(), "") << "it is stated already";
@@ -349,7 +349,7 @@ TEST(ForgetScales, KeepsTheReferenceAloneAndSaysWhatIsTaken) {
   EXPECT_EQ(bench.law.message, "a lone edge shows no image scale");
   bench.sweep.offset_mm = model::Estimate{30, 0.1};
   ForgetScales(bench.sweep, &bench.samples, &bench.law);
-  EXPECT_THAT(bench.law.message, HasSubstr("offset_mm is taken as given"));
+  EXPECT_THAT(bench.law.message, HasSubstr("the given offset_mm is used unchecked"));
 }
 
 }  // namespace

@@ -159,7 +159,7 @@ TEST(ScaleCauses, LensAndTargetAreBothNamedWhereTheyLookAlike) {
   const auto samples = MovingTarget(&sweep, 100, 0.8, [](double z) { return 500 - z; });
   EXPECT_THAT(ReasonOf(samples, sweep),
               AllOf(HasSubstr("direction must be 'toward'"), HasSubstr("or the lens"),
-                    HasSubstr("do not tell these apart: look at what moved")));
+                    HasSubstr("do not distinguish these causes: check what moved")));
 }
 
 TEST(ScaleCauses, ALensThatMovesIsNamedWhicheverDirectionIsStated) {
@@ -170,7 +170,7 @@ TEST(ScaleCauses, ALensThatMovesIsNamedWhicheverDirectionIsStated) {
     EXPECT_THAT(ReasonOf(samples, sweep),
                 AllOf(StartsWith("the image scale follows the lens, not the target"),
                       HasSubstr("move the target"), HasSubstr("extensions in mm"),
-                      Not(HasSubstr("direction")), Not(HasSubstr("are the readings in mm"))));
+                      Not(HasSubstr("direction")), Not(HasSubstr("that the readings are in mm"))));
   }
 }
 
@@ -201,7 +201,7 @@ TEST(ScaleCauses, ACauseThatUnitAndLensExplainAlikeIsLeftOpen) {
     EXPECT_THAT(ReasonOf(samples, sweep),
                 AllOf(StartsWith("either the image scale follows the lens"),
                       HasSubstr("; or the target moves"), HasSubstr("readings in centimetres"),
-                      HasSubstr("do not tell these apart: look at what moved")));
+                      HasSubstr("do not distinguish these causes: check what moved")));
   }
 }
 
@@ -242,8 +242,9 @@ TEST(UnitAdvice, PutsTheQuestionWithTheUnitThatFits) {
   for (const ScaleSample& sample : samples) frames[sample.frame].image_scale = sample.scale;
   EXPECT_THAT(
       UnitAdvice(sweep, frames, law, CompareScaleCauses(samples, sweep)),
-      AllOf(StartsWith("the image scale puts the target at 11.2 to 12.4 mm"),
-            HasSubstr("are the readings in mm? With readings in inches it is at about 300 mm")));
+      AllOf(
+          StartsWith("the image scale puts the target at 11.2 to 12.4 mm"),
+          HasSubstr("that the readings are in mm? With readings in inches it is at about 300 mm")));
 }
 
 // A wrong given zero is not reported as a moving lens.
@@ -266,8 +267,8 @@ TEST(ConstantScaleWarning, SpeaksWhereTheGivenZeroLetsTheScaleChange) {
   EXPECT_EQ(ConstantScaleWarning(sweep, samples), "") << "nothing is known of the depths";
   sweep.offset_mm = model::Estimate{190, 0};
   EXPECT_THAT(ConstantScaleWarning(sweep, samples),
-              AllOf(HasSubstr("although offset_mm says by 11 %"), HasSubstr("aligned"),
-                    HasSubstr("telecentric"), HasSubstr("look alike")));
+              AllOf(HasSubstr("although it should change by 11 % according to offset_mm"),
+                    HasSubstr("aligned"), HasSubstr("telecentric"), HasSubstr("look alike")));
 }
 
 }  // namespace

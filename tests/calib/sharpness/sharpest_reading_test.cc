@@ -75,7 +75,7 @@ TEST(SharpestReading, FourFramesAreTooFew) {
   const auto frames = Frames(110, 108, 1, 4, 0, 1);
   const SharpestReading found = FindSharpestReading(frames, All(frames));
   EXPECT_FALSE(found.done);
-  EXPECT_THAT(found.message, HasSubstr("4 of 4 frames passed the checks, 5 are needed"));
+  EXPECT_THAT(found.message, HasSubstr("4 of 4 frames passed the checks, but 5 are needed"));
 }
 
 // A sweep that was refused because of its light has no frames, which says nothing about edges.
@@ -85,7 +85,7 @@ TEST(SharpestReading, SaysWhetherFramesOrEdgesAreMissing) {
               HasSubstr("0 of 31 frames passed the checks"));
   for (std::size_t i = 3; i < frames.size(); ++i) frames[i].normalised_edge_slope = 0;
   EXPECT_THAT(FindSharpestReading(frames, All(frames)).message,
-              HasSubstr("3 of 31 frames have edges, 5 are needed"));
+              HasSubstr("3 of 31 frames have edges, but 5 are needed"));
   for (FrameMeasurement& frame : frames) frame.normalised_edge_slope = 0;
   EXPECT_THAT(FindSharpestReading(frames, All(frames)).message, HasSubstr("no edges were measured"))
       << "a sweep that is refused before that";

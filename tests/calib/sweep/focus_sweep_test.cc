@@ -41,7 +41,7 @@ TEST(MakeFocusSweep, RefusesTheFloorOfAnotherCamera) {
   file.floor_origin->pixel_pitch_mm *= 2;
   EXPECT_THAT(ErrorOf([&] { MakeFocusSweep(file, camera); }),
               AllOf(HasSubstr("s.yaml:3:9: edge.yaml has sensor.pixel_pitch_mm 0.009"),
-                    HasSubstr("of this sweep 0.0045")));
+                    HasSubstr("of this sweep has 0.0045")));
 }
 
 TEST(FocusSweep, APeriodMustBePositive) {

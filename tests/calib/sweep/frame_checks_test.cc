@@ -157,7 +157,7 @@ TEST(FrameChecks, ABlankFrameIsBlankBesideTheOthers) {
   QualityCheckOptions no_noise_check;
   no_noise_check.min_gradient_to_noise = 0;
   EXPECT_THAT(RejectionReason(s, good.contrast, no_noise_check).value_or("(none)"),
-              StartsWith("blank: contrast"));
+              StartsWith("blank: the contrast is"));
 }
 
 TEST(FrameChecks, ShadingIsNoContrast) {

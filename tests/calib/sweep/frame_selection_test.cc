@@ -69,14 +69,16 @@ TEST(FailedCheck, IsReadableTextForEveryCheck) {
 }
 
 TEST(FailedCheck, KeepsTheAmountsAndNamesOfTheSingleFrameOut) {
-  EXPECT_EQ(FailedCheck("reading off by 15.1 mm, or frame damaged: its image scale is that of"),
+  EXPECT_EQ(FailedCheck("reading off by 15.1 mm, or frame damaged: its image scale belongs to"),
             "reading off");
-  EXPECT_EQ(FailedCheck("reading off by -0.7 mm, or frame damaged: its blur lies 9 standard"),
-            "reading off");
+  EXPECT_EQ(
+      FailedCheck("reading off by -0.7 mm, or frame damaged: its blur deviates by 9 standard"),
+      "reading off");
   EXPECT_EQ(FailedCheck("repeated image: the same as frame-3.png at reading 300 mm"),
             "repeated image");
-  EXPECT_EQ(FailedCheck("frame damaged: its blur lies 9 standard deviations off"), "frame damaged");
-  EXPECT_EQ(FailedCheck("does not show what the others show: its spectrum lies 6 times"),
+  EXPECT_EQ(FailedCheck("frame damaged: its blur deviates by 9 standard deviations"),
+            "frame damaged");
+  EXPECT_EQ(FailedCheck("does not show what the others show: its spectrum deviates 6 times"),
             "does not show what the others show");
   EXPECT_EQ(FailedCheck("blank"), "blank");
   EXPECT_EQ(FailedCheck(""), "");
@@ -137,7 +139,7 @@ TEST(FrameSelection, TakesTheRejectionsOfOthers) {
 
 TEST(TooFewUsable, CountsEveryKindMostFramesFirst) {
   auto frames = GoodFrames(9);
-  frames[0].rejection = "blank: contrast 0.0100 against the sweep's median 0.3000";
+  frames[0].rejection = "blank: the contrast is 0.0100, but the median of the sweep is 0.3000";
   for (const std::size_t i : {1U, 3U, 5U, 6U})
     frames[i].rejection = "reading off by " + std::to_string(i) + ".0 mm, or frame damaged";
   FrameSelection selection(&frames);
@@ -152,7 +154,7 @@ TEST(TooFewUsable, SaysSoWhereReadingsAreEqual) {
   frames[8].reading_mm = 310;
   FrameSelection selection(&frames);
   EXPECT_EQ(selection.KeepUnrejected(),
-            "9 of 9 frames can be used at 2 different readings, 5 are needed");
+            "9 of 9 frames can be used at 2 different readings, but 5 are needed");
 }
 
 TEST(ExposureAdvice, SpeaksWhenMostFramesAreBadlyExposed) {
@@ -168,7 +170,7 @@ TEST(ExposureAdvice, SpeaksWhenMostFramesAreBadlyExposed) {
   reject(5, 6, "saturated: 80 % of the pixels are clipped at 255");
   EXPECT_THAT(advice(),
               AllOf(StartsWith("6 of 10 frames are over-exposed: lower"), Not(HasSubstr("under"))));
-  reject(0, 3, "dark: mean 0.003 of full scale");
+  reject(0, 3, "dark: the mean is 0.003");
   reject(3, 6, "black: 60 % of the pixels are clipped at 0");
   EXPECT_THAT(advice(), StartsWith("6 of 10 frames are under-exposed: raise"));
   // The file is dark but the image is clear to the eye: with 16 bits stored, the light need not
@@ -180,10 +182,10 @@ TEST(ExposureAdvice, SpeaksWhenMostFramesAreBadlyExposed) {
   }
   EXPECT_THAT(advice(), StartsWith("6 of 10 frames are under-exposed: raise"));
   is_16_bit = true;
-  EXPECT_THAT(advice(), AllOf(StartsWith("6 of 10 frames are dark in their files (on the average "
-                                         "400 of 65535)"),
-                              HasSubstr("10 or 12 bits"), HasSubstr("or under-exposed")));
-  reject(0, 6, "blank: contrast 0.01");
+  EXPECT_THAT(advice(),
+              AllOf(StartsWith("6 of 10 frames are dark in their files (on average 400 of 65535)"),
+                    HasSubstr("10 or 12 bits"), HasSubstr("or the frames are under-exposed")));
+  reject(0, 6, "blank: the contrast is 0.01");
   EXPECT_EQ(advice(), "");
 }
 
@@ -195,13 +197,13 @@ TEST(RegionAdvice, NamesTheSizeAndWhatIsNeeded) {
   EXPECT_EQ(RegionSidePx(sweep), 480);
   sweep.roi = {10, 20, 200, 63};
   EXPECT_EQ(RegionSidePx(sweep), 63);
-  EXPECT_THAT(RegionAdvice(sweep), AllOf(HasSubstr("region of interest (roi_px) is 200 x 63 px"),
-                                         HasSubstr("24 px"), HasSubstr("a texture 64")));
+  EXPECT_THAT(RegionAdvice(sweep), AllOf(HasSubstr("region of interest (roi_px) has 200 x 63 px"),
+                                         HasSubstr("24 px"), HasSubstr("a texture at least 64")));
   sweep.roi.height = 64;
   EXPECT_EQ(RegionAdvice(sweep), "");
   sweep.roi = {};
   sweep.camera.sensor.width_px = 40;
-  EXPECT_THAT(RegionAdvice(sweep), StartsWith("the image is 40 x 480 px"));
+  EXPECT_THAT(RegionAdvice(sweep), StartsWith("the image has 40 x 480 px"));
 }
 
 }  // namespace

@@ -58,7 +58,7 @@ TEST(Contradiction, OfTheGivenOffsetWidensEverything) {
   EXPECT_LT(c.bench_offset_mm->systematic->x(), truth_mm + 1);
   EXPECT_GT(c.focus_depth_mm->systematic->y() - c.focus_depth_mm->systematic->x(), 5);
   EXPECT_THAT(c.advice, HasSubstr("given offset_mm"));
-  EXPECT_THAT(c.warnings, Contains(HasSubstr("from the given one")));
+  EXPECT_THAT(c.warnings, Contains(HasSubstr("from the given bench zero")));
 }
 
 TEST(Contradiction, OfTheGivenOffsetByTensOfMillimetresIsRefused) {
@@ -66,7 +66,8 @@ TEST(Contradiction, OfTheGivenOffsetByTensOfMillimetresIsRefused) {
   s.sweep.offset_mm->value += 60;
   const Calibration c = CalibrateWithoutMap(s);
   EXPECT_EQ(c.outcome, Outcome::kRefused);
-  EXPECT_THAT(c.reason, HasSubstr("check offset_mm, and that it and the readings are in mm"));
+  EXPECT_THAT(c.reason,
+              HasSubstr("check offset_mm, and that both offset_mm and the readings are in mm"));
   EXPECT_FALSE(c.focus_depth_mm);
 }
 
@@ -93,7 +94,7 @@ TEST(Contradiction, ADiscThatIsStatedToBeAGaussianIsReported) {
     const Calibration c = CalibrateWithoutMap(s);
     ASSERT_TRUE(c.blur_ratio) << c.reason;
     ExpectCovers(c, s.truth);
-    EXPECT_EQ(c.advice, "state psf: disc in the camera file: it fits better");
+    EXPECT_EQ(c.advice, "state psf: disc in the camera file: this shape fits better");
     EXPECT_THAT(c.warnings, Contains(HasSubstr("the blur is a disc, not the gaussian")));
   }
 }

@@ -108,7 +108,7 @@ TEST(ChooseFloor, ASofterLensThanUsualIsAllowedForWhereTheTextureDoesNotExcludeI
     EXPECT_LT(zf[0] - 2 * c.focus_depth_mm->sigma, simulated.truth.focus_depth_mm) << floor_px;
     EXPECT_GT(zf[1] + 2 * c.focus_depth_mm->sigma, simulated.truth.focus_depth_mm) << floor_px;
     EXPECT_GE((*c.blur_floor_px->systematic)[1], std::max(1.0, floor_px));
-    EXPECT_THAT(c.warnings, Contains(HasSubstr("floor cannot be found from this target")));
+    EXPECT_THAT(c.warnings, Contains(HasSubstr("this target does not determine the lens floor")));
   }
 }
 

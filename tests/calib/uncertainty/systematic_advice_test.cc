@@ -100,7 +100,7 @@ TEST(WidenFocus, TheAdviceNamesTheLargestShare) {
   const Case cases[] = {
       {0.001, 0.004, 0.3, "second is 50 % of the error of d1: mend second"},
       {0.004, 0.001, 0.3, "first is 50 % of the error of d1: mend first"},
-      {0.001, 0.001, 0.3, "noise and readings are 34 % of the error of d1: more frames"},
+      {0.001, 0.001, 0.3, "noise and readings are 34 % of the error of d1: take more frames"},
       {0.0016, 0.001, 0.3, "noise and readings are 30 % of the error of d1"},
       {0.0017, 0.001, 0.3, "first is 30 % of the error of d1"},
       {0.0014, 0.001, 0.4, "the bench zero is 31 % of the error of d1: measure offset_mm"},

@@ -390,7 +390,8 @@ TEST(FitSides, SixFramesAreNeededOnASide) {
   FitSides(s.evidence, s.fit, &s.calibration);
   EXPECT_FALSE(s.calibration.nearer.done);
   EXPECT_EQ(s.calibration.nearer.frames_used, 5);
-  EXPECT_THAT(s.calibration.nearer.message, HasSubstr("5 frames on this side, 6 are needed"));
+  EXPECT_THAT(s.calibration.nearer.message,
+              HasSubstr("5 frames are on this side, but 6 are needed"));
   EXPECT_TRUE(s.calibration.farther.done);
 }
 

@@ -192,7 +192,7 @@ TEST(AddSystematicParts, TheShapesRemedyIsToStateTheBetterOne) {
     c.Solve();
     const SystematicPart* part = c.Part("shape of the blur");
     ASSERT_NE(part, nullptr);
-    EXPECT_THAT(part->remedy, better == model::Psf::kGaussian ? HasSubstr("nothing")
+    EXPECT_THAT(part->remedy, better == model::Psf::kGaussian ? HasSubstr("no remedy")
                                                               : HasSubstr("state psf: disc"));
   }
 }

@@ -428,7 +428,7 @@ TEST(BlockSolver, RefusesWhatCannotBeMeant) {
   EXPECT_THAT(message(input, {}), HasSubstr("1x1"));
   input = good;
   input.weights *= 2;
-  EXPECT_THAT(message(input, {}), HasSubstr("sum to 2"));
+  EXPECT_THAT(message(input, {}), HasSubstr("have the sum 2"));
   input = good;
   input.disparity.width_px = 11;
   EXPECT_THAT(message(input, {}), AllOf(HasSubstr("11x9"), HasSubstr("12x9")));
@@ -437,7 +437,7 @@ TEST(BlockSolver, RefusesWhatCannotBeMeant) {
   EXPECT_THAT(message(input, {}), HasSubstr("holes"));
   input = good;
   input.image.values[3] = std::numeric_limits<float>::infinity();
-  EXPECT_THAT(message(input, {}), HasSubstr("not finite"));
+  EXPECT_THAT(message(input, {}), HasSubstr("must be finite"));
   input = good;
   input.disparity.disparity[3] = 12.5F;
   EXPECT_THAT(message(input, {}), AllOf(HasSubstr("12.5 px per view step"), HasSubstr("12 px")));
@@ -474,7 +474,7 @@ TEST(BlockSolver, TheMemoryLimitChoosesTheBlocks) {
   options.memory_limit_mib = 0.7 * all;
   EXPECT_THAT(
       ErrorOf([&] { EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary); }),
-      AllOf(HasSubstr("blocks of 64 px need"), HasSubstr("or the blocks smaller")));
+      AllOf(HasSubstr("blocks of 64 px need"), HasSubstr("or use smaller blocks")));
   options.memory_limit_mib.reset();
   options.block_px = 4;
   EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary);

@@ -419,7 +419,7 @@ TEST(GridSolver, RefusesMoreMemoryThanItMayHave) {
   options.memory_limit_mib = 10;
   FunctionalSummary summary;
   EXPECT_THAT(ErrorOf([&] { EstimateOnGrid(input, options, &summary); }),
-              AllOf(HasSubstr("memory limit 10 MiB"), HasSubstr("at least that")));
+              AllOf(HasSubstr("memory limit 10 MiB"), HasSubstr("at least as large")));
   options.memory_limit_mib = 10000;
   options.max_iterations = 1;
   EstimateOnGrid(input, options, &summary);

@@ -380,7 +380,10 @@ TEST(PhotographDisparity, IsWithoutTheLandingOfItsSamples) {
   for (int i = 0; i < 3; ++i)
     EXPECT_FLOAT_EQ(map.disparity[Index(i)], 0.5F * static_cast<float>(i) - 0.4F);
   EXPECT_EQ(PhotographDisparity(on_grid, {0, 0}).disparity, on_grid.disparity);
-  EXPECT_THAT(ErrorOf([&] { PhotographDisparity(on_grid, {0.8, 0.4}); }), HasSubstr("same ratio"));
+  EXPECT_THAT(ErrorOf([&] {
+                PhotographDisparity(on_grid, {0.8, 0.4});
+              }),
+              HasSubstr("ratio of these must be that of the steps"));
 }
 
 }  // namespace

@@ -108,7 +108,7 @@ TEST(BlurCheck, TheRightBlurIsLeftAloneAfterOneSolve) {
   EXPECT_THAT(check.trials, SizeIs(1));
   EXPECT_GT(check.blocks, 10);
   EXPECT_EQ(check.unexplained_blocks, 0);
-  EXPECT_THAT(check.message, HasSubstr("nothing speaks for a narrower blur"));
+  EXPECT_THAT(check.message, HasSubstr("the photograph does not indicate a narrower blur"));
 }
 
 TEST(BlurCheck, TooWideABlurIsProposedNarrower) {
@@ -198,7 +198,7 @@ TEST(BlurCheck, AnInputInFocusOrWithoutTextureIsReported) {
   const BlurCheck in_focus = CheckBlur(input, {});
   EXPECT_EQ(in_focus.blocks, 0);
   EXPECT_FALSE(in_focus.narrower_blur);
-  EXPECT_THAT(in_focus.message, HasSubstr("no block tells"));
+  EXPECT_THAT(in_focus.message, HasSubstr("no block provides information"));
   std::fill(input.image.values.begin(), input.image.values.end(), 1.0F);
   const BlurCheck white = CheckBlur(input, {});
   EXPECT_THAT(white.trials, SizeIs(0));

@@ -215,8 +215,8 @@ TEST(SceneBands, AreAsManyAsTheMemoryAsksFor) {
   options.memory_limit_mib = 1;
   const std::string refusal =
       ErrorOf([&] { EstimateSceneViews(input, options, sink, &bands, nullptr); });
-  ASSERT_THAT(refusal, HasSubstr("memory limit 1 MiB: in any number of bands "));
-  ASSERT_THAT(refusal, HasSubstr("must be at least that"));
+  ASSERT_THAT(refusal, HasSubstr("memory limit 1 MiB: with any number of bands "));
+  ASSERT_THAT(refusal, HasSubstr("must be at least as large"));
   const double least = std::stod(refusal.substr(refusal.find("of bands ") + 9));
   ASSERT_LT(least + 5, whole.predicted_memory_mib);
   options.memory_limit_mib = (least + whole.predicted_memory_mib) / 2;

@@ -249,7 +249,8 @@ TEST(SceneSolver, ADeviceWithoutDoubleIsRefusedForDoublePrecision) {
   options.double_precision = true;
   SceneSummary summary;
   EXPECT_THAT(ErrorOf([&] { EstimateScene(MadeUp(1.3F), options, &summary, nullptr, &backend); }),
-              AllOf(HasSubstr("opencl:7:7"), HasSubstr("no double"), HasSubstr("cpu")));
+              AllOf(HasSubstr("opencl:7:7"), HasSubstr("does not support double precision"),
+                    HasSubstr("cpu")));
 }
 
 TEST(SceneSolver, CrossValidationFindsAStrengthAboutAsGood) {
@@ -438,7 +439,7 @@ TEST(SceneSolver, RefusesWhatItCannotUse) {
   EXPECT_THAT(message(input, {}), HasSubstr("the weight of the view (2, 1) is inf"));
   input = good;
   input.weights *= 2;
-  EXPECT_THAT(message(input, {}), HasSubstr("sum to 2"));
+  EXPECT_THAT(message(input, {}), HasSubstr("have the sum 2"));
   input = good;
   input.disparity.disparity[3] = std::numeric_limits<float>::quiet_NaN();
   EXPECT_THAT(message(input, {}), HasSubstr("holes"));

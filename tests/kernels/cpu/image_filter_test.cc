@@ -270,31 +270,33 @@ TEST(ImageFilterCheckTest, WrongFiltersAreNamed) {
             "filter: start has 4 elements: it must have 5");
   EXPECT_EQ(FilterError(across, [](Filter* f) { f->start[0] = 1; }),
             "filter: start begins with 1: it must begin with 0");
-  EXPECT_EQ(FilterError(across, [](Filter* f) { f->start[2] = 250; }),
-            "filter: start of block 2 is 250: it must be 256, as the block before has radius 0");
+  EXPECT_EQ(
+      FilterError(across, [](Filter* f) { f->start[2] = 250; }),
+      "filter: start of block 2 is 250: it must be 256, because the previous block has radius 0");
   EXPECT_EQ(FilterError(across, [](Filter* f) { f->coefficients.pop_back(); }),
             "filter: coefficients has 511 elements: it must have 512");
   const float nan = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_EQ(FilterError(across, [&](Filter* f) { f->coefficients[64 + 3] = nan; }),
-            "filter: coefficients: of pixel (3, 0) the one for n = 0 is nan: it must be finite");
+  EXPECT_EQ(
+      FilterError(across, [&](Filter* f) { f->coefficients[64 + 3] = nan; }),
+      "filter: coefficients: the coefficient n = 0 of pixel (3, 0) is nan: it must be finite");
 }
 
 TEST(ImageFilterCheckTest, CoefficientsOutsideAreNamed) {
   using Filter = VaryingFilter<float>;
-  const std::string outside = ": it must be 0, as it is outside of the image of 65 x 2 pixels";
+  const std::string outside = ": it must be 0, because it is outside the image of 65 x 2 pixels";
   EXPECT_EQ(FilterError(Axis::kAcross, [](Filter* f) { f->coefficients[0] = 1; }),
-            "filter: coefficients: of pixel (0, 0) the one for n = -1 is 1" + outside);
+            "filter: coefficients: the coefficient n = -1 of pixel (0, 0) is 1" + outside);
   EXPECT_EQ(FilterError(Axis::kAcross, [](Filter* f) { f->coefficients[1] = 1; }), "(no error)");
   EXPECT_EQ(FilterError(Axis::kAcross, [](Filter* f) { f->coefficients[192 + 1] = 1; }),
-            "filter: coefficients: of pixel (65, 0) the one for n = 0 is 1" + outside);
+            "filter: coefficients: the coefficient n = 0 of pixel (65, 0) is 1" + outside);
   EXPECT_EQ(FilterError(Axis::kAcross, [](Filter* f) { f->coefficients[320 + 128] = 1; }),
-            "filter: coefficients: of pixel (64, 1) the one for n = 1 is 1" + outside);
+            "filter: coefficients: the coefficient n = 1 of pixel (64, 1) is 1" + outside);
   EXPECT_EQ(FilterError(Axis::kDown, [](Filter* f) { f->coefficients[5] = 1; }),
-            "filter: coefficients: of pixel (5, 0) the one for n = -1 is 1" + outside);
+            "filter: coefficients: the coefficient n = -1 of pixel (5, 0) is 1" + outside);
   EXPECT_EQ(FilterError(Axis::kDown, [](Filter* f) { f->coefficients[192 + 1] = 1; }),
-            "filter: coefficients: of pixel (65, 0) the one for n = 0 is 1" + outside);
+            "filter: coefficients: the coefficient n = 0 of pixel (65, 0) is 1" + outside);
   EXPECT_EQ(FilterError(Axis::kDown, [](Filter* f) { f->coefficients[320 + 128] = 1; }),
-            "filter: coefficients: of pixel (64, 1) the one for n = 1 is 1" + outside);
+            "filter: coefficients: the coefficient n = 1 of pixel (64, 1) is 1" + outside);
   EXPECT_EQ(FilterError(Axis::kDown, [](Filter* f) { f->coefficients[128 + 63] = 1; }),
             "(no error)");
 }

@@ -138,17 +138,17 @@ TEST(PixelCsrCheckTest, WrongRowsAreNamed) {
   EXPECT_EQ(RowsError([](Rows*) {}), "(no error)");
   EXPECT_EQ(RowsError([](Rows* r) { r->pixels = -1; }), "rows: pixels is -1: it must be >= 0");
   EXPECT_EQ(RowsError([](Rows* r) { r->pixel[1] = 1; }),
-            "rows: pixel has 1 after 1: it must ascend from 0 to at most 4");
+            "rows: pixel: 1 follows 1: the list must ascend from 0 to at most 4");
   EXPECT_EQ(RowsError([](Rows* r) { r->pixel[0] = -1; }),
-            "rows: pixel has -1 after -1: it must ascend from 0 to at most 4");
+            "rows: pixel: -1 follows -1: the list must ascend from 0 to at most 4");
   EXPECT_EQ(RowsError([](Rows* r) { r->pixel[1] = 5; }),
-            "rows: pixel has 5 after 1: it must ascend from 0 to at most 4");
+            "rows: pixel: 5 follows 1: the list must ascend from 0 to at most 4");
   EXPECT_EQ(RowsError([](Rows* r) { r->start.pop_back(); }),
             "rows: start has 2 elements: it must have 3");
   EXPECT_EQ(RowsError([](Rows* r) { r->start[0] = 1; }),
             "rows: start begins with 1: it must begin with 0");
   EXPECT_EQ(RowsError([](Rows* r) { r->start[1] = -1; }),
-            "rows: start of row 1 is -1: it must be at least the one before, 0");
+            "rows: start of row 1 is -1: it must be at least the previous start, 0");
   EXPECT_EQ(RowsError([](Rows* r) { r->index.pop_back(); }),
             "rows: index has 2 elements: it must have 3");
   EXPECT_EQ(RowsError([](Rows* r) { r->weight.pop_back(); }),

@@ -165,7 +165,8 @@ TEST(RunInSubprocess, SurvivesWhateverTheChildDoes) {
   EXPECT_THAT(failure([] { ::raise(SIGKILL); }), HasSubstr("crashed (signal 9"));
   EXPECT_THAT(failure([] { std::abort(); }), HasSubstr("crashed (signal 6"));
   EXPECT_THAT(failure([] { ::_exit(3); }), HasSubstr("failed (exit code 3)"));
-  EXPECT_THAT(failure([] { throw Error("a reason"); }), HasSubstr("last words: a reason"));
+  EXPECT_THAT(failure([] { throw Error("a reason"); }),
+              HasSubstr("the last line of its output: a reason"));
   EXPECT_THAT(failure([] { throw 1; }), HasSubstr("failed"));
   EXPECT_THAT(failure(
                   [] {
@@ -509,7 +510,7 @@ TEST(BuildProgram, RefusesDoubleWhereThereIsNone) {
   OpenClDevice device = *OpenAnyDevice();
   device.has_double = false;
   EXPECT_THAT(ErrorOf([&] { BuildProgram(device, EmbeddedKernelFiles(), "double"); }),
-              HasSubstr("no double"));
+              HasSubstr("does not support double precision"));
 }
 
 TEST(TryDevice, ADeviceThatCannotBuildTheKernelsIsReported) {

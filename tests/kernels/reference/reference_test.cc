@@ -522,7 +522,7 @@ TEST_F(ReferenceTest, WrongArgumentsAreNamed) {
   EXPECT_EQ(ErrorOf([&] {
               reference_->WeightRays(block, Splat::kNearest, std::vector<std::int32_t>(12, 12), {});
             }),
-            "list of rays: 12 is none of the block's: it must be -1 to 11");
+            "list of rays: 12 is not a ray of the block: it must be -1 to 11");
   EXPECT_EQ(ErrorOf([&] {
               reference_->WeightRays(block, Splat::kNearest, std::vector<std::int32_t>(12, 0), {1});
             }),
@@ -546,7 +546,7 @@ TEST_F(ReferenceTest, WrongArgumentsAreNamed) {
       "values of a normal product has 0 el");
   reference_->StartWhole(9, 9, 2, 1, 1);
   EXPECT_EQ(ErrorOf([&] { reference_->AddBlock(block, 1, std::vector<double>(12)); }),
-            "block is added to channel 1: it must be 0 to 0");
+            "a block is added to channel 1: it must be 0 to 0");
   EXPECT_EQ(ErrorOf([&] { reference_->AddBlock(block, 0, std::vector<double>(11)); }),
             "block's rays has 11 elements: it must have 12");
   EXPECT_EQ(ErrorOf([&] { reference_->StartWhole(-1, 9, 2, 1, 1); }).substr(0, 13),

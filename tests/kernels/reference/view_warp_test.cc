@@ -273,12 +273,14 @@ TEST_P(ViewWarpTest, RefusesWhatDoesNotFit) {
                 HasSubstr(std::to_string(index) + ": it must be 0 to 107"));
   }
   occluded_ = {{5, 0, 0, 0}};
-  EXPECT_THAT(ErrorOf([&] { Warp(); }), HasSubstr("occluded sample 5 of a view is of disparity 0"));
+  EXPECT_THAT(ErrorOf([&] { Warp(); }),
+              HasSubstr("occluded sample 5 of a view has the disparity 0"));
   occluded_.clear();
   for (const std::int32_t index : {-1, 7, 108}) {
     boundary_ = {{7, {}, 0.5F}, {index, {}, 0.5F}};
-    EXPECT_THAT(ErrorOf([&] { Warp(); }),
-                HasSubstr(std::to_string(index) + " after 7: indices must grow from 0 to 107"));
+    EXPECT_THAT(
+        ErrorOf([&] { Warp(); }),
+        HasSubstr(std::to_string(index) + " after 7: indices must ascend from 0 to at most 107"));
   }
   for (const float share : {-0.1F, 1.1F, kNone}) {
     boundary_ = {{7, {}, share}};
@@ -289,7 +291,7 @@ TEST_P(ViewWarpTest, RefusesWhatDoesNotFit) {
   EXPECT_THAT(ErrorOf([&] { Warp(); }), HasSubstr("shift of a view is nan"));
   shift_y_ = 0;
   values_.push_back(0);
-  EXPECT_THAT(ErrorOf([&] { Warp(); }), HasSubstr("there must be 108"));
+  EXPECT_THAT(ErrorOf([&] { Warp(); }), HasSubstr("it must have 108"));
 }
 
 TEST_P(ViewWarpTest, IsUsedByManyThreads) {

@@ -375,7 +375,7 @@ TEST(OutputFolder, VanishedMeanwhileIsAnError) {
   const TemporaryFolder folder;
   const std::string parent = folder / "parent";
   const auto vanish = [&] { fs::remove_all(parent); };
-  const std::string why = "was removed or renamed by somebody else";
+  const std::string why = "was removed or renamed by another process";
   {
     fs::create_directory(parent);
     OutputFolder output(parent + "/out", "marker");
@@ -412,7 +412,7 @@ TEST(OutputFile, VanishedMeanwhileIsAnError) {
     fs::remove(folder / part);
     folder.Put(part, "of somebody else");
     EXPECT_THAT(ErrorOf([&] { output.Commit("mine"); }),
-                HasSubstr("was removed or renamed by somebody else"));
+                HasSubstr("was removed or renamed by another process"));
   }
   EXPECT_FALSE(fs::exists(folder / "out"));
   EXPECT_EQ(ContentOf(folder / part), "of somebody else");

@@ -281,7 +281,8 @@ TEST(OutputPlace, FilesThatAKilledRunDidNotTouchAreKept) {
   fs::create_directories(out + "/.thicklens.0123456789abcdef.part/frames");
   fs::create_directories(out + "/frames");
   std::ofstream(out + "/frames/photo.raw") << "mine";
-  EXPECT_THAT(FolderRefusal(out, {kMarker, "frames"}), ::testing::HasSubstr("holds other files"));
+  EXPECT_THAT(FolderRefusal(out, {kMarker, "frames"}),
+              ::testing::HasSubstr("contains other files"));
   EXPECT_EQ(ContentOf(out + "/frames/photo.raw"), "mine");
   // A mount point is written in place.
   const std::string place = folder / "place";
@@ -290,7 +291,7 @@ TEST(OutputPlace, FilesThatAKilledRunDidNotTouchAreKept) {
     fs::create_directories(place + "/frames");
     std::ofstream(place + "/frames/photo.raw") << "mine";
     const std::string refusal = FolderRefusal(place, {kMarker, "frames"});
-    return Unless(refusal.find("holds other files") != std::string::npos, refusal) +
+    return Unless(refusal.find("contains other files") != std::string::npos, refusal) +
            Unless(ContentOf(place + "/frames/photo.raw") == "mine", "the photo is lost");
   }));
 }

@@ -23,9 +23,10 @@ TEST(ResidualGuard, RefusesWhatIsFarWorseThanNothing) {
   try {
     RequireProgress("grid", 11, 892, "allow more");
   } catch (const Error& error) {
-    EXPECT_THAT(error.what(),
-                ::testing::HasSubstr("grid: the iterations led nowhere: after 892 of them the "
-                                     "relative residual is 11"));
+    EXPECT_THAT(
+        error.what(),
+        ::testing::HasSubstr(
+            "grid: the iterations diverged: after 892 of them the relative residual is 11"));
   }
 }
 

@@ -95,7 +95,7 @@ TEST(YamlScalar, BooleanTextAndChoice) {
   EXPECT_FALSE(Parse("x: false").At("x").Boolean());
   EXPECT_THAT(ErrorOf([] { Parse("x: yes").At("x").Boolean(); }), HasSubstr("true, false"));
   EXPECT_EQ(Parse("x: a b").At("x").Text(), "a b");
-  EXPECT_THAT(ErrorOf([] { Parse("x: ''").At("x").Text(); }), HasSubstr("a text is expected"));
+  EXPECT_THAT(ErrorOf([] { Parse("x: ''").At("x").Text(); }), HasSubstr("text is expected"));
   EXPECT_THAT(ErrorOf([] { Parse("x: [a]").At("x").Text(); }), HasSubstr("found a list"));
   EXPECT_THAT(ErrorOf([] {
                 Parse("x: up").At("x").OneOf({"away", "toward"});
@@ -125,11 +125,11 @@ TEST(YamlKeys, DuplicateKeyIsRefusedAtTheSecond) {
   EXPECT_EQ(ErrorOf([] {
               Parse("a: 1\nb: 2\na: 3").RequireKeys({"a", "b"});
             }),
-            "f.yaml:3:1: key 'a' stands here twice");
+            "f.yaml:3:1: key 'a' is given twice");
   EXPECT_EQ(ErrorOf([] {
               Parse("{a: 1, a: 1}").RequireKeys({"a", "b"});
             }),
-            "f.yaml:1:8: key 'a' stands here twice");
+            "f.yaml:1:8: key 'a' is given twice");
 }
 
 TEST(YamlKeys, OfSomethingThatIsNoMap) {
@@ -151,8 +151,8 @@ TEST(YamlSchema, MissingOtherOrNoMap) {
   EXPECT_THAT(error(""), HasSubstr("f.yaml: one YAML document is expected"));
   EXPECT_THAT(error("a: 1\n---\nb: 2"), HasSubstr("one YAML document is expected, found more"));
   // yaml-cpp would find documents without end here.
-  EXPECT_THAT(error(","), HasSubstr("f.yaml:1:1: no valid YAML"));
-  EXPECT_THAT(error("\n ]a: 1"), HasSubstr("f.yaml:2:2: no valid YAML"));
+  EXPECT_THAT(error(","), HasSubstr("f.yaml:1:1: not valid YAML"));
+  EXPECT_THAT(error("\n ]a: 1"), HasSubstr("f.yaml:2:2: not valid YAML"));
 }
 
 TEST(YamlPlace, LineAndColumnAreOnesOfTheValue) {

@@ -405,7 +405,7 @@ TEST(EffectsTest, ChoiceIsReadAndFollowed) {
   EXPECT_FALSE(on(automatic).Has(Effect::kQuantisation));
   EXPECT_EQ(SelectEffects(automatic, conditions, places, model).findings.size(), 17U);
   EXPECT_THAT(ErrorOf([&] { on(EffectSelectionOptionsFromText("auto", "tilt,drift", "")); }),
-              HasSubstr("effect tilt is not one of this image's: it has thickness"));
+              HasSubstr("effect tilt does not apply to this image: its effects are thickness"));
 }
 
 TEST(EffectsTest, SaysWhatIsWrong) {
@@ -432,7 +432,7 @@ TEST(EffectsTest, SaysWhatIsWrong) {
   wrong.bench = BenchConditions{true, 0, 0, 0, 90};
   EXPECT_THAT(message(wrong), HasSubstr("bench.tilt_deg is 90"));
   EXPECT_THAT(ErrorOf([&] { FindImpacts(conditions, {}, EffectSet::All()); }),
-              HasSubstr("there is no place"));
+              HasSubstr("the list of places is empty"));
   EXPECT_THAT(ErrorOf([&] { PlacesBetween(conditions.camera, 0, 1, false); }),
               HasSubstr("depths from 0 to 1 mm"));
   EffectTolerance none;

@@ -97,7 +97,7 @@ TEST(CameraFile, EveryErrorNamesItsPlace) {
               AllOf(StartsWith("c.yaml:5:6: psf"), HasSubstr("disc")));
   EXPECT_THAT(ErrorWith("lens: {", "lens: ["), StartsWith("c.yaml:3:"));
   EXPECT_THAT(ErrorWith("psf: gaussian", "psf: gaussian\npsf: disc"),
-              StartsWith("c.yaml:6:1: key 'psf' stands here twice"));
+              StartsWith("c.yaml:6:1: key 'psf' is given twice"));
   EXPECT_THAT(ErrorWith("name: bench\n", ""), HasSubstr("'name' is missing"));
   EXPECT_THAT(ErrorWith("schema: thicklens/camera/2\n", ""), HasSubstr("schema"));
   EXPECT_THAT(ErrorWith("camera/2", "camera/3"), HasSubstr("found 'thicklens/camera/3'"));

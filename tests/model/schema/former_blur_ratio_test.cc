@@ -91,7 +91,7 @@ TEST(FormerBlurRatio, IsConvertedWithItsErrorsAndANotice) {
   };
   EXPECT_NEAR(camera.blur_ratio(), converted(0.5, 16.2129), 1e-12);
   EXPECT_LT(camera.blur_ratio(), 0.495);
-  EXPECT_THAT(camera.notices, ElementsAre(HasSubstr("blur_ratio 0.5 was that of the aperture")));
+  EXPECT_THAT(camera.notices, ElementsAre(HasSubstr("blur_ratio 0.5 described the aperture")));
   // The covariance by finite differences.
   const Eigen::Vector2d slope((converted(0.5, 16.2139) - converted(0.5, 16.2119)) / 0.002,
                               (converted(0.501, 16.2129) - converted(0.499, 16.2129)) / 0.002);

@@ -66,7 +66,7 @@ TEST_F(SweepFolder, Floor) {
   EXPECT_EQ(floor("{from: 0.2, to: 0.7}").to_px.value(), 0.7);
   EXPECT_THAT(error("{from: 0.7, to: 0.2}"), HasSubstr("0.7 and 0.2"));
   EXPECT_THAT(error("{from: 0.7}"), HasSubstr("'to' is missing"));
-  EXPECT_THAT(error("{value: 1, from: 0, to: 2}"), HasSubstr("not a mixture"));
+  EXPECT_THAT(error("{value: 1, from: 0, to: 2}"), HasSubstr("exactly one of"));
   EXPECT_THAT(error("{}"), HasSubstr("expected"));
   EXPECT_THAT(error("-1"), HasSubstr("must be >= 0, found -1"));
   EXPECT_THAT(error("[0, 1]"), HasSubstr("blur_floor_px"));
@@ -99,7 +99,7 @@ TEST_F(SweepFolder, FloorOfAnotherCalibration) {
   EXPECT_EQ(sweep.floor_origin.value().camera_path, camera);
   EXPECT_THAT(
       ErrorWith(frames_ + "blur_floor_px: {from_calibration: edge/camera.yaml, value: 1}\n"),
-      HasSubstr("not a mixture"));
+      HasSubstr("exactly one of"));
   EXPECT_FALSE(Read(frames_ + "blur_floor_px: 0.5\n").floor_origin);
 }
 
@@ -110,7 +110,7 @@ TEST_F(SweepFolder, AFloorThatWasNotMeasuredIsRefused) {
   };
   const std::string place = "s.yaml:4:35: blur_floor_px.from_calibration: ";
   EXPECT_THAT(error(""),
-              AllOf(HasSubstr(place), HasSubstr("edge/camera.yaml holds no calibration:")));
+              AllOf(HasSubstr(place), HasSubstr("edge/camera.yaml contains no calibration:")));
   EXPECT_THAT(error("{blur_ratio: 0.4, evidence: {method: joint}}"),
               AllOf(HasSubstr(place), HasSubstr("no calibration.blur_floor_px")));
   for (const std::string method : {"assumed", "source-recipe"}) {
@@ -137,9 +137,9 @@ TEST_F(SweepFolder, AFloorOfAnotherCameraIsRefused) {
   EXPECT_THAT(
       error(camera(50, 9, 0.006)),
       AllOf(HasSubstr("s.yaml:4:35: blur_floor_px.from_calibration: "),
-            HasSubstr("sensor.pixel_pitch_mm 0.005"), HasSubstr("'edge' of this sweep 0.006")));
+            HasSubstr("sensor.pixel_pitch_mm 0.005"), HasSubstr("'edge' of this sweep has 0.006")));
   EXPECT_THAT(error(camera(35, 9, 0.005)),
-              AllOf(HasSubstr("lens.front_focal_length_mm 50"), HasSubstr("this sweep 35:")));
+              AllOf(HasSubstr("lens.front_focal_length_mm 50"), HasSubstr("this sweep has 35:")));
   EXPECT_THAT(error(camera(50, 4.5, 0.005)), HasSubstr("lens.aperture_radius_mm 9"));
   Camera other = camera(50, 9, 0.005);
   other.lens.lens_thickness_mm = 3;
@@ -188,7 +188,7 @@ TEST_F(SweepFolder, OrderAndRepeatsAreReported) {
   ReadTable("a.png,1\nb.png,3\nc.png,2\n", "reading_sigma_mm: 1\n");
   EXPECT_THAT(notices_, ElementsAre(HasSubstr("not in order")));
   ReadTable("a.png,3\nb.png,2\nc.png,2\n", "reading_sigma_mm: 1\n");
-  EXPECT_THAT(notices_, ElementsAre(HasSubstr("1 frames share")));
+  EXPECT_THAT(notices_, ElementsAre(HasSubstr("1 frames have the same reading")));
 }
 
 TEST_F(SweepFolder, YamlComesBack) {

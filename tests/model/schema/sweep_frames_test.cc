@@ -65,8 +65,8 @@ TEST_F(SweepFolder, TableErrorsNameTheLine) {
               AllOf(StartsWith(csv + ":2: "), HasSubstr("CSV")));
   EXPECT_THAT(ErrorOfTable("a.png,1\nb\"b.png,2\nc.png,3\n"),
               AllOf(StartsWith(csv + ":2: "), HasSubstr("CSV")));
-  EXPECT_THAT(ErrorOfTable(""), HasSubstr("no rows"));
-  EXPECT_THAT(ErrorOfTable("file,reading\n"), HasSubstr("no rows"));
+  EXPECT_THAT(ErrorOfTable(""), HasSubstr("no row has"));
+  EXPECT_THAT(ErrorOfTable("file,reading\n"), HasSubstr("no row has"));
   EXPECT_THAT(ErrorWith("frames_csv: none.csv\n"), HasSubstr("none.csv"));
 }
 
@@ -102,7 +102,7 @@ TEST_F(SweepFolder, TableInAnotherFolderAndUnits) {
               AllOf(HasSubstr("s.yaml:4:16: readings_unit"), HasSubstr("'feet'")));
   EXPECT_THAT(ErrorWith("readings_unit: cm\n" + frames_), HasSubstr("reading_mm"));
   EXPECT_THAT(ErrorWith("frames_csv: bench/r.csv\nframes_dir: none\n"),
-              HasSubstr("no such folder"));
+              HasSubstr("the folder does not exist"));
 }
 
 TEST_F(SweepFolder, SameNameInTwoFoldersIsAskedBack) {
@@ -150,11 +150,11 @@ TEST_F(SweepFolder, ListOfFrames) {
   EXPECT_THAT(ErrorWith("frames: [{image: a.png, reading_cm: 1}]\n"), HasSubstr("wrong unit"));
   EXPECT_THAT(ErrorWith("frames: [{image: a.png}]\n"), HasSubstr("'reading_mm' is missing"));
   EXPECT_THAT(ErrorWith("frames: [{image: a.png, reading_mm: nan}]\n"), HasSubstr("finite"));
-  EXPECT_THAT(ErrorWith("frames: []\n"), HasSubstr("s.yaml:3:9: frames: a frame at least"));
+  EXPECT_THAT(ErrorWith("frames: []\n"), HasSubstr("s.yaml:3:9: frames: at least one frame"));
   EXPECT_THAT(ErrorWith(""), HasSubstr("either 'frames'"));
   EXPECT_THAT(ErrorWith(frames_ + "frames_csv: r.csv\n"), HasSubstr("either 'frames'"));
-  EXPECT_THAT(ErrorWith(frames_ + "frames_dir: x\n"), HasSubstr("goes with 'frames_csv'"));
-  EXPECT_THAT(ErrorWith(frames_ + "frames_glob: x\n"), HasSubstr("goes with 'frames_csv'"));
+  EXPECT_THAT(ErrorWith(frames_ + "frames_dir: x\n"), HasSubstr("applies only to 'frames_csv'"));
+  EXPECT_THAT(ErrorWith(frames_ + "frames_glob: x\n"), HasSubstr("applies only to 'frames_csv'"));
   EXPECT_THAT(ErrorWith(frames_ + "offset_cm: 3\n"), HasSubstr("this field is 'offset_mm'"));
 }
 
@@ -173,7 +173,7 @@ TEST_F(SweepFolder, FromAFolderWithItsFramesBelow) {
     EXPECT_THAT(notices_, ElementsAre(HasSubstr("reading_sigma_mm")));
   }
   EXPECT_THAT(ErrorOf([&] { SweepFromFolder(folder_ / "none", csv, "c.yaml", nullptr); }),
-              HasSubstr("no such folder"));
+              HasSubstr("the folder does not exist"));
 }
 
 }  // namespace

@@ -83,8 +83,9 @@ class DoctorTest : public ::testing::Test {
 
     const ProgramResult refused = Run({"--device", "opencl", "--json", scratch_ / "refused.json"});
     EXPECT_EQ(refused.exit_code, 1);
-    EXPECT_THAT(refused.err, AllOf(StartsWith("thicklens: error: device 'opencl' cannot be used"),
-                                   HasSubstr(why), HasSubstr("device cpu needs no OpenCL")));
+    EXPECT_THAT(refused.err,
+                AllOf(StartsWith("thicklens: error: device 'opencl' cannot be used"),
+                      HasSubstr(why), HasSubstr("the device cpu does not need OpenCL")));
     EXPECT_EQ(refused.err.find('\n'), refused.err.size() - 1) << refused.err;
     const auto json = nlohmann::json::parse(ContentOf(scratch_ / "refused.json"));
     EXPECT_EQ(json["status"], "refused");

@@ -88,7 +88,7 @@ TEST_F(EstimateBandsTest, GiveTheSameViewsInLessMemory) {
   result = Run("none", {"--memory-limit", "5"});
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_FALSE(fs::exists(folder_ / "none"));
-  ASSERT_THAT(result.err, HasSubstr("memory limit 5 MiB: in any number of bands "));
+  ASSERT_THAT(result.err, HasSubstr("memory limit 5 MiB: with any number of bands "));
   const double least = std::stod(result.err.substr(result.err.find("of bands ") + 9));
   const double limit = (least + whole["predicted_memory_mib"].get<double>()) / 2;
 
@@ -173,7 +173,7 @@ TEST_F(EstimateBandsTest, TheForecastHoldsForRoughDepthAndManyViews) {
     const json whole = run(3000);
     EXPECT_EQ(whole["bands"], 1);
     const ProgramResult refused = Run("none", {"--threads", threads, "--memory-limit", "5"});
-    ASSERT_THAT(refused.err, HasSubstr("in any number of bands "));
+    ASSERT_THAT(refused.err, HasSubstr("with any number of bands "));
     const double least = std::stod(refused.err.substr(refused.err.find("of bands ") + 9));
     const double forecast = whole["predicted_memory_mib"];
     ASSERT_LT(least, forecast);

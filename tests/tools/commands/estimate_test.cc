@@ -193,11 +193,12 @@ TEST_F(EstimateTest, AnImageOfAPartOfTheSensor) {
   EXPECT_THAT(
       Refusal(With(With({Image(), depth}, rest), {"--sensor-origin", "21,8"})),
       AllOf(HasSubstr("--sensor-origin: "), HasSubstr("large.yaml: the rectangle 21,8,36,28"),
-            HasSubstr("leaves the sensor of 56x36 px"),
-            HasSubstr("x may be from 0 to 20, y to 8")));
-  EXPECT_THAT(Refusal(With(AsDisparity(Image(), Disparity()), {"--crop", "30,0,10,10"})),
-              AllOf(HasSubstr("--crop: "), HasSubstr("picture.png: the rectangle 30,0,10,10"),
-                    HasSubstr("leaves the image of 36x28 px"), HasSubstr("x may be from 0 to 26")));
+            HasSubstr("is not inside the sensor of 56x36 px"),
+            HasSubstr("x must be from 0 to 20 and y from 0 to 8")));
+  EXPECT_THAT(
+      Refusal(With(AsDisparity(Image(), Disparity()), {"--crop", "30,0,10,10"})),
+      AllOf(HasSubstr("--crop: "), HasSubstr("picture.png: the rectangle 30,0,10,10"),
+            HasSubstr("is not inside the image of 36x28 px"), HasSubstr("x must be from 0 to 26")));
 }
 
 TEST_F(EstimateTest, GreyAndSixteenBits) {
@@ -236,11 +237,11 @@ TEST_F(EstimateTest, DepthThatCannotBe) {
                      unit,  "--camera", Camera(),       "--views", "3x3"};
   };
   EXPECT_THAT(Refusal(as_z(Depth([](int, int) { return 0; }), "mm")),
-              AllOf(HasSubstr("depth.pfm"), HasSubstr("all are holes")));
+              AllOf(HasSubstr("depth.pfm"), HasSubstr("values are holes")));
   EXPECT_THAT(Refusal(as_z(Depth([](int, int) { return 800; }), "m")),
-              AllOf(HasSubstr("depth.pfm"), HasSubstr("is the unit right")));
+              AllOf(HasSubstr("depth.pfm"), HasSubstr("check the unit")));
   EXPECT_THAT(Refusal(as_z(Depth([](int, int) { return 0.8; }), "mm")),
-              AllOf(HasSubstr("depth.pfm"), HasSubstr("is the unit right")));
+              AllOf(HasSubstr("depth.pfm"), HasSubstr("check the unit")));
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THAT(Refusal(AsDisparity(image, Depth([](int, int) { return kNan; }))),
               AllOf(HasSubstr("depth.pfm"), HasSubstr("holes")));
@@ -327,7 +328,7 @@ TEST_F(EstimateTest, DisparityBeyondTheImage) {
   // The camera converts the disparity to an impossible depth, which the user did not give.
   EXPECT_THAT(Refusal(With(AsDisparity(Image(), Disparity()),
                            {"--camera", Camera(), "--disparity-scale", "1e6"})),
-              AllOf(HasSubstr("depth.pfm"), HasSubstr("scale and offset of the disparity"),
+              AllOf(HasSubstr("depth.pfm"), HasSubstr("the scale and the offset of the disparity"),
                     Not(HasSubstr("unit"))));
 }
 

@@ -247,7 +247,7 @@ TEST_F(SimulateSceneTest, OutlineMayBeAMaskFile) {
   folder_.Put("masks/card.png", io::EncodePng(mask));
   EXPECT_THAT(Failure({"image", config, "-o", folder_ / "other"}),
               AllOf(HasSubstr("layers[1]: outline.mask"), HasSubstr("card.png"),
-                    HasSubstr("is 20x60 px, the scene's image 40x30 px")));
+                    HasSubstr("has 20x60 px, but the scene's image has 40x30 px")));
   folder_.Put("masks/card.png", "none");
   EXPECT_THAT(Failure({"light-field", config, "-o", folder_ / "other"}), HasSubstr("card.png"));
   EXPECT_FALSE(fs::exists(folder_ / "other"));

@@ -263,7 +263,7 @@ TEST_F(RunFilesTest, ARefusalIsNotWrittenOverWhatIsNoSummary) {
   work_.Put("w/sweep/sweep.yaml", "schema: thicklens/sweep/1\ncamera: [\n");
   const ProgramRun run = Run({"calibrate", (*this)("sweep"), "--json", frame});
   EXPECT_EQ(run.exit_code, 1);
-  EXPECT_THAT(run.err, AllOf(HasSubstr("is not overwritten"), HasSubstr("no valid YAML")));
+  EXPECT_THAT(run.err, AllOf(HasSubstr("is not overwritten"), HasSubstr("not valid YAML")));
   EXPECT_EQ(ContentOf(frame), before);
   const std::string older = work_.Put("older.json", "{\"status\": \"ok\"}\n");
   EXPECT_EQ(Run({"calibrate", (*this)("sweep"), "--json", older}).exit_code, 1);

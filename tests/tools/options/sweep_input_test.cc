@@ -65,7 +65,7 @@ TEST_F(SweepInputTest, FloorFromAnUnfitCameraIsRefused) {
   arguments_.floor_from = folder_ / "other.yaml";
   EXPECT_THAT(ErrorOf([&] { ReadSweepInput(arguments_); }),
               AllOf(StartsWith("--floor-from: "), HasSubstr("sensor.pixel_pitch_mm 0.006"),
-                    HasSubstr("'bench' of this sweep 0.005")));
+                    HasSubstr("'bench' of this sweep has 0.005")));
   arguments_.floor_from = folder_ / "camera.yaml";
   EXPECT_THAT(ErrorOf([&] { ReadSweepInput(arguments_); }),
               AllOf(StartsWith("--floor-from: "), HasSubstr("no calibration")));

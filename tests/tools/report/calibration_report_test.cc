@@ -568,14 +568,14 @@ TEST(CalibrationReport, AccountsForFramesThatAreNotInTheFit) {
   MadeUpCalibration made = MakeUpCalibration(31, 300, 8);
   EXPECT_THAT(Page(made), Not(HasSubstr("no information about the blur")));
   for (const std::size_t i : {3u, 4u, 5u, 9u})
-    made.calibration.frames[i].not_in_fit = "too strongly blurred";
+    made.calibration.frames[i].not_in_fit = "blurred too strongly";
   made.calibration.frames[20].not_in_fit = "not registered";
   const std::string html = Page(made);
   ASSERT_EQ(ParseXml(html).error, "");
   EXPECT_THAT(
       html,
       HasSubstr("5 more frames passed the quality checks but give no information about the blur:"));
-  EXPECT_THAT(html, HasSubstr("too strongly blurred (4): frame_003.png … frame_005.png (3 frames), "
+  EXPECT_THAT(html, HasSubstr("blurred too strongly (4): frame_003.png … frame_005.png (3 frames), "
                               "frame_009.png</li>"));
   EXPECT_THAT(html, HasSubstr("not registered (1): frame_020.png</li>"));
   RejectFrame(0, "dark", &made.calibration);

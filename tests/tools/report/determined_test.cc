@@ -21,7 +21,7 @@ using ::testing::Not;
 
 MadeUpCalibration RefusedWithFindings() {
   MadeUpCalibration made = MakeUpCalibration(31, 300, 8);
-  RefuseAll("offset_mm is unknown and was not found", &made.calibration);
+  RefuseAll("offset_mm is not stated and could not be determined", &made.calibration);
   calib::Calibration& c = made.calibration;
   c.sharpest = {true, "fitted", {110.0312, 0.11}, 5, 12};
   c.focus_reading_mm = model::Estimate{109.99841, 0.0004};

@@ -23,7 +23,7 @@ std::vector<FrameMeasurement> Frames(int count) {
 
 TEST(RejectionLines, ShowEveryFramesOwnAmount) {
   std::vector<FrameMeasurement> frames = Frames(9);
-  const std::string about = "mm, or frame damaged: its image scale is that of reading ";
+  const std::string about = "mm, or frame damaged: its image scale belongs to the reading ";
   frames[2].rejection = "reading off by -12.0 " + about + "312.1 mm; swapped with f3.png";
   frames[3].rejection = "reading off by 12.0 " + about + "300.1 mm; swapped with f2.png";
   frames[7].rejection = "reading off by 4.5 " + about + "330.2 mm";
@@ -41,17 +41,17 @@ TEST(RejectionLines, ShowEveryFramesOwnAmount) {
 
 TEST(RejectionLines, ALoneFrameOrRunIsOneLine) {
   std::vector<FrameMeasurement> frames = Frames(9);
-  frames[1].rejection = "dark: mean 0.001";
+  frames[1].rejection = "dark: the mean is 0.001";
   for (const std::size_t i : {4U, 5U, 6U}) frames[i].rejection = "raw mosaic: develop it first";
   EXPECT_EQ(RejectionLines(frames),
-            "  f1.png: dark: mean 0.001\n"
-            "  f4.png .. f6.png (3 frames): raw mosaic: develop it first\n");
+            "  f1.png: dark: the mean is 0.001\n  f4.png .. f6.png (3 frames): raw mosaic: develop "
+            "it first\n");
   EXPECT_EQ(RejectionLines(Frames(9)), "");
 }
 
 TEST(RejectionLines, LeaveOutWhatAllHaveInCommonButNoAmount) {
   std::vector<FrameMeasurement> frames = Frames(6);
-  const std::string rest = " % of the pixels are clipped at 255, at most 5 % may";
+  const std::string rest = " % of the pixels are clipped at 255, but at most 5 % may be";
   frames[0].rejection = "saturated: 91" + rest;
   frames[1].rejection = "saturated: 81" + rest;  // the last digit is the same
   frames[4].rejection = "saturated: 91" + rest;
@@ -67,11 +67,11 @@ TEST(RejectionLines, LeaveOutWhatAllHaveInCommonButNoAmount) {
 TEST(RejectionLines, CountWhatTheyDoNotName) {
   std::vector<FrameMeasurement> frames = Frames(30);
   for (std::size_t i = 0; i < 20; ++i)
-    frames[i].rejection = "dark: mean 0.0" + std::to_string(10 + i / 2);
+    frames[i].rejection = "dark: the mean is 0.0" + std::to_string(10 + i / 2);
   const std::string text = RejectionLines(frames);
   EXPECT_THAT(text, HasSubstr("dark (20 frames)"));
   // Six runs of two frames are named.
-  EXPECT_THAT(text, HasSubstr("f10.png .. f11.png (2 frames): mean 0.015\n    and 8 more"));
+  EXPECT_THAT(text, HasSubstr("f10.png .. f11.png (2 frames): the mean is 0.015\n    and 8 more"));
   EXPECT_THAT(text, Not(HasSubstr("0.016")));
 }
 

@@ -392,7 +392,7 @@ TEST(HeightFieldSceneTest, WrongInputIsReported) {
             "layers[0] 'hill': depth.map 'map.pfm' is empty");
   EXPECT_THAT(
       message([](Layer*, Pixels* p) { p->depth.width_px = kHeight, p->depth.height_px = kWidth; }),
-      HasSubstr("layers[0] 'hill': depth.map 'map.pfm': it is 36x48 px, the image 48x36"));
+      HasSubstr("layers[0] 'hill': depth.map 'map.pfm': it has 36x48 px, but the image has 48x36"));
   EXPECT_EQ(
       message([](Layer*, Pixels* p) { p->depth.values[7] = p->depth.values[70] = NAN; }),
       "layers[0] 'hill': depth.map 'map.pfm': 2 of its 1728 values are holes: a surface needs "
@@ -407,7 +407,7 @@ TEST(HeightFieldSceneTest, WrongInputIsReported) {
                 l->outline.shape = OutlineOptions::Shape::kDisc;
                 l->outline.radius = 3;
               }),
-              HasSubstr("outline: a layer with a depth map is whole and has none"));
+              HasSubstr("outline: it is given for a layer with a depth map"));
 }
 
 }  // namespace

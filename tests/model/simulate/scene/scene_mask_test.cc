@@ -179,9 +179,10 @@ TEST(SceneMaskTest, WrongMasksAreReported) {
   };
   EXPECT_EQ(message({}), "outline.mask 'm.png' is empty");
   EXPECT_EQ(message({kWidth, kHeight, 3, std::vector<float>(3 * kWidth * kHeight)}),
-            "outline.mask 'm.png' has 3 channels: a mask is a grey image of one");
+            "outline.mask 'm.png' has 3 channels: a mask must be a grey image with 1 channel");
   EXPECT_EQ(message({3, 2, 1, std::vector<float>(6, 1.0F)}),
-            "outline.mask 'm.png' is 3x2 px, the scene's image 37x26 px: the sizes must be equal");
+            "outline.mask 'm.png' has 3x2 px, but the scene's image has 37x26 px: the sizes must "
+            "be equal");
   EXPECT_EQ(message(MaskOf(std::vector<float>(kWidth * kHeight, 127 / 255.0F))),
             "outline.mask 'm.png' is empty: none of its 962 values is at least half of full scale");
 }

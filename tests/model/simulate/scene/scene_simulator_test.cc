@@ -640,23 +640,24 @@ TEST(SceneSimulatorTest, RefusesScenesThatCannotBe) {
   using Options = SceneSimulationOptions;
   EXPECT_EQ(message([](Options*) {}), "(no error)");
   EXPECT_THAT(message([](Options* o) { o->layers.erase(o->layers.begin()); }),
-              HasSubstr("none of 1 is without an outline"));
-  EXPECT_THAT(message([](Options* o) { o->layers.clear(); }), HasSubstr("none of 0"));
+              HasSubstr("none of the 1 is without an outline"));
+  EXPECT_THAT(message([](Options* o) { o->layers.clear(); }), HasSubstr("none of the 0"));
   EXPECT_THAT(
       message([](Options* o) { o->layers[1].name = "card", o->layers[1].plane.depth_mm = -1; }),
       HasSubstr("layers[1] 'card': plane.depth_mm is -1"));
   EXPECT_THAT(message([](Options* o) { o->layers[0].plane.depth_mm = 49; }),
-              HasSubstr("layers[0]: its plane, depth_mm 49 and slope [0, 0], is not met"));
+              HasSubstr("layers[0]: some rays of the image do not meet its plane, depth_mm 49 "
+                        "and slope [0, 0],"));
   // 25 px of slope 0.000075 each: a plane that rises by 600 leaves the right of the image.
   EXPECT_THAT(message([](Options* o) {
                 o->layers[0].plane.slope = {700, 0};
               }),
-              HasSubstr("is not met by every ray"));
+              HasSubstr("some rays of the image do not meet its plane"));
   EXPECT_THAT(message([](Options* o) {
                 o->layers[0].plane.slope = {700, 0};
                 o->camera.calibration->blur_ratio->value = 0;
               }),
-              HasSubstr("is not met by every ray"));
+              HasSubstr("some rays of the image do not meet its plane"));
   EXPECT_THAT(message([](Options* o) { o->layers[0].plane.slope.y() = NAN; }),
               HasSubstr("plane.slope is [0, nan]"));
   EXPECT_THAT(message([](Options* o) { o->layers[1].outline.size.x() = 0; }),
@@ -675,7 +676,7 @@ TEST(SceneSimulatorTest, RefusesScenesThatCannotBe) {
   EXPECT_THAT(message([](Options* o) { o->layers[0].texture.feature_size_px = -1; }),
               HasSubstr("texture.feature_size_px is -1"));
   EXPECT_THAT(message([](Options* o) { o->layers[0].texture.feature_size_px = 0.1; }),
-              HasSubstr("layers[0]: texture.feature_size_px is 0.1: of dead-leaves"));
+              HasSubstr("layers[0]: texture.feature_size_px is 0.1: for dead-leaves"));
   EXPECT_THAT(message([](Options* o) { o->layers[0].texture.angle_deg = NAN; }),
               HasSubstr("texture.angle_deg is nan"));
   EXPECT_THAT(message([](Options* o) {

@@ -77,7 +77,7 @@ TEST(SceneTargetsTest, EdgeIsAsSharpAsTheLargestPixelAllows) {
   options.feature_size_px = 1.2;
   EXPECT_THAT(ErrorOf([&] { DrawTexture(options, SquareRequest(60, 1.25)); }),
               HasSubstr("texture.feature_size_px is 1.2: the sigma of an edge must be at least "
-                        "1.25 here, one of the layer's largest px"));
+                        "1.25 in this layer, one of its largest px"));
 }
 
 TEST(SceneTargetsTest, StarHasItsSectorsAroundTheMiddleAndIsGreyWhereTheyAreTooFine) {

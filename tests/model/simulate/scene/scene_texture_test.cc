@@ -194,9 +194,9 @@ TEST(SceneTextureTest, RefusesFeaturesThatCannotBeShown) {
     request.coarsest_pixel_mm = 0.025;
     return ErrorOf([&] { DrawTexture(options, request); });
   };
-  EXPECT_THAT(message(TextureKind::kSine, 2.4), HasSubstr("must be at least 2.5 here"));
+  EXPECT_THAT(message(TextureKind::kSine, 2.4), HasSubstr("must be at least 2.5 in this layer"));
   EXPECT_EQ(message(TextureKind::kSine, 2.51), "(no error)");
-  EXPECT_THAT(message(TextureKind::kNoise, 1.9), HasSubstr("of noise it must be from 2 to 1000"));
+  EXPECT_THAT(message(TextureKind::kNoise, 1.9), HasSubstr("for noise it must be from 2 to 1000"));
   EXPECT_THAT(message(TextureKind::kDeadLeaves, 0.4), HasSubstr("must be from 0.5 to"));
   EXPECT_THAT(message(TextureKind::kCheckerboard, 0.9), HasSubstr("must be from 1 to"));
   EXPECT_THAT(message(TextureKind::kCheckerboard, 2000), HasSubstr("must be from 1 to"));

@@ -355,7 +355,7 @@ TEST(SweepEffectsTest, RefusesWhatASweepDoesNotHave) {
     const SweepSimulator simulator(options, {});
     FAIL();
   } catch (const Error& error) {
-    EXPECT_THAT(error.what(), HasSubstr("effect occlusion is not one of this image's"));
+    EXPECT_THAT(error.what(), HasSubstr("effect occlusion does not apply to this image"));
   }
 }
 

@@ -204,7 +204,7 @@ TEST(TiltedSweepTest, RefusesWhatLooksPastTheTarget) {
   options.target.tilt_deg = 80;
   options.camera.sensor.pixel_pitch_mm = 0.15;
   EXPECT_FALSE(options.IsValid(&why));
-  EXPECT_THAT(why, HasSubstr("look past the target"));
+  EXPECT_THAT(why, HasSubstr("miss the target"));
 }
 
 }  // namespace
