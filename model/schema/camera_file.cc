@@ -275,7 +275,11 @@ Camera ParseCamera(const std::string& text, const std::string& source_name) {
   return camera;
 }
 
-Camera ReadCamera(const std::string& path) { return ParseCamera(ReadTextFile(path), path); }
+Camera ReadCamera(const std::string& path) {
+  Camera camera = ParseCamera(ReadTextFile(path), path);
+  camera.source = path;
+  return camera;
+}
 
 std::string CameraToYaml(const Camera& camera) { return CameraWriter(camera).Write(); }
 

@@ -29,6 +29,11 @@ class RunScope {
     };
   }
 
+  // The name by which the program's user knows an option.
+  std::string Option(const std::string& field) const {
+    return run_.option_name ? run_.option_name(field) : field;
+  }
+
   void Warn(const std::string& text) { Note(Notice::Level::kWarning, text); }
   void Inform(const std::string& text) { Note(Notice::Level::kInformation, text); }
   const std::vector<Notice>& notices() const { return notices_; }

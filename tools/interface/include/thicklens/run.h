@@ -56,6 +56,10 @@ struct RunControl {
   // Called with each notice when it arises, on the calling thread. The summaries also keep them.
   // Empty: none.
   std::function<void(const Notice&)> notice;
+  // How errors and notices name an option: it gets the path of the member ("sensor_origin",
+  // "depth.meaning.unit") and returns the name that the program's user knows ("--sensor-origin").
+  // Empty: the path itself. OptionError::field() is always the path.
+  std::function<std::string(const std::string& field)> option_name;
 
   // Returns true if `threads` is in its range. Otherwise `why`, if not null, gets the reason.
   THICKLENS_EXPORT bool IsValid(std::string* why) const;

@@ -97,6 +97,7 @@ struct Camera {
   std::optional<CameraCalibration> calibration;
   // Remarks on how the camera was read, one sentence each. They are not written to files.
   std::vector<std::string> notices;
+  std::string source;  // the file that ReadCamera read; messages name it; not written to files
 
   // Returns true if the numbers describe a possible camera. Otherwise `why`, if not null, gets the
   // field, the value and the constraint.
