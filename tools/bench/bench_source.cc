@@ -26,7 +26,7 @@
 #include "tools/bench/bench_source_rows.h"
 #include "tools/bench/bench_source_tables.h"
 #include "tools/options/bench_options.h"
-#include "tools/options/estimate_input.h"
+#include "tools/options/estimate_call.h"
 #include "tools/options/light_field_options.h"
 #include "tools/options/option_values.h"
 #include "tools/system/progress_line.h"
@@ -128,11 +128,11 @@ SourceImage Given(const BenchSourceOptions& options, int views) {
   given.common = options.common;
   given.views.text = fmt::format("{0}x{0}", views);
   given.ignore_exif = true;  // the times do not depend on it
-  PreparedEstimate prepared = PrepareEstimate(given);
+  const Problem problem = PrepareProblemOf(given);
   SourceImage image;
   image.name = std::filesystem::path(given.image_path).stem().string();
   image.views = views;
-  image.whole.input = std::move(prepared.input);
+  image.whole.input = problem.input();
   Cut(options.full, &image);
   return image;
 }

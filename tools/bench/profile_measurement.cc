@@ -29,7 +29,7 @@
 #include "tools/bench/bench_parts.h"
 #include "tools/bench/bench_scene.h"
 #include "tools/bench/bench_solvers.h"
-#include "tools/options/estimate_input.h"
+#include "tools/options/estimate_call.h"
 #include "tools/options/file_seconds.h"
 #include "tools/system/build_info.h"
 #include "tools/system/machine.h"
@@ -287,7 +287,7 @@ MeasuredProfile MeasureProfile(const std::vector<estimator::EstimatePlan>& plans
     if (!prepared.truth) continue;
     ++judged;
     profile.warping_psnr_db += PsnrDb(
-        prepared, RunWarping(PrepareEstimate(prepared.options).input, run.threads).light_field,
+        prepared, RunWarping(PrepareProblemOf(prepared.options).input(), run.threads).light_field,
         run.threads);
   }
   if (judged == 0) throw Error("a profile needs a case that is judged by true views");
@@ -296,7 +296,7 @@ MeasuredProfile MeasureProfile(const std::vector<estimator::EstimatePlan>& plans
   for (int round = 0; round < run.repeat; ++round) {
     for (CaseRuns& of_case : cases) {
       const Prepared& prepared = of_case.prepared;
-      const estimator::Workload load = MeasuredWorkload(PrepareEstimate(prepared.options).input);
+      const estimator::Workload load = MeasuredWorkload(PrepareProblemOf(prepared.options).input());
       of_case.file_seconds.push_back(load.file_seconds);
       for (std::size_t i = 0; i < plans.size(); ++i) {
         if (run.progress) run.progress(done++, total);

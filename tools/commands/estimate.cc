@@ -1,15 +1,18 @@
 // thicklens estimate: estimates a light field from one image and its depth map.
+#include "thicklens/estimate.h"
+
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <memory>
 #include <optional>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "thicklens/base/cancel.h"
@@ -18,24 +21,18 @@
 #include "thicklens/base/parallel.h"
 #include "thicklens/base/printable_text.h"
 #include "thicklens/base/stopwatch.h"
-#include "thicklens/base/utc_time.h"
-#include "thicklens/estimator/block_solver.h"
-#include "thicklens/estimator/functional_solver.h"
-#include "thicklens/estimator/grid_solver.h"
-#include "thicklens/estimator/inpaint.h"
-#include "thicklens/estimator/scene_solver.h"
 #include "thicklens/io/block_checkpoint.h"
 #include "thicklens/io/confidence_files.h"
 #include "thicklens/io/light_field_io.h"
-#include "thicklens/kernels/device.h"
 #include "tools/commands/commands.h"
 #include "tools/commands/estimate_run.h"
 #include "tools/options/command_frame.h"
-#include "tools/options/estimate_input.h"
+#include "tools/options/estimate_call.h"
 #include "tools/options/estimate_options.h"
 #include "tools/options/estimate_plan.h"
 #include "tools/options/estimate_profile.h"
 #include "tools/options/file_seconds.h"
+#include "tools/options/interface_options.h"
 #include "tools/options/plan_choice.h"
 #include "tools/options/quality_target_options.h"
 #include "tools/report/estimate_records.h"
@@ -44,7 +41,6 @@
 #include "tools/report/report_folder.h"
 #include "tools/system/build_info.h"
 #include "tools/system/interrupt.h"
-#include "tools/system/progress_line.h"
 
 namespace thicklens::tools {
 namespace {
@@ -56,7 +52,7 @@ struct Outputs {
         report_folder(options.report_folder) {
     if (!options.report_folder.empty()) report.emplace(options.report_path());
     if (!options.checkpoint_path.empty()) {
-      checkpoint = std::make_unique<io::BlockCheckpoint>(
+      checkpoint = std::make_shared<io::BlockCheckpoint>(
           options.checkpoint_path, BuildInfo(),
           [](const std::string& text) { spdlog::warn("{}", text); });
     }
@@ -72,7 +68,7 @@ struct Outputs {
   OutputFolder light_field;
   ReportFolder report_folder;
   std::optional<OutputFile> report;
-  std::unique_ptr<io::BlockCheckpoint> checkpoint;  // none if it was not requested
+  std::shared_ptr<io::BlockCheckpoint> checkpoint;  // none if it was not requested
 
  private:
   std::string WhatIsKept() const {
@@ -86,110 +82,38 @@ struct Outputs {
   const LastWords last_words_{[this] { return WhatIsKept(); }};
 };
 
-// The maximum size of a part of the image that is solved as a whole: larger parts take more
-// memory and time per pixel, and the result does not improve.
-constexpr double kMaxBandPixels = 3e6;
-
-estimator::SceneOptions SceneSettings(const EstimateOptions& options,
-                                      const estimator::EstimateInput& input,
-                                      const model::EffectSet& on, const Progress& progress) {
-  estimator::SceneOptions settings = SceneOptionsOf(options, on, progress);
-  if (!settings.memory_limit_mib) settings.memory_limit_mib = UsualMemoryLimitMib();
-  const auto pixels = static_cast<double>(input.disparity.disparity.size());
-  settings.least_bands = std::max(1, static_cast<int>(std::ceil(pixels / kMaxBandPixels)));
-  return settings;
-}
-
-void CheckBlur(const EstimateOptions& options, const estimator::EstimateInput& input,
-               const model::EffectSet& on, EstimateOutcome* outcome) {
-  ProgressLine line("checking the blur", options.common.quiet);
-  estimator::BlurCheckOptions settings =
-      BlurCheckOptionsOf(options, on, [&line](int done, int total) {
-        ThrowIfCancelled();
-        line.Show(done, total);
-      });
-  if (!settings.memory_limit_mib) settings.memory_limit_mib = UsualMemoryLimitMib();
-  const auto start = Clock::now();
-  outcome->blur.emplace(estimator::CheckBlur(input, settings), input, options.depth);
-  outcome->seconds.blur_check = SecondsSince(start);
-}
-
-// Views are written as soon as they are computed, unless a page shows them or they are inpainted.
-void SolveScene(const EstimateOptions& options, const estimator::EstimateInput& input,
-                const model::EffectSet& on, const Progress& progress, io::LightFieldWriter* writer,
-                EstimateOutcome* outcome) {
-  // Starting a device pays off only if it is requested.
-  const auto backend = kernels::OpenBackend(
-      kernels::ParseDeviceRequest(options.device == "auto" ? "cpu" : options.device), nullptr,
-      ThrowIfCancelled);
-  spdlog::debug("device: {}", backend->description());
-  const estimator::SceneOptions settings = SceneSettings(options, input, on, progress);
-  if (options.check_blur) CheckBlur(options, input, on, outcome);
-  estimator::SceneSummary scene;
-  if (!options.report_folder.empty() || options.fill == "telea") {
-    outcome->light_field =
-        estimator::EstimateScene(input, settings, &scene, &outcome->maps, backend.get());
-  } else {
-    estimator::SceneViewSink sink;
-    sink.take = [writer](int k, int l, const model::LinearImage& view,
-                         const std::vector<estimator::Confidence>& confidence) {
-      ThrowIfCancelled();
-      writer->WriteView(k, l, view);
-      writer->WriteConfidence(k, l, confidence, view.width_px);
-    };
-    sink.bytes = writer->BytesForView(static_cast<double>(input.image.values.size()));
-    outcome->light_field =
-        estimator::EstimateSceneViews(input, settings, sink, &scene, &outcome->maps, backend.get());
+// The views' files, written as the views are made.
+class FileSink final : public ViewSink {
+ public:
+  explicit FileSink(io::LightFieldWriter* writer) : writer_(writer) {}
+  void TakeView(int k, int l, const model::LinearImage& view) override {
+    writer_->WriteView(k, l, view);
   }
-  outcome->seconds.setup += scene.setup_seconds;
-  outcome->seconds.solve = scene.solve_seconds;
-  outcome->seconds.files = writer->seconds() / scene.threads;
-  outcome->seconds.views = std::max(0.0, scene.views_seconds - outcome->seconds.files);
-  outcome->maps.radiance = {};  // the centre view of the light field shows it
-  outcome->scene = std::move(scene);
-}
+  void TakeConfidence(int k, int l, const std::vector<std::uint8_t>& confidence,
+                      int width_px) override {
+    writer_->WriteConfidence(k, l, confidence, width_px);
+  }
+  double BytesForView(double values) const override { return writer_->BytesForView(values); }
 
-void SolveBlocks(const EstimateOptions& options, const estimator::EstimateInput& input,
-                 const model::EffectSet& on, const Progress& progress,
-                 io::BlockCheckpoint* checkpoint, EstimateOutcome* outcome) {
-  std::string notice;
+ private:
+  io::LightFieldWriter* writer_;
+};
+
+// A run with a checkpoint continues as the run began that left blocks in it.
+void ContinueFrom(const std::shared_ptr<io::BlockCheckpoint>& checkpoint,
+                  thicklens::EstimateOptions* settings) {
+  if (checkpoint == nullptr) return;
+  auto& blocks = std::get<BlockSolver>(settings->solver);
+  blocks.store = checkpoint;
   // The device that auto selects may depend on the load of the machine.
-  const std::string device = options.device == "auto" && checkpoint != nullptr
-                                 ? checkpoint->device().value_or(options.device)
-                                 : options.device;
-  const auto backend =
-      kernels::OpenBackend(kernels::ParseDeviceRequest(device), &notice, ThrowIfCancelled);
-  if (!notice.empty()) spdlog::warn("{}", notice);
-  spdlog::debug("device: {}", backend->description());
-  estimator::BlockOptions settings = BlockOptionsOf(options, on, progress);
-  settings.store = checkpoint;
+  if (settings->device == "auto") settings->device = checkpoint->device().value_or("auto");
   // The number of blocks that a memory limit allows varies a little from run to run with the other
   // memory of the process.
   constexpr double kLittle = 1.05;
-  if (checkpoint != nullptr && checkpoint->block_px() && settings.memory_limit_mib &&
-      !settings.block_px) {
-    settings.block_px = checkpoint->block_px();
-    *settings.memory_limit_mib *= kLittle;
+  if (checkpoint->block_px() && settings->memory_limit_mib && !blocks.block_px) {
+    blocks.block_px = checkpoint->block_px();
+    *settings->memory_limit_mib *= kLittle;
   }
-  estimator::BlockSummary blocks;
-  outcome->light_field = estimator::EstimateByBlocks(input, settings, backend.get(), &blocks);
-  outcome->seconds.setup += blocks.setup_seconds;
-  outcome->seconds.solve = blocks.solve_seconds;
-  outcome->blocks = std::move(blocks);
-}
-
-void SolveFunctional(const EstimateOptions& options, const estimator::EstimateInput& input,
-                     const model::EffectSet& on, const Progress& progress,
-                     EstimateOutcome* outcome) {
-  spdlog::debug("device: cpu");
-  const auto estimate =
-      options.solver == "grid" ? estimator::EstimateOnGrid : estimator::EstimateFunctional;
-  estimator::FunctionalSummary functional;
-  outcome->light_field = estimate(input, FunctionalOptionsOf(options, on, progress), &functional);
-  outcome->seconds.setup += functional.setup_seconds;
-  outcome->seconds.solve = functional.solve_seconds;
-  outcome->seconds.views = functional.views_seconds;
-  outcome->functional = std::move(functional);
 }
 
 // Chooses by the profile, scaled by the present speed of this machine if the profile was made on
@@ -221,69 +145,32 @@ estimator::PlanChoice ChoosePlanHere(const EstimateOptions& options,
   return choice;
 }
 
-// Throws Error for settings that are not valid.
-void CheckSettings(const EstimateOptions& options) {
-  if (options.solver == "scene") {
-    SceneOptionsOf(options, {}, {});
-  } else if (options.by_blocks()) {
-    BlockOptionsOf(options, {}, {});
-  } else {
-    FunctionalOptionsOf(options, {}, {});
-  }
-}
-
-void Solve(const EstimateOptions& options, const PreparedEstimate& prepared,
-           const Progress& progress, io::LightFieldWriter* writer, io::BlockCheckpoint* checkpoint,
-           EstimateOutcome* outcome) {
-  const estimator::EstimateInput& input = prepared.input;
-  const model::EffectSet& on = prepared.effects.on;
-  if (options.solver == "scene") return SolveScene(options, input, on, progress, writer, outcome);
-  if (options.by_blocks()) return SolveBlocks(options, input, on, progress, checkpoint, outcome);
-  SolveFunctional(options, input, on, progress, outcome);
-}
-
-void Inpaint(const EstimateOptions& options, const estimator::EstimateInput& input,
-             EstimateOutcome* outcome) {
-  ProgressLine line("inpainting", options.common.quiet);
-  estimator::InpaintOptions settings;
-  settings.threads = options.common.threads;
-  settings.progress = [&line](int done, int total) {
-    ThrowIfCancelled();
-    line.Show(done, total);
+// Lets the interface ask for the plan once the problem is known. `choice` gets it.
+SolverChooser ChooserOf(const EstimateOptions& options, Clock::time_point start,
+                        std::optional<estimator::PlanChoice>* choice) {
+  return [&options, start, choice](const Problem& problem, double /*seconds*/) {
+    *choice = ChoosePlanHere(options, problem.input(), start);
+    spdlog::info("{}", PrintableUtf8((*choice)->message));
+    EstimateOptions planned = options;
+    ApplyPlan((*choice)->plan, &planned);
+    CheckSolverUsage(planned);
+    return SolverOf((*choice)->plan);
   };
-  outcome->inpainting.emplace();
-  estimator::InpaintOccludedRays(input.disparity, settings, &outcome->light_field,
-                                 &*outcome->inpainting);
-  outcome->light_field.origin.method += "+telea";
-  outcome->seconds.views += outcome->inpainting->seconds;
-}
-
-// Writes the outputs that were not written while they were computed.
-void WriteRays(const EstimateOptions& options, const estimator::EstimateInput& input,
-               const EstimateOutcome& outcome, io::LightFieldWriter* writer) {
-  const model::LightField& light_field = outcome.light_field;
-  if (light_field.values.empty()) return;
-  io::WriteViews(light_field, writer);
-  if (outcome.scene) {
-    io::WriteConfidence(outcome.maps.confidence, light_field.u_count, light_field.s_count,
-                        light_field.t_count, writer);
-  } else {
-    io::WriteConfidence(input, options.common.threads, writer);
-  }
 }
 
 // Returns the photograph's disparity in px per view step, as the page shows it.
-PageDepth DepthForPage(const PreparedEstimate& prepared) {
-  const estimator::DisparityMap& map = prepared.input.disparity;
-  const bool along_u = map.step.x() != 0;
-  PageDepth depth{map.width_px, map.height_px, map.disparity, false};
-  const double step = along_u ? map.step.x() : map.step.y();
+PageDepth DepthForPage(const LightFieldEstimate& estimate) {
+  const Problem& problem = *estimate.problem;
+  const Eigen::Vector2d step_px = problem.disparity_step();
+  const bool along_u = step_px.x() != 0;
+  PageDepth depth{problem.width_px(), problem.height_px(), problem.disparity(), false};
+  const double step = along_u ? step_px.x() : step_px.y();
   for (std::size_t i = 0; i < depth.values.size(); ++i) {
-    depth.values[i] = prepared.depth.was_hole[i]
+    depth.values[i] = estimate.was_hole[i]
                           ? std::numeric_limits<float>::quiet_NaN()
                           : static_cast<float>(static_cast<double>(depth.values[i]) * step);
   }
-  if (along_u) depth.v_per_u = map.step.y() / map.step.x();
+  if (along_u) depth.v_per_u = step_px.y() / step_px.x();
   return depth;
 }
 
@@ -310,88 +197,90 @@ std::vector<std::pair<std::string, std::string>> SourcesOf(const EstimateOptions
           {"aperture", aperture}};
 }
 
-std::string Page(const EstimateOptions& options, PreparedEstimate prepared,
-                 const EstimateOutcome& outcome, const nlohmann::json& summary,
-                 std::vector<std::string> warnings) {
+std::string Page(const EstimateOptions& options, const LightFieldEstimate& estimate,
+                 const nlohmann::json& summary) {
   LightFieldPageInput page;
   page.name = options.output_folder;
-  page.light_field = &outcome.light_field;
-  page.depth = DepthForPage(prepared);
-  page.photo = std::move(prepared.input.image);
+  page.light_field = &estimate.light_field;
+  page.depth = DepthForPage(estimate);
+  page.photo = &estimate.problem->photograph();
   page.estimate =
       ParseEstimateRecord(summary.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace),
                           options.common.json_path);
-  if (outcome.scene) page.maps = &outcome.maps;
-  page.warnings = std::move(warnings);
-  page.sources = SourcesOf(options, prepared.aperture.InWords(), summary);
+  if (estimate.maps) page.maps = &*estimate.maps;
+  page.warnings = estimate.summary.warnings;
+  page.sources = SourcesOf(options, ApertureInWords(options, estimate.diagnostics), summary);
   page.mosaic = true;
   page.version = Version();
-  page.date = outcome.light_field.origin.date;
+  page.date = estimate.light_field.origin.date;
   page.threads = options.common.threads;
   return MakeLightFieldPage(page).html;
 }
 
+// Estimates, and writes the views below the staging path of their folder: as they are made, unless
+// a page shows them too.
+void EstimateInto(io::LightFieldWriter* writer, EstimateCall call, bool has_page,
+                  const RunControl& run, EstimateOutcome* outcome) {
+  LightFieldEstimate& estimate = outcome->estimate;
+  if (has_page) {
+    estimate = EstimateLightField(std::move(call.photo), std::move(call.depth), call.camera,
+                                  call.settings, run);
+  } else {
+    FileSink sink(writer);
+    estimate = EstimateLightFieldTo(&sink, std::move(call.photo), std::move(call.depth),
+                                    call.camera, call.settings, run);
+    outcome->files_seconds = estimate.summary.seconds.sink;
+  }
+  ThrowIfCancelled();
+  const auto start = Clock::now();
+  const LightField& light_field = estimate.light_field;
+  if (has_page) {
+    io::WriteViews(light_field, writer);
+    io::WriteConfidence(estimate.confidence, light_field.u_count, light_field.s_count,
+                        light_field.t_count, writer);
+  }
+  const std::size_t clipped = writer->Finish(light_field);
+  outcome->files_seconds += SecondsSince(start);
+  outcome->clipped_fraction =
+      static_cast<double>(clipped) /
+      static_cast<double>(light_field.ViewStart(light_field.channels, 0, 0));
+}
+
 }  // namespace
 
-CommandResult RunEstimate(const EstimateOptions& given) {
+CommandResult RunEstimate(const EstimateOptions& options) {
   const auto start = Clock::now();
-  EstimateOptions options = given;
-  CheckSettings(options);  // before anything is read
+  SettingsOf(options);  // before anything is read
   if (options.memory_limit_mib) ReturnMemoryAtOnce();
   Outputs outputs(options);
-  ProgressLine line("estimating", options.common.quiet);
-  const Progress progress = [&line](int done, int total) {
-    ThrowIfCancelled();
-    line.Show(done, total);
-  };
-  PreparedEstimate prepared = PrepareEstimate(options);
-  ThrowIfCancelled();
-  std::optional<estimator::PlanChoice> choice;
-  if (options.quality_target.has_value()) {
-    choice = ChoosePlanHere(options, prepared.input, start);
-    spdlog::info("{}", PrintableUtf8(choice->message));
-    ApplyPlan(choice->plan, &options);
-    CheckSolverUsage(options);
-    CheckSettings(options);
-  }
-
+  const CommandRun run(options.common, EstimateOptionNames());
   EstimateOutcome outcome;
-  outcome.seconds.read = outcome.seconds.setup = SecondsSince(start);
-  io::LightFieldWriter writer(
-      prepared.input.transfer,
-      options.format == "tiff" ? io::ViewFormat::kTiff : io::ViewFormat::kPng,
-      &outputs.light_field);
-  Solve(options, prepared, progress, &writer, outputs.checkpoint.get(), &outcome);
-  if (options.fill == "telea") Inpaint(options, prepared.input, &outcome);
-  model::LightFieldOrigin& origin = outcome.light_field.origin;
-  origin.seconds = outcome.seconds.setup + outcome.seconds.solve + outcome.seconds.views;
-  origin.effects = prepared.effects.on.Names();
-  origin.version = Version();
-  origin.date = NowIso8601();
-  CheckOutcome(prepared, &outcome);
-  ThrowIfCancelled();
-
-  const auto files_start = Clock::now();
-  WriteRays(options, prepared.input, outcome, &writer);
-  const std::size_t clipped = writer.Finish(outcome.light_field);
-  outcome.clipped_fraction =
-      static_cast<double>(clipped) /
-      static_cast<double>(outcome.light_field.ViewStart(outcome.light_field.channels, 0, 0));
-  outcome.confidence = estimator::SharesOf(writer.confidence_counts());
-  outcome.seconds.files += SecondsSince(files_start);
-  outcome.seconds.total = SecondsSince(start);
+  std::optional<estimator::PlanChoice> choice;
+  WithOptionNames(run.names(), [&] {
+    EstimateCall call = ReadEstimateCall(options, run.control());
+    ThrowIfCancelled();
+    ContinueFrom(outputs.checkpoint, &call.settings);
+    if (options.quality_target.has_value()) {
+      call.settings.solver = ChooserOf(options, start, &choice);
+    }
+    outcome.read_seconds = SecondsSince(start);
+    io::LightFieldWriter writer(
+        TransferOf(call), options.format == "tiff" ? io::ViewFormat::kTiff : io::ViewFormat::kPng,
+        &outputs.light_field);
+    EstimateInto(&writer, std::move(call), outputs.report.has_value(), run.control(), &outcome);
+  });
+  outcome.total_seconds = SecondsSince(start);
 
   CommandResult result;
-  result.summary = EstimateJson(options, prepared, outcome);
-  std::string text = EstimateText(prepared, outcome, result.summary);
+  result.summary = EstimateJson(options, outcome);
+  std::string text = EstimateText(options, outcome, result.summary);
   result.summary["plan"] = nullptr;
   if (choice) {
-    result.summary["plan"] = ChoiceJson(*choice, options.quality_target, outcome.seconds.total);
-    text += ChoiceText(*choice, outcome.seconds.total);
+    result.summary["plan"] = ChoiceJson(*choice, options.quality_target, outcome.total_seconds);
+    text += ChoiceText(*choice, outcome.total_seconds);
   }
-  const std::vector<std::string> warnings = EstimateWarnings(options, prepared, outcome);
   std::string page;
-  if (outputs.report) page = Page(options, std::move(prepared), outcome, result.summary, warnings);
+  if (outputs.report) page = Page(options, outcome.estimate, result.summary);
   ThrowIfCancelled();
   outputs.light_field.Commit();
   result.is_written = true;
@@ -399,7 +288,6 @@ CommandResult RunEstimate(const EstimateOptions& given) {
   if (outputs.checkpoint && !outputs.checkpoint->Remove()) {
     spdlog::warn("{}: is no longer needed, but could not be removed", outputs.checkpoint->path());
   }
-  for (const std::string& warning : warnings) spdlog::warn("{}", warning);
   PrintResult(options.common, text);
   return result;
 }

@@ -301,7 +301,9 @@ CommandResult Report(const ReportOptions& options) {
   input.name = options.light_field_path;
   input.light_field = &light_field;
   input.truth = truth ? &*truth : nullptr;
-  if (!options.photo_path.empty()) input.photo = ReadPhoto(options, light_field);
+  std::optional<model::LinearImage> photo;
+  if (!options.photo_path.empty()) photo = ReadPhoto(options, light_field);
+  input.photo = photo ? &*photo : nullptr;
   if (!options.depth_path.empty()) input.depth = ReadDepth(options, light_field);
   if (!options.sweep_path.empty()) {
     input.sweep = ReadSweepStrip(options.sweep_path, light_field.camera);

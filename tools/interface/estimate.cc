@@ -4,19 +4,19 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
-#include <ctime>
 #include <mutex>
 #include <utility>
 
 #include "thicklens/base/output_file.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/base/stopwatch.h"
 #include "thicklens/base/utc_time.h"
 #include "thicklens/estimator/estimate_checks.h"
 #include "thicklens/estimator/inpaint.h"
 #include "thicklens/estimator/ray_confidence.h"
 #include "thicklens/io/light_field_io.h"
 #include "thicklens/version.h"
+#include "tools/interface/blur_proposal.h"
 #include "tools/interface/problem.h"
 #include "tools/interface/solve.h"
 #include "tools/interface/validation.h"
@@ -24,12 +24,7 @@
 namespace thicklens {
 namespace {
 
-using Clock = std::chrono::steady_clock;
 constexpr double kEightBitLevels = 255;
-
-double SecondsSince(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 void RequireValidEstimate(const DepthMap& depth, const std::optional<Camera>& camera,
                           const EstimateOptions& options, const RunControl& run) {
@@ -61,16 +56,20 @@ void FindConfidence(const estimator::EstimateInput& input, int threads, const Ta
   });
 }
 
-// Counts confidences on their way to a program's sink.
+// Counts confidences, and the time that a program's sink takes, on their way to it.
 class CountingSink : public ViewSink {
  public:
   explicit CountingSink(ViewSink* sink) : sink_(sink) {}
   void TakeView(int k, int l, const model::LinearImage& view) override {
+    const auto start = Clock::now();
     sink_->TakeView(k, l, view);
+    AddSecondsSince(start);
   }
   void TakeConfidence(int k, int l, const std::vector<std::uint8_t>& confidence,
                       int width_px) override {
+    const auto start = Clock::now();
     sink_->TakeConfidence(k, l, confidence, width_px);
+    AddSecondsSince(start);
     Count(confidence.begin(), confidence.end());
   }
   double BytesForView(double values) const override { return sink_->BytesForView(values); }
@@ -82,10 +81,18 @@ class CountingSink : public ViewSink {
     for (std::size_t i = 0; i < counts.size(); ++i) counts_[i] += counts[i];
   }
   const std::array<std::size_t, 256>& counts() const { return counts_; }
+  double seconds() const { return seconds_; }  // in the program's sink, summed over the threads
 
  private:
+  void AddSecondsSince(Clock::time_point start) {
+    const double seconds = SecondsSince(start);
+    const std::lock_guard<std::mutex> lock(mutex_);
+    seconds_ += seconds;
+  }
+
   ViewSink* sink_;
   std::mutex mutex_;
+  double seconds_ = 0;
   std::array<std::size_t, 256> counts_{};
 };
 
@@ -93,11 +100,10 @@ void Inpaint(const estimator::EstimateInput& input, RunScope* run, LightFieldEst
   estimator::InpaintOptions settings;
   settings.threads = run->threads();
   settings.progress = run->ProgressOf("inpainting");
-  estimator::InpaintSummary summary;
+  estimator::InpaintSummary& summary = estimate->diagnostics.inpainting.emplace();
   estimator::InpaintOccludedRays(input.disparity, settings, &estimate->light_field, &summary);
   estimate->light_field.origin.method += "+telea";
   estimate->summary.seconds.views += summary.seconds;
-  estimate->diagnostics.inpainted_rays = summary.holes;
 }
 
 void CheckResult(const PreparedProblem& prepared, const Solved& solved,
@@ -120,42 +126,45 @@ void CheckResult(const PreparedProblem& prepared, const Solved& solved,
                                   disparity.width_px, disparity.height_px, noise_sigma);
 }
 
-// What may make the result wrong.
-std::vector<std::string> WarningsOf(const DepthMap& depth, const std::optional<Camera>& camera,
+// The depth map without its values.
+struct DepthFile {
+  std::string name;  // in messages
+  DepthMeaning meaning;
+  std::size_t value_count = 0;
+};
+
+// Returns the warnings about the result, one line each, with their numbers.
+std::vector<std::string> WarningsOf(const DepthFile& depth, bool has_camera, const RunScope& run,
                                     const LightFieldEstimate& estimate) {
   const EstimateDiagnostics& found = estimate.diagnostics;
-  const BlockSummary& summary = estimate.summary;
-  const std::string name = depth.source.empty() ? "depth" : depth.source;
+  const EstimateSummary& summary = estimate.summary;
   std::vector<std::string> warnings;
   constexpr double kMaxHoles = 0.5;
   if (found.holes_share > kMaxHoles) {
-    warnings.push_back(
-        fmt::format("{}: {} of its {} values are no depth: they are filled from the "
-                    "others",
-                    name, found.holes_filled, depth.values.size()));
+    warnings.push_back(fmt::format(
+        "{}: {} of its {} values are not depths: these areas are guessed from the others",
+        depth.name, found.holes_filled, depth.value_count));
   }
   if (found.coarse_share > 0) {
-    warnings.push_back(
-        fmt::format("{:.1f} % of the pixels move by more than {:g} px from view to view (up to "
-                    "{:.1f} px): between such views the blur is sampled too coarsely{}",
-                    100 * found.coarse_share, estimator::kLargestStepPx, found.largest_step_px,
-                    camera ? "; more views make the steps smaller" : ""));
+    warnings.push_back(fmt::format(
+        "{:.1f} % of the pixels move by more than {:g} px from view to view (up to {:.1f} px): "
+        "between such views the blur is sampled too coarsely{}",
+        100 * found.coarse_share, estimator::kLargestStepPx, found.largest_step_px,
+        has_camera ? fmt::format("; more {} make the steps smaller", run.Option("views")) : ""));
   }
   const std::optional<double> noise_px =
       found.depth_noise_left_px ? found.depth_noise_left_px : found.depth_noise_px;
   if (noise_px && *noise_px > estimator::kLargestDepthNoisePx) {
     warnings.push_back(fmt::format(
-        "{}: the depth has a noise of about {:.2f} px of disparity per view step{}, above {:g} px "
-        "it costs more than the estimate gains",
-        name, *noise_px, found.depth_noise_left_px ? " after smoothing" : "",
-        estimator::kLargestDepthNoisePx));
+        "{}: the depth has a noise of about {:.2f} px of disparity per view step{}; above {:g} px "
+        "it costs more than the estimate gains; {}",
+        depth.name, *noise_px, found.depth_noise_left_px ? " after smoothing" : "",
+        estimator::kLargestDepthNoisePx,
+        found.depth_noise_left_px
+            ? "better depth is needed"
+            : fmt::format("{} decides whether it is smoothed", run.Option("smooth_depth"))));
   }
-  if (summary.iterations && !summary.converged) {
-    warnings.push_back(fmt::format(
-        "not converged: the relative residual is {:.1e} after {} iterations; allow more, or a "
-        "larger tolerance",
-        summary.relative_residual.value_or(0), *summary.iterations));
-  }
+  if (!summary.partial_reason.empty()) warnings.push_back(summary.partial_reason);
   const double noise_levels = kEightBitLevels * found.noise_sigma.value_or(0);
   if (!found.patches.empty()) {
     const UnexplainedPatch& worst = found.patches.front();
@@ -168,32 +177,42 @@ std::vector<std::string> WarningsOf(const DepthMap& depth, const std::optional<C
   if (found.unexplained_share && *found.unexplained_share > estimator::kMaxUnexplained) {
     warnings.push_back(fmt::format(
         "{:.0f} % of the photograph is not explained beyond its noise of {:.1f} grey levels: most "
-        "likely it is sharper than this depth and aperture say",
-        100 * *found.unexplained_share, noise_levels));
+        "likely it is sharper than depth and aperture predict; {}",
+        100 * *found.unexplained_share, noise_levels,
+        depth.meaning.kind == DepthKind::kDisparity
+            ? fmt::format("are {} and {} right?", run.Option("depth.meaning.disparity_scale"),
+                          run.Option("depth.meaning.disparity_offset_px"))
+            : "are the depth's unit, and the camera's aperture and focus, right?"));
   }
   constexpr double kUnexplained = 1.5;  // times the noise
   if (found.residual_rms && found.noise_sigma && !found.unexplained_share &&
       *found.residual_rms > kUnexplained * *found.noise_sigma) {
     warnings.push_back(fmt::format(
-        "the photograph is explained to {:.1f} grey levels (noise: {:.1f}), and hardly any of it "
-        "is seen by the whole aperture: whether the estimate is right cannot be decided",
-        kEightBitLevels * *found.residual_rms, noise_levels));
+        "the photograph has a residual of {:.1f} grey levels (noise: {:.1f}), and the whole "
+        "aperture sees hardly any part of it: the aperture is wide for an image of {} x {} px, or "
+        "the depth is rough; which of them is unknown",
+        kEightBitLevels * *found.residual_rms, noise_levels, summary.width_px, summary.height_px));
+  }
+  if (found.blur_check) {
+    const std::string blur =
+        BlurWarning(*found.blur_check, found.blur_proposal, estimate.problem->input(), run);
+    if (!blur.empty()) warnings.push_back(blur);
   }
   return warnings;
 }
 
 // Hands on the views and the confidence that the solver did not.
-void GiveRays(const PreparedProblem& prepared, const Solved& solved, int threads,
-              CountingSink* sink, LightFieldEstimate* estimate) {
+void GiveRays(const PreparedProblem& prepared, int threads, CountingSink* sink, Solved* solved,
+              LightFieldEstimate* estimate) {
   LightField& light_field = estimate->light_field;
   const std::size_t view_size = light_field.view_size();
   const auto index = [&](int k, int l) {
     return static_cast<std::ptrdiff_t>(static_cast<std::size_t>(l * light_field.u_count + k) *
                                        view_size);
   };
-  if (solved.maps && !solved.views_in_sink) {
-    estimate->confidence = solved.maps->confidence;
-  } else if (!solved.maps) {
+  if (solved->maps && !solved->views_in_sink) {
+    estimate->confidence = std::move(solved->maps->confidence);
+  } else if (!solved->maps) {
     estimate->confidence.resize(view_size * static_cast<std::size_t>(light_field.u_count) *
                                 static_cast<std::size_t>(light_field.v_count));
     FindConfidence(*prepared.input, threads,
@@ -202,7 +221,7 @@ void GiveRays(const PreparedProblem& prepared, const Solved& solved, int threads
                                estimate->confidence.begin() + index(k, l));
                    });
   }
-  if (sink == nullptr || solved.views_in_sink) return;
+  if (sink == nullptr || solved->views_in_sink) return;
   ParallelFor(light_field.u_count * light_field.v_count, threads, [&](int i) {
     const int k = i % light_field.u_count, l = i / light_field.u_count;
     if (light_field.IsPresent(k, l)) sink->TakeView(k, l, model::ViewImage(light_field, k, l));
@@ -214,10 +233,10 @@ void GiveRays(const PreparedProblem& prepared, const Solved& solved, int threads
   estimate->confidence.clear();
 }
 
-void FillSummary(const SolverSummary& solver, const AnySolver& chosen, int threads,
+void FillSummary(const SolverSummary& solver, const AnySolver& chosen, const RunScope& run,
                  LightFieldEstimate* estimate) {
   const LightField& light_field = estimate->light_field;
-  BlockSummary& summary = estimate->summary;
+  EstimateSummary& summary = estimate->summary;
   summary.message = solver.message;
   summary.solver = SolverName(chosen);
   summary.prior = light_field.origin.prior;
@@ -231,21 +250,30 @@ void FillSummary(const SolverSummary& solver, const AnySolver& chosen, int threa
   summary.relative_residual = solver.relative_residual;
   summary.rcond_min = solver.rcond_min;
   summary.device = solver.device;
-  summary.threads = ResolveThreads(threads);
+  summary.threads = ResolveThreads(run.threads());
+  if (summary.iterations && !summary.converged) {
+    summary.partial_reason = fmt::format(
+        "not converged: the relative residual is {:.1e} after {} iterations; allow more ({}), or a "
+        "larger residual ({})",
+        summary.relative_residual.value_or(0), *summary.iterations,
+        run.Option("solver.max_iterations"), run.Option("solver.tolerance"));
+  }
   summary.seconds.setup = solver.setup_seconds;
   summary.seconds.solve = solver.solve_seconds;
   summary.seconds.views += solver.views_seconds;
 }
 
-LightFieldEstimate Estimate(ViewSink* given_sink, const Image& photo, const DepthMap& depth,
+LightFieldEstimate Estimate(ViewSink* given_sink, Image photo, DepthMap depth,
                             const std::optional<Camera>& camera, const EstimateOptions& given,
                             const RunControl& control) {
   const auto start = Clock::now();
   RequireValidEstimate(depth, camera, given, control);
   RunScope run(control);
   LightFieldEstimate estimate;
-  const PreparedProblem prepared =
-      Prepare(photo, depth, camera, given, &estimate.diagnostics, &run);
+  const DepthFile depth_file{depth.source.empty() ? "depth" : depth.source, depth.meaning,
+                             depth.values.size()};
+  PreparedProblem prepared =
+      Prepare(std::move(photo), std::move(depth), camera, given, &estimate.diagnostics, &run);
   ThrowIfCancelled();
   EstimateOptions options = given;
   if (const auto* chooser = std::get_if<SolverChooser>(&given.solver)) {
@@ -263,12 +291,18 @@ LightFieldEstimate Estimate(ViewSink* given_sink, const Image& photo, const Dept
   estimate.light_field = std::move(solved.light_field);
   estimate.blocks = std::move(solved.blocks);
   if (options.hidden_rays == HiddenRays::kTelea) Inpaint(*prepared.input, &run, &estimate);
-  FillSummary(solved.summary, options.solver, control.threads, &estimate);
+  FillSummary(solved.summary, options.solver, run, &estimate);
   model::LightFieldOrigin& origin = estimate.light_field.origin;
   EstimateSeconds& seconds = estimate.summary.seconds;
+  if (sink && solved.views_in_sink) {
+    seconds.sink = sink->seconds() / ResolveThreads(control.threads);
+    seconds.views = std::max(0.0, seconds.views - seconds.sink);
+  }
   if (solved.blur) {
-    estimate.diagnostics.blur_check = solved.blur->message;
     seconds.blur_check = solved.blur->seconds;
+    estimate.diagnostics.blur_proposal =
+        ProposalOf(*solved.blur, *prepared.input, depth_file.meaning);
+    estimate.diagnostics.blur_check = std::move(solved.blur);
   }
   origin.seconds = seconds.prepare + seconds.setup + seconds.solve + seconds.views;
   origin.effects = prepared.effects.on.Names();
@@ -277,7 +311,9 @@ LightFieldEstimate Estimate(ViewSink* given_sink, const Image& photo, const Dept
   estimate.summary.effects = origin.effects;
   CheckResult(prepared, solved, &estimate);
   ThrowIfCancelled();
-  GiveRays(prepared, solved, control.threads, sink ? &*sink : nullptr, &estimate);
+  const auto rays_start = Clock::now();
+  GiveRays(prepared, control.threads, sink ? &*sink : nullptr, &solved, &estimate);
+  if (sink && !solved.views_in_sink) seconds.sink = SecondsSince(rays_start);
   CountingSink own(nullptr);
   if (!sink) own.Count(estimate.confidence.begin(), estimate.confidence.end());
   const estimator::ConfidenceShares shares =
@@ -286,7 +322,12 @@ LightFieldEstimate Estimate(ViewSink* given_sink, const Image& photo, const Dept
   estimate.diagnostics.rays_partly_visible = shares.partly_visible;
   estimate.diagnostics.rays_blurred = shares.blurred;
   estimate.diagnostics.rays_filled_in = shares.filled_in;
-  estimate.summary.warnings = WarningsOf(depth, camera, estimate);
+  estimate.problem.emplace(prepared.input);
+  estimate.problem->set_falloff(prepared.effects.on.Has(Effect::kFalloff));
+  estimate.was_hole = std::move(prepared.was_hole);
+  estimate.maps = std::move(solved.maps);
+  estimate.summary.warnings =
+      WarningsOf(depth_file, prepared.input->camera.has_value(), run, estimate);
   for (const std::string& warning : estimate.summary.warnings) run.Warn(warning);
   estimate.diagnostics.notices = run.notices();
   return estimate;
@@ -297,26 +338,27 @@ LightFieldEstimate Estimate(ViewSink* given_sink, const Image& photo, const Dept
 ViewSink::~ViewSink() = default;
 double ViewSink::BytesForView(double /*values*/) const { return 0; }
 
-LightFieldEstimate EstimateLightField(const Image& photo, const DepthMap& depth,
+LightFieldEstimate EstimateLightField(Image photo, DepthMap depth,
                                       const std::optional<Camera>& camera,
                                       const EstimateOptions& options, const RunControl& run) {
-  return Estimate(nullptr, photo, depth, camera, options, run);
+  return Estimate(nullptr, std::move(photo), std::move(depth), camera, options, run);
 }
 
-LightFieldEstimate EstimateLightFieldTo(ViewSink* sink, const Image& photo, const DepthMap& depth,
+LightFieldEstimate EstimateLightFieldTo(ViewSink* sink, Image photo, DepthMap depth,
                                         const std::optional<Camera>& camera,
                                         const EstimateOptions& options, const RunControl& run) {
   if (sink == nullptr) throw Error("sink: a sink is expected, found null");
-  return Estimate(sink, photo, depth, camera, options, run);
+  return Estimate(sink, std::move(photo), std::move(depth), camera, options, run);
 }
 
-Problem PrepareProblem(const Image& photo, const DepthMap& depth,
-                       const std::optional<Camera>& camera, const EstimateOptions& options,
-                       EstimateDiagnostics* diagnostics, const RunControl& run) {
+Problem PrepareProblem(Image photo, DepthMap depth, const std::optional<Camera>& camera,
+                       const EstimateOptions& options, EstimateDiagnostics* diagnostics,
+                       const RunControl& run) {
   RequireValidEstimate(depth, camera, options, run);
   RunScope scope(run);
   EstimateDiagnostics found;
-  const PreparedProblem prepared = Prepare(photo, depth, camera, options, &found, &scope);
+  const PreparedProblem prepared =
+      Prepare(std::move(photo), std::move(depth), camera, options, &found, &scope);
   found.notices = scope.notices();
   if (diagnostics != nullptr) *diagnostics = std::move(found);
   Problem problem(prepared.input);
@@ -324,7 +366,7 @@ Problem PrepareProblem(const Image& photo, const DepthMap& depth,
   return problem;
 }
 
-std::string BlockSummary::BriefReport() const {
+std::string EstimateSummary::BriefReport() const {
   if (u_count == 0) return "light field: " + message;
   std::string text = fmt::format("light field: {} x {} views of {} x {} px by {}", u_count, v_count,
                                  width_px, height_px, solver);

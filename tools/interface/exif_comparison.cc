@@ -243,6 +243,11 @@ std::optional<ExifComparison> OrientationFinding(const io::PhotoExif& exif) {
 
 }  // namespace
 
+std::string ExifVerdictName(ExifComparison::Verdict verdict) {
+  if (verdict == ExifComparison::Verdict::kAgrees) return "agrees";
+  return verdict == ExifComparison::Verdict::kUndecided ? "undecided" : "contradicts";
+}
+
 std::vector<ExifComparison> CompareExif(const io::PhotoExif& exif, const Camera& camera,
                                         const PhotoSize& size) {
   std::vector<ExifComparison> findings;

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "thicklens/estimator/aperture_weights.h"
+#include "thicklens/io/aperture_statement.h"
 
 namespace thicklens {
 namespace {
@@ -18,7 +18,7 @@ struct ShapeAndSource {
   std::string from;
 };
 
-// Of an aperture of which no light field states the weights.
+// Returns the shape for an aperture whose weights no light field states.
 ShapeAndSource ShapeFor(const EstimateOptions& options, const Camera* camera) {
   if (options.aperture.shape) return {*options.aperture.shape, "option"};
   if (options.effects.LeavesOut(Effect::kApertureShape)) {
@@ -28,50 +28,18 @@ ShapeAndSource ShapeFor(const EstimateOptions& options, const Camera* camera) {
   return {model::ApertureShape::kUniform, "assumed"};
 }
 
-Eigen::ArrayXXd SharesOfPresent(Eigen::ArrayXXd weights, const LightField& light_field) {
-  for (int l = 0; l < light_field.v_count; ++l) {
-    for (int k = 0; k < light_field.u_count; ++k) {
-      if (!light_field.IsPresent(k, l)) weights(l, k) = 0;
-    }
-  }
-  return weights / weights.sum();
-}
-
-Eigen::ArrayXXd ShapeOfPresentViews(model::ApertureShape shape, const LightField& light_field) {
-  return SharesOfPresent(model::ApertureWeights(shape, light_field.u_count, light_field.v_count),
-                         light_field);
-}
-
-std::string ShapeInWords(const LightField& light_field) {
-  const std::optional<model::ApertureShape> shape = estimator::ShapeOfWeights(light_field);
-  return shape ? model::ApertureShapeName(*shape) : "weights of no known shape";
-}
-
-void RequireStatedShape(const ApertureViews& views, model::ApertureShape shape) {
-  const Eigen::ArrayXXd stated = SharesOfPresent(views.description.weights, views.description);
-  const Eigen::ArrayXXd wanted = ShapeOfPresentViews(shape, views.description);
-  Eigen::Index l = 0, k = 0;
-  if ((stated - wanted).abs().maxCoeff(&l, &k) <= kRoundedWeight) return;
-  throw OptionError(
-      "aperture.shape",
-      fmt::format("aperture.shape: {} states its aperture as {} (view ({}, {}) has a share of "
-                  "{:.6g}), and {} gives that view {:.6g}: they must be equal; without a shape the "
-                  "stated weights are used",
-                  views.source, ShapeInWords(views.description), k, l, stated(l, k),
-                  model::ApertureShapeName(shape), wanted(l, k)));
-}
-
 void WarnOfCameraPsf(const ApertureViews& views, const Camera& camera, RunScope* run) {
   const model::ApertureShape of_camera = model::ApertureShapeOf(camera.psf);
-  if (((SharesOfPresent(views.description.weights, views.description) -
-        ShapeOfPresentViews(of_camera, views.description))
+  if (((io::OwnWeightsOfPresentViews(views.description) -
+        io::ShapeOfPresentViews(of_camera, views.description))
            .abs() <= kRoundedWeight)
           .all()) {
     return;
   }
   run->Warn(fmt::format(
-      "{} states its aperture as {}, camera '{}' as {} (psf): that of the light field is used",
-      views.source, ShapeInWords(views.description), camera.name,
+      "{} states its aperture as {}, {} as {} (psf): the one of the light field is used",
+      views.source, io::OwnApertureInWords(views.description),
+      camera.source.empty() ? fmt::format("camera '{}'", camera.name) : camera.source,
       model::ApertureShapeName(of_camera)));
 }
 
@@ -100,21 +68,22 @@ PreparedAperture PrepareAperture(const EstimateOptions& options, const Camera* c
   if (!views.weights_stated) {
     if (aperture.from == "assumed") {
       run->Warn(fmt::format(
-          "{}: nothing states through which aperture the photograph was taken, and a uniform one "
-          "is assumed; aperture.shape states another",
-          views.source));
+          "{}: neither the light field nor a camera states the aperture of the photograph, so a "
+          "uniform one is assumed; {} states another",
+          views.source, run->Option("aperture.shape")));
     }
-    aperture.weights = ShapeOfPresentViews(unstated.shape, light_field);
+    aperture.weights = io::ShapeOfPresentViews(unstated.shape, light_field);
     return aperture;
   }
   if (aperture.from == "option") {
-    RequireStatedShape(views, unstated.shape);
+    io::RequireStatedAperture(views.source, light_field, unstated.shape,
+                              fmt::format("{} {}", run->Option("aperture.shape"), aperture.shape));
   } else {
     aperture.from = "light-field";
-    aperture.shape = ShapeInWords(light_field);
+    aperture.shape = io::OwnApertureInWords(light_field);
     if (camera != nullptr) WarnOfCameraPsf(views, *camera, run);
   }
-  aperture.weights = SharesOfPresent(light_field.weights, light_field);
+  aperture.weights = io::OwnWeightsOfPresentViews(light_field);
   return aperture;
 }
 
@@ -130,11 +99,11 @@ void WarnOfOtherSteps(const EstimateOptions& options, const PreparedAperture& ap
       continue;
     }
     run->Warn(fmt::format(
-        "{}: its views are {:.4g} mm apart on the aperture along {}, those of the estimate {:.4g} "
-        "mm, so that camera '{}' and the weights give the calibrated blur: the views are seen from "
-        "other places",
+        "{}: its views are {:.4g} mm apart on the aperture along {}, but {:.4g} mm in the "
+        "estimate, so that camera {} and the weights give the calibrated blur: the views are seen "
+        "from other places",
         options.aperture.views_of->source, there[axis], axis == 0 ? "u" : "v", here[axis],
-        camera.name));
+        camera.source.empty() ? fmt::format("'{}'", camera.name) : camera.source));
     return;
   }
 }

@@ -66,15 +66,15 @@ PreparedDepth PrepareByCamera(const DepthMap& map, const model::LinearImage& ima
 PreparedDepth PrepareDepth(const DepthMap& map, const model::LinearImage& image,
                            const Camera* camera, const model::LightFieldGrid* grid) {
   if (map.width_px != image.width_px || map.height_px != image.height_px) {
-    throw Error(fmt::format("{}: it is {}x{} px, the image {}x{} px: the sizes must be equal",
+    throw Error(fmt::format("{}: it is {}x{} px, the image is {}x{} px: the sizes must be equal",
                             NameOf(map), map.width_px, map.height_px, image.width_px,
                             image.height_px));
   }
   if (camera != nullptr) return PrepareByCamera(map, image, *camera, *grid);
   if (map.meaning.kind != DepthKind::kDisparity) {
     throw OptionError("depth.meaning.kind",
-                      "depth.meaning.kind: millimetres need a camera; without one the map must be "
-                      "a disparity");
+                      "depth.meaning.kind: millimetres need a camera; without a camera the map "
+                      "must be a disparity");
   }
   PreparedDepth prepared;
   prepared.disparity = WithFileContext(NameOf(map), [&] {

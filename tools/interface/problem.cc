@@ -24,7 +24,15 @@ namespace {
 
 std::string NameOf(const Image& photo) { return photo.source().empty() ? "photo" : photo.source(); }
 std::string NameOf(const DepthMap& depth) { return depth.source.empty() ? "depth" : depth.source; }
-std::string NameOf(const Camera& camera) { return fmt::format("camera '{}'", camera.name); }
+std::string NameOf(const Camera& camera) {
+  return camera.source.empty() ? fmt::format("camera '{}'", camera.name) : camera.source;
+}
+
+// The photograph as a file; what remains of it once its pixels have been taken.
+struct PhotoFile {
+  std::string name;  // in messages
+  std::string path;  // empty: it is not from a file
+};
 
 // ---- 1. Sizes and crop.
 
@@ -53,29 +61,34 @@ void CutToCrop(const std::optional<PixelRect>& crop, Image* photo, DepthMap* dep
       photo->width_px() != depth->width_px || photo->height_px() != depth->height_px;
   const auto was_cut = [&](int width_px, int height_px, const std::string& name) {
     const bool cut = width_px == crop->width && height_px == crop->height && differ;
-    if (cut) run->Warn(fmt::format("{}: has the size of the crop and is taken as it is", name));
+    if (cut) {
+      run->Warn(fmt::format("{}: has the size of {} already and is not cropped", name,
+                            run->Option("crop")));
+    }
     return cut;
   };
   const bool cut_photo = !was_cut(photo->width_px(), photo->height_px(), NameOf(*photo));
   const bool cut_depth = !was_cut(depth->width_px, depth->height_px, NameOf(*depth));
   if (cut_photo) {
-    *photo = WithFileContext("crop: " + NameOf(*photo), [&] { return Cropped(*photo, *crop); });
+    *photo = WithFileContext(run->Option("crop") + ": " + NameOf(*photo),
+                             [&] { return Cropped(*photo, *crop); });
   }
   if (cut_depth) {
-    *depth = WithFileContext("crop: " + NameOf(*depth), [&] { return Cropped(*depth, *crop); });
+    *depth = WithFileContext(run->Option("crop") + ": " + NameOf(*depth),
+                             [&] { return Cropped(*depth, *crop); });
   }
 }
 
 // ---- 2. The camera of this photograph.
 
-void CheckExif(const Image& photo, const Camera& camera, const PhotoSize& size, ExifCheck check,
+void CheckExif(const PhotoFile& photo, const Camera& camera, const PhotoSize& size, ExifCheck check,
                EstimateDiagnostics* diagnostics, RunScope* run) {
-  if (!photo.is_from_file()) return;
+  if (photo.path.empty()) return;
   std::string damaged;
   const io::PhotoExif exif =
-      io::ReadExifIfAny(photo.source(), camera.sensor.width_px, camera.sensor.height_px, &damaged);
+      io::ReadExifIfAny(photo.path, camera.sensor.width_px, camera.sensor.height_px, &damaged);
   if (!damaged.empty()) {
-    run->Warn(damaged + "; it is not compared with the camera");
+    run->Warn(damaged + "; it is not compared with the camera file");
     return;
   }
   if (exif.IsEmpty()) return;
@@ -85,48 +98,51 @@ void CheckExif(const Image& photo, const Camera& camera, const PhotoSize& size, 
   for (const ExifComparison& finding : diagnostics->exif) {
     if (finding.verdict == ExifComparison::Verdict::kAgrees) continue;
     const std::string text =
-        fmt::format("{}: the photograph's EXIF says {}, the camera {} ({})", finding.quantity,
-                    finding.photo, finding.camera, finding.remark);
+        fmt::format("{}: the photograph's EXIF states {}, the camera file {} ({})",
+                    finding.quantity, finding.photo, finding.camera, finding.remark);
     const bool contradicts = finding.verdict == ExifComparison::Verdict::kContradicts;
     if (contradicts && check == ExifCheck::kRequire) {
       contradictions += (contradictions.empty() ? "" : "; ") + text;
     } else {
-      run->Warn(fmt::format("{}: {}{}", NameOf(photo), text, contradicts ? "; ignored" : ""));
+      run->Warn(fmt::format("{}: {}{}", photo.name, text,
+                            contradicts ? fmt::format("; ignored ({})", run->Option("exif")) : ""));
     }
   }
   if (contradictions.empty()) return;
-  throw Error(fmt::format(
-      "{}: it was not taken with the camera and setting of {}: {}; calibrate that setting, use its "
-      "camera, or ignore the EXIF if it is wrong",
-      NameOf(photo), NameOf(camera), contradictions));
+  throw Error(
+      fmt::format("{}: it was not taken with the camera and setting of {}: {}; calibrate that "
+                  "setting, name its "
+                  "camera file, or use {} if EXIF is wrong",
+                  photo.name, NameOf(camera), contradictions, run->Option("exif")));
 }
 
 void NoteAssumedFields(const Camera& camera, RunScope* run) {
   for (const std::string& notice : camera.notices) run->Warn(notice);
   const std::vector<std::string> fields = model::AssumedFields(camera);
   if (fields.empty()) return;
-  run->Warn(fmt::format("{}: assumed, neither published nor measured: {}", NameOf(camera),
+  run->Warn(fmt::format("camera '{}': assumed, neither published nor measured: {}", camera.name,
                         fmt::join(fields, ", ")));
 }
 
 // The camera behind an image of the full size, which may be a part of its sensor, and of that the
 // crop.
-Camera CameraFor(const Image& photo, int width_px, int height_px, Camera camera,
-                 const EstimateOptions& options, EstimateDiagnostics* diagnostics, RunScope* run) {
-  if (photo.transfer()) camera.sensor.transfer = *photo.transfer();
+Camera CameraFor(const PhotoFile& photo, const std::optional<TransferCurve>& transfer, int width_px,
+                 int height_px, Camera camera, const EstimateOptions& options,
+                 EstimateDiagnostics* diagnostics, RunScope* run) {
+  if (transfer) camera.sensor.transfer = *transfer;
   NoteAssumedFields(camera, run);
   CheckExif(photo, camera, {width_px, height_px, options.sensor_origin.has_value()}, options.exif,
             diagnostics, run);
   if (options.sensor_origin) {
     const PixelRect part{options.sensor_origin->x, options.sensor_origin->y, width_px, height_px};
-    camera = WithFileContext("sensor_origin: " + NameOf(camera),
+    camera = WithFileContext(run->Option("sensor_origin") + ": " + NameOf(camera),
                              [&] { return model::CropCamera(camera, part); });
   } else if (camera.sensor.width_px != width_px || camera.sensor.height_px != height_px) {
     throw Error(fmt::format(
         "{}: the image is {}x{} px, the sensor of {} has {}x{} px: they must be equal, or "
-        "sensor_origin must state which part of the sensor it is",
-        NameOf(photo), width_px, height_px, NameOf(camera), camera.sensor.width_px,
-        camera.sensor.height_px));
+        "{} must state which part of the sensor the image is",
+        photo.name, width_px, height_px, NameOf(camera), camera.sensor.width_px,
+        camera.sensor.height_px, run->Option("sensor_origin")));
   }
   return options.crop ? model::CropCamera(camera, *options.crop) : camera;
 }
@@ -136,7 +152,8 @@ TransferCurve TransferFor(const Image& photo, const std::optional<Camera>& camer
   diagnostics->transfer_from = photo.transfer() ? "image" : camera ? "camera" : "assumed";
   if (camera) return camera->sensor.transfer;
   if (photo.transfer()) return *photo.transfer();
-  run->Inform(fmt::format("{}: encoded values are taken as sRGB", NameOf(photo)));
+  run->Inform(fmt::format("{}: encoded values are assumed to be sRGB ({})", NameOf(photo),
+                          run->Option("photo.transfer")));
   return TransferCurve::Srgb();
 }
 
@@ -145,15 +162,14 @@ TransferCurve TransferFor(const Image& photo, const std::optional<Camera>& camer
 // UV on the aperture, where each view has one transmission; ST in the plane of focus unless a depth
 // is given.
 model::LightFieldGrid GridFor(const EstimateOptions& options, const Camera& camera,
-                              const Eigen::ArrayXXd& weights) {
+                              const Eigen::ArrayXXd& weights, const RunScope& run) {
   const model::ApertureSamples samples =
       model::SampleAperture(weights, camera.blur_ratio(), camera.lens.aperture_radius_mm);
   const double st_depth_mm = options.st_depth_mm.value_or(camera.focus_depth_mm());
   if (std::isinf(st_depth_mm)) {
     throw Error(fmt::format(
-        "{}: it is focused at infinity, where no ST plane can lie: st_depth_mm must state where it "
-        "lies",
-        NameOf(camera)));
+        "{}: the camera is focused at infinity, where no ST plane can lie: {} must give its depth",
+        NameOf(camera), run.Option("st_depth_mm")));
   }
   return model::GridOnPlanes(camera, {0, st_depth_mm}, samples);
 }
@@ -161,13 +177,14 @@ model::LightFieldGrid GridFor(const EstimateOptions& options, const Camera& came
 void CheckViewCounts(const Eigen::ArrayXXd& weights, RunScope* run) {
   if (weights.size() < 2) {
     throw OptionError("views",
-                      "views: at least two are expected, found 1 x 1: one view is the "
-                      "image");
+                      "views: 1x1 is not a light field: one view is the image itself; at least two "
+                      "views are expected, e.g. 3x3");
   }
   for (const auto& [count, axis] :
        {std::pair{weights.cols(), "u (across)"}, std::pair{weights.rows(), "v (down)"}}) {
     if (count == 1) {
-      run->Warn(fmt::format("views: one view along {}: no blur is modelled that way", axis));
+      run->Warn(fmt::format("{}: one view along {}: no blur is modelled in that direction",
+                            run->Option("views"), axis));
     }
   }
 }
@@ -185,8 +202,8 @@ void WarnOfUnlikelyDepth(const DepthMap& map, const Camera& camera,
     return;
   }
   run->Warn(fmt::format(
-      "{}: the median depth is {:.6g} mm, the camera is focused at {:.6g} mm; is its unit right?",
-      NameOf(map), depth.median_mm, focus_depth_mm));
+      "{}: the median depth is {:.6g} mm, but the camera is focused at {:.6g} mm; is {} right?",
+      NameOf(map), depth.median_mm, focus_depth_mm, run->Option("depth.meaning.unit")));
 }
 
 std::pair<double, double> DisparityRangePx(const estimator::DisparityMap& map) {
@@ -195,18 +212,21 @@ std::pair<double, double> DisparityRangePx(const estimator::DisparityMap& map) {
   return std::minmax({static_cast<double>(*least) * step, static_cast<double>(*most) * step});
 }
 
-// A disparity as large as the image is none of a scene.
-void CheckDisparities(const DepthMap& map, const estimator::DisparityMap& disparity) {
+// A disparity as large as the image does not occur in a scene.
+void CheckDisparities(const DepthMap& map, const estimator::DisparityMap& disparity,
+                      const RunScope& run) {
   const auto [low_px, high_px] = DisparityRangePx(disparity);
   const int size_px = std::max(disparity.width_px, disparity.height_px);
   if (std::max(std::abs(low_px), std::abs(high_px)) <= size_px) return;
   throw Error(fmt::format(
-      "{}: disparities from {:.4g} to {:.4g} px per view step, which must be within the {} px of "
-      "the image; {}",
+      "{}: disparities from {:.4g} to {:.4g} px per view step, but they must be within the {} px "
+      "of the image; are {} right?",
       NameOf(map), low_px, high_px, size_px,
       map.meaning.kind == DepthKind::kDisparity
-          ? "are disparity_scale and disparity_offset_px right?"
-          : "are the depth's unit, and the camera's aperture and focus, right?"));
+          ? fmt::format("{} and {}", run.Option("depth.meaning.disparity_scale"),
+                        run.Option("depth.meaning.disparity_offset_px"))
+          : fmt::format("{}, and the camera's aperture and focus,",
+                        run.Option("depth.meaning.unit"))));
 }
 
 void SmoothNoisyDepth(const EstimateOptions& options, estimator::DisparityMap* disparity,
@@ -230,26 +250,30 @@ EffectSet EffectsOfModel(const AnySolver& solver, bool camera) {
   return camera ? effects.With({Effect::kThickness, Effect::kFalloff}) : effects;
 }
 
+}  // namespace
+
 model::EffectSelection SelectEffects(const EstimateOptions& options,
                                      const std::optional<Camera>& camera,
                                      const std::optional<model::DepthStatistics>& depth) {
   const EffectSet of_model = EffectsOfModel(options.solver, camera.has_value());
   RequireEffectsOf(options.effects, of_model);
   model::EffectSelectionOptions choice = ChoiceOf(options.effects);
-  // The solution's own, which cost what they bring.
+  // Effects of the solution itself, which cost the time that they take.
   choice.kept = EffectsOfModel(options.solver, false);
   const bool is_gaussian = !options.aperture.shape && options.aperture.views_of == nullptr &&
                            camera && camera->psf == model::Psf::kGaussian;
   if (is_gaussian) choice.kept.Remove(Effect::kApertureShape);
   if (options.effects.LeavesOut(Effect::kDefocus)) {
     throw OptionError("effects",
-                      "effects: defocus is what an estimate undoes and cannot be left "
-                      "out");
+                      "effects: defocus is what an estimate inverts and cannot be left out; the "
+                      "image that is only warped by its depth is the baseline (DIBR) of a "
+                      "comparison");
   }
   if (of_model.Has(Effect::kOcclusion) && options.effects.LeavesOut(Effect::kOcclusion)) {
     throw OptionError("effects",
-                      "effects: occlusion cannot be left out of an estimate, whose views show the "
-                      "depth as each of them sees it");
+                      "effects: occlusion cannot be left out of an estimate, because each view "
+                      "shows the depth map from its own position; where nothing is occluded it "
+                      "costs nothing");
   }
   if (!camera) return DecideWithoutCamera(options.effects, of_model);
   model::EffectConditions conditions;
@@ -261,22 +285,17 @@ model::EffectSelection SelectEffects(const EstimateOptions& options,
                               of_model);
 }
 
-}  // namespace
-
-PreparedProblem Prepare(const Image& photo, const DepthMap& depth,
-                        const std::optional<Camera>& camera, const EstimateOptions& options,
-                        EstimateDiagnostics* diagnostics, RunScope* run) {
-  if (photo.channels() == 4) {
-    run->Warn(fmt::format("{}: its alpha channel is left out", NameOf(photo)));
-  }
-  // `part` is what is estimated; `photo` remains the whole image, whose EXIF is checked.
-  Image part = photo.WithoutAlpha();
-  DepthMap map = depth;
+PreparedProblem Prepare(Image photo, DepthMap map, const std::optional<Camera>& camera,
+                        const EstimateOptions& options, EstimateDiagnostics* diagnostics,
+                        RunScope* run) {
+  const PhotoFile file{NameOf(photo), photo.is_from_file() ? photo.source() : ""};
+  if (photo.channels() == 4) run->Warn(file.name + ": its alpha channel is ignored");
+  Image part = photo.channels() == 4 ? photo.WithoutAlpha() : std::move(photo);
   const int full_width_px = std::max(part.width_px(), map.width_px);
   const int full_height_px = std::max(part.height_px(), map.height_px);
   CutToCrop(options.crop, &part, &map, run);
   if (map.width_px != part.width_px() || map.height_px != part.height_px()) {
-    throw Error(fmt::format("{}: it is {}x{} px, the image {} {}x{} px: the sizes must be equal",
+    throw Error(fmt::format("{}: it is {}x{} px, the image {} is {}x{} px: the sizes must be equal",
                             NameOf(map), map.width_px, map.height_px, NameOf(part), part.width_px(),
                             part.height_px()));
   }
@@ -284,12 +303,13 @@ PreparedProblem Prepare(const Image& photo, const DepthMap& depth,
   prepared.input = std::make_shared<estimator::EstimateInput>();
   estimator::EstimateInput& input = *prepared.input;
   if (camera) {
-    input.camera =
-        CameraFor(photo, full_width_px, full_height_px, *camera, options, diagnostics, run);
+    input.camera = CameraFor(file, part.transfer(), full_width_px, full_height_px, *camera, options,
+                             diagnostics, run);
   }
-  input.transfer = TransferFor(photo, input.camera, diagnostics, run);
+  input.transfer = TransferFor(part, input.camera, diagnostics, run);
   diagnostics->transfer = input.transfer;
   input.image = part.ToLight(input.transfer);
+  part = Image();  // its memory is needed
   const Camera* const known = input.camera ? &*input.camera : nullptr;
   const PreparedAperture aperture = PrepareAperture(options, known, run);
   diagnostics->aperture_shape = aperture.shape;
@@ -297,7 +317,7 @@ PreparedProblem Prepare(const Image& photo, const DepthMap& depth,
   input.weights = aperture.weights;
   CheckViewCounts(input.weights, run);
   if (input.camera) {
-    input.grid = GridFor(options, *input.camera, input.weights);
+    input.grid = GridFor(options, *input.camera, input.weights, *run);
     WarnOfOtherSteps(options, aperture, *input.grid, *input.camera, run);
   }
   PreparedDepth prepared_depth =
@@ -311,7 +331,7 @@ PreparedProblem Prepare(const Image& photo, const DepthMap& depth,
   if (prepared_depth.depth && map.meaning.kind != DepthKind::kDisparity) {
     WarnOfUnlikelyDepth(map, *input.camera, *prepared_depth.depth, run);
   }
-  CheckDisparities(map, input.disparity);
+  CheckDisparities(map, input.disparity, *run);
   SmoothNoisyDepth(options, &input.disparity, diagnostics, run->threads());
   diagnostics->disparity_range_px = DisparityRangePx(input.disparity);
   prepared.effects = SelectEffects(options, input.camera, prepared_depth.depth);

@@ -19,11 +19,21 @@ struct PreparedProblem {
 };
 
 // The steps of PrepareProblem. The options are valid.
-PreparedProblem Prepare(const Image& photo, const DepthMap& depth,
-                        const std::optional<Camera>& camera, const EstimateOptions& options,
-                        EstimateDiagnostics* diagnostics, RunScope* run);
+PreparedProblem Prepare(Image photo, DepthMap map, const std::optional<Camera>& camera,
+                        const EstimateOptions& options, EstimateDiagnostics* diagnostics,
+                        RunScope* run);
 
-// ---- Steps that compare shares.
+// ---- Steps of it.
+
+// Decides which effects of the photograph are taken into account. Fall-off and thickness are
+// decided by their impact with the camera; the others are on unless they are left out. Without a
+// camera the effects are defocus, aperture-shape and occlusion, and their impact is unknown. The
+// functional solver has no occlusion. `depth` is the range of the map, if there is a camera. Throws
+// OptionError if defocus or occlusion is left out, because an estimate is about them, and for
+// effects that it does not have.
+model::EffectSelection SelectEffects(const EstimateOptions& options,
+                                     const std::optional<Camera>& camera,
+                                     const std::optional<model::DepthStatistics>& depth);
 
 // The disparity of a map on the grid of its light field, without holes.
 struct PreparedDepth {

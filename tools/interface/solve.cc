@@ -151,6 +151,7 @@ Solved SolveScene(const SceneSolver& solver, const PreparedProblem& prepared,
   solved.summary.predicted_memory_mib = scene.predicted_memory_mib;
   solved.summary.device = scene.device;
   diagnostics->strength = scene.strength;
+  diagnostics->strength_rule = solver.strength_rule;
   diagnostics->noise_sigma = scene.noise_sigma;
   diagnostics->residual_rms = scene.residual_rms;
   diagnostics->row_share = scene.row_share;
@@ -194,6 +195,7 @@ Solved SolveBlocks(const BlockSolver& solver, const PreparedProblem& prepared,
   diagnostics->gamma = blocks.gamma;
   diagnostics->ridge = diagnostics->strength = blocks.ridge;
   diagnostics->block_px = blocks.block_px;
+  diagnostics->blocks_from_store = blocks.blocks_from_store;
   for (const estimator::BlockReport& block : blocks.blocks) {
     solved.blocks.push_back({block.x, block.y, block.width_px, block.height_px, block.unknowns,
                              block.iterations, block.rcond, block.relative_residual});

@@ -52,7 +52,6 @@ std::string OwnApertureInWords(const model::LightField& light_field) {
 void RequireStatedAperture(const std::string& light_field_path,
                            const model::LightField& light_field, model::ApertureShape shape,
                            const std::string& asked) {
-  if (!StatesAperture(light_field_path)) return;
   const Eigen::ArrayXXd stated = OwnWeightsOfPresentViews(light_field);
   const Eigen::ArrayXXd wanted = ShapeOfPresentViews(shape, light_field);
   Eigen::Index l = 0, k = 0;
@@ -60,7 +59,7 @@ void RequireStatedAperture(const std::string& light_field_path,
   throw Error(
       fmt::format("{}: weights: this light field states its aperture as {} (view ({}, {}) has a "
                   "share of {:.6g}), but {} gives that view {:.6g}: they must be equal; without "
-                  "--aperture-shape the stated weights are used",
+                  "that shape the stated weights are used",
                   PrintableUtf8((fs::path(light_field_path) / kLightFieldMarker).string()),
                   OwnApertureInWords(light_field), k, l, stated(l, k), asked, wanted(l, k)));
 }

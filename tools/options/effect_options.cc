@@ -90,6 +90,20 @@ void ApplyEffectOptions(const EffectOptions& options, model::EffectSelectionOpti
   }
 }
 
+EffectSelection SelectionOf(const EffectOptions& options) {
+  using Base = model::EffectSelectionOptions::Base;
+  model::EffectSelectionOptions choice;
+  ApplyEffectOptions(options, &choice);
+  EffectSelection selection;
+  selection.base = choice.base == Base::kAuto  ? EffectSelection::Base::kAuto
+                   : choice.base == Base::kAll ? EffectSelection::Base::kAll
+                                               : EffectSelection::Base::kGiven;
+  selection.given = choice.given;
+  selection.without = choice.without;
+  if (options.tolerance) selection.tolerance = choice.tolerance;
+  return selection;
+}
+
 std::string EffectSiteText(const model::EffectSite& place) {
   const std::string depth =
       std::isfinite(place.depth_mm) ? fmt::format("{:.5g} mm", place.depth_mm) : "infinity";

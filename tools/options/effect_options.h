@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "thicklens/effects.h"
 #include "thicklens/model/effect_selection.h"
 
 namespace thicklens::tools {
@@ -23,6 +24,8 @@ void AddEffectOptions(CLI::App* command, EffectOptions* options);
 void CheckEffectNames(const EffectOptions& options, const model::EffectSet& of_model);
 // Overrides `choice` with the given options. Throws UsageError.
 void ApplyEffectOptions(const EffectOptions& options, model::EffectSelectionOptions* choice);
+// Returns the given options as the interface takes them. Throws UsageError.
+EffectSelection SelectionOf(const EffectOptions& options);
 
 // "250 mm, at (0, 479)".
 std::string EffectSiteText(const model::EffectSite& place);

@@ -25,12 +25,12 @@ UsageError UsageErrorOf(const OptionError& error, const OptionNames& names) {
 CommandRun::CommandRun(const CommonOptions& options, OptionNames names)
     : names_(std::move(names)), quiet_(options.quiet) {
   control_.threads = options.threads;
-  control_.progress = [this](const Progress& progress) { Show(progress); };
+  control_.progress = [this](const thicklens::Progress& progress) { Show(progress); };
   control_.notice = ReportNotice;
   control_.option_name = [this](const std::string& field) { return names_(field); };
 }
 
-void CommandRun::Show(const Progress& progress) {
+void CommandRun::Show(const thicklens::Progress& progress) {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (line_ == nullptr || stage_ != progress.stage) {
     line_.reset();  // erases its line before the next one is shown

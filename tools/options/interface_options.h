@@ -54,7 +54,7 @@ class CommandRun {
   const OptionNames& names() const { return names_; }
 
  private:
-  void Show(const Progress& progress);
+  void Show(const thicklens::Progress& progress);
 
   OptionNames names_;
   bool quiet_;

@@ -14,12 +14,6 @@ namespace {
 using model::Effect;
 using model::EffectSet;
 
-EffectSet EffectsOf(const std::string& solver, bool camera) {
-  EffectSet effects = {Effect::kDefocus, Effect::kApertureShape};
-  if (solver != "functional") effects.Add(Effect::kOcclusion);
-  return camera ? effects.With({Effect::kThickness, Effect::kFalloff}) : effects;
-}
-
 model::EffectSelectionOptions ChoiceOf(const EffectOptions& options) {
   model::EffectSelectionOptions choice;
   ApplyEffectOptions(options, &choice);
@@ -39,43 +33,6 @@ model::EffectSelection DecisionWithoutCamera(const EffectOptions& options,
 }
 
 }  // namespace
-
-bool IsLeftOut(const EffectOptions& options, Effect effect) {
-  const model::EffectSelectionOptions choice = ChoiceOf(options);
-  return choice.without.Has(effect) ||
-         (choice.base == model::EffectSelectionOptions::Base::kGiven && !choice.given.Has(effect));
-}
-
-model::EffectSelection DecideEstimateEffects(const EstimateOptions& options,
-                                             const std::optional<model::Camera>& camera,
-                                             const std::optional<model::DepthStatistics>& depth) {
-  const EffectSet of_model = EffectsOf(options.solver, camera.has_value());
-  CheckEffectNames(options.effects, of_model);
-  model::EffectSelectionOptions choice = ChoiceOf(options.effects);
-  // Effects of the solution itself, which cost the time that they take.
-  choice.kept = EffectsOf(options.solver, false);
-  const bool is_gaussian = options.aperture_shape.empty() && options.aperture_of.empty() &&
-                           camera && camera->psf == model::Psf::kGaussian;
-  if (is_gaussian) choice.kept.Remove(Effect::kApertureShape);
-  if (IsLeftOut(options.effects, Effect::kDefocus)) {
-    throw UsageError(
-        "--effects, --without: defocus is what an estimate inverts and cannot be left out; "
-        "thicklens compare --dibr measures the image that is only warped by its depth");
-  }
-  if (of_model.Has(Effect::kOcclusion) && IsLeftOut(options.effects, Effect::kOcclusion)) {
-    throw UsageError(
-        "--effects, --without: occlusion cannot be left out of an estimate, because each view "
-        "shows the depth map from its own position; where nothing is occluded it costs nothing");
-  }
-  if (!camera) return DecisionWithoutCamera(options.effects, of_model);
-  model::EffectConditions conditions;
-  conditions.camera = *camera;
-  const double focus_depth_mm = camera->focus_depth_mm();
-  return model::SelectEffects(choice, conditions,
-                              model::PlacesBetween(*camera, depth ? depth->min_mm : focus_depth_mm,
-                                                   depth ? depth->max_mm : focus_depth_mm, true),
-                              of_model);
-}
 
 model::EffectSelection DecidePhotographEffects(const EffectOptions& options,
                                                const model::LightField& light_field) {

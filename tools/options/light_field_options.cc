@@ -175,6 +175,19 @@ model::DepthConvention ConventionOf(const DepthOptions& options) {
   return convention;
 }
 
+DepthMeaning MeaningOf(const DepthOptions& options) {
+  const model::DepthConvention convention = ConventionOf(options);
+  DepthMeaning meaning;
+  meaning.kind = convention.kind;
+  for (const LengthUnit unit : {LengthUnit::kMillimetre, LengthUnit::kCentimetre,
+                                LengthUnit::kMetre, LengthUnit::kTum5000}) {
+    if (options.unit == LengthUnitName(unit)) meaning.unit = unit;
+  }
+  meaning.disparity_scale = options.disparity_scale;
+  meaning.disparity_offset_px = options.disparity_offset_px;
+  return meaning;
+}
+
 void AddApertureShapeOption(CLI::App* command, std::string* text) {
   command
       ->add_option("--aperture-shape", *text,

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "thicklens/depth.h"
 #include "thicklens/estimator/view_geometry.h"
 #include "thicklens/io/light_field_io.h"
 #include "thicklens/model/camera.h"
@@ -53,6 +54,7 @@ struct DepthOptions {
 void AddDepthOptions(CLI::App* command, DepthOptions* options);
 // Throws UsageError if the kind is not given, z or range have no unit, or disparity has one.
 model::DepthConvention ConventionOf(const DepthOptions& options);
+DepthMeaning MeaningOf(const DepthOptions& options);  // the same for the interface
 
 // The option --aperture-shape; for an empty text the result is `otherwise`.
 void AddApertureShapeOption(CLI::App* command, std::string* text);

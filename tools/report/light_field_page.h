@@ -40,7 +40,7 @@ struct LightFieldPageInput {
   std::string name;  // of the light field, as the user gave it
   const model::LightField* light_field = nullptr;
   const model::LightField* truth = nullptr;  // of the same views and size
-  std::optional<model::LinearImage> photo;
+  const model::LinearImage* photo = nullptr;
   std::optional<PageDepth> depth;
   std::optional<SweepStrip> sweep;
   std::string calibration;                     // from InlinedCalibrationReport

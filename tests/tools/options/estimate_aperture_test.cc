@@ -1,6 +1,4 @@
 // thicklens estimate --aperture-of: the views, their aperture, and the origin of both.
-#include "tools/options/estimate_aperture.h"
-
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// --effects and --without of estimate and render: the effects that are on were requested or matter.
+// --effects and --without of render: the effects that are on were requested or matter.
 #include "tools/options/light_field_effects.h"
 
 #include <gmock/gmock.h>
@@ -25,7 +25,6 @@ using thicklens::testing::CentredSensor;
 using thicklens::testing::TestCameraFocusedAt;
 
 constexpr int kSensorWidthPx = 60, kSensorHeightPx = 40;
-const EstimateOptions kDefault;
 
 // Thick, with a wide field where the pixels are large.
 model::Camera ThickCamera(double pixel_pitch_mm, double aperture_radius_mm = 4) {
@@ -33,14 +32,6 @@ model::Camera ThickCamera(double pixel_pitch_mm, double aperture_radius_mm = 4) 
                              CentredSensor(kSensorWidthPx, kSensorHeightPx, pixel_pitch_mm));
 }
 
-EffectSet Decided(const EstimateOptions& options, const std::optional<model::Camera>& camera) {
-  return DecideEstimateEffects(options, camera, model::DepthStatistics{100, 0, 500, 800, 2000}).on;
-}
-EstimateOptions Without(const std::string& names) {
-  EstimateOptions options;
-  options.effects.without = names;
-  return options;
-}
 std::string UsageErrorOf(const std::function<void()>& work) {
   try {
     work();
@@ -48,77 +39,6 @@ std::string UsageErrorOf(const std::function<void()>& work) {
     return error.what();
   }
   return "";
-}
-
-TEST(LightFieldEffectsTest, AnEstimateTakesWhatMatters) {
-  const EffectSet kept = {Effect::kDefocus, Effect::kOcclusion};
-  EXPECT_EQ(Decided(kDefault, ThickCamera(0.2)), kept.With({Effect::kFalloff, Effect::kThickness}));
-  EXPECT_EQ(Decided(kDefault, ThickCamera(0.001, 0.05)), kept);
-  // A small field: the effect of a wide aperture on the blur there is included in the calibrated
-  // blur ratio.
-  EXPECT_EQ(Decided(kDefault, ThickCamera(0.001)), kept);
-  EXPECT_EQ(Decided(Without("thickness"), ThickCamera(0.2)), kept.With({Effect::kFalloff}));
-  EstimateOptions options;
-  options.effects.effects = "all";
-  EXPECT_EQ(Decided(options, ThickCamera(0.001, 0.05)),
-            kept.With({Effect::kFalloff, Effect::kThickness, Effect::kApertureShape}));
-  options.effects.effects = "defocus,occlusion";
-  EXPECT_EQ(Decided(options, ThickCamera(0.2)), kept);
-  options = kDefault;
-  options.effects.tolerance = "30gl";
-  EXPECT_EQ(Decided(options, ThickCamera(0.05, 1)), kept);
-  model::Camera disc = ThickCamera(0.001, 0.05);
-  disc.psf = model::Psf::kDisc;
-  EXPECT_EQ(Decided(kDefault, disc), kept.With({Effect::kApertureShape}));
-}
-
-TEST(LightFieldEffectsTest, WithoutACameraNothingIsKnownOfTheirImpact) {
-  EXPECT_EQ(Decided(kDefault, std::nullopt),
-            (EffectSet{Effect::kDefocus, Effect::kApertureShape, Effect::kOcclusion}));
-  EXPECT_TRUE(DecideEstimateEffects(kDefault, std::nullopt, std::nullopt).findings.empty());
-  EstimateOptions functional;
-  functional.solver = "functional";
-  EXPECT_EQ(Decided(functional, std::nullopt),
-            (EffectSet{Effect::kDefocus, Effect::kApertureShape}));
-  EstimateOptions tolerance;
-  tolerance.effects.tolerance = "1gl";
-  EXPECT_THAT(UsageErrorOf([&] { Decided(tolerance, std::nullopt); }),
-              HasSubstr("--effect-tolerance"));
-  EXPECT_THAT(UsageErrorOf([] { Decided(Without("falloff"), std::nullopt); }),
-              HasSubstr("--without: effect falloff is not available here"));
-}
-
-// The effects that auto leaves out also meet the tolerance as reported. The report leaves each out
-// alone, while auto leaves them out one after the other, which changes the bounds a little.
-TEST(LightFieldEffectsTest, OmittedEffectsStayWithinTheReportedTolerance) {
-  int left_out = 0;
-  for (const double pitch_mm : {0.001, 0.003, 0.01, 0.03, 0.1}) {
-    for (const double radius_mm : {0.02, 0.2, 1.0, 4.0}) {
-      const model::EffectSelection decision = DecideEstimateEffects(
-          kDefault, ThickCamera(pitch_mm, radius_mm), model::DepthStatistics{9, 0, 500, 800, 2000});
-      for (const model::LargestEffectImpact& finding : decision.findings) {
-        if (decision.on.Has(finding.effect)) continue;
-        EXPECT_LE(finding.impact.grey_levels, 0.6)
-            << model::EffectName(finding.effect) << " " << pitch_mm << " " << radius_mm;
-        if (finding.effect == Effect::kFalloff) ++left_out;
-      }
-    }
-  }
-  EXPECT_GT(left_out, 0);
-}
-
-TEST(LightFieldEffectsTest, AnEstimateRefusesToLeaveOutWhatItIsAbout) {
-  EXPECT_THAT(UsageErrorOf([] { Decided(Without("defocus"), ThickCamera(0.2)); }),
-              HasSubstr("compare --dibr"));
-  EXPECT_THAT(UsageErrorOf([] { Decided(Without("occlusion"), std::nullopt); }),
-              HasSubstr("occlusion cannot be left out"));
-  EXPECT_THAT(UsageErrorOf([] { Decided(Without("shot-noise"), ThickCamera(0.2)); }),
-              HasSubstr("--without: effect shot-noise is not available here"));
-  EXPECT_THAT(UsageErrorOf([] { Decided(Without("bokeh"), ThickCamera(0.2)); }),
-              HasSubstr("\"bokeh\""));
-  EstimateOptions options;
-  options.effects.effects = "falloff";
-  EXPECT_THAT(UsageErrorOf([&] { Decided(options, ThickCamera(0.2)); }), HasSubstr("defocus"));
 }
 
 // A uniform field, photographed by a camera and by its thin reference: the mean over the views of

@@ -147,7 +147,7 @@ class LightFieldPageTest : public ::testing::Test {
 
   void GiveAll() {
     input_.truth = &truth_;
-    input_.photo = model::ViewImage(truth_, 1, 1);
+    input_.photo = &photo_;
     GiveDepth();
     input_.sweep = SweepStrip{"bench/sweep.yaml", 41, {}};
     for (int i = 0; i < 7; ++i) {
@@ -181,6 +181,7 @@ class LightFieldPageTest : public ::testing::Test {
 
   model::LightField light_field_ = SeenByCamera(3, 3, 1);
   model::LightField truth_ = SeenByCamera(3, 3, 2);
+  model::LinearImage photo_ = model::ViewImage(truth_, 1, 1);
   LightFieldPageInput input_;
 };
 
@@ -235,10 +236,10 @@ TEST_F(LightFieldPageTest, SaysOnlyWhatItWasGiven) {
   const std::string html = Html();
   for (const char* absent : {"DIBR", "truth", "PSNR", "sweep", "refocus", "MiB"})
     EXPECT_THAT(html.substr(html.find("<main>")), Not(HasSubstr(absent)));
-  input_.photo = model::ViewImage(truth_, 1, 1);
+  input_.photo = &photo_;
   EXPECT_THAT(Page().sections, ElementsAre("summary", "image", "views", "epipolar", "how"));
   EXPECT_THAT(Html(), Not(HasSubstr("Depth map")));
-  input_.photo.reset();
+  input_.photo = nullptr;
   GiveDepth();
   EXPECT_THAT(Page().sections,
               ElementsAre("summary", "image", "views", "epipolar", "refocus", "how"));
@@ -659,7 +660,8 @@ TEST_F(LightFieldPageTest, SlowStaysBelowFourMegabytesForOrdinaryImages) {
                       0.2F * static_cast<float>(i / 40 % 2) + noise(generator);
   }
   input_.light_field = input_.truth = &large;
-  input_.photo = model::ViewImage(large, 0, 0);
+  const model::LinearImage photo = model::ViewImage(large, 0, 0);
+  input_.photo = &photo;
   input_.depth = PageDepth{640, 480, {}, false};
   for (int i = 0; i < 640 * 480; ++i)
     input_.depth->values.push_back(std::sin(0.01F * static_cast<float>(i % 640)) +

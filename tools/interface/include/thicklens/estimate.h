@@ -13,6 +13,9 @@
 #include "thicklens/camera.h"
 #include "thicklens/depth.h"
 #include "thicklens/effects.h"
+#include "thicklens/estimator/blur_check.h"
+#include "thicklens/estimator/inpaint.h"
+#include "thicklens/estimator/scene_solver.h"
 #include "thicklens/export.h"
 #include "thicklens/image.h"
 #include "thicklens/light_field.h"
@@ -78,11 +81,12 @@ struct EstimateSeconds {
   double prepare = 0;  // camera, aperture, depth, effects
   double setup = 0, blur_check = 0, solve = 0;
   double views = 0;  // making the views, and inpainting
-  double total() const { return prepare + setup + blur_check + solve + views; }
+  double sink = 0;   // giving views and confidence to a ViewSink; shared among the threads
+  double total() const { return prepare + setup + blur_check + solve + views + sink; }
 };
 
 // The result in numbers.
-struct BlockSummary {
+struct EstimateSummary {
   std::string message = "not run";  // of the solver
   std::string solver;               // "scene", "blocks", "functional", "grid" or a program's own
   std::string prior;                // of SceneSolver; otherwise empty
@@ -92,7 +96,9 @@ struct BlockSummary {
   std::optional<double> relative_residual, rcond_min;
   std::string device;
   int threads = 0;
-  std::vector<std::string> effects;   // names of the effects that were taken into account
+  std::vector<std::string> effects;  // names of the effects that were taken into account
+  // Why the result is partial: the iterations did not converge. Empty: it is complete.
+  std::string partial_reason;
   std::vector<std::string> warnings;  // what may make the result wrong, one line each
   EstimateSeconds seconds;
 
@@ -111,6 +117,24 @@ struct ExifComparison {
   std::string quantity, photo, camera;
   Verdict verdict = Verdict::kAgrees;
   std::string remark;  // what a disagreement may mean
+};
+
+THICKLENS_EXPORT std::string ExifVerdictName(ExifComparison::Verdict verdict);  // "agrees", ...
+
+// What SceneSolver::check_blur proposes, in the numbers that a user can change: those of the map of
+// disparities, or those of the camera. Nothing of it is applied. Absent: not proposed.
+struct BlurProposal {
+  struct NarrowerBlur {
+    // Either the meaning of the map for which the blur is as narrow as proposed, or kappa.
+    std::optional<double> disparity_scale, disparity_offset_px, blur_ratio;
+  };
+  struct OtherFocus {
+    // Either the offset of the disparities, px per view step, or the plane of focus, mm from Ap,
+    // which may be infinite.
+    std::optional<double> disparity_offset_px, focus_depth_mm;
+  };
+  std::optional<NarrowerBlur> narrower_blur;
+  std::optional<OtherFocus> other_focus;
 };
 
 // A part of the photograph that the estimate does not explain, px; rms in encoded values, 1 at full
@@ -141,17 +165,20 @@ struct EstimateDiagnostics {
   double coarse_share = 0;     // share of the pixels whose step is above 3 px
   std::optional<double> strength, noise_sigma, residual_rms;  // noise, residual in encoded values
   std::optional<double> row_share, occluded_fraction, unexplained_share;
-  std::vector<UnexplainedPatch> patches;  // by descending residual
+  std::vector<UnexplainedPatch> patches;      // by descending residual
+  std::optional<StrengthRule> strength_rule;  // of SceneSolver
   int bands = 1;
   int reweightings = 0;
   double predicted_memory_mib = 0;
   std::optional<double> gamma, ridge;
   std::optional<int> block_px;
+  int blocks_from_store = 0;  // of BlockSolver::store
   // Shares of all rays: seen by the whole aperture, in part, blurred too strongly for details, and
   // filled in. The sum is 1.
   double rays_visible = 0, rays_partly_visible = 0, rays_blurred = 0, rays_filled_in = 0;
-  std::size_t inpainted_rays = 0;
-  std::string blur_check;  // what SceneSolver::check_blur found, one line; empty: not asked for
+  std::optional<estimator::InpaintSummary> inpainting;  // of HiddenRays::kTelea
+  std::optional<estimator::BlurCheck> blur_check;       // of SceneSolver::check_blur
+  BlurProposal blur_proposal;                           // that follows from it
   std::vector<Notice> notices;
 };
 
@@ -164,9 +191,15 @@ struct BlockRecord {
 
 struct LightFieldEstimate {
   LightField light_field;
-  BlockSummary summary;
+  EstimateSummary summary;
   EstimateDiagnostics diagnostics;
   std::vector<BlockRecord> blocks;
+  // What the solver started from: the photograph in linear light, its disparity, weights and grid.
+  std::optional<Problem> problem;
+  std::vector<bool> was_hole;  // per pixel of the depth map: its value was filled in
+  // Per pixel of the photograph, from SceneSolver: residual, occluded fraction and blur. Without
+  // radiance, which the middle of the light field shows, and confidence, which follows.
+  std::optional<estimator::SceneMaps> maps;
   // One byte per ray, view by view (index l * U + k), row by row: how well the photograph shows it
   // (docs/file-formats.md).
   std::vector<std::uint8_t> confidence;
@@ -195,10 +228,12 @@ class THICKLENS_EXPORT ViewSink {
 // disparity, holes filled; noise smoothed; effects chosen; solver; occluded rays; checks. Sources:
 // the paper's (10), (16), (18) to (21) for the model and the functional, [D101] for SceneSolver.
 //
-// The result does not depend on the number of threads. Throws OptionError for options, Error for
+// Photograph and depth are taken by value: whoever moves them there does not hold them twice while
+// the light field is solved for. The result does not depend on the number of threads. Throws
+// OptionError for options, Error for
 // inputs that do not fit each other (sizes, units, EXIF that contradicts the camera, disparities
 // larger than the image) and for what the solver refuses, and Interrupted.
-THICKLENS_EXPORT LightFieldEstimate EstimateLightField(const Image& photo, const DepthMap& depth,
+THICKLENS_EXPORT LightFieldEstimate EstimateLightField(Image photo, DepthMap depth,
                                                        const std::optional<Camera>& camera,
                                                        const EstimateOptions& options,
                                                        const RunControl& run = {});
@@ -206,14 +241,14 @@ THICKLENS_EXPORT LightFieldEstimate EstimateLightField(const Image& photo, const
 // The same, with the views given to `sink`: the returned light field and confidence have no values.
 // SceneSolver never holds more than a few views. Same bits, except that a memory limit may need
 // fewer bands.
-THICKLENS_EXPORT LightFieldEstimate EstimateLightFieldTo(ViewSink* sink, const Image& photo,
-                                                         const DepthMap& depth,
+THICKLENS_EXPORT LightFieldEstimate EstimateLightFieldTo(ViewSink* sink, Image photo,
+                                                         DepthMap depth,
                                                          const std::optional<Camera>& camera,
                                                          const EstimateOptions& options,
                                                          const RunControl& run = {});
 
 // The steps before the solver. `diagnostics` (may be null) gets what they found.
-THICKLENS_EXPORT Problem PrepareProblem(const Image& photo, const DepthMap& depth,
+THICKLENS_EXPORT Problem PrepareProblem(Image photo, DepthMap depth,
                                         const std::optional<Camera>& camera,
                                         const EstimateOptions& options,
                                         EstimateDiagnostics* diagnostics,

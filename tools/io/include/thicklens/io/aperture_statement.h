@@ -24,8 +24,8 @@ Eigen::ArrayXXd OwnWeightsOfPresentViews(const model::LightField& light_field);
 // The name of the shape whose weights the light field has, or "weights of no known shape".
 std::string OwnApertureInWords(const model::LightField& light_field);
 
-// Throws Error with both values if the light field's file states an aperture whose weights are not
-// those of `shape`. `asked` says who asks for that shape: "--aperture-shape gaussian".
+// Throws Error with both values if the light field's weights, which its file states, are not those
+// of `shape`. `asked` says who asks for that shape: "--aperture-shape gaussian".
 void RequireStatedAperture(const std::string& light_field_path,
                            const model::LightField& light_field, model::ApertureShape shape,
                            const std::string& asked);

@@ -1,5 +1,5 @@
 // The EXIF data of a photograph are compared with the camera file for its estimate.
-#include "tools/options/exif_check.h"
+#include "tools/interface/exif_comparison.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -51,7 +51,7 @@ PhotoSize Whole() { return {kPhotoWidthPx, kPhotoHeightPx, false}; }
 // The verdict on one quantity; "" where it is not compared.
 std::string VerdictOn(const std::string& quantity, const io::PhotoExif& exif,
                       const model::Camera& camera = BenchLens(), const PhotoSize& size = Whole()) {
-  for (const ExifFinding& finding : CompareExif(exif, camera, size)) {
+  for (const ExifComparison& finding : CompareExif(exif, camera, size)) {
     if (finding.quantity == quantity) return ExifVerdictName(finding.verdict);
   }
   return "";

@@ -1,4 +1,4 @@
-#include "tools/report/blur_proposal.h"
+#include "tools/interface/blur_proposal.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 #include "thicklens/model/light_field_grid.h"
 #include "thicklens/model/thick_lens.h"
 
-namespace thicklens::tools {
+namespace thicklens {
 namespace {
 
 using ::testing::AllOf;
@@ -27,10 +27,16 @@ estimator::EstimateInput WithCamera() {
   return input;
 }
 
-DepthOptions Depth(const std::string& kind) {
-  DepthOptions depth;
-  depth.kind = kind;
-  return depth;
+DepthMeaning Meaning(DepthKind kind) {
+  DepthMeaning meaning;
+  meaning.kind = kind;
+  return meaning;
+}
+
+std::string Warning(const estimator::BlurCheck& check, const estimator::EstimateInput& input,
+                    const DepthMeaning& meaning) {
+  const RunControl control;
+  return BlurWarning(check, ProposalOf(check, input, meaning), input, RunScope(control));
 }
 
 estimator::BlurTrial Trial(double scale, double offset_px, double unexplained) {
@@ -69,55 +75,51 @@ TEST(BlurProposal, FocusIsWhereTheOffsetLeadsToNoDisparity) {
 }
 
 TEST(BlurProposal, SaysNothingWhereNothingIsFound) {
-  const BlurProposal proposal(Checked(), WithCamera(), Depth("z"));
-  EXPECT_THAT(proposal.Warning(), IsEmpty());
-  EXPECT_TRUE(proposal.Json().at("proposal").is_null());
-  EXPECT_EQ(proposal.Json().at("evaluations").size(), 2u);
-  EXPECT_EQ(proposal.Json().at("evaluations")[1].at("blur_scale"), 0.5);
-  EXPECT_THAT(proposal.Summary(), HasSubstr("looked (2 solve(s)"));
+  EXPECT_THAT(Warning(Checked(), WithCamera(), Meaning(DepthKind::kZ)), IsEmpty());
+  const BlurProposal proposal = ProposalOf(Checked(), WithCamera(), Meaning(DepthKind::kZ));
+  EXPECT_FALSE(proposal.narrower_blur || proposal.other_focus);
 }
 
 TEST(BlurProposal, SpeaksOfTheCameraWhereDepthIsADepth) {
   estimator::BlurCheck check = Checked();
   check.narrower_blur = Trial(0.5, 0, 0.1);
-  const BlurProposal blur(check, WithCamera(), Depth("z"));
-  EXPECT_THAT(blur.Warning(),
+  EXPECT_THAT(Warning(check, WithCamera(), Meaning(DepthKind::kZ)),
               AllOf(HasSubstr("7 of 20 blocks"), HasSubstr("0.5 times"),
                     HasSubstr("blur_ratio of 0.225 instead of 0.45"), HasSubstr("leaves 10 %"),
                     HasSubstr("none of this was applied"), Not(HasSubstr("plane of focus"))));
-  EXPECT_DOUBLE_EQ(blur.Json().at("proposal").at("narrower_blur").at("blur_ratio").get<double>(),
-                   0.225);
-  EXPECT_FALSE(blur.Json().at("proposal").contains("other_focus"));
+  const BlurProposal blur = ProposalOf(check, WithCamera(), Meaning(DepthKind::kZ));
+  EXPECT_DOUBLE_EQ(blur.narrower_blur.value().blur_ratio.value(), 0.225);
+  EXPECT_FALSE(blur.narrower_blur->disparity_scale);
+  EXPECT_FALSE(blur.other_focus);
 
   check.other_focus = Trial(1, -0.3, 0.2);
   const estimator::EstimateInput input = WithCamera();
-  const BlurProposal both(check, input, Depth("range"));
-  EXPECT_THAT(both.Warning(),
+  EXPECT_THAT(Warning(check, input, Meaning(DepthKind::kRange)),
               AllOf(HasSubstr("plane of focus at"), HasSubstr("instead of 800 mm"),
                     HasSubstr("-0.3 px"), HasSubstr("the photograph does not show")));
-  EXPECT_EQ(both.Json().at("proposal").at("other_focus").at("focus_depth_mm"),
-            FocusDepthForOffsetMm(input, -0.3));
+  const BlurProposal both = ProposalOf(check, input, Meaning(DepthKind::kRange));
+  EXPECT_EQ(both.other_focus.value().focus_depth_mm.value(), FocusDepthForOffsetMm(input, -0.3));
 }
 
 TEST(BlurProposal, SpeaksOfTheMapWhereItHoldsDisparities) {
   estimator::BlurCheck check = Checked();
   check.narrower_blur = Trial(0.5, 0, 0.1);
   check.other_focus = Trial(1, 0.25, 0.2);
-  DepthOptions depth = Depth("disparity");
-  depth.disparity_scale = 0.02;
-  depth.disparity_offset_px = -1.5;
+  DepthMeaning meaning = Meaning(DepthKind::kDisparity);
+  meaning.disparity_scale = 0.02;
+  meaning.disparity_offset_px = -1.5;
   estimator::EstimateInput input;
   input.weights = model::ApertureWeights(model::ApertureShape::kUniform, 5, 5);
-  const BlurProposal proposal(check, input, depth);
   // 0.5 (0.02 v - 1.5) and 0.02 v - 1.5 + 0.25.
-  EXPECT_THAT(proposal.Warning(),
-              AllOf(HasSubstr("--disparity-scale 0.01 --disparity-offset -0.75"),
-                    HasSubstr("--disparity-offset -1.25 ")));
-  const nlohmann::json json = proposal.Json().at("proposal");
-  EXPECT_DOUBLE_EQ(json.at("narrower_blur").at("disparity_scale").get<double>(), 0.01);
-  EXPECT_DOUBLE_EQ(json.at("narrower_blur").at("disparity_offset_px").get<double>(), -0.75);
-  EXPECT_DOUBLE_EQ(json.at("other_focus").at("disparity_offset_px").get<double>(), -1.25);
+  EXPECT_THAT(Warning(check, input, meaning),
+              AllOf(HasSubstr("depth.meaning.disparity_scale 0.01"),
+                    HasSubstr("depth.meaning.disparity_offset_px -0.75"),
+                    HasSubstr("depth.meaning.disparity_offset_px -1.25 ")));
+  const BlurProposal proposal = ProposalOf(check, input, meaning);
+  EXPECT_DOUBLE_EQ(proposal.narrower_blur.value().disparity_scale.value(), 0.01);
+  EXPECT_DOUBLE_EQ(proposal.narrower_blur->disparity_offset_px.value(), -0.75);
+  EXPECT_DOUBLE_EQ(proposal.other_focus.value().disparity_offset_px.value(), -1.25);
 }
 
 }  // namespace
-}  // namespace thicklens::tools
+}  // namespace thicklens

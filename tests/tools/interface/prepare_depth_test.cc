@@ -1,0 +1,159 @@
+// From a depth map to the disparity of a photograph's pixels.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "support/error_message.h"
+#include "support/test_cameras.h"
+#include "thicklens/model/light_field_grid.h"
+#include "thicklens/model/thick_lens.h"
+#include "tools/interface/problem.h"
+
+namespace thicklens {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+using thicklens::testing::ErrorOf;
+
+constexpr float kHole = std::numeric_limits<float>::quiet_NaN();
+constexpr int kMapWidth = 3, kMapHeight = 2;
+
+model::Camera MapCamera() {
+  return thicklens::testing::SmallCamera(kMapWidth, kMapHeight, {1, 0.5});
+}
+
+model::RawDepthMap MapOf(std::vector<float> values) {
+  return {kMapWidth, kMapHeight, std::move(values), false};
+}
+
+// Tells nothing about surfaces.
+model::LinearImage GreyImage(int width_px = kMapWidth) {
+  return {width_px, kMapHeight, 1,
+          std::vector<float>(static_cast<std::size_t>(width_px * kMapHeight))};
+}
+
+DepthMeaning KindAndUnit(const std::string& kind, const std::string& unit) {
+  DepthMeaning meaning;
+  meaning.kind = model::DepthKindFromName(kind);
+  if (!unit.empty()) meaning.unit = LengthUnit::kMillimetre;
+  return meaning;
+}
+
+PreparedDepth Prepared(const model::RawDepthMap& map, const std::string& source,
+                       const DepthMeaning& meaning, const model::LinearImage& image,
+                       const model::Camera* camera, const model::LightFieldGrid* grid) {
+  return PrepareDepth({map.width_px, map.height_px, map.values, map.integer, meaning, source},
+                      image, camera, grid);
+}
+
+TEST(PrepareDepth, WithoutACameraADisparityIsScaledAndFilled) {
+  DepthMeaning options = KindAndUnit("disparity", "");
+  options.disparity_scale = 2;
+  options.disparity_offset_px = -1;
+  // Around the hole there are 1 and 0 on the left, and 3, -2 and 0.25 elsewhere, each of which is a
+  // surface of its own.
+  const PreparedDepth prepared =
+      Prepared(MapOf({1, kHole, 3, 0, -2, 0.25F}), "d.pfm", options, GreyImage(), nullptr, nullptr);
+  EXPECT_THAT(prepared.disparity.disparity, ElementsAre(1, -5, 5, -1, -5, -0.5F));
+  EXPECT_EQ(prepared.disparity.step, Eigen::Vector2d(1, 1));
+  EXPECT_EQ(prepared.holes, 1U);
+  EXPECT_FALSE(prepared.depth);
+}
+
+TEST(PrepareDepth, WithoutACameraMillimetresMeanNothing) {
+  EXPECT_THAT(ErrorOf([] {
+                Prepared(MapOf(std::vector<float>(6, 500)), "d.pfm", KindAndUnit("z", "mm"),
+                         GreyImage(), nullptr, nullptr);
+              }),
+              AllOf(StartsWith("depth.meaning.kind: "), HasSubstr("need a camera"),
+                    HasSubstr("disparity")));
+}
+
+TEST(PrepareDepth, TheMapIsNamedWhereItIsWrong) {
+  const model::Camera camera = MapCamera();
+  const model::LightFieldGrid grid = model::DefaultGrid(camera, 3, 3);
+  const model::RawDepthMap holes = MapOf(std::vector<float>(6, kHole));
+  for (const model::Camera* used : {static_cast<const model::Camera*>(nullptr), &camera}) {
+    const auto message = [&](const model::RawDepthMap& map, int width_px) {
+      return ErrorOf([&] {
+        Prepared(map, "d.pfm", KindAndUnit("disparity", ""), GreyImage(width_px), used, &grid);
+      });
+    };
+    EXPECT_THAT(message(holes, kMapWidth), AllOf(StartsWith("d.pfm: "), HasSubstr("hole")));
+    EXPECT_THAT(message(MapOf(std::vector<float>(6, 0)), 7),
+                AllOf(StartsWith("d.pfm: "), HasSubstr("3x2"), HasSubstr("7x2")));
+  }
+}
+
+// The UV plane is in the scene, so nearer points have no disparity.
+TEST(PrepareDepth, DepthsNearerThanTheUvPlaneAreRefused) {
+  const model::Camera camera = MapCamera();
+  const model::LightFieldGrid grid = model::GridOnPlanes(camera, {100, 1000}, 3, 3);
+  EXPECT_THAT(ErrorOf([&] {
+                Prepared(MapOf({500, 500, 500, 500, 500, 90}), "d.pfm", KindAndUnit("z", "mm"),
+                         GreyImage(), &camera, &grid);
+              }),
+              StartsWith("d.pfm: "));
+}
+
+TEST(PrepareDepth, WithACameraADepthBecomesItsDisparity) {
+  const model::Camera camera = MapCamera();
+  const model::LightFieldGrid grid = model::DefaultGrid(camera, 3, 3);
+  const std::vector<float> depth_mm = {400, 800, 1200, 400, 0, 5000};
+  const PreparedDepth prepared =
+      Prepared(MapOf(depth_mm), "d.pfm", KindAndUnit("z", "mm"), GreyImage(), &camera, &grid);
+  EXPECT_EQ(prepared.holes, 1U);
+  ASSERT_TRUE(prepared.depth);
+  EXPECT_EQ(prepared.depth->min_mm, 400);
+  EXPECT_EQ(prepared.depth->max_mm, 5000);
+  for (std::size_t i = 0; i < depth_mm.size(); ++i) {
+    if (depth_mm[i] == 0) continue;
+    const double expected_px = model::DisparityPx(camera, grid.u_step_mm, depth_mm[i]);
+    EXPECT_NEAR(prepared.disparity.disparity[i] * prepared.disparity.step.x(), expected_px,
+                1e-5 * std::abs(expected_px) + 1e-5);
+  }
+}
+
+// A disparity per step of the grid's own views is converted to depth and back without a change,
+// also if u has one view.
+TEST(PrepareDepth, WithACameraADisparityIsPerViewStepOfItsGrid) {
+  const model::Camera camera = MapCamera();
+  const std::vector<float> disparity_px = {-0.5F, 0, 0.5F, 0.25F, 0.125F, -0.25F};
+  for (const auto& [u_count, v_count] : {std::pair{3, 3}, std::pair{1, 5}}) {
+    const model::LightFieldGrid grid = model::DefaultGrid(camera, u_count, v_count);
+    const PreparedDepth prepared = Prepared(
+        MapOf(disparity_px), "d.pfm", KindAndUnit("disparity", ""), GreyImage(), &camera, &grid);
+    const Eigen::Vector2d step = prepared.disparity.step;
+    for (std::size_t i = 0; i < disparity_px.size(); ++i) {
+      const double found_px = prepared.disparity.disparity[i] * (u_count > 1 ? step.x() : step.y());
+      EXPECT_NEAR(found_px, disparity_px[i], 1e-5);
+    }
+  }
+}
+
+// UV off the aperture: the views' step on the aperture is not du.
+TEST(PrepareDepth, TheStepOfADisparityIsTakenOnTheAperture) {
+  const model::Camera camera = MapCamera();
+  const double st_depth_mm = camera.focus_depth_mm();
+  const model::LightFieldGrid grid = model::GridOnPlanes(camera, {-800, st_depth_mm + 800}, 3, 3);
+  const double aperture_step_mm = grid.u_step_mm * st_depth_mm / (st_depth_mm + 800);  // [S10]
+  const double depth_mm = 700;
+  const auto disparity_px =
+      static_cast<float>(model::DisparityPx(camera, aperture_step_mm, depth_mm));
+  const PreparedDepth prepared =
+      Prepared(MapOf(std::vector<float>(6, disparity_px)), "d.pfm", KindAndUnit("disparity", ""),
+               GreyImage(), &camera, &grid);
+  EXPECT_NEAR(prepared.disparity.disparity[0] * prepared.disparity.step.x(),
+              -model::SlopeOnGrid(grid, depth_mm), 1e-4);
+}
+
+}  // namespace
+}  // namespace thicklens
