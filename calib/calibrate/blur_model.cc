@@ -24,13 +24,15 @@ bool IsImageDistance(const FocusSweep& sweep, double image_distance_mm) {
 }  // namespace
 
 std::optional<BlurModel> BlurModel::Of(const FocusSweep& sweep, const Calibration& calibration) {
-  if (!calibration.blur.done || !calibration.image_distance_mm || !calibration.blur_ratio)
+  if (!calibration.diagnostics.blur.done || !calibration.summary.image_distance_mm ||
+      !calibration.summary.blur_ratio)
     return std::nullopt;
-  const double image_distance_mm = calibration.image_distance_mm->value;
-  if (!std::isfinite(calibration.blur_ratio->value) || !IsImageDistance(sweep, image_distance_mm))
+  const double image_distance_mm = calibration.summary.image_distance_mm->value;
+  if (!std::isfinite(calibration.summary.blur_ratio->value) ||
+      !IsImageDistance(sweep, image_distance_mm))
     return std::nullopt;
   BlurModel blur(sweep, image_distance_mm);
-  blur.kappa_ = calibration.blur_ratio->value;
+  blur.kappa_ = calibration.summary.blur_ratio->value;
   blur.TakeFloor(calibration);
   blur.TakeCovariance(calibration);
   return blur;
@@ -109,8 +111,9 @@ std::optional<double> BlurModel::ResidualSigmas(const FrameMeasurement& frame) c
 }
 
 void BlurModel::TakeFloor(const Calibration& calibration) {
-  if (calibration.blur_floor_px && std::isfinite(calibration.blur_floor_px->value)) {
-    floor_squared_px2_ = std::pow(calibration.blur_floor_px->value, 2);
+  if (calibration.summary.blur_floor_px &&
+      std::isfinite(calibration.summary.blur_floor_px->value)) {
+    floor_squared_px2_ = std::pow(calibration.summary.blur_floor_px->value, 2);
     return;
   }
   floor_squared_px2_ = FloorSquaredFromFrames(calibration);
@@ -118,24 +121,24 @@ void BlurModel::TakeFloor(const Calibration& calibration) {
 }
 
 void BlurModel::TakeCovariance(const Calibration& calibration) {
-  const auto count = static_cast<Eigen::Index>(calibration.covariance_order.size());
-  if (count == 0 || calibration.covariance.rows() != count ||
-      calibration.covariance.cols() != count)
+  const auto count = static_cast<Eigen::Index>(calibration.diagnostics.covariance_order.size());
+  if (count == 0 || calibration.diagnostics.covariance.rows() != count ||
+      calibration.diagnostics.covariance.cols() != count)
     return;
   const std::array<const char*, 4> names = {"image_distance_mm", "blur_ratio", "blur_floor_px",
                                             "bench_offset_mm"};
   std::array<Eigen::Index, 4> at{};
   for (std::size_t i = 0; i < names.size(); ++i)
-    at[i] = std::find(calibration.covariance_order.begin(), calibration.covariance_order.end(),
-                      names[i]) -
-            calibration.covariance_order.begin();
+    at[i] = std::find(calibration.diagnostics.covariance_order.begin(),
+                      calibration.diagnostics.covariance_order.end(), names[i]) -
+            calibration.diagnostics.covariance_order.begin();
   if (at[0] == count || at[1] == count) return;
   covariance_ = Eigen::Matrix4d::Zero();
   for (std::size_t i = 0; i < names.size(); ++i)
     for (std::size_t j = 0; j < names.size(); ++j)
       if (at[i] < count && at[j] < count)
         (*covariance_)(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) =
-            calibration.covariance(at[i], at[j]);
+            calibration.diagnostics.covariance(at[i], at[j]);
 }
 
 double BlurModel::SignedDefocusPx(double depth_mm) const {

@@ -55,9 +55,14 @@ class Calibrator {
     } else {
       Measure();
     }
-    result_.frames_used =
-        result_.blur.done ? result_.blur.frames_used : static_cast<int>(used().size());
-    result_.seconds =
+    result_.summary.frames_used = result_.diagnostics.blur.done
+                                      ? result_.diagnostics.blur.frames_used
+                                      : static_cast<int>(used().size());
+    result_.summary.frames_rejected = static_cast<int>(
+        std::count_if(result_.frames.begin(), result_.frames.end(),
+                      [](const FrameMeasurement& frame) { return !frame.rejection.empty(); }));
+    result_.summary.chi2_per_dof = result_.diagnostics.blur.chi2_per_dof;
+    result_.summary.seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     return std::move(result_);
   }
@@ -75,8 +80,8 @@ class Calibrator {
   }
 
   bool Refuse(const std::string& reason) {
-    result_.outcome = Outcome::kRefused;
-    result_.reason = reason;
+    result_.summary.outcome = Outcome::kRefused;
+    result_.summary.reason = reason;
     return false;
   }
   // Returns whether a quality check let enough frames pass.
@@ -86,7 +91,7 @@ class Calibrator {
     const bool needs_scale = options_.fit_blur || !sweep_.offset_mm;
     if (MeasureAndCheck() && MeasureSharpness() &&
         (needs_scale ? FindDepths() : UseGivenOffset())) {
-      result_.source = RunSourceRecipe(sweep_.camera, result_.frames, used());
+      result_.diagnostics.paper_recipe = RunSourceRecipe(sweep_.camera, result_.frames, used());
       FitPeak();
       if (options_.fit_blur) {
         MeasureAndSolve();
@@ -102,39 +107,42 @@ class Calibrator {
   // light.
   void FindSharpest() {
     const SharpestReading found = FindSharpestReading(result_.frames, used());
-    if (found.done || !result_.sharpest.done) result_.sharpest = found;
+    if (found.done || !result_.diagnostics.sharpest.done) result_.diagnostics.sharpest = found;
   }
 
   void LookForStructure(const std::vector<ScaleSample>& samples) {
-    if (result_.structure.measured) return;
-    result_.structure =
+    if (result_.diagnostics.structure.measured) return;
+    result_.diagnostics.structure =
         MeasureStructure({sweep_, [this](std::size_t frame) { return Grey(frame); }, used(),
                           samples, RegionCentre(sweep_), [this] { Tick(); }});
   }
 
   void EndBeforeFit() {
-    result_.outcome = Outcome::kPartial;
-    result_.reason = "the fit of the blur was not requested";
+    result_.summary.outcome = Outcome::kPartial;
+    result_.summary.reason = "the fit of the blur was not requested";
   }
 
   // The reason of a refusal is often only the consequence of a simpler cause.
   void ReportRootCause() {
     const std::string exposure =
         ExposureAdvice(result_.frames, [this] { return store_.Stored(0).depth() == CV_16U; });
-    if (result_.outcome != Outcome::kRefused) {
+    if (result_.summary.outcome != Outcome::kRefused) {
       if (!exposure.empty())
-        result_.warnings.insert(result_.warnings.begin(),
-                                exposure + "; the results come from the other frames alone");
+        result_.summary.warnings.insert(
+            result_.summary.warnings.begin(),
+            exposure + "; the results come from the other frames alone");
       return;
     }
     for (const std::string& cause :
          {exposure, RegionAdvice(sweep_),
-          UnitAdvice(sweep_, result_.frames, result_.scale, causes_),
-          RegistrationAdvice(sweep_, result_.frames, used(), result_.scale, result_.structure)}) {
+          UnitAdvice(sweep_, result_.frames, result_.diagnostics.scale, causes_),
+          RegistrationAdvice(sweep_, result_.frames, used(), result_.diagnostics.scale,
+                             result_.diagnostics.structure)}) {
       if (cause.empty()) continue;
       // No advice is given on what is missing because of the light.
-      result_.reason =
-          cause == exposure ? cause : cause + "; the immediate reason is: " + result_.reason;
+      result_.summary.reason = cause == exposure
+                                   ? cause
+                                   : cause + "; the immediate reason is: " + result_.summary.reason;
       return;
     }
   }
@@ -210,28 +218,32 @@ class Calibrator {
     std::vector<ScaleSample> samples = TrackScale(
         sweep_, [this](std::size_t frame) { return Grey(frame); }, used(), reference_, known_mm,
         options_.threads, [this] { Tick(); });
-    result_.scale = FitScaleModel(samples, static_cast<int>(reference_), sweep_.reading_sigma_mm,
-                                  sweep_.direction, RegionCornerRadiusPx(sweep_));
-    CorrectForFalloff(kDefaultRatio, result_.scale.reference_depth_mm, &result_.scale);
-    const bool is_lone_edge = IsLoneEdge(sweep_, used().size(), samples.size(), result_.scale);
-    if (is_lone_edge) ForgetScales(sweep_, &samples, &result_.scale);
+    result_.diagnostics.scale =
+        FitScaleModel(samples, static_cast<int>(reference_), sweep_.reading_sigma_mm,
+                      sweep_.direction, RegionCornerRadiusPx(sweep_));
+    CorrectForFalloff(kDefaultRatio, result_.diagnostics.scale.reference_depth_mm,
+                      &result_.diagnostics.scale);
+    const bool is_lone_edge =
+        IsLoneEdge(sweep_, used().size(), samples.size(), result_.diagnostics.scale);
+    if (is_lone_edge) ForgetScales(sweep_, &samples, &result_.diagnostics.scale);
     for (const ScaleSample& sample : samples) {
       if (sample.scale_is_from_reading) continue;
       result_.frames[sample.frame].image_scale = sample.scale;
       result_.frames[sample.frame].image_scale_sigma = sample.registration.scale_sigma;
     }
     if (!is_lone_edge && !ScalesAllowAResult(samples)) return false;
-    if (const auto reason = ReasonAgainstScales(sweep_, result_.frames, used(), result_.scale))
+    if (const auto reason =
+            ReasonAgainstScales(sweep_, result_.frames, used(), result_.diagnostics.scale))
       return Refuse(*reason);
-    RejectUnregistered(samples, used(), reference_, result_.scale, result_.structure,
-                       &result_.frames);
+    RejectUnregistered(samples, used(), reference_, result_.diagnostics.scale,
+                       result_.diagnostics.structure, &result_.frames);
     WarnOfBands(samples.size());
-    RejectWrongReadings(sweep_, samples, result_.scale, &result_.frames);
+    RejectWrongReadings(sweep_, samples, result_.diagnostics.scale, &result_.frames);
     if (!Passed(selection_.KeepUnrejected())) return false;
     for (const ScaleSample& sample : samples) {
       if (!result_.frames[sample.frame].rejection.empty()) continue;
       scales_.push_back(sample);
-      result_.frames[sample.frame].in_scale_fit = result_.scale.done;
+      result_.frames[sample.frame].in_scale_fit = result_.diagnostics.scale.done;
     }
     ReplaceReference();
     if (sweep_.offset_mm) {
@@ -241,15 +253,16 @@ class Calibrator {
         if (check.refusal) return Refuse(*check.refusal);
         conflicting_offset_mm_ = check.conflicting_mm;
       }
-    } else if (result_.scale.done) {
-      result_.bench_offset_mm = result_.scale.offset_mm;
+    } else if (result_.diagnostics.scale.done) {
+      result_.summary.bench_offset_mm = result_.diagnostics.scale.offset_mm;
     } else {
-      return Refuse(ReasonOfUnknownOffset(result_.scale));
+      return Refuse(ReasonOfUnknownOffset(result_.diagnostics.scale));
     }
-    if (ShowsDistortion(result_) || FindScaleNonlinearity(scales_, result_.scale, sweep_))
+    if (ShowsDistortion(result_) ||
+        FindScaleNonlinearity(scales_, result_.diagnostics.scale, sweep_))
       LookForStructure(scales_);
     if (const auto refusal = CheckDistortion(&result_)) return Refuse(*refusal);
-    slip_ = FindReadingStep(scales_, result_.scale);
+    slip_ = FindReadingStep(scales_, result_.diagnostics.scale);
     if (slip_) WarnOfReadingStep(*slip_, &result_);
     bend_ = CheckScaleNonlinearity(sweep_, scales_, &result_);
     return PlacedWithinReach();
@@ -257,27 +270,27 @@ class Calibrator {
 
   // Compares the possible causes of the measured scales.
   bool ScalesAllowAResult(const std::vector<ScaleSample>& samples) {
-    const ScaleKind kind = result_.scale.kind;
+    const ScaleKind kind = result_.diagnostics.scale.kind;
     if (static_cast<double>(samples.size()) < kFewRegistered * static_cast<double>(used().size()))
       LookForStructure(samples);
     if (kind == ScaleKind::kConstant) {
       const std::string warning = ConstantScaleWarning(sweep_, samples);
-      if (!warning.empty()) result_.scale.message = warning;
+      if (!warning.empty()) result_.diagnostics.scale.message = warning;
     }
     if (kind != ScaleKind::kInverseDepth && kind != ScaleKind::kReversed) return true;
     causes_ = CompareScaleCauses(samples, sweep_);
-    result_.diagnoses.push_back(causes_.diagnosis);
-    const auto reason = ReasonOfScaleCauses(sweep_, result_.scale, causes_);
+    result_.diagnostics.diagnoses.push_back(causes_.diagnosis);
+    const auto reason = ReasonOfScaleCauses(sweep_, result_.diagnostics.scale, causes_);
     return !reason || Refuse(*reason);
   }
 
   void WarnOfBands(std::size_t registered) {
-    if (!result_.structure.HasBands() || !result_.scale.done) return;
+    if (!result_.diagnostics.structure.HasBands() || !result_.diagnostics.scale.done) return;
     const std::size_t frames = used().size();
-    result_.warnings.push_back(
+    result_.summary.warnings.push_back(
         fmt::format("only {} of {} frames could be registered: {}{}", registered, frames,
-                    BandsInWords(result_.structure),
-                    BandsExplain(result_.structure, frames - registered, frames)
+                    BandsInWords(result_.diagnostics.structure),
+                    BandsExplain(result_.diagnostics.structure, frames - registered, frames)
                         ? ""
                         : "; this does not explain so many missing frames: some may show another "
                           "part of the target"));
@@ -290,20 +303,20 @@ class Calibrator {
   }
 
   void TakeGivenOffset() {
-    result_.bench_offset_mm =
+    result_.summary.bench_offset_mm =
         Result{sweep_.offset_mm->value, sweep_.offset_mm->sigma, std::nullopt};
   }
 
   bool PlacedWithinReach() {
     PlaceFrames();
-    return Passed(selection_.KeepPossibleDepths(result_.bench_offset_mm->value,
+    return Passed(selection_.KeepPossibleDepths(result_.summary.bench_offset_mm->value,
                                                 sweep_.camera.lens.front_focal_length_mm));
   }
 
   void PlaceFrames() {
     const double sign = model::DirectionSign(sweep_.direction);
     for (FrameMeasurement& frame : result_.frames)
-      frame.depth_mm = result_.bench_offset_mm->value + sign * frame.reading_mm;
+      frame.depth_mm = result_.summary.bench_offset_mm->value + sign * frame.reading_mm;
   }
 
   // The image scale's zero is the centre of perspective. Its distance from the aperture depends on
@@ -347,7 +360,7 @@ class Calibrator {
     for (const std::size_t i : used()) {
       samples.push_back({result_.frames[i].depth_mm, result_.frames[i].normalised_edge_slope});
     }
-    result_.sharpness = FitSharpnessPeak(samples);
+    result_.diagnostics.sharpness = FitSharpnessPeak(samples);
   }
 
   // Flat and defocused frames show the noise alone, but a fine texture in focus resembles noise: a
@@ -360,22 +373,24 @@ class Calibrator {
   }
 
   void MeasureAndSolve() {
-    const double start_mm = result_.sharpness.done ? result_.sharpness.focus_depth_mm
-                                                   : result_.frames[reference_].depth_mm;
+    const double start_mm = result_.diagnostics.sharpness.done
+                                ? result_.diagnostics.sharpness.focus_depth_mm
+                                : result_.frames[reference_].depth_mm;
     BlurTask task(sweep_, store_);
     task.frames = used();
     task.reference = reference_;
     task.scales = scales_;
-    task.scale_centre_mm = result_.scale.centre_mm;
-    task.law = result_.scale.kind == ScaleKind::kConstant ? BlurModel::kTelecentric
-                                                          : BlurModel::kPerspective;
-    task.scale_follows_readings = result_.scale.done;
-    task.offset_mm = {result_.bench_offset_mm->value, result_.bench_offset_mm->sigma};
+    task.scale_centre_mm = result_.diagnostics.scale.centre_mm;
+    task.law = result_.diagnostics.scale.kind == ScaleKind::kConstant ? BlurModel::kTelecentric
+                                                                      : BlurModel::kPerspective;
+    task.scale_follows_readings = result_.diagnostics.scale.done;
+    task.offset_mm = {result_.summary.bench_offset_mm->value,
+                      result_.summary.bench_offset_mm->sigma};
     task.reading_sigma_mm = sweep_.reading_sigma_mm;
     task.reading_sigma_is_known = sweep_.reading_sigma_mm > 0;
-    if (!task.reading_sigma_is_known && result_.scale.done) {
+    if (!task.reading_sigma_is_known && result_.diagnostics.scale.done) {
       // No sigma was stated, but the scale law has measured it.
-      task.reading_sigma_mm = result_.scale.reading_rms_mm;
+      task.reading_sigma_mm = result_.diagnostics.scale.reading_rms_mm;
     }
     const auto [nearest, farthest] = DepthRange();
     task.start_focus_depth_mm = std::clamp(start_mm, nearest, farthest);
@@ -390,15 +405,15 @@ class Calibrator {
       return MeasureAndSolve();
     if (!result_.frames[reference_].rejection.empty()) return;
     if (sweep_.target_period_mm) CheckMagnification(sweep_, reference_, Grey(reference_), &result_);
-    if (result_.outcome == Outcome::kRefused) return;
+    if (result_.summary.outcome == Outcome::kRefused) return;
     WidenByContradictions(evidence.setup, fit);
     if (options_.map_field) MapField(sweep_, evidence, fit, &store_, &result_);
   }
 
   // Widens the systematic intervals by the findings of the checks, as far as they move the results.
   void WidenByContradictions(const BlurFitSetup& setup, const BlurFitResult& fit) {
-    if (!sweep_.offset_mm && result_.scale.done) {
-      const Eigen::Vector2d& offsets_mm = result_.scale.offset_of_pupil_laws_mm;
+    if (!sweep_.offset_mm && result_.diagnostics.scale.done) {
+      const Eigen::Vector2d& offsets_mm = result_.diagnostics.scale.offset_of_pupil_laws_mm;
       WidenByTrials("pupil law",
                     "measure offset_mm: a bench zero from the image scale depends on how the light "
                     "is distributed over the pupil",
@@ -408,7 +423,7 @@ class Calibrator {
       // If the other zero is assumed, its error must be assumed too.
       const model::Estimate& zero = *conflicting_offset_mm_;
       const double reach_mm = kZeroReach * zero.sigma;
-      const Eigen::Vector2d& laws_mm = result_.scale.offset_of_pupil_laws_mm;
+      const Eigen::Vector2d& laws_mm = result_.diagnostics.scale.offset_of_pupil_laws_mm;
       WidenByTrials("given offset_mm", "measure offset_mm again: the image scale contradicts it",
                     WithOffsets(setup, {laws_mm.x() - reach_mm, laws_mm.y() + reach_mm}), fit,
                     &result_);
@@ -421,7 +436,8 @@ class Calibrator {
     if (bend_ && !sweep_.offset_mm) {
       const double half_mm = 0.5 * std::abs(bend_->zero_spread_mm);
       const double zero_mm = setup.offset_mm.value;
-      WidenByTrials("nonlinearity of the image scale", NonlinearityRemedy(result_.structure),
+      WidenByTrials("nonlinearity of the image scale",
+                    NonlinearityRemedy(result_.diagnostics.structure),
                     WithOffsets(setup, {zero_mm - half_mm, zero_mm + half_mm}), fit, &result_);
     }
   }
@@ -450,15 +466,17 @@ class Calibrator {
   // The bench zero of the image scale was found with a usual blur ratio. It is found once more if
   // the fitted ratio moves it by more than a part of its error.
   bool RefineOffsetWithFittedBlur(const Calibration& before) {
-    if (sweep_.offset_mm || zero_is_settled_ || !result_.blur_ratio) return false;
+    if (sweep_.offset_mm || zero_is_settled_ || !result_.summary.blur_ratio) return false;
     zero_is_settled_ = true;
     Calibration again = before;
-    CorrectForFalloff(result_.blur_ratio->value, result_.focus_depth_mm->value, &again.scale);
-    const Result& zero_mm = again.scale.offset_mm;
-    if (!(std::abs(zero_mm.value - before.scale.offset_mm.value) > kZeroMoves * zero_mm.sigma))
+    CorrectForFalloff(result_.summary.blur_ratio->value, result_.summary.focus_depth_mm->value,
+                      &again.diagnostics.scale);
+    const Result& zero_mm = again.diagnostics.scale.offset_mm;
+    if (!(std::abs(zero_mm.value - before.diagnostics.scale.offset_mm.value) >
+          kZeroMoves * zero_mm.sigma))
       return false;
     result_ = std::move(again);
-    result_.bench_offset_mm = result_.scale.offset_mm;
+    result_.summary.bench_offset_mm = result_.diagnostics.scale.offset_mm;
     PlaceFrames();
     return true;
   }

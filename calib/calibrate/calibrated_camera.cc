@@ -18,7 +18,7 @@ model::Camera CalibratedCamera(const model::Camera& camera, const Calibration& c
                                bool use_source_recipe) {
   model::Camera result = camera;
   model::CameraCalibration found;
-  found.evidence.frames_used = calibration.frames_used;
+  found.evidence.frames_used = calibration.summary.frames_used;
   for (const FrameMeasurement& frame : calibration.frames) {
     if (!frame.rejection.empty())
       found.evidence.frames_rejected.push_back({FileName(frame.image), frame.rejection});
@@ -27,28 +27,31 @@ model::Camera CalibratedCamera(const model::Camera& camera, const Calibration& c
     if (!r) return std::nullopt;
     return model::Estimate{r->value, r->sigma};
   };
-  found.bench_offset_mm = estimate(calibration.bench_offset_mm);
+  found.bench_offset_mm = estimate(calibration.summary.bench_offset_mm);
   if (use_source_recipe) {
     found.evidence.method = "source-recipe";
-    found.image_distance_mm = model::Estimate{calibration.source.image_distance_mm, 0};
-    found.blur_ratio = model::Estimate{calibration.source.blur_ratio, 0};
-    found.evidence.focus_depth_mm = model::Estimate{calibration.source.focus_depth_mm, 0};
+    found.image_distance_mm =
+        model::Estimate{calibration.diagnostics.paper_recipe.image_distance_mm, 0};
+    found.blur_ratio = model::Estimate{calibration.diagnostics.paper_recipe.blur_ratio, 0};
+    found.evidence.focus_depth_mm =
+        model::Estimate{calibration.diagnostics.paper_recipe.focus_depth_mm, 0};
   } else {
     found.evidence.method = "joint-blur-fit";
-    const auto& left_open = calibration.blur.undetermined;
+    const auto& left_open = calibration.diagnostics.blur.undetermined;
     const auto is_fixed = [&](const char* name) {
       return std::find(left_open.begin(), left_open.end(), name) == left_open.end();
     };
     if (is_fixed("image_distance_mm"))
-      found.image_distance_mm = estimate(calibration.image_distance_mm);
-    if (is_fixed("blur_ratio")) found.blur_ratio = estimate(calibration.blur_ratio);
-    if (is_fixed("blur_floor_px")) found.blur_floor_px = estimate(calibration.blur_floor_px);
-    found.covariance_order = calibration.covariance_order;
-    found.covariance = calibration.covariance;
-    found.evidence.focus_depth_mm = estimate(calibration.focus_depth_mm);
-    found.evidence.chi2_per_dof = calibration.blur.chi2_per_dof;
-    found.evidence.blur_family = model::PsfName(calibration.blur.family);
-    found.evidence.blur_band = calibration.blur.band;
+      found.image_distance_mm = estimate(calibration.summary.image_distance_mm);
+    if (is_fixed("blur_ratio")) found.blur_ratio = estimate(calibration.summary.blur_ratio);
+    if (is_fixed("blur_floor_px"))
+      found.blur_floor_px = estimate(calibration.summary.blur_floor_px);
+    found.covariance_order = calibration.diagnostics.covariance_order;
+    found.covariance = calibration.diagnostics.covariance;
+    found.evidence.focus_depth_mm = estimate(calibration.summary.focus_depth_mm);
+    found.evidence.chi2_per_dof = calibration.diagnostics.blur.chi2_per_dof;
+    found.evidence.blur_family = model::PsfName(calibration.diagnostics.blur.family);
+    found.evidence.blur_band = calibration.diagnostics.blur.band;
   }
   result.calibration = found;
   return result;

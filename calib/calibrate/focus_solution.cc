@@ -37,12 +37,12 @@ class Solution {
     if (const auto reason = RejectOutliers(sweep_.direction, &evidence_, &result_))
       return Refuse(*reason);
     CompareChoices(sweep_.camera.psf, &evidence_);
-    const FloorChoice choice = ChooseFloor(sweep_.floor, evidence_, &result_.warnings);
+    const FloorChoice choice = ChooseFloor(sweep_.floor, evidence_, &result_.summary.warnings);
     evidence_.setup.floor_variance_px2 = choice.variance_px2;
     fit_ = FitBlur(evidence_.setup);
     if (fit_.done && TakeTails(sweep_.camera.psf, fit_, &evidence_))
       fit_ = FitBlur(evidence_.setup);
-    result_.blur.message = fit_.message;
+    result_.diagnostics.blur.message = fit_.message;
     if (!fit_.done) return Refuse(fit_.message + StatedFloor());
     FillBlur();
     FillFrames();
@@ -59,13 +59,14 @@ class Solution {
 
  private:
   void Refuse(const std::string& reason) {
-    result_.outcome = Outcome::kRefused;
-    result_.reason = reason;
-    if (result_.scale.kind == ScaleKind::kConstant) result_.reason += "; " + result_.scale.message;
-    result_.image_distance_mm.reset();
-    result_.focus_depth_mm.reset();
-    result_.blur_ratio.reset();
-    result_.blur_floor_px.reset();
+    result_.summary.outcome = Outcome::kRefused;
+    result_.summary.reason = reason;
+    if (result_.diagnostics.scale.kind == ScaleKind::kConstant)
+      result_.summary.reason += "; " + result_.diagnostics.scale.message;
+    result_.summary.image_distance_mm.reset();
+    result_.summary.focus_depth_mm.reset();
+    result_.summary.blur_ratio.reset();
+    result_.summary.blur_floor_px.reset();
   }
 
   // A stated floor that is too large leaves none of the blur, whatever else may be wrong.
@@ -103,7 +104,7 @@ class Solution {
 
   // ---- results ----
   void FillBlur() {
-    BlurFit& blur = result_.blur;
+    BlurFit& blur = result_.diagnostics.blur;
     blur.done = true;
     blur.chi2_per_dof = fit_.chi2_per_dof;
     blur.weak_direction = fit_.weak_direction;
@@ -122,7 +123,7 @@ class Solution {
 
   void WarnOfMisfit() {
     if (!(fit_.chi2_per_dof > kLargeMisfit) || !(fit_.error_factor > 1)) return;
-    result_.warnings.push_back(
+    result_.summary.warnings.push_back(
         fmt::format("the frames deviate from the blur law by more than their errors (chi2/dof "
                     "{:.3g}), which were widened accordingly: {}",
                     fit_.chi2_per_dof, CausesOfMisfit(sweep_, evidence_, result_)));
@@ -155,7 +156,7 @@ class Solution {
       frame.blur_fit_weight = fit_.weights[row];
       frame.reading_error_mm = fit_.reading_errors_mm[row];
       frame.reading_error_sigma_mm = fit_.reading_error_sigmas_mm[row];
-      ++result_.blur.frames_used;
+      ++result_.diagnostics.blur.frames_used;
       if (frame.blur_fit_weight < kOutlierWeight) light.push_back(f);
     }
     WarnOfLight(light);
@@ -176,18 +177,18 @@ class Solution {
                            why);
     }
     if (light.size() > 3) names += fmt::format(" and {} more", light.size() - 3);
-    result_.warnings.push_back(
+    result_.summary.warnings.push_back(
         fmt::format("{} of {} frames do not follow the laws well and have less weight: {}",
-                    light.size(), result_.blur.frames_used, names));
+                    light.size(), result_.diagnostics.blur.frames_used, names));
   }
 
   void FillValues() {
     const double zf = fit_.values[kFocusDepth];
     const model::ThickLens& lens = evidence_.setup.lens;
-    result_.focus_depth_mm =
+    result_.summary.focus_depth_mm =
         Result{zf, std::sqrt(fit_.covariance(kFocusDepth, kFocusDepth)), std::nullopt};
-    result_.blur_ratio = Result{fit_.values[kBlurRatio],
-                                std::sqrt(fit_.covariance(kBlurRatio, kBlurRatio)), std::nullopt};
+    result_.summary.blur_ratio = Result{
+        fit_.values[kBlurRatio], std::sqrt(fit_.covariance(kBlurRatio, kBlurRatio)), std::nullopt};
     const model::Estimate& zero_mm = evidence_.setup.offset_mm;
     at_held_zero_ = fit_;
     if (zero_mm.sigma > 0) {
@@ -196,28 +197,28 @@ class Solution {
       const BlurFitResult alone = FitBlur(held, &fit_);
       if (alone.done) at_held_zero_ = alone;
     }
-    result_.focus_reading_mm =
+    result_.diagnostics.focus_reading_mm =
         model::Estimate{model::DirectionSign(sweep_.direction) * (zf - zero_mm.value),
                         std::sqrt(at_held_zero_.covariance(kFocusDepth, kFocusDepth))};
-    result_.image_distance_mm =
-        Result{model::ImageDistanceMm(lens, zf),
-               std::abs(model::ImageDistanceSlope(lens, zf)) * result_.focus_depth_mm->sigma,
-               std::nullopt};
+    result_.summary.image_distance_mm = Result{
+        model::ImageDistanceMm(lens, zf),
+        std::abs(model::ImageDistanceSlope(lens, zf)) * result_.summary.focus_depth_mm->sigma,
+        std::nullopt};
   }
 
   bool IsPlausible() {
     const double zf = fit_.values[kFocusDepth];
     const double kappa = fit_.values[kBlurRatio];
-    const double zf_sigma = result_.focus_depth_mm->sigma;
-    const double kappa_sigma = result_.blur_ratio->sigma;
+    const double zf_sigma = result_.summary.focus_depth_mm->sigma;
+    const double kappa_sigma = result_.summary.blur_ratio->sigma;
     const auto [nearest, farthest] = DepthRange();
     const double outside_mm = std::max({0.0, nearest - zf, zf - farthest});
     const char* side = zf < nearest ? "nearer" : "farther";
     // These errors are from the blur alone, with the bench zero held.
     const double own_kappa_sigma = std::sqrt(at_held_zero_.covariance(kBlurRatio, kBlurRatio));
-    const double own_zf_sigma = result_.focus_reading_mm->sigma;
+    const double own_zf_sigma = result_.diagnostics.focus_reading_mm->sigma;
     if (!(kappa > 3 * own_kappa_sigma)) {
-      result_.focus_reading_mm.reset();
+      result_.diagnostics.focus_reading_mm.reset();
       Refuse(fmt::format(
           "the blur does not change over the sweep by more than its errors, for any bench zero "
           "(kappa would be {:.2g} +- {:.2g}): move the target farther from focus on both sides",
@@ -225,7 +226,7 @@ class Solution {
       return false;
     }
     if (!(own_zf_sigma < 0.5 * (farthest - nearest))) {
-      result_.focus_reading_mm.reset();
+      result_.diagnostics.focus_reading_mm.reset();
       Refuse(
           fmt::format("the blur does not determine the depth of focus: {:.1f} +- {:.1f} mm in a "
                       "sweep from {:.1f} to {:.1f} mm, with the bench zero held fixed",
@@ -252,15 +253,15 @@ class Solution {
       return false;
     }
     if (!(kappa >= kLowRatio && kappa <= kHighRatio)) {
-      result_.warnings.push_back(
+      result_.summary.warnings.push_back(
           fmt::format("a blur ratio of {:.3f} is unusual (the full aperture gives 0.5): a wrong "
                       "focal length, aperture radius or pixel pitch has this effect; photograph a "
                       "grid and state its target_period_mm to check them",
                       kappa));
     }
-    result_.blur.outside_mm = outside_mm;
+    result_.diagnostics.blur.outside_mm = outside_mm;
     if (outside_mm > 0) {
-      result_.warnings.push_back(
+      result_.summary.warnings.push_back(
           fmt::format("the focus at {:.2f} mm is extrapolated: it lies {:.2f} mm {} than the sweep",
                       zf, outside_mm, side));
     }
@@ -282,8 +283,8 @@ class Solution {
     return fmt::format(
         "the bench zero is not known well enough: {}, so that the depth of focus is {:.1f} +- "
         "{:.1f} mm. The reading at focus is known: {:.6g} +- {:.2g} mm. State offset_mm{}",
-        from, fit_.values[kFocusDepth], result_.focus_depth_mm->sigma,
-        result_.focus_reading_mm->value, result_.focus_reading_mm->sigma,
+        from, fit_.values[kFocusDepth], result_.summary.focus_depth_mm->sigma,
+        result_.diagnostics.focus_reading_mm->value, result_.diagnostics.focus_reading_mm->sigma,
         sweep_.offset_mm ? " more exactly" : "");
   }
 
@@ -293,15 +294,15 @@ class Solution {
     if (choice.interval_px2) {
       // Only the interval is known; any value in it would be arbitrary.
       constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
-      result_.blur_floor_px =
+      result_.summary.blur_floor_px =
           Result{kUnknown, kUnknown, Eigen::Vector2d(choice.interval_px2->cwiseSqrt())};
-      result_.blur.undetermined.emplace_back("blur_floor_px");
+      result_.diagnostics.blur.undetermined.emplace_back("blur_floor_px");
     } else if (floor_px2 > error_px2 || !choice.is_measured) {
       const double floor_px = std::sqrt(std::max(0.0, floor_px2));
-      result_.blur_floor_px =
+      result_.summary.blur_floor_px =
           Result{floor_px, floor_px > 0 ? error_px2 / (2 * floor_px) : 0, std::nullopt};
     } else {
-      result_.blur.undetermined.emplace_back("blur_floor_px");
+      result_.diagnostics.blur.undetermined.emplace_back("blur_floor_px");
     }
   }
 
@@ -309,24 +310,24 @@ class Solution {
   // undetermined floor has no row.
   void FillCovariance() {
     std::vector<int> rows = {kFocusDepth, kBlurRatio};
-    result_.covariance_order = {"image_distance_mm", "blur_ratio"};
+    result_.diagnostics.covariance_order = {"image_distance_mm", "blur_ratio"};
     Eigen::Vector4d slope(model::ImageDistanceSlope(evidence_.setup.lens, fit_.values[kFocusDepth]),
                           1, 0, 1);
-    const bool floor_is_open = !result_.blur.undetermined.empty();
+    const bool floor_is_open = !result_.diagnostics.blur.undetermined.empty();
     Eigen::Matrix4d covariance = fit_.covariance;
     const double offset_sigma = evidence_.setup.offset_mm.sigma;
     covariance(kBenchOffset, kBenchOffset) =
         std::max(covariance(kBenchOffset, kBenchOffset), offset_sigma * offset_sigma);
     if (!floor_is_open) {
       rows.push_back(kFloorVariance);
-      result_.covariance_order.emplace_back("blur_floor_px");
+      result_.diagnostics.covariance_order.emplace_back("blur_floor_px");
       const double floor_px = std::sqrt(std::max(0.0, fit_.values[kFloorVariance]));
       slope[kFloorVariance] = floor_px > 0 ? 1 / (2 * floor_px) : 0;
     }
     rows.push_back(kBenchOffset);
-    result_.covariance_order.emplace_back("bench_offset_mm");
+    result_.diagnostics.covariance_order.emplace_back("bench_offset_mm");
     const Eigen::Matrix4d full = slope.asDiagonal() * covariance * slope.asDiagonal();
-    result_.covariance = full(rows, rows);
+    result_.diagnostics.covariance = full(rows, rows);
   }
 
   // Reports the frames that passed every quality check and still do not constrain the blur.
@@ -342,11 +343,12 @@ class Solution {
   }
 
   void Decide() {
-    result_.outcome = Outcome::kOk;
-    result_.reason.clear();
-    if (!result_.blur.undetermined.empty()) {
-      result_.outcome = Outcome::kPartial;
-      result_.reason = "the data do not determine blur_floor_px, which is therefore not written";
+    result_.summary.outcome = Outcome::kOk;
+    result_.summary.reason.clear();
+    if (!result_.diagnostics.blur.undetermined.empty()) {
+      result_.summary.outcome = Outcome::kPartial;
+      result_.summary.reason =
+          "the data do not determine blur_floor_px, which is therefore not written";
     }
   }
 

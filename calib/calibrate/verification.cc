@@ -66,7 +66,7 @@ class Verifier {
  private:
   double Systematic(Eigen::Vector2d SystematicPart::*interval) const {
     double variance = 0;
-    for (const SystematicPart& part : found_.systematic_parts) {
+    for (const SystematicPart& part : found_.diagnostics.systematic_parts) {
       if (!IsOfCameraFile(part)) variance += std::pow(SpreadOf(part.*interval), 2);
     }
     return std::sqrt(variance);
@@ -91,7 +91,7 @@ class Verifier {
   }
 
   bool IsFixed(const char* name) const {
-    const std::vector<std::string>& open = found_.blur.undetermined;
+    const std::vector<std::string>& open = found_.diagnostics.blur.undetermined;
     return std::find(open.begin(), open.end(), name) == open.end();
   }
 
@@ -104,20 +104,20 @@ class Verifier {
   }
 
   void TakeParameters() {
-    if (found_.outcome == Outcome::kRefused) return;
+    if (found_.summary.outcome == Outcome::kRefused) return;
     const std::string open = "the sweep does not determine it";
-    Take(kImageDistance, stored_.image_distance_mm, found_.image_distance_mm,
+    Take(kImageDistance, stored_.image_distance_mm, found_.summary.image_distance_mm,
          Systematic(&SystematicPart::image_distance_mm), IsFixed(kImageDistance) ? "" : open);
-    Take(kFocusDepth, StoredFocusDepth(), found_.focus_depth_mm,
+    Take(kFocusDepth, StoredFocusDepth(), found_.summary.focus_depth_mm,
          Systematic(&SystematicPart::focus_depth_mm), "it follows from image_distance_mm");
-    Take(kBlurRatio, stored_.blur_ratio, found_.blur_ratio, Systematic(&SystematicPart::blur_ratio),
-         IsFixed(kBlurRatio) ? "" : open);
+    Take(kBlurRatio, stored_.blur_ratio, found_.summary.blur_ratio,
+         Systematic(&SystematicPart::blur_ratio), IsFixed(kBlurRatio) ? "" : open);
     const bool floor_is_stated = sweep_.floor.given_px || sweep_.floor.from_px;
-    Take(kFloor, stored_.blur_floor_px, found_.blur_floor_px, 0,
+    Take(kFloor, stored_.blur_floor_px, found_.summary.blur_floor_px, 0,
          !IsFixed(kFloor)  ? open
          : floor_is_stated ? "the sweep states it and does not measure it"
                            : "");
-    Take(kOffset, stored_.bench_offset_mm, found_.bench_offset_mm, 0,
+    Take(kOffset, stored_.bench_offset_mm, found_.summary.bench_offset_mm, 0,
          sweep_.offset_mm ? "the sweep states it and does not measure it"
          : options_.same_bench
              ? ""
@@ -147,7 +147,8 @@ class Verifier {
         const ComparedParameter& b = *counted[static_cast<std::size_t>(j)];
         const double covariance =
             CovarianceOf(stored_.covariance_order, stored_.covariance, a.name, b.name) +
-            CovarianceOf(found_.covariance_order, found_.covariance, a.name, b.name);
+            CovarianceOf(found_.diagnostics.covariance_order, found_.diagnostics.covariance, a.name,
+                         b.name);
         correlation(i, j) = correlation(j, i) = covariance / (a.sigma * b.sigma);
       }
     }
@@ -193,11 +194,12 @@ class Verifier {
   // An error of the bench zero moves all depths, including zf.
   void WarnOfBenchZero() {
     const ComparedParameter* focus = Find(kFocusDepth);
-    if (focus == nullptr || sweep_.offset_mm || !found_.bench_offset_mm) return;
-    const double offset_sigma = found_.bench_offset_mm->sigma;
-    const double covariance =
-        CovarianceOf(found_.covariance_order, found_.covariance, kImageDistance, kOffset);
-    const double d1_sigma = found_.image_distance_mm ? found_.image_distance_mm->sigma : 0;
+    if (focus == nullptr || sweep_.offset_mm || !found_.summary.bench_offset_mm) return;
+    const double offset_sigma = found_.summary.bench_offset_mm->sigma;
+    const double covariance = CovarianceOf(found_.diagnostics.covariance_order,
+                                           found_.diagnostics.covariance, kImageDistance, kOffset);
+    const double d1_sigma =
+        found_.summary.image_distance_mm ? found_.summary.image_distance_mm->sigma : 0;
     if (!(offset_sigma > 0) || !(d1_sigma > 0)) return;
     result_.warnings.push_back(fmt::format(
         "the bench zero is not stated, and the sweep determines it to +- {:.3g} mm only: the error "
@@ -220,8 +222,8 @@ class Verifier {
   }
 
   void Decide() {
-    if (found_.outcome == Outcome::kRefused) {
-      result_.reason = "the new sweep gives no calibration: " + found_.reason;
+    if (found_.summary.outcome == Outcome::kRefused) {
+      result_.reason = "the new sweep gives no calibration: " + found_.summary.reason;
       return;
     }
     const ComparedParameter* d1 = Find(kImageDistance);
@@ -232,8 +234,8 @@ class Verifier {
     double kappa = 0;
     if (stored_.blur_ratio) {
       kappa = stored_.blur_ratio->value;
-    } else if (found_.blur_ratio) {
-      kappa = found_.blur_ratio->value;
+    } else if (found_.summary.blur_ratio) {
+      kappa = found_.summary.blur_ratio->value;
     }
     if (d1 != nullptr && d1->counted) {
       result_.detectable_blur_px = BlurPxOf(d1->smallest_detectable, kappa);

@@ -32,10 +32,10 @@ double SweepLengthMm(const Calibration& calibration) {
 std::string CausesOfMisfit(const FocusSweep& sweep, const BlurEvidence& evidence,
                            const Calibration& calibration) {
   std::vector<std::string> causes;
-  if (calibration.structure.HasBands()) causes.emplace_back("bands of the light");
-  if (calibration.structure.HasFixedStructure())
+  if (calibration.diagnostics.structure.HasBands()) causes.emplace_back("bands of the light");
+  if (calibration.diagnostics.structure.HasFixedStructure())
     causes.emplace_back("structure that stays on the sensor");
-  const ScaleModel& scale = calibration.scale;
+  const ScaleModel& scale = calibration.diagnostics.scale;
   // The image scale shows the readings' errors without the blur.
   const bool readings_are_as_stated = scale.done && sweep.reading_sigma_mm > 0 &&
                                       scale.reading_rms_mm < kAsStated * sweep.reading_sigma_mm;
@@ -61,7 +61,7 @@ std::string CausesOfMisfit(const FocusSweep& sweep, const BlurEvidence& evidence
 }
 
 bool IsAstigmatic(const Calibration& calibration) {
-  const auto& astigmatism = calibration.field.astigmatism_mm;
+  const auto& astigmatism = calibration.diagnostics.field.astigmatism_mm;
   return astigmatism &&
          std::abs(astigmatism->value) >
              std::max(kSignificant * astigmatism->sigma, kMatters * SweepLengthMm(calibration));
@@ -69,7 +69,7 @@ bool IsAstigmatic(const Calibration& calibration) {
 
 std::string AstigmatismInWords(const Calibration& calibration) {
   if (!IsAstigmatic(calibration)) return "";
-  const model::Estimate& astigmatism = *calibration.field.astigmatism_mm;
+  const model::Estimate& astigmatism = *calibration.diagnostics.field.astigmatism_mm;
   return fmt::format(
       "the blur along x is smallest at a depth {:.3g} +- {:.2g} mm {} than the blur along y: the "
       "lens is astigmatic, or the texture along x has other depths than the texture along y (turn "
@@ -80,7 +80,7 @@ std::string AstigmatismInWords(const Calibration& calibration) {
 
 bool AstigmatismExplains(double spread_mm, const Calibration& calibration) {
   return IsAstigmatic(calibration) &&
-         spread_mm < kReach * std::abs(calibration.field.astigmatism_mm->value);
+         spread_mm < kReach * std::abs(calibration.diagnostics.field.astigmatism_mm->value);
 }
 
 }  // namespace thicklens::calib

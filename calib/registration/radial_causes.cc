@@ -71,24 +71,24 @@ std::string CausesInWords(const Diagnosis& diagnosis, const FrameStructureFindin
 }  // namespace
 
 bool ShowsDistortion(const Calibration& calibration) {
-  const auto& distortion = calibration.scale.distortion_at_corner;
+  const auto& distortion = calibration.diagnostics.scale.distortion_at_corner;
   return distortion &&
          std::abs(distortion->value) > std::max(kWorthReporting, kSignificant * distortion->sigma);
 }
 
 std::optional<std::string> CheckDistortion(Calibration* calibration) {
   if (!ShowsDistortion(*calibration)) return std::nullopt;
-  const model::Estimate& distortion = *calibration->scale.distortion_at_corner;
-  Diagnosis diagnosis = Compare(distortion, calibration->structure);
+  const model::Estimate& distortion = *calibration->diagnostics.scale.distortion_at_corner;
+  Diagnosis diagnosis = Compare(distortion, calibration->diagnostics.structure);
   const std::string found = fmt::format(
       "the frames are displaced against one another like distorted images, {:+.1f} +- {:.1f} % at "
       "the corner ({}): {}",
       100 * distortion.value, 100 * distortion.sigma,
       distortion.value > 0 ? "pincushion" : "barrel",
-      CausesInWords(diagnosis, calibration->structure));
-  calibration->diagnoses.push_back(std::move(diagnosis));
+      CausesInWords(diagnosis, calibration->diagnostics.structure));
+  calibration->diagnostics.diagnoses.push_back(std::move(diagnosis));
   if (std::abs(distortion.value) > kGross) return found;
-  calibration->warnings.push_back(
+  calibration->summary.warnings.push_back(
       found + ". The depth and the blur assume an undistorted camera and a flat target");
   return std::nullopt;
 }
@@ -101,14 +101,14 @@ std::string NonlinearityRemedy(const FrameStructureFinding& structure) {
 
 std::string NonlinearityText(const ScaleNonlinearity& nonlinearity,
                              const Calibration& calibration) {
-  const std::string seen = StructureInWords(calibration.structure);
+  const std::string seen = StructureInWords(calibration.diagnostics.structure);
   const std::string causes =
       seen.empty()
           ? std::string(
                 "The rail's scale is not linear, the images are distorted, the target is not flat, "
                 "or the lens breathes; these look alike. A rail of known steps (a micrometer "
                 "screw) distinguishes the first of these causes from the others") +
-                OcclusionText(calibration.structure)
+                OcclusionText(calibration.diagnostics.structure)
           : fmt::format(
                 "{}{}. This biases the image scale. If it is not the cause, the rail's scale is "
                 "not linear, the images are distorted, the target is not flat, or the lens "

@@ -37,9 +37,10 @@ MagnificationCheck DistanceFromPeriod(const FocusSweep& sweep, const PeriodEstim
 OffsetCheck CheckGivenOffset(const FocusSweep& sweep, const std::string& unit_that_fits,
                              Calibration* calibration) {
   OffsetCheck check;
-  const ScaleModel& law = calibration->scale;
+  const ScaleModel& law = calibration->diagnostics.scale;
   if (!law.done) {
-    calibration->warnings.push_back("the given offset_mm could not be checked: " + law.message);
+    calibration->summary.warnings.push_back("the given offset_mm could not be checked: " +
+                                            law.message);
     return check;
   }
   // No pupil law is known to hold: the zero may lie anywhere in the interval of the laws.
@@ -59,7 +60,7 @@ OffsetCheck CheckGivenOffset(const FocusSweep& sweep, const std::string& unit_th
     if (!unit_that_fits.empty()) *check.refusal += " (" + unit_that_fits + ")";
     return check;
   }
-  calibration->warnings.push_back(found);
+  calibration->summary.warnings.push_back(found);
   check.conflicting_mm = model::Estimate{given_mm + apart_mm, law.offset_mm.sigma};
   return check;
 }
@@ -68,15 +69,15 @@ std::optional<ScaleNonlinearity> CheckScaleNonlinearity(const FocusSweep& sweep,
                                                         const std::vector<ScaleSample>& scales,
                                                         Calibration* calibration) {
   const std::optional<ScaleNonlinearity> nonlinearity =
-      FindScaleNonlinearity(scales, calibration->scale, sweep);
+      FindScaleNonlinearity(scales, calibration->diagnostics.scale, sweep);
   if (!nonlinearity) return std::nullopt;
-  calibration->warnings.push_back(NonlinearityText(*nonlinearity, *calibration));
+  calibration->summary.warnings.push_back(NonlinearityText(*nonlinearity, *calibration));
   return nonlinearity;
 }
 
 void WarnOfReadingStep(const ReadingStep& reading_step, Calibration* calibration) {
   const FrameMeasurement& frame = calibration->frames[reading_step.frame];
-  calibration->warnings.push_back(
+  calibration->summary.warnings.push_back(
       fmt::format("the readings jump by {:+.2f} +- {:.2f} mm against the image scale from {} "
                   "(reading {:.6g} mm) on: check the clamp and the table of readings there",
                   reading_step.jump_mm.value, reading_step.jump_mm.sigma, FileName(frame.image),
@@ -109,27 +110,28 @@ std::vector<BlurFitSetup> WithoutReadingStep(const FocusSweep& sweep, const Blur
   const ScaleModel law = FitScaleModel(scales, static_cast<int>(reference), setup.reading_sigma_mm,
                                        sweep.direction, RegionCornerRadiusPx(sweep));
   if (!law.done) return {later, earlier};
-  later.offset_mm.value = law.offset_mm.value + calibration.scale.centre_mm;
+  later.offset_mm.value = law.offset_mm.value + calibration.diagnostics.scale.centre_mm;
   return {later};
 }
 
 void CheckMagnification(const FocusSweep& sweep, std::size_t reference, const cv::Mat& grey,
                         Calibration* calibration) {
-  if (!calibration->image_distance_mm) return;
+  if (!calibration->summary.image_distance_mm) return;
   const std::optional<PeriodEstimate> period = MeasurePeriodPx(grey);
   if (!period) {
-    calibration->warnings.emplace_back(
+    calibration->summary.warnings.emplace_back(
         "target_period_mm is stated, but the sharpest frame shows no periodic texture to compare "
         "it with");
     return;
   }
-  const MagnificationCheck check = DistanceFromPeriod(
-      sweep, *period, calibration->frames[reference].depth_mm, calibration->bench_offset_mm->sigma);
-  calibration->magnification = check;
-  const Result& focus = *calibration->image_distance_mm;
+  const MagnificationCheck check =
+      DistanceFromPeriod(sweep, *period, calibration->frames[reference].depth_mm,
+                         calibration->summary.bench_offset_mm->sigma);
+  calibration->diagnostics.magnification = check;
+  const Result& focus = *calibration->summary.image_distance_mm;
   const double apart_mm = check.image_distance_mm.value - focus.value;
   if (std::abs(apart_mm) > 3 * std::hypot(check.image_distance_mm.sigma, focus.sigma)) {
-    calibration->warnings.push_back(
+    calibration->summary.warnings.push_back(
         fmt::format("the image scale of the target puts d1 at {:.4g} +- {:.2g} mm, which differs "
                     "by {:+.1f} % from the value by the focus: focal length, pixel pitch, "
                     "target_period_mm or the readings are wrong by this amount",

@@ -41,7 +41,7 @@ class Field {
   }
 
   void Run() {
-    FieldMap& map = result_.field;
+    FieldMap& map = result_.diagnostics.field;
     if (evidence_.spectrum < 0 || setup_.frames.size() < 5) {
       map.message = "the target must have texture over the whole field";
       return;
@@ -50,7 +50,7 @@ class Field {
     // Astigmatism comes first, because it may cause different depths of focus over the field.
     MeasureAstigmatism();
     const std::string astigmatism = AstigmatismInWords(result_);
-    if (!astigmatism.empty()) result_.warnings.push_back(astigmatism);
+    if (!astigmatism.empty()) result_.summary.warnings.push_back(astigmatism);
     MapTiles();
     MeasureChannels();
   }
@@ -127,7 +127,7 @@ class Field {
   }
 
   void MapTiles() {
-    FieldMap& map = result_.field;
+    FieldMap& map = result_.diagnostics.field;
     const int side = setup_.size_px.minCoeff() < kSmallField ? 3 : 5;
     const double part = 2.0 / (side + 1);  // neighbours overlap by half
     map.columns = map.rows = side;
@@ -178,7 +178,7 @@ class Field {
   // together with curvature: without the quadratic term an off-centre field would resemble a tilted
   // one.
   void DescribeSurface(const std::vector<std::size_t>& fitted) {
-    FieldMap& map = result_.field;
+    FieldMap& map = result_.diagnostics.field;
     const bool with_curvature = fitted.size() >= 6;
     const Eigen::Index terms = with_curvature ? 4 : 3;
     const auto n = static_cast<Eigen::Index>(fitted.size());
@@ -235,7 +235,7 @@ class Field {
   // Finds the depths of a stepped target: where no smooth surface describes the tiles, they are
   // divided at the gaps between their depths.
   void FindClusters(std::vector<std::size_t> fitted, double chi2) {
-    FieldMap& map = result_.field;
+    FieldMap& map = result_.diagnostics.field;
     std::sort(fitted.begin(), fitted.end(), [&](std::size_t a, std::size_t b) {
       return map.tiles[a].focus_depth_mm.value < map.tiles[b].focus_depth_mm.value;
     });
@@ -277,7 +277,7 @@ class Field {
     }
     const double spread_mm =
         map.clusters.back().focus_depth_mm.value - map.clusters.front().focus_depth_mm.value;
-    result_.warnings.push_back(
+    result_.summary.warnings.push_back(
         AstigmatismExplains(spread_mm, result_)
             ? fmt::format("parts of the field come into focus at {}: the astigmatism is as large "
                           "and has this effect if the direction of the texture varies; or the "
@@ -290,7 +290,7 @@ class Field {
   }
 
   void WarnOfTilt() {
-    const FieldMap& map = result_.field;
+    const FieldMap& map = result_.diagnostics.field;
     if (map.clusters.size() > 1) return;
     const auto significant = [](const model::Estimate& tilt) {
       return std::abs(tilt.value) > std::max(1.0, 4 * tilt.sigma);
@@ -302,7 +302,7 @@ class Field {
       nearest_mm = std::min(nearest_mm, tile.focus_depth_mm.value);
       farthest_mm = std::max(farthest_mm, tile.focus_depth_mm.value);
     }
-    result_.warnings.push_back(fmt::format(
+    result_.summary.warnings.push_back(fmt::format(
         "{}the target is tilted against the sensor: {:+.1f} +- {:.1f} degrees toward the right, "
         "{:+.1f} +- {:.1f} toward the bottom (positive: nearer there)",
         AstigmatismExplains(farthest_mm - nearest_mm, result_)
@@ -315,7 +315,7 @@ class Field {
   // One zf for a field that has several is wrong by the spread beyond their own errors; where the
   // target has several depths, by the largest difference.
   void WidenBySpread(const std::vector<std::size_t>& fitted) {
-    const FieldMap& map = result_.field;
+    const FieldMap& map = result_.diagnostics.field;
     const double zf = fit_.values[kFocusDepth];
     double farthest_mm = 0, squares = 0, errors = 0;
     for (const std::size_t t : fitted) {
@@ -352,8 +352,8 @@ class Field {
     const auto along_x = along(0);
     const auto along_y = along(1);
     if (!along_x || !along_y) return;
-    result_.field.astigmatism_mm = model::Estimate{along_x->value - along_y->value,
-                                                   std::hypot(along_x->sigma, along_y->sigma)};
+    result_.diagnostics.field.astigmatism_mm = model::Estimate{
+        along_x->value - along_y->value, std::hypot(along_x->sigma, along_y->sigma)};
   }
 
   // Returns the index, among the frames used here, of a frame of the evidence's own set-up.
@@ -389,7 +389,7 @@ class Field {
           focus.focus_depth_mm = *found;
         }
       }
-      result_.channels.push_back(focus);
+      result_.diagnostics.channels.push_back(focus);
     }
   }
 

@@ -70,8 +70,8 @@ SideFit FitSide(const BlurEvidence& evidence, const BlurFitResult& fit, bool nea
 }  // namespace
 
 void FitSides(const BlurEvidence& evidence, const BlurFitResult& fit, Calibration* calibration) {
-  calibration->nearer = FitSide(evidence, fit, true);
-  calibration->farther = FitSide(evidence, fit, false);
+  calibration->diagnostics.nearer = FitSide(evidence, fit, true);
+  calibration->diagnostics.farther = FitSide(evidence, fit, false);
 }
 
 }  // namespace thicklens::calib

@@ -12,7 +12,7 @@ double Width(const Eigen::Vector2d& interval) { return interval.y() - interval.x
 
 // A clearly wrong shape changes kappa, whatever the shares of d1 are.
 std::optional<std::string> WrongShape(const Calibration& calibration) {
-  for (const SystematicPart& part : calibration.systematic_parts) {
+  for (const SystematicPart& part : calibration.diagnostics.systematic_parts) {
     if (part.name == kShapePart && Width(part.blur_ratio) > 0) return part.remedy;
   }
   return std::nullopt;
@@ -21,16 +21,18 @@ std::optional<std::string> WrongShape(const Calibration& calibration) {
 }  // namespace
 
 void SortAndAdvise(Calibration* calibration) {
-  std::vector<SystematicPart>& parts = calibration->systematic_parts;
+  std::vector<SystematicPart>& parts = calibration->diagnostics.systematic_parts;
   std::stable_sort(parts.begin(), parts.end(),
                    [](const SystematicPart& a, const SystematicPart& b) {
                      return Width(a.image_distance_mm) > Width(b.image_distance_mm);
                    });
-  const double zf_sigma_mm = calibration->focus_depth_mm->sigma;
+  const double zf_sigma_mm = calibration->summary.focus_depth_mm->sigma;
   const double zero_sigma_mm =
-      calibration->bench_offset_mm ? std::min(calibration->bench_offset_mm->sigma, zf_sigma_mm) : 0;
+      calibration->summary.bench_offset_mm
+          ? std::min(calibration->summary.bench_offset_mm->sigma, zf_sigma_mm)
+          : 0;
   const double d1_per_zf =
-      zf_sigma_mm > 0 ? calibration->image_distance_mm->sigma / zf_sigma_mm : 0;
+      zf_sigma_mm > 0 ? calibration->summary.image_distance_mm->sigma / zf_sigma_mm : 0;
   const double zero_mm = 2 * 1.96 * d1_per_zf * zero_sigma_mm;
   const double noise_mm =
       2 * 1.96 * d1_per_zf * std::sqrt(zf_sigma_mm * zf_sigma_mm - zero_sigma_mm * zero_sigma_mm);
@@ -39,20 +41,21 @@ void SortAndAdvise(Calibration* calibration) {
   if (!(all_mm > 0)) return;
   const double worst_mm = parts.empty() ? 0 : Width(parts.front().image_distance_mm);
   if (const auto wrong = WrongShape(*calibration)) {
-    calibration->advice = *wrong;
+    calibration->diagnostics.advice = *wrong;
     return;
   }
   const auto share = [&](double part_mm) { return 100 * part_mm / all_mm; };
   if (worst_mm > noise_mm && worst_mm > zero_mm) {
-    calibration->advice = fmt::format("{} is {:.0f} % of the error of d1: {}", parts.front().name,
-                                      share(worst_mm), parts.front().remedy);
+    calibration->diagnostics.advice =
+        fmt::format("{} is {:.0f} % of the error of d1: {}", parts.front().name, share(worst_mm),
+                    parts.front().remedy);
   } else if (zero_mm > noise_mm) {
-    calibration->advice = fmt::format(
+    calibration->diagnostics.advice = fmt::format(
         "the bench zero is {:.0f} % of the error of d1: measure offset_mm, or sweep over a longer "
         "range so that the image scale determines it better",
         share(zero_mm));
   } else {
-    calibration->advice = fmt::format(
+    calibration->diagnostics.advice = fmt::format(
         "noise and readings are {:.0f} % of the error of d1: take more frames, or use a finer "
         "bench scale",
         share(noise_mm));
@@ -61,7 +64,7 @@ void SortAndAdvise(Calibration* calibration) {
 
 void WidenFocus(const std::string& name, double move_mm, const std::string& remedy,
                 const model::ThickLens& lens, Calibration* calibration) {
-  const double zf = calibration->focus_depth_mm->value;
+  const double zf = calibration->summary.focus_depth_mm->value;
   const double d1_mm = model::ImageDistanceMm(lens, zf);
   SystematicPart part;
   part.name = name;
@@ -71,11 +74,11 @@ void WidenFocus(const std::string& name, double move_mm, const std::string& reme
   part.focus_depth_mm = {nearest_mm - zf, move_mm};
   part.image_distance_mm = {model::ImageDistanceMm(lens, zf + move_mm) - d1_mm,
                             model::ImageDistanceMm(lens, nearest_mm) - d1_mm};
-  if (calibration->focus_depth_mm->systematic)
-    *calibration->focus_depth_mm->systematic += part.focus_depth_mm;
-  if (calibration->image_distance_mm->systematic)
-    *calibration->image_distance_mm->systematic += part.image_distance_mm;
-  calibration->systematic_parts.push_back(part);
+  if (calibration->summary.focus_depth_mm->systematic)
+    *calibration->summary.focus_depth_mm->systematic += part.focus_depth_mm;
+  if (calibration->summary.image_distance_mm->systematic)
+    *calibration->summary.image_distance_mm->systematic += part.image_distance_mm;
+  calibration->diagnostics.systematic_parts.push_back(part);
   SortAndAdvise(calibration);
 }
 
@@ -85,13 +88,13 @@ void WidenByTrials(const std::string& name, const std::string& remedy,
   SystematicPart part;
   part.name = name;
   part.remedy = remedy;
-  std::optional<Result>& zero = calibration->bench_offset_mm;
+  std::optional<Result>& zero = calibration->summary.bench_offset_mm;
   Eigen::Vector2d zero_mm(0, 0);
   if (zero) zero_mm = zero->systematic.value_or(Eigen::Vector2d(zero->value, zero->value));
   for (const BlurFitSetup& setup : setups) {
     const BlurFitResult trial = FitBlur(setup, &fit);
     if (!trial.done) {
-      calibration->warnings.push_back(
+      calibration->summary.warnings.push_back(
           fmt::format("{}: the fit of its effect on the results failed, and the intervals do not "
                       "include it ({})",
                       name, trial.message));
@@ -111,10 +114,10 @@ void WidenByTrials(const std::string& name, const std::string& remedy,
   const auto add = [](std::optional<Result>* result, const Eigen::Vector2d& moves) {
     if (*result && (*result)->systematic) *(*result)->systematic += moves;
   };
-  add(&calibration->focus_depth_mm, part.focus_depth_mm);
-  add(&calibration->image_distance_mm, part.image_distance_mm);
-  add(&calibration->blur_ratio, part.blur_ratio);
-  calibration->systematic_parts.push_back(part);
+  add(&calibration->summary.focus_depth_mm, part.focus_depth_mm);
+  add(&calibration->summary.image_distance_mm, part.image_distance_mm);
+  add(&calibration->summary.blur_ratio, part.blur_ratio);
+  calibration->diagnostics.systematic_parts.push_back(part);
   SortAndAdvise(calibration);
 }
 

@@ -51,7 +51,7 @@ class Parts {
     own.name = "blur estimator";
     own.blur_ratio = kEstimatorRatioError * fit_.values[kBlurRatio] * Eigen::Vector2d(-1, 1);
     own.remedy = "no remedy: this is the accuracy of the blur estimator itself";
-    result_.systematic_parts.push_back(own);
+    result_.diagnostics.systematic_parts.push_back(own);
     SetIntervals(floor);
     SortAndAdvise(&result_);
   }
@@ -83,15 +83,15 @@ class Parts {
       setup.floor_variance_px2 = model::Estimate{end_px2, 0};
       Include(Try(setup), &part);
     }
-    result_.systematic_parts.push_back(part);
+    result_.diagnostics.systematic_parts.push_back(part);
   }
 
   // Adds a part only where the two sides contradict each other.
   void AddSides() {
-    const SideFit& nearer = result_.nearer;
-    const SideFit& farther = result_.farther;
+    const SideFit& nearer = result_.diagnostics.nearer;
+    const SideFit& farther = result_.diagnostics.farther;
     if (!nearer.done || !farther.done) {
-      result_.warnings.push_back(
+      result_.summary.warnings.push_back(
           fmt::format("the two sides of focus cannot be compared (nearer: {}; farther: {}): a lens "
                       "that blurs differently on the two sides would not be noticed",
                       SideInWords(nearer), SideInWords(farther)));
@@ -100,7 +100,7 @@ class Parts {
     const double apart_mm = nearer.focus_depth_mm.value - farther.focus_depth_mm.value;
     const double sigma_mm = std::hypot(nearer.focus_depth_mm.sigma, farther.focus_depth_mm.sigma);
     if (!(std::abs(apart_mm) > kSidesDisagree * sigma_mm)) return;
-    result_.warnings.push_back(fmt::format(
+    result_.summary.warnings.push_back(fmt::format(
         "the two sides of focus disagree: the nearer frames alone give {:.2f} +- {:.2g} mm, "
         "the farther ones {:.2f} +- {:.2g} mm",
         nearer.focus_depth_mm.value, nearer.focus_depth_mm.sigma, farther.focus_depth_mm.value,
@@ -118,7 +118,7 @@ class Parts {
       as_fit.values[kBlurRatio] = side->blur_ratio.value;
       Include({as_fit, evidence_.setup.lens}, &part);
     }
-    result_.systematic_parts.push_back(part);
+    result_.diagnostics.systematic_parts.push_back(part);
   }
 
   // Fits with other samples in place of an estimator's. Rejected frames remain excluded.
@@ -150,7 +150,7 @@ class Parts {
     part.name = "frequency band";
     part.remedy = "use a target with finer texture, or steps closer to focus";
     Include(*trial, &part);
-    result_.systematic_parts.push_back(part);
+    result_.diagnostics.systematic_parts.push_back(part);
   }
 
   // Whether the other shape is right beyond doubt: the frames themselves show it, or the law holds
@@ -194,9 +194,9 @@ class Parts {
                       : std::string("no remedy: the shape that the camera file states fits better");
     Include(*trial, &part);
     if (!is_right && OtherShapeIsRuledOut()) part.blur_ratio.setZero();
-    result_.systematic_parts.push_back(part);
+    result_.diagnostics.systematic_parts.push_back(part);
     if (!is_right) return;
-    result_.warnings.push_back(fmt::format(
+    result_.summary.warnings.push_back(fmt::format(
         "the blur is a {}, not the {} that the camera file states: with it the frames "
         "follow the blur law (chi2/dof {:.3g} against {:.3g}) and the blur ratio is "
         "{:.4f}; state psf: {} in the camera file",
@@ -231,7 +231,7 @@ class Parts {
       part.blur_ratio.y() = std::max(part.blur_ratio.y(), kappa * (1 / ratios.x() - 1));
     }
     if (part.blur_ratio.isZero() && part.focus_depth_mm.isZero()) return;
-    result_.systematic_parts.push_back(part);
+    result_.diagnostics.systematic_parts.push_back(part);
   }
 
   // Tries each estimator alone, where there are two.
@@ -248,7 +248,7 @@ class Parts {
         setup.floor_variance_px2 = model::Estimate{fit_.values[kFloorVariance], 0};
       Include(Try(setup), &part);
     }
-    result_.systematic_parts.push_back(part);
+    result_.diagnostics.systematic_parts.push_back(part);
   }
 
   // Tries the numbers of the camera file that state a tolerance.
@@ -265,7 +265,7 @@ class Parts {
         is_used = true;
         Include(Try(setup), &part);
       }
-      if (is_used) result_.systematic_parts.push_back(part);
+      if (is_used) result_.diagnostics.systematic_parts.push_back(part);
     }
   }
 
@@ -288,7 +288,7 @@ class Parts {
   void SetIntervals(const FloorInterval& floor) {
     const auto total = [&](Eigen::Vector2d SystematicPart::*of) {
       Eigen::Vector2d ends(0, 0), squares(0, 0);
-      for (const SystematicPart& part : result_.systematic_parts) {
+      for (const SystematicPart& part : result_.diagnostics.systematic_parts) {
         if (floor && part.name == "lens floor") {
           ends += part.*of;
         } else {
@@ -300,9 +300,9 @@ class Parts {
     const auto set = [](std::optional<Result>* result, const Eigen::Vector2d& moves) {
       (*result)->systematic = moves.array() + (*result)->value;
     };
-    set(&result_.focus_depth_mm, total(&SystematicPart::focus_depth_mm));
-    set(&result_.image_distance_mm, total(&SystematicPart::image_distance_mm));
-    set(&result_.blur_ratio, total(&SystematicPart::blur_ratio));
+    set(&result_.summary.focus_depth_mm, total(&SystematicPart::focus_depth_mm));
+    set(&result_.summary.image_distance_mm, total(&SystematicPart::image_distance_mm));
+    set(&result_.summary.blur_ratio, total(&SystematicPart::blur_ratio));
   }
 
   const FocusSweep& sweep_;

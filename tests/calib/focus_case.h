@@ -34,7 +34,8 @@ struct FocusCase {
     sweep.camera.lens = bench.lens;
     sweep.camera.sensor.pixel_pitch_mm = bench.pitch_mm;
     sweep.direction = bench.direction;
-    calibration.bench_offset_mm = calib::Result{bench.offset_mm, offset_sigma_mm, std::nullopt};
+    calibration.summary.bench_offset_mm =
+        calib::Result{bench.offset_mm, offset_sigma_mm, std::nullopt};
     calib::FrameMeasurement dark;
     dark.image = "bench/dark.png";
     dark.reading_mm = evidence.setup.frames.front().reading_mm;
@@ -90,7 +91,7 @@ struct FocusCase {
     return calibration.frames[fit_frame + kChecked];
   }
   const calib::SystematicPart* Part(const std::string& name) const {
-    for (const calib::SystematicPart& part : calibration.systematic_parts) {
+    for (const calib::SystematicPart& part : calibration.diagnostics.systematic_parts) {
       if (part.name == name) return &part;
     }
     return nullptr;

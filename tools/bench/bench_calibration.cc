@@ -82,13 +82,14 @@ double ToPercentOf(double truth) { return 100 / truth; }
 
 CalibrationTrial OfFit(const calib::Calibration& c, const BenchSweep& bench) {
   CalibrationTrial trial;
-  trial.outcome = c.outcome;
-  trial.reason = c.reason;
-  if (c.outcome == calib::Outcome::kRefused) return trial;
+  trial.outcome = c.summary.outcome;
+  trial.reason = c.summary.reason;
+  if (c.summary.outcome == calib::Outcome::kRefused) return trial;
   const model::SweepTruth& truth = bench.truth;
-  trial.focus_depth_mm = ErrorOf(c.focus_depth_mm, truth.focus_depth_mm, 1);
-  trial.image_distance_um = ErrorOf(c.image_distance_mm, truth.image_distance_mm, kMmToUm);
-  trial.blur_ratio_percent = ErrorOf(c.blur_ratio, truth.blur_ratio, ToPercentOf(truth.blur_ratio));
+  trial.focus_depth_mm = ErrorOf(c.summary.focus_depth_mm, truth.focus_depth_mm, 1);
+  trial.image_distance_um = ErrorOf(c.summary.image_distance_mm, truth.image_distance_mm, kMmToUm);
+  trial.blur_ratio_percent =
+      ErrorOf(c.summary.blur_ratio, truth.blur_ratio, ToPercentOf(truth.blur_ratio));
   return trial;
 }
 
@@ -99,13 +100,13 @@ CalibrationTrial OfPart(bool done, const std::string& message, const calib::Cali
   if (done) {
     trial.outcome = calib::Outcome::kOk;
   } else {
-    trial.reason = c.outcome == calib::Outcome::kRefused ? c.reason : message;
+    trial.reason = c.summary.outcome == calib::Outcome::kRefused ? c.summary.reason : message;
   }
   return trial;
 }
 
 CalibrationTrial OfPeak(const calib::Calibration& c, const BenchSweep& bench) {
-  const calib::SharpnessPeak& peak = c.sharpness;
+  const calib::SharpnessPeak& peak = c.diagnostics.sharpness;
   const model::ThickLens& lens = bench.sweep.camera.lens;
   const bool done = peak.done && peak.focus_depth_mm > lens.front_focal_length_mm;
   CalibrationTrial trial = OfPart(done, peak.message, c);
@@ -119,7 +120,7 @@ CalibrationTrial OfPeak(const calib::Calibration& c, const BenchSweep& bench) {
 }
 
 CalibrationTrial OfSource(const calib::Calibration& c, const BenchSweep& bench) {
-  const calib::SourceRecipe& source = c.source;
+  const calib::SourceRecipe& source = c.diagnostics.paper_recipe;
   CalibrationTrial trial = OfPart(source.done, source.message, c);
   if (!source.done) return trial;
   const model::SweepTruth& truth = bench.truth;
@@ -155,7 +156,7 @@ std::vector<CalibrationTrial> RunMethod(const Method& method, const calib::Focus
   } catch (const Interrupted&) {
     throw;
   } catch (const Error& error) {  // only this sweep fails, the others go on
-    calibration.reason = error.what();
+    calibration.summary.reason = error.what();
   }
   const double seconds = ThreadSeconds() - begin;
   for (const Method::Reading& reading : method.readings) {

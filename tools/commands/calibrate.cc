@@ -1,11 +1,9 @@
 // thicklens calibrate: from a focus sweep to a camera with its image distance and blur.
-#include "thicklens/calib/calibrate.h"
+#include "thicklens/calibrate.h"
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include <algorithm>
-#include <chrono>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -13,13 +11,16 @@
 #include <vector>
 
 #include "thicklens/base/cancel.h"
-#include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/base/printable_text.h"
 #include "thicklens/base/utc_time.h"
+#include "thicklens/calib/focus_sweep.h"
 #include "thicklens/model/camera_file.h"
+#include "thicklens/opencv.h"
+#include "thicklens/sweep.h"
 #include "tools/commands/commands.h"
 #include "tools/options/command_frame.h"
+#include "tools/options/interface_options.h"
 #include "tools/options/option_values.h"
 #include "tools/options/sweep_input.h"
 #include "tools/options/sweep_options.h"
@@ -29,7 +30,6 @@
 #include "tools/report/input_summary.h"
 #include "tools/report/report_folder.h"
 #include "tools/system/build_info.h"
-#include "tools/system/progress_line.h"
 
 namespace thicklens::tools {
 namespace {
@@ -78,61 +78,42 @@ struct Outputs {
   std::optional<OutputFolder> figures;
 };
 
-const model::SweepTruth* TruthOf(const SweepInput& input) {
-  return input.truth ? &*input.truth : nullptr;
+const model::SweepTruth* TruthOf(const Sweep& sweep) {
+  return sweep.truth ? &*sweep.truth : nullptr;
 }
 
-// Returns the reason why there is no camera to write; empty if there is one.
-std::string RefusalOf(const calib::Calibration& calibration, bool use_source_recipe) {
-  if (use_source_recipe) return calibration.source.done ? "" : calibration.source.message;
-  return calibration.outcome == calib::Outcome::kRefused ? calibration.reason : "";
+// Its progress line ends with it.
+Calibration Measure(const CalibrateOptions& options, const Sweep& sweep) {
+  const CommandRun run(options.common, SweepOptionNames());
+  thicklens::CalibrateOptions asked;
+  asked.method = options.use_source_recipe() ? CalibrationMethod::kPaper : CalibrationMethod::kFit;
+  asked.map_field = options.map_field;
+  asked.on_refusal = OnRefusal::kReturn;
+  return thicklens::Calibrate(sweep, asked, run.control());
 }
 
-calib::Calibration Measure(const SweepInput& input, const CalibrateOptions& asked) {
-  ProgressLine progress("measuring", asked.common.quiet);
-  calib::CalibrationOptions options;
-  options.map_field = asked.map_field;
-  options.threads = asked.common.threads;
-  options.progress = [&](int done, int total) {
-    progress.Show(done, total);
-    return !IsCancelled();
-  };
-  return calib::Calibrate(input.sweep, options);
-}
-
-model::Camera CameraWithEvidence(const SweepInput& input, const calib::Calibration& calibration,
-                                 const std::string& date, bool use_source_recipe) {
-  model::Camera camera =
-      calib::CalibratedCamera(input.sweep.camera, calibration, use_source_recipe);
-  if (!camera.calibration) return camera;
-  model::Evidence& evidence = camera.calibration->evidence;
-  evidence.data_sha256 = input.frame_files->DataSha256();
-  evidence.version = Version();
-  evidence.date = date;
-  return camera;
-}
-
-CalibrationReport Report(const CalibrateOptions& options, const SweepInput& input,
-                         const calib::Calibration& calibration, const std::string& date) {
-  const ReportOrigin origin{options.sweep.input, Version(), date, input.notices,
-                            input.file.reading_sigma_stated};
-  return MakeCalibrationReport(input.sweep, calibration, TruthOf(input), origin,
-                               input.sweep.read_frame);
+CalibrationReport Report(const CalibrateOptions& options, const Sweep& sweep,
+                         const calib::FocusSweep& focus_sweep, const Calibration& calibration) {
+  const auto& calibrated = calibration.camera.calibration;
+  const ReportOrigin origin{options.sweep.input, Version(),
+                            calibrated ? calibrated->evidence.date : NowIso8601(), sweep.notices,
+                            sweep.description.reading_sigma_stated};
+  return MakeCalibrationReport(focus_sweep, calibration, TruthOf(sweep), origin,
+                               focus_sweep.read_frame);
 }
 
 // All texts are made, and the figures written to temporary files, before the first file is put in
 // place.
-void WriteOutputs(const CalibrateOptions& options, const SweepInput& input,
-                  const calib::Calibration& calibration, bool refused, Outputs* outputs) {
-  const std::string date = NowIso8601();
+void WriteOutputs(const CalibrateOptions& options, const Sweep& sweep,
+                  const calib::FocusSweep& focus_sweep, const Calibration& calibration,
+                  Outputs* outputs) {
   std::string camera;
   CalibrationReport report;
-  if (outputs->camera && !refused) {
-    camera = model::CameraToYaml(
-        CameraWithEvidence(input, calibration, date, options.use_source_recipe()));
+  if (outputs->camera && calibration.refusal.empty()) {
+    camera = model::CameraToYaml(calibration.camera);
   }
   if (outputs->report) {
-    report = Report(options, input, calibration, date);
+    report = Report(options, sweep, focus_sweep, calibration);
     for (const ReportFile& figure : report.figures)
       outputs->figures->Write(figure.name, figure.content);
     outputs->figures->Write(kCaptions, report.captions);
@@ -149,25 +130,25 @@ void WriteOutputs(const CalibrateOptions& options, const SweepInput& input,
   }
 }
 
-CommandResult RunCalibration(const CalibrateOptions& options, const SweepInput& input) {
+CommandResult RunCalibration(const CalibrateOptions& options, const Sweep& sweep) {
   Outputs outputs(options);
-  const calib::Calibration calibration = Measure(input, options);
-  ThrowIfCancelled();
-  const std::string refusal = RefusalOf(calibration, options.use_source_recipe());
-  WriteOutputs(options, input, calibration, !refusal.empty(), &outputs);
+  const Calibration calibration = Measure(options, sweep);
+  const calib::FocusSweep focus_sweep = FocusSweepOf(sweep);
+  WriteOutputs(options, sweep, focus_sweep, calibration, &outputs);
   if (options.common.quiet) {  // otherwise they are part of the text
-    for (const std::string& warning : calibration.warnings)
+    for (const std::string& warning : calibration.summary.warnings)
       spdlog::warn("{}", PrintableUtf8(warning));
   }
   // A refusal before any measurement is one line on stderr.
-  if (refusal.empty() || calibration.source.done)
-    PrintResult(options.common, CalibrationText(input.sweep, calibration, TruthOf(input)));
+  if (calibration.refusal.empty() || calibration.diagnostics.paper_recipe.done)
+    PrintResult(options.common, CalibrationText(focus_sweep, calibration, TruthOf(sweep)));
   CommandResult result;
   result.is_written = outputs.camera || outputs.report;
   result.summary =
-      CalibrationJson(input.sweep, calibration, TruthOf(input), options.use_source_recipe());
-  if (!refusal.empty())
-    result.refusal = PrintableUtf8(fmt::format("{}: {}", options.sweep.input, refusal));
+      CalibrationJson(focus_sweep, calibration, TruthOf(sweep), options.use_source_recipe());
+  if (!calibration.refusal.empty()) {
+    result.refusal = PrintableUtf8(fmt::format("{}: {}", options.sweep.input, calibration.refusal));
+  }
   return result;
 }
 
@@ -180,19 +161,18 @@ std::string OutputsText(const CalibrateOptions& options) {
   return outputs.empty() ? "nothing" : fmt::format("{}", fmt::join(outputs, ", "));
 }
 
-CommandResult RunDry(const CalibrateOptions& options, const SweepInput& input) {
-  const Understanding found = Understand(input);
+CommandResult RunDry(const CalibrateOptions& options, const Sweep& sweep) {
+  for (const std::string& notice : NoticesOf(sweep)) spdlog::warn("{}", PrintableUtf8(notice));
+  const Understanding found = Understand(sweep);
   { const Outputs could_be_written(options); }
   PrintResult(options.common,
-              UnderstandingText(input, found, options.method, OutputsText(options)));
-  return {UnderstandingJson(input, found, options.method), ""};
+              UnderstandingText(sweep, found, options.method, OutputsText(options)));
+  return {UnderstandingJson(sweep, found, options.method), ""};
 }
 
 CommandResult Calibrate(const CalibrateOptions& options) {
-  const SweepInput input = ReadSweepInput(options.sweep);
-  for (const std::string& notice : input.notices) spdlog::warn("{}", PrintableUtf8(notice));
-  ReportAssumedFields(input.sweep.camera);
-  return options.dry_run ? RunDry(options, input) : RunCalibration(options, input);
+  const Sweep sweep = ReadSweepInput(options.sweep);
+  return options.dry_run ? RunDry(options, sweep) : RunCalibration(options, sweep);
 }
 
 void AddSweepOptions(CLI::App* command, SweepArguments* sweep) {

@@ -8,15 +8,14 @@
 #include <memory>
 #include <vector>
 
-#include "thicklens/base/cancel.h"
-#include "thicklens/base/error.h"
 #include "thicklens/base/printable_text.h"
-#include "thicklens/calib/calibrate.h"
-#include "thicklens/model/camera_file.h"
+#include "thicklens/camera.h"
+#include "thicklens/sweep.h"
+#include "thicklens/verify.h"
+#include "tools/options/interface_options.h"
 #include "tools/options/option_values.h"
 #include "tools/options/sweep_input.h"
 #include "tools/options/sweep_options.h"
-#include "tools/system/progress_line.h"
 
 namespace thicklens::tools {
 namespace {
@@ -27,7 +26,7 @@ struct CameraVerifyOptions {
   CommonOptions common;
   std::string camera_path;
   SweepArguments sweep;
-  calib::VerificationOptions verification;
+  VerifyOptions verification;
 };
 
 json FiniteOrNull(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }
@@ -63,44 +62,18 @@ std::string ParameterLine(const calib::ComparedParameter& parameter) {
                         : std::string("not counted"));
 }
 
-// Reads the stored camera. The sweep is calibrated with its lens and sensor only.
-model::Camera ReadStoredCamera(const std::string& path) {
-  model::Camera camera = model::ReadCamera(path);
-  if (!camera.calibration) {
-    throw Error(fmt::format(
-        "{}: calibration is missing: a camera that thicklens calibrate wrote is expected", path));
-  }
-  return camera;
+// Its progress line ends with it.
+CameraVerification Verify(const CameraVerifyOptions& options) {
+  const CommandRun run(options.common, SweepOptionNames());
+  const model::Camera stored = ReadCamera(options.camera_path);
+  const Sweep sweep = ReadSweepInput(options.sweep, run.control());
+  return VerifyCamera(stored, sweep, options.verification, run.control());
 }
 
-calib::Calibration CalibrateNewSweep(const CameraVerifyOptions& options, const SweepInput& input) {
-  ProgressLine progress("measuring", options.common.quiet);
-  calib::CalibrationOptions settings;
-  settings.map_field = false;
-  settings.threads = options.common.threads;
-  settings.progress = [&](int done, int total) {
-    progress.Show(done, total);
-    return !IsCancelled();
-  };
-  return calib::Calibrate(input.sweep, settings);
-}
-
-CommandResult VerifyCamera(const CameraVerifyOptions& options) {
-  const model::Camera stored = ReadStoredCamera(options.camera_path);
-  SweepInput input = ReadSweepInput(options.sweep);
-  for (const std::string& notice : input.notices) spdlog::warn("{}", PrintableUtf8(notice));
-  ReportAssumedFields(stored);
-  input.sweep.camera.calibration.reset();
-  const calib::Calibration found = CalibrateNewSweep(options, input);
-  ThrowIfCancelled();
-  calib::Verification verification =
-      calib::VerifyCalibration(stored, input.sweep, found, options.verification);
-  const std::string& of_stored = stored.calibration->evidence.data_sha256;
-  if (!of_stored.empty() && of_stored == input.frame_files->DataSha256()) {
-    verification.verdict = calib::Verdict::kUndetermined;
-    verification.reason =
-        "this is the sweep that the stored calibration was made from: take a new one";
-  }
+CommandResult RunVerification(const CameraVerifyOptions& options) {
+  const CameraVerification verification = Verify(options);
+  const CalibrationSummary& found = verification.calibration.summary;
+  const calib::BlurFit& blur = verification.calibration.diagnostics.blur;
   for (const std::string& warning : found.warnings) spdlog::debug("{}", PrintableUtf8(warning));
 
   PrintResult(options.common, VerificationText(verification));
@@ -115,8 +88,7 @@ CommandResult VerifyCamera(const CameraVerifyOptions& options) {
        {"calibration",
         {{"status", calib::OutcomeName(found.outcome)},
          {"reason", found.outcome == calib::Outcome::kOk ? "" : PrintableUtf8(found.reason)},
-         {"chi2_per_dof",
-          found.blur.done ? FiniteOrNull(found.blur.chi2_per_dof) : json(nullptr)}}}});
+         {"chi2_per_dof", blur.done ? FiniteOrNull(blur.chi2_per_dof) : json(nullptr)}}}});
   if (verification.verdict != calib::Verdict::kHolds) {
     const bool is_other = verification.verdict == calib::Verdict::kDoesNotHold;
     result.refusal = PrintableUtf8(fmt::format(
@@ -228,7 +200,7 @@ void AddCameraVerifyCommand(CLI::App* camera, CommandAction* action) {
       std::vector<std::string> inputs = options->sweep.Files();
       inputs.push_back(options->camera_path);
       RequireDistinctFiles({options->common.json_path}, inputs);
-      RunCommand(options->common, [&] { return VerifyCamera(*options); });
+      RunCommand(options->common, [&] { return RunVerification(*options); });
     };
   });
 }

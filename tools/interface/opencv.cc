@@ -2,11 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <utility>
 #include <vector>
 
 #include "thicklens/base/error.h"
+#include "thicklens/io/image_io.h"
 
 namespace thicklens {
 namespace {
@@ -89,6 +92,21 @@ cv::Mat MatFromImage(const Image& image, ChannelOrder order) {
     return MatOf<std::uint16_t, std::uint8_t>(values, width_px, height_px, channels, CV_8U, swap);
   }
   return MatOf<std::uint16_t, std::uint16_t>(values, width_px, height_px, channels, CV_16U, swap);
+}
+
+calib::FocusSweep FocusSweepOf(const Sweep& sweep) {
+  calib::FocusSweep focus_sweep = calib::MakeFocusSweep(sweep.description, sweep.camera);
+  if (sweep.frames != nullptr) {
+    focus_sweep.read_frame = [frames = sweep.frames](std::size_t i) {
+      const Image image = frames->Read(i);
+      return MatFromImage(image, image.order());
+    };
+  } else {
+    focus_sweep.read_frame =
+        [frames = std::make_shared<const std::vector<model::SweepFrame>>(sweep.description.frames)](
+            std::size_t i) { return io::ReadImageFile(frames->at(i).image); };
+  }
+  return focus_sweep;
 }
 
 }  // namespace thicklens

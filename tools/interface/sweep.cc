@@ -13,6 +13,7 @@
 #include "thicklens/calib/focus_sweep.h"
 #include "thicklens/model/camera_file.h"
 #include "tools/interface/missing_tolerances.h"
+#include "tools/interface/run_scope.h"
 #include "tools/interface/validation.h"
 
 namespace thicklens {
@@ -23,18 +24,20 @@ namespace fs = std::filesystem;
 constexpr char kSweepName[] = "sweep.yaml";
 constexpr char kTruthName[] = "truth.yaml";
 
-void ApplyOverrides(const SweepOverrides& overrides, model::SweepFile* file) {
+void ApplyOverrides(const SweepOverrides& overrides, const RunScope& run, model::SweepFile* file) {
   if (overrides.offset_unknown) file->offset_mm.reset();
   if (overrides.offset_mm) file->offset_mm = Measured{*overrides.offset_mm, 0};
   if (overrides.offset_sigma_mm) {
     if (!file->offset_mm) {
-      throw OptionError("offset_sigma_mm", "offset_sigma_mm: the offset itself is missing");
+      throw OptionError("offset_sigma_mm",
+                        fmt::format("offset_sigma_mm: the offset itself is missing, give {}",
+                                    run.Option("offset_mm")));
     }
     file->offset_mm->sigma = *overrides.offset_sigma_mm;
   }
   if (!overrides.floor_from_calibration.empty()) {
     model::TakeFloorOfCalibration(overrides.floor_from_calibration,
-                                  "floor_from_calibration: ", file);
+                                  run.Option("floor_from_calibration") + ": ", file);
   } else if (overrides.floor_unknown || overrides.floor_px) {
     file->floor = {};
     file->floor_origin.reset();
@@ -55,18 +58,18 @@ bool IsJpeg(const std::string& path) {
   return ending == ".jpg" || ending == ".jpeg";
 }
 
-// Lossy compression removes fine detail as blur does, and no fit of the frames alone separates the
-// two: on a simulated sweep of 1 px of blur, quality 90 moves kappa by 1 %.
+// Compression removes fine detail, which looks like blur, and a fit of the frames alone cannot
+// separate the two: on a simulated sweep with 1 px of blur, quality 90 changes kappa by 1 %.
 void NoteCompression(const std::vector<model::SweepFrame>& frames,
                      std::vector<std::string>* notices) {
   const auto jpegs = std::count_if(frames.begin(), frames.end(),
                                    [](const auto& frame) { return IsJpeg(frame.image); });
   if (jpegs == 0) return;
-  notices->push_back(fmt::format(
-      "{} of {} frames are JPEG files: compression takes fine detail away as blur does, and the "
-      "errors given do not contain what that does to zf and kappa (about 1 % of kappa at quality "
-      "90 and 1 px of blur); use PNG or TIFF for the last per cent",
-      jpegs, frames.size()));
+  notices->push_back(
+      fmt::format("{} of {} frames are JPEG files: compression removes fine detail as blur does, "
+                  "and the stated errors do not include its effect on zf and kappa (about 1 % of "
+                  "kappa at quality 90 and 1 px of blur); use PNG or TIFF if 1 % matters",
+                  jpegs, frames.size()));
 }
 
 // A file that merely happens to be called truth.yaml must not stop a calibration.
@@ -78,7 +81,8 @@ std::optional<model::SweepTruth> ReadTruth(const std::string& truth_path,
   const fs::path beside = fs::path(sweep_yaml).parent_path() / kTruthName;
   std::error_code failure;
   if (!fs::is_regular_file(beside, failure)) return std::nullopt;
-  ReportInput(beside.string());  // also where it is not used: it belongs to the sweep
+  // The file is reported even if it is not used: it belongs to the sweep.
+  ReportInput(beside.string());
   try {
     return model::ReadSweepTruth(beside.string());
   } catch (const Error& error) {
@@ -88,9 +92,9 @@ std::optional<model::SweepTruth> ReadTruth(const std::string& truth_path,
 }
 
 Sweep Finish(model::SweepFile file, const std::string& sweep_yaml, const SweepOverrides& overrides,
-             Sweep sweep) {
-  ApplyOverrides(overrides, &file);
-  if (file.reading_sigma_stated) {  // the file did not state it, but the overrides do
+             const RunScope& run, Sweep sweep) {
+  ApplyOverrides(overrides, run, &file);
+  if (file.reading_sigma_stated) {  // the file does not state it, but the overrides do
     const auto is_moot = [](const std::string& notice) {
       return notice.rfind("reading_sigma_mm is not stated", 0) == 0;
     };
@@ -101,7 +105,7 @@ Sweep Finish(model::SweepFile file, const std::string& sweep_yaml, const SweepOv
   sweep.truth = ReadTruth(overrides.truth_path, sweep_yaml, &sweep.notices);
   sweep.camera = model::ReadCamera(file.camera_path);
   calib::MakeFocusSweep(file, sweep.camera);  // throws if the floor is of another camera
-  if (!sweep.truth) {                         // a simulated camera's numbers are exact
+  if (!sweep.truth) {                         // the parameters of a simulated camera are exact
     const std::string missing = MissingTolerancesLine(sweep.camera);
     if (!missing.empty()) sweep.notices.push_back(missing);
   }
@@ -129,8 +133,11 @@ bool Sweep::IsValid(std::string* why) const {
   return true;
 }
 
-Sweep ReadSweep(const std::string& path, const SweepOverrides& overrides) {
+Sweep ReadSweep(const std::string& path, const SweepOverrides& overrides,
+                const RunControl& control) {
+  checks::RequireValid(control);
   checks::RequireValid(overrides);
+  const RunScope run(control);
   std::error_code failure;
   std::string yaml = path;
   if (fs::is_directory(path, failure)) {
@@ -146,20 +153,33 @@ Sweep ReadSweep(const std::string& path, const SweepOverrides& overrides) {
   Sweep sweep;
   model::SweepFile file = model::ReadSweep(yaml, &sweep.notices);
   if (!overrides.camera_path.empty()) file.camera_path = overrides.camera_path;
-  return Finish(std::move(file), yaml, overrides, std::move(sweep));
+  return Finish(std::move(file), yaml, overrides, run, std::move(sweep));
 }
 
 Sweep ReadSweepFolder(const std::string& folder, const std::string& readings_csv,
-                      const SweepOverrides& overrides) {
+                      const SweepOverrides& overrides, const RunControl& control) {
+  checks::RequireValid(control);
   checks::RequireValid(overrides);
+  const RunScope run(control);
   if (overrides.camera_path.empty()) {
     throw OptionError("camera_path",
-                      "camera_path: a folder with a table of readings needs a camera");
+                      "camera_path: a folder with a table of readings also needs a camera");
   }
   Sweep sweep;
   model::SweepFile file =
       model::SweepFromFolder(folder, readings_csv, overrides.camera_path, &sweep.notices);
-  return Finish(std::move(file), "", overrides, std::move(sweep));
+  return Finish(std::move(file), "", overrides, run, std::move(sweep));
+}
+
+std::vector<std::string> NoticesOf(const Sweep& sweep) {
+  std::vector<std::string> notices = sweep.notices;
+  notices.insert(notices.end(), sweep.camera.notices.begin(), sweep.camera.notices.end());
+  const std::vector<std::string> assumed = model::AssumedFields(sweep.camera);
+  if (!assumed.empty()) {
+    notices.push_back(fmt::format("camera '{}': assumed, neither published nor measured: {}",
+                                  sweep.camera.name, fmt::join(assumed, ", ")));
+  }
+  return notices;
 }
 
 }  // namespace thicklens

@@ -1,14 +1,13 @@
 #ifndef THICKLENS_TOOLS_OPTIONS_SWEEP_INPUT_H_
 #define THICKLENS_TOOLS_OPTIONS_SWEEP_INPUT_H_
 
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "thicklens/calib/focus_sweep.h"
-#include "thicklens/io/frame_files.h"
-#include "thicklens/model/sweep_file.h"
+#include "thicklens/run.h"
+#include "thicklens/sweep.h"
+#include "tools/options/interface_options.h"
 
 namespace thicklens::tools {
 
@@ -31,17 +30,15 @@ struct SweepArguments {
   std::vector<std::string> Files() const;
 };
 
-struct SweepInput {
-  model::SweepFile file;  // with the overrides of the command line
-  calib::FocusSweep sweep;
-  std::shared_ptr<io::FrameFiles> frame_files;
-  std::optional<model::SweepTruth> truth;  // --truth, or truth.yaml beside the sweep's file
-  std::vector<std::string> notices;        // one line each
-};
+// The statements of the command line. Throws UsageError for texts that make no sense.
+SweepOverrides SweepOverridesOf(const SweepArguments& arguments);
+// The options behind the members of SweepOverrides.
+OptionNames SweepOptionNames();
 
-// Reads the sweep's and the camera's file, and checks only that the frames exist. Throws Error, and
-// UsageError for arguments that make no sense.
-SweepInput ReadSweepInput(const SweepArguments& arguments);
+// Reads the sweep's and the camera's file, and checks only that the frames exist. Messages name the
+// options unless `run` says how to name them. Throws Error, and UsageError for arguments that make
+// no sense.
+Sweep ReadSweepInput(const SweepArguments& arguments, const RunControl& run = {});
 
 }  // namespace thicklens::tools
 

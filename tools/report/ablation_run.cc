@@ -67,12 +67,13 @@ model::SweepCalibration CalibrationOf(const model::SweepToCalibrate& simulated, 
     return true;
   };
   const calib::Calibration calibration = calib::Calibrate(sweep, options);
-  if (!calibration.image_distance_mm || !calibration.blur_ratio) {
-    return {std::nullopt, calibration.reason};
+  if (!calibration.summary.image_distance_mm || !calibration.summary.blur_ratio) {
+    return {std::nullopt, calibration.summary.reason};
   }
-  return {model::CalibratedValues{calibration.image_distance_mm->value,
-                                  calibration.image_distance_mm->sigma,
-                                  calibration.blur_ratio->value, calibration.blur_ratio->sigma},
+  return {model::CalibratedValues{calibration.summary.image_distance_mm->value,
+                                  calibration.summary.image_distance_mm->sigma,
+                                  calibration.summary.blur_ratio->value,
+                                  calibration.summary.blur_ratio->sigma},
           ""};
 }
 

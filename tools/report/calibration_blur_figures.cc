@@ -107,9 +107,11 @@ void AddModels(const FocusSweep& sweep, const Calibration& calibration,
     plot->series.push_back(Curve("fitted law", Ink::kFit, Stroke::kSolid, curve));
     plot->bands.push_back(ModelBand(*law, curve));
   }
-  if (const auto side = calib::BlurModel::OfSide(sweep, calibration, calibration.nearer))
+  if (const auto side =
+          calib::BlurModel::OfSide(sweep, calibration, calibration.diagnostics.nearer))
     plot->series.push_back(SideCurve("nearer side only", Stroke::kSolid, *side, x_range));
-  if (const auto side = calib::BlurModel::OfSide(sweep, calibration, calibration.farther))
+  if (const auto side =
+          calib::BlurModel::OfSide(sweep, calibration, calibration.diagnostics.farther))
     plot->series.push_back(SideCurve("farther side only", Stroke::kDashed, *side, x_range));
 }
 
@@ -179,7 +181,7 @@ std::vector<ReportFigure> BlurFigures(const FocusSweep& sweep, const Calibration
   x_range = {x_range.first - pad, x_range.second + pad};
   plot.x_axis.range = x_range;
   return {FigureOf({plot}, BlurCaption(law)),
-          ResidualFigure(calibration.blur, std::move(points), abscissa, x_range)};
+          ResidualFigure(calibration.diagnostics.blur, std::move(points), abscissa, x_range)};
 }
 
 ReportFigure ReadingErrorFigure(const FocusSweep& sweep, const Calibration& calibration,

@@ -41,7 +41,7 @@ struct ScalePoints {
 };
 
 ScalePoints ScalePointsOf(const FocusSweep& sweep, const Calibration& calibration) {
-  const calib::ScaleModel& scale = calibration.scale;
+  const calib::ScaleModel& scale = calibration.diagnostics.scale;
   const double sign = model::DirectionSign(sweep.direction);
   ScalePoints points;
   for (const FrameMeasurement& frame : calibration.frames) {
@@ -161,7 +161,7 @@ ReportFigure SharpnessFigure(const Calibration& calibration, const std::vector<R
              PointName(frame, abscissa, "normalised MES per px", frame.normalised_edge_slope));
   }
   plot.series = {std::move(raw), std::move(normalised)};
-  const calib::SharpnessPeak& peak = calibration.sharpness;
+  const calib::SharpnessPeak& peak = calibration.diagnostics.sharpness;
   if (peak.done && abscissa.is_depth && peak.reference_depth_mm > 0) {
     CurvePoints curve;
     for (int i = 0; i <= 100; ++i) {
@@ -174,7 +174,7 @@ ReportFigure SharpnessFigure(const Calibration& calibration, const std::vector<R
   }
   if (abscissa.is_depth) {
     plot.lines = FocusLines(rows);
-    AddNormalisedSharpest(calibration.source, &plot);
+    AddNormalisedSharpest(calibration.diagnostics.paper_recipe, &plot);
   }
   return FigureOf(
       {plot},
@@ -185,7 +185,7 @@ ReportFigure SharpnessFigure(const Calibration& calibration, const std::vector<R
 }
 
 ReportFigure ScaleFigure(const FocusSweep& sweep, const Calibration& calibration) {
-  const calib::ScaleModel& scale = calibration.scale;
+  const calib::ScaleModel& scale = calibration.diagnostics.scale;
   ScalePoints points = ScalePointsOf(sweep, calibration);
   if (points.fitted.x.size() + points.left_out.x.size() < 2) return {};
   if (!scale.done || !(scale.reference_depth_mm > 0))

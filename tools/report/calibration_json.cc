@@ -132,13 +132,16 @@ json ImageJson(const calib::Calibration& calibration, int index) {
 
 json SourceJson(const calib::Calibration& calibration, const std::vector<ResultRow>& rows) {
   json out = {
-      {"done", calibration.source.done},
-      {"message", PrintableUtf8(calibration.source.message)},
-      {"sharpest_image", ImageJson(calibration, calibration.source.sharpest_frame)},
-      {"ratio_frames", Count(calibration.source.done, calibration.source.ratio_frames)},
+      {"done", calibration.diagnostics.paper_recipe.done},
+      {"message", PrintableUtf8(calibration.diagnostics.paper_recipe.message)},
+      {"sharpest_image",
+       ImageJson(calibration, calibration.diagnostics.paper_recipe.sharpest_frame)},
+      {"ratio_frames", Count(calibration.diagnostics.paper_recipe.done,
+                             calibration.diagnostics.paper_recipe.ratio_frames)},
       {"sharpest_normalised_image",
-       ImageJson(calibration, calibration.source.sharpest_normalised_frame)},
-      {"normalised_focus_depth_mm", Measured(calibration.source.normalised_focus_depth_mm)}};
+       ImageJson(calibration, calibration.diagnostics.paper_recipe.sharpest_normalised_frame)},
+      {"normalised_focus_depth_mm",
+       Measured(calibration.diagnostics.paper_recipe.normalised_focus_depth_mm)}};
   for (const ResultRow& row : rows)
     if (row.source || row.key == "image_distance_mm" || row.key == "focus_depth_mm" ||
         row.key == "blur_ratio")
@@ -147,7 +150,7 @@ json SourceJson(const calib::Calibration& calibration, const std::vector<ResultR
 }
 
 json SharpnessPeakJson(const calib::Calibration& calibration, const std::vector<ResultRow>& rows) {
-  const calib::SharpnessPeak& peak = calibration.sharpness;
+  const calib::SharpnessPeak& peak = calibration.diagnostics.sharpness;
   json out = {{"done", peak.done},
               {"message", PrintableUtf8(peak.message)},
               {"frames_used", Count(peak.done, peak.frames_used)}};
@@ -166,7 +169,7 @@ json SharpnessPeakJson(const calib::Calibration& calibration, const std::vector<
 }
 
 json ScaleModelJson(const calib::Calibration& calibration) {
-  const calib::ScaleModel& scale = calibration.scale;
+  const calib::ScaleModel& scale = calibration.diagnostics.scale;
   const bool done = scale.done;
   return {{"done", done},
           {"message", PrintableUtf8(scale.message)},
@@ -181,15 +184,18 @@ json ScaleModelJson(const calib::Calibration& calibration) {
 }
 
 json CovarianceJson(const calib::Calibration& calibration) {
-  if (calibration.covariance_order.empty() || calibration.covariance.size() == 0) return nullptr;
+  if (calibration.diagnostics.covariance_order.empty() ||
+      calibration.diagnostics.covariance.size() == 0)
+    return nullptr;
   json rows = json::array();
-  for (Eigen::Index i = 0; i < calibration.covariance.rows(); ++i) {
+  for (Eigen::Index i = 0; i < calibration.diagnostics.covariance.rows(); ++i) {
     json row = json::array();
-    for (Eigen::Index j = 0; j < calibration.covariance.cols(); ++j)
-      row.push_back(NumberOrNull(calibration.covariance(i, j)));
+    for (Eigen::Index j = 0; j < calibration.diagnostics.covariance.cols(); ++j)
+      row.push_back(NumberOrNull(calibration.diagnostics.covariance(i, j)));
     rows.push_back(std::move(row));
   }
-  return {{"order", TextsJson(calibration.covariance_order)}, {"rows", std::move(rows)}};
+  return {{"order", TextsJson(calibration.diagnostics.covariance_order)},
+          {"rows", std::move(rows)}};
 }
 
 json TruthJson(const std::vector<ResultRow>& rows) {
@@ -297,24 +303,26 @@ json ExamplesJson(const calib::Calibration& calibration) {
 
 // The values of the fit only, without the combined results.
 json FitJson(const calib::Calibration& calibration) {
-  const bool done = calibration.blur.done;
-  return {{"chi2_per_dof", done ? NumberOrNull(calibration.blur.chi2_per_dof) : json(nullptr)},
-          {"undetermined", TextsJson(calibration.blur.undetermined)},
+  const bool done = calibration.diagnostics.blur.done;
+  return {{"chi2_per_dof",
+           done ? NumberOrNull(calibration.diagnostics.blur.chi2_per_dof) : json(nullptr)},
+          {"undetermined", TextsJson(calibration.diagnostics.blur.undetermined)},
           {"covariance", CovarianceJson(calibration)},
-          {"blur_fit", BlurFitJson(calibration.blur)},
+          {"blur_fit", BlurFitJson(calibration.diagnostics.blur)},
           {"sides",
-           {{"nearer", SideJson(calibration.nearer)},
-            {"farther", SideJson(calibration.farther)},
+           {{"nearer", SideJson(calibration.diagnostics.nearer)},
+            {"farther", SideJson(calibration.diagnostics.farther)},
             {"apart_mm", EstimateJson(SidesApartMm(calibration))}}},
-          {"field", FieldJson(calibration.field)},
-          {"channels", ChannelsJson(calibration.channels)},
-          {"systematic_parts", PartsJson(calibration.systematic_parts)},
-          {"advice", TextJson(calibration.advice)},
+          {"field", FieldJson(calibration.diagnostics.field)},
+          {"channels", ChannelsJson(calibration.diagnostics.channels)},
+          {"systematic_parts", PartsJson(calibration.diagnostics.systematic_parts)},
+          {"advice", TextJson(calibration.diagnostics.advice)},
           {"examples", ExamplesJson(calibration)},
-          {"frames_used", calibration.frames_used},
-          {"status", calib::OutcomeName(calibration.outcome)},
-          {"reason",
-           calibration.outcome == calib::Outcome::kOk ? "" : PrintableUtf8(calibration.reason)}};
+          {"frames_used", calibration.summary.frames_used},
+          {"status", calib::OutcomeName(calibration.summary.outcome)},
+          {"reason", calibration.summary.outcome == calib::Outcome::kOk
+                         ? ""
+                         : PrintableUtf8(calibration.summary.reason)}};
 }
 
 json FramesJson(const calib::FocusSweep& sweep, const calib::Calibration& calibration) {
@@ -344,7 +352,7 @@ json CalibrationJson(const calib::FocusSweep& sweep, const calib::Calibration& c
   out["other_methods"] = {{"source", SourceJson(calibration, rows)},
                           {"sharpness_peak", SharpnessPeakJson(calibration, rows)}};
   if (use_source_recipe) {
-    const calib::SourceRecipe& source = calibration.source;
+    const calib::SourceRecipe& source = calibration.diagnostics.paper_recipe;
     out["status"] = source.done ? "ok" : "refused";
     out["reason"] = source.done ? "" : PrintableUtf8(source.message);
     out["frames_used"] = Count(source.done, source.ratio_frames);
@@ -357,15 +365,15 @@ json CalibrationJson(const calib::FocusSweep& sweep, const calib::Calibration& c
   out["method"] = use_source_recipe ? "source" : "fit";
   out["frames"] = FramesJson(sweep, calibration);
   out["frames_rejected"] = RejectedJson(calibration);
-  out["seconds"] = NumberOrNull(calibration.seconds);
+  out["seconds"] = NumberOrNull(calibration.summary.seconds);
   out["camera"] = PrintableUtf8(sweep.camera.name);
   out["assumed_fields"] = TextsJson(model::AssumedFields(sweep.camera));
-  out["warnings"] = TextsJson(calibration.warnings);
+  out["warnings"] = TextsJson(calibration.summary.warnings);
   out["scale_model"] = ScaleModelJson(calibration);
   out["sharpest_reading"] = SharpestJson(calibration);
   out["diagnoses"] = DiagnosesJson(calibration);
-  out["frame_structure"] = StructureJson(calibration.structure);
-  out["magnification"] = MagnificationJson(calibration.magnification);
+  out["frame_structure"] = StructureJson(calibration.diagnostics.structure);
+  out["magnification"] = MagnificationJson(calibration.diagnostics.magnification);
   if (truth != nullptr) out["truth"] = TruthJson(rows);
   return out;
 }

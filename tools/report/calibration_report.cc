@@ -123,19 +123,19 @@ std::string HowItWasMade(const FocusSweep& sweep, const Calibration& calibration
                        ? fmt::format(", with a period of {:.6g} mm", *sweep.target_period_mm)
                        : ""));
   item(fmt::format("thicklens {}, {}; the calibration took {:.1f} s.", origin.version, origin.date,
-                   calibration.seconds));
+                   calibration.summary.seconds));
   for (const std::string& note : origin.notes) item(note);
   html += "</ul>\n";
   return html;
 }
 
 std::string FieldSection(const Calibration& calibration, Figures* figures) {
-  figures->Add(FieldFigure(calibration.field));
+  figures->Add(FieldFigure(calibration.diagnostics.field));
   const std::string content = figures->TakeHtml() + FieldWords(calibration);
   if (!content.empty()) return "<h2>Over the field</h2>\n" + content;
-  if (calibration.field.message == calib::FieldMap().message) return "";
+  if (calibration.diagnostics.field.message == calib::FieldMap().message) return "";
   return fmt::format("<h2>Over the field</h2>\n<p>No map: {}</p>\n",
-                     EscapeXml(calibration.field.message));
+                     EscapeXml(calibration.diagnostics.field.message));
 }
 
 std::string MeasuredSection(const FocusSweep& sweep, const Calibration& calibration,

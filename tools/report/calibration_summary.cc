@@ -95,7 +95,7 @@ void AddLine(const char* about, const std::string& line, std::string* text) {
 }
 
 std::string NormalisedSharpest(const calib::Calibration& calibration) {
-  const calib::SourceRecipe& source = calibration.source;
+  const calib::SourceRecipe& source = calibration.diagnostics.paper_recipe;
   const auto image = ImageOf(calibration, source.sharpest_normalised_frame);
   if (!image || !(source.normalised_focus_depth_mm > 0)) return "";
   return fmt::format("; over mean grey {}, at {:.5g} mm", FrameName(*image),
@@ -105,7 +105,7 @@ std::string NormalisedSharpest(const calib::Calibration& calibration) {
 std::string SecondaryLines(const calib::Calibration& calibration,
                            const std::vector<ResultRow>& rows) {
   std::string text;
-  const calib::SourceRecipe& source = calibration.source;
+  const calib::SourceRecipe& source = calibration.diagnostics.paper_recipe;
   text +=
       source.done
           ? fmt::format("paper's recipe: sharpest frame {}, blur ratio from {} frames{}\n",
@@ -116,12 +116,12 @@ std::string SecondaryLines(const calib::Calibration& calibration,
     if (row.key != "focus_depth_mm") continue;
     if (!row.peak) {
       text += fmt::format("normalised sharpness: no peak, {}\n",
-                          PrintableUtf8(calibration.sharpness.message));
+                          PrintableUtf8(calibration.diagnostics.sharpness.message));
       continue;
     }
     text += fmt::format("normalised sharpness: peak at {} +- {} mm, {} frames",
                         RoundedTo(row.peak->value, row.peak->sigma), RoundedSigma(row.peak->sigma),
-                        calibration.sharpness.frames_used);
+                        calibration.diagnostics.sharpness.frames_used);
     if (row.truth)
       text += fmt::format(", error {} mm",
                           SignedRoundedTo(row.peak->value - *row.truth, row.peak->sigma));
@@ -129,7 +129,7 @@ std::string SecondaryLines(const calib::Calibration& calibration,
   }
   AddLine("sharpest", SharpestLine(calibration), &text);
   AddLine("focus", FocusReadingLine(calibration), &text);
-  const calib::ScaleModel& scale = calibration.scale;
+  const calib::ScaleModel& scale = calibration.diagnostics.scale;
   if (!scale.done) AddLine("image scale", ScaleChangeLine(scale), &text);
   text +=
       scale.done
@@ -139,7 +139,7 @@ std::string SecondaryLines(const calib::Calibration& calibration,
                 RoundedTo(scale.offset_mm.value, scale.offset_mm.sigma),
                 RoundedSigma(scale.offset_mm.sigma), scale.reading_rms_mm, scale.frames_used)
           : fmt::format("image scale: no model, {}\n", PrintableUtf8(scale.message));
-  const calib::BlurFit& blur = calibration.blur;
+  const calib::BlurFit& blur = calibration.diagnostics.blur;
   AddLine("image scale", DistortionLine(scale), &text);
   AddLine("magnification", MagnificationLine(calibration), &text);
   text += blur.done ? fmt::format("blur fit: chi2/dof {:.2f}, {} frames{}\n", blur.chi2_per_dof,
@@ -156,22 +156,23 @@ std::string SecondaryLines(const calib::Calibration& calibration,
 // The additional findings of the frames: shape of the blur, sides, field, colours.
 std::string DetailLines(const calib::FocusSweep& sweep, const calib::Calibration& calibration) {
   std::string text;
-  AddLine("blur shape", ShapeLine(sweep, calibration.blur), &text);
-  if (calibration.nearer.done || calibration.farther.done)
+  AddLine("blur shape", ShapeLine(sweep, calibration.diagnostics.blur), &text);
+  if (calibration.diagnostics.nearer.done || calibration.diagnostics.farther.done)
     AddLine("sides of focus", SidesLine(calibration), &text);
-  for (const std::string& line : FieldLines(calibration.field)) AddLine("field", line, &text);
-  if (!calibration.field.done && calibration.field.message != kNotRun)
-    AddLine("field", "no map, " + calibration.field.message, &text);
-  AddLine("colours", ChannelLine(calibration.channels), &text);
-  const std::vector<calib::SystematicPart>& parts = calibration.systematic_parts;
+  for (const std::string& line : FieldLines(calibration.diagnostics.field))
+    AddLine("field", line, &text);
+  if (!calibration.diagnostics.field.done && calibration.diagnostics.field.message != kNotRun)
+    AddLine("field", "no map, " + calibration.diagnostics.field.message, &text);
+  AddLine("colours", ChannelLine(calibration.diagnostics.channels), &text);
+  const std::vector<calib::SystematicPart>& parts = calibration.diagnostics.systematic_parts;
   for (std::size_t i = 0; i < std::min(parts.size(), kReportedParts); ++i)
     AddLine("systematic",
             fmt::format("{}: zf {} mm, d1 {} mm, kappa {}", parts[i].name,
                         PartRange(parts[i].focus_depth_mm), PartRange(parts[i].image_distance_mm),
                         PartRange(parts[i].blur_ratio)),
             &text);
-  AddLine("advice", calibration.advice, &text);
-  if (calibration.outcome == calib::Outcome::kRefused)
+  AddLine("advice", calibration.diagnostics.advice, &text);
+  if (calibration.summary.outcome == calib::Outcome::kRefused)
     for (const std::string& line : DiagnosisLines(calibration)) AddLine("compared", line, &text);
   return text;
 }
@@ -181,21 +182,32 @@ std::string DetailLines(const calib::FocusSweep& sweep, const calib::Calibration
 std::vector<ResultRow> ResultRows(const calib::Calibration& calibration,
                                   const model::SweepTruth* truth) {
   std::vector<ResultRow> rows(5);
-  rows[0] = {
-      "image_distance_mm", "image distance d1", "mm", calibration.image_distance_mm, {}, {}, {}};
-  rows[1] = {
-      "focus_depth_mm", "in-focus distance zf", "mm", calibration.focus_depth_mm, {}, {}, {}};
-  rows[2] = {"blur_ratio", "blur ratio kappa", "", calibration.blur_ratio, {}, {}, {}};
-  rows[3] = {"blur_floor_px", "blur floor", "px", calibration.blur_floor_px, {}, {}, {}};
-  rows[4] = {"bench_offset_mm", "bench offset", "mm", calibration.bench_offset_mm, {}, {}, {}};
-  if (calibration.source.done) {
-    rows[0].source = calibration.source.image_distance_mm;
-    rows[1].source = calibration.source.focus_depth_mm;
-    rows[2].source = calibration.source.blur_ratio;
+  rows[0] = {"image_distance_mm",
+             "image distance d1",
+             "mm",
+             calibration.summary.image_distance_mm,
+             {},
+             {},
+             {}};
+  rows[1] = {"focus_depth_mm",
+             "in-focus distance zf",
+             "mm",
+             calibration.summary.focus_depth_mm,
+             {},
+             {},
+             {}};
+  rows[2] = {"blur_ratio", "blur ratio kappa", "", calibration.summary.blur_ratio, {}, {}, {}};
+  rows[3] = {"blur_floor_px", "blur floor", "px", calibration.summary.blur_floor_px, {}, {}, {}};
+  rows[4] = {
+      "bench_offset_mm", "bench offset", "mm", calibration.summary.bench_offset_mm, {}, {}, {}};
+  if (calibration.diagnostics.paper_recipe.done) {
+    rows[0].source = calibration.diagnostics.paper_recipe.image_distance_mm;
+    rows[1].source = calibration.diagnostics.paper_recipe.focus_depth_mm;
+    rows[2].source = calibration.diagnostics.paper_recipe.blur_ratio;
   }
-  if (calibration.sharpness.done)
-    rows[1].peak = calib::Result{calibration.sharpness.focus_depth_mm,
-                                 calibration.sharpness.sigma_mm, std::nullopt};
+  if (calibration.diagnostics.sharpness.done)
+    rows[1].peak = calib::Result{calibration.diagnostics.sharpness.focus_depth_mm,
+                                 calibration.diagnostics.sharpness.sigma_mm, std::nullopt};
   if (truth != nullptr) {
     rows[0].truth = truth->image_distance_mm;
     rows[1].truth = truth->focus_depth_mm;
@@ -219,7 +231,7 @@ std::string CalibrationText(const calib::FocusSweep& sweep, const calib::Calibra
                     [](const calib::FrameMeasurement& frame) { return !frame.rejection.empty(); });
   std::string text =
       fmt::format("camera {}, {} frames: {} used, {} rejected\n", PrintableUtf8(sweep.camera.name),
-                  sweep.frames.size(), calibration.frames_used, rejected);
+                  sweep.frames.size(), calibration.summary.frames_used, rejected);
   const auto not_in_fit =
       std::count_if(calibration.frames.begin(), calibration.frames.end(),
                     [](const calib::FrameMeasurement& frame) { return !frame.not_in_fit.empty(); });
@@ -234,13 +246,13 @@ std::string CalibrationText(const calib::FocusSweep& sweep, const calib::Calibra
                   [](const ResultRow& row) { return row.fit || row.source || row.peak; }))
     text += ResultTable(rows, truth != nullptr) + '\n';
   text += SecondaryLines(calibration, rows) + DetailLines(sweep, calibration);
-  for (const std::string& warning : calibration.warnings)
+  for (const std::string& warning : calibration.summary.warnings)
     text += fmt::format("warning: {}\n", PrintableUtf8(warning));
-  text += calibration.outcome == calib::Outcome::kOk
-              ? fmt::format("{}", calib::OutcomeName(calibration.outcome))
-              : fmt::format("{}: {}", calib::OutcomeName(calibration.outcome),
-                            PrintableUtf8(calibration.reason));
-  text += fmt::format(" ({:.1f} s)\n", calibration.seconds);
+  text += calibration.summary.outcome == calib::Outcome::kOk
+              ? fmt::format("{}", calib::OutcomeName(calibration.summary.outcome))
+              : fmt::format("{}: {}", calib::OutcomeName(calibration.summary.outcome),
+                            PrintableUtf8(calibration.summary.reason));
+  text += fmt::format(" ({:.1f} s)\n", calibration.summary.seconds);
   return text;
 }
 

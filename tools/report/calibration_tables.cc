@@ -93,7 +93,7 @@ Way SideWay(const std::string& name, const calib::SideFit& side) {
 
 std::vector<Way> OtherWays(const Calibration& calibration) {
   std::vector<Way> ways;
-  const calib::SourceRecipe& source = calibration.source;
+  const calib::SourceRecipe& source = calibration.diagnostics.paper_recipe;
   Way raw{"sharpest frame, raw (paper's recipe)", source.done, source.message, {}, {}};
   if (source.done) {
     raw.remark = fmt::format("{}; κ from {} frames",
@@ -108,16 +108,16 @@ std::vector<Way> OtherWays(const Calibration& calibration) {
                     NameOfFrame(calibration, source.sharpest_normalised_frame),
                     model::Estimate{source.normalised_focus_depth_mm, 0},
                     {}});
-  const calib::SharpnessPeak& peak = calibration.sharpness;
+  const calib::SharpnessPeak& peak = calibration.diagnostics.sharpness;
   Way parabola{"peak of the normalised sharpness", peak.done, peak.message, {}, {}};
   if (peak.done) {
     parabola.remark = fmt::format("log-parabola through {} frames", peak.frames_used);
     parabola.focus_depth_mm = model::Estimate{peak.focus_depth_mm, peak.sigma_mm};
   }
   ways.push_back(parabola);
-  ways.push_back(SideWay("blur, nearer side only", calibration.nearer));
-  ways.push_back(SideWay("blur, farther side only", calibration.farther));
-  for (const calib::ChannelFocus& channel : calibration.channels) {
+  ways.push_back(SideWay("blur, nearer side only", calibration.diagnostics.nearer));
+  ways.push_back(SideWay("blur, farther side only", calibration.diagnostics.farther));
+  for (const calib::ChannelFocus& channel : calibration.diagnostics.channels) {
     Way way{
         fmt::format("blur, {} channel only", channel.name), channel.done, channel.message, {}, {}};
     if (channel.done) {
@@ -213,13 +213,13 @@ std::string ResultsSection(const std::vector<ResultRow>& rows, bool has_truth) {
 
 std::string SystematicSection(const FocusSweep& sweep, const Calibration& calibration,
                               bool has_truth) {
-  if (calibration.systematic_parts.empty()) return "";
+  if (calibration.diagnostics.systematic_parts.empty()) return "";
   const std::string missing = has_truth ? "" : MissingTolerancesLine(sweep.camera);
   std::string html =
       "<h2>Where the systematic error comes from</h2>\n" +
       TableBegin(
           {{"cause", false}, {"zf [mm]"}, {"d1 [mm]"}, {"κ"}, {"what would reduce it", false}});
-  for (const calib::SystematicPart& part : calibration.systematic_parts) {
+  for (const calib::SystematicPart& part : calibration.diagnostics.systematic_parts) {
     html += RowHead(part.name);
     for (const Eigen::Vector2d& range :
          {part.focus_depth_mm, part.image_distance_mm, part.blur_ratio})
@@ -250,15 +250,16 @@ std::string OtherWaysSection(const Calibration& calibration, const std::vector<R
              ApartCell(way.focus_depth_mm, zf) + EstimateCell(way.blur_ratio, SigmaOf(kappa)) +
              TableCell(way.remark, "soft") + "</tr>\n";
   }
-  say("model of the image scale", calibration.scale.done, calibration.scale.message);
-  say("blur fit", calibration.blur.done, calibration.blur.message);
+  say("model of the image scale", calibration.diagnostics.scale.done,
+      calibration.diagnostics.scale.message);
+  say("blur fit", calibration.diagnostics.blur.done, calibration.diagnostics.blur.message);
   std::string html;
   if (!table.empty())
     html +=
         TableBegin({{"method", false}, {"zf [mm]"}, {"from the fit [mm]"}, {"κ"}, {"", false}}) +
         table + kTableEnd;
   for (const std::string& line :
-       {MagnificationLine(calibration), DistortionLine(calibration.scale)})
+       {MagnificationLine(calibration), DistortionLine(calibration.diagnostics.scale)})
     if (!line.empty())
       html += fmt::format("<p class=\"soft\">From the image scale: {}.</p>\n",
                           EscapeXml(Typeset(line)));
@@ -271,21 +272,23 @@ std::string FieldWords(const Calibration& calibration) {
   const auto item = [&](const std::string& text) {
     items += fmt::format("<li>{}</li>\n", EscapeXml(Typeset(text)));
   };
-  for (const std::string& line : FieldLines(calibration.field)) item(line);
-  if (!calibration.channels.empty()) item("colours: " + ChannelLine(calibration.channels));
+  for (const std::string& line : FieldLines(calibration.diagnostics.field)) item(line);
+  if (!calibration.diagnostics.channels.empty())
+    item("colours: " + ChannelLine(calibration.diagnostics.channels));
   return items.empty() ? "" : "<ul>\n" + items + "</ul>\n";
 }
 
 std::string CorrelationSection(const Calibration& calibration) {
-  const Eigen::MatrixXd& covariance = calibration.covariance;
-  const auto count = static_cast<Eigen::Index>(calibration.covariance_order.size());
+  const Eigen::MatrixXd& covariance = calibration.diagnostics.covariance;
+  const auto count = static_cast<Eigen::Index>(calibration.diagnostics.covariance_order.size());
   if (count == 0 || covariance.rows() != count || covariance.cols() != count) return "";
   std::vector<TableColumn> columns = {{"correlation", false}};
-  for (const std::string& name : calibration.covariance_order) columns.push_back({name.c_str()});
+  for (const std::string& name : calibration.diagnostics.covariance_order)
+    columns.push_back({name.c_str()});
   columns.push_back({"standard deviation"});
   std::string html = "<h2>Covariance of the fit</h2>\n" + TableBegin(columns);
   for (Eigen::Index i = 0; i < count; ++i) {
-    html += RowHead(calibration.covariance_order[static_cast<std::size_t>(i)]);
+    html += RowHead(calibration.diagnostics.covariance_order[static_cast<std::size_t>(i)]);
     for (Eigen::Index j = 0; j < count; ++j) {
       const double scale = std::sqrt(covariance(i, i) * covariance(j, j));
       html += TableCell(scale > 0 ? fmt::format("{:+.3f}", covariance(i, j) / scale) : kNone);

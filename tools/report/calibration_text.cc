@@ -105,8 +105,8 @@ std::string ChannelLine(const std::vector<calib::ChannelFocus>& channels) {
 // The sides share no frame, so their errors are independent except for the bench zero, which shifts
 // both alike: the hypotenuse is the upper bound.
 std::optional<Estimate> SidesApartMm(const calib::Calibration& calibration) {
-  const calib::SideFit& nearer = calibration.nearer;
-  const calib::SideFit& farther = calibration.farther;
+  const calib::SideFit& nearer = calibration.diagnostics.nearer;
+  const calib::SideFit& farther = calibration.diagnostics.farther;
   if (!nearer.done || !farther.done) return std::nullopt;
   return Estimate{farther.focus_depth_mm.value - nearer.focus_depth_mm.value,
                   std::hypot(nearer.focus_depth_mm.sigma, farther.focus_depth_mm.sigma)};
@@ -119,7 +119,8 @@ std::string SidesLine(const calib::Calibration& calibration) {
                              WithError(fit.focus_depth_mm.value, fit.focus_depth_mm.sigma, "mm"))
                : fmt::format("{} side none, {}", name, fit.message);
   };
-  std::string line = side("near", calibration.nearer) + "; " + side("far", calibration.farther);
+  std::string line = side("near", calibration.diagnostics.nearer) + "; " +
+                     side("far", calibration.diagnostics.farther);
   if (const auto apart = SidesApartMm(calibration))
     line += fmt::format("; apart {}", Signed(*apart, "mm"));
   return line;
@@ -139,14 +140,15 @@ std::string ShapeLine(const calib::FocusSweep& sweep, const calib::BlurFit& blur
 }
 
 std::string MagnificationLine(const calib::Calibration& calibration) {
-  if (!calibration.magnification) return "";
-  const calib::MagnificationCheck& check = *calibration.magnification;
+  if (!calibration.diagnostics.magnification) return "";
+  const calib::MagnificationCheck& check = *calibration.diagnostics.magnification;
   const Estimate& d1 = check.image_distance_mm;
   std::string line =
       fmt::format("the target's period of {:.6g} mm is {:.5g} px in the image: d1 = {}",
                   check.period_mm, check.period_px, WithError(d1.value, d1.sigma, "mm"));
-  if (calibration.image_distance_mm && std::isfinite(calibration.image_distance_mm->value)) {
-    const double apart = d1.value / calibration.image_distance_mm->value - 1;
+  if (calibration.summary.image_distance_mm &&
+      std::isfinite(calibration.summary.image_distance_mm->value)) {
+    const double apart = d1.value / calibration.summary.image_distance_mm->value - 1;
     line += fmt::format(", {:+.2f} % from that of the focus fit", 100 * apart);
   }
   return line;

@@ -24,32 +24,34 @@ std::string Paragraph(const std::string& text) {
 
 std::string FoundInWords(const Calibration& calibration) {
   std::vector<std::string> found;
-  if (calibration.image_distance_mm)
-    found.push_back(
-        fmt::format("image distance d1 = {} mm", WithSigma(*calibration.image_distance_mm)));
-  if (calibration.focus_depth_mm)
-    found.push_back(
-        fmt::format("in-focus distance zf = {} mm", WithSigma(*calibration.focus_depth_mm)));
-  if (calibration.blur_ratio)
-    found.push_back(fmt::format("blur ratio κ = {}", WithSigma(*calibration.blur_ratio)));
+  if (calibration.summary.image_distance_mm)
+    found.push_back(fmt::format("image distance d1 = {} mm",
+                                WithSigma(*calibration.summary.image_distance_mm)));
+  if (calibration.summary.focus_depth_mm)
+    found.push_back(fmt::format("in-focus distance zf = {} mm",
+                                WithSigma(*calibration.summary.focus_depth_mm)));
+  if (calibration.summary.blur_ratio)
+    found.push_back(fmt::format("blur ratio κ = {}", WithSigma(*calibration.summary.blur_ratio)));
   if (found.empty()) return "";
   return fmt::format("Found: {}, from {} of {} frames{}.", fmt::join(found, ", "),
-                     calibration.frames_used, calibration.frames.size(),
-                     calibration.blur.done ? fmt::format(", χ²/dof {:.2f} (1 is expected)",
-                                                         calibration.blur.chi2_per_dof)
-                                           : "");
+                     calibration.summary.frames_used, calibration.frames.size(),
+                     calibration.diagnostics.blur.done
+                         ? fmt::format(", χ²/dof {:.2f} (1 is expected)",
+                                       calibration.diagnostics.blur.chi2_per_dof)
+                         : "");
 }
 
 // Describes what limits the accuracy of the in-focus distance, noise or the systematic interval,
 // and what would help, unless the calibration itself gives advice.
 std::string LimitInWords(const FocusSweep& sweep, const Calibration& calibration) {
-  if (!calibration.focus_depth_mm) return "";
-  const calib::Result& focus = *calibration.focus_depth_mm;
+  if (!calibration.summary.focus_depth_mm) return "";
+  const calib::Result& focus = *calibration.summary.focus_depth_mm;
   if (!focus.systematic || !focus.systematic->allFinite() || !(focus.sigma > 0)) return "";
   const double half_mm =
       std::max(focus.systematic->y() - focus.value, focus.value - focus.systematic->x());
-  const bool zero_dominates = calibration.bench_offset_mm &&
-                              calibration.bench_offset_mm->sigma > kDominantShare * focus.sigma;
+  const bool zero_dominates =
+      calibration.summary.bench_offset_mm &&
+      calibration.summary.bench_offset_mm->sigma > kDominantShare * focus.sigma;
   const std::string numbers = fmt::format(
       "{} an uncertainty of ±{} mm in the in-focus distance, the systematic interval one of up to "
       "{:.2g} mm.",
@@ -69,7 +71,7 @@ std::string LimitInWords(const FocusSweep& sweep, const Calibration& calibration
     text = zero_dominates ? "Bench zero and systematic errors contribute alike: "
                           : "Noise and systematic errors contribute alike: ";
   }
-  return text + numbers + (calibration.advice.empty() ? help : "");
+  return text + numbers + (calibration.diagnostics.advice.empty() ? help : "");
 }
 
 // Describes what does not depend on the bench zero or the camera: most users want to know it first,
@@ -79,24 +81,25 @@ std::string DeterminedInWords(const Calibration& calibration) {
   const auto add = [&html](const std::string& about, const std::string& line) {
     if (!line.empty()) html += Paragraph(Typeset(AsSentence(about + line)));
   };
-  if (calibration.sharpest.done) add("The sweep is sharpest at the ", SharpestLine(calibration));
+  if (calibration.diagnostics.sharpest.done)
+    add("The sweep is sharpest at the ", SharpestLine(calibration));
   add("Focus lies at the ", FocusReadingLine(calibration));
-  if (calibration.outcome != calib::Outcome::kRefused) return html;
-  add("", ScaleChangeLine(calibration.scale));
-  add("", fmt::format("{} of {} frames can be used", calibration.frames_used,
+  if (calibration.summary.outcome != calib::Outcome::kRefused) return html;
+  add("", ScaleChangeLine(calibration.diagnostics.scale));
+  add("", fmt::format("{} of {} frames can be used", calibration.summary.frames_used,
                       calibration.frames.size()));
   for (const std::string& line : DiagnosisLines(calibration)) add("Compared: ", line);
   return html;
 }
 
 std::string Outcome(const Calibration& calibration, std::string* css_class) {
-  if (calibration.outcome == calib::Outcome::kOk) {
+  if (calibration.summary.outcome == calib::Outcome::kOk) {
     *css_class = "ok";
     return "Calibrated";
   }
-  const bool partial = calibration.outcome == calib::Outcome::kPartial;
+  const bool partial = calibration.summary.outcome == calib::Outcome::kPartial;
   *css_class = partial ? "partial" : "refused";
-  return (partial ? "Partly calibrated: " : "Refused: ") + calibration.reason;
+  return (partial ? "Partly calibrated: " : "Refused: ") + calibration.summary.reason;
 }
 
 }  // namespace
@@ -113,13 +116,13 @@ std::string VerdictSection(const FocusSweep& sweep, const Calibration& calibrati
   const std::string outcome = Outcome(calibration, &css_class);
   std::string html = fmt::format("<div class=\"verdict {}\">\n<p class=\"outcome\">{}</p>\n",
                                  css_class, EscapeXml(Typeset(outcome)));
-  if (!calibration.advice.empty())
+  if (!calibration.diagnostics.advice.empty())
     html += fmt::format("<p><b>What to do next:</b> {}</p>\n",
-                        EscapeXml(Typeset(AsSentence(calibration.advice))));
+                        EscapeXml(Typeset(AsSentence(calibration.diagnostics.advice))));
   html += Paragraph(FoundInWords(calibration));
   html += DeterminedInWords(calibration);
   html += Paragraph(LimitInWords(sweep, calibration));
-  const calib::BlurFit& blur = calibration.blur;
+  const calib::BlurFit& blur = calibration.diagnostics.blur;
   html += Paragraph(AsSentence(OutsideLine(blur)));
   if (!blur.undetermined.empty())
     html +=
@@ -127,9 +130,9 @@ std::string VerdictSection(const FocusSweep& sweep, const Calibration& calibrati
   html += Paragraph(AsSentence(WorstKnownLine(blur)));
   html += Paragraph(AsSentence(Typeset(ShapeLine(sweep, blur))));
   html += "</div>\n";
-  if (calibration.warnings.empty()) return html;
+  if (calibration.summary.warnings.empty()) return html;
   html += "<ul class=\"warnings\">\n";
-  for (const std::string& warning : calibration.warnings)
+  for (const std::string& warning : calibration.summary.warnings)
     html += fmt::format("<li>{}</li>\n", EscapeXml(Typeset(warning)));
   return html + "</ul>\n";
 }

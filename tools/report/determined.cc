@@ -25,7 +25,7 @@ nlohmann::json ErrorJson(const std::optional<model::Estimate>& estimate) {
 }
 
 std::string SharpestImage(const calib::Calibration& calibration) {
-  const int index = calibration.sharpest.sharpest_frame;
+  const int index = calibration.diagnostics.sharpest.sharpest_frame;
   if (index < 0 || index >= static_cast<int>(calibration.frames.size())) return "";
   return calibration.frames[static_cast<std::size_t>(index)].image;
 }
@@ -33,7 +33,7 @@ std::string SharpestImage(const calib::Calibration& calibration) {
 }  // namespace
 
 std::string SharpestLine(const calib::Calibration& calibration) {
-  const calib::SharpestReading& sharpest = calibration.sharpest;
+  const calib::SharpestReading& sharpest = calibration.diagnostics.sharpest;
   if (!sharpest.done && sharpest.message == calib::SharpestReading().message) return "";
   const std::string image = SharpestImage(calibration);
   const std::string frame =
@@ -45,10 +45,10 @@ std::string SharpestLine(const calib::Calibration& calibration) {
 }
 
 std::string FocusReadingLine(const calib::Calibration& calibration) {
-  if (!calibration.focus_reading_mm) return "";
-  return fmt::format(
-      "reading {}, from the blur, without the error of the bench zero",
-      WithError(calibration.focus_reading_mm->value, calibration.focus_reading_mm->sigma, "mm"));
+  if (!calibration.diagnostics.focus_reading_mm) return "";
+  return fmt::format("reading {}, from the blur, without the error of the bench zero",
+                     WithError(calibration.diagnostics.focus_reading_mm->value,
+                               calibration.diagnostics.focus_reading_mm->sigma, "mm"));
 }
 
 std::string ScaleChangeLine(const calib::ScaleModel& scale) {
@@ -64,7 +64,7 @@ std::string ScaleChangeLine(const calib::ScaleModel& scale) {
 
 std::vector<std::string> DiagnosisLines(const calib::Calibration& calibration) {
   std::vector<std::string> lines;
-  for (const calib::Diagnosis& diagnosis : calibration.diagnoses) {
+  for (const calib::Diagnosis& diagnosis : calibration.diagnostics.diagnoses) {
     std::vector<std::string> causes;
     for (std::size_t i = 0; i < std::min(diagnosis.causes.size(), kReportedCauses); ++i)
       causes.push_back(fmt::format("{} (chi2 {:.3g}{})", diagnosis.causes[i].cause,
@@ -76,7 +76,7 @@ std::vector<std::string> DiagnosisLines(const calib::Calibration& calibration) {
 }
 
 nlohmann::json SharpestJson(const calib::Calibration& calibration) {
-  const calib::SharpestReading& sharpest = calibration.sharpest;
+  const calib::SharpestReading& sharpest = calibration.diagnostics.sharpest;
   nlohmann::json out = {{"done", sharpest.done}, {"message", PrintableUtf8(sharpest.message)}};
   out["reading_mm"] = sharpest.done ? ErrorJson(sharpest.reading_mm) : nlohmann::json(nullptr);
   out["frames_used"] =
@@ -84,13 +84,13 @@ nlohmann::json SharpestJson(const calib::Calibration& calibration) {
   const std::string image = SharpestImage(calibration);
   out["sharpest_image"] =
       image.empty() ? nlohmann::json(nullptr) : nlohmann::json(PrintableUtf8(image));
-  out["focus_by_blur_mm"] = ErrorJson(calibration.focus_reading_mm);
+  out["focus_by_blur_mm"] = ErrorJson(calibration.diagnostics.focus_reading_mm);
   return out;
 }
 
 nlohmann::json DiagnosesJson(const calib::Calibration& calibration) {
   nlohmann::json out = nlohmann::json::array();
-  for (const calib::Diagnosis& diagnosis : calibration.diagnoses) {
+  for (const calib::Diagnosis& diagnosis : calibration.diagnostics.diagnoses) {
     nlohmann::json causes = nlohmann::json::array();
     for (std::size_t i = 0; i < diagnosis.causes.size(); ++i)
       causes.push_back({{"cause", PrintableUtf8(diagnosis.causes[i].cause)},

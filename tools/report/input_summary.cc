@@ -11,17 +11,19 @@
 #include "thicklens/base/error.h"
 #include "thicklens/base/printable_text.h"
 #include "thicklens/calib/calibrate.h"
+#include "thicklens/calib/focus_sweep.h"
+#include "thicklens/opencv.h"
 
 namespace thicklens::tools {
 namespace {
 
 // Returns the depths of the nearest and the farthest frame, if the offset is known.
-std::optional<std::pair<double, double>> DepthRangeMm(const SweepInput& input,
+std::optional<std::pair<double, double>> DepthRangeMm(const Sweep& sweep,
                                                       const Understanding& found) {
-  if (!input.sweep.offset_mm) return std::nullopt;
-  const double sign = model::DirectionSign(input.sweep.direction);
-  return std::minmax(input.sweep.offset_mm->value + sign * found.min_reading_mm,
-                     input.sweep.offset_mm->value + sign * found.max_reading_mm);
+  if (!sweep.description.offset_mm) return std::nullopt;
+  const double sign = model::DirectionSign(sweep.description.direction);
+  return std::minmax(sweep.description.offset_mm->value + sign * found.min_reading_mm,
+                     sweep.description.offset_mm->value + sign * found.max_reading_mm);
 }
 
 std::string EstimateText(const std::optional<model::Estimate>& estimate, const char* unit) {
@@ -47,30 +49,31 @@ std::string CameraText(const model::Camera& camera) {
       model::PsfName(camera.psf));
 }
 
-std::string BenchText(const SweepInput& input, const Understanding& found) {
-  const auto depths = DepthRangeMm(input, found);
+std::string BenchText(const Sweep& sweep, const Understanding& found) {
+  const auto depths = DepthRangeMm(sweep, found);
   return fmt::format(
       "readings   {:.6g} to {:.6g} mm, {} distinct, step {:.4g} mm (median), sigma {:.3g} mm\n"
       "bench      direction {}, offset {}\n"
       "depths     {}\n",
       found.min_reading_mm, found.max_reading_mm, found.distinct_readings, found.median_step_mm,
-      input.sweep.reading_sigma_mm, model::BenchDirectionName(input.sweep.direction),
-      EstimateText(input.sweep.offset_mm, "mm"),
+      sweep.description.reading_sigma_mm, model::BenchDirectionName(sweep.description.direction),
+      EstimateText(sweep.description.offset_mm, "mm"),
       depths ? fmt::format("{:.6g} to {:.6g} mm from the aperture", depths->first, depths->second)
              : "unknown until the offset is estimated from the image scale");
 }
 
 }  // namespace
 
-Understanding Understand(const SweepInput& input) {
+Understanding Understand(const Sweep& sweep) {
+  const calib::FocusSweep focus_sweep = FocusSweepOf(sweep);
   std::string why;
-  if (!input.sweep.IsValid(&why)) throw Error(fmt::format("{}: {}", input.file.source, why));
-  if (!calib::HasEnoughFrames(input.sweep, &why))
-    throw Error(fmt::format("{}: {}", input.file.source, why));
-  const cv::Mat first = input.sweep.read_frame(0);
-  calib::LinearGrey(first, input.sweep, 0);
+  if (!focus_sweep.IsValid(&why)) throw Error(fmt::format("{}: {}", sweep.description.source, why));
+  if (!calib::HasEnoughFrames(focus_sweep, &why))
+    throw Error(fmt::format("{}: {}", sweep.description.source, why));
+  const cv::Mat first = focus_sweep.read_frame(0);
+  calib::LinearGrey(first, focus_sweep, 0);
   std::set<double> readings;
-  for (const model::SweepFrame& frame : input.sweep.frames) readings.insert(frame.reading_mm);
+  for (const model::SweepFrame& frame : sweep.description.frames) readings.insert(frame.reading_mm);
   std::multiset<double> steps;
   for (auto reading = std::next(readings.begin()); reading != readings.end(); ++reading)
     steps.insert(*reading - *std::prev(reading));
@@ -81,9 +84,9 @@ Understanding Understand(const SweepInput& input) {
       readings.size()};
 }
 
-std::string UnderstandingText(const SweepInput& input, const Understanding& found,
+std::string UnderstandingText(const Sweep& sweep, const Understanding& found,
                               const std::string& method, const std::string& outputs) {
-  const model::RegionOfInterest& roi = input.sweep.roi;
+  const model::RegionOfInterest& roi = sweep.description.roi;
   return fmt::format(
       "frames     {}, the first {} x {} px, {} bit, {} channel{}\n{}{}"
       "region     {}\n"
@@ -91,22 +94,23 @@ std::string UnderstandingText(const SweepInput& input, const Understanding& foun
       "method     {}\n"
       "output     {}\n"
       "dry run: nothing was measured\n",
-      input.sweep.frames.size(), found.frame_size_px.width, found.frame_size_px.height,
+      sweep.description.frames.size(), found.frame_size_px.width, found.frame_size_px.height,
       found.frame_bits, found.frame_channels, found.frame_channels == 1 ? "" : "s",
-      BenchText(input, found), CameraText(input.sweep.camera),
+      BenchText(sweep, found), CameraText(sweep.camera),
       roi.width > 0 ? fmt::format("{} x {} px from ({}, {})", roi.width, roi.height, roi.x, roi.y)
                     : "the whole field",
-      model::SweepTargetName(input.sweep.target), FloorText(input.sweep.floor), method, outputs);
+      model::SweepTargetName(sweep.description.target), FloorText(sweep.description.floor), method,
+      outputs);
 }
 
-nlohmann::json UnderstandingJson(const SweepInput& input, const Understanding& found,
+nlohmann::json UnderstandingJson(const Sweep& sweep, const Understanding& found,
                                  const std::string& method) {
   nlohmann::json json = {{"status", "ok"},
                          {"reason", ""},
                          {"dry_run", true},
                          {"method", method},
-                         {"camera", input.sweep.camera.name},
-                         {"frames", input.sweep.frames.size()},
+                         {"camera", sweep.camera.name},
+                         {"frames", sweep.description.frames.size()},
                          {"width_px", found.frame_size_px.width},
                          {"height_px", found.frame_size_px.height},
                          {"bits", found.frame_bits},
@@ -115,16 +119,16 @@ nlohmann::json UnderstandingJson(const SweepInput& input, const Understanding& f
                          {"max_reading_mm", found.max_reading_mm},
                          {"median_step_mm", found.median_step_mm},
                          {"distinct_readings", found.distinct_readings},
-                         {"reading_sigma_mm", input.sweep.reading_sigma_mm},
-                         {"direction", model::BenchDirectionName(input.sweep.direction)},
-                         {"target", model::SweepTargetName(input.sweep.target)},
+                         {"reading_sigma_mm", sweep.description.reading_sigma_mm},
+                         {"direction", model::BenchDirectionName(sweep.description.direction)},
+                         {"target", model::SweepTargetName(sweep.description.target)},
                          {"offset_mm", nullptr},
                          {"depth_range_mm", nullptr}};
-  if (input.sweep.offset_mm) {
-    json["offset_mm"] = {{"value", input.sweep.offset_mm->value},
-                         {"sigma", input.sweep.offset_mm->sigma}};
+  if (sweep.description.offset_mm) {
+    json["offset_mm"] = {{"value", sweep.description.offset_mm->value},
+                         {"sigma", sweep.description.offset_mm->sigma}};
   }
-  if (const auto depths = DepthRangeMm(input, found))
+  if (const auto depths = DepthRangeMm(sweep, found))
     json["depth_range_mm"] = {depths->first, depths->second};
   return json;
 }

@@ -6,7 +6,7 @@
 #include <opencv2/core/types.hpp>
 #include <string>
 
-#include "tools/options/sweep_input.h"
+#include "thicklens/sweep.h"
 
 namespace thicklens::tools {
 
@@ -20,12 +20,12 @@ struct Understanding {
 
 // Opens only the first frame, so that a large sweep takes no longer. Throws Error for everything
 // that would stop the calibration.
-Understanding Understand(const SweepInput& input);
+Understanding Understand(const Sweep& sweep);
 
 // Returns the text of a dry run. `outputs` names the files that a run would write.
-std::string UnderstandingText(const SweepInput& input, const Understanding& found,
+std::string UnderstandingText(const Sweep& sweep, const Understanding& found,
                               const std::string& method, const std::string& outputs);
-nlohmann::json UnderstandingJson(const SweepInput& input, const Understanding& found,
+nlohmann::json UnderstandingJson(const Sweep& sweep, const Understanding& found,
                                  const std::string& method);
 
 }  // namespace thicklens::tools

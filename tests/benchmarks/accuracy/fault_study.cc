@@ -82,22 +82,22 @@ Row RunOne(const std::string& case_name, const Damage& damage, const TrialSettin
   how.map_field = settings.map_field;
   const calib::Calibration c = Calibrate(simulated.sweep, how);
   Row row;
-  row.outcome = OutcomeName(c.outcome);
-  row.first_warning = c.outcome == calib::Outcome::kRefused ? c.reason
-                      : c.warnings.empty()                  ? ""
-                                                            : c.warnings.front();
+  row.outcome = OutcomeName(c.summary.outcome);
+  row.first_warning = c.summary.outcome == calib::Outcome::kRefused ? c.summary.reason
+                      : c.summary.warnings.empty()                  ? ""
+                                                                    : c.summary.warnings.front();
   row.rejected =
       static_cast<int>(std::count_if(c.frames.begin(), c.frames.end(),
                                      [](const auto& frame) { return !frame.rejection.empty(); }));
-  row.done = c.focus_depth_mm && c.blur_ratio;
+  row.done = c.summary.focus_depth_mm && c.summary.blur_ratio;
   if (!row.done) return row;
   const model::SweepTruth& truth = simulated.truth;
-  row.focus_error_mm = c.focus_depth_mm->value - truth.focus_depth_mm;
-  row.focus_sigma_mm = c.focus_depth_mm->sigma;
-  row.focus_beyond_mm = Beyond(*c.focus_depth_mm, truth.focus_depth_mm);
-  row.ratio_error = c.blur_ratio->value / truth.blur_ratio - 1;
-  row.ratio_sigma = c.blur_ratio->sigma / truth.blur_ratio;
-  row.ratio_beyond = Beyond(*c.blur_ratio, truth.blur_ratio) / truth.blur_ratio;
+  row.focus_error_mm = c.summary.focus_depth_mm->value - truth.focus_depth_mm;
+  row.focus_sigma_mm = c.summary.focus_depth_mm->sigma;
+  row.focus_beyond_mm = Beyond(*c.summary.focus_depth_mm, truth.focus_depth_mm);
+  row.ratio_error = c.summary.blur_ratio->value / truth.blur_ratio - 1;
+  row.ratio_sigma = c.summary.blur_ratio->sigma / truth.blur_ratio;
+  row.ratio_beyond = Beyond(*c.summary.blur_ratio, truth.blur_ratio) / truth.blur_ratio;
   return row;
 }
 

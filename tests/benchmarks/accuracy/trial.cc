@@ -41,19 +41,21 @@ Measured Compare(const calib::Result& result, double truth) {
 }
 
 void Fill(const calib::Calibration& c, const SimulatedSweep& simulated, Trial* trial) {
-  trial->partial = c.outcome == calib::Outcome::kPartial;
+  trial->partial = c.summary.outcome == calib::Outcome::kPartial;
   const model::SweepTruth& truth = simulated.truth;
-  if (c.source.done && c.source.normalised_focus_depth_mm > 0)
-    trial->recipe_error_mm = c.source.normalised_focus_depth_mm - truth.focus_depth_mm;
-  if (c.blur_floor_px) trial->blur_floor_px = Compare(*c.blur_floor_px, truth.blur_floor_px);
-  trial->done = c.focus_depth_mm && c.image_distance_mm && c.blur_ratio;
+  if (c.diagnostics.paper_recipe.done && c.diagnostics.paper_recipe.normalised_focus_depth_mm > 0)
+    trial->recipe_error_mm =
+        c.diagnostics.paper_recipe.normalised_focus_depth_mm - truth.focus_depth_mm;
+  if (c.summary.blur_floor_px)
+    trial->blur_floor_px = Compare(*c.summary.blur_floor_px, truth.blur_floor_px);
+  trial->done = c.summary.focus_depth_mm && c.summary.image_distance_mm && c.summary.blur_ratio;
   if (!trial->done) {
-    trial->reason = Countable(c.reason);
+    trial->reason = Countable(c.summary.reason);
     return;
   }
-  trial->focus_depth_mm = Compare(*c.focus_depth_mm, truth.focus_depth_mm);
-  trial->image_distance_mm = Compare(*c.image_distance_mm, truth.image_distance_mm);
-  trial->blur_ratio = Compare(*c.blur_ratio, truth.blur_ratio);
+  trial->focus_depth_mm = Compare(*c.summary.focus_depth_mm, truth.focus_depth_mm);
+  trial->image_distance_mm = Compare(*c.summary.image_distance_mm, truth.image_distance_mm);
+  trial->blur_ratio = Compare(*c.summary.blur_ratio, truth.blur_ratio);
 }
 
 }  // namespace
@@ -103,7 +105,7 @@ std::vector<Trial> RunTrials(const TrialKey& key, const TrialSettings& settings,
     try {
       const double begin = ThreadSeconds();
       const calib::Calibration c = calib::Calibrate(simulated.sweep, how);
-      trial.seconds = how.threads == 1 ? ThreadSeconds() - begin : c.seconds;
+      trial.seconds = how.threads == 1 ? ThreadSeconds() - begin : c.summary.seconds;
       Fill(c, simulated, &trial);
     } catch (const std::exception& e) {
       trial.reason = Countable(std::string("error: ") + e.what());

@@ -56,10 +56,10 @@ void ExpectBiasOfSweeps(const std::string& case_name, const Bias& bias) {
     SimulatedSweep s = Simulate(SweepCase(case_name, kSizePx, seed));
     GiveDrawnFloor(&s, seed);
     const Calibration c = Calibrate(s.sweep, how);
-    if (!c.image_distance_mm || !c.blur_ratio) return;
-    errors[static_cast<std::size_t>(i)] = {true,
-                                           c.image_distance_mm->value - s.truth.image_distance_mm,
-                                           c.blur_ratio->value - s.truth.blur_ratio};
+    if (!c.summary.image_distance_mm || !c.summary.blur_ratio) return;
+    errors[static_cast<std::size_t>(i)] = {
+        true, c.summary.image_distance_mm->value - s.truth.image_distance_mm,
+        c.summary.blur_ratio->value - s.truth.blur_ratio};
   });
   std::vector<double> image_distance_mm, blur_ratio;
   for (const Errors& error : errors) {

@@ -49,21 +49,23 @@ Calibration Calibrated(const SimulatedSweep& simulated) {
 }
 
 void ExpectRefused(const Calibration& c, const std::string& why) {
-  EXPECT_EQ(c.outcome, Outcome::kRefused) << c.reason;
-  EXPECT_THAT(c.reason, HasSubstr(why));
-  EXPECT_FALSE(c.image_distance_mm);
-  EXPECT_FALSE(c.focus_depth_mm);
-  EXPECT_FALSE(c.blur_ratio);
+  EXPECT_EQ(c.summary.outcome, Outcome::kRefused) << c.summary.reason;
+  EXPECT_THAT(c.summary.reason, HasSubstr(why));
+  EXPECT_FALSE(c.summary.image_distance_mm);
+  EXPECT_FALSE(c.summary.focus_depth_mm);
+  EXPECT_FALSE(c.summary.blur_ratio);
 }
 
 // Expects that the results are right within their own errors and that these are small.
 void ExpectRight(const Calibration& c, const model::SweepTruth& truth) {
-  ASSERT_TRUE(c.focus_depth_mm) << c.reason;
-  EXPECT_EQ(c.outcome, Outcome::kOk) << c.reason;
-  EXPECT_LT(std::abs(c.focus_depth_mm->value - truth.focus_depth_mm), 3 * c.focus_depth_mm->sigma);
-  EXPECT_LT(c.focus_depth_mm->sigma, 0.15);
-  EXPECT_NEAR(c.blur_ratio->value / truth.blur_ratio, 1, 0.005);
-  EXPECT_NEAR(c.image_distance_mm->value, truth.image_distance_mm, 3 * c.image_distance_mm->sigma);
+  ASSERT_TRUE(c.summary.focus_depth_mm) << c.summary.reason;
+  EXPECT_EQ(c.summary.outcome, Outcome::kOk) << c.summary.reason;
+  EXPECT_LT(std::abs(c.summary.focus_depth_mm->value - truth.focus_depth_mm),
+            3 * c.summary.focus_depth_mm->sigma);
+  EXPECT_LT(c.summary.focus_depth_mm->sigma, 0.15);
+  EXPECT_NEAR(c.summary.blur_ratio->value / truth.blur_ratio, 1, 0.005);
+  EXPECT_NEAR(c.summary.image_distance_mm->value, truth.image_distance_mm,
+              3 * c.summary.image_distance_mm->sigma);
 }
 
 TEST(Calibrate, AGoodSweepIsRight) { ExpectRight(Calibrated(Good()), Good().truth); }
@@ -75,13 +77,13 @@ TEST(Calibrate, OneAndTwoThreadsGiveTheSameBits) {
   const Calibration one = Calibrate(good.sweep, options);
   options.threads = 2;
   const Calibration two = Calibrate(good.sweep, options);
-  ASSERT_TRUE(one.focus_depth_mm && two.focus_depth_mm);
-  EXPECT_EQ(one.focus_depth_mm->value, two.focus_depth_mm->value);
-  EXPECT_EQ(one.focus_depth_mm->sigma, two.focus_depth_mm->sigma);
-  EXPECT_EQ(one.blur_ratio->value, two.blur_ratio->value);
-  EXPECT_EQ(one.scale.offset_mm.value, two.scale.offset_mm.value);
-  EXPECT_EQ(one.source.blur_ratio, two.source.blur_ratio);
-  EXPECT_TRUE(one.covariance == two.covariance);
+  ASSERT_TRUE(one.summary.focus_depth_mm && two.summary.focus_depth_mm);
+  EXPECT_EQ(one.summary.focus_depth_mm->value, two.summary.focus_depth_mm->value);
+  EXPECT_EQ(one.summary.focus_depth_mm->sigma, two.summary.focus_depth_mm->sigma);
+  EXPECT_EQ(one.summary.blur_ratio->value, two.summary.blur_ratio->value);
+  EXPECT_EQ(one.diagnostics.scale.offset_mm.value, two.diagnostics.scale.offset_mm.value);
+  EXPECT_EQ(one.diagnostics.paper_recipe.blur_ratio, two.diagnostics.paper_recipe.blur_ratio);
+  EXPECT_TRUE(one.diagnostics.covariance == two.diagnostics.covariance);
 }
 
 TEST(Calibrate, TheSourcesRecipeAndThePeakNeedNoFit) {
@@ -90,14 +92,16 @@ TEST(Calibrate, TheSourcesRecipeAndThePeakNeedNoFit) {
   CalibrationOptions options;
   options.fit_blur = false;
   const Calibration alone = Calibrate(good.sweep, options);
-  EXPECT_EQ(alone.outcome, Outcome::kPartial);
-  EXPECT_EQ(alone.reason, "the fit of the blur was not requested");
-  ASSERT_TRUE(alone.source.done && alone.sharpness.done);
-  EXPECT_EQ(alone.source.focus_depth_mm, whole.source.focus_depth_mm);
-  EXPECT_EQ(alone.source.blur_ratio, whole.source.blur_ratio);
-  EXPECT_EQ(alone.sharpness.focus_depth_mm, whole.sharpness.focus_depth_mm);
-  EXPECT_FALSE(alone.image_distance_mm || alone.blur_ratio || alone.blur.done || alone.field.done);
-  EXPECT_FALSE(alone.scale.done);  // the bench zero is given
+  EXPECT_EQ(alone.summary.outcome, Outcome::kPartial);
+  EXPECT_EQ(alone.summary.reason, "the fit of the blur was not requested");
+  ASSERT_TRUE(alone.diagnostics.paper_recipe.done && alone.diagnostics.sharpness.done);
+  EXPECT_EQ(alone.diagnostics.paper_recipe.focus_depth_mm,
+            whole.diagnostics.paper_recipe.focus_depth_mm);
+  EXPECT_EQ(alone.diagnostics.paper_recipe.blur_ratio, whole.diagnostics.paper_recipe.blur_ratio);
+  EXPECT_EQ(alone.diagnostics.sharpness.focus_depth_mm, whole.diagnostics.sharpness.focus_depth_mm);
+  EXPECT_FALSE(alone.summary.image_distance_mm || alone.summary.blur_ratio ||
+               alone.diagnostics.blur.done || alone.diagnostics.field.done);
+  EXPECT_FALSE(alone.diagnostics.scale.done);  // the bench zero is given
 }
 
 TEST(Calibrate, WithoutFitAnUnknownBenchZeroIsStillFound) {
@@ -106,10 +110,11 @@ TEST(Calibrate, WithoutFitAnUnknownBenchZeroIsStillFound) {
   CalibrationOptions options;
   options.fit_blur = false;
   const Calibration alone = Calibrate(s.sweep, options);
-  ASSERT_TRUE(alone.scale.done && alone.bench_offset_mm);
-  EXPECT_NEAR(alone.bench_offset_mm->value, s.truth.bench_offset_mm,
-              4 * alone.bench_offset_mm->sigma);
-  EXPECT_NEAR(alone.sharpness.focus_depth_mm, Calibrated(s).sharpness.focus_depth_mm, 0.1);
+  ASSERT_TRUE(alone.diagnostics.scale.done && alone.summary.bench_offset_mm);
+  EXPECT_NEAR(alone.summary.bench_offset_mm->value, s.truth.bench_offset_mm,
+              4 * alone.summary.bench_offset_mm->sigma);
+  EXPECT_NEAR(alone.diagnostics.sharpness.focus_depth_mm,
+              Calibrated(s).diagnostics.sharpness.focus_depth_mm, 0.1);
 }
 
 TEST(Calibrate, ThreeFramesAreTooFew) {
@@ -159,12 +164,13 @@ TEST(Calibrate, AnUnknownBenchZeroIsFound) {
   s.sweep.offset_mm.reset();
   for (model::SweepFrame& frame : s.sweep.frames) frame.reading_mm -= 45;
   const Calibration c = Calibrated(s);
-  ASSERT_TRUE(c.bench_offset_mm) << c.reason;
-  EXPECT_NEAR(c.bench_offset_mm->value, 45, 3 * c.bench_offset_mm->sigma);
-  ASSERT_TRUE(c.focus_depth_mm);
-  EXPECT_NEAR(c.focus_depth_mm->value, s.truth.focus_depth_mm, 3 * c.focus_depth_mm->sigma);
+  ASSERT_TRUE(c.summary.bench_offset_mm) << c.summary.reason;
+  EXPECT_NEAR(c.summary.bench_offset_mm->value, 45, 3 * c.summary.bench_offset_mm->sigma);
+  ASSERT_TRUE(c.summary.focus_depth_mm);
+  EXPECT_NEAR(c.summary.focus_depth_mm->value, s.truth.focus_depth_mm,
+              3 * c.summary.focus_depth_mm->sigma);
   // The error of the bench zero is contained in that of the focus.
-  EXPECT_GE(c.focus_depth_mm->sigma, 0.8 * c.bench_offset_mm->sigma);
+  EXPECT_GE(c.summary.focus_depth_mm->sigma, 0.8 * c.summary.bench_offset_mm->sigma);
 }
 
 TEST(Calibrate, OneImageRepeatedIsRefused) {
@@ -173,8 +179,8 @@ TEST(Calibrate, OneImageRepeatedIsRefused) {
   {
     SCOPED_TRACE("bench zero given");
     const Calibration c = Calibrated(s);
-    EXPECT_EQ(c.outcome, Outcome::kRefused) << c.reason;
-    EXPECT_FALSE(c.blur_ratio);
+    EXPECT_EQ(c.summary.outcome, Outcome::kRefused) << c.summary.reason;
+    EXPECT_FALSE(c.summary.blur_ratio);
   }
   s.sweep.offset_mm.reset();
   ExpectRefused(Calibrated(s), "does not change with the reading");
@@ -189,12 +195,14 @@ TEST(Calibrate, AFocusBeyondTheSweepIsExtrapolatedWithAWarning) {
     SimulatedSweep s = Good();
     Keep(&s, nearer ? 27 : 2, 11);
     const Calibration c = Calibrated(s);
-    EXPECT_EQ(c.outcome, Outcome::kOk) << c.reason;
-    EXPECT_THAT(c.warnings, Contains(AllOf(HasSubstr("is extrapolated"),
-                                           HasSubstr(nearer ? "nearer than" : "farther than"))));
-    ASSERT_TRUE(c.focus_depth_mm);
-    EXPECT_NEAR(c.focus_depth_mm->value, s.truth.focus_depth_mm, 4 * c.focus_depth_mm->sigma);
-    EXPECT_LT(c.focus_depth_mm->sigma, 4);
+    EXPECT_EQ(c.summary.outcome, Outcome::kOk) << c.summary.reason;
+    EXPECT_THAT(c.summary.warnings,
+                Contains(AllOf(HasSubstr("is extrapolated"),
+                               HasSubstr(nearer ? "nearer than" : "farther than"))));
+    ASSERT_TRUE(c.summary.focus_depth_mm);
+    EXPECT_NEAR(c.summary.focus_depth_mm->value, s.truth.focus_depth_mm,
+                4 * c.summary.focus_depth_mm->sigma);
+    EXPECT_LT(c.summary.focus_depth_mm->sigma, 4);
   }
 }
 
@@ -264,17 +272,18 @@ TEST(Calibrate, StatedTolerancesWidenTheSystematicInterval) {
   s.sweep.camera.statements["sensor.pixel_pitch_mm"] = {0.02 * s.sweep.camera.sensor.pixel_pitch_mm,
                                                         false};
   const Calibration c = Calibrated(s);
-  ASSERT_TRUE(exact.image_distance_mm && c.image_distance_mm);
-  EXPECT_EQ(c.image_distance_mm->value, exact.image_distance_mm->value);
-  const double zf = c.focus_depth_mm->value;
+  ASSERT_TRUE(exact.summary.image_distance_mm && c.summary.image_distance_mm);
+  EXPECT_EQ(c.summary.image_distance_mm->value, exact.summary.image_distance_mm->value);
+  const double zf = c.summary.focus_depth_mm->value;
   const double half_mm = 0.1 * zf / (zf - s.sweep.camera.lens.front_focal_length_mm);
-  EXPECT_NEAR(c.image_distance_mm->systematic->y() - exact.image_distance_mm->systematic->y(),
+  EXPECT_NEAR(c.summary.image_distance_mm->systematic->y() -
+                  exact.summary.image_distance_mm->systematic->y(),
               half_mm, 1e-3);
   // The limited accuracy of the blur estimator and all other parts are added in quadrature.
-  const double before = exact.blur_ratio->systematic->y() - exact.blur_ratio->value;
-  const double after = c.blur_ratio->systematic->y() - c.blur_ratio->value;
-  EXPECT_NEAR(std::sqrt(after * after - before * before), 0.02 * c.blur_ratio->value,
-              0.001 * c.blur_ratio->value);
+  const double before = exact.summary.blur_ratio->systematic->y() - exact.summary.blur_ratio->value;
+  const double after = c.summary.blur_ratio->systematic->y() - c.summary.blur_ratio->value;
+  EXPECT_NEAR(std::sqrt(after * after - before * before), 0.02 * c.summary.blur_ratio->value,
+              0.001 * c.summary.blur_ratio->value);
 }
 
 TEST(Calibrate, ABlackAndAnOverexposedFrameAreRejectedByName) {
@@ -288,8 +297,8 @@ TEST(Calibrate, ABlackAndAnOverexposedFrameAreRejectedByName) {
   EXPECT_EQ(std::count_if(c.frames.begin(), c.frames.end(),
                           [](const FrameMeasurement& f) { return !f.rejection.empty(); }),
             2);
-  EXPECT_EQ(c.frames_used, c.blur.frames_used);
-  EXPECT_GE(c.frames_used, 37);
+  EXPECT_EQ(c.summary.frames_used, c.diagnostics.blur.frames_used);
+  EXPECT_GE(c.summary.frames_used, 37);
 }
 
 TEST(Calibrate, SwappedReadingsAreNamedAndDoNoHarm) {
@@ -306,12 +315,12 @@ TEST(Calibrate, AnUnknownFloorLeavesItUnwrittenAndTheTruthInsideTheInterval) {
   SimulatedSweep s = Good();
   s.sweep.floor = {};
   const Calibration c = Calibrated(s);
-  EXPECT_EQ(c.outcome, Outcome::kPartial);
-  EXPECT_THAT(c.reason, HasSubstr("blur_floor_px"));
-  ASSERT_TRUE(c.focus_depth_mm && c.focus_depth_mm->systematic);
-  const Eigen::Vector2d interval = *c.focus_depth_mm->systematic;
-  EXPECT_GT(s.truth.focus_depth_mm, interval.x() - 3 * c.focus_depth_mm->sigma);
-  EXPECT_LT(s.truth.focus_depth_mm, interval.y() + 3 * c.focus_depth_mm->sigma);
+  EXPECT_EQ(c.summary.outcome, Outcome::kPartial);
+  EXPECT_THAT(c.summary.reason, HasSubstr("blur_floor_px"));
+  ASSERT_TRUE(c.summary.focus_depth_mm && c.summary.focus_depth_mm->systematic);
+  const Eigen::Vector2d interval = *c.summary.focus_depth_mm->systematic;
+  EXPECT_GT(s.truth.focus_depth_mm, interval.x() - 3 * c.summary.focus_depth_mm->sigma);
+  EXPECT_LT(s.truth.focus_depth_mm, interval.y() + 3 * c.summary.focus_depth_mm->sigma);
   EXPECT_GT(interval.y() - interval.x(), 0.5);
 }
 
@@ -330,14 +339,14 @@ TEST(CalibratedCamera, KeepsTheMakersValuesAndSurvivesItsFile) {
 
   const model::Camera read = model::ParseCamera(model::CameraToYaml(camera), "written");
   ASSERT_TRUE(read.calibration);
-  EXPECT_EQ(read.image_distance_mm(), c.image_distance_mm->value);
-  EXPECT_EQ(read.blur_ratio(), c.blur_ratio->value);
-  EXPECT_EQ(read.calibration->covariance_order, c.covariance_order);
-  EXPECT_TRUE(read.calibration->covariance == c.covariance);
-  EXPECT_EQ(read.calibration->blur_floor_px->value, c.blur_floor_px->value);
-  EXPECT_EQ(read.calibration->bench_offset_mm->value, c.bench_offset_mm->value);
-  EXPECT_NEAR(std::sqrt(c.covariance(0, 0)), c.image_distance_mm->sigma,
-              1e-9 * c.image_distance_mm->sigma);
+  EXPECT_EQ(read.image_distance_mm(), c.summary.image_distance_mm->value);
+  EXPECT_EQ(read.blur_ratio(), c.summary.blur_ratio->value);
+  EXPECT_EQ(read.calibration->covariance_order, c.diagnostics.covariance_order);
+  EXPECT_TRUE(read.calibration->covariance == c.diagnostics.covariance);
+  EXPECT_EQ(read.calibration->blur_floor_px->value, c.summary.blur_floor_px->value);
+  EXPECT_EQ(read.calibration->bench_offset_mm->value, c.summary.bench_offset_mm->value);
+  EXPECT_NEAR(std::sqrt(c.diagnostics.covariance(0, 0)), c.summary.image_distance_mm->sigma,
+              1e-9 * c.summary.image_distance_mm->sigma);
 }
 
 TEST(CalibratedCamera, DoesNotWriteWhatTheDataDidNotFix) {

@@ -14,21 +14,22 @@ using ::testing::IsEmpty;
 // All numbers are different, so that a test notices if two are exchanged.
 Calibration Found() {
   Calibration c;
-  c.outcome = Outcome::kOk;
-  c.image_distance_mm = Result{16.2, 0.01, Eigen::Vector2d(16, 16.5)};
-  c.focus_depth_mm = Result{400, 0.2, std::nullopt};
-  c.blur_ratio = Result{0.45, 0.03, std::nullopt};
-  c.blur_floor_px = Result{0.5, 0.04, std::nullopt};
-  c.bench_offset_mm = Result{30, 0.05, std::nullopt};
-  c.covariance_order = {"image_distance_mm", "blur_ratio", "blur_floor_px", "bench_offset_mm"};
-  c.covariance = Eigen::Vector4d(1, 2, 3, 4).asDiagonal();
-  c.blur.chi2_per_dof = 1.25;
-  c.blur.family = model::Psf::kDisc;
-  c.blur.band = 0.75;
-  c.source.image_distance_mm = 17.1;
-  c.source.blur_ratio = 2.5;
-  c.source.focus_depth_mm = 380;
-  c.frames_used = 2;
+  c.summary.outcome = Outcome::kOk;
+  c.summary.image_distance_mm = Result{16.2, 0.01, Eigen::Vector2d(16, 16.5)};
+  c.summary.focus_depth_mm = Result{400, 0.2, std::nullopt};
+  c.summary.blur_ratio = Result{0.45, 0.03, std::nullopt};
+  c.summary.blur_floor_px = Result{0.5, 0.04, std::nullopt};
+  c.summary.bench_offset_mm = Result{30, 0.05, std::nullopt};
+  c.diagnostics.covariance_order = {"image_distance_mm", "blur_ratio", "blur_floor_px",
+                                    "bench_offset_mm"};
+  c.diagnostics.covariance = Eigen::Vector4d(1, 2, 3, 4).asDiagonal();
+  c.diagnostics.blur.chi2_per_dof = 1.25;
+  c.diagnostics.blur.family = model::Psf::kDisc;
+  c.diagnostics.blur.band = 0.75;
+  c.diagnostics.paper_recipe.image_distance_mm = 17.1;
+  c.diagnostics.paper_recipe.blur_ratio = 2.5;
+  c.diagnostics.paper_recipe.focus_depth_mm = 380;
+  c.summary.frames_used = 2;
   c.frames.resize(4);
   c.frames[0].image = "/bench/day 1/a.png";
   c.frames[0].rejection = "dark: mean 1";
@@ -95,7 +96,7 @@ TEST(CalibratedCamera, WhatIsUndeterminedIsNotWritten) {
   const std::string names[] = {"image_distance_mm", "blur_ratio", "blur_floor_px"};
   for (const std::string& name : names) {
     Calibration found = Found();
-    found.blur.undetermined = {name};
+    found.diagnostics.blur.undetermined = {name};
     const model::CameraCalibration c = *CalibratedCamera({}, found, false).calibration;
     EXPECT_EQ(c.image_distance_mm.has_value(), name != "image_distance_mm");
     EXPECT_EQ(c.blur_ratio.has_value(), name != "blur_ratio");
@@ -105,8 +106,8 @@ TEST(CalibratedCamera, WhatIsUndeterminedIsNotWritten) {
 
 TEST(CalibratedCamera, WhatIsNotThereIsNotWritten) {
   Calibration found = Found();
-  found.blur_floor_px.reset();
-  found.bench_offset_mm.reset();
+  found.summary.blur_floor_px.reset();
+  found.summary.bench_offset_mm.reset();
   const model::CameraCalibration c = *CalibratedCamera({}, found, false).calibration;
   EXPECT_FALSE(c.blur_floor_px);
   EXPECT_FALSE(c.bench_offset_mm);

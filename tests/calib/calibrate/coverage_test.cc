@@ -56,14 +56,14 @@ void ExpectHonestErrors(const std::string& case_name, int size_px, int sweeps_pe
       SimulatedSweep s = Simulate(options);
       GiveDrawnFloor(&s, seed);
       const Calibration c = Calibrate(s.sweep, how);
-      if (!c.focus_depth_mm || !c.image_distance_mm || !c.blur_ratio) {
+      if (!c.summary.focus_depth_mm || !c.summary.image_distance_mm || !c.summary.blur_ratio) {
         ++refused;
         continue;
       }
       const auto score = [](const Result& r, double truth) { return (r.value - truth) / r.sigma; };
-      z.focus_depth.push_back(score(*c.focus_depth_mm, s.truth.focus_depth_mm));
-      z.image_distance.push_back(score(*c.image_distance_mm, s.truth.image_distance_mm));
-      z.blur_ratio.push_back(score(*c.blur_ratio, s.truth.blur_ratio));
+      z.focus_depth.push_back(score(*c.summary.focus_depth_mm, s.truth.focus_depth_mm));
+      z.image_distance.push_back(score(*c.summary.image_distance_mm, s.truth.image_distance_mm));
+      z.blur_ratio.push_back(score(*c.summary.blur_ratio, s.truth.blur_ratio));
     }
   }
   EXPECT_LE(refused, most_refused);
@@ -87,14 +87,16 @@ TEST(CoverageSlow, ThinningMovesTheFocusByLessThanTheErrors) {
   for (const std::string name : {"i", "iii"}) {
     SimulatedSweep whole = SweepWithFloor(name, 192, 7);
     const Calibration all = Calibrate(whole.sweep, {});
-    ASSERT_TRUE(all.focus_depth_mm) << name << ": " << all.reason;
+    ASSERT_TRUE(all.summary.focus_depth_mm) << name << ": " << all.summary.reason;
     for (const std::size_t every : {2U, 3U, 6U}) {
       SCOPED_TRACE(name + ", one frame of " + std::to_string(every));
       const Calibration part = Calibrate(Thinned(whole, every).sweep, {});
-      ASSERT_TRUE(part.focus_depth_mm) << part.reason;
-      const double moved_mm = std::abs(part.focus_depth_mm->value - all.focus_depth_mm->value);
-      EXPECT_LT(moved_mm, 2 * std::hypot(part.focus_depth_mm->sigma, all.focus_depth_mm->sigma));
-      EXPECT_GT(part.focus_depth_mm->sigma, all.focus_depth_mm->sigma);
+      ASSERT_TRUE(part.summary.focus_depth_mm) << part.summary.reason;
+      const double moved_mm =
+          std::abs(part.summary.focus_depth_mm->value - all.summary.focus_depth_mm->value);
+      EXPECT_LT(moved_mm, 2 * std::hypot(part.summary.focus_depth_mm->sigma,
+                                         all.summary.focus_depth_mm->sigma));
+      EXPECT_GT(part.summary.focus_depth_mm->sigma, all.summary.focus_depth_mm->sigma);
     }
   }
 }

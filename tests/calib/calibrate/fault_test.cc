@@ -48,18 +48,18 @@ bool NamesFrame(const std::string& text, const std::string& name) {
 // Returns all messages about one frame.
 std::string Said(const Calibration& c, std::size_t frame) {
   std::string said = c.frames[frame].rejection;
-  for (const std::string& warning : c.warnings) {
+  for (const std::string& warning : c.summary.warnings) {
     if (NamesFrame(warning, c.frames[frame].image)) said += " | " + warning;
   }
   return said;
 }
 
 void ExpectRefused(const Calibration& c, const std::string& why) {
-  EXPECT_EQ(c.outcome, Outcome::kRefused) << c.reason;
-  EXPECT_THAT(c.reason, ContainsRegex(why));
-  EXPECT_FALSE(c.image_distance_mm);
-  EXPECT_FALSE(c.focus_depth_mm);
-  EXPECT_FALSE(c.blur_ratio);
+  EXPECT_EQ(c.summary.outcome, Outcome::kRefused) << c.summary.reason;
+  EXPECT_THAT(c.summary.reason, ContainsRegex(why));
+  EXPECT_FALSE(c.summary.image_distance_mm);
+  EXPECT_FALSE(c.summary.focus_depth_mm);
+  EXPECT_FALSE(c.summary.blur_ratio);
 }
 
 // Returns the amount in "reading off by 15.1 mm", without its sign.
@@ -81,18 +81,19 @@ void ExpectRightInSpiteOfFaults(const std::string& name) {
   SimulatedSweep damaged = DeepCopy(Clean(name));
   const PlantedFaults faults = PlantFaults(&damaged);
   const Calibration& clean = CleanResult(name);
-  ASSERT_TRUE(clean.focus_depth_mm) << clean.reason;
+  ASSERT_TRUE(clean.summary.focus_depth_mm) << clean.summary.reason;
   const Calibration c = CalibrateWithoutMap(damaged);
-  ASSERT_TRUE(c.focus_depth_mm && c.blur_ratio && c.image_distance_mm) << c.reason;
+  ASSERT_TRUE(c.summary.focus_depth_mm && c.summary.blur_ratio && c.summary.image_distance_mm)
+      << c.summary.reason;
   const model::SweepTruth& truth = damaged.truth;
   const auto within = [](const Result& r, double true_value) {
     EXPECT_LT(std::abs(r.value - true_value), 2.5 * r.sigma);
   };
-  within(*c.focus_depth_mm, truth.focus_depth_mm);
-  within(*c.image_distance_mm, truth.image_distance_mm);
-  within(*c.blur_ratio, truth.blur_ratio);
-  EXPECT_LT(c.focus_depth_mm->sigma, 1.5 * clean.focus_depth_mm->sigma);
-  EXPECT_LT(c.blur_ratio->sigma, 1.5 * clean.blur_ratio->sigma);
+  within(*c.summary.focus_depth_mm, truth.focus_depth_mm);
+  within(*c.summary.image_distance_mm, truth.image_distance_mm);
+  within(*c.summary.blur_ratio, truth.blur_ratio);
+  EXPECT_LT(c.summary.focus_depth_mm->sigma, 1.5 * clean.summary.focus_depth_mm->sigma);
+  EXPECT_LT(c.summary.blur_ratio->sigma, 1.5 * clean.summary.blur_ratio->sigma);
   for (const std::size_t frame : {faults.black, faults.white, faults.overexposed, faults.smeared}) {
     EXPECT_NE(Said(c, frame), "") << "nothing is said of " << c.frames[frame].image;
   }
@@ -164,8 +165,8 @@ TEST(WrongSweepOfALongLens, AWrongFocalLengthIsRefusedOrWarnedOf) {
   lens.front_focal_length_mm = lens.rear_focal_length_mm = 35;
   lens.aperture_radius_mm *= 35.0 / 50;  // follows from the f-number
   const Calibration c = CalibrateWithoutMap(s);
-  std::string said = c.outcome == Outcome::kRefused ? c.reason : "";
-  for (const std::string& warning : c.warnings) said += " | " + warning;
+  std::string said = c.summary.outcome == Outcome::kRefused ? c.summary.reason : "";
+  for (const std::string& warning : c.summary.warnings) said += " | " + warning;
   EXPECT_THAT(said, ContainsRegex("0\\.9[0-9]|1\\.0[0-9]"));
   EXPECT_THAT(said, ContainsRegex("no lens|not physical|kappa|blur ratio"));
 }
@@ -173,12 +174,12 @@ TEST(WrongSweepOfALongLens, AWrongFocalLengthIsRefusedOrWarnedOf) {
 // Expects no wrong result with a small error: either the sweep is refused, or the truth is within 3
 // sigma of the stated values.
 void ExpectHonest(const Calibration& c, const model::SweepTruth& truth) {
-  if (c.outcome == Outcome::kRefused) {
-    EXPECT_FALSE(c.focus_depth_mm);
+  if (c.summary.outcome == Outcome::kRefused) {
+    EXPECT_FALSE(c.summary.focus_depth_mm);
     return;
   }
-  ASSERT_TRUE(c.focus_depth_mm) << c.reason;
-  const Result& zf = *c.focus_depth_mm;
+  ASSERT_TRUE(c.summary.focus_depth_mm) << c.summary.reason;
+  const Result& zf = *c.summary.focus_depth_mm;
   const Eigen::Vector2d interval = zf.systematic.value_or(Eigen::Vector2d(zf.value, zf.value));
   EXPECT_GT(truth.focus_depth_mm, std::min(interval.x(), zf.value) - 3 * zf.sigma);
   EXPECT_LT(truth.focus_depth_mm, std::max(interval.y(), zf.value) + 3 * zf.sigma);
@@ -201,21 +202,21 @@ TEST(PeriodicTarget, SlowIsNeverConfidentlyWrong) {
 // invisible to the eye.)
 void ExpectHarmless(const SimulatedSweep& touched, const std::string& name) {
   const Calibration& clean = CleanResult(name);
-  ASSERT_TRUE(clean.focus_depth_mm) << clean.reason;
+  ASSERT_TRUE(clean.summary.focus_depth_mm) << clean.summary.reason;
   const Calibration c = CalibrateWithoutMap(touched);
-  ASSERT_TRUE(c.focus_depth_mm && c.blur_ratio) << c.reason;
-  const Result& zf = *c.focus_depth_mm;
+  ASSERT_TRUE(c.summary.focus_depth_mm && c.summary.blur_ratio) << c.summary.reason;
+  const Result& zf = *c.summary.focus_depth_mm;
   const double step_mm =
       std::abs(touched.sweep.frames[1].reading_mm - touched.sweep.frames[0].reading_mm);
   EXPECT_LT(std::abs(zf.value - touched.truth.focus_depth_mm),
             std::max(2.5 * zf.sigma, 0.05 * step_mm));
-  EXPECT_LT(std::abs(zf.value - clean.focus_depth_mm->value),
+  EXPECT_LT(std::abs(zf.value - clean.summary.focus_depth_mm->value),
             std::max(2 * zf.sigma, 0.05 * step_mm));
-  EXPECT_LT(zf.sigma, 1.5 * clean.focus_depth_mm->sigma);
-  const Result& ratio = *c.blur_ratio;
+  EXPECT_LT(zf.sigma, 1.5 * clean.summary.focus_depth_mm->sigma);
+  const Result& ratio = *c.summary.blur_ratio;
   EXPECT_LT(std::abs(ratio.value - touched.truth.blur_ratio),
             std::max(2.5 * ratio.sigma, 0.01 * ratio.value));
-  EXPECT_LT(std::abs(ratio.value - clean.blur_ratio->value),
+  EXPECT_LT(std::abs(ratio.value - clean.summary.blur_ratio->value),
             std::max(2 * ratio.sigma, 0.01 * ratio.value));
 }
 

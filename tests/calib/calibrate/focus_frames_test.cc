@@ -57,15 +57,15 @@ TEST(SolveFocus, AWrongReadingIsNamedWithWhatItIsOffBy) {
         FocusCase c = Texture(bench);
         c.WriteReading(frame, c.frame(frame).reading_mm + error_mm);
         c.Solve();
-        EXPECT_EQ(c.calibration.outcome, Outcome::kOk) << c.calibration.reason;
+        EXPECT_EQ(c.calibration.summary.outcome, Outcome::kOk) << c.calibration.summary.reason;
         const FrameMeasurement& off = c.frame(frame);
         EXPECT_NEAR(off.reading_error_mm, error_mm, 0.02 * std::abs(error_mm));
         EXPECT_THAT(off.rejection,
                     StartsWith(error_mm > 0 ? "reading off by " : "reading off by -"));
         EXPECT_THAT(off.rejection, HasSubstr("or frame damaged"));
         EXPECT_FALSE(off.in_blur_fit);
-        EXPECT_EQ(c.calibration.blur.frames_used, c.bench.count - 1);
-        EXPECT_NEAR(c.calibration.focus_depth_mm->value, c.bench.focus_mm, 1e-3);
+        EXPECT_EQ(c.calibration.diagnostics.blur.frames_used, c.bench.count - 1);
+        EXPECT_NEAR(c.calibration.summary.focus_depth_mm->value, c.bench.focus_mm, 1e-3);
         for (std::size_t i = 0; i < static_cast<std::size_t>(c.bench.count); ++i)
           EXPECT_EQ(c.frame(i).rejection.empty(), i != frame) << i;
       }
@@ -80,7 +80,7 @@ TEST(SolveFocus, ADamagedFrameIsNotReportedAsAWrongReading) {
   c.Solve();
   EXPECT_THAT(c.frame(13).rejection, StartsWith("frame damaged: its blur deviates "));
   EXPECT_EQ(c.frame(13).reading_error_mm, 0);
-  EXPECT_EQ(c.calibration.outcome, Outcome::kOk);
+  EXPECT_EQ(c.calibration.summary.outcome, Outcome::kOk);
 }
 
 TEST(SolveFocus, WhatIsRejectedIsNotInTheFit) {
@@ -129,7 +129,7 @@ TEST(SolveFocus, AFrameWhoseSpectrumScattersIsRejected) {
               AllOf(HasSubstr("does not show what the others show"), HasSubstr("lies 6 times")));
   EXPECT_EQ(c.frame(5).rejection, "");
   EXPECT_THAT(c.evidence.setup.estimators[0].frames, Not(Contains(4U)));
-  EXPECT_EQ(c.calibration.blur.frames_used, c.bench.count - 1);
+  EXPECT_EQ(c.calibration.diagnostics.blur.frames_used, c.bench.count - 1);
 }
 
 TEST(SolveFocus, TheFirstReasonStands) {
@@ -151,7 +151,7 @@ TEST(SolveFocus, RejectedFramesDoNotReachTheSweepsRange) {
   c.evidence.setup.estimators[0].variances_px2[30] += 40;  // the one frame beyond 400 mm
   c.Solve();
   EXPECT_NE(c.frame(30).rejection, "");
-  EXPECT_THAT(c.calibration.warnings, Contains(HasSubstr("is extrapolated")));
+  EXPECT_THAT(c.calibration.summary.warnings, Contains(HasSubstr("is extrapolated")));
 }
 
 // ---- frames with less weight ----
@@ -167,19 +167,19 @@ FocusCase WithLight(const std::vector<Eigen::Index>& frames) {
 
 TEST(SolveFocus, LightFramesAreWarnedOfByName) {
   FocusCase c = WithLight({8});
-  EXPECT_EQ(c.calibration.outcome, Outcome::kOk);
+  EXPECT_EQ(c.calibration.summary.outcome, Outcome::kOk);
   EXPECT_LT(c.frame(8).blur_fit_weight, 0.6);
   EXPECT_EQ(c.frame(8).rejection, "");
   EXPECT_TRUE(c.frame(8).in_blur_fit);
-  EXPECT_THAT(c.calibration.warnings,
+  EXPECT_THAT(c.calibration.summary.warnings,
               Contains(AllOf(StartsWith("1 of 31 frames"),
                              HasSubstr("weigh less: frame-8.png (reading 340 mm"))));
-  EXPECT_THAT(c.calibration.warnings, Contains(HasSubstr("deviate from the blur law")));
+  EXPECT_THAT(c.calibration.summary.warnings, Contains(HasSubstr("deviate from the blur law")));
 }
 
 TEST(SolveFocus, ThreeLightFramesAreNamedAndTheOthersCounted) {
   FocusCase c = WithLight({4, 7, 10, 24, 27});
-  EXPECT_THAT(c.calibration.warnings,
+  EXPECT_THAT(c.calibration.summary.warnings,
               Contains(AllOf(StartsWith("5 of 31 frames"), HasSubstr("frame-4.png"),
                              HasSubstr("frame-7.png"), HasSubstr("frame-10.png"),
                              HasSubstr(" and 2 more"), Not(HasSubstr("frame-24.png")))));
@@ -190,7 +190,7 @@ TEST(SolveFocus, FramesWithinTheirErrorsHaveWeightOne) {
   FocusCase c = FocusCase().WithTexture(5e-4).WithTrueFloor();
   c.evidence.setup.estimators[0].variances_px2[8] += 0.0015;
   c.Solve();
-  EXPECT_THAT(c.calibration.warnings, IsEmpty());
+  EXPECT_THAT(c.calibration.summary.warnings, IsEmpty());
   EXPECT_EQ(c.frame(8).blur_fit_weight, 1);
 }
 
@@ -224,7 +224,7 @@ TEST(SolveFocus, EveryFrameGetsItsBlur) {
     }
     EXPECT_FALSE(c.calibration.frames[0].in_blur_fit);
     EXPECT_EQ(c.calibration.frames[0].rejection, "dark: mean 1");
-    EXPECT_EQ(c.calibration.blur.frames_used, c.bench.count);
+    EXPECT_EQ(c.calibration.diagnostics.blur.frames_used, c.bench.count);
   }
 }
 
@@ -248,7 +248,7 @@ TEST(SolveFocus, ReadingErrorsAreReported) {
   bench.noise = 0;
   FocusCase c = FocusCase(bench).WithTexture(kErrorPx2).WithTrueFloor();
   c.Solve();
-  ASSERT_EQ(c.calibration.outcome, Outcome::kOk) << c.calibration.reason;
+  ASSERT_EQ(c.calibration.summary.outcome, Outcome::kOk) << c.calibration.summary.reason;
   const double sign = model::DirectionSign(bench.direction);
   for (std::size_t i = 0; i < static_cast<std::size_t>(bench.count); ++i) {
     const double error_mm = c.frame(i).reading_mm - sign * (bench.Depth(i) - bench.offset_mm);
@@ -270,7 +270,7 @@ TEST(SolveFocus, FramesThatNoMeterHasAreReportedAsUnused) {
   EXPECT_THAT(c.frame(1).not_in_fit, HasSubstr("could not be registered"));
   EXPECT_EQ(c.frame(2).not_in_fit, "");
   EXPECT_EQ(c.frame(3).not_in_fit, "");
-  EXPECT_EQ(c.calibration.blur.frames_used, c.bench.count - 3);
+  EXPECT_EQ(c.calibration.diagnostics.blur.frames_used, c.bench.count - 3);
   EXPECT_EQ(c.frame(0).rejection, "");
 }
 

@@ -22,13 +22,13 @@ using thicklens::testing::ExactBench;
 using thicklens::testing::FocusCase;
 
 void ExpectRefused(const Calibration& c, const std::string& why) {
-  EXPECT_EQ(c.outcome, Outcome::kRefused);
-  EXPECT_THAT(c.reason, HasSubstr(why));
-  EXPECT_FALSE(c.image_distance_mm);
-  EXPECT_FALSE(c.focus_depth_mm);
-  EXPECT_FALSE(c.blur_ratio);
-  EXPECT_FALSE(c.blur_floor_px);
-  EXPECT_THAT(c.covariance_order, IsEmpty());
+  EXPECT_EQ(c.summary.outcome, Outcome::kRefused);
+  EXPECT_THAT(c.summary.reason, HasSubstr(why));
+  EXPECT_FALSE(c.summary.image_distance_mm);
+  EXPECT_FALSE(c.summary.focus_depth_mm);
+  EXPECT_FALSE(c.summary.blur_ratio);
+  EXPECT_FALSE(c.summary.blur_floor_px);
+  EXPECT_THAT(c.diagnostics.covariance_order, IsEmpty());
 }
 
 FocusCase Solved(const BlurBench& bench, double error_px2, double offset_sigma_mm = 0) {
@@ -50,7 +50,7 @@ TEST(SolveFocus, WithoutAnEstimatorTheMeasurementSaysWhy) {
   c.evidence.message = "neither edges nor texture";
   c.Solve();
   ExpectRefused(c.calibration, "neither edges nor texture");
-  EXPECT_FALSE(c.calibration.blur.done);
+  EXPECT_FALSE(c.calibration.diagnostics.blur.done);
 }
 
 TEST(SolveFocus, FourFramesAreTooFewAndFiveAreNot) {
@@ -66,7 +66,7 @@ TEST(SolveFocus, FourFramesAreTooFewAndFiveAreNot) {
       ExpectRefused(c.calibration,
                     "the blur of only 4 frames follows one law, but 5 frames are needed");
     } else {
-      EXPECT_EQ(c.calibration.outcome, Outcome::kOk) << c.calibration.reason;
+      EXPECT_EQ(c.calibration.summary.outcome, Outcome::kOk) << c.calibration.summary.reason;
     }
   }
 }
@@ -83,7 +83,7 @@ TEST(SolveFocus, AFewEdgesBesideEnoughTextureDoNoHarm) {
     edges.covariance = Eigen::MatrixXd(edges.covariance.block(12, 12, 3, 3));
     if (edges_first) c.WithTexture(0.01);
     c.Solve();
-    EXPECT_EQ(c.calibration.outcome, Outcome::kOk) << c.calibration.reason;
+    EXPECT_EQ(c.calibration.summary.outcome, Outcome::kOk) << c.calibration.summary.reason;
   }
 }
 
@@ -91,17 +91,17 @@ TEST(SolveFocus, AFloorAboveTheBlursCurvatureIsRefused) {
   FocusCase c = FocusCase().WithTexture(0.01).WithFloor(12, 0);  // A uf^2 = 116.6 px^2
   c.Solve();
   ExpectRefused(c.calibration, "no minimum in depth above the lens floor");
-  EXPECT_THAT(c.calibration.blur.message, HasSubstr("no minimum"));
-  EXPECT_FALSE(c.calibration.blur.done);
+  EXPECT_THAT(c.calibration.diagnostics.blur.message, HasSubstr("no minimum"));
+  EXPECT_FALSE(c.calibration.diagnostics.blur.done);
 }
 
 TEST(SolveFocus, AScaleThatDoesNotChangeIsPartOfTheReason) {
   FocusCase c = FocusCase().WithTexture(0.01).WithFloor(12, 0);
-  c.calibration.scale.kind = ScaleKind::kConstant;
-  c.calibration.scale.message = "the image scale is constant";
+  c.calibration.diagnostics.scale.kind = ScaleKind::kConstant;
+  c.calibration.diagnostics.scale.message = "the image scale is constant";
   c.Solve();
   ExpectRefused(c.calibration, "no minimum in depth");
-  EXPECT_THAT(c.calibration.reason, EndsWith("; the image scale is constant"));
+  EXPECT_THAT(c.calibration.summary.reason, EndsWith("; the image scale is constant"));
 }
 
 TEST(SolveFocus, ABlurWithinItsErrorsIsRefused) {
@@ -110,7 +110,7 @@ TEST(SolveFocus, ABlurWithinItsErrorsIsRefused) {
   ExpectRefused(Solved(bench, 1.08 * a_third_px2).calibration,
                 "the blur does not change over the sweep by more than its errors");
   const FocusCase passes = Solved(bench, 0.92 * a_third_px2);
-  EXPECT_EQ(passes.calibration.outcome, Outcome::kOk) << passes.calibration.reason;
+  EXPECT_EQ(passes.calibration.summary.outcome, Outcome::kOk) << passes.calibration.summary.reason;
 }
 
 // The blur determines where focus is in the sweep; unknown is where the sweep is.
@@ -122,16 +122,16 @@ TEST(SolveFocus, ABenchZeroThatIsNotKnownIsNotBlamedOnTheBlur) {
   const double half_mm = 0.5 * (bench.last_mm - bench.first_mm);
   // Nearly the whole error of the bench zero enters zf.
   const FocusCase trial = Solved(bench, 0.001, 10);
-  const double per_zero = trial.calibration.focus_depth_mm->sigma / 10;
+  const double per_zero = trial.calibration.summary.focus_depth_mm->sigma / 10;
   EXPECT_NEAR(per_zero, 1, 0.1);
   const FocusCase c = Solved(bench, 0.001, 1.1 * half_mm / per_zero);
   ExpectRefused(c.calibration, "the bench zero is not known well enough: the sweep is 45 mm long");
-  EXPECT_THAT(c.calibration.reason, HasSubstr("State offset_mm"));
-  ASSERT_TRUE(c.calibration.focus_reading_mm) << "the reading of focus is determined";
-  EXPECT_NEAR(c.calibration.focus_reading_mm->value, 400 - bench.offset_mm, 0.2);
-  EXPECT_LT(c.calibration.focus_reading_mm->sigma, 1);
+  EXPECT_THAT(c.calibration.summary.reason, HasSubstr("State offset_mm"));
+  ASSERT_TRUE(c.calibration.diagnostics.focus_reading_mm) << "the reading of focus is determined";
+  EXPECT_NEAR(c.calibration.diagnostics.focus_reading_mm->value, 400 - bench.offset_mm, 0.2);
+  EXPECT_LT(c.calibration.diagnostics.focus_reading_mm->sigma, 1);
   const FocusCase passes = Solved(bench, 0.001, 0.9 * half_mm / per_zero);
-  EXPECT_EQ(passes.calibration.outcome, Outcome::kOk) << passes.calibration.reason;
+  EXPECT_EQ(passes.calibration.summary.outcome, Outcome::kOk) << passes.calibration.summary.reason;
 }
 
 TEST(SolveFocus, AFocusThatTheBlurDoesNotFixIsRefused) {
@@ -141,11 +141,11 @@ TEST(SolveFocus, AFocusThatTheBlurDoesNotFixIsRefused) {
   const double half_mm = 0.5 * (bench.last_mm - bench.first_mm);
   const FocusCase c = Solved(bench, ErrorFor(bench, kFocusDepth, 1.1 * half_mm));
   // If the blur ratio is even less certain, it is the stated reason.
-  EXPECT_EQ(c.calibration.outcome, Outcome::kRefused);
-  EXPECT_THAT(c.calibration.reason,
+  EXPECT_EQ(c.calibration.summary.outcome, Outcome::kRefused);
+  EXPECT_THAT(c.calibration.summary.reason,
               AnyOf(HasSubstr("the blur does not determine the depth of focus"),
                     HasSubstr("the blur does not change over the sweep")));
-  EXPECT_FALSE(c.calibration.focus_reading_mm) << "it is not determined";
+  EXPECT_FALSE(c.calibration.diagnostics.focus_reading_mm) << "it is not determined";
 }
 
 // Sweeps that end before they reach the focus at 400 mm, in steps of 3 mm.
@@ -164,11 +164,11 @@ TEST(SolveFocus, AFocusBeyondTheSweepThatIsKnownToAStepIsWarnedOf) {
       BlurBench bench = Beyond(nearer);
       bench.direction = direction;
       const FocusCase c = Solved(bench, ErrorFor(bench, kFocusDepth, 0.9 * 3));
-      EXPECT_EQ(c.calibration.outcome, Outcome::kOk) << c.calibration.reason;
-      EXPECT_THAT(c.calibration.warnings,
+      EXPECT_EQ(c.calibration.summary.outcome, Outcome::kOk) << c.calibration.summary.reason;
+      EXPECT_THAT(c.calibration.summary.warnings,
                   Contains(AllOf(HasSubstr("is extrapolated"), HasSubstr("12.50 mm"),
                                  HasSubstr(nearer ? "nearer than" : "farther than"))));
-      EXPECT_NEAR(c.calibration.blur.outside_mm, 12.5, 1e-2);
+      EXPECT_NEAR(c.calibration.diagnostics.blur.outside_mm, 12.5, 1e-2);
     }
   }
 }
@@ -178,7 +178,7 @@ TEST(SolveFocus, AFocusBeyondTheSweepThatIsNotKnownToAStepIsRefused) {
     const BlurBench bench = Beyond(nearer);
     const FocusCase c = Solved(bench, ErrorFor(bench, kFocusDepth, 1.1 * 3));
     ExpectRefused(c.calibration, "sharpness is monotone");
-    EXPECT_THAT(c.calibration.reason,
+    EXPECT_THAT(c.calibration.summary.reason,
                 AllOf(HasSubstr(nearer ? "lies nearer than" : "lies farther than"),
                       HasSubstr("extend the sweep"), HasSubstr("about 400")));
   }
@@ -188,8 +188,8 @@ TEST(SolveFocus, AFocusBeyondTheSweepThatIsNotKnownToAStepIsRefused) {
 TEST(SolveFocus, AFocusInsideNeedNotBeKnownToAStep) {
   const BlurBench bench = ExactBench();
   const FocusCase c = Solved(bench, ErrorFor(bench, kFocusDepth, 1.5 * 5));
-  EXPECT_EQ(c.calibration.outcome, Outcome::kOk) << c.calibration.reason;
-  EXPECT_THAT(c.calibration.warnings, Not(Contains(HasSubstr("extrapolated"))));
+  EXPECT_EQ(c.calibration.summary.outcome, Outcome::kOk) << c.calibration.summary.reason;
+  EXPECT_THAT(c.calibration.summary.warnings, Not(Contains(HasSubstr("extrapolated"))));
 }
 
 // A gap in the readings does not increase the step, and repeated readings do not make it 0.
@@ -202,7 +202,7 @@ TEST(SolveFocus, TheStepIsTheUsualOne) {
   again.reading_mm += 500;
   c.calibration.frames.push_back(again);
   c.Solve();
-  EXPECT_EQ(c.calibration.outcome, Outcome::kOk) << c.calibration.reason;
+  EXPECT_EQ(c.calibration.summary.outcome, Outcome::kOk) << c.calibration.summary.reason;
 }
 
 // No lens has such a blur ratio, so the stated aperture is wrong. The sweep measures kappa r.
@@ -223,14 +223,14 @@ TEST(SolveFocus, AnImplausibleBlurRatioIsRefusedAndAnUnusualOneWarnedOf) {
     c.Solve();
     if (k.refused) {
       ExpectRefused(c.calibration, "which no lens has");
-      EXPECT_THAT(c.calibration.reason, HasSubstr("check focal lengths"));
+      EXPECT_THAT(c.calibration.summary.reason, HasSubstr("check focal lengths"));
       continue;
     }
-    EXPECT_EQ(c.calibration.outcome, Outcome::kOk) << c.calibration.reason;
-    EXPECT_NEAR(c.calibration.blur_ratio->value, k.ratio, 1e-3);
-    EXPECT_EQ(!c.calibration.warnings.empty(), k.warned);
+    EXPECT_EQ(c.calibration.summary.outcome, Outcome::kOk) << c.calibration.summary.reason;
+    EXPECT_NEAR(c.calibration.summary.blur_ratio->value, k.ratio, 1e-3);
+    EXPECT_EQ(!c.calibration.summary.warnings.empty(), k.warned);
     if (k.warned) {
-      EXPECT_THAT(c.calibration.warnings, Contains(HasSubstr("is unusual")));
+      EXPECT_THAT(c.calibration.summary.warnings, Contains(HasSubstr("is unusual")));
     }
   }
 }

@@ -68,12 +68,12 @@ void CheckLeaves(const Bounds& bounds, std::uint64_t seed) {
   SimulatedSweep s = Sweep(bounds.name, model::TargetKind::kDeadLeaves, seed);
   GiveFloor(&s);
   const Calibration c = Measured(s);
-  ASSERT_EQ(c.outcome, Outcome::kOk) << c.reason;
-  EXPECT_NEAR(c.focus_depth_mm->value, s.truth.focus_depth_mm, bounds.focus_mm);
-  EXPECT_NEAR(c.blur_ratio->value / s.truth.blur_ratio, 1, bounds.ratio);
-  ExpectCovered(*c.focus_depth_mm, s.truth.focus_depth_mm);
-  ExpectCovered(*c.blur_ratio, s.truth.blur_ratio);
-  ExpectCovered(*c.image_distance_mm, s.truth.image_distance_mm);
+  ASSERT_EQ(c.summary.outcome, Outcome::kOk) << c.summary.reason;
+  EXPECT_NEAR(c.summary.focus_depth_mm->value, s.truth.focus_depth_mm, bounds.focus_mm);
+  EXPECT_NEAR(c.summary.blur_ratio->value / s.truth.blur_ratio, 1, bounds.ratio);
+  ExpectCovered(*c.summary.focus_depth_mm, s.truth.focus_depth_mm);
+  ExpectCovered(*c.summary.blur_ratio, s.truth.blur_ratio);
+  ExpectCovered(*c.summary.image_distance_mm, s.truth.image_distance_mm);
 }
 
 Calibration MeasuredEdge(const Bounds& bounds, std::uint64_t seed, model::SweepTruth* truth) {
@@ -87,17 +87,19 @@ void CheckEdge(const Bounds& bounds, std::uint64_t seed) {
   SCOPED_TRACE(std::string("knife edge, case ") + bounds.name + ", seed " + std::to_string(seed));
   model::SweepTruth truth;
   const Calibration c = MeasuredEdge(bounds, seed, &truth);
-  ASSERT_NE(c.outcome, Outcome::kRefused) << c.reason;
-  EXPECT_LT(c.focus_depth_mm->sigma, bounds.focus_mm);
-  EXPECT_LT(c.blur_ratio->sigma / truth.blur_ratio, bounds.ratio);
-  EXPECT_NEAR(c.focus_depth_mm->value, truth.focus_depth_mm, kReach * c.focus_depth_mm->sigma);
-  EXPECT_NEAR(c.blur_ratio->value, truth.blur_ratio,
-              kReach * c.blur_ratio->sigma + kModelRatio * truth.blur_ratio);
-  ExpectCovered(*c.focus_depth_mm, truth.focus_depth_mm);
-  ExpectCovered(*c.blur_ratio, truth.blur_ratio);
+  ASSERT_NE(c.summary.outcome, Outcome::kRefused) << c.summary.reason;
+  EXPECT_LT(c.summary.focus_depth_mm->sigma, bounds.focus_mm);
+  EXPECT_LT(c.summary.blur_ratio->sigma / truth.blur_ratio, bounds.ratio);
+  EXPECT_NEAR(c.summary.focus_depth_mm->value, truth.focus_depth_mm,
+              kReach * c.summary.focus_depth_mm->sigma);
+  EXPECT_NEAR(c.summary.blur_ratio->value, truth.blur_ratio,
+              kReach * c.summary.blur_ratio->sigma + kModelRatio * truth.blur_ratio);
+  ExpectCovered(*c.summary.focus_depth_mm, truth.focus_depth_mm);
+  ExpectCovered(*c.summary.blur_ratio, truth.blur_ratio);
   // A coarse sweep may leave the floor undetermined.
-  if (c.blur_floor_px) {
-    EXPECT_NEAR(c.blur_floor_px->value, truth.blur_floor_px, kReach * c.blur_floor_px->sigma);
+  if (c.summary.blur_floor_px) {
+    EXPECT_NEAR(c.summary.blur_floor_px->value, truth.blur_floor_px,
+                kReach * c.summary.blur_floor_px->sigma);
   }
 }
 
@@ -124,9 +126,10 @@ void CheckEdges(const Bounds& bounds, std::uint64_t count) {
   for (std::uint64_t seed = 1; seed <= count; ++seed) {
     model::SweepTruth truth;
     const Calibration c = MeasuredEdge(bounds, seed, &truth);
-    ASSERT_TRUE(c.focus_depth_mm && c.blur_ratio) << seed << ": " << c.reason;
-    focus.Add(*c.focus_depth_mm, truth.focus_depth_mm);
-    ratio.Add(*c.blur_ratio, truth.blur_ratio);
+    ASSERT_TRUE(c.summary.focus_depth_mm && c.summary.blur_ratio)
+        << seed << ": " << c.summary.reason;
+    focus.Add(*c.summary.focus_depth_mm, truth.focus_depth_mm);
+    ratio.Add(*c.summary.blur_ratio, truth.blur_ratio);
   }
   focus.ExpectNormal("zf");
   ratio.ExpectNormal("kappa");
@@ -155,10 +158,10 @@ TEST(FocusRegression, KnifeEdgesInDarkCornersAreMeasured) {
   CalibrationOptions how;
   how.map_field = false;
   const Calibration c = Calibrate(s.sweep, how);
-  ASSERT_TRUE(c.blur_ratio && c.blur_floor_px) << c.reason;
-  EXPECT_NEAR(c.blur_ratio->value / s.truth.blur_ratio, 1, kModelRatio);
-  EXPECT_NEAR(c.image_distance_mm->value, s.truth.image_distance_mm, 1e-5);
-  EXPECT_NEAR(c.blur_floor_px->value, s.truth.blur_floor_px, 5e-5);
+  ASSERT_TRUE(c.summary.blur_ratio && c.summary.blur_floor_px) << c.summary.reason;
+  EXPECT_NEAR(c.summary.blur_ratio->value / s.truth.blur_ratio, 1, kModelRatio);
+  EXPECT_NEAR(c.summary.image_distance_mm->value, s.truth.image_distance_mm, 1e-5);
+  EXPECT_NEAR(c.summary.blur_floor_px->value, s.truth.blur_floor_px, 5e-5);
 }
 
 TEST(FocusRegression, SlowLeavesInEveryCase) {
@@ -174,11 +177,11 @@ void CheckPrinted(const char* name) {
   SCOPED_TRACE(name);
   const SimulatedSweep s = Sweep(name, model::TargetKind::kPrintedEdge, 1);
   const Calibration c = Measured(s);
-  EXPECT_EQ(c.outcome, Outcome::kPartial) << c.reason;
-  ASSERT_TRUE(c.focus_depth_mm);
-  ExpectCovered(*c.focus_depth_mm, s.truth.focus_depth_mm);
-  ExpectCovered(*c.blur_ratio, s.truth.blur_ratio);
-  ExpectCovered(*c.image_distance_mm, s.truth.image_distance_mm);
+  EXPECT_EQ(c.summary.outcome, Outcome::kPartial) << c.summary.reason;
+  ASSERT_TRUE(c.summary.focus_depth_mm);
+  ExpectCovered(*c.summary.focus_depth_mm, s.truth.focus_depth_mm);
+  ExpectCovered(*c.summary.blur_ratio, s.truth.blur_ratio);
+  ExpectCovered(*c.summary.image_distance_mm, s.truth.image_distance_mm);
 }
 TEST(FocusRegression, APrintedEdgeOfUnknownFloorCoversTheTruth) { CheckPrinted("iii"); }
 TEST(FocusRegression, SlowAPrintedEdgeOfUnknownFloorCoversTheTruth) {
@@ -196,13 +199,13 @@ void CheckUnknownOffset(const char* name, double within_mm) {
   GiveFloor(&s);
   s.sweep.offset_mm.reset();
   const Calibration c = Measured(s);
-  ASSERT_TRUE(c.bench_offset_mm && c.focus_depth_mm) << c.reason;
-  const double offset_error_mm = c.bench_offset_mm->value - s.truth.bench_offset_mm;
-  const double focus_error_mm = c.focus_depth_mm->value - s.truth.focus_depth_mm;
+  ASSERT_TRUE(c.summary.bench_offset_mm && c.summary.focus_depth_mm) << c.summary.reason;
+  const double offset_error_mm = c.summary.bench_offset_mm->value - s.truth.bench_offset_mm;
+  const double focus_error_mm = c.summary.focus_depth_mm->value - s.truth.focus_depth_mm;
   EXPECT_LT(std::abs(offset_error_mm), within_mm);
   EXPECT_LT(std::abs(focus_error_mm), within_mm);
-  EXPECT_LT(std::abs(offset_error_mm), 3 * c.bench_offset_mm->sigma);
-  EXPECT_LT(std::abs(focus_error_mm), 3 * c.focus_depth_mm->sigma);
+  EXPECT_LT(std::abs(offset_error_mm), 3 * c.summary.bench_offset_mm->sigma);
+  EXPECT_LT(std::abs(focus_error_mm), 3 * c.summary.focus_depth_mm->sigma);
 }
 TEST(FocusRegression, AnUnknownOffsetIsFoundFromTheImageScale) { CheckUnknownOffset("iii", 0.6); }
 TEST(FocusRegression, SlowAnUnknownOffsetIsFoundFromTheImageScale) {
@@ -219,14 +222,16 @@ void CheckSourceRecipe(const char* name) {
   SimulatedSweep s = Sweep(name, model::TargetKind::kDeadLeaves, 1);
   GiveFloor(&s);
   const Calibration c = Measured(s);
-  ASSERT_TRUE(c.source.done && c.focus_depth_mm);
-  const double ours_mm = std::abs(c.focus_depth_mm->value - s.truth.focus_depth_mm);
-  const double source_mm = std::abs(c.source.focus_depth_mm - s.truth.focus_depth_mm);
+  ASSERT_TRUE(c.diagnostics.paper_recipe.done && c.summary.focus_depth_mm);
+  const double ours_mm = std::abs(c.summary.focus_depth_mm->value - s.truth.focus_depth_mm);
+  const double source_mm =
+      std::abs(c.diagnostics.paper_recipe.focus_depth_mm - s.truth.focus_depth_mm);
   EXPECT_GT(source_mm, 5 * ours_mm);
-  EXPECT_GT(source_mm, 5 * c.focus_depth_mm->sigma);
-  EXPECT_LT(c.source.focus_depth_mm, s.truth.focus_depth_mm);  // shifted to the near side
-  EXPECT_GT(std::abs(c.source.blur_ratio / s.truth.blur_ratio - 1), 0.3);
-  EXPECT_LT(std::abs(c.blur_ratio->value / s.truth.blur_ratio - 1), 0.004);
+  EXPECT_GT(source_mm, 5 * c.summary.focus_depth_mm->sigma);
+  EXPECT_LT(c.diagnostics.paper_recipe.focus_depth_mm,
+            s.truth.focus_depth_mm);  // shifted to the near side
+  EXPECT_GT(std::abs(c.diagnostics.paper_recipe.blur_ratio / s.truth.blur_ratio - 1), 0.3);
+  EXPECT_LT(std::abs(c.summary.blur_ratio->value / s.truth.blur_ratio - 1), 0.004);
 }
 TEST(SourceRecipe, MissesFocusAndRatioInCaseThree) { CheckSourceRecipe("iii"); }
 TEST(SourceRecipe, SlowMissesFocusAndRatioInCaseFour) { CheckSourceRecipe("iv"); }

@@ -27,22 +27,24 @@ constexpr double kErrorPx2 = 0.01;
 
 void ExpectTrueFocus(const FocusCase& c, double within_mm) {
   const Calibration& found = c.calibration;
-  ASSERT_TRUE(found.focus_depth_mm && found.image_distance_mm && found.blur_ratio) << found.reason;
-  EXPECT_NEAR(found.focus_depth_mm->value, c.bench.focus_mm, within_mm);
-  EXPECT_NEAR(found.blur_ratio->value, c.bench.ratio, 0.01 * within_mm);
-  EXPECT_EQ(found.image_distance_mm->value,
-            model::ImageDistanceMm(c.bench.lens, found.focus_depth_mm->value));
+  ASSERT_TRUE(found.summary.focus_depth_mm && found.summary.image_distance_mm &&
+              found.summary.blur_ratio)
+      << found.summary.reason;
+  EXPECT_NEAR(found.summary.focus_depth_mm->value, c.bench.focus_mm, within_mm);
+  EXPECT_NEAR(found.summary.blur_ratio->value, c.bench.ratio, 0.01 * within_mm);
+  EXPECT_EQ(found.summary.image_distance_mm->value,
+            model::ImageDistanceMm(c.bench.lens, found.summary.focus_depth_mm->value));
 }
 
 // d1 is computed from differences of the imaging equation, not from the formula of its slope.
 void ExpectImageDistanceSigma(const FocusCase& c) {
-  const Result& zf = *c.calibration.focus_depth_mm;
+  const Result& zf = *c.calibration.summary.focus_depth_mm;
   const double h = 1e-3;
   const double slope = (model::ImageDistanceMm(c.bench.lens, zf.value + h) -
                         model::ImageDistanceMm(c.bench.lens, zf.value - h)) /
                        (2 * h);
   ASSERT_GT(zf.sigma, 0);
-  EXPECT_NEAR(c.calibration.image_distance_mm->sigma, std::abs(slope) * zf.sigma,
+  EXPECT_NEAR(c.calibration.summary.image_distance_mm->sigma, std::abs(slope) * zf.sigma,
               1e-6 * std::abs(slope) * zf.sigma);
 }
 
@@ -50,19 +52,20 @@ void ExpectImageDistanceSigma(const FocusCase& c) {
 // reference.
 void ExpectCovariance(const Calibration& c, const Eigen::Matrix4d& reference,
                       const std::vector<int>& rows) {
-  ASSERT_EQ(c.covariance.rows(), static_cast<Eigen::Index>(rows.size()));
-  ASSERT_EQ(c.covariance.cols(), c.covariance.rows());
+  ASSERT_EQ(c.diagnostics.covariance.rows(), static_cast<Eigen::Index>(rows.size()));
+  ASSERT_EQ(c.diagnostics.covariance.cols(), c.diagnostics.covariance.rows());
   const Eigen::MatrixXd expected = reference(rows, rows);
   for (Eigen::Index a = 0; a < expected.rows(); ++a) {
     for (Eigen::Index b = 0; b < expected.cols(); ++b) {
-      EXPECT_NEAR(c.covariance(a, b), expected(a, b),
+      EXPECT_NEAR(c.diagnostics.covariance(a, b), expected(a, b),
                   2e-3 * std::sqrt(expected(a, a) * expected(b, b)))
           << a << ", " << b;
     }
   }
-  EXPECT_NEAR(c.image_distance_mm->sigma, std::sqrt(c.covariance(0, 0)),
-              1e-9 * c.image_distance_mm->sigma);
-  EXPECT_NEAR(c.blur_ratio->sigma, std::sqrt(c.covariance(1, 1)), 1e-9 * c.blur_ratio->sigma);
+  EXPECT_NEAR(c.summary.image_distance_mm->sigma, std::sqrt(c.diagnostics.covariance(0, 0)),
+              1e-9 * c.summary.image_distance_mm->sigma);
+  EXPECT_NEAR(c.summary.blur_ratio->sigma, std::sqrt(c.diagnostics.covariance(1, 1)),
+              1e-9 * c.summary.blur_ratio->sigma);
 }
 
 // ---- a floor that is given ----
@@ -70,19 +73,19 @@ void ExpectCovariance(const Calibration& c, const Eigen::Matrix4d& reference,
 TEST(SolveFocus, AGivenFloorIsWrittenWithItsError) {
   FocusCase c = FocusCase().WithTexture(kErrorPx2).WithTrueFloor(0.03);
   c.Solve();
-  EXPECT_EQ(c.calibration.outcome, Outcome::kOk);
-  EXPECT_EQ(c.calibration.reason, "");
-  EXPECT_THAT(c.calibration.warnings, IsEmpty());
-  EXPECT_THAT(c.calibration.blur.undetermined, IsEmpty());
+  EXPECT_EQ(c.calibration.summary.outcome, Outcome::kOk);
+  EXPECT_EQ(c.calibration.summary.reason, "");
+  EXPECT_THAT(c.calibration.summary.warnings, IsEmpty());
+  EXPECT_THAT(c.calibration.diagnostics.blur.undetermined, IsEmpty());
   ExpectTrueFocus(c, 1e-3);
   ExpectImageDistanceSigma(c);
-  ASSERT_TRUE(c.calibration.blur_floor_px);
-  EXPECT_NEAR(c.calibration.blur_floor_px->value, 0.5, 1e-4);
+  ASSERT_TRUE(c.calibration.summary.blur_floor_px);
+  EXPECT_NEAR(c.calibration.summary.blur_floor_px->value, 0.5, 1e-4);
   // A texture contains almost no information about the floor, so the error of the floor stays the
   // same.
-  EXPECT_NEAR(c.calibration.blur_floor_px->sigma, 0.03, 1e-4);
-  EXPECT_FALSE(c.calibration.blur_floor_px->systematic);
-  EXPECT_THAT(c.calibration.covariance_order,
+  EXPECT_NEAR(c.calibration.summary.blur_floor_px->sigma, 0.03, 1e-4);
+  EXPECT_FALSE(c.calibration.summary.blur_floor_px->systematic);
+  EXPECT_THAT(c.calibration.diagnostics.covariance_order,
               ElementsAre("image_distance_mm", "blur_ratio", "blur_floor_px", "bench_offset_mm"));
   LinearReference reference{kErrorPx2, true, 0.03};
   ExpectCovariance(c.calibration, reference.Covariance(c.bench), {0, 1, 2, 3});
@@ -95,17 +98,17 @@ TEST(SolveFocus, AGivenFloorsErrorIsInTheFocus) {
   FocusCase c = FocusCase().WithTexture(1e-4).WithTrueFloor(0.05);
   c.Solve();
   const double by_floor_mm = c.bench.focus_mm * 2 * 0.5 * 0.05 / c.bench.Curvature();
-  EXPECT_NEAR(c.calibration.focus_depth_mm->sigma, by_floor_mm, 0.01 * by_floor_mm);
+  EXPECT_NEAR(c.calibration.summary.focus_depth_mm->sigma, by_floor_mm, 0.01 * by_floor_mm);
 }
 
 TEST(SolveFocus, AFloorWithoutErrorStaysWhatItIs) {
   FocusCase c = FocusCase().WithTexture(kErrorPx2).WithTrueFloor();
   c.Solve();
-  EXPECT_EQ(c.calibration.outcome, Outcome::kOk);
+  EXPECT_EQ(c.calibration.summary.outcome, Outcome::kOk);
   ExpectTrueFocus(c, 1e-3);
-  ASSERT_TRUE(c.calibration.blur_floor_px);
-  EXPECT_NEAR(c.calibration.blur_floor_px->value, 0.5, 1e-12);
-  EXPECT_EQ(c.calibration.blur_floor_px->sigma, 0);
+  ASSERT_TRUE(c.calibration.summary.blur_floor_px);
+  EXPECT_NEAR(c.calibration.summary.blur_floor_px->value, 0.5, 1e-12);
+  EXPECT_EQ(c.calibration.summary.blur_floor_px->sigma, 0);
   LinearReference reference{kErrorPx2, true, 0, true};
   ExpectCovariance(c.calibration, reference.Covariance(c.bench), {0, 1, 2, 3});
 }
@@ -115,11 +118,11 @@ TEST(SolveFocus, APerfectLensMayBeStated) {
   bench.floor_px2 = 0;
   FocusCase c = FocusCase(bench).WithTexture(kErrorPx2).WithFloor(0, 0);
   c.Solve();
-  EXPECT_EQ(c.calibration.outcome, Outcome::kOk);
+  EXPECT_EQ(c.calibration.summary.outcome, Outcome::kOk);
   ExpectTrueFocus(c, 1e-3);
-  EXPECT_EQ(c.calibration.blur_floor_px->value, 0);
-  EXPECT_EQ(c.calibration.blur_floor_px->sigma, 0);
-  EXPECT_TRUE(c.calibration.covariance.allFinite());
+  EXPECT_EQ(c.calibration.summary.blur_floor_px->value, 0);
+  EXPECT_EQ(c.calibration.summary.blur_floor_px->sigma, 0);
+  EXPECT_TRUE(c.calibration.diagnostics.covariance.allFinite());
 }
 
 // ---- a knife edge measures it ----
@@ -127,37 +130,37 @@ TEST(SolveFocus, APerfectLensMayBeStated) {
 TEST(SolveFocus, AKnifeEdgeMeasuresTheFloor) {
   FocusCase c = FocusCase().WithKnifeEdge(kErrorPx2);
   c.Solve();
-  EXPECT_EQ(c.calibration.outcome, Outcome::kOk) << c.calibration.reason;
+  EXPECT_EQ(c.calibration.summary.outcome, Outcome::kOk) << c.calibration.summary.reason;
   ExpectTrueFocus(c, 1e-3);
   ExpectImageDistanceSigma(c);
-  ASSERT_TRUE(c.calibration.blur_floor_px);
-  EXPECT_NEAR(c.calibration.blur_floor_px->value, 0.5, 1e-4);
+  ASSERT_TRUE(c.calibration.summary.blur_floor_px);
+  EXPECT_NEAR(c.calibration.summary.blur_floor_px->value, 0.5, 1e-4);
   const Eigen::Matrix4d reference = LinearReference{kErrorPx2}.Covariance(c.bench);
-  EXPECT_NEAR(c.calibration.blur_floor_px->sigma, std::sqrt(reference(2, 2)),
+  EXPECT_NEAR(c.calibration.summary.blur_floor_px->sigma, std::sqrt(reference(2, 2)),
               1e-3 * std::sqrt(reference(2, 2)));
-  EXPECT_THAT(c.calibration.covariance_order,
+  EXPECT_THAT(c.calibration.diagnostics.covariance_order,
               ElementsAre("image_distance_mm", "blur_ratio", "blur_floor_px", "bench_offset_mm"));
   ExpectCovariance(c.calibration, reference, {0, 1, 2, 3});
-  EXPECT_EQ(c.calibration.blur.estimator, "edges");
+  EXPECT_EQ(c.calibration.diagnostics.blur.estimator, "edges");
   EXPECT_EQ(c.Part("lens floor"), nullptr);
 }
 
 TEST(SolveFocus, AKnifeEdgeBesideATextureFixesTheTexturesFloorToo) {
   FocusCase c = FocusCase().WithTexture(kErrorPx2).WithKnifeEdge(kErrorPx2);
   c.Solve();
-  EXPECT_EQ(c.calibration.outcome, Outcome::kOk);
+  EXPECT_EQ(c.calibration.summary.outcome, Outcome::kOk);
   ExpectTrueFocus(c, 1e-3);
-  EXPECT_NEAR(c.calibration.blur_floor_px->value, 0.5, 1e-4);
-  EXPECT_EQ(c.calibration.blur.estimator, "edges and relative spectrum");
+  EXPECT_NEAR(c.calibration.summary.blur_floor_px->value, 0.5, 1e-4);
+  EXPECT_EQ(c.calibration.diagnostics.blur.estimator, "edges and relative spectrum");
   // Frames are counted, not samples.
-  EXPECT_EQ(c.calibration.blur.frames_used, c.bench.count);
+  EXPECT_EQ(c.calibration.diagnostics.blur.frames_used, c.bench.count);
 }
 
 TEST(SolveFocus, WhatIsGivenCountsMoreThanTheKnifeEdge) {
   FocusCase c = FocusCase().WithKnifeEdge(0.3).WithFloor(0.6, 0.001);
   c.Solve();
-  EXPECT_NEAR(c.calibration.blur_floor_px->value, 0.6, 0.01);
-  EXPECT_LT(c.calibration.blur_floor_px->sigma, 0.0011);
+  EXPECT_NEAR(c.calibration.summary.blur_floor_px->value, 0.6, 0.01);
+  EXPECT_LT(c.calibration.summary.blur_floor_px->sigma, 0.0011);
 }
 
 // The lens is so sharp that the edge cannot distinguish its floor from 0.
@@ -166,12 +169,12 @@ TEST(SolveFocus, AFloorBelowItsOwnErrorIsLeftOpen) {
   bench.floor_px2 = 1e-4;
   FocusCase c = FocusCase(bench).WithKnifeEdge(kErrorPx2);
   c.Solve();
-  EXPECT_EQ(c.calibration.outcome, Outcome::kPartial);
-  EXPECT_THAT(c.calibration.blur.undetermined, ElementsAre("blur_floor_px"));
-  EXPECT_FALSE(c.calibration.blur_floor_px);
-  EXPECT_THAT(c.calibration.covariance_order,
+  EXPECT_EQ(c.calibration.summary.outcome, Outcome::kPartial);
+  EXPECT_THAT(c.calibration.diagnostics.blur.undetermined, ElementsAre("blur_floor_px"));
+  EXPECT_FALSE(c.calibration.summary.blur_floor_px);
+  EXPECT_THAT(c.calibration.diagnostics.covariance_order,
               ElementsAre("image_distance_mm", "blur_ratio", "bench_offset_mm"));
-  EXPECT_EQ(c.calibration.covariance.rows(), 3);
+  EXPECT_EQ(c.calibration.diagnostics.covariance.rows(), 3);
   ExpectTrueFocus(c, 1e-2);
 }
 
@@ -180,18 +183,18 @@ TEST(SolveFocus, AFloorBelowItsOwnErrorIsLeftOpen) {
 // Checks everything that is stated about an interval (px), given or found.
 void ExpectInterval(const FocusCase& c, double from_px, double to_px, double within_px) {
   const Calibration& found = c.calibration;
-  EXPECT_EQ(found.outcome, Outcome::kPartial);
-  EXPECT_THAT(found.reason, HasSubstr("blur_floor_px"));
-  EXPECT_THAT(found.blur.undetermined, ElementsAre("blur_floor_px"));
-  ASSERT_TRUE(found.blur_floor_px && found.blur_floor_px->systematic);
-  EXPECT_TRUE(std::isnan(found.blur_floor_px->value));
-  EXPECT_TRUE(std::isnan(found.blur_floor_px->sigma));
-  EXPECT_NEAR(found.blur_floor_px->systematic->x(), from_px, within_px);
-  EXPECT_NEAR(found.blur_floor_px->systematic->y(), to_px, within_px);
-  EXPECT_THAT(found.covariance_order,
+  EXPECT_EQ(found.summary.outcome, Outcome::kPartial);
+  EXPECT_THAT(found.summary.reason, HasSubstr("blur_floor_px"));
+  EXPECT_THAT(found.diagnostics.blur.undetermined, ElementsAre("blur_floor_px"));
+  ASSERT_TRUE(found.summary.blur_floor_px && found.summary.blur_floor_px->systematic);
+  EXPECT_TRUE(std::isnan(found.summary.blur_floor_px->value));
+  EXPECT_TRUE(std::isnan(found.summary.blur_floor_px->sigma));
+  EXPECT_NEAR(found.summary.blur_floor_px->systematic->x(), from_px, within_px);
+  EXPECT_NEAR(found.summary.blur_floor_px->systematic->y(), to_px, within_px);
+  EXPECT_THAT(found.diagnostics.covariance_order,
               ElementsAre("image_distance_mm", "blur_ratio", "bench_offset_mm"));
-  EXPECT_EQ(found.covariance.rows(), 3);
-  EXPECT_TRUE(found.covariance.allFinite());
+  EXPECT_EQ(found.diagnostics.covariance.rows(), 3);
+  EXPECT_TRUE(found.diagnostics.covariance.allFinite());
 }
 
 // Returns zf for a floor. The vertex of the parabola that the blur follows on the target does not
@@ -210,18 +213,21 @@ TEST(SolveFocus, AnIntervalIsAnIntervalOfTheFocus) {
   ExpectInterval(c, 0.3, 0.8, 1e-12);
   // The mean of the squares is assumed.
   const double middle_px2 = 0.5 * (0.09 + 0.64);
-  EXPECT_NEAR(c.calibration.focus_depth_mm->value, FocusWithFloor(c.bench, middle_px2), 1e-3);
-  ASSERT_TRUE(c.calibration.focus_depth_mm->systematic);
-  EXPECT_NEAR(c.calibration.focus_depth_mm->systematic->x(), FocusWithFloor(c.bench, 0.09), 1e-2);
-  EXPECT_NEAR(c.calibration.focus_depth_mm->systematic->y(), FocusWithFloor(c.bench, 0.64), 1e-2);
+  EXPECT_NEAR(c.calibration.summary.focus_depth_mm->value, FocusWithFloor(c.bench, middle_px2),
+              1e-3);
+  ASSERT_TRUE(c.calibration.summary.focus_depth_mm->systematic);
+  EXPECT_NEAR(c.calibration.summary.focus_depth_mm->systematic->x(), FocusWithFloor(c.bench, 0.09),
+              1e-2);
+  EXPECT_NEAR(c.calibration.summary.focus_depth_mm->systematic->y(), FocusWithFloor(c.bench, 0.64),
+              1e-2);
   ASSERT_NE(c.Part("lens floor"), nullptr);
   // The floor was stated, so there is no warning.
-  EXPECT_THAT(c.calibration.warnings, IsEmpty());
+  EXPECT_THAT(c.calibration.summary.warnings, IsEmpty());
   // The remaining rows equal those of the reference with a fixed floor.
   BlurBench assumed = c.bench;
   assumed.floor_px2 = middle_px2;
-  assumed.focus_mm = c.calibration.focus_depth_mm->value;
-  assumed.ratio = c.calibration.blur_ratio->value;
+  assumed.focus_mm = c.calibration.summary.focus_depth_mm->value;
+  assumed.ratio = c.calibration.summary.blur_ratio->value;
   ExpectCovariance(c.calibration, LinearReference{kErrorPx2, true, 0, true}.Covariance(assumed),
                    {0, 1, 3});
 }
@@ -231,8 +237,8 @@ TEST(SolveFocus, AnUnknownFloorIsUpToASoftLens) {
   FocusCase c = FocusCase().WithTexture(kErrorPx2);
   c.Solve();
   ExpectInterval(c, 0, 3, 1e-12);
-  EXPECT_NEAR(c.calibration.focus_depth_mm->value, FocusWithFloor(c.bench, 4.5), 1e-2);
-  EXPECT_THAT(c.calibration.warnings,
+  EXPECT_NEAR(c.calibration.summary.focus_depth_mm->value, FocusWithFloor(c.bench, 4.5), 1e-2);
+  EXPECT_THAT(c.calibration.summary.warnings,
               ElementsAre(AllOf(HasSubstr("this target does not determine the lens floor"),
                                 HasSubstr("0 to 3.0 px"), HasSubstr("state blur_floor_px"))));
 }
@@ -244,9 +250,9 @@ TEST(SolveFocus, PrintedEdgesBoundTheFloor) {
   FocusCase c = FocusCase().WithPrintedEdge(kErrorPx2, kInkPx2);
   c.Solve();
   ExpectInterval(c, 0, 0.8, 0.02);  // the ink is fitted as if it were lens blur
-  EXPECT_THAT(c.calibration.warnings,
+  EXPECT_THAT(c.calibration.summary.warnings,
               ElementsAre(AllOf(HasSubstr("px at focus"), HasSubstr("knife edge"))));
-  const Eigen::Vector2d& zf = *c.calibration.focus_depth_mm->systematic;
+  const Eigen::Vector2d& zf = *c.calibration.summary.focus_depth_mm->systematic;
   EXPECT_LT(zf.x(), c.bench.focus_mm - 0.2);
   EXPECT_GT(zf.y(), c.bench.focus_mm + 0.2);
 }
@@ -263,8 +269,8 @@ TEST(SolveFocus, EdgesOfATextureBoundTheFloor) {
   c.evidence.unstated_edges->variances_px2[2] += 5;
   c.Solve();
   ExpectInterval(c, 0, 0.8, 0.02);
-  EXPECT_THAT(c.calibration.warnings, ElementsAre(HasSubstr("px at focus")));
-  EXPECT_EQ(c.calibration.blur.estimator, "relative spectrum");
+  EXPECT_THAT(c.calibration.summary.warnings, ElementsAre(HasSubstr("px at focus")));
+  EXPECT_EQ(c.calibration.diagnostics.blur.estimator, "relative spectrum");
 }
 
 // Frames off focus, whose scale differs from that of the reference, give the same bound, although a
@@ -285,15 +291,15 @@ TEST(SolveFocus, EdgesWithoutSoftnessAreNoBound) {
   FocusCase c = FocusCase().WithPrintedEdge(kErrorPx2, -0.6);
   c.Solve();
   ExpectInterval(c, 0, 1, 1e-12);
-  EXPECT_THAT(c.calibration.warnings, ElementsAre(HasSubstr("0 to 1.0 px")));
+  EXPECT_THAT(c.calibration.summary.warnings, ElementsAre(HasSubstr("0 to 1.0 px")));
 }
 
 TEST(SolveFocus, EdgesOfATextureWithoutSoftnessAreNoBoundEither) {
   FocusCase c = FocusCase().WithTexture(kErrorPx2);
   c.evidence.unstated_edges = c.bench.Absolute(kErrorPx2, -0.6, &c.random);
   c.Solve();
-  EXPECT_EQ(c.calibration.outcome, Outcome::kPartial);
-  EXPECT_THAT(c.calibration.warnings, ElementsAre(HasSubstr("are allowed for")));
+  EXPECT_EQ(c.calibration.summary.outcome, Outcome::kPartial);
+  EXPECT_THAT(c.calibration.summary.warnings, ElementsAre(HasSubstr("are allowed for")));
 }
 
 // ---- the bench zero ----
@@ -302,14 +308,14 @@ TEST(SolveFocus, TheBenchZerosErrorIsInTheCovariance) {
   constexpr double kZeroSigmaMm = 0.6;
   FocusCase c = FocusCase(ExactBench(), kZeroSigmaMm).WithTexture(kErrorPx2).WithTrueFloor(0.03);
   c.Solve();
-  ASSERT_EQ(c.calibration.covariance.rows(), 4);
-  EXPECT_NEAR(c.calibration.covariance(3, 3), kZeroSigmaMm * kZeroSigmaMm, 1e-9);
+  ASSERT_EQ(c.calibration.diagnostics.covariance.rows(), 4);
+  EXPECT_NEAR(c.calibration.diagnostics.covariance(3, 3), kZeroSigmaMm * kZeroSigmaMm, 1e-9);
   LinearReference reference{kErrorPx2, true, 0.03};
   reference.offset_sigma_mm = kZeroSigmaMm;
   ExpectCovariance(c.calibration, reference.Covariance(c.bench), {0, 1, 2, 3});
   // If the zero is too large, zf is too large and d1 too small.
-  EXPECT_LT(c.calibration.covariance(0, 3), 0);
-  EXPECT_GT(c.calibration.focus_depth_mm->sigma, 0.9 * kZeroSigmaMm);
+  EXPECT_LT(c.calibration.diagnostics.covariance(0, 3), 0);
+  EXPECT_GT(c.calibration.summary.focus_depth_mm->sigma, 0.9 * kZeroSigmaMm);
 }
 
 // ---- messages about the blur ----
@@ -320,17 +326,17 @@ TEST(SolveFocus, MessagesOfTheMetersAreKept) {
   c.evidence.disc_misfit = 1.3;
   c.evidence.examples.resize(3);
   c.Solve();
-  EXPECT_TRUE(c.calibration.blur.done);
-  EXPECT_EQ(c.calibration.blur.estimator, "relative spectrum");
-  EXPECT_EQ(c.calibration.blur.message, "converged");
-  EXPECT_EQ(c.calibration.blur.gaussian_misfit, 1.2);
-  EXPECT_EQ(c.calibration.blur.disc_misfit, 1.3);
-  EXPECT_EQ(c.calibration.blur.better_psf, model::Psf::kGaussian);
+  EXPECT_TRUE(c.calibration.diagnostics.blur.done);
+  EXPECT_EQ(c.calibration.diagnostics.blur.estimator, "relative spectrum");
+  EXPECT_EQ(c.calibration.diagnostics.blur.message, "converged");
+  EXPECT_EQ(c.calibration.diagnostics.blur.gaussian_misfit, 1.2);
+  EXPECT_EQ(c.calibration.diagnostics.blur.disc_misfit, 1.3);
+  EXPECT_EQ(c.calibration.diagnostics.blur.better_psf, model::Psf::kGaussian);
   EXPECT_EQ(c.calibration.examples.size(), 3U);
-  EXPECT_EQ(c.calibration.blur.outside_mm, 0);
-  EXPECT_EQ(c.calibration.blur.chi2_per_dof, c.fit.chi2_per_dof);
-  EXPECT_NE(c.calibration.blur.weak_direction, "");
-  EXPECT_TRUE(c.calibration.nearer.done && c.calibration.farther.done);
+  EXPECT_EQ(c.calibration.diagnostics.blur.outside_mm, 0);
+  EXPECT_EQ(c.calibration.diagnostics.blur.chi2_per_dof, c.fit.chi2_per_dof);
+  EXPECT_NE(c.calibration.diagnostics.blur.weak_direction, "");
+  EXPECT_TRUE(c.calibration.diagnostics.nearer.done && c.calibration.diagnostics.farther.done);
 }
 
 TEST(SolveFocus, AnotherShapeIsWarnedOfWhereItFitsClearlyBetter) {
@@ -357,9 +363,9 @@ TEST(SolveFocus, AnotherShapeIsWarnedOfWhereItFitsClearlyBetter) {
     c.evidence.better_psf = k.gaussian <= k.disc ? model::Psf::kGaussian : model::Psf::kDisc;
     c.Solve();
     if (k.warning != nullptr) {
-      EXPECT_THAT(c.calibration.warnings, Contains(HasSubstr(k.warning)));
+      EXPECT_THAT(c.calibration.summary.warnings, Contains(HasSubstr(k.warning)));
     } else {
-      EXPECT_THAT(c.calibration.warnings, Not(Contains(HasSubstr("the blur is a"))));
+      EXPECT_THAT(c.calibration.summary.warnings, Not(Contains(HasSubstr("the blur is a"))));
     }
   }
 }

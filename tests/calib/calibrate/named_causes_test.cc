@@ -36,10 +36,11 @@ SimulatedSweep Good() {
 }
 
 void ExpectSharpestAt(const Calibration& c, double reading_mm, double within_mm) {
-  ASSERT_TRUE(c.sharpest.done) << c.sharpest.message;
-  EXPECT_NEAR(c.sharpest.reading_mm.value, reading_mm, within_mm);
-  EXPECT_NEAR(c.sharpest.reading_mm.value, reading_mm, 4 * c.sharpest.reading_mm.sigma);
-  EXPECT_LT(c.sharpest.reading_mm.sigma, within_mm);
+  ASSERT_TRUE(c.diagnostics.sharpest.done) << c.diagnostics.sharpest.message;
+  EXPECT_NEAR(c.diagnostics.sharpest.reading_mm.value, reading_mm, within_mm);
+  EXPECT_NEAR(c.diagnostics.sharpest.reading_mm.value, reading_mm,
+              4 * c.diagnostics.sharpest.reading_mm.sigma);
+  EXPECT_LT(c.diagnostics.sharpest.reading_mm.sigma, within_mm);
 }
 
 TEST(Reason, ReadingsInInchesWithAStatedErrorAreStillAskedAbout) {
@@ -49,10 +50,11 @@ TEST(Reason, ReadingsInInchesWithAStatedErrorAreStillAskedAbout) {
     frame.reading_mm = (frame.reading_mm - 190) / 25.4;
   s.sweep.reading_sigma_mm = 0.05;  // 4 % of the range of the readings
   const Calibration c = CalibrateWithoutMap(s);
-  EXPECT_EQ(c.outcome, Outcome::kRefused);
-  EXPECT_THAT(c.reason, AllOf(StartsWith("the image scale puts the target at 1"),
-                              HasSubstr("that the readings are in mm? With readings in inches"),
-                              Not(HasSubstr("does not follow"))));
+  EXPECT_EQ(c.summary.outcome, Outcome::kRefused);
+  EXPECT_THAT(c.summary.reason,
+              AllOf(StartsWith("the image scale puts the target at 1"),
+                    HasSubstr("that the readings are in mm? With readings in inches"),
+                    Not(HasSubstr("does not follow"))));
   ExpectSharpestAt(c, 110 / 25.4, 0.03);
 }
 
@@ -67,13 +69,13 @@ TEST(Reason, AlignedFramesAreNotCalledDistorted) {
     cv::warpAffine(frame.clone(), frame, map, frame.size(), cv::INTER_CUBIC, cv::BORDER_REFLECT);
   }
   const Calibration c = CalibrateWithoutMap(s);
-  std::string said = c.reason;
-  for (const std::string& warning : c.warnings) said += " | " + warning;
+  std::string said = c.summary.reason;
+  for (const std::string& warning : c.summary.warnings) said += " | " + warning;
   EXPECT_THAT(said, AllOf(HasSubstr("the image scale does not change with the reading, although it "
                                     "should change by 11 % according to offset_mm"),
                           HasSubstr("aligned"), HasSubstr("telecentric"),
                           Not(HasSubstr("distorted")), Not(HasSubstr("undistort"))));
-  EXPECT_FALSE(c.scale.distortion_at_corner);
+  EXPECT_FALSE(c.diagnostics.scale.distortion_at_corner);
   ExpectSharpestAt(c, 300, 0.7);
 }
 
@@ -129,14 +131,15 @@ TEST(Reason, ALensThatMovesIsNamedAndNotTheDirectionOrTheUnit) {
   for (const auto direction : {model::BenchDirection::kAway, model::BenchDirection::kToward}) {
     s.sweep.direction = direction;
     const Calibration c = CalibrateWithoutMap(s);
-    EXPECT_EQ(c.outcome, Outcome::kRefused);
-    EXPECT_THAT(c.reason, AllOf(StartsWith("the image scale follows the lens, not the target"),
-                                Not(HasSubstr("direction must be")),
-                                Not(HasSubstr("that the readings are in mm")),
-                                Not(HasSubstr("no lens has"))));
+    EXPECT_EQ(c.summary.outcome, Outcome::kRefused);
+    EXPECT_THAT(
+        c.summary.reason,
+        AllOf(StartsWith("the image scale follows the lens, not the target"),
+              Not(HasSubstr("direction must be")), Not(HasSubstr("that the readings are in mm")),
+              Not(HasSubstr("no lens has"))));
     ExpectSharpestAt(c, 0, 0.03);
-    ASSERT_TRUE(c.scale.change_over_sweep);
-    EXPECT_NEAR(c.scale.change_over_sweep->value, -0.02, 0.001);
+    ASSERT_TRUE(c.diagnostics.scale.change_over_sweep);
+    EXPECT_NEAR(c.diagnostics.scale.change_over_sweep->value, -0.02, 0.001);
   }
 }
 
@@ -157,16 +160,16 @@ TEST(Reason, AnUnknownZeroOfAMacroSweepIsNamedAndTheFocusReported) {
     s.sweep.offset_mm.reset();
     if (is_stated) s.sweep.offset_mm = model::Estimate{100, 2};
     const Calibration c = CalibrateWithoutMap(s);
-    ASSERT_EQ(c.outcome, Outcome::kRefused) << c.reason;
+    ASSERT_EQ(c.summary.outcome, Outcome::kRefused) << c.summary.reason;
     EXPECT_THAT(
-        c.reason,
+        c.summary.reason,
         AllOf(StartsWith("the bench zero is not known well enough"), HasSubstr("State offset_mm"),
               HasSubstr("reading at focus is known: 100"),
               Not(HasSubstr("that the readings are in mm")), Not(HasSubstr("blur does not"))))
-        << c.reason;
-    ASSERT_TRUE(c.focus_reading_mm);
-    EXPECT_NEAR(c.focus_reading_mm->value, 100, 0.01);
-    EXPECT_LT(c.focus_reading_mm->sigma, 0.01);
+        << c.summary.reason;
+    ASSERT_TRUE(c.diagnostics.focus_reading_mm);
+    EXPECT_NEAR(c.diagnostics.focus_reading_mm->value, 100, 0.01);
+    EXPECT_LT(c.diagnostics.focus_reading_mm->sigma, 0.01);
     ExpectSharpestAt(c, 100, 0.1);
   }
 }
@@ -184,20 +187,21 @@ TEST(Reason, AFlickeringLampIsNamedWhereFramesDoNotRegister) {
     }
   }
   const Calibration c = CalibrateWithoutMap(s);
-  std::string said = c.reason;
-  for (const std::string& warning : c.warnings) said += " | " + warning;
+  std::string said = c.summary.reason;
+  for (const std::string& warning : c.summary.warnings) said += " | " + warning;
   EXPECT_THAT(said, AllOf(HasSubstr("whole rows brighten together"), HasSubstr("rolling shutter"),
                           Not(HasSubstr("knife-edge or"))));
 }
 
 TEST(Reason, AGoodSweepHasNoCause) {
   const Calibration c = CalibrateWithoutMap(Good());
-  EXPECT_EQ(c.outcome, Outcome::kOk) << c.reason;
-  EXPECT_THAT(c.warnings, Each(Not(AnyOf(HasSubstr("bands"), HasSubstr("darker"),
-                                         HasSubstr("moves"), HasSubstr("distort")))));
+  EXPECT_EQ(c.summary.outcome, Outcome::kOk) << c.summary.reason;
+  EXPECT_THAT(c.summary.warnings, Each(Not(AnyOf(HasSubstr("bands"), HasSubstr("darker"),
+                                                 HasSubstr("moves"), HasSubstr("distort")))));
   ExpectSharpestAt(c, 300, 0.7);
-  ASSERT_TRUE(c.focus_reading_mm);
-  EXPECT_NEAR(c.focus_reading_mm->value, 300, 4 * c.focus_reading_mm->sigma);
+  ASSERT_TRUE(c.diagnostics.focus_reading_mm);
+  EXPECT_NEAR(c.diagnostics.focus_reading_mm->value, 300,
+              4 * c.diagnostics.focus_reading_mm->sigma);
 }
 
 }  // namespace

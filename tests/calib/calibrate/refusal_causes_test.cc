@@ -57,7 +57,9 @@ TEST(Exposure, AnOverExposedSweepGetsTheAdviceToLowerIt) {
       Expose(&s, 6, 0, last);
       const Calibration c = CalibrateWithoutMap(s);
       const std::string reported =
-          c.outcome == Outcome::kRefused || c.warnings.empty() ? c.reason : c.warnings.front();
+          c.summary.outcome == Outcome::kRefused || c.summary.warnings.empty()
+              ? c.summary.reason
+              : c.summary.warnings.front();
       EXPECT_THAT(reported, AllOf(HasSubstr("of 41 frames are over-exposed: lower the exposure"),
                                   Not(StartsWith("offset_mm"))));
     }
@@ -69,9 +71,9 @@ TEST(Exposure, AResultFromTheFewGoodFramesSaysSo) {
   SimulatedSweep s = Good();
   Expose(&s, 6, 14, 26);
   const Calibration c = CalibrateWithoutMap(s);
-  ASSERT_NE(c.outcome, Outcome::kRefused) << c.reason;
-  ASSERT_FALSE(c.warnings.empty());
-  EXPECT_THAT(c.warnings.front(),
+  ASSERT_NE(c.summary.outcome, Outcome::kRefused) << c.summary.reason;
+  ASSERT_FALSE(c.summary.warnings.empty());
+  EXPECT_THAT(c.summary.warnings.front(),
               AllOf(HasSubstr("of 41 frames are over-exposed: lower the exposure"),
                     HasSubstr("the results come from the other frames alone")));
 }
@@ -80,16 +82,17 @@ TEST(Exposure, ADarkSweepGetsTheAdviceToRaiseIt) {
   SimulatedSweep s = Good();
   Expose(&s, 0.01, 0, 1);
   const Calibration c = CalibrateWithoutMap(s);
-  EXPECT_EQ(c.outcome, Outcome::kRefused);
-  EXPECT_THAT(c.reason, StartsWith("39 of 41 frames are under-exposed: raise the exposure"));
+  EXPECT_EQ(c.summary.outcome, Outcome::kRefused);
+  EXPECT_THAT(c.summary.reason,
+              StartsWith("39 of 41 frames are under-exposed: raise the exposure"));
 }
 
 TEST(Exposure, AFewBadFramesAreNotTheCause) {
   SimulatedSweep s = Good();
   Expose(&s, 6, 4, 40);
   const Calibration c = CalibrateWithoutMap(s);
-  EXPECT_NE(c.outcome, Outcome::kRefused) << c.reason;
-  EXPECT_THAT(c.warnings, Not(Contains(HasSubstr("exposed"))));
+  EXPECT_NE(c.summary.outcome, Outcome::kRefused) << c.summary.reason;
+  EXPECT_THAT(c.summary.warnings, Not(Contains(HasSubstr("exposed"))));
 }
 
 // Half of the sweep is missing because of the light, so no other advice is given.
@@ -97,9 +100,9 @@ TEST(Exposure, WhatFollowsFromItIsNotAdvisedOn) {
   SimulatedSweep s = Good();
   Expose(&s, 6, 0, 6);
   const Calibration c = CalibrateWithoutMap(s);
-  ASSERT_EQ(c.outcome, Outcome::kRefused);
-  EXPECT_THAT(c.reason, AllOf(StartsWith("34 of 41 frames are over-exposed"),
-                              EndsWith("take the sweep again")));
+  ASSERT_EQ(c.summary.outcome, Outcome::kRefused);
+  EXPECT_THAT(c.summary.reason, AllOf(StartsWith("34 of 41 frames are over-exposed"),
+                                      EndsWith("take the sweep again")));
 }
 
 TEST(Unit, ReadingsInInchesAreAskedAbout) {
@@ -107,17 +110,17 @@ TEST(Unit, ReadingsInInchesAreAskedAbout) {
   s.sweep.offset_mm.reset();
   for (model::SweepFrame& frame : s.sweep.frames) frame.reading_mm /= 25.4;
   const Calibration c = CalibrateWithoutMap(s);
-  EXPECT_EQ(c.outcome, Outcome::kRefused);
-  EXPECT_THAT(c.reason, AllOf(StartsWith("the image scale puts the target at "),
-                              HasSubstr("that the readings are in mm")));
+  EXPECT_EQ(c.summary.outcome, Outcome::kRefused);
+  EXPECT_THAT(c.summary.reason, AllOf(StartsWith("the image scale puts the target at "),
+                                      HasSubstr("that the readings are in mm")));
 }
 
 TEST(Region, TooSmallForAnythingIsRefusedBeforeItIsMeasured) {
   SimulatedSweep s = Good();
   s.sweep.roi = {60, 60, 80, 23};
   const Calibration c = CalibrateWithoutMap(s);
-  EXPECT_EQ(c.outcome, Outcome::kRefused);
-  EXPECT_THAT(c.reason, StartsWith("the region of interest (roi_px) has 80 x 23 px"));
+  EXPECT_EQ(c.summary.outcome, Outcome::kRefused);
+  EXPECT_THAT(c.summary.reason, StartsWith("the region of interest (roi_px) has 80 x 23 px"));
   EXPECT_EQ(c.frames[0].statistics.mean_encoded, 0);
 }
 
@@ -125,8 +128,8 @@ TEST(Region, TooSmallForATextureIsNamedAsTheCause) {
   SimulatedSweep s = Good();
   s.sweep.roi = {60, 60, 40, 40};
   const Calibration c = CalibrateWithoutMap(s);
-  EXPECT_EQ(c.outcome, Outcome::kRefused);
-  EXPECT_THAT(c.reason,
+  EXPECT_EQ(c.summary.outcome, Outcome::kRefused);
+  EXPECT_THAT(c.summary.reason,
               StartsWith("the region of interest (roi_px) has 40 x 40 px: an edge requires"));
 }
 
@@ -134,8 +137,8 @@ TEST(Region, ASmallOneThatIsEnoughIsLeftAlone) {
   SimulatedSweep s = KnifeEdge();
   s.sweep.roi = {60, 60, 40, 40};
   const Calibration c = CalibrateWithoutMap(s);
-  EXPECT_EQ(c.outcome, Outcome::kOk) << c.reason;
-  EXPECT_THAT(c.warnings, Not(Contains(HasSubstr("roi_px"))));
+  EXPECT_EQ(c.summary.outcome, Outcome::kOk) << c.summary.reason;
+  EXPECT_THAT(c.summary.warnings, Not(Contains(HasSubstr("roi_px"))));
 }
 
 }  // namespace

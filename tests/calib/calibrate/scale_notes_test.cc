@@ -45,19 +45,19 @@ SimulatedSweep KnifeEdge() {
 TEST(LoneEdge, ItsMissingScaleIsANoteNotAWarning) {
   const SimulatedSweep s = KnifeEdge();
   const Calibration c = CalibrateWithoutMap(s);
-  EXPECT_EQ(c.outcome, Outcome::kOk) << c.reason;
-  EXPECT_FALSE(c.scale.done);
-  EXPECT_EQ(c.scale.message,
+  EXPECT_EQ(c.summary.outcome, Outcome::kOk) << c.summary.reason;
+  EXPECT_FALSE(c.diagnostics.scale.done);
+  EXPECT_EQ(c.diagnostics.scale.message,
             "a lone edge shows no image scale: the given offset_mm is used unchecked");
-  EXPECT_THAT(c.warnings, Not(Contains(HasSubstr("offset_mm"))));
+  EXPECT_THAT(c.summary.warnings, Not(Contains(HasSubstr("offset_mm"))));
 }
 
 TEST(LoneEdge, NeedsAGivenOffset) {
   SimulatedSweep s = KnifeEdge();
   s.sweep.offset_mm.reset();
   const Calibration c = CalibrateWithoutMap(s);
-  EXPECT_EQ(c.outcome, Outcome::kRefused);
-  EXPECT_THAT(c.reason,
+  EXPECT_EQ(c.summary.outcome, Outcome::kRefused);
+  EXPECT_THAT(c.summary.reason,
               AllOf(HasSubstr("a lone edge shows no image scale;"), HasSubstr("state offset_mm")));
 }
 
@@ -67,12 +67,12 @@ TEST(LoneEdge, OfAnUnstatedTargetItsSoftnessIsOpen) {
   SimulatedSweep s = KnifeEdge();
   s.sweep.target = model::SweepTarget::kAuto;
   const Calibration c = CalibrateWithoutMap(s);
-  ASSERT_EQ(c.outcome, Outcome::kPartial) << c.reason;
-  const double reach_mm = 2 * c.focus_depth_mm->sigma;
-  EXPECT_LT(c.focus_depth_mm->systematic->x() - reach_mm, s.truth.focus_depth_mm);
-  EXPECT_GT(c.focus_depth_mm->systematic->y() + reach_mm, s.truth.focus_depth_mm);
-  EXPECT_THAT(c.warnings, Contains(HasSubstr("the given offset_mm could not be checked")));
-  EXPECT_THAT(c.warnings, Contains(HasSubstr("photograph a knife edge")));
+  ASSERT_EQ(c.summary.outcome, Outcome::kPartial) << c.summary.reason;
+  const double reach_mm = 2 * c.summary.focus_depth_mm->sigma;
+  EXPECT_LT(c.summary.focus_depth_mm->systematic->x() - reach_mm, s.truth.focus_depth_mm);
+  EXPECT_GT(c.summary.focus_depth_mm->systematic->y() + reach_mm, s.truth.focus_depth_mm);
+  EXPECT_THAT(c.summary.warnings, Contains(HasSubstr("the given offset_mm could not be checked")));
+  EXPECT_THAT(c.summary.warnings, Contains(HasSubstr("photograph a knife edge")));
 }
 
 class StraightModel : public ::testing::TestWithParam<const char*> {};
@@ -81,8 +81,8 @@ TEST_P(StraightModel, SlowAStraightLawHasNoNoteOfABend) {
   for (const std::uint64_t seed : {1U, 2U}) {
     SimulatedSweep s = SweepWithFloor(GetParam(), 256, seed);
     const Calibration c = CalibrateWithoutMap(s);
-    EXPECT_TRUE(c.scale.done) << c.scale.message;
-    EXPECT_THAT(c.warnings, Not(Contains(HasSubstr("bend")))) << seed;
+    EXPECT_TRUE(c.diagnostics.scale.done) << c.diagnostics.scale.message;
+    EXPECT_THAT(c.summary.warnings, Not(Contains(HasSubstr("bend")))) << seed;
   }
 }
 INSTANTIATE_TEST_SUITE_P(Cases, StraightModel, ::testing::Values("i", "ii", "iii", "iv", "v"));
@@ -95,11 +95,11 @@ TEST(BentModel, IsWarnedOfWithItsSize) {
     frame.reading_mm += 0.8 * u * u;
   }
   const Calibration c = CalibrateWithoutMap(s);
-  const auto warning =
-      std::find_if(c.warnings.begin(), c.warnings.end(), [](const std::string& text) {
+  const auto warning = std::find_if(
+      c.summary.warnings.begin(), c.summary.warnings.end(), [](const std::string& text) {
         return text.find("readings bend against the image scale") != std::string::npos;
       });
-  ASSERT_NE(warning, c.warnings.end());
+  ASSERT_NE(warning, c.summary.warnings.end());
   EXPECT_THAT(*warning, AllOf(HasSubstr("they deviate by -0."), HasSubstr("less certain")));
   const std::string before = "they deviate by ";
   EXPECT_NEAR(std::stod(warning->substr(warning->find(before) + before.size())), -0.8, 0.2);

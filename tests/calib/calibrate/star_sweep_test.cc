@@ -29,23 +29,27 @@ SimulatedSweep StarSweep(const std::string& name, std::uint64_t seed) {
 }
 
 void ExpectRight(const Calibration& c, const model::SweepTruth& truth, double step_mm) {
-  ASSERT_TRUE(c.focus_depth_mm && c.blur_ratio && c.image_distance_mm) << c.reason;
-  EXPECT_NEAR(c.focus_depth_mm->value, truth.focus_depth_mm, 3 * c.focus_depth_mm->sigma);
-  EXPECT_NEAR(c.focus_depth_mm->value, truth.focus_depth_mm, 0.07 * step_mm);
-  EXPECT_NEAR(c.image_distance_mm->value, truth.image_distance_mm, 3 * c.image_distance_mm->sigma);
-  EXPECT_NEAR(c.blur_ratio->value, truth.blur_ratio, 3 * c.blur_ratio->sigma);
-  EXPECT_NEAR(c.blur_ratio->value / truth.blur_ratio, 1, 0.01);
+  ASSERT_TRUE(c.summary.focus_depth_mm && c.summary.blur_ratio && c.summary.image_distance_mm)
+      << c.summary.reason;
+  EXPECT_NEAR(c.summary.focus_depth_mm->value, truth.focus_depth_mm,
+              3 * c.summary.focus_depth_mm->sigma);
+  EXPECT_NEAR(c.summary.focus_depth_mm->value, truth.focus_depth_mm, 0.07 * step_mm);
+  EXPECT_NEAR(c.summary.image_distance_mm->value, truth.image_distance_mm,
+              3 * c.summary.image_distance_mm->sigma);
+  EXPECT_NEAR(c.summary.blur_ratio->value, truth.blur_ratio, 3 * c.summary.blur_ratio->sigma);
+  EXPECT_NEAR(c.summary.blur_ratio->value / truth.blur_ratio, 1, 0.01);
 }
 
 TEST(StarSweep, CalibratesWithinItsErrors) {
   const SimulatedSweep iii = StarSweep("iii", 3);
   const Calibration c = CalibrateWithoutMap(iii);
-  EXPECT_EQ(c.outcome, Outcome::kOk) << c.reason;
+  EXPECT_EQ(c.summary.outcome, Outcome::kOk) << c.summary.reason;
   ExpectRight(c, iii.truth, 4);
-  EXPECT_EQ(c.blur.estimator, "relative spectrum");
-  EXPECT_FALSE(c.scale.done);
-  EXPECT_THAT(c.warnings, Contains(HasSubstr("the given offset_mm could not be checked: the target "
-                                             "looks the same at every scale")));
+  EXPECT_EQ(c.diagnostics.blur.estimator, "relative spectrum");
+  EXPECT_FALSE(c.diagnostics.scale.done);
+  EXPECT_THAT(c.summary.warnings,
+              Contains(HasSubstr("the given offset_mm could not be checked: the target "
+                                 "looks the same at every scale")));
 }
 
 TEST(StarSweep, StrongDefocusCalibratesToo) {
@@ -84,19 +88,19 @@ TEST(StarSweep, TheSharpestFrameMayHaveTheWrongReading) {
   EXPECT_THAT(c.frames[sharpest].rejection, HasSubstr("reading off by"));
   EXPECT_FALSE(c.frames[sharpest].in_blur_fit);
   // The comparison of bands and shapes was possible, although it needs a reference.
-  EXPECT_EQ(clean.systematic_parts.size(), c.systematic_parts.size());
-  EXPECT_TRUE(c.blur.disc_misfit);
+  EXPECT_EQ(clean.diagnostics.systematic_parts.size(), c.diagnostics.systematic_parts.size());
+  EXPECT_TRUE(c.diagnostics.blur.disc_misfit);
 }
 
 TEST(StarSweep, WithoutAnOffsetItSaysWhatToDo) {
   SimulatedSweep s = StarSweep("iii", 3);
   s.sweep.offset_mm.reset();
   const Calibration c = CalibrateWithoutMap(s);
-  EXPECT_EQ(c.outcome, Outcome::kRefused);
-  EXPECT_FALSE(c.focus_depth_mm);
-  EXPECT_THAT(c.reason, HasSubstr("offset_mm is not stated"));
-  EXPECT_THAT(c.reason, HasSubstr("looks the same at every scale"));
-  EXPECT_THAT(c.reason, HasSubstr("state offset_mm, or use a texture"));
+  EXPECT_EQ(c.summary.outcome, Outcome::kRefused);
+  EXPECT_FALSE(c.summary.focus_depth_mm);
+  EXPECT_THAT(c.summary.reason, HasSubstr("offset_mm is not stated"));
+  EXPECT_THAT(c.summary.reason, HasSubstr("looks the same at every scale"));
+  EXPECT_THAT(c.summary.reason, HasSubstr("state offset_mm, or use a texture"));
 }
 
 }  // namespace

@@ -36,15 +36,16 @@ model::Camera StoredCamera(double d1_sigma, double ratio_sigma) {
 
 Calibration FoundCalibration(double d1_mm, double d1_sigma, double ratio, double ratio_sigma) {
   Calibration found;
-  found.outcome = Outcome::kOk;
-  found.image_distance_mm = Result{d1_mm, d1_sigma, std::nullopt};
+  found.summary.outcome = Outcome::kOk;
+  found.summary.image_distance_mm = Result{d1_mm, d1_sigma, std::nullopt};
   const model::ThickLens lens = StoredCamera(0, 0).lens;
   const double zf = model::FocusDepthMm(lens, d1_mm);
-  found.focus_depth_mm =
+  found.summary.focus_depth_mm =
       Result{zf, d1_sigma / std::abs(model::ImageDistanceSlope(lens, zf)), std::nullopt};
-  found.blur_ratio = Result{ratio, ratio_sigma, std::nullopt};
-  found.covariance_order = {"image_distance_mm", "blur_ratio"};
-  found.covariance = Eigen::Vector2d(d1_sigma * d1_sigma, ratio_sigma * ratio_sigma).asDiagonal();
+  found.summary.blur_ratio = Result{ratio, ratio_sigma, std::nullopt};
+  found.diagnostics.covariance_order = {"image_distance_mm", "blur_ratio"};
+  found.diagnostics.covariance =
+      Eigen::Vector2d(d1_sigma * d1_sigma, ratio_sigma * ratio_sigma).asDiagonal();
   return found;
 }
 
@@ -104,9 +105,9 @@ TEST(VerifyCalibration, UsesTheCorrelationOfBothMatrices) {
   stored.calibration->covariance_order = {"blur_ratio", "image_distance_mm"};  // another order
   stored.calibration->covariance = (Eigen::Matrix2d() << 1e-4, 0.9e-4, 0.9e-4, 1e-4).finished();
   Calibration along = FoundCalibration(kD1Mm + 0.02, 0.01, kRatio + 0.02, 0.01);
-  along.covariance = (Eigen::Matrix2d() << 1e-4, 0.9e-4, 0.9e-4, 1e-4).finished();
+  along.diagnostics.covariance = (Eigen::Matrix2d() << 1e-4, 0.9e-4, 0.9e-4, 1e-4).finished();
   Calibration across = along;
-  across.blur_ratio->value = kRatio - 0.02;
+  across.summary.blur_ratio->value = kRatio - 0.02;
   // C = 2e-4 [1 .9; .9 1]: d^2/(2e-4)/(1 +- .9) * 2.
   const Verification one = VerifyCalibration(stored, {}, along, {});
   const Verification other = VerifyCalibration(stored, {}, across, {});
@@ -127,9 +128,9 @@ TEST(VerifyCalibration, TheBenchZeroIsComparedWhereTheCameraHasNotMoved) {
   stored.calibration->covariance = matrix;
   // Only d1 is off, by one sigma, and the bench zero is the same.
   Calibration found = FoundCalibration(kD1Mm + std::sqrt(2.0) * 0.01, 0.01, kRatio, 0.001);
-  found.bench_offset_mm = Result{100, 1, std::nullopt};
-  found.covariance_order = stored.calibration->covariance_order;
-  found.covariance = matrix;
+  found.summary.bench_offset_mm = Result{100, 1, std::nullopt};
+  found.diagnostics.covariance_order = stored.calibration->covariance_order;
+  found.diagnostics.covariance = matrix;
   const Verification moved = VerifyCalibration(stored, {}, found, {});
   EXPECT_NEAR(moved.chi_square, 1, 1e-8);
   EXPECT_THAT(Named(moved, "bench_offset_mm").why_not_counted,
@@ -154,12 +155,12 @@ TEST(VerifyCalibration, SystematicPartsOfTheNewSweepWidenWhatTheCameraFileDoesNo
   floor.image_distance_mm = {-0.01, 0.02};
   focal.name = "lens.front_focal_length_mm";
   focal.image_distance_mm = {-1, 1};
-  found.systematic_parts = {floor, focal};
+  found.diagnostics.systematic_parts = {floor, focal};
   const Verification result = VerifyCalibration(StoredCamera(0.001, 0.001), {}, found, {});
   const ComparedParameter& d1 = Named(result, "image_distance_mm");
   EXPECT_NEAR(d1.systematic_sigma, 0.03 / std::sqrt(12.0), 1e-12);
   EXPECT_NEAR(d1.sigma, std::sqrt(2e-6 + 0.0009 / 12), 1e-12);
-  found.systematic_parts.clear();
+  found.diagnostics.systematic_parts.clear();
   EXPECT_EQ(VerifyCalibration(StoredCamera(0.001, 0.001), {}, found, {}).verdict,
             Verdict::kDoesNotHold);
 }
@@ -206,12 +207,12 @@ TEST(VerifyCalibration, WhatWouldNotShowAChangeCannotTell) {
 
 TEST(VerifyCalibration, ASweepIsComparedInWhatItDetermines) {
   Calibration found = FoundCalibration(kD1Mm, 0.002, kRatio, 0.001);
-  found.blur_ratio.reset();
+  found.summary.blur_ratio.reset();
   const Verification result = VerifyCalibration(StoredCamera(0.001, 0.001), {}, found, {});
   EXPECT_EQ(result.verdict, Verdict::kHolds) << result.reason;
   EXPECT_EQ(result.degrees_of_freedom, 1);
-  found.outcome = Outcome::kRefused;
-  found.reason = "too few frames";
+  found.summary.outcome = Outcome::kRefused;
+  found.summary.reason = "too few frames";
   const Verification refused = VerifyCalibration(StoredCamera(0.001, 0.001), {}, found, {});
   EXPECT_EQ(refused.verdict, Verdict::kUndetermined);
   EXPECT_THAT(refused.reason, HasSubstr("too few frames"));

@@ -51,19 +51,19 @@ TEST(WideLens, KappaIsThatOfTheBlurUnderAnyPupilLaw) {
       SCOPED_TRACE(PsfName(psf) + ", " + PupilLawName(law));
       const SimulatedSweep s = Wide(psf, law, 71);
       const Calibration c = CalibrateWithoutMap(s);
-      ASSERT_EQ(c.outcome, Outcome::kOk) << c.reason;
-      EXPECT_EQ(c.blur.family, psf);
-      EXPECT_LT(c.blur_ratio->sigma, 0.005 * kRatio);
-      EXPECT_LT(Beyond(c.blur_ratio, kRatio), 2);
-      EXPECT_LT(Beyond(c.focus_depth_mm, s.truth.focus_depth_mm), 2);
+      ASSERT_EQ(c.summary.outcome, Outcome::kOk) << c.summary.reason;
+      EXPECT_EQ(c.diagnostics.blur.family, psf);
+      EXPECT_LT(c.summary.blur_ratio->sigma, 0.005 * kRatio);
+      EXPECT_LT(Beyond(c.summary.blur_ratio, kRatio), 2);
+      EXPECT_LT(Beyond(c.summary.focus_depth_mm, s.truth.focus_depth_mm), 2);
       // The tails of the sine condition are visible in the frames, and widen the interval only for
       // that law.
       const bool has_tails = law == model::PupilLaw::kSineCondition;
-      EXPECT_LT(c.blur_ratio->systematic->y() - c.blur_ratio->systematic->x(),
+      EXPECT_LT(c.summary.blur_ratio->systematic->y() - c.summary.blur_ratio->systematic->x(),
                 (has_tails ? 0.08 : 0.015) * kRatio);
-      EXPECT_THAT(c.warnings, Not(Contains(HasSubstr("the blur is a"))));
-      EXPECT_THAT(c.warnings, Not(Contains(HasSubstr("bench zero"))));
-      if (!has_tails) pulls += (c.blur_ratio->value - kRatio) / kRatio;
+      EXPECT_THAT(c.summary.warnings, Not(Contains(HasSubstr("the blur is a"))));
+      EXPECT_THAT(c.summary.warnings, Not(Contains(HasSubstr("bench zero"))));
+      if (!has_tails) pulls += (c.summary.blur_ratio->value - kRatio) / kRatio;
     }
     // It would be 1 to 2.4 % if a law were part of the definition.
     EXPECT_LT(std::abs(pulls / 3), 0.004);
@@ -77,13 +77,14 @@ TEST(WideLens, AnUnknownZeroHasThePupilLawInItsInterval) {
     SimulatedSweep s = Wide(model::Psf::kGaussian, law, 72);
     s.sweep.offset_mm.reset();
     const Calibration c = CalibrateWithoutMap(s);
-    ASSERT_EQ(c.outcome, Outcome::kOk) << c.reason;
-    EXPECT_THAT(c.systematic_parts, Contains(Field(&SystematicPart::name, "pupil law")));
-    EXPECT_LT(Beyond(c.bench_offset_mm, s.truth.bench_offset_mm), 2);
-    EXPECT_LT(Beyond(c.focus_depth_mm, s.truth.focus_depth_mm), 2);
-    EXPECT_LT(Beyond(c.image_distance_mm, s.truth.image_distance_mm), 2);
-    EXPECT_LT(Beyond(c.blur_ratio, kRatio), 2);
-    const Eigen::Vector2d& zero_mm = *c.bench_offset_mm->systematic;
+    ASSERT_EQ(c.summary.outcome, Outcome::kOk) << c.summary.reason;
+    EXPECT_THAT(c.diagnostics.systematic_parts,
+                Contains(Field(&SystematicPart::name, "pupil law")));
+    EXPECT_LT(Beyond(c.summary.bench_offset_mm, s.truth.bench_offset_mm), 2);
+    EXPECT_LT(Beyond(c.summary.focus_depth_mm, s.truth.focus_depth_mm), 2);
+    EXPECT_LT(Beyond(c.summary.image_distance_mm, s.truth.image_distance_mm), 2);
+    EXPECT_LT(Beyond(c.summary.blur_ratio, kRatio), 2);
+    const Eigen::Vector2d& zero_mm = *c.summary.bench_offset_mm->systematic;
     // The difference between the sine condition and cos^4 is 6 (sigma/d1)^2 K.
     const double sigma_mm = kRatio * s.sweep.camera.lens.aperture_radius_mm;
     const double k_mm = model::DefocusScaleMm(s.sweep.camera.lens, s.truth.image_distance_mm);
@@ -96,7 +97,8 @@ TEST(WideLens, AnUnknownZeroHasThePupilLawInItsInterval) {
 TEST(WideLens, AGivenZeroHasNone) {
   const Calibration c =
       CalibrateWithoutMap(Wide(model::Psf::kGaussian, model::PupilLaw::kUniform, 73));
-  EXPECT_THAT(c.systematic_parts, Not(Contains(Field(&SystematicPart::name, "pupil law"))));
+  EXPECT_THAT(c.diagnostics.systematic_parts,
+              Not(Contains(Field(&SystematicPart::name, "pupil law"))));
 }
 
 TEST(WideLens, SlopesOfThePredictionAreThoseOfItsValues) {

@@ -19,10 +19,10 @@ using ::testing::Not;
 
 Calibration Distorted(double value, double sigma) {
   Calibration c;
-  c.scale.distortion_at_corner = model::Estimate{value, sigma};
-  c.structure.measured = true;
-  c.structure.vignetting = model::Estimate{-0.01, 0.01};
-  c.structure.fixed_structure = model::Estimate{0, 0.0005};
+  c.diagnostics.scale.distortion_at_corner = model::Estimate{value, sigma};
+  c.diagnostics.structure.measured = true;
+  c.diagnostics.structure.vignetting = model::Estimate{-0.01, 0.01};
+  c.diagnostics.structure.fixed_structure = model::Estimate{0, 0.0005};
   return c;
 }
 
@@ -31,32 +31,35 @@ TEST(CheckDistortion, IsSilentWithoutASignificantOne) {
   EXPECT_FALSE(CheckDistortion(&none));
   Calibration small = Distorted(-0.14, 0.05);
   EXPECT_FALSE(CheckDistortion(&small));
-  EXPECT_TRUE(small.warnings.empty() && none.warnings.empty() && small.diagnoses.empty());
+  EXPECT_TRUE(small.summary.warnings.empty() && none.summary.warnings.empty() &&
+              small.diagnostics.diagnoses.empty());
 }
 
 // A flat target with a distorting lens looks like a target that is not flat with a perfect lens.
 TEST(CheckDistortion, NamesLensAndTargetWhereNothingElseIsSeen) {
   Calibration c = Distorted(0.02, 0.001);
   EXPECT_FALSE(CheckDistortion(&c));
-  ASSERT_EQ(c.warnings.size(), 1U);
-  EXPECT_THAT(c.warnings[0],
+  ASSERT_EQ(c.summary.warnings.size(), 1U);
+  EXPECT_THAT(c.summary.warnings[0],
               AllOf(HasSubstr("+2.0 +- 0.1 % at the corner (pincushion)"),
                     HasSubstr("the lens distorts, or the target is not flat"),
                     HasSubstr("a flat target distinguishes them"), Not(HasSubstr("vignetting"))));
-  ASSERT_EQ(c.diagnoses.size(), 1U);
-  EXPECT_TRUE(c.diagnoses[0].Names(kLensDistorts) && c.diagnoses[0].Names(kTargetIsNotFlat));
-  EXPECT_FALSE(c.diagnoses[0].Names(kVignettingShifts) ||
-               c.diagnoses[0].Names(kFixedStructureShifts));
+  ASSERT_EQ(c.diagnostics.diagnoses.size(), 1U);
+  EXPECT_TRUE(c.diagnostics.diagnoses[0].Names(kLensDistorts) &&
+              c.diagnostics.diagnoses[0].Names(kTargetIsNotFlat));
+  EXPECT_FALSE(c.diagnostics.diagnoses[0].Names(kVignettingShifts) ||
+               c.diagnostics.diagnoses[0].Names(kFixedStructureShifts));
 }
 
 // Causes that a small sweep cannot exclude stay in the list.
 TEST(CheckDistortion, WhatIsNotExcludedIsNamedToo) {
   Calibration c = Distorted(0.02, 0.001);
-  c.structure.vignetting->sigma = 0.2;
+  c.diagnostics.structure.vignetting->sigma = 0.2;
   EXPECT_FALSE(CheckDistortion(&c));
-  EXPECT_TRUE(c.diagnoses.at(0).Names(kVignettingShifts));
-  EXPECT_THAT(c.warnings.at(0), HasSubstr("Vignetting would have the same effect, and this sweep "
-                                          "does not show whether this is present"));
+  EXPECT_TRUE(c.diagnostics.diagnoses.at(0).Names(kVignettingShifts));
+  EXPECT_THAT(c.summary.warnings.at(0),
+              HasSubstr("Vignetting would have the same effect, and this sweep "
+                        "does not show whether this is present"));
 }
 
 TEST(CheckDistortion, RefusesWhatCannotBeAllowedFor) {
@@ -71,38 +74,38 @@ TEST(CheckDistortion, WhatNoLensDoesIsNotBlamedOnTheLens) {
   EXPECT_THAT(CheckDistortion(&c).value_or(""),
               AllOf(HasSubstr("no lens distorts so much: the target is not flat"),
                     Not(HasSubstr("undistort"))));
-  EXPECT_TRUE(c.diagnoses[0].NamesOnly(kTargetIsNotFlat));
+  EXPECT_TRUE(c.diagnostics.diagnoses[0].NamesOnly(kTargetIsNotFlat));
 }
 
 TEST(CheckDistortion, WhatIsSeenInTheFramesIsNamedFirst) {
   Calibration dust = Distorted(0.007, 0.001);
-  dust.structure.fixed_structure = model::Estimate{0.01, 0.001};
+  dust.diagnostics.structure.fixed_structure = model::Estimate{0.01, 0.001};
   EXPECT_FALSE(CheckDistortion(&dust));
-  ASSERT_EQ(dust.warnings.size(), 1U);
-  EXPECT_THAT(dust.warnings[0],
+  ASSERT_EQ(dust.summary.warnings.size(), 1U);
+  EXPECT_THAT(dust.summary.warnings[0],
               AllOf(HasSubstr("fine structure of 1 %"), HasSubstr("dust on the sensor"),
                     HasSubstr("If it is not the cause, the lens distorts")));
-  EXPECT_TRUE(dust.diagnoses[0].Names(kFixedStructureShifts));
+  EXPECT_TRUE(dust.diagnostics.diagnoses[0].Names(kFixedStructureShifts));
   Calibration vignetted = Distorted(0.007, 0.001);
-  vignetted.structure.vignetting = model::Estimate{std::log(0.5), 0.02};
+  vignetted.diagnostics.structure.vignetting = model::Estimate{std::log(0.5), 0.02};
   EXPECT_FALSE(CheckDistortion(&vignetted));
-  EXPECT_THAT(vignetted.warnings.at(0),
+  EXPECT_THAT(vignetted.summary.warnings.at(0),
               AllOf(HasSubstr("the corners are 50 % darker"), HasSubstr("evenly lit white sheet")));
 }
 
 TEST(ScaleNonlinearity, NamesWhatTheFramesShow) {
   const ScaleNonlinearity nonlinearity{{0.18, 0.03}, -7.1};
   Calibration c;
-  c.structure = Distorted(0, 1).structure;
+  c.diagnostics.structure = Distorted(0, 1).diagnostics.structure;
   EXPECT_THAT(NonlinearityText(nonlinearity, c),
               AllOf(HasSubstr("The rail's scale is not linear"), HasSubstr("look alike"),
                     HasSubstr("micrometer screw")));
-  EXPECT_THAT(NonlinearityRemedy(c.structure), HasSubstr("check the rail's scale"));
-  c.structure.vignetting = model::Estimate{std::log(0.5), 0.02};
+  EXPECT_THAT(NonlinearityRemedy(c.diagnostics.structure), HasSubstr("check the rail's scale"));
+  c.diagnostics.structure.vignetting = model::Estimate{std::log(0.5), 0.02};
   EXPECT_THAT(NonlinearityText(nonlinearity, c),
               AllOf(HasSubstr("+0.18 +- 0.03 mm"), HasSubstr("the corners are 50 % darker"),
                     HasSubstr("If it is not the cause, the rail's scale is not linear")));
-  EXPECT_THAT(NonlinearityRemedy(c.structure),
+  EXPECT_THAT(NonlinearityRemedy(c.diagnostics.structure),
               AllOf(HasSubstr("measure offset_mm"), Not(HasSubstr("rail"))));
 }
 

@@ -43,9 +43,9 @@ void ExpectCovers(const std::optional<Result>& result, double truth) {
 }
 
 void ExpectCovers(const Calibration& c, const model::SweepTruth& truth) {
-  ExpectCovers(c.focus_depth_mm, truth.focus_depth_mm);
-  ExpectCovers(c.image_distance_mm, truth.image_distance_mm);
-  ExpectCovers(c.blur_ratio, truth.blur_ratio);
+  ExpectCovers(c.summary.focus_depth_mm, truth.focus_depth_mm);
+  ExpectCovers(c.summary.image_distance_mm, truth.image_distance_mm);
+  ExpectCovers(c.summary.blur_ratio, truth.blur_ratio);
 }
 
 TEST(Contradiction, OfTheGivenOffsetWidensEverything) {
@@ -53,22 +53,23 @@ TEST(Contradiction, OfTheGivenOffsetWidensEverything) {
   const double truth_mm = s.sweep.offset_mm->value;
   s.sweep.offset_mm->value += 6;
   const Calibration c = CalibrateWithoutMap(s);
-  EXPECT_NE(c.outcome, Outcome::kRefused) << c.reason;
+  EXPECT_NE(c.summary.outcome, Outcome::kRefused) << c.summary.reason;
   ExpectCovers(c, s.truth);
-  EXPECT_LT(c.bench_offset_mm->systematic->x(), truth_mm + 1);
-  EXPECT_GT(c.focus_depth_mm->systematic->y() - c.focus_depth_mm->systematic->x(), 5);
-  EXPECT_THAT(c.advice, HasSubstr("given offset_mm"));
-  EXPECT_THAT(c.warnings, Contains(HasSubstr("from the given bench zero")));
+  EXPECT_LT(c.summary.bench_offset_mm->systematic->x(), truth_mm + 1);
+  EXPECT_GT(c.summary.focus_depth_mm->systematic->y() - c.summary.focus_depth_mm->systematic->x(),
+            5);
+  EXPECT_THAT(c.diagnostics.advice, HasSubstr("given offset_mm"));
+  EXPECT_THAT(c.summary.warnings, Contains(HasSubstr("from the given bench zero")));
 }
 
 TEST(Contradiction, OfTheGivenOffsetByTensOfMillimetresIsRefused) {
   SimulatedSweep s = Sweep(model::TargetKind::kDeadLeaves, model::Psf::kGaussian);
   s.sweep.offset_mm->value += 60;
   const Calibration c = CalibrateWithoutMap(s);
-  EXPECT_EQ(c.outcome, Outcome::kRefused);
-  EXPECT_THAT(c.reason,
+  EXPECT_EQ(c.summary.outcome, Outcome::kRefused);
+  EXPECT_THAT(c.summary.reason,
               HasSubstr("check offset_mm, and that both offset_mm and the readings are in mm"));
-  EXPECT_FALSE(c.focus_depth_mm);
+  EXPECT_FALSE(c.summary.focus_depth_mm);
 }
 
 TEST(Contradiction, AJumpOfTheReadingsMovesTheZeroByMoreThanItself) {
@@ -78,12 +79,12 @@ TEST(Contradiction, AJumpOfTheReadingsMovesTheZeroByMoreThanItself) {
     if (!offset_is_known) s.sweep.offset_mm.reset();
     for (std::size_t i = 16; i < s.sweep.frames.size(); ++i) s.sweep.frames[i].reading_mm += 1.5;
     const Calibration c = CalibrateWithoutMap(s);
-    ASSERT_NE(c.outcome, Outcome::kRefused) << c.reason;
-    EXPECT_THAT(c.warnings, Contains(HasSubstr("the readings jump by +1.")));
+    ASSERT_NE(c.summary.outcome, Outcome::kRefused) << c.summary.reason;
+    EXPECT_THAT(c.summary.warnings, Contains(HasSubstr("the readings jump by +1.")));
     ExpectCovers(c, s.truth);
     if (offset_is_known) continue;
-    ExpectCovers(c.bench_offset_mm, truth_mm);
-    EXPECT_THAT(c.advice, HasSubstr("jump of the readings"));
+    ExpectCovers(c.summary.bench_offset_mm, truth_mm);
+    EXPECT_THAT(c.diagnostics.advice, HasSubstr("jump of the readings"));
   }
 }
 
@@ -92,10 +93,10 @@ TEST(Contradiction, ADiscThatIsStatedToBeAGaussianIsReported) {
     SimulatedSweep s = Sweep(target, model::Psf::kDisc);
     s.sweep.camera.psf = model::Psf::kGaussian;
     const Calibration c = CalibrateWithoutMap(s);
-    ASSERT_TRUE(c.blur_ratio) << c.reason;
+    ASSERT_TRUE(c.summary.blur_ratio) << c.summary.reason;
     ExpectCovers(c, s.truth);
-    EXPECT_EQ(c.advice, "state psf: disc in the camera file: this shape fits better");
-    EXPECT_THAT(c.warnings, Contains(HasSubstr("the blur is a disc, not the gaussian")));
+    EXPECT_EQ(c.diagnostics.advice, "state psf: disc in the camera file: this shape fits better");
+    EXPECT_THAT(c.summary.warnings, Contains(HasSubstr("the blur is a disc, not the gaussian")));
   }
 }
 
@@ -105,10 +106,10 @@ TEST(Contradiction, NoneWhereAllIsWell) {
     for (const auto target : {model::TargetKind::kDeadLeaves, model::TargetKind::kKnifeEdge}) {
       const SimulatedSweep s = Sweep(target, psf);
       const Calibration c = CalibrateWithoutMap(s);
-      ASSERT_TRUE(c.blur_ratio) << c.reason;
+      ASSERT_TRUE(c.summary.blur_ratio) << c.summary.reason;
       ExpectCovers(c, s.truth);
-      EXPECT_THAT(c.advice, Not(HasSubstr("psf:")));
-      EXPECT_THAT(c.warnings, Not(Contains(HasSubstr("the blur is a"))));
+      EXPECT_THAT(c.diagnostics.advice, Not(HasSubstr("psf:")));
+      EXPECT_THAT(c.summary.warnings, Not(Contains(HasSubstr("the blur is a"))));
     }
   }
 }

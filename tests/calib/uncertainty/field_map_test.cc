@@ -53,28 +53,32 @@ SimulatedSweep InStrips(int strips, const DepthAt& depth_at) {
 TEST(FieldMap, AFlatTargetHasOneDepthAndNoTilt) {
   const SimulatedSweep s = SweepAt(0);
   const Calibration c = Calibrate(s.sweep, {});
-  ASSERT_TRUE(c.field.done) << c.field.message << c.reason;
-  EXPECT_EQ(c.field.clusters.size(), 1U);
-  EXPECT_EQ(c.field.tiles.size(), 25U);
-  EXPECT_NEAR(c.field.tilt_right_deg->value, 0, 4 * c.field.tilt_right_deg->sigma);
-  EXPECT_NEAR(c.field.tilt_down_deg->value, 0, 4 * c.field.tilt_down_deg->sigma);
-  EXPECT_LT(c.field.tilt_right_deg->sigma, 1);
-  EXPECT_NEAR(c.field.curvature_mm->value, 0, 4 * c.field.curvature_mm->sigma);
-  EXPECT_NEAR(c.field.astigmatism_mm->value, 0, 4 * c.field.astigmatism_mm->sigma);
-  for (const FieldTile& tile : c.field.tiles) {
+  ASSERT_TRUE(c.diagnostics.field.done) << c.diagnostics.field.message << c.summary.reason;
+  EXPECT_EQ(c.diagnostics.field.clusters.size(), 1U);
+  EXPECT_EQ(c.diagnostics.field.tiles.size(), 25U);
+  EXPECT_NEAR(c.diagnostics.field.tilt_right_deg->value, 0,
+              4 * c.diagnostics.field.tilt_right_deg->sigma);
+  EXPECT_NEAR(c.diagnostics.field.tilt_down_deg->value, 0,
+              4 * c.diagnostics.field.tilt_down_deg->sigma);
+  EXPECT_LT(c.diagnostics.field.tilt_right_deg->sigma, 1);
+  EXPECT_NEAR(c.diagnostics.field.curvature_mm->value, 0,
+              4 * c.diagnostics.field.curvature_mm->sigma);
+  EXPECT_NEAR(c.diagnostics.field.astigmatism_mm->value, 0,
+              4 * c.diagnostics.field.astigmatism_mm->sigma);
+  for (const FieldTile& tile : c.diagnostics.field.tiles) {
     ASSERT_TRUE(tile.done) << tile.message;
     EXPECT_NEAR(tile.focus_depth_mm.value, s.truth.focus_depth_mm, 1);
   }
-  EXPECT_TRUE(c.channels.empty());  // grey frames
+  EXPECT_TRUE(c.diagnostics.channels.empty());  // grey frames
 }
 
 TEST(FieldMap, IsLeftOutOnRequest) {
   CalibrationOptions options;
   options.map_field = false;
   const Calibration c = Calibrate(SweepAt(0).sweep, options);
-  EXPECT_TRUE(c.focus_depth_mm);
-  EXPECT_FALSE(c.field.done);
-  EXPECT_TRUE(c.field.tiles.empty());
+  EXPECT_TRUE(c.summary.focus_depth_mm);
+  EXPECT_FALSE(c.diagnostics.field.done);
+  EXPECT_TRUE(c.diagnostics.field.tiles.empty());
 }
 
 TEST(FieldMap, SlowATiltIsMeasuredInDegrees) {
@@ -84,11 +88,11 @@ TEST(FieldMap, SlowATiltIsMeasuredInDegrees) {
   const SimulatedSweep s = InStrips(
       16, [&](double x_px) { return -x_px * mm_per_px * std::tan(kTiltDeg * CV_PI / 180); });
   const Calibration c = Calibrate(s.sweep, {});
-  ASSERT_TRUE(c.field.done) << c.field.message << c.reason;
-  EXPECT_NEAR(c.field.tilt_right_deg->value, kTiltDeg, 1);
-  EXPECT_NEAR(c.field.tilt_down_deg->value, 0, 1);
-  EXPECT_EQ(c.field.clusters.size(), 1U);
-  EXPECT_THAT(c.warnings, Contains(HasSubstr("tilted")));
+  ASSERT_TRUE(c.diagnostics.field.done) << c.diagnostics.field.message << c.summary.reason;
+  EXPECT_NEAR(c.diagnostics.field.tilt_right_deg->value, kTiltDeg, 1);
+  EXPECT_NEAR(c.diagnostics.field.tilt_down_deg->value, 0, 1);
+  EXPECT_EQ(c.diagnostics.field.clusters.size(), 1U);
+  EXPECT_THAT(c.summary.warnings, Contains(HasSubstr("tilted")));
 }
 
 // The target is simulated with a tilt, for a lens whose focus determines depths well. The result
@@ -102,11 +106,14 @@ TEST(FieldMap, FindsTheTiltThatWasSimulated) {
     SimulatedSweep s = Simulate(options);
     GiveFloor(&s);
     const Calibration c = Calibrate(s.sweep, {});
-    ASSERT_TRUE(c.field.done) << c.field.message << c.reason;
-    EXPECT_LT(c.field.tilt_right_deg->sigma, 0.05);
-    EXPECT_NEAR(c.field.tilt_right_deg->value, tilt_deg, 3.5 * c.field.tilt_right_deg->sigma);
-    EXPECT_NEAR(c.field.tilt_down_deg->value, 0, 3.5 * c.field.tilt_down_deg->sigma);
-    EXPECT_NEAR(c.focus_depth_mm->value, s.truth.focus_depth_mm, 4 * c.focus_depth_mm->sigma);
+    ASSERT_TRUE(c.diagnostics.field.done) << c.diagnostics.field.message << c.summary.reason;
+    EXPECT_LT(c.diagnostics.field.tilt_right_deg->sigma, 0.05);
+    EXPECT_NEAR(c.diagnostics.field.tilt_right_deg->value, tilt_deg,
+                3.5 * c.diagnostics.field.tilt_right_deg->sigma);
+    EXPECT_NEAR(c.diagnostics.field.tilt_down_deg->value, 0,
+                3.5 * c.diagnostics.field.tilt_down_deg->sigma);
+    EXPECT_NEAR(c.summary.focus_depth_mm->value, s.truth.focus_depth_mm,
+                4 * c.summary.focus_depth_mm->sigma);
   }
 }
 
@@ -118,9 +125,10 @@ TEST(FieldMap, SlowALongSweepIsMappedFromAPartOfItsFrames) {
   SimulatedSweep s = Simulate(options);
   GiveFloor(&s);
   const Calibration c = Calibrate(s.sweep, {});
-  ASSERT_TRUE(c.field.done) << c.field.message << c.reason;
-  EXPECT_NEAR(c.field.tilt_right_deg->value, 0, 4 * c.field.tilt_right_deg->sigma);
-  for (const FieldTile& tile : c.field.tiles) {
+  ASSERT_TRUE(c.diagnostics.field.done) << c.diagnostics.field.message << c.summary.reason;
+  EXPECT_NEAR(c.diagnostics.field.tilt_right_deg->value, 0,
+              4 * c.diagnostics.field.tilt_right_deg->sigma);
+  for (const FieldTile& tile : c.diagnostics.field.tiles) {
     ASSERT_TRUE(tile.done) << tile.message;
     EXPECT_NEAR(tile.focus_depth_mm.value, s.truth.focus_depth_mm, 1);
   }
@@ -130,17 +138,17 @@ TEST(FieldMap, DepthsOfATargetInStepsAreParted) {
   constexpr double kStepMm = 12;
   const SimulatedSweep s = InStrips(2, [](double x_px) { return x_px < 0 ? 0.0 : kStepMm; });
   const Calibration c = Calibrate(s.sweep, {});
-  ASSERT_TRUE(c.field.done) << c.field.message << c.reason;
-  ASSERT_GE(c.field.clusters.size(), 2U);
-  EXPECT_THAT(c.warnings, Contains(HasSubstr("not at one depth")));
+  ASSERT_TRUE(c.diagnostics.field.done) << c.diagnostics.field.message << c.summary.reason;
+  ASSERT_GE(c.diagnostics.field.clusters.size(), 2U);
+  EXPECT_THAT(c.summary.warnings, Contains(HasSubstr("not at one depth")));
   // A part that is farther than its reading states is in focus at a smaller reading.
   const double truth = s.truth.focus_depth_mm;
-  EXPECT_NEAR(c.field.clusters.front().focus_depth_mm.value, truth - kStepMm, 1.5);
-  EXPECT_NEAR(c.field.clusters.back().focus_depth_mm.value, truth, 1.5);
+  EXPECT_NEAR(c.diagnostics.field.clusters.front().focus_depth_mm.value, truth - kStepMm, 1.5);
+  EXPECT_NEAR(c.diagnostics.field.clusters.back().focus_depth_mm.value, truth, 1.5);
   // Both values are in the interval.
-  ASSERT_TRUE(c.focus_depth_mm->systematic);
-  EXPECT_LT(c.focus_depth_mm->systematic->x(), truth - kStepMm + 1.5);
-  EXPECT_GT(c.focus_depth_mm->systematic->y(), truth - 1.5);
+  ASSERT_TRUE(c.summary.focus_depth_mm->systematic);
+  EXPECT_LT(c.summary.focus_depth_mm->systematic->x(), truth - kStepMm + 1.5);
+  EXPECT_GT(c.summary.focus_depth_mm->systematic->y(), truth - 1.5);
 }
 
 TEST(FieldMap, EachColourHasItsOwnFocus) {
@@ -157,12 +165,13 @@ TEST(FieldMap, EachColourHasItsOwnFocus) {
     (*s.stored)[i] = image;
   }
   const Calibration c = Calibrate(s.sweep, {});
-  ASSERT_EQ(c.channels.size(), 3U) << c.reason;
+  ASSERT_EQ(c.diagnostics.channels.size(), 3U) << c.summary.reason;
   const char* const names[] = {"red", "green", "blue"};
   for (std::size_t k = 0; k < 3; ++k) {
-    EXPECT_EQ(c.channels[k].name, names[k]);
-    ASSERT_TRUE(c.channels[k].done) << c.channels[k].message;
-    EXPECT_NEAR(c.channels[k].focus_depth_mm.value, s.truth.focus_depth_mm - shifts_mm[k], 0.5);
+    EXPECT_EQ(c.diagnostics.channels[k].name, names[k]);
+    ASSERT_TRUE(c.diagnostics.channels[k].done) << c.diagnostics.channels[k].message;
+    EXPECT_NEAR(c.diagnostics.channels[k].focus_depth_mm.value,
+                s.truth.focus_depth_mm - shifts_mm[k], 0.5);
   }
 }
 

@@ -103,12 +103,15 @@ TEST(ChooseFloor, ASofterLensThanUsualIsAllowedForWhereTheTextureDoesNotExcludeI
     CalibrationOptions how;
     how.map_field = false;
     const Calibration c = Calibrate(simulated.sweep, how);
-    ASSERT_TRUE(c.focus_depth_mm) << c.reason;
-    const Eigen::Vector2d zf = *c.focus_depth_mm->systematic;
-    EXPECT_LT(zf[0] - 2 * c.focus_depth_mm->sigma, simulated.truth.focus_depth_mm) << floor_px;
-    EXPECT_GT(zf[1] + 2 * c.focus_depth_mm->sigma, simulated.truth.focus_depth_mm) << floor_px;
-    EXPECT_GE((*c.blur_floor_px->systematic)[1], std::max(1.0, floor_px));
-    EXPECT_THAT(c.warnings, Contains(HasSubstr("this target does not determine the lens floor")));
+    ASSERT_TRUE(c.summary.focus_depth_mm) << c.summary.reason;
+    const Eigen::Vector2d zf = *c.summary.focus_depth_mm->systematic;
+    EXPECT_LT(zf[0] - 2 * c.summary.focus_depth_mm->sigma, simulated.truth.focus_depth_mm)
+        << floor_px;
+    EXPECT_GT(zf[1] + 2 * c.summary.focus_depth_mm->sigma, simulated.truth.focus_depth_mm)
+        << floor_px;
+    EXPECT_GE((*c.summary.blur_floor_px->systematic)[1], std::max(1.0, floor_px));
+    EXPECT_THAT(c.summary.warnings,
+                Contains(HasSubstr("this target does not determine the lens floor")));
   }
 }
 

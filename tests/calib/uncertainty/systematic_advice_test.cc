@@ -20,12 +20,12 @@ using thicklens::testing::BlurBench;
 Calibration Plain(double zf_mm, double zf_sigma_mm, double zero_sigma_mm,
                   const model::ThickLens& lens) {
   Calibration c;
-  c.focus_depth_mm = Result{zf_mm, zf_sigma_mm, Eigen::Vector2d(zf_mm - 1, zf_mm + 2)};
+  c.summary.focus_depth_mm = Result{zf_mm, zf_sigma_mm, Eigen::Vector2d(zf_mm - 1, zf_mm + 2)};
   const double d1_mm = model::ImageDistanceMm(lens, zf_mm);
-  c.image_distance_mm =
+  c.summary.image_distance_mm =
       Result{d1_mm, std::abs(model::ImageDistanceSlope(lens, zf_mm)) * zf_sigma_mm,
              Eigen::Vector2d(d1_mm - 0.002, d1_mm + 0.001)};
-  c.bench_offset_mm = Result{0, zero_sigma_mm, std::nullopt};
+  c.summary.bench_offset_mm = Result{0, zero_sigma_mm, std::nullopt};
   return c;
 }
 
@@ -33,20 +33,21 @@ TEST(WidenFocus, AddsToBothIntervals) {
   const model::ThickLens lens = BlurBench().lens;
   Calibration c = Plain(400, 0.1, 0, lens);
   WidenFocus("a jump", 5, "mend it", lens, &c);
-  EXPECT_NEAR(c.focus_depth_mm->systematic->x(), 400 - 1 - 5, 1e-9);
-  EXPECT_NEAR(c.focus_depth_mm->systematic->y(), 400 + 2 + 5, 1e-9);
-  const double d1_mm = c.image_distance_mm->value;
+  EXPECT_NEAR(c.summary.focus_depth_mm->systematic->x(), 400 - 1 - 5, 1e-9);
+  EXPECT_NEAR(c.summary.focus_depth_mm->systematic->y(), 400 + 2 + 5, 1e-9);
+  const double d1_mm = c.summary.image_distance_mm->value;
   // rho + f2 zf/(zf - f1) at 405 and at 395 mm.
   const double low_mm = 3 + 12.8 * 405 / 392.5, high_mm = 3 + 12.8 * 395 / 382.5;
-  EXPECT_NEAR(c.image_distance_mm->systematic->x(), d1_mm - 0.002 + (low_mm - d1_mm), 1e-9);
-  EXPECT_NEAR(c.image_distance_mm->systematic->y(), d1_mm + 0.001 + (high_mm - d1_mm), 1e-9);
-  ASSERT_EQ(c.systematic_parts.size(), 1U);
-  EXPECT_EQ(c.systematic_parts[0].name, "a jump");
-  EXPECT_EQ(c.systematic_parts[0].remedy, "mend it");
-  EXPECT_NEAR(c.systematic_parts[0].focus_depth_mm.x(), -5, 1e-12);
-  EXPECT_NEAR(c.systematic_parts[0].focus_depth_mm.y(), 5, 1e-12);
-  EXPECT_EQ(c.systematic_parts[0].blur_ratio.norm(), 0);
-  EXPECT_THAT(c.advice, StartsWith("a jump is "));
+  EXPECT_NEAR(c.summary.image_distance_mm->systematic->x(), d1_mm - 0.002 + (low_mm - d1_mm), 1e-9);
+  EXPECT_NEAR(c.summary.image_distance_mm->systematic->y(), d1_mm + 0.001 + (high_mm - d1_mm),
+              1e-9);
+  ASSERT_EQ(c.diagnostics.systematic_parts.size(), 1U);
+  EXPECT_EQ(c.diagnostics.systematic_parts[0].name, "a jump");
+  EXPECT_EQ(c.diagnostics.systematic_parts[0].remedy, "mend it");
+  EXPECT_NEAR(c.diagnostics.systematic_parts[0].focus_depth_mm.x(), -5, 1e-12);
+  EXPECT_NEAR(c.diagnostics.systematic_parts[0].focus_depth_mm.y(), 5, 1e-12);
+  EXPECT_EQ(c.diagnostics.systematic_parts[0].blur_ratio.norm(), 0);
+  EXPECT_THAT(c.diagnostics.advice, StartsWith("a jump is "));
 }
 
 // Nearer than the focal point there is no image. One hundredth beyond it, d1 is rho + 101 f2.
@@ -55,26 +56,27 @@ TEST(WidenFocus, StopsShortOfTheFocalPoint) {
   for (const double move_mm : {387.4, 390.0, 5000.0}) {
     Calibration c = Plain(400, 0.1, 0, lens);
     WidenFocus("a jump", move_mm, "mend it", lens, &c);
-    EXPECT_NEAR(c.systematic_parts[0].image_distance_mm.y(),
-                3 + 101 * 12.8 - c.image_distance_mm->value, 1e-6);
-    EXPECT_NEAR(c.focus_depth_mm->systematic->x(), 399 - (400 - 12.625), 1e-9);
-    EXPECT_NEAR(c.focus_depth_mm->systematic->y() - c.focus_depth_mm->value, move_mm + 2, 1e-9);
+    EXPECT_NEAR(c.diagnostics.systematic_parts[0].image_distance_mm.y(),
+                3 + 101 * 12.8 - c.summary.image_distance_mm->value, 1e-6);
+    EXPECT_NEAR(c.summary.focus_depth_mm->systematic->x(), 399 - (400 - 12.625), 1e-9);
+    EXPECT_NEAR(c.summary.focus_depth_mm->systematic->y() - c.summary.focus_depth_mm->value,
+                move_mm + 2, 1e-9);
   }
   Calibration c = Plain(400, 0.1, 0, lens);
   WidenFocus("a jump", 387, "mend it", lens, &c);
-  EXPECT_NEAR(c.systematic_parts[0].image_distance_mm.y(),
-              3 + 12.8 * 13 / 0.5 - c.image_distance_mm->value, 1e-6);
+  EXPECT_NEAR(c.diagnostics.systematic_parts[0].image_distance_mm.y(),
+              3 + 12.8 * 13 / 0.5 - c.summary.image_distance_mm->value, 1e-6);
 }
 
 TEST(WidenFocus, MakesNoIntervalWhereThereIsNone) {
   const model::ThickLens lens = BlurBench().lens;
   Calibration c = Plain(400, 0.1, 0, lens);
-  c.focus_depth_mm->systematic.reset();
-  c.image_distance_mm->systematic.reset();
+  c.summary.focus_depth_mm->systematic.reset();
+  c.summary.image_distance_mm->systematic.reset();
   WidenFocus("a jump", 5, "mend it", lens, &c);
-  EXPECT_FALSE(c.focus_depth_mm->systematic);
-  EXPECT_FALSE(c.image_distance_mm->systematic);
-  EXPECT_EQ(c.systematic_parts.size(), 1U);
+  EXPECT_FALSE(c.summary.focus_depth_mm->systematic);
+  EXPECT_FALSE(c.summary.image_distance_mm->systematic);
+  EXPECT_EQ(c.diagnostics.systematic_parts.size(), 1U);
 }
 
 // ---- the advice ----
@@ -112,15 +114,16 @@ TEST(WidenFocus, TheAdviceNamesTheLargestShare) {
   for (const Case& k : cases) {
     SCOPED_TRACE(k.advice);
     Calibration c = Plain(400, 0.5, k.zero_mm, lens);
-    c.systematic_parts = {PartOfImageDistance("first", -0.25 * k.first_mm, 0.75 * k.first_mm),
-                          PartOfImageDistance("second", -k.second_mm, 0)};
+    c.diagnostics.systematic_parts = {
+        PartOfImageDistance("first", -0.25 * k.first_mm, 0.75 * k.first_mm),
+        PartOfImageDistance("second", -k.second_mm, 0)};
     WidenFocus("a hair", 0.001, "nothing", lens, &c);
-    EXPECT_THAT(c.advice, StartsWith(k.advice));
-    ASSERT_EQ(c.systematic_parts.size(), 3U);
+    EXPECT_THAT(c.diagnostics.advice, StartsWith(k.advice));
+    ASSERT_EQ(c.diagnostics.systematic_parts.size(), 3U);
     for (std::size_t i = 1; i < 3; ++i) {
       const auto width = [&](std::size_t p) {
-        return c.systematic_parts[p].image_distance_mm.y() -
-               c.systematic_parts[p].image_distance_mm.x();
+        return c.diagnostics.systematic_parts[p].image_distance_mm.y() -
+               c.diagnostics.systematic_parts[p].image_distance_mm.x();
       };
       EXPECT_GE(width(i - 1), width(i));
     }
@@ -132,17 +135,17 @@ TEST(WidenFocus, WithoutAZeroItHasNoShare) {
   const model::ThickLens lens = BlurBench().lens;
   Calibration c = Plain(400, 0.5, 0, lens);
   Calibration without = c;
-  without.bench_offset_mm.reset();
+  without.summary.bench_offset_mm.reset();
   for (Calibration* each : {&c, &without}) WidenFocus("a hair", 0.001, "nothing", lens, each);
-  EXPECT_THAT(without.advice, StartsWith("noise and readings are 100 %"));
-  EXPECT_EQ(without.advice, c.advice);
+  EXPECT_THAT(without.diagnostics.advice, StartsWith("noise and readings are 100 %"));
+  EXPECT_EQ(without.diagnostics.advice, c.diagnostics.advice);
 }
 
 TEST(WidenFocus, WithoutAnyErrorThereIsNoAdvice) {
   const model::ThickLens lens = BlurBench().lens;
   Calibration c = Plain(400, 0, 0, lens);
   WidenFocus("nothing", 0, "nothing", lens, &c);
-  EXPECT_EQ(c.advice, "");
+  EXPECT_EQ(c.diagnostics.advice, "");
 }
 
 }  // namespace

@@ -33,9 +33,10 @@ struct Solved {
     ASSERT_TRUE(fit.done) << fit.message;
     const auto sigma = [&](BlurParameter p) { return std::sqrt(fit.covariance(p, p)); };
     const double zf = fit.values[kFocusDepth];
-    calibration.focus_depth_mm = Result{zf, sigma(kFocusDepth), std::nullopt};
-    calibration.blur_ratio = Result{fit.values[kBlurRatio], sigma(kBlurRatio), std::nullopt};
-    calibration.image_distance_mm = Result{
+    calibration.summary.focus_depth_mm = Result{zf, sigma(kFocusDepth), std::nullopt};
+    calibration.summary.blur_ratio =
+        Result{fit.values[kBlurRatio], sigma(kBlurRatio), std::nullopt};
+    calibration.summary.image_distance_mm = Result{
         model::ImageDistanceMm(bench.lens, zf),
         std::abs(model::ImageDistanceSlope(bench.lens, zf)) * sigma(kFocusDepth), std::nullopt};
   }
@@ -43,7 +44,7 @@ struct Solved {
     AddSystematicParts(sweep, evidence, fit, floor, &calibration);
   }
   const SystematicPart* Part(const std::string& name) const {
-    for (const SystematicPart& part : calibration.systematic_parts) {
+    for (const SystematicPart& part : calibration.diagnostics.systematic_parts) {
       if (part.name == name) return &part;
     }
     return nullptr;
@@ -83,7 +84,7 @@ TEST(AddSystematicParts, TheFloorsEndsMoveTheResultsAsDerived) {
     const double move_mm = zf * off_px2 / (curvature - off_px2);
     EXPECT_NEAR(part->focus_depth_mm[end], move_mm, 1e-3);
     EXPECT_NEAR(move_mm, zf * off_px2 / curvature, 0.01 * std::abs(move_mm));
-    EXPECT_NEAR(s.calibration.focus_depth_mm->systematic.value()[end], zf + move_mm, 1e-3);
+    EXPECT_NEAR(s.calibration.summary.focus_depth_mm->systematic.value()[end], zf + move_mm, 1e-3);
     const double ratio =
         s.bench.ratio * std::sqrt(1 - off_px2 / curvature) * (zf + move_mm - f1) / (zf - f1);
     const bool rises = ratio > s.bench.ratio;
@@ -102,17 +103,17 @@ TEST(AddSystematicParts, WithoutAnIntervalTheFloorIsNoPart) {
   s.Add();
   EXPECT_FALSE(s.Part("lens floor"));
   // The limited accuracy of the blur estimator affects kappa only.
-  ASSERT_TRUE(s.calibration.focus_depth_mm->systematic);
-  EXPECT_NEAR((*s.calibration.focus_depth_mm->systematic)[0], s.bench.focus_mm, 1e-3);
-  EXPECT_NEAR((*s.calibration.focus_depth_mm->systematic)[1], s.bench.focus_mm, 1e-3);
-  const Eigen::Vector2d kappa = s.calibration.blur_ratio->systematic.value();
+  ASSERT_TRUE(s.calibration.summary.focus_depth_mm->systematic);
+  EXPECT_NEAR((*s.calibration.summary.focus_depth_mm->systematic)[0], s.bench.focus_mm, 1e-3);
+  EXPECT_NEAR((*s.calibration.summary.focus_depth_mm->systematic)[1], s.bench.focus_mm, 1e-3);
+  const Eigen::Vector2d kappa = s.calibration.summary.blur_ratio->systematic.value();
   EXPECT_LT(kappa[0], s.bench.ratio);
   EXPECT_GT(kappa[1], s.bench.ratio);
 }
 
 // Every interval contains its value, whatever moved its ends.
 void ExpectOrdered(const Calibration& c) {
-  for (const SystematicPart& part : c.systematic_parts) {
+  for (const SystematicPart& part : c.diagnostics.systematic_parts) {
     for (const Eigen::Vector2d& ends :
          {part.focus_depth_mm, part.image_distance_mm, part.blur_ratio}) {
       EXPECT_LE(ends[0], 0) << part.name;
@@ -120,7 +121,8 @@ void ExpectOrdered(const Calibration& c) {
     }
     EXPECT_NE(part.remedy, "") << part.name;
   }
-  for (const auto& result : {c.focus_depth_mm, c.image_distance_mm, c.blur_ratio}) {
+  for (const auto& result :
+       {c.summary.focus_depth_mm, c.summary.image_distance_mm, c.summary.blur_ratio}) {
     EXPECT_LE(result->systematic.value()[0], result->value);
     EXPECT_GE(result->systematic.value()[1], result->value);
   }
@@ -171,7 +173,7 @@ TEST(AddSystematicParts, StatedTolerancesMoveTheResultsAsTheFormulasSay) {
   EXPECT_FALSE(s.Part("sensor.principal_point_px[0]"));
   ExpectOrdered(s.calibration);
   // The parts are added in quadrature, separately for each side.
-  const Result& d1 = *s.calibration.image_distance_mm;
+  const Result& d1 = *s.calibration.summary.image_distance_mm;
   EXPECT_NEAR(d1.systematic.value()[1] - d1.value, std::sqrt(squares), 0.01 * std::sqrt(squares));
   EXPECT_NEAR(d1.value - (*d1.systematic)[0], std::sqrt(squares), 0.01 * std::sqrt(squares));
 }
@@ -185,7 +187,7 @@ TEST(AddSystematicParts, TheFloorAddsAndTheRestGoesInQuadrature) {
   s.Add(Eigen::Vector2d(0.05, 0.65));
   const double floor_mm = s.Part("lens floor")->image_distance_mm[1];
   ASSERT_GT(floor_mm, 3e-4);
-  const Result& d1 = *s.calibration.image_distance_mm;
+  const Result& d1 = *s.calibration.summary.image_distance_mm;
   EXPECT_NEAR(d1.systematic.value()[1] - d1.value, floor_mm + std::hypot(3.097e-4, 4e-4), 1e-5);
 }
 
@@ -200,7 +202,7 @@ TEST(AddSystematicParts, TheNarrowBandsAnswerIsAPart) {
   ASSERT_TRUE(part);
   EXPECT_NEAR(part->focus_depth_mm[1], 0.8, 0.01);
   EXPECT_EQ(part->focus_depth_mm[0], 0);
-  EXPECT_NEAR((*s.calibration.focus_depth_mm->systematic)[1], s.bench.focus_mm + 0.8, 0.01);
+  EXPECT_NEAR((*s.calibration.summary.focus_depth_mm->systematic)[1], s.bench.focus_mm + 0.8, 0.01);
 }
 
 TEST(AddSystematicParts, AnotherShapeMovesTheDepthAlone) {
@@ -282,25 +284,27 @@ TEST(AddSystematicParts, TheAdviceNamesTheLargestPartOfImageDistance) {
   Solved floor = Texture(0, 1e-3);
   floor.sweep.camera.statements["lens.rear_focal_length_mm"] = {1e-5, false};
   floor.Add(Eigen::Vector2d(0, 0.49));
-  EXPECT_EQ(floor.calibration.systematic_parts.front().name, "lens floor");
-  EXPECT_THAT(floor.calibration.advice,
+  EXPECT_EQ(floor.calibration.diagnostics.systematic_parts.front().name, "lens floor");
+  EXPECT_THAT(floor.calibration.diagnostics.advice,
               AllOf(StartsWith("lens floor is "), HasSubstr("knife edge")));
 
   Solved tolerance = Texture(0, 1e-3);
   tolerance.sweep.camera.statements["lens.rear_focal_length_mm"] = {0.2, false};
   tolerance.Add(Eigen::Vector2d(0, 0.49));
-  EXPECT_EQ(tolerance.calibration.systematic_parts.front().name, "lens.rear_focal_length_mm");
-  EXPECT_THAT(tolerance.calibration.advice, AllOf(StartsWith("lens.rear_focal_length_mm is 100 %"),
-                                                  HasSubstr("better than +- 0.2")));
+  EXPECT_EQ(tolerance.calibration.diagnostics.systematic_parts.front().name,
+            "lens.rear_focal_length_mm");
+  EXPECT_THAT(
+      tolerance.calibration.diagnostics.advice,
+      AllOf(StartsWith("lens.rear_focal_length_mm is 100 %"), HasSubstr("better than +- 0.2")));
 
   Solved noise = Texture(0, 0.5);
   noise.sweep.camera.statements["lens.rear_focal_length_mm"] = {1e-5, false};
   noise.Add();
-  EXPECT_THAT(noise.calibration.advice, HasSubstr("noise and readings are"));
+  EXPECT_THAT(noise.calibration.diagnostics.advice, HasSubstr("noise and readings are"));
 
   for (const Solved* s : {&floor, &tolerance, &noise}) {
     ExpectOrdered(s->calibration);
-    const auto& parts = s->calibration.systematic_parts;
+    const auto& parts = s->calibration.diagnostics.systematic_parts;
     for (std::size_t i = 1; i < parts.size(); ++i) {
       EXPECT_LE(parts[i].image_distance_mm[1] - parts[i].image_distance_mm[0],
                 parts[i - 1].image_distance_mm[1] - parts[i - 1].image_distance_mm[0]);
@@ -314,7 +318,8 @@ TEST(FitSides, AgreeOnExactData) {
   Solved s = Texture(0);
   FitSides(s.evidence, s.fit, &s.calibration);
   int frames = 0;
-  for (const SideFit* side : {&s.calibration.nearer, &s.calibration.farther}) {
+  for (const SideFit* side :
+       {&s.calibration.diagnostics.nearer, &s.calibration.diagnostics.farther}) {
     ASSERT_TRUE(side->done) << side->message;
     EXPECT_NEAR(side->focus_depth_mm.value, s.bench.focus_mm, 0.01);
     EXPECT_NEAR(side->blur_ratio.value, s.bench.ratio, 1e-4);
@@ -324,7 +329,7 @@ TEST(FitSides, AgreeOnExactData) {
   EXPECT_EQ(frames, 31);
   s.Add();
   EXPECT_FALSE(s.Part("side of focus"));
-  EXPECT_TRUE(s.calibration.warnings.empty());
+  EXPECT_TRUE(s.calibration.summary.warnings.empty());
 }
 
 // If one law holds on both sides, their difference is due to chance and agrees with the stated
@@ -340,7 +345,8 @@ TEST(FitSides, DifferOnCleanDataByNoMoreThanChance) {
     for (unsigned seed = 0; seed < kRuns; ++seed) {
       Solved s = Texture(1, 0.02, 900 + seed, bench);
       FitSides(s.evidence, s.fit, &s.calibration);
-      const SideFit &nearer = s.calibration.nearer, &farther = s.calibration.farther;
+      const SideFit &nearer = s.calibration.diagnostics.nearer,
+                    &farther = s.calibration.diagnostics.farther;
       ASSERT_TRUE(nearer.done && farther.done);
       const double apart = (nearer.focus_depth_mm.value - farther.focus_depth_mm.value) /
                            std::hypot(nearer.focus_depth_mm.sigma, farther.focus_depth_mm.sigma);
@@ -370,14 +376,15 @@ TEST(FitSides, DisagreeWhereTwoModelsWereMixed) {
   s.Fit();
   FitSides(s.evidence, s.fit, &s.calibration);
   s.Add();
-  EXPECT_THAT(s.calibration.warnings,
+  EXPECT_THAT(s.calibration.summary.warnings,
               Contains(AllOf(HasSubstr("two sides of focus disagree"), HasSubstr("nearer"))));
   const SystematicPart* part = s.Part("side of focus");
   ASSERT_TRUE(part);
-  EXPECT_NEAR(part->focus_depth_mm[0] + s.fit.values[kFocusDepth],
-              std::min({s.calibration.nearer.focus_depth_mm.value,
-                        s.calibration.farther.focus_depth_mm.value, s.fit.values[kFocusDepth]}),
-              1e-9);
+  EXPECT_NEAR(
+      part->focus_depth_mm[0] + s.fit.values[kFocusDepth],
+      std::min({s.calibration.diagnostics.nearer.focus_depth_mm.value,
+                s.calibration.diagnostics.farther.focus_depth_mm.value, s.fit.values[kFocusDepth]}),
+      1e-9);
   ExpectOrdered(s.calibration);
 }
 
@@ -388,11 +395,11 @@ TEST(FitSides, SixFramesAreNeededOnASide) {
   bench.reference = 4;
   Solved s = Texture(0, 0.01, 1, bench);
   FitSides(s.evidence, s.fit, &s.calibration);
-  EXPECT_FALSE(s.calibration.nearer.done);
-  EXPECT_EQ(s.calibration.nearer.frames_used, 5);
-  EXPECT_THAT(s.calibration.nearer.message,
+  EXPECT_FALSE(s.calibration.diagnostics.nearer.done);
+  EXPECT_EQ(s.calibration.diagnostics.nearer.frames_used, 5);
+  EXPECT_THAT(s.calibration.diagnostics.nearer.message,
               HasSubstr("5 frames are on this side, but 6 are needed"));
-  EXPECT_TRUE(s.calibration.farther.done);
+  EXPECT_TRUE(s.calibration.diagnostics.farther.done);
 }
 
 TEST(FitSides, AKnifeEdgesSidesAgree) {
@@ -405,7 +412,8 @@ TEST(FitSides, AKnifeEdgesSidesAgree) {
   s.evidence.edges = 0;
   s.Fit();
   FitSides(s.evidence, s.fit, &s.calibration);
-  for (const SideFit* side : {&s.calibration.nearer, &s.calibration.farther}) {
+  for (const SideFit* side :
+       {&s.calibration.diagnostics.nearer, &s.calibration.diagnostics.farther}) {
     ASSERT_TRUE(side->done) << side->message;
     EXPECT_NEAR(side->focus_depth_mm.value, s.bench.focus_mm, 0.01);
   }

@@ -49,7 +49,8 @@ TEST(FitSides, AKnifeEdgesFloorIsHeldAtTheWholeSweeps) {
   c.Solve();
   for (const bool nearer : {true, false}) {
     SCOPED_TRACE(nearer);
-    const SideFit& side = nearer ? c.calibration.nearer : c.calibration.farther;
+    const SideFit& side =
+        nearer ? c.calibration.diagnostics.nearer : c.calibration.diagnostics.farther;
     ASSERT_TRUE(side.done) << side.message;
     const Eigen::Vector2d sigmas = SideSigmas(c.bench, nearer);
     EXPECT_NEAR(side.focus_depth_mm.sigma, sigmas[0], 0.01 * sigmas[0]);
@@ -66,7 +67,8 @@ TEST(FitSides, ATexturesConstantIsHeldAtTheWholeSweeps) {
   c.Solve();
   for (const bool nearer : {true, false}) {
     SCOPED_TRACE(nearer);
-    const SideFit& side = nearer ? c.calibration.nearer : c.calibration.farther;
+    const SideFit& side =
+        nearer ? c.calibration.diagnostics.nearer : c.calibration.diagnostics.farther;
     ASSERT_TRUE(side.done) << side.message;
     EXPECT_NEAR(side.focus_depth_mm.sigma, SideSigmas(c.bench, nearer)[0],
                 0.01 * SideSigmas(c.bench, nearer)[0]);
@@ -80,8 +82,8 @@ TEST(FitSides, NearerIsNearer) {
     bench.direction = direction;
     FocusCase c = FocusCase(bench).WithTexture(kErrorPx2).WithTrueFloor();
     c.Solve();
-    EXPECT_EQ(c.calibration.nearer.frames_used, 12);
-    EXPECT_EQ(c.calibration.farther.frames_used, 19);
+    EXPECT_EQ(c.calibration.diagnostics.nearer.frames_used, 12);
+    EXPECT_EQ(c.calibration.diagnostics.farther.frames_used, 19);
   }
 }
 
@@ -94,10 +96,12 @@ TEST(FitSides, TheBenchZerosErrorIsNoDifferenceOfTheSides) {
     c.Solve();
     found[is_known ? 1 : 0] = c.calibration;
   }
-  EXPECT_GT(found[0].focus_depth_mm->sigma, 10 * found[1].focus_depth_mm->sigma);
-  ASSERT_TRUE(found[0].nearer.done && found[0].farther.done);
-  EXPECT_NEAR(found[0].nearer.focus_depth_mm.sigma, found[1].nearer.focus_depth_mm.sigma, 1e-4);
-  EXPECT_NEAR(found[0].farther.focus_depth_mm.sigma, found[1].farther.focus_depth_mm.sigma, 1e-4);
+  EXPECT_GT(found[0].summary.focus_depth_mm->sigma, 10 * found[1].summary.focus_depth_mm->sigma);
+  ASSERT_TRUE(found[0].diagnostics.nearer.done && found[0].diagnostics.farther.done);
+  EXPECT_NEAR(found[0].diagnostics.nearer.focus_depth_mm.sigma,
+              found[1].diagnostics.nearer.focus_depth_mm.sigma, 1e-4);
+  EXPECT_NEAR(found[0].diagnostics.farther.focus_depth_mm.sigma,
+              found[1].diagnostics.farther.focus_depth_mm.sigma, 1e-4);
 }
 
 // Edges that were measured on one side only are not used on the other.
@@ -108,11 +112,11 @@ TEST(FitSides, AnEstimatorThatHasOneSideAloneIsLeftOutOnTheOther) {
   edges.variances_px2.conservativeResize(12);
   edges.covariance.conservativeResize(12, 12);
   c.Solve();
-  ASSERT_TRUE(c.calibration.nearer.done && c.calibration.farther.done)
-      << c.calibration.nearer.message << c.calibration.farther.message;
-  EXPECT_EQ(c.calibration.nearer.frames_used, 12);
-  EXPECT_EQ(c.calibration.farther.frames_used, 19);
-  EXPECT_NEAR(c.calibration.farther.focus_depth_mm.value, c.bench.focus_mm, 0.01);
+  ASSERT_TRUE(c.calibration.diagnostics.nearer.done && c.calibration.diagnostics.farther.done)
+      << c.calibration.diagnostics.nearer.message << c.calibration.diagnostics.farther.message;
+  EXPECT_EQ(c.calibration.diagnostics.nearer.frames_used, 12);
+  EXPECT_EQ(c.calibration.diagnostics.farther.frames_used, 19);
+  EXPECT_NEAR(c.calibration.diagnostics.farther.focus_depth_mm.value, c.bench.focus_mm, 0.01);
 }
 
 // Frames are counted once, for the blur estimator that has most of them.
@@ -123,8 +127,8 @@ TEST(FitSides, TheLargerEstimatorCountsTheFrames) {
   edges.variances_px2.conservativeResize(20);
   edges.covariance.conservativeResize(20, 20);
   c.Solve();
-  EXPECT_EQ(c.calibration.nearer.frames_used, 12);
-  EXPECT_EQ(c.calibration.farther.frames_used, 19);
+  EXPECT_EQ(c.calibration.diagnostics.nearer.frames_used, 12);
+  EXPECT_EQ(c.calibration.diagnostics.farther.frames_used, 19);
 }
 
 // ---- two sides that disagree ----
@@ -133,12 +137,12 @@ TEST(FitSides, TheLargerEstimatorCountsTheFrames) {
 FocusCase Apart(double sigmas) {
   FocusCase c = FocusCase(Asymmetric()).WithTexture(kErrorPx2).WithTrueFloor();
   c.Solve();
-  c.calibration.systematic_parts.clear();
-  const double zf = c.calibration.focus_depth_mm->value;
-  c.calibration.nearer.focus_depth_mm = {zf + 0.6 * 0.5 * sigmas, 0.3};
-  c.calibration.farther.focus_depth_mm = {zf - 0.4 * 0.5 * sigmas, 0.4};
-  c.calibration.nearer.blur_ratio = {0.46, 0.001};
-  c.calibration.farther.blur_ratio = {0.43, 0.001};
+  c.calibration.diagnostics.systematic_parts.clear();
+  const double zf = c.calibration.summary.focus_depth_mm->value;
+  c.calibration.diagnostics.nearer.focus_depth_mm = {zf + 0.6 * 0.5 * sigmas, 0.3};
+  c.calibration.diagnostics.farther.focus_depth_mm = {zf - 0.4 * 0.5 * sigmas, 0.4};
+  c.calibration.diagnostics.nearer.blur_ratio = {0.46, 0.001};
+  c.calibration.diagnostics.farther.blur_ratio = {0.43, 0.001};
   AddSystematicParts(c.sweep, c.evidence, c.fit, std::nullopt, &c.calibration);
   return c;
 }
@@ -147,7 +151,7 @@ TEST(AddSystematicParts, SidesWithinThreeOfTheirErrorsAgree) {
   for (const double sigmas : {2.9, -2.9}) {
     const FocusCase c = Apart(sigmas);
     EXPECT_EQ(c.Part("side of focus"), nullptr);
-    EXPECT_THAT(c.calibration.warnings, IsEmpty());
+    EXPECT_THAT(c.calibration.summary.warnings, IsEmpty());
   }
 }
 
@@ -160,17 +164,17 @@ TEST(AddSystematicParts, SidesFartherApartAreAPartAsLargeAsTheirAnswers) {
     const double nearer_mm = 0.3 * sigmas, farther_mm = -0.2 * sigmas;
     EXPECT_NEAR(part->focus_depth_mm.x(), std::min(nearer_mm, farther_mm), 1e-9);
     EXPECT_NEAR(part->focus_depth_mm.y(), std::max(nearer_mm, farther_mm), 1e-9);
-    const double zf = c.calibration.focus_depth_mm->value;
+    const double zf = c.calibration.summary.focus_depth_mm->value;
     const auto d1_mm = [&](double move_mm) {
       return model::ImageDistanceMm(c.bench.lens, zf + move_mm) -
              model::ImageDistanceMm(c.bench.lens, zf);
     };
     EXPECT_NEAR(part->image_distance_mm.x(), d1_mm(std::max(nearer_mm, farther_mm)), 1e-9);
     EXPECT_NEAR(part->image_distance_mm.y(), d1_mm(std::min(nearer_mm, farther_mm)), 1e-9);
-    const double kappa = c.calibration.blur_ratio->value;
+    const double kappa = c.calibration.summary.blur_ratio->value;
     EXPECT_NEAR(part->blur_ratio.x(), 0.43 - kappa, 1e-9);
     EXPECT_NEAR(part->blur_ratio.y(), 0.46 - kappa, 1e-9);
-    EXPECT_THAT(c.calibration.warnings,
+    EXPECT_THAT(c.calibration.summary.warnings,
                 Contains(AllOf(HasSubstr("two sides of focus disagree"),
                                HasSubstr("+- 0.3 mm, the farther ones"), HasSubstr("+- 0.4 mm"))));
   }
@@ -183,7 +187,7 @@ TEST(AddSystematicParts, SidesThatCannotBeComparedAreReportedWithTheirFrames) {
   bench.reference = 4;
   FocusCase c = FocusCase(bench).WithTexture(kErrorPx2).WithTrueFloor();
   c.Solve();
-  EXPECT_THAT(c.calibration.warnings,
+  EXPECT_THAT(c.calibration.summary.warnings,
               Contains(AllOf(
                   HasSubstr("cannot be compared"),
                   HasSubstr("nearer: 5 frames on this side, 6 are needed; farther: 26 frames"))));

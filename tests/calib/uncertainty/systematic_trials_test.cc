@@ -61,11 +61,15 @@ TEST(AddSystematicParts, AToleranceIsWhatAnotherCameraFileWouldGive) {
     };
     for (const double change : {-field.tolerance, field.tolerance}) {
       const FocusCase again = solved(change, false);
-      ASSERT_TRUE(again.calibration.focus_depth_mm) << again.calibration.reason;
-      widen(again.calibration.focus_depth_mm->value - c.calibration.focus_depth_mm->value, &zf);
-      widen(again.calibration.image_distance_mm->value - c.calibration.image_distance_mm->value,
+      ASSERT_TRUE(again.calibration.summary.focus_depth_mm) << again.calibration.summary.reason;
+      widen(again.calibration.summary.focus_depth_mm->value -
+                c.calibration.summary.focus_depth_mm->value,
+            &zf);
+      widen(again.calibration.summary.image_distance_mm->value -
+                c.calibration.summary.image_distance_mm->value,
             &d1);
-      widen(again.calibration.blur_ratio->value - c.calibration.blur_ratio->value, &kappa);
+      widen(again.calibration.summary.blur_ratio->value - c.calibration.summary.blur_ratio->value,
+            &kappa);
     }
     for (int end = 0; end < 2; ++end) {
       EXPECT_NEAR(part->focus_depth_mm[end], zf[end], 1e-5);
@@ -106,14 +110,14 @@ TEST(AddSystematicParts, TheFloorsEndsAreTwoMoreCalibrations) {
     return c;
   };
   const FocusCase c = solved(std::nullopt), low = solved(0.3), high = solved(0.7);
-  const auto zf_mm = [](const FocusCase& k) { return k.calibration.focus_depth_mm->value; };
-  ASSERT_TRUE(c.calibration.focus_depth_mm->systematic);
-  EXPECT_NEAR(c.calibration.focus_depth_mm->systematic->x(), zf_mm(low), 1e-4);
-  EXPECT_NEAR(c.calibration.focus_depth_mm->systematic->y(), zf_mm(high), 1e-4);
-  EXPECT_NEAR(c.calibration.image_distance_mm->systematic->x(),
-              high.calibration.image_distance_mm->value, 1e-6);
-  EXPECT_NEAR(c.calibration.image_distance_mm->systematic->y(),
-              low.calibration.image_distance_mm->value, 1e-6);
+  const auto zf_mm = [](const FocusCase& k) { return k.calibration.summary.focus_depth_mm->value; };
+  ASSERT_TRUE(c.calibration.summary.focus_depth_mm->systematic);
+  EXPECT_NEAR(c.calibration.summary.focus_depth_mm->systematic->x(), zf_mm(low), 1e-4);
+  EXPECT_NEAR(c.calibration.summary.focus_depth_mm->systematic->y(), zf_mm(high), 1e-4);
+  EXPECT_NEAR(c.calibration.summary.image_distance_mm->systematic->x(),
+              high.calibration.summary.image_distance_mm->value, 1e-6);
+  EXPECT_NEAR(c.calibration.summary.image_distance_mm->systematic->y(),
+              low.calibration.summary.image_distance_mm->value, 1e-6);
 }
 
 // Each blur estimator alone gets the floor that the other one measured.
@@ -129,7 +133,7 @@ TEST(AddSystematicParts, ATextureAloneKeepsTheKnifeEdgesFloor) {
   c.Solve();
   const SystematicPart* part = c.Part("edges against texture");
   ASSERT_NE(part, nullptr);
-  const double zf = c.calibration.focus_depth_mm->value;
+  const double zf = c.calibration.summary.focus_depth_mm->value;
   EXPECT_NEAR(zf + part->focus_depth_mm.x(), bench.focus_mm, 0.1);
   EXPECT_NEAR(zf + part->focus_depth_mm.y(), behind.focus_mm, 0.1);
 }
@@ -147,7 +151,7 @@ TEST(AddSystematicParts, TheEstimatorsOwnErrorIsInKappa) {
   EXPECT_NEAR(own->blur_ratio.y(), 0.003 * 0.45, 1e-6);
   EXPECT_NEAR(own->blur_ratio.x(), -0.003 * 0.45, 1e-6);
   EXPECT_EQ(own->focus_depth_mm.norm() + own->image_distance_mm.norm(), 0);
-  const Result& kappa = *c.calibration.blur_ratio;
+  const Result& kappa = *c.calibration.summary.blur_ratio;
   EXPECT_NEAR(kappa.systematic->y() - kappa.value, 0.005 * 0.45, 1e-5);
   EXPECT_NEAR(kappa.value - kappa.systematic->x(), 0.005 * 0.45, 1e-5);
 }
@@ -162,7 +166,7 @@ TEST(AddSystematicParts, OnEachEndTheFloorAddsToTheRest) {
   const SystematicPart* floor = c.Part("lens floor");
   ASSERT_NE(floor, nullptr);
   const double rest_mm = std::hypot(3e-4 * 400 / 387.5, 4e-4);
-  const Result& d1 = *c.calibration.image_distance_mm;
+  const Result& d1 = *c.calibration.summary.image_distance_mm;
   EXPECT_NEAR(d1.systematic->x(), d1.value + floor->image_distance_mm.x() - rest_mm, 1e-6);
   EXPECT_NEAR(d1.systematic->y(), d1.value + floor->image_distance_mm.y() + rest_mm, 1e-6);
 }
@@ -177,7 +181,7 @@ TEST(AddSystematicParts, PartsThatMoveOneWayWidenOneEnd) {
     c.evidence.narrow_band = band.Relative(kErrorPx2, thicklens::testing::kReferencePx2, &c.random);
     c.evidence.other_psf = shape.Relative(kErrorPx2, thicklens::testing::kReferencePx2, &c.random);
     c.Solve();
-    const Result& zf = *c.calibration.focus_depth_mm;
+    const Result& zf = *c.calibration.summary.focus_depth_mm;
     ASSERT_TRUE(zf.systematic);
     EXPECT_NEAR(zf.systematic->x(), zf.value - (sign > 0 ? 0 : 1), 0.01);
     EXPECT_NEAR(zf.systematic->y(), zf.value + (sign > 0 ? 1 : 0), 0.01);

@@ -67,7 +67,7 @@ TEST(BlurRoundTrip, RendersTheSimulatedBlurUnderAnyPupilLaw) {
     calib::CalibrationOptions how;
     how.map_field = false;
     const calib::Calibration found = calib::Calibrate(simulated.sweep, how);
-    ASSERT_EQ(found.outcome, calib::Outcome::kOk) << found.reason;
+    ASSERT_EQ(found.summary.outcome, calib::Outcome::kOk) << found.summary.reason;
     const model::Camera camera = calib::CalibratedCamera(simulated.sweep.camera, found, false);
     const double floor2_px2 = std::pow(simulated.truth.blur_floor_px, 2);
     for (const bool falloff : {true, false}) {
@@ -82,14 +82,17 @@ TEST(BlurRoundTrip, RendersTheSimulatedBlurUnderAnyPupilLaw) {
         ASSERT_GT(simulated_px, 1.5);
         // Kappa's interval, its error and that of the focus, and a little of the spot's own
         // fall-off.
-        const double by_focus =
-            found.focus_depth_mm->sigma / std::abs(truth.depth_mm - simulated.truth.focus_depth_mm);
-        const double kappa = found.blur_ratio->value;
-        const double reach = 3 * std::hypot(found.blur_ratio->sigma / kappa, by_focus) + 0.003;
+        const double by_focus = found.summary.focus_depth_mm->sigma /
+                                std::abs(truth.depth_mm - simulated.truth.focus_depth_mm);
+        const double kappa = found.summary.blur_ratio->value;
+        const double reach =
+            3 * std::hypot(found.summary.blur_ratio->sigma / kappa, by_focus) + 0.003;
         EXPECT_LT(reach, 0.012);
-        EXPECT_GT(simulated_px / rendered_px, found.blur_ratio->systematic->x() / kappa - reach)
+        EXPECT_GT(simulated_px / rendered_px,
+                  found.summary.blur_ratio->systematic->x() / kappa - reach)
             << "depth " << truth.depth_mm << (falloff ? ", with fall-off" : "");
-        EXPECT_LT(simulated_px / rendered_px, found.blur_ratio->systematic->y() / kappa + reach)
+        EXPECT_LT(simulated_px / rendered_px,
+                  found.summary.blur_ratio->systematic->y() / kappa + reach)
             << "depth " << truth.depth_mm << (falloff ? ", with fall-off" : "");
       }
     }

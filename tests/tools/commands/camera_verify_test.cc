@@ -62,7 +62,7 @@ calib::Verification Verified(const CalibratedSweep& stored, const CalibratedSwee
                              double d1_sigmas) {
   model::Camera camera = calib::CalibratedCamera(stored.sweep.camera, stored.calibration, false);
   model::Estimate& d1 = *camera.calibration->image_distance_mm;
-  d1.value += d1_sigmas * std::hypot(d1.sigma, next.calibration.image_distance_mm->sigma);
+  d1.value += d1_sigmas * std::hypot(d1.sigma, next.calibration.summary.image_distance_mm->sigma);
   return calib::VerifyCalibration(camera, next.sweep, next.calibration, {});
 }
 
@@ -74,7 +74,8 @@ TEST(VerifySlow, TheJointChiSquareIsOneAndFiveSigmaAreFound) {
   double chi_square = 0;
   int degrees_of_freedom = 0, holds = 0, found = 0;
   for (std::size_t i = 0; i < sweeps.size(); i += 2) {
-    ASSERT_TRUE(sweeps[i].calibration.image_distance_mm) << sweeps[i].calibration.reason;
+    ASSERT_TRUE(sweeps[i].calibration.summary.image_distance_mm)
+        << sweeps[i].calibration.summary.reason;
     const calib::Verification same = Verified(sweeps[i], sweeps[i + 1], 0);
     chi_square += same.chi_square;
     degrees_of_freedom += same.degrees_of_freedom;

@@ -55,9 +55,9 @@ class SweepInputTest : public ::testing::Test {
 TEST_F(SweepInputTest, FloorFromACalibratedCamera) {
   Sweep("blur_floor_px: 0.9\n");
   arguments_.floor_from = folder_ / "edge.yaml";
-  const SweepInput input = ReadSweepInput(arguments_);
-  EXPECT_EQ(input.sweep.floor.given_px.value().value, 0.52);
-  EXPECT_EQ(input.sweep.floor.given_px.value().sigma, 0.01);
+  const thicklens::Sweep input = ReadSweepInput(arguments_);
+  EXPECT_EQ(input.description.floor.given_px.value().value, 0.52);
+  EXPECT_EQ(input.description.floor.given_px.value().sigma, 0.01);
   EXPECT_THAT(arguments_.Files(), Contains(folder_ / "edge.yaml"));
 }
 
@@ -100,13 +100,13 @@ TEST_F(SweepInputTest, TheCameraInUseIsTheOneCompared) {
               HasSubstr("sweep.yaml:4:35: blur_floor_px.from_calibration: "));
   // Another camera on the command line, of the floor's pitch.
   arguments_.camera_path = folder_ / "other.yaml";
-  EXPECT_EQ(ReadSweepInput(arguments_).sweep.floor.given_px.value().value, 0.52);
+  EXPECT_EQ(ReadSweepInput(arguments_).description.floor.given_px.value().value, 0.52);
   // A floor on the command line takes the place of the other camera's.
   arguments_.camera_path.clear();
   arguments_.floor_px = "0.3:0.1";
-  EXPECT_EQ(ReadSweepInput(arguments_).sweep.floor.given_px.value().value, 0.3);
+  EXPECT_EQ(ReadSweepInput(arguments_).description.floor.given_px.value().value, 0.3);
   arguments_.floor_px = "unknown";
-  EXPECT_FALSE(ReadSweepInput(arguments_).sweep.floor.given_px);
+  EXPECT_FALSE(ReadSweepInput(arguments_).description.floor.given_px);
 }
 
 TEST_F(SweepInputTest, OneFloorIsEnough) {
@@ -117,14 +117,14 @@ TEST_F(SweepInputTest, OneFloorIsEnough) {
 
 TEST_F(SweepInputTest, ThePeriodOfTheTargetComesThrough) {
   Sweep("target_period_mm: 5\n");
-  EXPECT_EQ(ReadSweepInput(arguments_).sweep.target_period_mm.value(), 5);
+  EXPECT_EQ(ReadSweepInput(arguments_).description.target_period_mm.value(), 5);
 }
 
 // Numbers of the camera that affect a result and have no stated tolerance are reported once.
 TEST_F(SweepInputTest, MissingTolerancesAreReportedUnlessTheTruthIsKnown) {
   Sweep("");
   const auto reported = [&] {
-    const SweepInput input = ReadSweepInput(arguments_);
+    const thicklens::Sweep input = ReadSweepInput(arguments_);
     return std::count_if(input.notices.begin(), input.notices.end(), [](const std::string& line) {
       return line.find("no tolerance is stated") != std::string::npos;
     });

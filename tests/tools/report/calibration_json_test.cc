@@ -97,7 +97,7 @@ TEST(CalibrationJson, WhatWasNotMeasuredIsNull) {
 TEST(CalibrationJson, HoldsWhatTheReportShows) {
   const MadeUpCalibration made = MakeUpCalibration(41, 320, 4);
   const json out = CalibrationJson(made.sweep, made.calibration, &made.truth, false);
-  EXPECT_EQ(out.at("advice"), made.calibration.advice);
+  EXPECT_EQ(out.at("advice"), made.calibration.diagnostics.advice);
   EXPECT_EQ(out.at("assumed_fields"), json::array({"lens.lens_thickness_mm"}));
   EXPECT_EQ(out.at("sides").at("nearer").at("focus_depth_mm").at("value"), 398.6);
   EXPECT_NEAR(out["sides"].at("apart_mm").at("value").get<double>(), 2.5, 1e-9);
@@ -130,8 +130,10 @@ TEST(CalibrationJson, HoldsWhatTheReportShows) {
   EXPECT_EQ(frame.at("reading_error_sigma_mm"), 0.03);
   // Residuals of a law that the frames follow: measured minus law over both errors.
   const double z = made.calibration.frames[6].depth_mm;
-  const double d = made.calibration.image_distance_mm->value - 3, zf = 12.5 * d / (d - 12.8);
-  const double a = made.calibration.blur_ratio->value * 4.46 * 12.5 * zf / (zf - 12.5) / 0.006;
+  const double d = made.calibration.summary.image_distance_mm->value - 3,
+               zf = 12.5 * d / (d - 12.8);
+  const double a =
+      made.calibration.summary.blur_ratio->value * 4.46 * 12.5 * zf / (zf - 12.5) / 0.006;
   const double defocus = a * (1 / z - 1 / zf), law = std::hypot(0.508, defocus);
   EXPECT_NEAR(frame.at("blur_model_sigma_px").get<double>(), law, 1e-9);
   const double slope = defocus * a / (z * z) / law;
@@ -165,29 +167,31 @@ TEST(CalibrationJson, SourcesRecipeInPlaceOfTheFit) {
 TEST(CalibrationJson, SurvivesNanAndBrokenFileNames) {
   MadeUpCalibration made = MakeUpCalibration(7, 340, 20);
   calib::Calibration& c = made.calibration;
-  c.image_distance_mm->value = kNan;
-  c.focus_depth_mm->sigma = kNan;
-  c.blur_ratio->systematic = Eigen::Vector2d(kNan, 1);
-  c.covariance(1, 1) = std::numeric_limits<double>::infinity();
-  c.blur.chi2_per_dof = kNan;
-  c.seconds = kNan;
-  c.scale.reading_rms_mm = kNan;
+  c.summary.image_distance_mm->value = kNan;
+  c.summary.focus_depth_mm->sigma = kNan;
+  c.summary.blur_ratio->systematic = Eigen::Vector2d(kNan, 1);
+  c.diagnostics.covariance(1, 1) = std::numeric_limits<double>::infinity();
+  c.diagnostics.blur.chi2_per_dof = kNan;
+  c.summary.seconds = kNan;
+  c.diagnostics.scale.reading_rms_mm = kNan;
   c.frames[0].image = "caf\xE9.png";
   c.frames[0].blur_sigma_px = kNan;
   c.frames[1].image_scale = kNan;
   c.frames[1].statistics.contrast = kNan;
   c.frames[2].rejection = "bad \xFF";
-  c.warnings = {"\x80"};
-  c.covariance_order[0] = c.blur.weak_direction = c.advice = c.nearer.message = "\xFE";
-  c.field.tiles[1].message = c.channels[1].name = c.systematic_parts[1].remedy = "\xFE";
-  c.blur.undetermined = {"\xFE"};
-  c.field.tiles[0].focus_depth_mm = {kNan, kNan};
-  c.systematic_parts[0].blur_ratio = {kNan, 1};
+  c.summary.warnings = {"\x80"};
+  c.diagnostics.covariance_order[0] = c.diagnostics.blur.weak_direction = c.diagnostics.advice =
+      c.diagnostics.nearer.message = "\xFE";
+  c.diagnostics.field.tiles[1].message = c.diagnostics.channels[1].name =
+      c.diagnostics.systematic_parts[1].remedy = "\xFE";
+  c.diagnostics.blur.undetermined = {"\xFE"};
+  c.diagnostics.field.tiles[0].focus_depth_mm = {kNan, kNan};
+  c.diagnostics.systematic_parts[0].blur_ratio = {kNan, 1};
   c.examples[0].measured[0] = kNan;
   c.frames[3].reading_error_mm = kNan;
   c.frames[3].image_scale_sigma = kNan;
-  c.magnification->period_px = kNan;
-  c.sharpness.log_parabola[1] = kNan;
+  c.diagnostics.magnification->period_px = kNan;
+  c.diagnostics.sharpness.log_parabola[1] = kNan;
   const json out = CalibrationJson(made.sweep, c, &made.truth, false);
   const json back = json::parse(out.dump());
   EXPECT_EQ(back, out) << "a NaN compares unequal to itself or came back as null";

@@ -77,7 +77,7 @@ TEST(CalibrationReport, WithoutDetailsLeavesTheirPartsOut) {
                              "Least certain", "red channel", "sharpest frame, over mean grey"})
     EXPECT_THAT(html, Not(HasSubstr(absent)));
   EXPECT_THAT(html, Not(HasSubstr("not run")));
-  made.calibration.nearer.message = "3 frames; 5 are needed";
+  made.calibration.diagnostics.nearer.message = "3 frames; 5 are needed";
   EXPECT_THAT(Page(made), HasSubstr("<li>blur, nearer side only: 3 frames; 5 are needed</li>"));
 }
 
@@ -88,23 +88,23 @@ TEST(CalibrationReport, EscapesNamesFromOutside) {
   made.calibration.frames[1].image = nasty + "1";
   made.calibration.frames[2].image = nasty + "2";
   RejectFrame(2, nasty, &made.calibration);
-  made.calibration.warnings = {nasty};
-  made.calibration.outcome = calib::Outcome::kPartial;
-  made.calibration.reason = nasty;
-  made.calibration.scale.done = false;
-  made.calibration.scale.message = nasty;
-  made.calibration.covariance_order[0] = nasty;
-  made.calibration.blur.undetermined = {nasty};
-  made.calibration.blur.weak_direction = made.calibration.advice = nasty;
-  made.calibration.nearer = {};
-  made.calibration.nearer.message = nasty;
-  made.calibration.field.tiles[3].done = false;
-  made.calibration.field.tiles[3].message = nasty;
-  made.calibration.channels[0].name = nasty;
-  made.calibration.channels[1].done = false;
-  made.calibration.channels[1].message = nasty;
-  made.calibration.systematic_parts[0].name = nasty;
-  made.calibration.systematic_parts[1].remedy = nasty;
+  made.calibration.summary.warnings = {nasty};
+  made.calibration.summary.outcome = calib::Outcome::kPartial;
+  made.calibration.summary.reason = nasty;
+  made.calibration.diagnostics.scale.done = false;
+  made.calibration.diagnostics.scale.message = nasty;
+  made.calibration.diagnostics.covariance_order[0] = nasty;
+  made.calibration.diagnostics.blur.undetermined = {nasty};
+  made.calibration.diagnostics.blur.weak_direction = made.calibration.diagnostics.advice = nasty;
+  made.calibration.diagnostics.nearer = {};
+  made.calibration.diagnostics.nearer.message = nasty;
+  made.calibration.diagnostics.field.tiles[3].done = false;
+  made.calibration.diagnostics.field.tiles[3].message = nasty;
+  made.calibration.diagnostics.channels[0].name = nasty;
+  made.calibration.diagnostics.channels[1].done = false;
+  made.calibration.diagnostics.channels[1].message = nasty;
+  made.calibration.diagnostics.systematic_parts[0].name = nasty;
+  made.calibration.diagnostics.systematic_parts[1].remedy = nasty;
   const CalibrationReport report = MakeCalibrationReport(
       made.sweep, made.calibration, &made.truth, {nasty, nasty, nasty, {nasty}},
       [](std::size_t) { return cv::Mat(4, 4, CV_8U, cv::Scalar(9)); });
@@ -145,13 +145,13 @@ TEST(CalibrationReport, WithoutDepthsPlotsAgainstReadings) {
 TEST(CalibrationReport, PartialResultKeepsTheFiguresItHas) {
   MadeUpCalibration made = MakeUpCalibration(31, 300, 8);
   calib::Calibration& c = made.calibration;
-  c.outcome = calib::Outcome::kPartial;
-  c.reason = "the blur floor is not determined";
-  c.blur_floor_px.reset();
-  c.bench_offset_mm.reset();
+  c.summary.outcome = calib::Outcome::kPartial;
+  c.summary.reason = "the blur floor is not determined";
+  c.summary.blur_floor_px.reset();
+  c.summary.bench_offset_mm.reset();
   RemoveDetails(&c);
-  c.scale = {};
-  c.scale.kind = calib::ScaleKind::kConstant;
+  c.diagnostics.scale = {};
+  c.diagnostics.scale.kind = calib::ScaleKind::kConstant;
   const std::string html = Page(made, false);
   const XmlDocument document = ParseXml(html);
   ASSERT_EQ(document.error, "");
@@ -164,10 +164,10 @@ TEST(CalibrationReport, PartialResultKeepsTheFiguresItHas) {
 // A floor of which only an interval is known has no value; the law is drawn all the same.
 TEST(CalibrationReport, AnIntervalForTheFloorKeepsTheFittedCurve) {
   MadeUpCalibration made = MakeUpCalibration(31, 300, 8);
-  made.calibration.blur_floor_px.reset();
+  made.calibration.summary.blur_floor_px.reset();
   const std::string without = Page(made, false);
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-  made.calibration.blur_floor_px = calib::Result{kNan, kNan, Eigen::Vector2d(0, 0.7)};
+  made.calibration.summary.blur_floor_px = calib::Result{kNan, kNan, Eigen::Vector2d(0, 0.7)};
   const std::string html = Page(made, false);
   ASSERT_EQ(ParseXml(html).error, "");
   EXPECT_THAT(html, HasSubstr("is estimated from the points"));
@@ -186,28 +186,28 @@ TEST(CalibrationReport, SurvivesNumbersThatAreNone) {
   made.calibration.frames[3].blur_sigma_error_px = inf;
   made.calibration.frames[4].image_scale = 0.0;
   made.calibration.frames[5].depth_mm = -3;
-  made.calibration.covariance(0, 0) = nan;
-  made.calibration.focus_depth_mm->value = inf;
+  made.calibration.diagnostics.covariance(0, 0) = nan;
+  made.calibration.summary.focus_depth_mm->value = inf;
   EXPECT_EQ(ParseXml(Page(made)).error, "");
-  made.calibration.field.tiles[2].focus_depth_mm = {nan, inf};
+  made.calibration.diagnostics.field.tiles[2].focus_depth_mm = {nan, inf};
   made.calibration.examples[0].measured[1] = nan;
   made.calibration.examples[1].x.resize(2);
   made.calibration.examples[2].frame = 99;
-  made.calibration.nearer.focus_depth_mm.value = 2;  // nearer than any focus
-  made.calibration.farther.blur_ratio.value = nan;
-  made.calibration.systematic_parts[0].focus_depth_mm = {nan, inf};
-  made.calibration.channels[0].focus_depth_mm.value = nan;
+  made.calibration.diagnostics.nearer.focus_depth_mm.value = 2;  // nearer than any focus
+  made.calibration.diagnostics.farther.blur_ratio.value = nan;
+  made.calibration.diagnostics.systematic_parts[0].focus_depth_mm = {nan, inf};
+  made.calibration.diagnostics.channels[0].focus_depth_mm.value = nan;
   made.calibration.frames[6].reading_error_mm = nan;
   EXPECT_EQ(ParseXml(Page(made)).error, "");
-  for (calib::FieldTile& tile : made.calibration.field.tiles) tile.done = false;
-  made.calibration.image_distance_mm->value = 1;  // a sensor in front of every image
+  for (calib::FieldTile& tile : made.calibration.diagnostics.field.tiles) tile.done = false;
+  made.calibration.summary.image_distance_mm->value = 1;  // a sensor in front of every image
   EXPECT_EQ(ParseXml(Page(made)).error, "");
 }
 
 TEST(CalibrationReport, NamesWhatLimitsIt) {
   MadeUpCalibration made = MakeUpCalibration(31, 300, 8);
   RemoveDetails(&made.calibration);
-  calib::Result& focus = *made.calibration.focus_depth_mm;
+  calib::Result& focus = *made.calibration.summary.focus_depth_mm;
   focus = {400, 0.1, Eigen::Vector2d(397, 402)};
   EXPECT_THAT(Page(made), HasSubstr("Systematic errors dominate"));
   EXPECT_THAT(Page(made), HasSubstr("knife edge"));
@@ -219,7 +219,7 @@ TEST(CalibrationReport, NamesWhatLimitsIt) {
   EXPECT_THAT(Page(made), HasSubstr("contribute alike"));
   // If the calibration itself gives advice, no general advice is added.
   focus = {400, 0.1, Eigen::Vector2d(397, 402)};
-  made.calibration.advice = "photograph a knife edge: +-2.9 mm would become +-0.4";
+  made.calibration.diagnostics.advice = "photograph a knife edge: +-2.9 mm would become +-0.4";
   const std::string html = Page(made);
   EXPECT_THAT(html, HasSubstr("What to do next:</b> Photograph a knife edge: ±2.9 mm would"));
   EXPECT_THAT(html, Not(HasSubstr("More frames would not help")));
@@ -246,8 +246,8 @@ TEST(CalibrationReport, SaysWhatTheFieldAndTheColoursDo) {
     EXPECT_THAT(html, HasSubstr(words));
   EXPECT_THAT(html, HasSubstr("the target&#39;s right side is nearer"));
   EXPECT_THAT(html, Not(HasSubstr("different readings")));
-  made.calibration.field.clusters = {{{398, 0.2}, 12}, {{405, 0.3}, 1}};
-  made.calibration.blur.better_psf = model::Psf::kDisc;
+  made.calibration.diagnostics.field.clusters = {{{398, 0.2}, 12}, {{405, 0.3}, 1}};
+  made.calibration.diagnostics.blur.better_psf = model::Psf::kDisc;
   html = Page(made);
   EXPECT_THAT(html, HasSubstr("2 different readings: zf = 398.00 ± 0.20 mm (12 tiles), "
                               "405.00 ± 0.30 mm (1 tile)"));
@@ -270,7 +270,7 @@ TEST(CalibrationReport, DrawsTheFieldAsItLies) {
   }
   EXPECT_LT(tiles[0].Number("x"), tiles[1].Number("x"));
   EXPECT_EQ(tiles[19].Attribute("class"), "empty");
-  const auto& field = made.calibration.field.tiles;
+  const auto& field = made.calibration.diagnostics.field.tiles;
   const auto by_depth = [](const calib::FieldTile& a, const calib::FieldTile& b) {
     return a.focus_depth_mm.value < b.focus_depth_mm.value;
   };
@@ -419,12 +419,12 @@ TEST(CalibrationReport, DrawsTheFittedBlurModel) {
   const int kBlurPlot = PlotNamed(document, "blur");
   const Scale z_at = AxisScale(document, kBlurPlot, "middle", "x", 0);
   const Scale sigma_at = AxisScale(document, kBlurPlot, "end", "y", -4);
-  const double d_mm = made.calibration.image_distance_mm->value - 3.0;
+  const double d_mm = made.calibration.summary.image_distance_mm->value - 3.0;
   const double zf_mm = 12.5 * d_mm / (d_mm - 12.8);
   const double k_mm = 12.5 * zf_mm / (zf_mm - 12.5);
-  const double kappa = made.calibration.blur_ratio->value;
+  const double kappa = made.calibration.summary.blur_ratio->value;
   const double a_px2_mm2 = kappa * kappa * std::pow(4.46 * k_mm / 0.006, 2);
-  const double s0_px2 = std::pow(made.calibration.blur_floor_px->value, 2);
+  const double s0_px2 = std::pow(made.calibration.summary.blur_floor_px->value, 2);
   int checked = 0;
   for (const XmlElement& path : document.Named("path", kBlurPlot)) {
     const std::string d = path.Attribute("d");
@@ -458,7 +458,8 @@ std::vector<std::pair<double, double>> PathPoints(std::string d) {
 // The drawn band against the scatter of the law over draws of its parameters.
 TEST(CalibrationReport, TheBandIsTheScatterOfTheModel) {
   MadeUpCalibration made = MakeUpCalibration(41, 320, 4);
-  made.calibration.covariance *= 9;  // large enough to exceed the rounding of the drawing
+  made.calibration.diagnostics.covariance *=
+      9;  // large enough to exceed the rounding of the drawing
   const XmlDocument document = ParseXml(Page(made, false));
   const int plot = PlotNamed(document, "blur");
   const Scale z_at = AxisScale(document, plot, "middle", "x", 0);
@@ -468,10 +469,10 @@ TEST(CalibrationReport, TheBandIsTheScatterOfTheModel) {
     if (path.Attribute("class") == "band") band = PathPoints(path.Attribute("d"));
   ASSERT_EQ(band.size(), 2u * 401u);
 
-  const Eigen::LLT<Eigen::MatrixXd> root(made.calibration.covariance);
+  const Eigen::LLT<Eigen::MatrixXd> root(made.calibration.diagnostics.covariance);
   const Eigen::Vector4d mean(
-      made.calibration.image_distance_mm->value, made.calibration.blur_ratio->value,
-      made.calibration.blur_floor_px->value, 0);  // of the offset only the change matters
+      made.calibration.summary.image_distance_mm->value, made.calibration.summary.blur_ratio->value,
+      made.calibration.summary.blur_floor_px->value, 0);  // of the offset only the change matters
   std::mt19937 generator(4);
   std::normal_distribution<double> normal;
   std::vector<Eigen::Vector4d> draws(4000);
@@ -519,7 +520,7 @@ TEST(CalibrationReport, ScaleResidualsVanishOnTheModel) {
     made.sweep.direction = direction;
     const double sign = direction == model::BenchDirection::kAway ? 1 : -1;
     const double offset_mm = sign > 0 ? 12.34 : 600;
-    made.calibration.scale.offset_mm = {offset_mm, 0.1, std::nullopt};
+    made.calibration.diagnostics.scale.offset_mm = {offset_mm, 0.1, std::nullopt};
     for (std::size_t i = 0; i < made.calibration.frames.size(); ++i) {
       calib::FrameMeasurement& frame = made.calibration.frames[i];
       frame.reading_mm = sign * (made.truth.frames[i].depth_mm - offset_mm);
@@ -538,13 +539,13 @@ TEST(CalibrationReport, ScaleResidualsVanishOnTheModel) {
 TEST(CalibrationReport, NamesTheBenchZeroWhereItIsMostOfTheError) {
   MadeUpCalibration made = MakeUpCalibration(31, 300, 8);
   RemoveDetails(&made.calibration);
-  *made.calibration.focus_depth_mm = {400, 0.57, Eigen::Vector2d(399.9, 400.1)};
-  made.calibration.bench_offset_mm->sigma = 0.56;
+  *made.calibration.summary.focus_depth_mm = {400, 0.57, Eigen::Vector2d(399.9, 400.1)};
+  made.calibration.summary.bench_offset_mm->sigma = 0.56;
   EXPECT_THAT(
       Page(made),
       HasSubstr("Statistical errors dominate: the bench zero leaves an uncertainty of ±0.57"));
   EXPECT_THAT(Page(made), Not(HasSubstr("noise and readings leave")));
-  made.calibration.bench_offset_mm->sigma = 0.3;
+  made.calibration.summary.bench_offset_mm->sigma = 0.3;
   EXPECT_THAT(Page(made), HasSubstr("Statistical errors dominate: noise and readings leave"));
 }
 
@@ -585,8 +586,8 @@ TEST(CalibrationReport, AccountsForFramesThatAreNotInTheFit) {
 TEST(CalibrationReport, TheWorstKnownValueIsNamedOnlyWhereItIsInformative) {
   MadeUpCalibration made = MakeUpCalibration(31, 300, 8);
   const auto page_with = [&](double correlation) {
-    made.calibration.blur.weak_direction = "a with b";
-    made.calibration.blur.weak_correlation = correlation;
+    made.calibration.diagnostics.blur.weak_direction = "a with b";
+    made.calibration.diagnostics.blur.weak_correlation = correlation;
     return Page(made);
   };
   EXPECT_THAT(page_with(0.05), Not(HasSubstr("Least certain")));
@@ -606,19 +607,19 @@ TEST(CalibrationReport, SaysWhatWasNotStatedOfTheReadings) {
 TEST(CalibrationReport, SaysWhereTheFramesLieOffTheModel) {
   MadeUpCalibration made = MakeUpCalibration(31, 300, 8);
   EXPECT_THAT(Page(made), Not(HasSubstr("exceed their errors")));
-  made.calibration.blur.chi2_per_dof = 2.5;
+  made.calibration.diagnostics.blur.chi2_per_dof = 2.5;
   const std::string widened =
       "The residuals of the frames exceed their errors (χ²/dof 2.5); the errors were widened";
   EXPECT_THAT(Page(made), HasSubstr(widened));
   // With few frames chance may do as much, and no widening is reported.
-  made.calibration.blur.frames_used = 8;
+  made.calibration.diagnostics.blur.frames_used = 8;
   EXPECT_THAT(Page(made), HasSubstr("exceed their errors (χ²/dof 2.5)."));
 }
 
 // Tiles that differ by noise alone stay near the middle of the colours, all with as many digits.
 TEST(CalibrationReport, NoiseDoesNotFillTheColoursOfTheField) {
   MadeUpCalibration made = MakeUpCalibration(41, 320, 4);
-  auto& tiles = made.calibration.field.tiles;
+  auto& tiles = made.calibration.diagnostics.field.tiles;
   for (std::size_t i = 0; i < tiles.size(); ++i)
     tiles[i].focus_depth_mm = {400 + (i % 2 == 0 ? 0.1 : -0.1), i == 0 ? 0.031 : 0.21};
   const XmlDocument document = ParseXml(Page(made));

@@ -68,14 +68,14 @@ TEST(CalibrationText, PutsBothMethodsBesideTheTruth) {
 
 TEST(CalibrationText, AnErrorThatTheIntervalAllowsForIsNotCountedInSigmas) {
   MadeUpCalibration made = MakeUpCalibration(41, 320, 4);
-  made.calibration.image_distance_mm->value = 16.2159;  // 16.2129 is the truth: 2.5 sigma
-  made.calibration.image_distance_mm->systematic = Eigen::Vector2d(16.2128, 16.2190);
+  made.calibration.summary.image_distance_mm->value = 16.2159;  // 16.2129 is the truth: 2.5 sigma
+  made.calibration.summary.image_distance_mm->systematic = Eigen::Vector2d(16.2128, 16.2190);
   const auto d1 = [&] {
     return LineWith(CalibrationText(made.sweep, made.calibration, &made.truth),
                     "image distance d1 [mm]");
   };
   EXPECT_THAT(d1(), HasSubstr("+0.0030 (within the interval)"));
-  made.calibration.image_distance_mm->systematic = Eigen::Vector2d(16.2130, 16.2190);
+  made.calibration.summary.image_distance_mm->systematic = Eigen::Vector2d(16.2130, 16.2190);
   EXPECT_THAT(d1(), HasSubstr("+0.0030 (+2.5 sigma)"));
 }
 
@@ -98,9 +98,9 @@ TEST(CalibrationText, RejectedFramesHaveTheirReasons) {
   RejectFrame(0, "dark: mean 0.001 below 0.016", &made.calibration);
   RejectFrame(1, "dark: mean 0.002 below 0.016", &made.calibration);
   RejectFrame(9, "blank", &made.calibration);
-  made.calibration.warnings = {"focus extrapolated by 3 mm"};
-  made.calibration.outcome = calib::Outcome::kPartial;
-  made.calibration.reason = "floor unknown";
+  made.calibration.summary.warnings = {"focus extrapolated by 3 mm"};
+  made.calibration.summary.outcome = calib::Outcome::kPartial;
+  made.calibration.summary.reason = "floor unknown";
   const std::string text = CalibrationText(made.sweep, made.calibration, nullptr);
   EXPECT_THAT(text, HasSubstr("41 frames: 38 used, 3 rejected\n"));
   EXPECT_THAT(text, HasSubstr("  dark (2 frames):\n    frame_000.png: mean 0.001"));
@@ -127,7 +127,7 @@ TEST(CalibrationText, DetailsTakeFewLines) {
               HasSubstr("zf -2.9 .. +3.6 mm, d1 -0.0015 .. +0.0012 mm, kappa -0.0070 .. +0.0080"));
   EXPECT_THAT(text, HasSubstr("advice: photograph a knife edge"));
   EXPECT_LE(std::count(text.begin(), text.end(), '\n'), 35);
-  made.calibration.blur.outside_mm = 2.5;
+  made.calibration.diagnostics.blur.outside_mm = 2.5;
   EXPECT_THAT(CalibrationText(made.sweep, made.calibration, nullptr),
               HasSubstr("2.5 mm outside the sweep and is extrapolated"));
 }

@@ -23,18 +23,18 @@ MadeUpCalibration RefusedWithFindings() {
   MadeUpCalibration made = MakeUpCalibration(31, 300, 8);
   RefuseAll("offset_mm is not stated and could not be determined", &made.calibration);
   calib::Calibration& c = made.calibration;
-  c.sharpest = {true, "fitted", {110.0312, 0.11}, 5, 12};
-  c.focus_reading_mm = model::Estimate{109.99841, 0.0004};
-  c.scale.done = false;
-  c.scale.change_over_sweep = model::Estimate{0.101, 0.001};
+  c.diagnostics.sharpest = {true, "fitted", {110.0312, 0.11}, 5, 12};
+  c.diagnostics.focus_reading_mm = model::Estimate{109.99841, 0.0004};
+  c.diagnostics.scale.done = false;
+  c.diagnostics.scale.change_over_sweep = model::Estimate{0.101, 0.001};
   calib::Diagnosis diagnosis;
   diagnosis.symptom = "the image scale against the readings";
   diagnosis.chi2_of_none = 500;
   diagnosis.causes = {{"the lens moves", 20}, {"the target moves", 60}};
   diagnosis.named = 1;
-  c.diagnoses = {diagnosis};
-  c.structure.measured = true;
-  c.structure.bands = model::Estimate{0.1, 0.01};
+  c.diagnostics.diagnoses = {diagnosis};
+  c.diagnostics.structure.measured = true;
+  c.diagnostics.structure.bands = model::Estimate{0.1, 0.01};
   return made;
 }
 

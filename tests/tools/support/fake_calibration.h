@@ -86,18 +86,19 @@ inline void AddDetails(calib::Calibration* calibration) {
   calib::Calibration& c = *calibration;
   std::mt19937 generator(8);
   const int count = static_cast<int>(c.frames.size());
-  c.source.sharpest_normalised_frame = count / 2;
-  c.source.normalised_focus_depth_mm = c.frames[static_cast<std::size_t>(count / 2)].depth_mm;
-  c.scale.kind = calib::ScaleKind::kInverseDepth;
-  c.scale.distortion_at_corner = model::Estimate{0.0042, 0.0006};
-  c.blur.weak_direction = "blur_floor_px against focus_depth_mm";
-  c.blur.weak_correlation = -0.9;
-  c.blur.estimator = "relative spectrum";
-  c.blur.gaussian_misfit = 1.04;
-  c.blur.disc_misfit = 2.31;
-  c.nearer = Side(-1.4, count / 2);
-  c.farther = Side(1.1, count - count / 2);
-  c.field = Field(&generator);
+  c.diagnostics.paper_recipe.sharpest_normalised_frame = count / 2;
+  c.diagnostics.paper_recipe.normalised_focus_depth_mm =
+      c.frames[static_cast<std::size_t>(count / 2)].depth_mm;
+  c.diagnostics.scale.kind = calib::ScaleKind::kInverseDepth;
+  c.diagnostics.scale.distortion_at_corner = model::Estimate{0.0042, 0.0006};
+  c.diagnostics.blur.weak_direction = "blur_floor_px against focus_depth_mm";
+  c.diagnostics.blur.weak_correlation = -0.9;
+  c.diagnostics.blur.estimator = "relative spectrum";
+  c.diagnostics.blur.gaussian_misfit = 1.04;
+  c.diagnostics.blur.disc_misfit = 2.31;
+  c.diagnostics.nearer = Side(-1.4, count / 2);
+  c.diagnostics.farther = Side(1.1, count - count / 2);
+  c.diagnostics.field = Field(&generator);
   for (const auto& [name, off_mm] :
        {std::pair("red", 0.61), std::pair("green", 0.02), std::pair("blue", 1.44)}) {
     calib::ChannelFocus channel;
@@ -105,10 +106,10 @@ inline void AddDetails(calib::Calibration* calibration) {
     channel.done = true;
     channel.message = "done";
     channel.focus_depth_mm = {kFocusMm + off_mm, 0.12};
-    c.channels.push_back(channel);
+    c.diagnostics.channels.push_back(channel);
   }
-  c.magnification = calib::MagnificationCheck{26.4812, 5, {16.1, 0.05}};
-  c.systematic_parts = {
+  c.diagnostics.magnification = calib::MagnificationCheck{26.4812, 5, {16.1, 0.05}};
+  c.diagnostics.systematic_parts = {
       {"lens floor", {-2.9, 3.6}, {-0.0015, 0.0012}, {-0.007, 0.008}, "photograph a knife edge"},
       {"lens.front_focal_length_mm",
        {0, 0},
@@ -120,7 +121,7 @@ inline void AddDetails(calib::Calibration* calibration) {
        {-0.0005, 0.0005},
        {-0.004, 0.005},
        "more frames on both sides"}};
-  c.advice =
+  c.diagnostics.advice =
       "photograph a knife edge: the floor is 80 % of your error, +-3.6 mm would become +-1.5";
   for (const int i : {0, count / 2, count - 1})
     c.examples.push_back(
@@ -154,8 +155,8 @@ inline MadeUpCalibration MakeUpCalibration(int frame_count, double first_depth_m
   std::mt19937 generator(7);
   std::normal_distribution<double> normal;
   calib::Calibration& c = made.calibration;
-  c.outcome = calib::Outcome::kOk;
-  c.reason.clear();
+  c.summary.outcome = calib::Outcome::kOk;
+  c.summary.reason.clear();
   for (int i = 0; i < frame_count; ++i) {
     const double z_mm = first_depth_mm + step_mm * i;
     calib::FrameMeasurement frame;
@@ -187,53 +188,56 @@ inline MadeUpCalibration MakeUpCalibration(int frame_count, double first_depth_m
     c.frames[static_cast<std::size_t>(i)].image_scale =
         reference_mm / (first_depth_mm + step_mm * i);
 
-  c.image_distance_mm = {d1_mm + 0.0003, 0.0012, Eigen::Vector2d(d1_mm - 0.004, d1_mm + 0.003)};
-  c.focus_depth_mm = {kFocusMm - 0.28, 1.1, Eigen::Vector2d(kFocusMm - 3.1, kFocusMm + 3.9)};
-  c.blur_ratio = {kKappa + 0.0012, 0.0021, Eigen::Vector2d(0.441, 0.462)};
-  c.blur_floor_px = {kFloorPx + 0.008, 0.012, std::nullopt};
-  c.bench_offset_mm = {kOffsetMm - 0.05, 0.11, std::nullopt};
-  c.covariance_order = {"image_distance_mm", "blur_ratio", "blur_floor_px", "bench_offset_mm"};
+  c.summary.image_distance_mm = {d1_mm + 0.0003, 0.0012,
+                                 Eigen::Vector2d(d1_mm - 0.004, d1_mm + 0.003)};
+  c.summary.focus_depth_mm = {kFocusMm - 0.28, 1.1,
+                              Eigen::Vector2d(kFocusMm - 3.1, kFocusMm + 3.9)};
+  c.summary.blur_ratio = {kKappa + 0.0012, 0.0021, Eigen::Vector2d(0.441, 0.462)};
+  c.summary.blur_floor_px = {kFloorPx + 0.008, 0.012, std::nullopt};
+  c.summary.bench_offset_mm = {kOffsetMm - 0.05, 0.11, std::nullopt};
+  c.diagnostics.covariance_order = {"image_distance_mm", "blur_ratio", "blur_floor_px",
+                                    "bench_offset_mm"};
   const Eigen::Vector4d sigmas(0.0012, 0.0021, 0.012, 0.11);
   Eigen::Matrix4d correlation = Eigen::Matrix4d::Identity();
   correlation(0, 3) = correlation(3, 0) = -0.71;
   correlation(1, 2) = correlation(2, 1) = -0.55;
-  c.covariance = sigmas.asDiagonal() * correlation * sigmas.asDiagonal();
+  c.diagnostics.covariance = sigmas.asDiagonal() * correlation * sigmas.asDiagonal();
 
-  c.source.done = true;
-  c.source.message = "done";
-  c.source.sharpest_frame = std::max(0, middle - 1);
-  c.source.focus_depth_mm = kFocusMm - 6.5;
-  c.source.image_distance_mm = 3.0 + 12.8 * 393.5 / (393.5 - 12.5);
-  c.source.blur_ratio = 0.77;
-  c.source.ratio_frames = frame_count - 1;
+  c.diagnostics.paper_recipe.done = true;
+  c.diagnostics.paper_recipe.message = "done";
+  c.diagnostics.paper_recipe.sharpest_frame = std::max(0, middle - 1);
+  c.diagnostics.paper_recipe.focus_depth_mm = kFocusMm - 6.5;
+  c.diagnostics.paper_recipe.image_distance_mm = 3.0 + 12.8 * 393.5 / (393.5 - 12.5);
+  c.diagnostics.paper_recipe.blur_ratio = 0.77;
+  c.diagnostics.paper_recipe.ratio_frames = frame_count - 1;
 
-  c.sharpness.done = true;
-  c.sharpness.message = "done";
-  c.sharpness.focus_depth_mm = kFocusMm + 0.9;
-  c.sharpness.sigma_mm = 1.3;
-  c.sharpness.reference_depth_mm = kFocusMm;
+  c.diagnostics.sharpness.done = true;
+  c.diagnostics.sharpness.message = "done";
+  c.diagnostics.sharpness.focus_depth_mm = kFocusMm + 0.9;
+  c.diagnostics.sharpness.sigma_mm = 1.3;
+  c.diagnostics.sharpness.reference_depth_mm = kFocusMm;
   // ln of the index above to second order in x = z0/z - 1: the blur is sigma = B |x|, so that
   // ln(0.3/sqrt(S0 + 0.4^2 + B^2 x^2)) = ln(0.3/sqrt(0.41)) - B^2 x^2/(2 * 0.41).
   const double b_px = kKappa * 4.46 * k_mm / kFocusMm / 0.006;
-  c.sharpness.log_parabola = {std::log(0.3 / std::sqrt(0.41)), 0, -b_px * b_px / 0.82};
-  c.sharpness.from_depth_mm = 385;
-  c.sharpness.to_depth_mm = 416;
-  c.sharpness.frames_used = 8;
+  c.diagnostics.sharpness.log_parabola = {std::log(0.3 / std::sqrt(0.41)), 0, -b_px * b_px / 0.82};
+  c.diagnostics.sharpness.from_depth_mm = 385;
+  c.diagnostics.sharpness.to_depth_mm = 416;
+  c.diagnostics.sharpness.frames_used = 8;
 
-  c.scale.done = true;
-  c.scale.message = "done";
-  c.scale.reference_frame = middle;
-  c.scale.offset_mm = {kOffsetMm - 0.05, 0.11, std::nullopt};
-  c.scale.reference_depth_mm = reference_mm;
-  c.scale.reading_rms_mm = 0.068;
-  c.scale.frames_used = frame_count;
+  c.diagnostics.scale.done = true;
+  c.diagnostics.scale.message = "done";
+  c.diagnostics.scale.reference_frame = middle;
+  c.diagnostics.scale.offset_mm = {kOffsetMm - 0.05, 0.11, std::nullopt};
+  c.diagnostics.scale.reference_depth_mm = reference_mm;
+  c.diagnostics.scale.reading_rms_mm = 0.068;
+  c.diagnostics.scale.frames_used = frame_count;
 
-  c.blur.done = true;
-  c.blur.message = "done";
-  c.blur.chi2_per_dof = 1.04;
-  c.blur.frames_used = frame_count;
-  c.frames_used = frame_count;
-  c.seconds = 2.7;
+  c.diagnostics.blur.done = true;
+  c.diagnostics.blur.message = "done";
+  c.diagnostics.blur.chi2_per_dof = 1.04;
+  c.diagnostics.blur.frames_used = frame_count;
+  c.summary.frames_used = frame_count;
+  c.summary.seconds = 2.7;
   made_up::AddDetails(&c);
   return made;
 }
@@ -241,20 +245,20 @@ inline MadeUpCalibration MakeUpCalibration(int frame_count, double first_depth_m
 // Leaves only the results: no sides, field, colours, examples, parts.
 inline void RemoveDetails(calib::Calibration* calibration) {
   calib::Calibration& c = *calibration;
-  c.source.sharpest_normalised_frame = -1;
-  c.source.normalised_focus_depth_mm = 0;
-  c.scale.kind = calib::ScaleKind::kUnknown;
-  c.scale.distortion_at_corner.reset();
-  c.blur.weak_direction.clear();
-  c.blur.estimator.clear();
-  c.blur.gaussian_misfit.reset();
-  c.blur.disc_misfit.reset();
-  c.nearer = c.farther = {};
-  c.field = {};
-  c.channels.clear();
-  c.magnification.reset();
-  c.systematic_parts.clear();
-  c.advice.clear();
+  c.diagnostics.paper_recipe.sharpest_normalised_frame = -1;
+  c.diagnostics.paper_recipe.normalised_focus_depth_mm = 0;
+  c.diagnostics.scale.kind = calib::ScaleKind::kUnknown;
+  c.diagnostics.scale.distortion_at_corner.reset();
+  c.diagnostics.blur.weak_direction.clear();
+  c.diagnostics.blur.estimator.clear();
+  c.diagnostics.blur.gaussian_misfit.reset();
+  c.diagnostics.blur.disc_misfit.reset();
+  c.diagnostics.nearer = c.diagnostics.farther = {};
+  c.diagnostics.field = {};
+  c.diagnostics.channels.clear();
+  c.diagnostics.magnification.reset();
+  c.diagnostics.systematic_parts.clear();
+  c.diagnostics.advice.clear();
   c.examples.clear();
   for (calib::FrameMeasurement& frame : c.frames)
     frame.image_scale_sigma = frame.reading_error_mm = frame.reading_error_sigma_mm = 0;
@@ -270,15 +274,15 @@ inline void RejectFrame(int index, const std::string& reason, calib::Calibration
   frame.statistics = old.statistics;
   frame.rejection = reason;
   old = frame;
-  --calibration->frames_used;
+  --calibration->summary.frames_used;
 }
 
 // The same sweep with a refused calibration.
 inline void RefuseAll(const std::string& reason, calib::Calibration* calibration) {
   calib::Calibration refused;
-  refused.reason = reason;
+  refused.summary.reason = reason;
   refused.frames = calibration->frames;
-  refused.frames_used = calibration->frames_used;
+  refused.summary.frames_used = calibration->summary.frames_used;
   *calibration = refused;
 }
 

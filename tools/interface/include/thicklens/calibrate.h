@@ -22,7 +22,7 @@ enum class CalibrationMethod {
 // What Calibrate does with a sweep that determines no camera.
 enum class OnRefusal {
   kThrow,   // it throws CalibrationRefused
-  kReturn,  // it returns a Calibration whose camera has no calibration; look at the summary
+  kReturn,  // it returns a Calibration with its refusal, whose camera has no calibration
 };
 
 struct CalibrateOptions {
@@ -34,54 +34,18 @@ struct CalibrateOptions {
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 
-// The result of a calibration for people and programs: what was found, and whether it can be used.
-struct CalibrationSummary {
-  calib::Outcome outcome = calib::Outcome::kRefused;  // kOk, kPartial or kRefused
-  std::string reason = "not run";                     // of an outcome other than kOk
-  std::vector<std::string> warnings;                  // one line each
-  // Values with statistical sigma and systematic interval; absent: not determined.
-  std::optional<calib::Result> image_distance_mm;  // d1, from Ap to the sensor
-  std::optional<calib::Result> focus_depth_mm;     // zf, from Ap toward the scene [S13]
-  std::optional<calib::Result> blur_ratio;         // kappa, dimensionless
-  std::optional<calib::Result> blur_floor_px;      // sigma of the lens floor
-  std::optional<calib::Result> bench_offset_mm;    // depth of reading 0 from Ap
-  double chi2_per_dof = 0;                         // of the blur fit; 0: there is none
-  int frames_used = 0, frames_rejected = 0;
-  double seconds = 0;
+// The results, and the evidence behind them (thicklens/calib/calibration.h says what each is).
+using CalibrationSummary = calib::CalibrationSummary;
+using CalibrationDiagnostics = calib::CalibrationDiagnostics;
 
-  // One line: outcome, d1, zf and kappa with their sigmas, frames, time.
-  THICKLENS_EXPORT std::string BriefReport() const;
-};
-
-// Evidence behind the result: intermediate results, alternatives, causes (calib/calibration.h says
-// what each one is).
-struct CalibrationDiagnostics {
-  std::vector<std::string> covariance_order;
-  Eigen::MatrixXd covariance;
-  calib::SharpestReading sharpest;
-  std::optional<Measured> focus_reading_mm;
-  std::vector<calib::Diagnosis> diagnoses;
-  calib::FrameStructureFinding structure;
-  calib::SourceRecipe paper_recipe;
-  calib::SharpnessPeak sharpness;
-  calib::ScaleModel scale;
-  calib::BlurFit blur;
-  calib::SideFit nearer, farther;
-  calib::FieldMap field;
-  std::vector<calib::ChannelFocus> channels;
-  std::optional<calib::MagnificationCheck> magnification;
-  std::vector<calib::SystematicPart> systematic_parts;
-  std::string advice;
-};
-
-struct Calibration {
+// What was found, with one record per frame, and the camera that has it.
+struct Calibration : calib::Calibration {
   // The sweep's camera with the calibrated values and their evidence (hash of the frames, version,
-  // date). Without a calibration if the outcome is kRefused.
+  // date). Without a calibration if it was refused.
   Camera camera;
-  CalibrationSummary summary;
-  CalibrationDiagnostics diagnostics;
-  std::vector<calib::FrameMeasurement> frames;  // one record per frame, in the sweep's order
-  std::vector<calib::BlurExample> examples;     // blur of three frames, for plots
+  // Why the sweep determines no camera by the chosen method, one line; empty: it does. The summary
+  // has the outcome of the fit, which kPaper does not need.
+  std::string refusal;
 };
 
 // A sweep that determines no camera. The message is the reason.

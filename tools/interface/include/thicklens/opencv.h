@@ -7,8 +7,10 @@
 #include <optional>
 #include <string>
 
+#include "thicklens/calib/focus_sweep.h"
 #include "thicklens/export.h"
 #include "thicklens/image.h"
+#include "thicklens/sweep.h"
 
 namespace thicklens {
 
@@ -21,6 +23,10 @@ THICKLENS_EXPORT Image ImageFromMat(const cv::Mat& mat, ChannelOrder order,
 // Converts an image to a matrix of its own memory with the channels in `order`: CV_8U, CV_16U or
 // CV_32F. Throws Error if `order` has another number of channels than the image.
 THICKLENS_EXPORT cv::Mat MatFromImage(const Image& image, ChannelOrder order);
+
+// The sweep as the library thicklens::calib measures it, with a reader of its frames. Throws Error
+// if the description takes its floor from the calibration of another camera.
+THICKLENS_EXPORT calib::FocusSweep FocusSweepOf(const Sweep& sweep);
 
 }  // namespace thicklens
 

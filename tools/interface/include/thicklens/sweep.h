@@ -11,6 +11,7 @@
 #include "thicklens/export.h"
 #include "thicklens/image.h"
 #include "thicklens/model/sweep_file.h"
+#include "thicklens/run.h"
 
 namespace thicklens {
 
@@ -64,11 +65,16 @@ struct SweepOverrides {
 // Reads a sweep's description (schema thicklens/sweep/1), or the sweep.yaml of a folder, and its
 // camera; checks that the frames exist and opens none. Throws OptionError, and Error with
 // file:line:column.
-THICKLENS_EXPORT Sweep ReadSweep(const std::string& path, const SweepOverrides& overrides = {});
+THICKLENS_EXPORT Sweep ReadSweep(const std::string& path, const SweepOverrides& overrides = {},
+                                 const RunControl& run = {});
 // Reads a folder of frames with a table of readings in mm (columns file, reading).
 // `overrides.camera_path` is required.
 THICKLENS_EXPORT Sweep ReadSweepFolder(const std::string& folder, const std::string& readings_csv,
-                                       const SweepOverrides& overrides);
+                                       const SweepOverrides& overrides, const RunControl& run = {});
+
+// What was assumed about the sweep and its camera, one line each: what Calibrate reports before it
+// measures.
+THICKLENS_EXPORT std::vector<std::string> NoticesOf(const Sweep& sweep);
 
 }  // namespace thicklens
 

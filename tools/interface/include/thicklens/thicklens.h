@@ -20,6 +20,7 @@
 #include "thicklens/simulate.h"     // IWYU pragma: export
 #include "thicklens/solver.h"       // IWYU pragma: export
 #include "thicklens/sweep.h"        // IWYU pragma: export
+#include "thicklens/verify.h"       // IWYU pragma: export
 #include "thicklens/version.h"      // IWYU pragma: export
 
 #endif  // THICKLENS_THICKLENS_H_

@@ -216,16 +216,29 @@ struct BlurFit {
 enum class Outcome { kOk, kPartial, kRefused };
 std::string OutcomeName(Outcome outcome);
 
-struct Calibration {
-  Outcome outcome = Outcome::kRefused;
-  std::string reason = "not run";     // reason of an outcome other than kOk
-  std::vector<std::string> warnings;  // one line each
+// The result of a calibration for people and programs: what was found, and whether it can be used.
+struct CalibrationSummary {
+  Outcome outcome = Outcome::kRefused;  // of the fit
+  std::string reason = "not run";       // of an outcome other than kOk
+  std::vector<std::string> warnings;    // one line each
+  // Values with statistical sigma and systematic interval; absent: not determined.
+  std::optional<Result> image_distance_mm;  // d1, from Ap to the sensor
+  std::optional<Result> focus_depth_mm;     // zf, from Ap toward the scene [S13]
+  std::optional<Result> blur_ratio;         // kappa, dimensionless
+  std::optional<Result> blur_floor_px;      // sigma of the lens floor
+  std::optional<Result> bench_offset_mm;    // depth of reading 0 from Ap
+  double chi2_per_dof = 0;                  // of the blur fit; 0: there is none
+  // In the blur fit, or, before the fit, the frames that passed the quality checks.
+  int frames_used = 0;
+  int frames_rejected = 0;
+  double seconds = 0;
 
-  std::optional<Result> image_distance_mm;
-  std::optional<Result> focus_depth_mm;
-  std::optional<Result> blur_ratio;
-  std::optional<Result> blur_floor_px;
-  std::optional<Result> bench_offset_mm;
+  // One line: outcome, d1, zf and kappa with their sigmas, frames, time.
+  std::string BriefReport() const;
+};
+
+// Evidence behind the result: intermediate results, alternatives, causes.
+struct CalibrationDiagnostics {
   // Covariance of the named parameters, in their units; sigma^2 is on the diagonal.
   std::vector<std::string> covariance_order;
   Eigen::MatrixXd covariance;
@@ -240,7 +253,7 @@ struct Calibration {
   std::vector<Diagnosis> diagnoses;
   FrameStructureFinding structure;
 
-  SourceRecipe source;
+  SourceRecipe paper_recipe;
   SharpnessPeak sharpness;
   ScaleModel scale;
   BlurFit blur;
@@ -250,11 +263,13 @@ struct Calibration {
   std::optional<MagnificationCheck> magnification;
   std::vector<SystematicPart> systematic_parts;  // sorted by their part of d1, the largest first
   std::string advice;                            // how to shrink the largest error, and to what
-  std::vector<BlurExample> examples;             // the nearest, the sharpest and the farthest frame
-  std::vector<FrameMeasurement> frames;          // in the sweep's order
-  int frames_used =
-      0;  // in the blur fit, or, before the fit, the frames that passed the quality checks
-  double seconds = 0;
+};
+
+struct Calibration {
+  CalibrationSummary summary;
+  CalibrationDiagnostics diagnostics;
+  std::vector<FrameMeasurement> frames;  // one record per frame, in the sweep's order
+  std::vector<BlurExample> examples;     // blur of the nearest, sharpest and farthest frame
 };
 
 }  // namespace thicklens::calib

@@ -1,0 +1,32 @@
+#include "tools/interface/measured_sweep.h"
+
+#include <cstddef>
+#include <string>
+
+#include "thicklens/base/cancel.h"
+#include "thicklens/opencv.h"
+
+namespace thicklens {
+
+MeasuredSweep MeasureSweep(const Sweep& sweep, bool map_field, RunScope* run) {
+  for (const std::string& notice : NoticesOf(sweep)) run->Warn(notice);
+  MeasuredSweep measured;
+  measured.sweep = FocusSweepOf(sweep);
+  if (sweep.frames == nullptr) {  // the files are hashed as they are read
+    measured.files = std::make_shared<io::FrameFiles>(sweep.description.frames);
+    measured.sweep.read_frame = [files = measured.files](std::size_t i) { return files->Read(i); };
+  }
+  calib::CalibrationOptions settings;
+  settings.map_field = map_field;
+  settings.threads = run->threads();
+  settings.progress = [progress = run->ProgressOf("measuring"), token = CurrentCancelToken()](
+                          int done, int total) {
+    progress(done, total);
+    return token == nullptr || !token->IsCancelled();
+  };
+  measured.calibration = calib::Calibrate(measured.sweep, settings);
+  ThrowIfCancelled();
+  return measured;
+}
+
+}  // namespace thicklens
