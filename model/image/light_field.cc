@@ -195,6 +195,7 @@ LightField DescriptionOf(const LightField& light_field) {
   description.grid = light_field.grid;
   description.camera = light_field.camera;
   description.origin = light_field.origin;
+  description.source = light_field.source;
   return description;
 }
 

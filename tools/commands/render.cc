@@ -1,5 +1,5 @@
 // thicklens render: renders images from a light field, or converts it to another layout.
-#include "thicklens/estimator/render.h"
+#include "thicklens/render.h"
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -18,26 +18,20 @@
 #include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/base/stopwatch.h"
-#include "thicklens/io/aperture_statement.h"
-#include "thicklens/io/image_description.h"
-#include "thicklens/io/image_io.h"
-#include "thicklens/io/light_field_io.h"
-#include "thicklens/kernels/device.h"
-#include "thicklens/model/scene.h"
+#include "thicklens/image.h"
+#include "thicklens/light_field.h"
 #include "tools/commands/commands.h"
 #include "tools/options/command_frame.h"
-#include "tools/options/light_field_effects.h"
+#include "tools/options/effect_options.h"
+#include "tools/options/interface_options.h"
 #include "tools/options/light_field_options.h"
 #include "tools/options/option_values.h"
 
 namespace thicklens::tools {
 namespace {
 
-using model::Effect;
-
 constexpr int kMosaicGapPx = 2;
 constexpr int kEpipolarRepeatPx = 8;  // one line per view would be too thin to see
-constexpr double kEncodedLevels = 255;
 constexpr double kMaxLengthMm = 1e9;
 constexpr int kDefaultBits = 8;
 
@@ -163,168 +157,102 @@ EpiLine ParseEpi(const std::string& text) {
 // --- What is rendered.
 
 struct Rendering {
-  model::LinearImage image;
+  Image image;
   std::string what;  // for the text output
   nlohmann::json details;
-  std::string effects{};  // for the text output, a line of its own; may be empty
+  std::string effects{};                  // for the text output, a line of its own; may be empty
+  std::vector<std::string> effects_on{};  // of a photograph
 };
 
-Eigen::ArrayXXd WeightsOf(const RenderOptions& options, const model::LightField& light_field,
-                          nlohmann::json* details) {
+OptionNames RenderOptionNames() {
+  return {{"aperture", "--aperture and --aperture-shape"},
+          {"aperture.shape", "--aperture-shape"},
+          {"aperture.radius", "--aperture"},
+          {"effects", "--effects"},
+          {"effects.without", "--without"},
+          {"effects.tolerance", "--tolerance"},
+          {"depth_mm", "--focus"},
+          {"disparity_px", "--focus-disparity"},
+          {"device", "--device"},
+          {"noise_levels", "--noise"},
+          {"bits", "--bits"}};
+}
+
+RenderAperture ApertureOf(const RenderOptions& options) {
+  RenderAperture aperture;
+  if (!options.aperture_shape.empty()) {
+    aperture.shape = model::ApertureShapeFromName(options.aperture_shape);
+  }
+  aperture.radius = options.aperture_radius;
+  return aperture;
+}
+
+void AddAperture(const RenderOptions& options, const LightField& light_field,
+                 const RenderSummary& found, nlohmann::json* details) {
   if (options.aperture_radius) {
     const char* const key = light_field.camera ? "aperture_radius_mm" : "aperture_radius_steps";
     (*details)[key] = *options.aperture_radius;
-    return estimator::WeightsForRadius(light_field, *options.aperture_radius);
   }
-  if (options.aperture_shape.empty()) {
-    const bool is_stated = io::StatesAperture(options.light_field);
-    (*details)["aperture_shape"] = is_stated ? "own" : "uniform";
-    (*details)["aperture_from"] = is_stated ? "light-field" : "assumed";
-    return light_field.weights;
-  }
-  (*details)["aperture_from"] = "option";
-  (*details)["aperture_shape"] = options.aperture_shape;
-  return model::ApertureWeights(model::ApertureShapeFromName(options.aperture_shape),
-                                light_field.u_count, light_field.v_count);
+  if (!found.aperture_shape.empty()) (*details)["aperture_shape"] = found.aperture_shape;
+  if (!found.aperture_from.empty()) (*details)["aperture_from"] = found.aperture_from;
 }
 
-std::string ApertureText(const RenderOptions& options, const model::LightField& light_field) {
+std::string ApertureText(const RenderOptions& options, const LightField& light_field,
+                         const RenderSummary& found) {
   if (options.aperture_radius) {
     return fmt::format("an aperture of {:g} {}", *options.aperture_radius,
                        light_field.camera ? "mm" : "view steps");
   }
-  if (!options.aperture_shape.empty()) return fmt::format("a {} aperture", options.aperture_shape);
-  return io::StatesAperture(options.light_field) ? "the light field's own aperture"
-                                                 : "a uniform aperture (assumed)";
+  if (found.aperture_from == "assumed") return "a uniform aperture (assumed)";
+  return found.aperture_shape == "own"       ? "the light field's own aperture"
+         : found.aperture_shape == "pinhole" ? "a pinhole"
+                                             : fmt::format("a {} aperture", found.aperture_shape);
 }
 
-// Returns the weights with the effects that are on.
-Eigen::ArrayXXd PhotographWeights(const RenderOptions& options,
-                                  const model::LightField& light_field, const model::EffectSet& on,
-                                  nlohmann::json* details) {
-  const bool is_said = options.aperture_radius || !options.aperture_shape.empty();
-  for (const Effect effect : {Effect::kDefocus, Effect::kApertureShape}) {
-    if (!is_said || on.Has(effect)) continue;
-    throw UsageError(
-        fmt::format("--aperture and --aperture-shape: they need the effect {}, which is left out",
-                    model::EffectName(effect)));
-  }
-  if (!on.Has(Effect::kDefocus)) {
-    (*details)["aperture_shape"] = "pinhole";
-    return estimator::WeightsForRadius(light_field, 0);
-  }
-  if (!on.Has(Effect::kApertureShape)) {
-    (*details)["aperture_shape"] = "gaussian";
-    return model::ApertureWeights(model::ApertureShape::kGaussian, light_field.u_count,
-                                  light_field.v_count);
-  }
-  return WeightsOf(options, light_field, details);
-}
-
-// Returns the transmission of the aperture of PhotographWeights for rays that cross it between the
-// views.
-estimator::Vignetting VignettingOf(const RenderOptions& options,
-                                   const model::LightField& light_field,
-                                   const model::EffectSelection& effects) {
-  using model::ApertureShape;
-  if (!effects.on.Has(Effect::kApertureShape)) return {ApertureShape::kGaussian, {}};
-  if (!options.aperture_shape.empty()) {
-    return {model::ApertureShapeFromName(options.aperture_shape), {}};
-  }
-  const std::optional<ApertureShape> own = estimator::ShapeOfWeights(light_field);
-  if (own) return {*own, options.aperture_radius};
-  throw Error(fmt::format(
-      "{}: its UV plane lies off the aperture and its weights belong to no known shape, so that "
-      "the aperture between the views is unknown: give {}--without vignetting",
-      options.light_field, options.aperture_radius ? "" : "--aperture-shape NAME or "));
-}
-
-// Light that the views do not contain cannot be restored by weights.
-void WarnOfWander(const model::LightField& light_field) {
-  constexpr double kMuch = 0.4;
-  const double wander = estimator::MaxPupilShift(light_field);
-  if (!(wander > kMuch)) return;
-  spdlog::warn(
-      "with the UV plane at {:g} mm the rays of the outermost pixels cross the aperture off its "
-      "middle, by {:.2g} of the half-width that the views cover: part of their light is missing, "
-      "and out-of-focus parts are displaced and not blurred enough",
-      light_field.grid->planes.uv_depth_mm, wander);
-}
-
-Rendering RenderPhotograph(const RenderOptions& options, const model::LightField& light_field) {
-  std::string notice;
-  const auto backend =
-      kernels::OpenBackend(kernels::ParseDeviceRequest(options.device), &notice, ThrowIfCancelled);
-  if (!notice.empty()) spdlog::warn("{}", notice);
-  spdlog::debug("device: {}", backend->description());
-  // On the processor, rendering is faster without the kernels.
-  const auto kernels = backend->is_opencl() ? backend->NewFloat() : nullptr;
+Rendering RenderPhotograph(const RenderOptions& options, const LightField& light_field,
+                           const RunControl& run) {
+  PhotographOptions asked;
+  asked.aperture = ApertureOf(options);
+  asked.effects = EffectSelectionOf(options.effects);
+  asked.device = options.device;
+  RenderSummary found;
   Rendering rendering;
-  rendering.details = {{"rendered", "as-captured"}, {"device", backend->name()}};
-  const model::EffectSelection effects = DecidePhotographEffects(options.effects, light_field);
-  rendering.details["effects"] = effects.on.Names();
-  rendering.details["effect_impacts"] = EffectsJson(effects);
-  std::optional<model::Camera> falloff;
-  if (effects.on.Has(Effect::kFalloff)) {
-    falloff = effects.on.Has(Effect::kThickness) ? *light_field.camera
-                                                 : model::ThinLensEquivalent(*light_field.camera);
-  }
-  std::optional<estimator::Vignetting> vignetting;
-  // An aperture of radius 0 is a single view.
-  if (effects.on.Has(Effect::kVignetting) && options.aperture_radius.value_or(1) > 0) {
-    vignetting = VignettingOf(options, light_field, effects);
-    WarnOfWander(light_field);
-  }
-  rendering.image = estimator::Photograph(
-      light_field, PhotographWeights(options, light_field, effects.on, &rendering.details),
-      falloff ? &*falloff : nullptr, vignetting ? &*vignetting : nullptr, kernels.get(),
-      options.common.threads);
-  const bool is_pinhole = !effects.on.Has(Effect::kDefocus);
-  const bool is_gaussian = !effects.on.Has(Effect::kApertureShape);
-  rendering.what =
-      fmt::format("photograph through {}", is_pinhole    ? "a pinhole"
-                                           : is_gaussian ? "a gaussian aperture"
-                                                         : ApertureText(options, light_field));
-  if (!effects.findings.empty()) rendering.effects = EffectsText(effects);
+  rendering.image = thicklens::RenderPhotograph(light_field, asked, run, &found);
+  spdlog::debug("device: {}", found.device_description);
+  rendering.effects_on = found.effects.on.Names();
+  rendering.details = {{"rendered", "as-captured"},
+                       {"device", found.device},
+                       {"effects", rendering.effects_on},
+                       {"effect_impacts", EffectsJson(found.effects)}};
+  AddAperture(options, light_field, found, &rendering.details);
+  rendering.what = "photograph through " + ApertureText(options, light_field, found);
+  if (!found.effects.findings.empty()) rendering.effects = EffectsText(found.effects);
   return rendering;
 }
 
-// The disparity along v is the disparity along u times the ratio of the view steps.
-Eigen::Vector2d FocusDisparityPx(const RenderOptions& options,
-                                 const model::LightField& light_field) {
-  if (options.focus_mm) {
-    if (!light_field.camera) {
-      throw Error(
-          fmt::format("--focus {} mm: {} has no camera, so that depths in mm are unknown; give "
-                      "--focus-disparity PX",
-                      *options.focus_mm, options.light_field));
-    }
-    return estimator::DisparityAtDepthPx(light_field, *options.focus_mm);
-  }
-  Eigen::Vector2d disparity_px(*options.focus_disparity_px, *options.focus_disparity_px);
-  if (light_field.grid && light_field.grid->u_step_mm != 0)
-    disparity_px.y() *= light_field.grid->v_step_mm / light_field.grid->u_step_mm;
-  return disparity_px;
-}
-
-Rendering RenderFocused(const RenderOptions& options, const model::LightField& light_field) {
-  const Eigen::Vector2d disparity_px = FocusDisparityPx(options, light_field);
+Rendering RenderFocused(const RenderOptions& options, const LightField& light_field,
+                        const RunControl& run) {
+  FocusOptions asked;
+  asked.depth_mm = options.focus_mm;
+  asked.disparity_px = options.focus_disparity_px;
+  asked.aperture = ApertureOf(options);
+  RenderSummary found;
   Rendering rendering;
+  rendering.image = Refocus(light_field, asked, run, &found);
+  const Eigen::Vector2d& disparity_px = found.disparity_px;
   rendering.details = {{"rendered", "focus"},
                        {"disparity_px", {disparity_px.x(), disparity_px.y()}}};
   if (options.focus_mm) rendering.details["focus_depth_mm"] = *options.focus_mm;
-  const Eigen::ArrayXXd weights = WeightsOf(options, light_field, &rendering.details);
-  rendering.image = estimator::Refocus(light_field, disparity_px.x(), disparity_px.y(), weights,
-                                       options.common.threads);
+  AddAperture(options, light_field, found, &rendering.details);
   rendering.what = options.focus_mm
                        ? fmt::format("focus at {:g} mm (disparity {:.4g} px per view step)",
                                      *options.focus_mm, disparity_px.x())
                        : fmt::format("focus at disparity {:g} px per view step", disparity_px.x());
-  rendering.what += " through " + ApertureText(options, light_field);
+  rendering.what += " through " + ApertureText(options, light_field, found);
   return rendering;
 }
 
-Rendering RenderView(const RenderOptions& options, const model::LightField& light_field) {
+Rendering RenderView(const RenderOptions& options, const LightField& light_field) {
   ViewPlace place = ParseView(options.view);
   if (place.centre) {
     if (light_field.u_count % 2 == 0 || light_field.v_count % 2 == 0) {
@@ -346,7 +274,7 @@ Rendering RenderView(const RenderOptions& options, const model::LightField& ligh
   }
   if (!light_field.IsPresent(k, l))
     throw Error(fmt::format("--view {},{}: {} has no such view", k, l, options.light_field));
-  return {model::ViewImage(light_field, k, l),
+  return {ViewOf(light_field, k, l),
           fmt::format("view ({}, {})", k, l),
           {{"rendered", "view"}, {"u", k}, {"v", l}}};
 }
@@ -359,34 +287,34 @@ int Chosen(const std::string& name, const std::optional<int>& asked, int count,
                           light_field, count - 1));
 }
 
-Rendering RenderEpi(const RenderOptions& options, const model::LightField& light_field) {
+Rendering RenderEpi(const RenderOptions& options, const LightField& light_field) {
   const EpiLine epi = ParseEpi(options.epi);
   const std::string& name = options.light_field;
   if (epi.is_row) {
     const int t = Chosen("row", epi.line, light_field.t_count, name);
     const int l = Chosen("v", epi.view, light_field.v_count, name);
-    return {estimator::EpipolarRow(light_field, t, l, kEpipolarRepeatPx),
+    return {RenderEpipolarRow(light_field, t, l, kEpipolarRepeatPx),
             fmt::format("row {} of the views in row {}, one above the other", t, l),
             {{"rendered", "epi"}, {"row", t}, {"v", l}}};
   }
   const int s = Chosen("column", epi.line, light_field.s_count, name);
   const int k = Chosen("u", epi.view, light_field.u_count, name);
-  return {estimator::EpipolarColumn(light_field, s, k, kEpipolarRepeatPx),
+  return {RenderEpipolarColumn(light_field, s, k, kEpipolarRepeatPx),
           fmt::format("column {} of the views in column {}, side by side", s, k),
           {{"rendered", "epi"}, {"column", s}, {"u", k}}};
 }
 
-Rendering RenderAny(const RenderOptions& options, const model::LightField& light_field) {
-  if (options.as_captured) return RenderPhotograph(options, light_field);
-  if (IsFocused(options)) return RenderFocused(options, light_field);
+Rendering RenderAny(const RenderOptions& options, const LightField& light_field,
+                    const RunControl& run) {
+  if (options.as_captured) return RenderPhotograph(options, light_field, run);
+  if (IsFocused(options)) return RenderFocused(options, light_field, run);
   if (options.is_epi) return RenderEpi(options, light_field);
   if (!options.mosaic) return RenderView(options, light_field);
-  return {estimator::Mosaic(light_field, kMosaicGapPx),
-          "all views side by side",
-          {{"rendered", "mosaic"}}};
+  return {
+      RenderMosaic(light_field, kMosaicGapPx), "all views side by side", {{"rendered", "mosaic"}}};
 }
 
-void AddToSummary(const RenderOptions& options, const model::LightField& light_field,
+void AddToSummary(const RenderOptions& options, const LightField& light_field,
                   double clipped_fraction, double seconds, nlohmann::json* summary) {
   summary->update({{"status", "ok"},
                    {"reason", ""},
@@ -405,66 +333,67 @@ std::string ClippedText(double fraction) {
 }
 
 // The description in the file: "photograph through ...; effects: defocus, falloff".
-std::string Description(const Rendering& rendering) {
-  const auto effects = rendering.details.find("effects");
-  if (effects == rendering.details.end()) return rendering.what;
-  const auto names = effects->get<std::vector<std::string>>();
+std::string Description(const RenderOptions& options, const Rendering& rendering) {
+  if (!options.as_captured) return rendering.what;
   return fmt::format("{}; effects: {}", rendering.what,
-                     names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", ")));
+                     rendering.effects_on.empty()
+                         ? "none"
+                         : fmt::format("{}", fmt::join(rendering.effects_on, ", ")));
 }
 
 CommandResult RenderImage(const RenderOptions& options) {
   const auto start = Clock::now();
   OutputFile output(options.output);
-  const model::LightField light_field =
-      io::ReadLightField(options.light_field, ReadingOf(options.reading));
+  const CommandRun run(options.common, RenderOptionNames());
+  const LightField light_field =
+      ReadLightField(options.light_field, LightFieldReadOptionsOf(options.reading), run.control());
   ThrowIfCancelled();
-  Rendering rendering = RenderAny(options, light_field);
+  Rendering rendering =
+      WithOptionNames(run.names(), [&] { return RenderAny(options, light_field, run.control()); });
   ThrowIfCancelled();
 
-  const int bits = options.bits.value_or(kDefaultBits);
-  const double noise_levels = options.noise_levels.value_or(0);
-  const auto seed = static_cast<std::uint64_t>(options.seed.value_or(0));
-  const model::LinearImage& image = rendering.image;
-  const std::size_t clipped = io::CountClipped(image, light_field.transfer, bits);
-  output.Commit(io::WithDescription(
-      io::EncodePng(model::ToEncodedWithNoise(image, light_field.transfer, bits,
-                                              noise_levels / kEncodedLevels, seed)),
-      Description(rendering)));
+  ImageFileOptions file;
+  file.bits = options.bits.value_or(kDefaultBits);
+  file.noise_levels = options.noise_levels.value_or(0);
+  file.seed = static_cast<std::uint64_t>(options.seed.value_or(0));
+  file.description = Description(options, rendering);
+  const Image& image = rendering.image;
+  const EncodedImageFile encoded = EncodeImage(image, file);
+  output.Commit(encoded.png);
 
-  const double fraction = static_cast<double>(clipped) / static_cast<double>(image.values.size());
+  const double fraction = static_cast<double>(encoded.clipped_values) /
+                          static_cast<double>(image.light().values.size());
   CommandResult result;
   result.is_written = true;
   result.summary = std::move(rendering.details);
-  result.summary.update({{"width_px", image.width_px},
-                         {"height_px", image.height_px},
-                         {"bits", bits},
-                         {"noise_levels", noise_levels},
-                         {"seed", seed}});
+  result.summary.update({{"width_px", image.width_px()},
+                         {"height_px", image.height_px()},
+                         {"bits", file.bits},
+                         {"noise_levels", file.noise_levels},
+                         {"seed", file.seed}});
   AddToSummary(options, light_field, fraction, SecondsSince(start), &result.summary);
-  const std::string noise =
-      noise_levels > 0 ? fmt::format(", noise {:g}/255 (seed {})", noise_levels, seed) : "";
+  const std::string noise = file.noise_levels > 0 ? fmt::format(", noise {:g}/255 (seed {})",
+                                                                file.noise_levels, file.seed)
+                                                  : "";
   PrintResult(options.common,
               fmt::format("{}\n{} x {} views -> {} x {} px, {} channel(s), {} bit{}: {}\n{}",
-                          rendering.what, light_field.u_count, light_field.v_count, image.width_px,
-                          image.height_px, image.channels, bits, noise, options.output,
-                          ClippedText(fraction)) +
+                          rendering.what, light_field.u_count, light_field.v_count,
+                          image.width_px(), image.height_px(), image.channels(), file.bits, noise,
+                          options.output, ClippedText(fraction)) +
                   rendering.effects);
   return result;
 }
 
 CommandResult Convert(const RenderOptions& options) {
   const auto start = Clock::now();
-  const bool is_hci = options.convert == "hci";
-  OutputFolder folder =
-      is_hci ? io::ClaimHciFolder(options.output)
-             : OutputFolder(options.output, io::kLightFieldMarker, io::LightFieldEntries());
-  const model::LightField light_field =
-      io::ReadLightField(options.light_field, ReadingOf(options.reading));
-  const io::ViewFormat format =
-      options.convert == "thicklens-tiff" ? io::ViewFormat::kTiff : io::ViewFormat::kPng;
-  const std::size_t clipped = is_hci ? io::WriteHciLightField(light_field, &folder)
-                                     : io::WriteLightField(light_field, format, &folder);
+  const LightFieldFormat format = options.convert == "hci"              ? LightFieldFormat::kHci
+                                  : options.convert == "thicklens-tiff" ? LightFieldFormat::kTiff
+                                                                        : LightFieldFormat::kPng;
+  OutputFolder folder = ClaimLightFieldFolder(options.output, format);
+  const CommandRun run(options.common, RenderOptionNames());
+  const LightField light_field =
+      ReadLightField(options.light_field, LightFieldReadOptionsOf(options.reading), run.control());
+  const std::size_t clipped = WriteLightField(&folder, light_field, format, run.control());
   ThrowIfCancelled();
   folder.Commit();
 
@@ -559,7 +488,7 @@ void AddRenderCommand(CLI::App* program, CommandAction* action) {
       CheckUsage(options.get());
       if (!options->view.empty()) ParseView(options->view);
       ParseEpi(options->epi);
-      ReadingOf(options->reading);
+      LightFieldReadOptionsOf(options->reading);  // reports wrong usage before any work begins
       RequireDistinctFiles({options->common.json_path, options->output}, {options->light_field});
       RunCommand(options->common, [&] {
         return options->convert.empty() ? RenderImage(*options) : Convert(*options);

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
 #include "thicklens/run.h"
 
 namespace thicklens {
@@ -19,18 +21,21 @@ model::EffectSelectionOptions ChoiceOf(const EffectSelection& selection) {
 }
 
 void RequireEffectsOf(const EffectSelection& selection, const EffectSet& of_model) {
-  const EffectSet unknown = selection.given.With(selection.without).Without(of_model);
-  if (unknown.empty()) return;
-  throw OptionError("effects",
-                    fmt::format("effects: the forward model does not have {}; it has {}",
-                                model::JoinedNames(unknown), model::JoinedNames(of_model)));
+  for (const auto& [field, effects] : {std::pair("effects.given", selection.given),
+                                       std::pair("effects.without", selection.without)}) {
+    const EffectSet foreign = effects.Without(of_model);
+    if (foreign.empty()) continue;
+    throw OptionError(field,
+                      fmt::format("{}: effect {} is not available here, the effects are: {}", field,
+                                  model::JoinedNames(foreign), model::JoinedNames(of_model)));
+  }
 }
 
 model::EffectSelection DecideWithoutCamera(const EffectSelection& selection,
                                            const EffectSet& of_model) {
   if (selection.tolerance) {
     throw OptionError("effects.tolerance",
-                      "effects.tolerance: needs a camera, without which no impact is known");
+                      "effects.tolerance: without a camera, which effects are relevant is unknown");
   }
   const EffectSet base =
       selection.base == EffectSelection::Base::kGiven ? selection.given : of_model;

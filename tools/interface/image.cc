@@ -14,6 +14,7 @@
 #include "thicklens/io/image_io.h"
 #include "thicklens/io/light_field_io.h"
 #include "tools/interface/validation.h"
+#include "tools/interface/with_file_context.h"
 
 namespace thicklens {
 namespace {
@@ -163,6 +164,21 @@ Image Image::WithoutAlpha() const {
   return opaque;
 }
 
+Image Image::Cropped(const model::PixelRect& rect) const {
+  Image cropped;
+  cropped.transfer_ = transfer_;
+  cropped.source_ = source_;
+  cropped.is_from_file_ = is_from_file_;
+  WithFileContext(source_.empty() ? "image" : source_, [&] {
+    if (is_linear()) {
+      cropped.pixels_ = model::CropImage(light(), rect);
+    } else {
+      cropped.pixels_ = model::CropImage(encoded(), rect);
+    }
+  });
+  return cropped;
+}
+
 Image ReadImage(const std::string& path, std::optional<TransferCurve> transfer) {
   Image image;
   image.pixels_ = io::ToEncodedImage(io::ReadImageFile(path));
@@ -172,26 +188,32 @@ Image ReadImage(const std::string& path, std::optional<TransferCurve> transfer) 
   return image;
 }
 
-std::size_t WriteImage(const std::string& path, const Image& image,
-                       const ImageFileOptions& options) {
+EncodedImageFile EncodeImage(const Image& image, const ImageFileOptions& options) {
   checks::RequireValid(options);
-  OutputFile output(path);
-  std::size_t clipped = 0;
-  model::EncodedImage stored;
+  EncodedImageFile file;
   if (image.is_linear()) {
     const TransferCurve transfer = image.transfer().value_or(TransferCurve::Srgb());
-    clipped = io::CountClipped(image.light(), transfer, options.bits);
-    stored = model::ToEncodedWithNoise(image.light(), transfer, options.bits,
-                                       options.noise_levels / kEncodedLevels, options.seed);
+    file.clipped_values = io::CountClipped(image.light(), transfer, options.bits);
+    file.png = io::EncodePng(model::ToEncodedWithNoise(image.light(), transfer, options.bits,
+                                                       options.noise_levels / kEncodedLevels,
+                                                       options.seed));
   } else {
     if (options.noise_levels != 0) {
       throw OptionError("noise_levels", "noise_levels: is for linear light only");
     }
-    stored = image.encoded();
+    file.png = io::EncodePng(image.encoded());
   }
-  const std::string png = io::EncodePng(stored);
-  output.Commit(options.description.empty() ? png : io::WithDescription(png, options.description));
-  return clipped;
+  if (!options.description.empty()) file.png = io::WithDescription(file.png, options.description);
+  return file;
+}
+
+std::size_t WriteImage(const std::string& path, const Image& image,
+                       const ImageFileOptions& options) {
+  checks::RequireValid(options);
+  OutputFile output(path);
+  const EncodedImageFile file = EncodeImage(image, options);
+  output.Commit(file.png);
+  return file.clipped_values;
 }
 
 }  // namespace thicklens

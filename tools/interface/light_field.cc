@@ -56,20 +56,25 @@ Image ViewOf(const LightField& light_field, int k, int l) {
                           light_field.transfer, fmt::format("view ({}, {})", k, l));
 }
 
+OutputFolder ClaimLightFieldFolder(const std::string& folder, LightFieldFormat format) {
+  if (format == LightFieldFormat::kHci) return io::ClaimHciFolder(folder);
+  return OutputFolder(folder, io::kLightFieldMarker, io::LightFieldEntries());
+}
+
+std::size_t WriteLightField(OutputFolder* folder, const LightField& light_field,
+                            LightFieldFormat format, const RunControl& run) {
+  const RunScope scope(run);
+  if (format == LightFieldFormat::kHci) return io::WriteHciLightField(light_field, folder);
+  return io::WriteLightField(
+      light_field, format == LightFieldFormat::kPng ? io::ViewFormat::kPng : io::ViewFormat::kTiff,
+      folder);
+}
+
 std::size_t WriteLightField(const std::string& folder, const LightField& light_field,
                             LightFieldFormat format, const RunControl& run) {
   const RunScope scope(run);
-  if (format == LightFieldFormat::kHci) {
-    OutputFolder output = io::ClaimHciFolder(folder);
-    const std::size_t clipped = io::WriteHciLightField(light_field, &output);
-    ThrowIfCancelled();
-    output.Commit();
-    return clipped;
-  }
-  OutputFolder output(folder, io::kLightFieldMarker, io::LightFieldEntries());
-  const std::size_t clipped = io::WriteLightField(
-      light_field, format == LightFieldFormat::kPng ? io::ViewFormat::kPng : io::ViewFormat::kTiff,
-      &output);
+  OutputFolder output = ClaimLightFieldFolder(folder, format);
+  const std::size_t clipped = WriteLightField(&output, light_field, format, run);
   ThrowIfCancelled();
   output.Commit();
   return clipped;
@@ -82,7 +87,7 @@ std::size_t WriteLightField(const std::string& folder, const LightFieldEstimate&
     return WriteLightField(folder, light_field, format, run);
   }
   const RunScope scope(run);
-  OutputFolder output(folder, io::kLightFieldMarker, io::LightFieldEntries());
+  OutputFolder output = ClaimLightFieldFolder(folder, format);
   io::LightFieldWriter writer(
       light_field.transfer,
       format == LightFieldFormat::kPng ? io::ViewFormat::kPng : io::ViewFormat::kTiff, &output);

@@ -125,7 +125,7 @@ bool SweepOverrides::IsValid(std::string* why) const {
     return Fail(why, "offset_mm", "an offset is given, and offset_unknown says that it is not");
   }
   if (offset_unknown && offset_sigma_mm) {
-    return Fail(why, "offset_sigma_mm", "an unknown offset has no sigma");
+    return Fail(why, "offset_sigma_mm", "an unknown offset has no standard deviation");
   }
   if (!floor_from_calibration.empty() && (floor_px || floor_unknown)) {
     return Fail(why, "floor_from_calibration", "excludes floor_px and floor_unknown");
@@ -295,7 +295,8 @@ bool PhotographOptions::IsValid(std::string* why) const {
   for (const Effect effect : {Effect::kDefocus, Effect::kApertureShape}) {
     if ((aperture.shape || aperture.radius) && effects.LeavesOut(effect)) {
       return Fail(why, "aperture",
-                  fmt::format("needs the effect {}, which is left out", model::EffectName(effect)));
+                  fmt::format("this statement needs the effect {}, which is left out",
+                              model::EffectName(effect)));
     }
   }
   return IsDevice(why, device);

@@ -9,6 +9,7 @@
 #include "thicklens/base/error.h"
 #include "thicklens/estimator/aperture_weights.h"
 #include "thicklens/estimator/render.h"
+#include "thicklens/io/aperture_statement.h"
 #include "thicklens/kernels/device.h"
 #include "thicklens/model/effect_impact.h"
 #include "tools/interface/effects_choice.h"
@@ -18,13 +19,18 @@
 namespace thicklens {
 namespace {
 
+std::string NameOf(const LightField& light_field) {
+  return light_field.source.empty() ? "light field" : light_field.source;
+}
+
 Image ImageOf(model::LinearImage image, const LightField& light_field) {
   if (image.channels != 1 && image.channels != 3) {
-    throw Error(fmt::format("light field: 1 or 3 channels are expected, found {}", image.channels));
+    throw Error(fmt::format("{}: 1 or 3 channels are expected, found {}", NameOf(light_field),
+                            image.channels));
   }
   return Image::FromLight(image.width_px, image.height_px,
                           image.channels == 1 ? ChannelOrder::kGrey : ChannelOrder::kRgb,
-                          std::move(image.values), light_field.transfer);
+                          std::move(image.values), light_field.transfer, light_field.source);
 }
 
 // Which effects of a photograph of the light field are taken into account. Occlusion is contained
@@ -42,7 +48,8 @@ model::EffectSelection SelectEffects(const EffectSelection& selection,
   model::EffectConditions conditions;
   conditions.camera = *light_field.camera;
   if (light_field.grid) conditions.planes = light_field.grid->planes;
-  // Views do not state their depths: any depth from half of that of the plane of focus on.
+  // Views do not state their depths: every depth from half of the in-focus distance on is possible.
+  // The impact of defocus and aperture shape is therefore not reported.
   constexpr double kFarMm = 1e6;
   const double near_mm = std::min(light_field.camera->focus_depth_mm(), kFarMm) / 2;
   model::EffectSelection decision =
@@ -50,60 +57,81 @@ model::EffectSelection SelectEffects(const EffectSelection& selection,
                            model::PlacesBetween(*light_field.camera, near_mm,
                                                 std::numeric_limits<double>::infinity(), false),
                            of_model);
-  // Without defocus a pixel has one ray.
+  // Without defocus each pixel has one ray.
   if (!decision.on.Has(Effect::kDefocus)) decision.on.Remove(Effect::kVignetting);
+  decision.findings.erase(std::remove_if(decision.findings.begin(), decision.findings.end(),
+                                         [&](const model::LargestEffectImpact& finding) {
+                                           return of_views.Has(finding.effect);
+                                         }),
+                          decision.findings.end());
   return decision;
 }
 
-Eigen::ArrayXXd WeightsOf(const RenderAperture& aperture, const LightField& light_field) {
+Eigen::ArrayXXd WeightsOf(const RenderAperture& aperture, const LightField& light_field,
+                          RenderSummary* summary) {
   if (aperture.radius) return estimator::WeightsForRadius(light_field, *aperture.radius);
-  if (!aperture.shape) return light_field.weights;
+  if (!aperture.shape) {
+    const bool is_stated = light_field.source.empty() || io::StatesAperture(light_field.source);
+    summary->aperture_shape = is_stated ? "own" : "uniform";
+    summary->aperture_from = is_stated ? "light-field" : "assumed";
+    return light_field.weights;
+  }
+  summary->aperture_shape = model::ApertureShapeName(*aperture.shape);
+  summary->aperture_from = "option";
   return model::ApertureWeights(*aperture.shape, light_field.u_count, light_field.v_count);
 }
 
 Eigen::ArrayXXd PhotographWeights(const RenderAperture& aperture, const LightField& light_field,
-                                  const EffectSet& on) {
+                                  const EffectSet& on, RenderSummary* summary) {
   for (const Effect effect : {Effect::kDefocus, Effect::kApertureShape}) {
     if ((!aperture.radius && !aperture.shape) || on.Has(effect)) continue;
-    throw OptionError("aperture", fmt::format("aperture: needs the effect {}, which is left out",
-                                              model::EffectName(effect)));
+    throw OptionError("aperture",
+                      fmt::format("aperture: this statement needs the effect {}, which is left out",
+                                  model::EffectName(effect)));
   }
-  if (!on.Has(Effect::kDefocus)) return estimator::WeightsForRadius(light_field, 0);
+  if (!on.Has(Effect::kDefocus)) {
+    summary->aperture_shape = "pinhole";
+    return estimator::WeightsForRadius(light_field, 0);
+  }
   if (!on.Has(Effect::kApertureShape)) {
+    summary->aperture_shape = "gaussian";
     return model::ApertureWeights(model::ApertureShape::kGaussian, light_field.u_count,
                                   light_field.v_count);
   }
-  return WeightsOf(aperture, light_field);
+  return WeightsOf(aperture, light_field, summary);
 }
 
-// The aperture of PhotographWeights where a ray crosses it between the views.
+// The transmission of the aperture of PhotographWeights for rays that cross it between the views.
 estimator::Vignetting VignettingOf(const RenderAperture& aperture, const LightField& light_field,
-                                   const EffectSet& on) {
+                                   const EffectSet& on, const RunScope& run) {
   if (!on.Has(Effect::kApertureShape)) return {model::ApertureShape::kGaussian, {}};
   if (aperture.shape) return {*aperture.shape, {}};
   const std::optional<model::ApertureShape> own = estimator::ShapeOfWeights(light_field);
   if (own) return {*own, aperture.radius};
-  throw Error(
-      "light field: its UV plane lies off the aperture, and its weights are those of no shape, so "
-      "that nothing is known of the aperture between the views: state a shape, or leave the effect "
-      "vignetting out");
+  const std::string give =
+      aperture.radius ? "" : fmt::format("give {}, or ", run.Option("aperture.shape"));
+  throw Error(fmt::format(
+      "{}: its UV plane lies off the aperture and its weights belong to no known shape, so that "
+      "the aperture between the views is unknown: {}leave out the effect vignetting ({})",
+      NameOf(light_field), give, run.Option("effects.without")));
 }
 
+// Light that the views do not contain cannot be restored by weights.
 void WarnOfShiftedPupil(const LightField& light_field, RunScope* run) {
   constexpr double kMuch = 0.4;
   const double shift = estimator::MaxPupilShift(light_field);
   if (!(shift > kMuch)) return;
   run->Warn(fmt::format(
-      "with the UV plane at {:g} mm the rays of the outermost pixels cross the aperture beside its "
+      "with the UV plane at {:g} mm the rays of the outermost pixels cross the aperture off its "
       "middle, by {:.2g} of the half-width that the views cover: part of their light is missing, "
-      "and what is out of focus there is displaced and not blurred enough",
+      "and out-of-focus parts are displaced and not blurred enough",
       light_field.grid->planes.uv_depth_mm, shift));
 }
 
 }  // namespace
 
 Image RenderPhotograph(const LightField& light_field, const PhotographOptions& options,
-                       const RunControl& control, std::vector<std::string>* effects_on) {
+                       const RunControl& control, RenderSummary* summary) {
   checks::RequireValid(control);
   checks::RequireValid(options);
   RunScope run(control);
@@ -111,51 +139,63 @@ Image RenderPhotograph(const LightField& light_field, const PhotographOptions& o
   const auto backend = kernels::OpenBackend(kernels::ParseDeviceRequest(options.device), &notice,
                                             [] { ThrowIfCancelled(); });
   if (!notice.empty()) run.Warn(notice);
-  // The processor is faster without the kernels.
+  // On the processor, rendering is faster without the kernels.
   const auto kernels = backend->is_opencl() ? backend->NewFloat() : nullptr;
-  const EffectSet on = SelectEffects(options.effects, light_field).on;
-  if (effects_on != nullptr) *effects_on = on.Names();
+  RenderSummary found;
+  found.device = backend->name();
+  found.device_description = backend->description();
+  found.effects = SelectEffects(options.effects, light_field);
+  const EffectSet& on = found.effects.on;
   std::optional<Camera> falloff;
   if (on.Has(Effect::kFalloff)) {
     falloff = on.Has(Effect::kThickness) ? *light_field.camera
                                          : model::ThinLensEquivalent(*light_field.camera);
   }
   std::optional<estimator::Vignetting> vignetting;
-  // An aperture of no size is one view.
+  // An aperture of radius 0 is a single view.
   if (on.Has(Effect::kVignetting) && options.aperture.radius.value_or(1) > 0) {
-    vignetting = VignettingOf(options.aperture, light_field, on);
+    vignetting = VignettingOf(options.aperture, light_field, on, run);
     WarnOfShiftedPupil(light_field, &run);
   }
-  return ImageOf(
-      estimator::Photograph(light_field, PhotographWeights(options.aperture, light_field, on),
-                            falloff ? &*falloff : nullptr, vignetting ? &*vignetting : nullptr,
-                            kernels.get(), control.threads),
-      light_field);
+  Image image =
+      ImageOf(estimator::Photograph(
+                  light_field, PhotographWeights(options.aperture, light_field, on, &found),
+                  falloff ? &*falloff : nullptr, vignetting ? &*vignetting : nullptr, kernels.get(),
+                  control.threads),
+              light_field);
+  found.notices = run.notices();
+  if (summary != nullptr) *summary = std::move(found);
+  return image;
 }
 
-Image Refocus(const LightField& light_field, const FocusOptions& options,
-              const RunControl& control) {
+Image Refocus(const LightField& light_field, const FocusOptions& options, const RunControl& control,
+              RenderSummary* summary) {
   checks::RequireValid(control);
   checks::RequireValid(options);
   const RunScope run(control);
-  Eigen::Vector2d disparity_px;
+  RenderSummary found;
+  Eigen::Vector2d& disparity_px = found.disparity_px;
   if (options.depth_mm) {
     if (!light_field.camera) {
-      throw OptionError("depth_mm",
-                        "depth_mm: the light field has no camera, so that millimetres "
-                        "mean nothing; disparity_px states the focus without one");
+      throw Error(
+          fmt::format("{} {} mm: {} has no camera, so that depths in mm are unknown; give {}",
+                      run.Option("depth_mm"), *options.depth_mm, NameOf(light_field),
+                      run.Option("disparity_px")));
     }
     disparity_px = estimator::DisparityAtDepthPx(light_field, *options.depth_mm);
   } else {
-    // The disparity along v is that along u times the ratio of the view steps.
+    // The disparity along v is the disparity along u times the ratio of the view steps.
     disparity_px = {*options.disparity_px, *options.disparity_px};
     if (light_field.grid && light_field.grid->u_step_mm != 0) {
       disparity_px.y() *= light_field.grid->v_step_mm / light_field.grid->u_step_mm;
     }
   }
-  return ImageOf(estimator::Refocus(light_field, disparity_px.x(), disparity_px.y(),
-                                    WeightsOf(options.aperture, light_field), control.threads),
-                 light_field);
+  Image image =
+      ImageOf(estimator::Refocus(light_field, disparity_px.x(), disparity_px.y(),
+                                 WeightsOf(options.aperture, light_field, &found), control.threads),
+              light_field);
+  if (summary != nullptr) *summary = std::move(found);
+  return image;
 }
 
 Image RenderMosaic(const LightField& light_field, int gap_px) {

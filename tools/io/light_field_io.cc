@@ -433,6 +433,7 @@ model::LightField ReadLightField(const std::string& folder, const LightFieldRead
   light_field.present = present;
   std::string why;
   if (!light_field.IsValid(&why)) throw Error(fmt::format("{}: {}", folder, why));
+  light_field.source = folder;
   return light_field;
 }
 

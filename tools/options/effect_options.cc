@@ -90,17 +90,17 @@ void ApplyEffectOptions(const EffectOptions& options, model::EffectSelectionOpti
   }
 }
 
-EffectSelection SelectionOf(const EffectOptions& options) {
-  using Base = model::EffectSelectionOptions::Base;
+EffectSelection EffectSelectionOf(const EffectOptions& options) {
   model::EffectSelectionOptions choice;
   ApplyEffectOptions(options, &choice);
+  using Base = model::EffectSelectionOptions::Base;
   EffectSelection selection;
   selection.base = choice.base == Base::kAuto  ? EffectSelection::Base::kAuto
                    : choice.base == Base::kAll ? EffectSelection::Base::kAll
                                                : EffectSelection::Base::kGiven;
   selection.given = choice.given;
   selection.without = choice.without;
-  if (options.tolerance) selection.tolerance = choice.tolerance;
+  if (options.tolerance && choice.base == Base::kAuto) selection.tolerance = choice.tolerance;
   return selection;
 }
 

@@ -24,8 +24,10 @@ void AddEffectOptions(CLI::App* command, EffectOptions* options);
 void CheckEffectNames(const EffectOptions& options, const model::EffectSet& of_model);
 // Overrides `choice` with the given options. Throws UsageError.
 void ApplyEffectOptions(const EffectOptions& options, model::EffectSelectionOptions* choice);
-// Returns the given options as the interface takes them. Throws UsageError.
-EffectSelection SelectionOf(const EffectOptions& options);
+
+// The given options as the interface takes them. A tolerance has no effect unless the base is auto.
+// Throws UsageError.
+EffectSelection EffectSelectionOf(const EffectOptions& options);
 
 // "250 mm, at (0, 479)".
 std::string EffectSiteText(const model::EffectSite& place);

@@ -145,7 +145,7 @@ thicklens::EstimateOptions SettingsOf(const EstimateOptions& options) {
   }
   settings.st_depth_mm = options.st_depth_mm;
   settings.smooth_depth = !options.keep_depth_noise;
-  settings.effects = SelectionOf(options.effects);
+  settings.effects = EffectSelectionOf(options.effects);
   settings.solver = AsAnySolver(SolverOf(options));
   if (options.fill == "telea") settings.hidden_rays = HiddenRays::kTelea;
   settings.device = options.device;
@@ -166,7 +166,7 @@ EstimateCall ReadEstimateCall(const EstimateOptions& options, const RunControl& 
   std::optional<TransferCurve> transfer;
   if (!options.transfer.empty()) transfer = TransferCurve::FromName(options.transfer);
   call.photo = ReadImage(options.image_path, transfer);
-  call.depth = ReadDepth(options.depth_path, MeaningOf(options.depth));
+  call.depth = ReadDepth(options.depth_path, DepthMeaningOf(options.depth));
   if (!options.camera_path.empty()) call.camera = ReadCamera(options.camera_path);
   if (options.aperture_of.empty()) return call;
   LightFieldReadOptions reading;

@@ -359,7 +359,7 @@ void CheckEstimateUsage(const EstimateOptions& options) {
   needs(options.ignore_exif, camera, "--ignore-exif needs a --camera, with which EXIF is compared");
   needs(options.st_depth_mm.has_value(), camera, "--st-depth-mm needs a --camera");
   needs(options.grid > 0 || options.sparse, aperture_of, "--grid and --sparse need --aperture-of");
-  needs(SelectionOf(options.effects).LeavesOut(Effect::kApertureShape),
+  needs(EffectSelectionOf(options.effects).LeavesOut(Effect::kApertureShape),
         options.aperture_shape.empty() && !aperture_of,
         "--aperture-shape and --aperture-of state the shape of the aperture; without the effect "
         "aperture-shape it is Gaussian");

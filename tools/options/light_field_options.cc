@@ -112,6 +112,16 @@ io::LightFieldReading ReadingOf(const ReadingOptions& options) {
   return reading;
 }
 
+LightFieldReadOptions LightFieldReadOptionsOf(const ReadingOptions& options) {
+  LightFieldReadOptions reading;
+  reading.hci_grid = options.grid;
+  reading.allow_missing_views = options.sparse;
+  const auto [u_count, v_count] = ViewCounts(options.views);
+  if (u_count > 0) reading.inner_views = thicklens::ViewCounts{u_count, v_count};
+  reading.crop = CropRect(options.crop);
+  return reading;
+}
+
 void AddDepthOptions(CLI::App* command, DepthOptions* options) {
   command
       ->add_option(
@@ -175,12 +185,12 @@ model::DepthConvention ConventionOf(const DepthOptions& options) {
   return convention;
 }
 
-DepthMeaning MeaningOf(const DepthOptions& options) {
+DepthMeaning DepthMeaningOf(const DepthOptions& options) {
   const model::DepthConvention convention = ConventionOf(options);
   DepthMeaning meaning;
   meaning.kind = convention.kind;
-  for (const LengthUnit unit : {LengthUnit::kMillimetre, LengthUnit::kCentimetre,
-                                LengthUnit::kMetre, LengthUnit::kTum5000}) {
+  for (const auto unit : {LengthUnit::kMillimetre, LengthUnit::kCentimetre, LengthUnit::kMetre,
+                          LengthUnit::kTum5000}) {
     if (options.unit == LengthUnitName(unit)) meaning.unit = unit;
   }
   meaning.disparity_scale = options.disparity_scale;

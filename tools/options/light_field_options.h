@@ -11,6 +11,7 @@
 #include "thicklens/depth.h"
 #include "thicklens/estimator/view_geometry.h"
 #include "thicklens/io/light_field_io.h"
+#include "thicklens/light_field.h"
 #include "thicklens/model/camera.h"
 #include "thicklens/model/light_field_grid.h"
 #include "thicklens/model/scene.h"
@@ -40,7 +41,8 @@ struct ReadingOptions {
   CropOption crop;
 };
 void AddReadingOptions(CLI::App* command, ReadingOptions* options);
-io::LightFieldReading ReadingOf(const ReadingOptions& options);  // throws UsageError
+io::LightFieldReading ReadingOf(const ReadingOptions& options);                // throws UsageError
+LightFieldReadOptions LightFieldReadOptionsOf(const ReadingOptions& options);  // throws UsageError
 
 // The options --depth-kind, --depth-unit, --disparity-scale and --disparity-offset state what a
 // depth map's numbers mean. Kind and unit are never guessed: z and range need a unit, disparity has
@@ -54,7 +56,9 @@ struct DepthOptions {
 void AddDepthOptions(CLI::App* command, DepthOptions* options);
 // Throws UsageError if the kind is not given, z or range have no unit, or disparity has one.
 model::DepthConvention ConventionOf(const DepthOptions& options);
-DepthMeaning MeaningOf(const DepthOptions& options);  // the same for the interface
+
+// The same as the interface takes it.
+DepthMeaning DepthMeaningOf(const DepthOptions& options);
 
 // The option --aperture-shape; for an empty text the result is `otherwise`.
 void AddApertureShapeOption(CLI::App* command, std::string* text);

@@ -1,6 +1,7 @@
 #ifndef THICKLENS_IMAGE_H_
 #define THICKLENS_IMAGE_H_
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -8,6 +9,7 @@
 #include <vector>
 
 #include "thicklens/export.h"
+#include "thicklens/model/light_field.h"
 #include "thicklens/model/scene.h"
 #include "thicklens/model/transfer_curve.h"
 
@@ -64,6 +66,8 @@ class THICKLENS_EXPORT Image {
   model::LinearImage ToLight(const TransferCurve& transfer) const;
   // Returns a copy without the alpha channel.
   Image WithoutAlpha() const;
+  // Returns a rectangle of the image. Throws Error if it is empty or not inside.
+  Image Cropped(const model::PixelRect& rect) const;
 
  private:
   friend THICKLENS_EXPORT Image ReadImage(const std::string& path,
@@ -92,6 +96,15 @@ struct ImageFileOptions {
 
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
+// The bytes of a PNG file.
+struct EncodedImageFile {
+  std::string png;
+  // Values of linear light half a level or more beyond the range, or NaN; 0 for encoded values.
+  std::size_t clipped_values = 0;
+};
+// Makes what WriteImage writes. `source` of the image is not part of it. Throws OptionError.
+THICKLENS_EXPORT EncodedImageFile EncodeImage(const Image& image,
+                                              const ImageFileOptions& options = {});
 // Writes a PNG file. Linear light is encoded by the image's transfer curve and clipped. The file
 // appears completely or not at all. Returns the number of clipped values (half a level beyond the
 // range, or NaN); 0 for encoded values. Throws OptionError, and Error that names the file.

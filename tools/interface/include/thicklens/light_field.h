@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "thicklens/base/output_file.h"
 #include "thicklens/export.h"
 #include "thicklens/image.h"
 #include "thicklens/model/light_field.h"
@@ -50,6 +51,15 @@ enum class LightFieldFormat {
 // write is not replaced. Returns the number of clipped values. Throws Error.
 THICKLENS_EXPORT std::size_t WriteLightField(const std::string& folder,
                                              const LightField& light_field,
+                                             LightFieldFormat format = LightFieldFormat::kPng,
+                                             const RunControl& run = {});
+
+// The same in two steps, for a folder that is to be claimed before a long computation, or that gets
+// other files too: the name is claimed, views and description are written below it, and Commit of
+// the folder (thicklens/base/output_file.h) puts it in place. Throws Error.
+THICKLENS_EXPORT OutputFolder
+ClaimLightFieldFolder(const std::string& folder, LightFieldFormat format = LightFieldFormat::kPng);
+THICKLENS_EXPORT std::size_t WriteLightField(OutputFolder* folder, const LightField& light_field,
                                              LightFieldFormat format = LightFieldFormat::kPng,
                                              const RunControl& run = {});
 

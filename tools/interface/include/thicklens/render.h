@@ -1,6 +1,7 @@
 #ifndef THICKLENS_RENDER_H_
 #define THICKLENS_RENDER_H_
 
+#include <Eigen/Core>
 #include <optional>
 #include <string>
 #include <vector>
@@ -32,15 +33,30 @@ struct PhotographOptions {
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 
+// How an image was rendered.
+struct RenderSummary {
+  // "own" (the light field states weights), "uniform", "gaussian", "disc" or "pinhole"; empty: a
+  // radius was given.
+  std::string aperture_shape;
+  // "option", "light-field" or "assumed"; empty: a radius was given, or the effects determine it.
+  std::string aperture_from;
+  Eigen::Vector2d disparity_px{0, 0};  // of Refocus: the disparity in focus, px per view step
+  // Of RenderPhotograph. The effects have no finding for defocus and aperture shape, because views
+  // do not state their depths; they have none at all without a camera.
+  model::EffectSelection effects;
+  std::string device, device_description;  // that rendered it: "cpu", "opencl:0:0"
+  std::vector<Notice> notices;
+};
+
 // Each function returns linear light with the light field's transfer curve, ready for WriteImage.
-// They throw OptionError, and Error for a light field that is not valid.
+// They throw OptionError, and Error for a light field that is not valid. `summary` may be null.
 
 // The photograph that the whole aperture would take of the light field: `thicklens render
-// --as-captured` [S12], [D23]. `effects_on`, if not null, gets the names of the effects.
+// --as-captured` [S12], [D23].
 THICKLENS_EXPORT Image RenderPhotograph(const LightField& light_field,
                                         const PhotographOptions& options = {},
                                         const RunControl& run = {},
-                                        std::vector<std::string>* effects_on = nullptr);
+                                        RenderSummary* summary = nullptr);
 
 struct FocusOptions {
   // Exactly one: the depth to focus at, mm from Ap, finite, > 0, with a camera; or a disparity, px
@@ -52,7 +68,7 @@ struct FocusOptions {
 };
 // Shifts the views so that points at that depth coincide, and averages them [D98].
 THICKLENS_EXPORT Image Refocus(const LightField& light_field, const FocusOptions& options,
-                               const RunControl& run = {});
+                               const RunControl& run = {}, RenderSummary* summary = nullptr);
 
 // All views side by side, (0, 0) at the top left, with `gap_px` >= 0 black pixels between them.
 THICKLENS_EXPORT Image RenderMosaic(const LightField& light_field, int gap_px = 2);

@@ -58,6 +58,7 @@ struct LightField {
   std::optional<LightFieldGrid> grid;
   std::optional<Camera> camera;  // present if and only if `grid` is present
   LightFieldOrigin origin;
+  std::string source;  // the folder that it was read from; messages name it; not written to files
 
   std::size_t view_size() const {
     return static_cast<std::size_t>(s_count) * static_cast<std::size_t>(t_count);

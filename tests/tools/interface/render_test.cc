@@ -1,0 +1,122 @@
+#include "thicklens/render.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "support/error_message.h"
+#include "support/test_cameras.h"
+
+namespace thicklens {
+namespace {
+
+using ::testing::AllOf;
+using testing::CentredSensor;
+using testing::ErrorOf;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+using testing::TestCameraFocusedAt;
+
+constexpr int kRenderWidthPx = 60, kRenderHeightPx = 40;
+
+LightField UniformField(const std::optional<Camera>& camera) {
+  LightField field = model::MakeLightField(kRenderWidthPx, kRenderHeightPx, 3, 3, 1);
+  std::fill(field.values.begin(), field.values.end(), 0.5F);
+  if (camera) {
+    field.camera = camera;
+    field.grid = model::DefaultGrid(*camera, 3, 3);
+  }
+  return field;
+}
+
+// Thick, with a wide field where the pixels are large.
+Camera CameraOfPitch(double pixel_pitch_mm, double aperture_radius_mm = 4) {
+  return TestCameraFocusedAt(800, "", {12.5, 14, 6, aperture_radius_mm},
+                             CentredSensor(kRenderWidthPx, kRenderHeightPx, pixel_pitch_mm));
+}
+
+RenderSummary SummaryOf(const LightField& field, const PhotographOptions& options = {}) {
+  RenderSummary summary;
+  RenderPhotograph(field, options, {}, &summary);
+  return summary;
+}
+
+std::string FieldOfOptionError(const std::function<void()>& work) {
+  try {
+    work();
+  } catch (const OptionError& error) {
+    return error.field();
+  }
+  return "";
+}
+
+TEST(RenderInterfaceTest, APhotographTakesTheEffectsThatMatter) {
+  const EffectSet kept = {Effect::kDefocus, Effect::kApertureShape};
+  const RenderSummary relative = SummaryOf(UniformField({}));
+  EXPECT_EQ(relative.effects.on, kept);
+  EXPECT_TRUE(relative.effects.findings.empty());
+  const RenderSummary wide = SummaryOf(UniformField(CameraOfPitch(0.2)));
+  EXPECT_EQ(wide.effects.on, kept.With({Effect::kThickness, Effect::kFalloff}));
+  for (const model::LargestEffectImpact& finding : wide.effects.findings) {
+    EXPECT_FALSE(kept.Has(finding.effect)) << model::EffectName(finding.effect);
+  }
+  EXPECT_EQ(SummaryOf(UniformField(CameraOfPitch(0.001, 0.05))).effects.on, kept);
+  LightField off_aperture = UniformField(CameraOfPitch(0.01));
+  off_aperture.grid = model::GridOnPlanes(*off_aperture.camera, {20, 780}, 3, 3);
+  EXPECT_TRUE(SummaryOf(off_aperture).effects.on.Has(Effect::kVignetting));
+  off_aperture.grid = model::GridOnPlanes(*off_aperture.camera, {1e-4, 800 - 1e-4}, 3, 3);
+  EXPECT_FALSE(SummaryOf(off_aperture).effects.on.Has(Effect::kVignetting));
+}
+
+TEST(RenderInterfaceTest, EffectsThatTheModelLacksAreRefused) {
+  const LightField field = UniformField(CameraOfPitch(0.001, 0.05));
+  PhotographOptions vignetting;
+  vignetting.effects.base = EffectSelection::Base::kGiven;
+  vignetting.effects.given = {Effect::kVignetting};
+  EXPECT_EQ(FieldOfOptionError([&] { SummaryOf(field, vignetting); }), "effects.given");
+  PhotographOptions noise;
+  noise.effects.without = {Effect::kReadNoise};
+  EXPECT_EQ(FieldOfOptionError([&] { SummaryOf(field, noise); }), "effects.without");
+  EXPECT_THAT(ErrorOf([&] { SummaryOf(field, noise); }), HasSubstr("read-noise"));
+  PhotographOptions tolerance;
+  tolerance.effects.tolerance = model::EffectTolerance{};
+  EXPECT_EQ(FieldOfOptionError([&] { SummaryOf(UniformField({}), tolerance); }),
+            "effects.tolerance");
+}
+
+TEST(RenderInterfaceTest, TheApertureIsThatOfTheOptionsOrTheEffects) {
+  const LightField field = UniformField({});
+  EXPECT_EQ(SummaryOf(field).aperture_shape, "own");
+  EXPECT_EQ(SummaryOf(field).aperture_from, "light-field");
+  PhotographOptions options;
+  options.aperture.shape = model::ApertureShape::kDisc;
+  EXPECT_EQ(SummaryOf(field, options).aperture_shape, "disc");
+  EXPECT_EQ(SummaryOf(field, options).aperture_from, "option");
+  options = {};
+  options.effects.base = EffectSelection::Base::kGiven;
+  const RenderSummary none = SummaryOf(field, options);
+  EXPECT_TRUE(none.effects.on.empty());
+  EXPECT_EQ(none.aperture_shape, "pinhole");
+  options.effects.given = {Effect::kDefocus};
+  EXPECT_EQ(SummaryOf(field, options).aperture_shape, "gaussian");
+}
+
+// A program names its own options in the messages.
+TEST(RenderInterfaceTest, AFocusInMillimetresNeedsACamera) {
+  LightField field = UniformField({});
+  field.source = "fields/window";
+  FocusOptions focus;
+  focus.depth_mm = 800;
+  RunControl run;
+  run.option_name = [](const std::string& path) { return "--" + path; };
+  EXPECT_THAT(ErrorOf([&] { Refocus(field, focus, run); }),
+              AllOf(StartsWith("--depth_mm 800 mm: fields/window has no camera"),
+                    HasSubstr("give --disparity_px")));
+}
+
+}  // namespace
+}  // namespace thicklens
