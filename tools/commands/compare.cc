@@ -1,11 +1,8 @@
 // thicklens compare: compares an image or a light field with the true one.
-#include "thicklens/estimator/compare.h"
+#include "thicklens/compare.h"
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
-#include <algorithm>
-#include <cstddef>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -15,16 +12,13 @@
 #include <vector>
 
 #include "thicklens/base/error.h"
-#include "thicklens/base/output_file.h"
 #include "thicklens/base/printable_text.h"
-#include "thicklens/estimator/estimate_input.h"
-#include "thicklens/io/aperture_statement.h"
-#include "thicklens/io/depth_io.h"
-#include "thicklens/io/image_io.h"
-#include "thicklens/io/light_field_io.h"
-#include "thicklens/model/encoded_values.h"
+#include "thicklens/depth.h"
+#include "thicklens/image.h"
+#include "thicklens/light_field.h"
 #include "tools/commands/commands.h"
 #include "tools/options/command_frame.h"
+#include "tools/options/interface_options.h"
 #include "tools/options/light_field_options.h"
 #include "tools/options/option_values.h"
 #include "tools/options/with_file_context.h"
@@ -61,141 +55,80 @@ bool IsToCrop(const Rect& crop, int width_px, int height_px) {
   return crop && (crop->width != width_px || crop->height != height_px);
 }
 
-model::EncodedImage ReadImage(const std::string& path) {
-  return io::ToEncodedImage(io::ReadImageFile(path));
+Image ReadCroppedImage(const std::string& path, const Rect& crop) {
+  Image image = thicklens::ReadImage(path);
+  return IsToCrop(crop, image.width_px(), image.height_px()) ? image.Cropped(*crop) : image;
 }
 
-model::EncodedImage Cropped(const model::EncodedImage& image, const Rect& crop,
-                            const std::string& path) {
-  if (!IsToCrop(crop, image.width_px, image.height_px)) return image;
-  return WithFileContext(path, [&] { return model::CropImage(image, *crop); });
+OptionNames CompareOptionNames() {
+  return {
+      {"border_px", "--border"}, {"baseline", "--dibr"}, {"depth.meaning.kind", "--depth-kind"}};
 }
 
 // ---- Two images.
 
 CommandResult CompareImageFiles(const CompareOptions& options) {
-  const io::LightFieldReading reading = ReadingOf(options.reading);
-  if (reading.grid > 0 || reading.sparse || reading.u_count > 0 || !options.dibr_paths.empty()) {
+  const LightFieldReadOptions reading = LightFieldReadOptionsOf(options.reading);
+  if (reading.hci_grid > 0 || reading.allow_missing_views || reading.inner_views ||
+      !options.dibr_paths.empty()) {
     throw UsageError(
         fmt::format("--grid, --sparse, --views and --dibr are for light fields, but {} is an image",
                     PrintableUtf8(options.reference_path)));
   }
-  model::EncodedImage reference = ReadImage(options.reference_path);
-  if (reading.crop) {
-    reference = WithFileContext(options.reference_path,
-                                [&] { return model::CropImage(reference, *reading.crop); });
-  }
-  const model::EncodedImage other =
-      Cropped(ReadImage(options.other_path), reading.crop, options.other_path);
-  const estimator::ImageScores scores = WithFileContext(options.other_path, [&] {
-    return estimator::CompareImages(model::EncodedValuesOf(reference),
-                                    model::EncodedValuesOf(other), options.border_px);
-  });
+  Image reference = thicklens::ReadImage(options.reference_path);
+  if (reading.crop) reference = reference.Cropped(*reading.crop);
+  const Image other = ReadCroppedImage(options.other_path, reading.crop);
+  thicklens::CompareOptions asked;
+  asked.border_px = options.border_px;
+  const ImageScores scores = CompareImages(reference, other, asked);
   PrintResult(options.common, ImageScoresText(scores, options.border_px));
   CommandResult result;
   result.summary = ImageScoresJson(scores);
   result.summary["status"] = "ok";
   result.summary["reason"] = "";
-  result.summary["size"] = {reference.width_px, reference.height_px};
+  result.summary["size"] = {reference.width_px(), reference.height_px()};
   result.summary["border_px"] = options.border_px;
   return result;
 }
 
 // ---- Two light fields.
 
-// Takes the inner views of the larger light field, or of both if each is larger along one axis.
-void TakeCommonViews(const CompareOptions& options, model::LightField* reference,
-                     model::LightField* other) {
-  const int u_count = std::min(reference->u_count, other->u_count);
-  const int v_count = std::min(reference->v_count, other->v_count);
-  const auto take = [&](model::LightField* light_field, const std::string& path) {
-    if (light_field->u_count == u_count && light_field->v_count == v_count) return;
-    const int all_u = light_field->u_count;
-    const int all_v = light_field->v_count;
-    *light_field =
-        WithFileContext(path, [&] { return model::InnerViews(*light_field, u_count, v_count); });
-    spdlog::warn("{}: the inner {}x{} of its {}x{} views are compared", PrintableUtf8(path),
-                 u_count, v_count, all_u, all_v);
-  };
-  take(reference, options.reference_path);
-  take(other, options.other_path);
-}
-
-model::LinearImage Photograph(const CompareOptions& options, const Rect& crop,
-                              const model::LightField& reference) {
-  const std::string& path = options.dibr_paths.front();
-  model::EncodedImage stored = Cropped(ReadImage(path), crop, path);
-  const int channels = stored.channels;
-  if (channels == 1 && reference.channels == 3) {
-    throw Error(fmt::format(
-        "{}: a photograph in colour is expected because the views are in colour; it is grey",
-        PrintableUtf8(path)));
-  }
-  model::LinearImage light = model::ToLinear(stored, reference.transfer);
-  if (reference.channels == 1) return model::ToGrey(light);
-  if (channels != 4) return light;
-  model::LinearImage opaque{light.width_px, light.height_px, 3, {}};  // without alpha
-  opaque.values.reserve(light.values.size() / 4 * 3);
-  for (std::size_t i = 0; i < light.values.size(); ++i) {
-    if (i % 4 != 3) opaque.values.push_back(light.values[i]);
-  }
-  return opaque;
-}
-
-std::optional<estimator::DibrInput> ReadDibr(const CompareOptions& options, const Rect& crop,
-                                             const model::LightField& reference) {
-  if (options.dibr_paths.empty()) return std::nullopt;
-  const std::string& map_path = options.dibr_paths.back();
+// The photograph of --dibr and its depth map.
+Baseline ReadBaseline(const CompareOptions& options, const Rect& crop, bool has_camera) {
   DepthOptions depth = options.depth;
   // Without a camera the map can only hold disparities.
-  if (depth.kind.empty() && !reference.camera) depth.kind = "disparity";
-  estimator::DibrInput dibr;
-  dibr.photograph = Photograph(options, crop, reference);
-  if (dibr.photograph.width_px != reference.s_count ||
-      dibr.photograph.height_px != reference.t_count) {
-    throw Error(fmt::format("{}: it is {}x{} px, the views are {}x{} px: the sizes must be equal",
-                            PrintableUtf8(options.dibr_paths.front()), dibr.photograph.width_px,
-                            dibr.photograph.height_px, reference.s_count, reference.t_count));
+  if (depth.kind.empty() && !has_camera) depth.kind = "disparity";
+  Baseline baseline;
+  baseline.photo = ReadCroppedImage(options.dibr_paths.front(), crop);
+  baseline.depth = ReadDepth(options.dibr_paths.back(), DepthMeaningOf(depth));
+  if (IsToCrop(crop, baseline.depth.width_px, baseline.depth.height_px))
+    baseline.depth = baseline.depth.Cropped(*crop);
+  baseline.remove_falloff = options.without.empty();
+  return baseline;
+}
+
+LightFieldScores ScoresOf(const CompareOptions& options, const RunControl& run) {
+  LightFieldReadOptions reading = LightFieldReadOptionsOf(options.reading);
+  LightField reference = ReadLightField(options.reference_path, reading, run);
+  const Rect crop = std::exchange(reading.crop, std::nullopt);
+  LightField other = ReadLightField(options.other_path, reading, run);
+  if (IsToCrop(crop, other.s_count, other.t_count))
+    other = WithFileContext(options.other_path, [&] { return model::CropViews(other, *crop); });
+  thicklens::CompareOptions asked;
+  asked.border_px = options.border_px;
+  if (!options.dibr_paths.empty()) {
+    asked.baseline = ReadBaseline(options, crop, reference.camera.has_value());
   }
-  // Views hold radiance, but a photograph does not: its fall-off would count as an error of the
-  // warp.
-  if (reference.camera && options.without.empty()) {
-    dibr.photograph = estimator::WithoutFalloff(dibr.photograph, *reference.grid, *reference.camera,
-                                                reference.weights, options.common.threads);
-  }
-  model::RawDepthMap map = io::ReadDepthMap(map_path);
-  if (IsToCrop(crop, map.width_px, map.height_px))
-    map = WithFileContext(map_path, [&] { return model::CropDepth(map, *crop); });
-  PreparedDepth prepared = PrepareDepth(map, map_path, depth, dibr.photograph,
-                                        reference.camera ? &*reference.camera : nullptr,
-                                        reference.grid ? &*reference.grid : nullptr);
-  if (prepared.holes > 0)
-    spdlog::warn("{}: {} holes are filled from the surfaces beside them", PrintableUtf8(map_path),
-                 prepared.holes);
-  dibr.disparity = std::move(prepared.disparity);
-  return dibr;
+  return CompareLightFields(std::move(reference), std::move(other), std::move(asked), run);
 }
 
 CommandResult CompareFolders(const CompareOptions& options) {
-  io::LightFieldReading reading = ReadingOf(options.reading);
-  model::LightField reference = io::ReadLightField(options.reference_path, reading);
-  const Rect crop = std::exchange(reading.crop, std::nullopt);
-  model::LightField other = io::ReadLightField(options.other_path, reading);
-  if (IsToCrop(crop, other.s_count, other.t_count))
-    other = WithFileContext(options.other_path, [&] { return model::CropViews(other, *crop); });
-  if (const auto warning =
-          io::DifferentApertures(options.reference_path, reference, options.other_path, other)) {
-    spdlog::warn("{}", *warning);
-  }
-  TakeCommonViews(options, &reference, &other);
-  const std::optional<estimator::DibrInput> dibr = ReadDibr(options, crop, reference);
-  const estimator::LightFieldScores scores = WithFileContext(options.other_path, [&] {
-    return estimator::CompareLightFields(reference, other, options.border_px, dibr,
-                                         options.common.threads);
-  });
+  const CommandRun run(options.common, CompareOptionNames());
+  const LightFieldScores scores =
+      WithOptionNames(run.names(), [&] { return ScoresOf(options, run.control()); });
   PrintResult(options.common,
-              LightFieldScoresText(scores, reference, options.border_px, options.common.verbose));
-  return {LightFieldScoresJson(scores, reference, options.border_px), ""};
+              LightFieldScoresText(scores, options.border_px, options.common.verbose));
+  return {LightFieldScoresJson(scores, options.border_px), ""};
 }
 
 CommandResult Compare(const CompareOptions& options) {
@@ -258,7 +191,7 @@ void AddCompareCommand(CLI::App* program, CommandAction* action) {
   AddCommonOptions(command, &options->common);
   command->callback([options, action] {
     *action = [options] {
-      ReadingOf(options->reading);  // reports wrong usage before any work begins
+      LightFieldReadOptionsOf(options->reading);  // reports wrong usage before any work begins
       std::vector<std::string> inputs = options->dibr_paths;
       inputs.insert(inputs.end(), {options->reference_path, options->other_path});
       RequireDistinctFiles({options->common.json_path}, inputs);

@@ -8,10 +8,12 @@
 #include "thicklens/base/error.h"
 #include "thicklens/estimator/compare.h"
 #include "thicklens/estimator/estimate_input.h"
+#include "thicklens/io/aperture_statement.h"
 #include "thicklens/model/encoded_values.h"
 #include "tools/interface/problem.h"
 #include "tools/interface/run_scope.h"
 #include "tools/interface/validation.h"
+#include "tools/interface/with_file_context.h"
 
 namespace thicklens {
 namespace {
@@ -24,12 +26,17 @@ std::optional<ImageScores> ScoresOf(const std::optional<estimator::ImageScores>&
   return ScoresOf(*scores);
 }
 
+std::string NameOr(const std::string& source, const char* otherwise) {
+  return source.empty() ? otherwise : source;
+}
+
 // The baseline's photograph in the channels of the reference, without alpha.
 model::LinearImage PhotographFor(const Image& photo, const LightField& reference) {
-  const std::string name = photo.source().empty() ? "photo" : photo.source();
+  const std::string name = NameOr(photo.source(), "photograph");
   if (photo.channels() == 1 && reference.channels == 3) {
-    throw Error(
-        fmt::format("{}: a photograph in colour is expected, as the views are; it is grey", name));
+    throw Error(fmt::format(
+        "{}: a photograph in colour is expected because the views are in colour; it is grey",
+        name));
   }
   model::LinearImage light = photo.ToLight(reference.transfer);
   if (reference.channels == 1) return model::ToGrey(light);
@@ -42,17 +49,19 @@ model::LinearImage PhotographFor(const Image& photo, const LightField& reference
   return opaque;
 }
 
-estimator::DibrInput DibrOf(const Baseline& baseline, const LightField& reference, RunScope* run) {
+estimator::DibrInput DibrOf(Baseline baseline, const LightField& reference, RunScope* run) {
+  const std::string photo_name = NameOr(baseline.photo.source(), "photograph");
   estimator::DibrInput dibr;
   dibr.photograph = PhotographFor(baseline.photo, reference);
+  baseline.photo = Image();
   if (dibr.photograph.width_px != reference.s_count ||
       dibr.photograph.height_px != reference.t_count) {
-    throw Error(fmt::format(
-        "photograph: it is {}x{} px, the views are {}x{} px: the sizes must be "
-        "equal",
-        dibr.photograph.width_px, dibr.photograph.height_px, reference.s_count, reference.t_count));
+    throw Error(fmt::format("{}: it is {}x{} px, the views are {}x{} px: the sizes must be equal",
+                            photo_name, dibr.photograph.width_px, dibr.photograph.height_px,
+                            reference.s_count, reference.t_count));
   }
-  // Views are radiance, a photograph is not: its fall-off would count as an error of the warp.
+  // Views hold radiance, but a photograph does not: its fall-off would count as an error of the
+  // warp.
   if (reference.camera && baseline.remove_falloff) {
     dibr.photograph = estimator::WithoutFalloff(dibr.photograph, *reference.grid, *reference.camera,
                                                 reference.weights, run->threads());
@@ -61,19 +70,24 @@ estimator::DibrInput DibrOf(const Baseline& baseline, const LightField& referenc
       PrepareDepth(baseline.depth, dibr.photograph, reference.camera ? &*reference.camera : nullptr,
                    reference.grid ? &*reference.grid : nullptr);
   if (prepared.holes > 0) {
-    run->Warn(
-        fmt::format("depth: {} holes are filled along the surfaces beside them", prepared.holes));
+    run->Warn(fmt::format("{}: {} holes are filled from the surfaces beside them",
+                          NameOr(baseline.depth.source, "depth"), prepared.holes));
   }
   dibr.disparity = std::move(prepared.disparity);
   return dibr;
 }
 
-LightField CommonViews(const LightField& light_field, int u_count, int v_count, const char* which,
-                       RunScope* run) {
-  if (light_field.u_count == u_count && light_field.v_count == v_count) return light_field;
-  run->Warn(fmt::format("{}: the inner {}x{} of its {}x{} views are compared", which, u_count,
-                        v_count, light_field.u_count, light_field.v_count));
-  return model::InnerViews(light_field, u_count, v_count);
+// Takes the inner views unless the counts are those already.
+void TakeInnerViews(int u_count, int v_count, const char* which, LightField* light_field,
+                    RunScope* run) {
+  const int all_u = light_field->u_count;
+  const int all_v = light_field->v_count;
+  if (all_u == u_count && all_v == v_count) return;
+  const std::string name = NameOr(light_field->source, which);
+  *light_field =
+      WithFileContext(name, [&] { return model::InnerViews(*light_field, u_count, v_count); });
+  run->Warn(fmt::format("{}: the inner {}x{} of its {}x{} views are compared", name, u_count,
+                        v_count, all_u, all_v));
 }
 
 }  // namespace
@@ -82,25 +96,43 @@ ImageScores CompareImages(const Image& reference, const Image& other,
                           const CompareOptions& options) {
   checks::RequireValid(options);
   if (options.baseline) throw OptionError("baseline", "baseline: is for light fields");
-  return ScoresOf(estimator::CompareImages(model::EncodedValuesOf(reference.encoded()),
-                                           model::EncodedValuesOf(other.encoded()),
-                                           options.border_px));
+  return WithFileContext(NameOr(other.source(), "image"), [&] {
+    return ScoresOf(estimator::CompareImages(model::EncodedValuesOf(reference.encoded()),
+                                             model::EncodedValuesOf(other.encoded()),
+                                             options.border_px));
+  });
 }
 
-LightFieldScores CompareLightFields(const LightField& reference, const LightField& other,
-                                    const CompareOptions& options, const RunControl& control) {
+LightFieldScores CompareLightFields(LightField reference, LightField other, CompareOptions options,
+                                    const RunControl& control) {
   checks::RequireValid(control);
   checks::RequireValid(options);
   RunScope run(control);
+  if (!reference.source.empty() && !other.source.empty()) {
+    if (const auto warning =
+            io::DifferentApertures(reference.source, reference, other.source, other)) {
+      run.Warn(*warning);
+    }
+  }
   const int u_count = std::min(reference.u_count, other.u_count);
   const int v_count = std::min(reference.v_count, other.v_count);
-  const LightField one = CommonViews(reference, u_count, v_count, "reference", &run);
-  const LightField two = CommonViews(other, u_count, v_count, "other", &run);
+  TakeInnerViews(u_count, v_count, "reference", &reference, &run);
+  TakeInnerViews(u_count, v_count, "other", &other, &run);
   std::optional<estimator::DibrInput> dibr;
-  if (options.baseline) dibr = DibrOf(*options.baseline, one, &run);
+  if (options.baseline) {
+    dibr = DibrOf(std::move(*options.baseline), reference, &run);
+    options.baseline.reset();
+  }
   const estimator::LightFieldScores found =
-      estimator::CompareLightFields(one, two, options.border_px, dibr, control.threads);
+      WithFileContext(NameOr(other.source, "light field"), [&] {
+        return estimator::CompareLightFields(reference, other, options.border_px, dibr,
+                                             control.threads);
+      });
   LightFieldScores scores;
+  scores.u_count = reference.u_count;
+  scores.v_count = reference.v_count;
+  scores.width_px = reference.s_count;
+  scores.height_px = reference.t_count;
   scores.mean = ScoresOf(found.mean);
   scores.centre = ScoresOf(found.centre);
   scores.corner = ScoresOf(found.corner);

@@ -5,6 +5,7 @@
 #include "thicklens/base/output_file.h"
 #include "thicklens/io/depth_io.h"
 #include "tools/interface/validation.h"
+#include "tools/interface/with_file_context.h"
 
 namespace thicklens {
 
@@ -22,6 +23,14 @@ std::string LengthUnitName(LengthUnit unit) {
       break;
   }
   return "";
+}
+
+DepthMap DepthMap::Cropped(const model::PixelRect& rect) const {
+  return WithFileContext(source.empty() ? "depth" : source, [&] {
+    model::RawDepthMap map = model::CropDepth({width_px, height_px, values, is_integer}, rect);
+    return DepthMap{map.width_px, map.height_px, std::move(map.values),
+                    map.integer,  meaning,       source};
+  });
 }
 
 DepthMap ReadDepth(const std::string& path, const DepthMeaning& meaning) {

@@ -10,10 +10,6 @@
 namespace thicklens::tools {
 namespace {
 
-using estimator::ImageScores;
-using estimator::LightFieldScores;
-using estimator::ViewScores;
-
 std::string NumberText(double value, int digits) {
   return std::isfinite(value) ? fmt::format("{:.{}f}", value, digits) : "-";
 }
@@ -66,8 +62,8 @@ std::size_t ViewsInPsnrMean(const LightFieldScores& scores) {
 }
 
 nlohmann::json ViewJson(const ViewScores& view) {
-  return {{"u", view.u},
-          {"v", view.v},
+  return {{"u", view.k},
+          {"v", view.l},
           {"psnr_db", FiniteOrNull(view.scores.psnr_db)},
           {"identical", IsIdentical(view.scores)},
           {"ssim", FiniteOrNull(view.scores.ssim)},
@@ -96,12 +92,11 @@ int ViewsAboveDibr(const LightFieldScores& scores) {
       }));
 }
 
-std::string LightFieldScoresText(const LightFieldScores& scores, const model::LightField& reference,
-                                 int border_px, bool per_view) {
+std::string LightFieldScoresText(const LightFieldScores& scores, int border_px, bool per_view) {
   const std::size_t views = scores.views.size();
   std::string text =
-      fmt::format("{} views of {}x{}, {}x{} px each, border {} px\n", views, reference.u_count,
-                  reference.v_count, reference.s_count, reference.t_count, border_px);
+      fmt::format("{} views of {}x{}, {}x{} px each, border {} px\n", views, scores.u_count,
+                  scores.v_count, scores.width_px, scores.height_px, border_px);
   text += HeadLine();
   text += LinesWithDibr("mean", scores.mean, scores.dibr_mean);
   text += LinesWithDibr("centre", scores.centre, scores.dibr_centre);
@@ -120,16 +115,15 @@ std::string LightFieldScoresText(const LightFieldScores& scores, const model::Li
     text += fmt::format("views above DIBR (PSNR): {} of {}\n", ViewsAboveDibr(scores), views);
   if (!per_view) return text;
   for (const ViewScores& view : scores.views)
-    text += LinesWithDibr(fmt::format("({}, {})", view.u, view.v), view.scores, view.dibr);
+    text += LinesWithDibr(fmt::format("({}, {})", view.k, view.l), view.scores, view.dibr);
   return text;
 }
 
-nlohmann::json LightFieldScoresJson(const LightFieldScores& scores,
-                                    const model::LightField& reference, int border_px) {
+nlohmann::json LightFieldScoresJson(const LightFieldScores& scores, int border_px) {
   nlohmann::json json = {{"status", "ok"},
                          {"reason", ""},
-                         {"views", {reference.u_count, reference.v_count}},
-                         {"size", {reference.s_count, reference.t_count}},
+                         {"views", {scores.u_count, scores.v_count}},
+                         {"size", {scores.width_px, scores.height_px}},
                          {"border_px", border_px},
                          {"mean", ImageScoresJson(scores.mean)},
                          {"centre", ImageScoresJson(scores.centre)},

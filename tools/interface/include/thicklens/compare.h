@@ -29,7 +29,9 @@ struct ViewScores {
 };
 
 struct LightFieldScores {
-  ImageScores mean, centre, corner;  // over all views, the middle ones, the outermost ones
+  int u_count = 0, v_count = 0, width_px = 0, height_px = 0;  // of the views that were compared
+  // Over all views, the middle ones, the outermost ones. The mean of PSNRs is over the finite ones.
+  ImageScores mean, centre, corner;
   std::optional<ImageScores> dibr_mean, dibr_centre, dibr_corner;
   std::vector<ViewScores> views;  // the views that both have
   std::vector<Notice> notices;
@@ -59,10 +61,11 @@ THICKLENS_EXPORT ImageScores CompareImages(const Image& reference, const Image& 
 
 // Compares two light fields view by view, as the reference's transfer curve would store them. Of
 // light fields with different counts the inner views of the larger one are taken, which a notice
-// reports. Throws OptionError, and Error if they do not fit.
-THICKLENS_EXPORT LightFieldScores CompareLightFields(const LightField& reference,
-                                                     const LightField& other,
-                                                     const CompareOptions& options = {},
+// reports, and so is a difference of the apertures that their files state. The arguments are values
+// so that large ones can be moved in: they are freed as soon as they are no longer needed. Throws
+// OptionError, and Error if they do not fit.
+THICKLENS_EXPORT LightFieldScores CompareLightFields(LightField reference, LightField other,
+                                                     CompareOptions options = {},
                                                      const RunControl& run = {});
 
 }  // namespace thicklens

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "thicklens/export.h"
+#include "thicklens/model/light_field.h"
 #include "thicklens/model/scene.h"
 
 namespace thicklens {
@@ -44,6 +45,9 @@ struct DepthMap {
   bool is_integer = false;  // the file's type is integer, so that 0 means "no data"
   DepthMeaning meaning;
   std::string source;  // file that it was read from; messages name it
+
+  // Returns a rectangle of the map, px. Throws Error if it is empty or not inside.
+  THICKLENS_EXPORT DepthMap Cropped(const model::PixelRect& rect) const;
 
   // Returns true if the sizes are >= 1, the number of values fits and the meaning is valid.
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
