@@ -1,11 +1,10 @@
 // thicklens simulate: simulates photographs on the bench, with their true values.
+#include "thicklens/simulate.h"
+
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
-#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <memory>
@@ -14,26 +13,19 @@
 
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/output_file.h"
-#include "thicklens/base/parallel.h"
 #include "thicklens/base/stopwatch.h"
-#include "thicklens/io/image_io.h"
-#include "thicklens/io/simulated_sweep.h"
-#include "thicklens/model/camera_file.h"
-#include "thicklens/model/sweep_simulator.h"
 #include "tools/commands/commands.h"
 #include "tools/commands/simulate_scene.h"
 #include "tools/options/command_frame.h"
 #include "tools/options/deprecated_names.h"
 #include "tools/options/effect_options.h"
+#include "tools/options/interface_options.h"
 #include "tools/report/ablation_page.h"
 #include "tools/report/ablation_run.h"
 #include "tools/system/progress_line.h"
 
 namespace thicklens::tools {
 namespace {
-
-// A folder with this file was written by this program, which may replace it.
-constexpr char kMarkerFile[] = "truth.yaml";
 
 struct SimulateOptions {
   CommonOptions common;
@@ -45,25 +37,7 @@ struct SimulateOptions {
   EffectOptions effects{{}, {}, {}, ""};  // auto has nothing to choose
 };
 
-// Returns the bits per encoded value.
-int RenderFrames(const model::SweepSimulator& simulator, const CommonOptions& common,
-                 OutputFolder* folder) {
-  const auto& frames = simulator.truth().frames;
-  const int count = static_cast<int>(frames.size());
-  ProgressLine progress("rendering", common.quiet);
-  std::atomic<int> done{0}, bits{0};
-  ParallelFor(count, common.threads, [&](int i) {
-    ThrowIfCancelled();
-    const model::EncodedImage stored = simulator.RenderFrame(i);
-    bits = stored.bits;
-    folder->Write(frames[static_cast<std::size_t>(i)].image, io::EncodePng(stored));
-    progress.Show(++done, count);
-  });
-  return bits;
-}
-
-nlohmann::json Summary(const SimulateOptions& options,
-                       const model::SweepSimulationOptions& simulation,
+nlohmann::json Summary(const SimulateOptions& options, const SweepSimulation& simulation,
                        const model::SweepTruth& truth, double seconds) {
   const auto [near, far] =
       std::minmax_element(truth.frames.begin(), truth.frames.end(),
@@ -87,26 +61,22 @@ nlohmann::json Summary(const SimulateOptions& options,
           {"seconds", seconds}};
 }
 
+// Writes the frames as they are rendered. Its progress line ends with it.
+SimulatedSweep RenderSweep(const SimulateOptions& options, const SweepSimulation& simulation,
+                           OutputFolder* folder) {
+  const CommandRun run(options.common, {});
+  return thicklens::SimulateSweep(simulation, folder, options.unknown_offset, run.control());
+}
+
 CommandResult SimulateSweep(const SimulateOptions& options) {
   const auto start = Clock::now();
-  model::SweepSimulationOptions simulation = model::ReadSweepSimulation(options.config_path);
+  SweepSimulation simulation = ReadSweepSimulation(options.config_path);
   ReportDeprecated(options.common, simulation.notices);
   if (options.seed) simulation.seed = static_cast<std::uint64_t>(*options.seed);
   CheckEffectNames(options.effects, model::SweepEffects());
   ApplyEffectOptions(options.effects, &simulation.effects);
-  OutputFolder folder(
-      options.output_folder, kMarkerFile,
-      {"frames", "sweep.yaml", "camera.yaml", kMarkerFile, kAblationPage, kAblationTable});
-
-  const model::LinearImage target_image = io::ReadTargetImage(simulation.target);
-  const model::SweepSimulator simulator(simulation, target_image);
-  const int bits = RenderFrames(simulator, options.common, &folder);
-  model::Camera camera = simulator.camera();
-  camera.calibration.reset();  // a calibration of this sweep must find it
-  folder.Write("camera.yaml", model::CameraToYaml(camera));
-  folder.Write("sweep.yaml", model::SweepToYaml(
-                                 io::DescribeSweep(simulation, simulator, options.unknown_offset)));
-  folder.Write(kMarkerFile, model::SweepTruthToYaml(simulator.truth()));
+  OutputFolder folder = ClaimSweepFolder(options.output_folder);
+  const SimulatedSweep sweep = RenderSweep(options, simulation, &folder);
   Ablation ablation;
   if (options.ablate) {
     ProgressLine progress("ablating", options.common.quiet);
@@ -120,15 +90,14 @@ CommandResult SimulateSweep(const SimulateOptions& options) {
   const std::chrono::duration<double> seconds = Clock::now() - start;
   CommandResult result;
   result.is_written = true;
-  result.summary = Summary(options, simulation, simulator.truth(), seconds.count());
-  result.summary["bits"] = bits;
-  result.summary["effects"] = EffectsJson(simulator.effects());
+  result.summary = Summary(options, simulation, sweep.truth, seconds.count());
+  result.summary["bits"] = sweep.bits;
+  result.summary["effects"] = EffectsJson(sweep.effects);
   PrintResult(options.common,
               fmt::format("{} frames of {} x {} px in {:.1f} s: {}\n", simulation.frame_count,
-                          camera.sensor.width_px, camera.sensor.height_px, seconds.count(),
-                          options.output_folder) +
-                  EffectsText(simulator.effects()) +
-                  (options.ablate ? AblationText(ablation) : ""));
+                          simulation.camera.sensor.width_px, simulation.camera.sensor.height_px,
+                          seconds.count(), options.output_folder) +
+                  EffectsText(sweep.effects) + (options.ablate ? AblationText(ablation) : ""));
   if (options.ablate) result.summary["ablation"] = AblationJson(ablation);
   return result;
 }

@@ -17,22 +17,18 @@
 #include "thicklens/base/deprecation.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/base/stopwatch.h"
-#include "thicklens/base/utc_time.h"
-#include "thicklens/io/depth_io.h"
-#include "thicklens/io/image_description.h"
-#include "thicklens/io/image_io.h"
-#include "thicklens/io/light_field_io.h"
-#include "thicklens/io/scene_pixels.h"
-#include "thicklens/io/simulated_sweep.h"
+#include "thicklens/depth.h"
+#include "thicklens/image.h"
+#include "thicklens/light_field.h"
 #include "thicklens/model/camera_file.h"
-#include "thicklens/model/scene_simulator.h"
+#include "thicklens/simulate.h"
 #include "tools/options/deprecated_names.h"
 #include "tools/options/effect_options.h"
+#include "tools/options/interface_options.h"
 #include "tools/options/light_field_options.h"
 #include "tools/options/option_values.h"
 #include "tools/report/ablation_page.h"
 #include "tools/report/ablation_run.h"
-#include "tools/system/build_info.h"
 #include "tools/system/progress_line.h"
 
 namespace thicklens::tools {
@@ -57,8 +53,8 @@ struct SceneOptions {
   std::string format = "png";         // light-field
 };
 
-model::SceneSimulationOptions ReadConfig(const SceneOptions& options) {
-  model::SceneSimulationOptions scene = model::ReadSceneSimulation(options.config_path);
+SceneSimulation ReadConfig(const SceneOptions& options) {
+  SceneSimulation scene = ReadSceneSimulation(options.config_path);
   ReportDeprecated(options.common, scene.notices);
   if (options.seed) scene.seed = static_cast<std::uint64_t>(*options.seed);
   CheckEffectNames(options.effects, model::ImageEffects());
@@ -72,15 +68,7 @@ model::SceneSimulationOptions ReadConfig(const SceneOptions& options) {
   return scene;
 }
 
-// Shows progress on the terminal and ends when the user requests it.
-model::SceneRun RunWith(const CommonOptions& common, ProgressLine* progress) {
-  return {common.threads, [progress](int done, int total) {
-            ThrowIfCancelled();
-            progress->Show(done, total);
-          }};
-}
-
-nlohmann::json Summary(const SceneOptions& options, const model::SceneSimulationOptions& scene,
+nlohmann::json Summary(const SceneOptions& options, const SceneSimulation& scene,
                        const model::SceneTruth& truth, Clock::time_point start) {
   const std::chrono::duration<double> seconds = Clock::now() - start;
   return {{"status", "ok"},
@@ -101,9 +89,7 @@ nlohmann::json Summary(const SceneOptions& options, const model::SceneSimulation
           {"seconds", seconds.count()}};
 }
 
-std::string SamplingText(const model::SceneSimulationOptions& scene,
-                         const model::SceneSimulator& simulator) {
-  const double error = simulator.sampling_error_grey_levels();
+std::string SamplingText(const SceneSimulation& scene, double error) {
   const double asked = scene.sampling_error_grey_levels;
   return fmt::format("largest sampling error: about {:.2g} grey levels rms{}\n", error,
                      error > asked && asked > 0
@@ -112,12 +98,11 @@ std::string SamplingText(const model::SceneSimulationOptions& scene,
                          : "");
 }
 
-Ablation Attribute(const SceneOptions& options, const model::SceneSimulationOptions& scene,
-                   const std::vector<model::LayerPixels>& pixels) {
+Ablation Attribute(const SceneOptions& options, const SceneSimulation& scene) {
   Ablation ablation;
-  std::optional<model::SweepSimulationOptions> sweep;
+  std::optional<SweepSimulation> sweep;
   if (!options.sweep_path.empty()) {  // read before anything that takes long
-    sweep = model::ReadSweepSimulation(options.sweep_path);
+    sweep = ReadSweepSimulation(options.sweep_path);
     ReportDeprecated(options.common, sweep->notices);
     if (options.seed) sweep->seed = static_cast<std::uint64_t>(*options.seed);
   }
@@ -128,51 +113,51 @@ Ablation Attribute(const SceneOptions& options, const model::SceneSimulationOpti
                                    AblationRunWith(options.common, &progress));
   }
   ProgressLine progress("ablating", options.common.quiet);
-  ablation.scene = AblateSceneOf(scene, pixels, AblationRunWith(options.common, &progress));
+  ablation.scene = AblateSceneOf(scene, AblationRunWith(options.common, &progress));
   return ablation;
+}
+
+// Its progress line ends with it.
+SimulatedPhotograph RenderScene(const SceneOptions& options, const SceneSimulation& scene) {
+  const CommandRun run(options.common, {});
+  return SimulatePhotograph(scene, run.control());
 }
 
 CommandResult SimulateImage(const SceneOptions& options) {
   const auto start = Clock::now();
-  const model::SceneSimulationOptions scene = ReadConfig(options);
+  const SceneSimulation scene = ReadConfig(options);
   OutputFolder folder(
       options.output_folder, kImageMarker,
       {"picture.png", "depth.pfm", "camera.yaml", kImageMarker, kAblationPage, kAblationTable});
 
-  const std::vector<model::LayerPixels> pixels = io::ReadScenePixels(scene);
-  const model::SceneSimulator simulator(scene, pixels, options.common.threads);
-  const model::RawDepthMap depth = simulator.RenderDepth();
-  const model::SceneTruth truth = simulator.Truth(depth);
-  int bits = 0;
-  {
-    ProgressLine progress("rendering", options.common.quiet);
-    const model::LinearImage image = simulator.RenderNoiseless(RunWith(options.common, &progress));
-    const model::EncodedImage stored = simulator.Store(image);
-    bits = stored.bits;
-    folder.Write("picture.png",
-                 io::WithDescription(io::EncodePng(stored),
-                                     fmt::format("simulated; effects: {}",
-                                                 model::JoinedNames(simulator.effects().on))));
-  }
-  folder.Write("depth.pfm", io::EncodePfm(depth));
-  folder.Write("camera.yaml", model::CameraToYaml(simulator.camera()));
-  folder.Write(kImageMarker, model::SceneTruthToYaml(truth));
+  SimulatedPhotograph simulated = RenderScene(options, scene);
+  const int bits = simulated.photo.bits();
+  ImageFileOptions file;
+  file.description =
+      fmt::format("simulated; effects: {}", model::JoinedNames(simulated.effects.on));
+  folder.Write("picture.png", EncodeImage(simulated.photo, file).png);
+  folder.Write("depth.pfm", EncodeDepth(simulated.depth));
+  folder.Write("camera.yaml", model::CameraToYaml(simulated.camera));
+  folder.Write(kImageMarker, model::SceneTruthToYaml(simulated.truth));
+  simulated.photo = Image();  // an ablation needs memory
+  simulated.depth = DepthMap();
   Ablation ablation;
   if (options.ablate) {
-    ablation = Attribute(options, scene, pixels);
+    ablation = Attribute(options, scene);
     WriteAblation(ablation, options.config_path, &folder);
   }
   ThrowIfCancelled();
   folder.Commit();
 
+  const model::SceneTruth& truth = simulated.truth;
   CommandResult result;
   result.is_written = true;
   result.summary = Summary(options, scene, truth, start);
   result.summary["bits"] = bits;
-  result.summary["effects"] = EffectsJson(simulator.effects());
-  result.summary["sampling_error_grey_levels"] = simulator.sampling_error_grey_levels();
+  result.summary["effects"] = EffectsJson(simulated.effects);
+  result.summary["sampling_error_grey_levels"] = simulated.sampling_error_grey_levels;
   result.summary["rays_per_pixel"] = scene.rays_per_pixel;
-  result.summary["mean_rays_per_pixel"] = simulator.mean_rays_per_pixel();
+  result.summary["mean_rays_per_pixel"] = simulated.mean_rays_per_pixel;
   PrintResult(
       options.common,
       fmt::format("an image of {} x {} px, depths from {:.6g} to {:.6g} mm, blur sigma up "
@@ -180,46 +165,47 @@ CommandResult SimulateImage(const SceneOptions& options) {
                   scene.camera.sensor.width_px, scene.camera.sensor.height_px,
                   truth.nearest_depth_mm, truth.farthest_depth_mm, truth.largest_blur_sigma_px,
                   result.summary["seconds"].get<double>(), options.output_folder) +
-          EffectsText(simulator.effects()) + SamplingText(scene, simulator) +
+          EffectsText(simulated.effects) +
+          SamplingText(scene, simulated.sampling_error_grey_levels) +
           (options.ablate ? AblationText(ablation) : ""));
   if (options.ablate) result.summary["ablation"] = AblationJson(ablation);
   return result;
 }
 
+// Writes the views below the folder, and returns the number of clipped values. Its progress line
+// ends with it.
+std::size_t RenderViews(const SceneOptions& options, const SceneSimulation& scene,
+                        LightFieldFormat format, OutputFolder* folder, SimulatedScene* simulated) {
+  const CommandRun run(options.common, {});
+  const LightField light_field = thicklens::SimulateLightField(scene, run.control(), simulated);
+  return WriteLightField(folder, light_field, format, run.control());
+}
+
 CommandResult SimulateLightField(const SceneOptions& options) {
   const auto start = Clock::now();
-  const model::SceneSimulationOptions scene = ReadConfig(options);
-  OutputFolder folder(options.output_folder, io::kLightFieldMarker, io::LightFieldEntries());
+  const SceneSimulation scene = ReadConfig(options);
+  const LightFieldFormat format =
+      options.format == "tiff" ? LightFieldFormat::kTiff : LightFieldFormat::kPng;
+  OutputFolder folder = ClaimLightFieldFolder(options.output_folder, format);
 
-  const model::SceneSimulator simulator(scene, io::ReadScenePixels(scene), options.common.threads);
-  std::size_t clipped = 0;
-  {
-    ProgressLine progress("rendering", options.common.quiet);
-    model::LightField light_field = simulator.RenderLightField(scene.u_count, scene.v_count,
-                                                               RunWith(options.common, &progress));
-    light_field.origin.version = Version();
-    light_field.origin.date = NowIso8601();
-    const io::ViewFormat format =
-        options.format == "tiff" ? io::ViewFormat::kTiff : io::ViewFormat::kPng;
-    clipped = io::WriteLightField(light_field, format, &folder);
-  }
-  const model::SceneTruth truth = simulator.Truth(simulator.RenderDepth());
+  SimulatedScene simulated;
+  const std::size_t clipped = RenderViews(options, scene, format, &folder, &simulated);
   ThrowIfCancelled();
   folder.Commit();
 
   CommandResult result;
   result.is_written = true;
-  result.summary = Summary(options, scene, truth, start);
+  result.summary = Summary(options, scene, simulated.truth, start);
   result.summary["views"] = {scene.u_count, scene.v_count};
   result.summary["clipped_values"] = clipped;
-  result.summary["effects_of_views"] = simulator.effects_of_views().Names();
+  result.summary["effects_of_views"] = simulated.effects_of_views.Names();
   PrintResult(
       options.common,
       fmt::format("{} x {} views of {} x {} px in {:.1f} s: {}\n", scene.u_count, scene.v_count,
                   scene.camera.sensor.width_px, scene.camera.sensor.height_px,
                   result.summary["seconds"].get<double>(), options.output_folder) +
           fmt::format("effects of the views: {}\n",
-                      model::JoinedNames(simulator.effects_of_views())));
+                      model::JoinedNames(simulated.effects_of_views)));
   return result;
 }
 

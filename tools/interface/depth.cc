@@ -39,10 +39,13 @@ DepthMap ReadDepth(const std::string& path, const DepthMeaning& meaning) {
   return {map.width_px, map.height_px, std::move(map.values), map.integer, meaning, path};
 }
 
-void WriteDepth(const std::string& path, const DepthMap& depth) {
+std::string EncodeDepth(const DepthMap& depth) {
   checks::RequireValid(depth);
-  WriteFileAtomically(
-      path, io::EncodePfm({depth.width_px, depth.height_px, depth.values, depth.is_integer}));
+  return io::EncodePfm({depth.width_px, depth.height_px, depth.values, depth.is_integer});
+}
+
+void WriteDepth(const std::string& path, const DepthMap& depth) {
+  WriteFileAtomically(path, EncodeDepth(depth));
 }
 
 }  // namespace thicklens

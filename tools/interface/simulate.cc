@@ -1,15 +1,14 @@
 #include "thicklens/simulate.h"
 
-#include <fmt/chrono.h>
-#include <fmt/format.h>
-
-#include <ctime>
+#include <cstddef>
 #include <filesystem>
 #include <mutex>
+#include <string>
 #include <utility>
 
 #include "thicklens/base/output_file.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/base/utc_time.h"
 #include "thicklens/io/image_io.h"
 #include "thicklens/io/scene_pixels.h"
 #include "thicklens/io/simulated_sweep.h"
@@ -36,32 +35,46 @@ SceneSimulation ReadSceneSimulation(const std::string& path) {
   return model::ReadSceneSimulation(path);
 }
 
-Sweep SimulateSweep(const SweepSimulation& simulation, const std::string& folder,
-                    bool unknown_offset, const RunControl& control) {
-  checks::RequireValid(control);
-  const RunScope run(control);
-  OutputFolder output(
+OutputFolder ClaimSweepFolder(const std::string& folder) {
+  return OutputFolder(
       folder, kTruthFile,
       {"frames", "sweep.yaml", "camera.yaml", kTruthFile, "attribution.html", "attribution.csv"});
+}
+
+SimulatedSweep SimulateSweep(const SweepSimulation& simulation, OutputFolder* folder,
+                             bool unknown_offset, const RunControl& control) {
+  checks::RequireValid(control);
+  const RunScope run(control);
   const model::SweepSimulator simulator(simulation, io::ReadTargetImage(simulation.target));
   const auto& frames = simulator.truth().frames;
   const int count = static_cast<int>(frames.size());
   const auto progress = run.ProgressOf("rendering");
   std::mutex mutex;
-  int done = 0;
+  int done = 0, bits = 0;
   ParallelFor(count, control.threads, [&](int i) {
-    output.Write(frames[static_cast<std::size_t>(i)].image,
-                 io::EncodePng(simulator.RenderFrame(i)));
+    const model::EncodedImage stored = simulator.RenderFrame(i);
+    folder->Write(frames[static_cast<std::size_t>(i)].image, io::EncodePng(stored));
     const std::lock_guard<std::mutex> lock(mutex);
+    bits = stored.bits;
     progress(++done, count);
   });
   Camera camera = simulator.camera();
-  camera.calibration.reset();  // what a calibration of this sweep has to find
-  output.Write("camera.yaml", model::CameraToYaml(camera));
-  output.Write("sweep.yaml",
-               model::SweepToYaml(io::DescribeSweep(simulation, simulator, unknown_offset)));
-  output.Write(kTruthFile, model::SweepTruthToYaml(simulator.truth()));
-  ThrowIfCancelled();
+  camera.calibration.reset();  // a calibration of this sweep must find it
+  folder->Write("camera.yaml", model::CameraToYaml(camera));
+  folder->Write("sweep.yaml",
+                model::SweepToYaml(io::DescribeSweep(simulation, simulator, unknown_offset)));
+  folder->Write(kTruthFile, model::SweepTruthToYaml(simulator.truth()));
+  return {simulator.truth(), simulator.effects(), bits};
+}
+
+Sweep SimulateSweep(const SweepSimulation& simulation, const std::string& folder,
+                    bool unknown_offset, const RunControl& control) {
+  OutputFolder output = ClaimSweepFolder(folder);
+  SimulateSweep(simulation, &output, unknown_offset, control);
+  {
+    const RunScope run(control);
+    ThrowIfCancelled();
+  }
   output.Commit();
   return ReadSweep((std::filesystem::path(folder) / "sweep.yaml").string());
 }
@@ -86,18 +99,24 @@ SimulatedPhotograph SimulatePhotograph(const SceneSimulation& simulation,
            ""},
           simulator.camera(),
           truth,
-          simulator.effects()};
+          simulator.effects(),
+          simulator.sampling_error_grey_levels(),
+          simulator.mean_rays_per_pixel()};
 }
 
-LightField SimulateLightField(const SceneSimulation& simulation, const RunControl& control) {
+LightField SimulateLightField(const SceneSimulation& simulation, const RunControl& control,
+                              SimulatedScene* scene) {
   checks::RequireValid(control);
   const RunScope run(control);
   const model::SceneSimulator simulator(simulation, io::ReadScenePixels(simulation),
                                         control.threads);
+  if (scene != nullptr) {  // before the views, which need much memory
+    *scene = {simulator.Truth(simulator.RenderDepth()), simulator.effects_of_views()};
+  }
   LightField light_field =
       simulator.RenderLightField(simulation.u_count, simulation.v_count, SceneRunOf(run));
   light_field.origin.version = LibraryVersion();
-  light_field.origin.date = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
+  light_field.origin.date = NowIso8601();
   return light_field;
 }
 

@@ -11,6 +11,7 @@
 #include "thicklens/estimator/compare.h"
 #include "thicklens/estimator/estimate_input.h"
 #include "thicklens/estimator/scene_solver.h"
+#include "thicklens/io/scene_pixels.h"
 #include "thicklens/io/simulated_sweep.h"
 #include "thicklens/model/light_field_grid.h"
 
@@ -87,12 +88,11 @@ model::AblationRun AblationRunWith(const CommonOptions& common, ProgressLine* pr
 }
 
 model::SceneAblation AblateSceneOf(const model::SceneSimulationOptions& scene,
-                                   const std::vector<model::LayerPixels>& pixels,
                                    const model::AblationRun& run) {
   const auto estimate = [&run](const model::SceneToEstimate& simulated) {
     return PsnrDbOfEstimate(simulated, run.threads);
   };
-  return model::AblateScene(scene, pixels, estimate, run);
+  return model::AblateScene(scene, io::ReadScenePixels(scene), estimate, run);
 }
 
 model::SweepAblation AblateSweepOf(const std::string& path,

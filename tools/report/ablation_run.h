@@ -2,7 +2,6 @@
 #define THICKLENS_TOOLS_REPORT_ABLATION_RUN_H_
 
 #include <string>
-#include <vector>
 
 #include "thicklens/model/scene_ablation.h"
 #include "thicklens/model/sweep_ablation.h"
@@ -14,10 +13,10 @@ namespace thicklens::tools {
 // Makes a run that shows its progress and ends when the user interrupts it.
 model::AblationRun AblationRunWith(const CommonOptions& common, ProgressLine* progress);
 
-// Runs model::AblateScene with the estimate of the scene solver; without defocus the estimate is
+// Runs model::AblateScene on the scene with the files that it names and with the estimate of the
+// scene solver; without defocus the estimate is
 // the photograph warped by its depth.
 model::SceneAblation AblateSceneOf(const model::SceneSimulationOptions& scene,
-                                   const std::vector<model::LayerPixels>& pixels,
                                    const model::AblationRun& run);
 
 // Runs model::AblateSweep with calib::Calibrate for a simulation that was read from the file

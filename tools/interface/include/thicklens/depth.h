@@ -57,7 +57,9 @@ struct DepthMap {
 // OptionError if the meaning is not valid, before the file is opened, and Error that names the
 // file.
 THICKLENS_EXPORT DepthMap ReadDepth(const std::string& path, const DepthMeaning& meaning);
-// Writes the values as a PFM file (float, little endian); the meaning is not part of the file.
+// The bytes of a PFM file (float, little endian) with the values; the meaning is not part of it.
+THICKLENS_EXPORT std::string EncodeDepth(const DepthMap& depth);
+// Writes that file, completely or not at all.
 THICKLENS_EXPORT void WriteDepth(const std::string& path, const DepthMap& depth);
 
 }  // namespace thicklens

@@ -5,8 +5,10 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/base/output_file.h"
 #include "thicklens/camera.h"
 #include "thicklens/depth.h"
+#include "thicklens/effects.h"
 #include "thicklens/export.h"
 #include "thicklens/image.h"
 #include "thicklens/light_field.h"
@@ -33,6 +35,20 @@ THICKLENS_EXPORT SceneSimulation ReadSceneSimulation(const std::string& path);
 THICKLENS_EXPORT Sweep SimulateSweep(const SweepSimulation& simulation, const std::string& folder,
                                      bool unknown_offset = false, const RunControl& run = {});
 
+// The same in steps, for a folder that is claimed before a long computation, or that gets other
+// files too: the name is claimed, the frames are written below it as they are rendered and the
+// descriptions after them, and Commit of the folder (thicklens/base/output_file.h) puts it in
+// place.
+struct SimulatedSweep {
+  model::SweepTruth truth;
+  model::EffectSelection effects;
+  int bits = 0;  // of the frames' values
+};
+THICKLENS_EXPORT OutputFolder ClaimSweepFolder(const std::string& folder);
+THICKLENS_EXPORT SimulatedSweep SimulateSweep(const SweepSimulation& simulation,
+                                              OutputFolder* folder, bool unknown_offset = false,
+                                              const RunControl& run = {});
+
 // A simulated photograph with its depth (kZ, mm from Ap), camera and truth.
 struct SimulatedPhotograph {
   Image photo;  // encoded
@@ -40,12 +56,21 @@ struct SimulatedPhotograph {
   Camera camera;  // with the true calibration
   model::SceneTruth truth;
   model::EffectSelection effects;
+  // Largest rms error of the encoded values by the finite number of rays, in 1/255 of full scale.
+  double sampling_error_grey_levels = 0;
+  double mean_rays_per_pixel = 0;
 };
 THICKLENS_EXPORT SimulatedPhotograph SimulatePhotograph(const SceneSimulation& simulation,
                                                         const RunControl& run = {});
-// The true light field of the same scene: its views have no defocus and no fall-off.
+// The true light field of the same scene: its views have no defocus and no fall-off. `scene`, if
+// not null, gets what is true of the scene.
+struct SimulatedScene {
+  model::SceneTruth truth;
+  EffectSet effects_of_views;
+};
 THICKLENS_EXPORT LightField SimulateLightField(const SceneSimulation& simulation,
-                                               const RunControl& run = {});
+                                               const RunControl& run = {},
+                                               SimulatedScene* scene = nullptr);
 
 }  // namespace thicklens
 
