@@ -1,4 +1,6 @@
 // thicklens explain: reports what a calibrated camera does at given depths.
+#include "thicklens/explain.h"
+
 #include <fmt/format.h>
 
 #include <limits>
@@ -10,19 +12,16 @@
 
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/output_file.h"
-#include "thicklens/io/depth_io.h"
-#include "thicklens/model/camera_file.h"
-#include "thicklens/model/effect_costs.h"
-#include "thicklens/model/explanation.h"
+#include "thicklens/camera.h"
+#include "thicklens/depth.h"
 #include "tools/commands/commands.h"
-#include "tools/commands/explain_scene.h"
 #include "tools/options/command_frame.h"
 #include "tools/options/effect_options.h"
+#include "tools/options/interface_options.h"
 #include "tools/options/light_field_options.h"
 #include "tools/options/option_values.h"
 #include "tools/report/explain_figure.h"
 #include "tools/report/explain_table.h"
-#include "tools/system/progress_line.h"
 
 namespace thicklens::tools {
 namespace {
@@ -45,7 +44,7 @@ struct ExplainOptions {
   std::string figure_path;
 };
 
-model::DepthRange ParseDepthRange(const std::string& text) {
+DepthRange ParseDepthRange(const std::string& text) {
   const std::string form = "NEAR:FAR in mm, with 0 < NEAR < FAR and FAR a number or inf,";
   const std::string inf_ending = ":inf";
   const bool to_infinity =
@@ -54,7 +53,7 @@ model::DepthRange ParseDepthRange(const std::string& text) {
   const auto numbers =
       SplitNumbers("--depth-range",
                    to_infinity ? text.substr(0, text.size() - inf_ending.size()) : text, ':', form);
-  model::DepthRange range{numbers[0], std::numeric_limits<double>::infinity()};
+  DepthRange range{numbers[0], std::numeric_limits<double>::infinity()};
   if (!to_infinity && numbers.size() > 1) range.far_mm = numbers[1];
   if (numbers.size() != (to_infinity ? 1 : 2) || !(range.near_mm > 0) ||
       !(range.far_mm > range.near_mm)) {
@@ -63,71 +62,45 @@ model::DepthRange ParseDepthRange(const std::string& text) {
   return range;
 }
 
-// The known part of what is photographed.
-struct ExplainedScene {
-  model::DepthRange range;
-  std::vector<model::EffectSite> places;
-};
+OptionNames ExplainOptionNames() {
+  return {{"depth_range", "--depth-range"},
+          {"depth", "--depth"},
+          {"depth.meaning.kind", "--depth-kind"},
+          {"depth.meaning.unit", "--depth-unit"},
+          {"depth_count", "--steps"},
+          {"effects", "--effects"},
+          {"effects.without", "--without"},
+          {"effects.tolerance", "--tolerance"},
+          {"bits", "--bits"},
+          {"full_well_electrons", "--full-well"},
+          {"read_noise_electrons", "--read-noise"},
+          {"bench.flicker", "--flicker"},
+          {"bench.drift_sigma_px", "--drift"},
+          {"bench.reading_sigma_mm", "--reading-error"},
+          {"bench.tilt_deg", "--tilt"},
+          {"uv_depth_mm", "--uv-depth"},
+          {"measure_costs", "--costs"}};
+}
 
-ExplainedScene SceneOf(const ExplainOptions& options, const model::Camera& camera) {
+// Its progress line ends with it.
+CameraExplanation ExplanationOf(const ExplainOptions& options, const Camera& camera) {
+  thicklens::ExplainOptions asked;
   if (options.depth_path.empty()) {
-    const model::DepthRange range = ParseDepthRange(options.depth_range);
-    return {range, model::PlacesBetween(camera, range.near_mm, range.far_mm, !options.as_sweep)};
+    asked.depth_range = ParseDepthRange(options.depth_range);
+  } else {
+    asked.depth = ReadDepth(options.depth_path, DepthMeaningOf(options.depth));
   }
-  const model::RawDepthMap map = io::ReadDepthMap(options.depth_path);
-  const model::Sensor& sensor = camera.sensor;
-  if (map.width_px != sensor.width_px || map.height_px != sensor.height_px) {
-    throw Error(fmt::format(
-        "{}: it is {}x{} px, but the camera's sensor has {}x{} px: the sizes must be "
-        "equal",
-        options.depth_path, map.width_px, map.height_px, sensor.width_px, sensor.height_px));
-  }
-  model::LinearImage empty{map.width_px, map.height_px, 1, {}};
-  empty.values.assign(map.values.size(), 0.0F);
-  const model::Scene scene = model::MakeScene(camera, std::move(empty), map,
-                                              ConventionOf(options.depth), options.depth_path);
-  return {{scene.depth.min_mm, scene.depth.max_mm}, PlacesOfDepth(camera, scene)};
-}
-
-model::EffectSelection Decide(const ExplainOptions& options, const model::Camera& camera,
-                              const std::vector<model::EffectSite>& places) {
-  model::EffectConditions conditions;
-  conditions.camera = camera;
-  conditions.bits = options.bits;
-  conditions.full_well_electrons = options.full_well_electrons;
-  conditions.read_noise_electrons = options.read_noise_electrons;
-  if (options.as_sweep) conditions.bench = options.bench;
-  if (options.uv_depth_mm) {
-    conditions.planes = {*options.uv_depth_mm, camera.focus_depth_mm() - *options.uv_depth_mm};
-  }
-  model::EffectSelectionOptions choice;
-  // A simulated image always has these effects.
-  choice.kept = {model::Effect::kQuantisation, model::Effect::kTransferCurve};
-  ApplyEffectOptions(options.effects, &choice);
-  return model::SelectEffects(choice, conditions, places, model::EffectSet::All());
-}
-
-model::EffectCosts CostsOf(const ExplainOptions& options, const model::Camera& camera,
-                           const model::DepthRange& range, const model::EffectSelection& decision) {
-  model::SceneSimulationOptions sensor;
-  sensor.full_well_electrons = options.full_well_electrons;
-  sensor.read_noise_electrons = options.read_noise_electrons;
-  sensor.bits = options.bits <= 8 ? 8 : 16;  // what simulations store; the time is the same
-  ProgressLine progress("measuring costs", options.common.quiet);
-  try {
-    return model::MeasureEffectCosts(camera, range, sensor, decision,
-                                     [&progress](int done, int total) {
-                                       ThrowIfCancelled();
-                                       progress.Show(done, total);
-                                     });
-  } catch (const Interrupted&) {
-    throw;
-  } catch (const Error& error) {
-    throw Error(
-        fmt::format("--costs: an image of depths from {:g} to {:g} mm cannot be simulated: "
-                    "{}",
-                    range.near_mm, range.far_mm, error.what()));
-  }
+  asked.depth_count = options.steps;
+  asked.effects = EffectSelectionOf(options.effects);
+  asked.bits = options.bits;
+  asked.full_well_electrons = options.full_well_electrons;
+  asked.read_noise_electrons = options.read_noise_electrons;
+  if (options.as_sweep) asked.bench = options.bench;
+  asked.uv_depth_mm = options.uv_depth_mm;
+  asked.measure_costs = options.costs;
+  const CommandRun run(options.common, ExplainOptionNames());
+  return WithOptionNames(run.names(),
+                         [&] { return ExplainCamera(camera, std::move(asked), run.control()); });
 }
 
 void AddCosts(const model::EffectCosts& costs, nlohmann::json* summary) {
@@ -151,26 +124,19 @@ std::string CostsText(const model::EffectCosts& costs) {
 CommandResult Explain(const ExplainOptions& options) {
   std::optional<OutputFile> figure;
   if (!options.figure_path.empty()) figure.emplace(options.figure_path);
-  const model::Camera camera = model::ReadCamera(options.camera_path);
-  ReportAssumedFields(camera);
-  const ExplainedScene scene = SceneOf(options, camera);
-  const model::Explanation explanation = model::ExplainCamera(camera, scene.range, options.steps);
-  const model::EffectSelection decision = Decide(options, camera, scene.places);
-  CommandResult result{ExplanationJson(explanation), ""};
-  result.summary["effects"] = EffectsJson(decision);
-  std::optional<model::EffectCosts> costs;
-  if (options.costs) {
-    costs = CostsOf(options, camera, scene.range, decision);
-    AddCosts(*costs, &result.summary);
-  }
+  const Camera camera = ReadCamera(options.camera_path);
+  const CameraExplanation found = ExplanationOf(options, camera);
+  CommandResult result{ExplanationJson(found.camera), ""};
+  result.summary["effects"] = EffectsJson(found.effects);
+  if (found.costs) AddCosts(*found.costs, &result.summary);
   ThrowIfCancelled();
-  if (figure) figure->Commit(BlurCurveSvg(camera, scene.range));
+  if (figure) figure->Commit(BlurCurveSvg(camera, found.depth_range));
   result.is_written = figure.has_value();
   PrintResult(options.common,
-              ExplanationText(explanation) +
+              ExplanationText(found.camera) +
                   "\nlargest impact of each effect here on edges between black and white\n" +
-                  EffectsTable(decision, costs ? &costs->of_effect : nullptr) +
-                  (costs ? CostsText(*costs) : ""));
+                  EffectsTable(found.effects, found.costs ? &found.costs->of_effect : nullptr) +
+                  (found.costs ? CostsText(*found.costs) : ""));
   return result;
 }
 

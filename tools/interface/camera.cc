@@ -1,5 +1,7 @@
 #include "thicklens/camera.h"
 
+#include <fmt/format.h>
+
 #include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/model/camera_file.h"
@@ -12,6 +14,16 @@ void WriteCamera(const std::string& path, const Camera& camera) {
   std::string why;
   if (!camera.IsValid(&why)) throw Error("camera: " + why);
   WriteFileAtomically(path, model::CameraToYaml(camera));
+}
+
+std::vector<std::string> NoticesOf(const Camera& camera) {
+  std::vector<std::string> notices = camera.notices;
+  const std::vector<std::string> assumed = model::AssumedFields(camera);
+  if (!assumed.empty()) {
+    notices.push_back(fmt::format("camera '{}': assumed, neither published nor measured: {}",
+                                  camera.name, fmt::join(assumed, ", ")));
+  }
+  return notices;
 }
 
 }  // namespace thicklens

@@ -1,4 +1,5 @@
 // The checks of every option struct of the interface.
+#include <cmath>
 #include <limits>
 #include <set>
 #include <type_traits>
@@ -8,6 +9,7 @@
 #include "thicklens/depth.h"
 #include "thicklens/effects.h"
 #include "thicklens/estimate.h"
+#include "thicklens/explain.h"
 #include "thicklens/image.h"
 #include "thicklens/kernels/device.h"
 #include "thicklens/light_field.h"
@@ -317,6 +319,52 @@ bool FocusOptions::IsValid(std::string* why) const {
 bool CompareOptions::IsValid(std::string* why) const {
   if (!WholeBetween(why, "border_px", 0, kMaxPixels, border_px)) return false;
   return !baseline || Member(why, "baseline.depth", baseline->depth);
+}
+
+bool ExplainOptions::IsValid(std::string* why) const {
+  constexpr int kMaxDepths = 10000;
+  constexpr double kMaxTiltDeg = 89;
+  if (depth_range.has_value() == depth.has_value()) {
+    return Fail(why, "depth_range", "exactly one of depth_range and depth is expected");
+  }
+  if (depth_range && !Positive(why, "depth_range.near_mm", depth_range->near_mm)) return false;
+  if (depth_range && !(depth_range->far_mm > depth_range->near_mm)) {
+    return Unexpected(why, "depth_range.far_mm", "a number above near_mm, or infinity",
+                      depth_range->far_mm);
+  }
+  if (depth) {
+    if (!Member(why, "depth", *depth)) return false;
+    if (depth->meaning.kind == DepthKind::kDisparity) {
+      return Fail(why, "depth.meaning.kind",
+                  "disparities refer to views, but a camera alone has no views; kZ or kRange is "
+                  "expected");
+    }
+  }
+  if (!WholeBetween(why, "depth_count", 2, kMaxDepths, depth_count) ||
+      !Member(why, "effects", effects) || !WholeBetween(why, "bits", 1, 32, bits) ||
+      !NonNegative(why, "full_well_electrons", full_well_electrons) ||
+      !NonNegative(why, "read_noise_electrons", read_noise_electrons)) {
+    return false;
+  }
+  if (read_noise_electrons > 0 && full_well_electrons == 0) {
+    return Fail(why, "read_noise_electrons",
+                "noise in electrons needs full_well_electrons, the electrons at full scale");
+  }
+  if (bench) {
+    if (!NonNegative(why, "bench.flicker", bench->flicker) ||
+        !NonNegative(why, "bench.drift_sigma_px", bench->drift_sigma_px) ||
+        !NonNegative(why, "bench.reading_sigma_mm", bench->reading_sigma_mm)) {
+      return false;
+    }
+    if (!(std::abs(bench->tilt_deg) <= kMaxTiltDeg)) {
+      return Unexpected(why, "bench.tilt_deg", "a number from -89 to 89", bench->tilt_deg);
+    }
+    if (measure_costs) {
+      return Fail(why, "measure_costs",
+                  "not available with a bench, whose effects take hardly any time");
+    }
+  }
+  return IfGiven(uv_depth_mm, [why](double given) { return Finite(why, "uv_depth_mm", given); });
 }
 
 bool Solver::IsValid(std::string* /*why*/) const { return true; }

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <filesystem>
 #include <system_error>
+#include <utility>
 
 #include "thicklens/base/error.h"
 #include "thicklens/base/input_file.h"
@@ -173,12 +174,7 @@ Sweep ReadSweepFolder(const std::string& folder, const std::string& readings_csv
 
 std::vector<std::string> NoticesOf(const Sweep& sweep) {
   std::vector<std::string> notices = sweep.notices;
-  notices.insert(notices.end(), sweep.camera.notices.begin(), sweep.camera.notices.end());
-  const std::vector<std::string> assumed = model::AssumedFields(sweep.camera);
-  if (!assumed.empty()) {
-    notices.push_back(fmt::format("camera '{}': assumed, neither published nor measured: {}",
-                                  sweep.camera.name, fmt::join(assumed, ", ")));
-  }
+  for (std::string& notice : NoticesOf(sweep.camera)) notices.push_back(std::move(notice));
   return notices;
 }
 

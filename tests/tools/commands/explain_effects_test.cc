@@ -11,7 +11,6 @@
 #include "support/temporary_folder.h"
 #include "thicklens/io/depth_io.h"
 #include "thicklens/model/camera_file.h"
-#include "tools/commands/explain_scene.h"
 #include "tools/support/child_process.h"
 
 namespace thicklens::tools {

@@ -2,6 +2,7 @@
 #define THICKLENS_CAMERA_H_
 
 #include <string>
+#include <vector>
 
 #include "thicklens/export.h"
 #include "thicklens/model/camera.h"
@@ -19,6 +20,10 @@ THICKLENS_EXPORT Camera ReadCamera(const std::string& path);
 // Writes a camera file, completely or not at all. Numbers that are read back have the same bits.
 // Throws Error if the camera is not valid or the file cannot be written.
 THICKLENS_EXPORT void WriteCamera(const std::string& path, const Camera& camera);
+
+// What the camera's file assumes, one line each: former names, and numbers that are neither
+// published nor measured.
+THICKLENS_EXPORT std::vector<std::string> NoticesOf(const Camera& camera);
 
 }  // namespace thicklens
 

@@ -13,6 +13,7 @@
 #include "thicklens/depth.h"        // IWYU pragma: export
 #include "thicklens/effects.h"      // IWYU pragma: export
 #include "thicklens/estimate.h"     // IWYU pragma: export
+#include "thicklens/explain.h"      // IWYU pragma: export
 #include "thicklens/image.h"        // IWYU pragma: export
 #include "thicklens/light_field.h"  // IWYU pragma: export
 #include "thicklens/render.h"       // IWYU pragma: export

@@ -1,20 +1,19 @@
-#ifndef THICKLENS_TOOLS_COMMANDS_EXPLAIN_SCENE_H_
-#define THICKLENS_TOOLS_COMMANDS_EXPLAIN_SCENE_H_
+#ifndef THICKLENS_MODEL_DEPTH_PLACES_H_
+#define THICKLENS_MODEL_DEPTH_PLACES_H_
 
 #include <vector>
 
 #include "thicklens/model/effect_impact.h"
 #include "thicklens/model/scene.h"
 
-namespace thicklens::tools {
+namespace thicklens::model {
 
 // Returns places of a depth map without its holes, for each block of 8 x 8 px: the pixel farthest
 // from the axis, the depth of maximum blur, and, across the steepest step between neighbours in the
 // block, the depth on the other side. The photographed object is not known, so an edge between
 // black and white is assumed everywhere.
-std::vector<model::EffectSite> PlacesOfDepth(const model::Camera& camera,
-                                             const model::Scene& scene);
+std::vector<EffectSite> PlacesOfDepth(const Camera& camera, const Scene& scene);
 
-}  // namespace thicklens::tools
+}  // namespace thicklens::model
 
-#endif  // THICKLENS_TOOLS_COMMANDS_EXPLAIN_SCENE_H_
+#endif  // THICKLENS_MODEL_DEPTH_PLACES_H_

@@ -1,4 +1,4 @@
-#include "tools/commands/explain_scene.h"
+#include "thicklens/model/depth_places.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,21 +7,21 @@
 
 #include "thicklens/base/cancel.h"
 
-namespace thicklens::tools {
+namespace thicklens::model {
 namespace {
 
 constexpr int kBlockPx = 8;
 
 class DepthBlocks {
  public:
-  DepthBlocks(const model::Camera& camera, const model::Scene& scene)
+  DepthBlocks(const Camera& camera, const Scene& scene)
       : scene_(scene),
         focus_(1 / camera.focus_depth_mm()),
         axis_px_(camera.sensor.principal_point_px) {}
 
   // Returns none if the block contains only holes.
-  std::optional<model::EffectSite> PlaceOf(int x0, int y0) const {
-    model::EffectSite place;
+  std::optional<EffectSite> PlaceOf(int x0, int y0) const {
+    EffectSite place;
     bool found = false;
     double steepest = 0;
     for (int y = y0; y < std::min(y0 + kBlockPx, scene_.image.height_px); ++y) {
@@ -60,17 +60,16 @@ class DepthBlocks {
     return std::isnan(step) ? 0 : step;
   }
 
-  const model::Scene& scene_;
+  const Scene& scene_;
   const double focus_;
   const Eigen::Vector2d axis_px_;
 };
 
 }  // namespace
 
-std::vector<model::EffectSite> PlacesOfDepth(const model::Camera& camera,
-                                             const model::Scene& scene) {
+std::vector<EffectSite> PlacesOfDepth(const Camera& camera, const Scene& scene) {
   const DepthBlocks blocks(camera, scene);
-  std::vector<model::EffectSite> places;
+  std::vector<EffectSite> places;
   for (int y = 0; y < scene.image.height_px; y += kBlockPx) {
     ThrowIfCancelled();
     for (int x = 0; x < scene.image.width_px; x += kBlockPx) {
@@ -80,4 +79,4 @@ std::vector<model::EffectSite> PlacesOfDepth(const model::Camera& camera,
   return places;
 }
 
-}  // namespace thicklens::tools
+}  // namespace thicklens::model
