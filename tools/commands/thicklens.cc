@@ -137,6 +137,8 @@ int Run(int argc, char** argv) {
     return Main(argc, argv);
   } catch (const tools::UsageError& error) {
     return Fail(error.what(), kUsage);
+  } catch (const Interrupted&) {  // with outputs in place, RunCommand has made another error of it
+    return Fail(tools::InterruptedText({}), kFailed);
   } catch (const std::bad_alloc&) {
     return Fail("out of memory", kFailed);
   } catch (const cv::Exception& error) {

@@ -166,7 +166,7 @@ void WatchSignals() {
 const CancelToken* ProgramToken() { return &program_token; }
 
 std::string InterruptedText(const std::vector<std::string>& outputs_in_place) {
-  if (outputs_in_place.empty()) return Interrupted().what();
+  if (outputs_in_place.empty()) return "interrupted; nothing was written";
   return PrintableUtf8(fmt::format("interrupted after {} was written; nothing else was written",
                                    fmt::join(outputs_in_place, " and ")));
 }

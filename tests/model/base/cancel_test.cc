@@ -34,6 +34,9 @@ TEST(Cancel, AScopeLooksAtItsTokenAndThenAtTheOneBefore) {
   EXPECT_THROW(ThrowIfCancelled(), Interrupted);
 }
 
+// A function does not know what its caller has written before.
+TEST(Cancel, ClaimsNothingAboutFiles) { EXPECT_STREQ(Interrupted().what(), "interrupted"); }
+
 TEST(Cancel, OtherThreadsAreNotAffected) {
   CancelToken token;
   const CancelScope scope(&token);

@@ -15,10 +15,10 @@ class Error : public std::runtime_error {
 };
 
 // A cancellation by the user. The owner of an incomplete output discards it while the exception
-// propagates.
+// propagates. The text does not say what was written before: only the caller knows that.
 class Interrupted : public Error {
  public:
-  Interrupted() : Error("interrupted; nothing was written") {}
+  Interrupted() : Error("interrupted") {}
 };
 
 }  // namespace thicklens
