@@ -24,6 +24,7 @@
 #include "calib/uncertainty/calibration_checks.h"
 #include "calib/uncertainty/field_map.h"
 #include "calib/uncertainty/systematic_advice.h"
+#include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/parallel.h"
 #include "thicklens/base/validity.h"
@@ -150,10 +151,11 @@ class Calibrator {
   const std::vector<std::size_t>& used() const { return selection_.used(); }
 
   void Tick() {
-    if (!options_.progress) return;
-    const std::lock_guard<std::mutex> lock(progress_mutex_);
-    if (!options_.progress(std::min(++steps_done_, total_steps_), total_steps_))
-      throw Interrupted();
+    if (options_.progress) {
+      const std::lock_guard<std::mutex> lock(progress_mutex_);
+      options_.progress(std::min(++steps_done_, total_steps_), total_steps_);
+    }
+    ThrowIfCancelled();
   }
 
   template <typename Work>

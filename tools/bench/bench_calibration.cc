@@ -135,7 +135,6 @@ CalibrationTrial OfSource(const calib::Calibration& c, const BenchSweep& bench) 
 std::vector<Method> Methods() {
   calib::CalibrationOptions fit;
   fit.threads = 1;  // the sweeps run side by side
-  fit.progress = [](int, int) { return !IsCancelled(); };
   calib::CalibrationOptions no_field = fit;
   no_field.map_field = false;
   calib::CalibrationOptions no_fit = no_field;

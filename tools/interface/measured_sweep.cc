@@ -19,11 +19,7 @@ MeasuredSweep MeasureSweep(const Sweep& sweep, bool map_field, RunScope* run) {
   calib::CalibrationOptions settings;
   settings.map_field = map_field;
   settings.threads = run->threads();
-  settings.progress = [progress = run->ProgressOf("measuring"), token = CurrentCancelToken()](
-                          int done, int total) {
-    progress(done, total);
-    return token == nullptr || !token->IsCancelled();
-  };
+  settings.progress = run->ProgressOf("measuring");
   measured.calibration = calib::Calibrate(measured.sweep, settings);
   ThrowIfCancelled();
   return measured;

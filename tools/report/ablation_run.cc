@@ -63,10 +63,7 @@ model::SweepCalibration CalibrationOf(const model::SweepToCalibrate& simulated, 
   calib::CalibrationOptions options;
   options.map_field = false;
   options.threads = threads;
-  options.progress = [&simulated](int, int) {
-    simulated.tell();
-    return true;
-  };
+  options.progress = [&simulated](int, int) { simulated.tell(); };
   const calib::Calibration calibration = calib::Calibrate(sweep, options);
   if (!calibration.summary.image_distance_mm || !calibration.summary.blur_ratio) {
     return {std::nullopt, calibration.summary.reason};

@@ -1,9 +1,9 @@
 #ifndef THICKLENS_CALIB_CALIBRATE_H_
 #define THICKLENS_CALIB_CALIBRATE_H_
 
-#include <functional>
 #include <string>
 
+#include "thicklens/base/progress.h"
 #include "thicklens/calib/calibration.h"
 #include "thicklens/calib/focus_sweep.h"
 #include "thicklens/calib/frame_checks.h"
@@ -16,11 +16,9 @@ struct CalibrationOptions {
   // If false, only the paper's recipe and the sharpness peak are computed. Where the bench zero is
   // given they need no image scale, and no frame is registered: a wrong reading is not noticed.
   bool fit_blur = true;
-  bool map_field = true;  // includes tiles and colour channels; needs the fit
-  int threads = 0;        // 0: one per core
-  // Called from time to time with (steps done, steps in all). The result false stops the run, which
-  // then throws Interrupted.
-  std::function<bool(int done, int total)> progress;
+  bool map_field = true;      // includes tiles and colour channels; needs the fit
+  int threads = 0;            // 0: one per core
+  ProgressFunction progress;  // called from time to time
 
   bool IsValid(std::string* why) const;
 };
@@ -30,7 +28,8 @@ struct CalibrationOptions {
 bool HasEnoughFrames(const FocusSweep& sweep, std::string* why);
 
 // Runs the quality checks, the estimators and both methods. Bad data give a Calibration whose
-// outcome is kRefused or kPartial, with the reason. A wrong file or setting throws Error.
+// outcome is kRefused or kPartial, with the reason. A wrong file or setting throws Error, and a
+// cancelled CancelScope throws Interrupted.
 Calibration Calibrate(const FocusSweep& sweep, const CalibrationOptions& options);
 
 // Returns the camera with the calibrated values, as it is written to a file. The manufacturer's

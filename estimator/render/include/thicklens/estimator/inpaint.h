@@ -2,9 +2,9 @@
 #define THICKLENS_ESTIMATOR_INPAINT_H_
 
 #include <cstddef>
-#include <functional>
 #include <string>
 
+#include "thicklens/base/progress.h"
 #include "thicklens/estimator/view_geometry.h"
 #include "thicklens/model/light_field.h"
 
@@ -13,8 +13,8 @@ namespace thicklens::estimator {
 struct InpaintOptions {
   double radius_px = 3;  // radius of the neighbourhood that Telea's method uses, > 0
   int threads = 0;       // 0: one per core
-  // Called for each visited view. May throw to stop; the light field is then partly filled.
-  std::function<void(int done, int total)> progress;
+  // Called for each visited view. If it throws, the light field is partly filled.
+  ProgressFunction progress;
 
   bool IsValid(std::string* why) const;
 };

@@ -1,11 +1,11 @@
 #ifndef THICKLENS_ESTIMATOR_BLUR_CHECK_H_
 #define THICKLENS_ESTIMATOR_BLUR_CHECK_H_
 
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "thicklens/base/progress.h"
 #include "thicklens/estimator/estimate_input.h"
 
 namespace thicklens::estimator {
@@ -42,9 +42,7 @@ struct BlurCheckOptions {
   int threads = 0;      // 0: one per core
   // Limit for the whole process. Where the image needs more, only rows in its middle are checked.
   std::optional<double> memory_limit_mib;
-  // Called from any thread, one at a time, for each trial and repeatedly between trials. May throw
-  // to stop.
-  std::function<void(int done, int total)> progress;
+  ProgressFunction progress;  // called for each trial and repeatedly between trials
 
   bool IsValid(std::string* why) const;
 };

@@ -2,18 +2,20 @@
 #define THICKLENS_BASE_ITERATION_PROGRESS_H_
 
 #include <algorithm>
-#include <functional>
 #include <mutex>
+
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/progress.h"
 
 namespace thicklens {
 
 // Progress over views and iterations, counted together from any thread. There may be fewer or more
-// iterations than expected.
+// iterations than expected. Each count is a safe point: it throws Interrupted if the token of its
+// thread was cancelled.
 class IterationProgress {
  public:
   // `report` may be empty, may throw, and must outlive this.
-  IterationProgress(const std::function<void(int done, int total)>& report, int total)
-      : report_(report), total_(total) {}
+  IterationProgress(const ProgressFunction& report, int total) : report_(report), total_(total) {}
 
   void Report() { Advance(0); }
   void Count() { Advance(1); }
@@ -25,9 +27,10 @@ class IterationProgress {
     const std::lock_guard<std::mutex> lock(mutex_);
     done_ = std::min(total_, done_ + steps);
     if (report_) report_(done_, total_);
+    ThrowIfCancelled();
   }
 
-  const std::function<void(int, int)>& report_;
+  const ProgressFunction& report_;
   const int total_;
   std::mutex mutex_;
   int done_ = 0;

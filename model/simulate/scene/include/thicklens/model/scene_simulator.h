@@ -3,13 +3,13 @@
 
 #include <Eigen/Core>
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "thicklens/base/progress.h"
 #include "thicklens/model/camera.h"
 #include "thicklens/model/effect_selection.h"
 #include "thicklens/model/light_field.h"
@@ -166,11 +166,10 @@ struct SceneTruth {
 };
 std::string SceneTruthToYaml(const SceneTruth& truth);  // schema thicklens/scene-truth/1
 
-// Control of a long computation. `progress` is called from any thread, one call at a time. An
-// exception that it throws ends the computation and propagates to the caller.
+// Control of a long computation.
 struct SceneRun {
   int threads = 0;  // 0: one per core
-  std::function<void(int done, int total)> progress;
+  ProgressFunction progress;
 };
 
 // Image formation from a scene of textured surfaces to a photograph and its true light field by the
