@@ -14,14 +14,17 @@
 #include "estimator/blocks/block_system.h"
 #include "estimator/blocks/linear_solver.h"
 #include "estimator/views/input_checks.h"
+#include "estimator/views/option_checks.h"
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/index.h"
+#include "thicklens/base/iteration_progress.h"
 #include "thicklens/base/parallel.h"
 #include "thicklens/base/residual_guard.h"
 #include "thicklens/base/run_cost.h"
 #include "thicklens/estimator/blas.h"
 #include "thicklens/estimator/block_store.h"
+#include "thicklens/kernels/device.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -203,15 +206,15 @@ double BytesUpTo(double limit, int block_px, int first_px, MemoryForecast* forec
   }
 }
 
-int ChooseBlockPx(const BlockOptions& options, const model::LinearImage& image,
-                  MemoryForecast forecast, double* bytes) {
+int ChooseBlockPx(const BlockOptions& options, std::optional<double> memory_limit_mib,
+                  const model::LinearImage& image, MemoryForecast forecast, double* bytes) {
   const int whole_px = std::max(image.width_px, image.height_px);
-  if (!options.memory_limit_mib) {
+  if (!memory_limit_mib) {
     const int block_px = std::min(options.block_px.value_or(kDefaultBlockPx), whole_px);
     *bytes = forecast.Bytes(block_px);
     return block_px;
   }
-  const double limit = *options.memory_limit_mib * kBytesPerMib;
+  const double limit = *memory_limit_mib * kBytesPerMib;
   constexpr int kSmallestPx = 2;
   constexpr int kFirstLookPx = 8;
   const int first_px = std::min(options.block_px.value_or(kSmallestPx), whole_px);
@@ -220,7 +223,7 @@ int ChooseBlockPx(const BlockOptions& options, const model::LinearImage& image,
     throw Error(fmt::format(
         "memory limit {:.0f} MiB: blocks of {} px need {:.0f} MiB or more in total; the limit must "
         "be at least as large{}",
-        *options.memory_limit_mib, first_px, std::ceil(*bytes / kBytesPerMib),
+        *memory_limit_mib, first_px, std::ceil(*bytes / kBytesPerMib),
         options.block_px ? ", or use smaller blocks" : ", or use fewer views or threads"));
   }
   if (options.block_px) return first_px;
@@ -357,10 +360,10 @@ bool Fits(const SolvedBlock& solved, const BlockGeometry& block, std::size_t cha
 }
 
 // Returns a block from the store, or nothing.
-std::optional<SolvedBlock> FromStore(const BlockOptions& options, int number,
+std::optional<SolvedBlock> FromStore(BlockStore* store, const BlockOptions& options, int number,
                                      const BlockGeometry& block, int channels) {
-  if (options.store == nullptr) return std::nullopt;
-  std::optional<SolvedBlock> found = options.store->Find(number);
+  if (store == nullptr) return std::nullopt;
+  std::optional<SolvedBlock> found = store->Find(number);
   if (found && !Fits(*found, block, Index(channels), options)) return std::nullopt;
   return found;
 }
@@ -391,26 +394,26 @@ void KeepPriorBesideTheImage(const BlockGeometry& whole, const model::LightField
   }
 }
 
-void CheckOptions(const BlockOptions& options) {
-  std::string why;
-  if (!options.IsValid(&why)) throw Error("block solver: " + why);
-}
-
 }  // namespace
 
 model::LightField EstimateByBlocks(const EstimateInput& input, const BlockOptions& given,
-                                   kernels::Backend* backend, BlockSummary* summary) {
-  CheckOptions(given);
+                                   const SolverRun& run, BlockSummary* summary) {
+  CheckOptions("block solver", given);
+  CheckRun("block solver", run, RunUse::kStore);
   CheckInput(input);
   const bool symmetric = given.stencil == Stencil::kWarp;
   // Throws Error for a solver that this build or the stencil does not have.
   const std::string device_of_solver = NewLinearSolver(given.solver, symmetric)->device();
 
   const auto start = Clock::now();
-  const int threads = ResolveThreads(given.threads);
+  const int threads = ResolveThreads(run.threads);
   BlockOptions options = given;
   options.ridge = given.ridge.value_or(1e-2 / static_cast<double>(input.weights.size()));
 
+  std::shared_ptr<kernels::Backend> processor;
+  if (run.backend == nullptr)
+    processor = kernels::OpenBackend(kernels::ParseDeviceRequest("cpu"), nullptr);
+  kernels::Backend* const backend = processor ? processor.get() : run.backend;
   // Systems are made in double; a device without double leaves that to the reference
   // implementation.
   const bool on_device = backend->has_double();
@@ -421,6 +424,8 @@ model::LightField EstimateByBlocks(const EstimateInput& input, const BlockOption
   // them and make sums depend on the number of threads.
   const OneBlasThread one_blas_thread;
 
+  BlockSummary unused;
+  if (summary == nullptr) summary = &unused;
   *summary = BlockSummary();
   summary->threads = threads;
   summary->device = on_device ? backend->name() : "cpu (" + backend->name() + " has no double)";
@@ -429,7 +434,7 @@ model::LightField EstimateByBlocks(const EstimateInput& input, const BlockOption
   summary->ridge = *options.ridge;
   double bytes = 0;
   summary->block_px =
-      ChooseBlockPx(options, input.image,
+      ChooseBlockPx(options, run.memory_limit_mib, input.image,
                     MemoryForecast(rays, options, *options.ridge, threads, merging.get()), &bytes);
   summary->predicted_memory_mib = bytes / kBytesPerMib;
   summary->setup_seconds = SecondsSince(start);
@@ -445,15 +450,16 @@ model::LightField EstimateByBlocks(const EstimateInput& input, const BlockOption
   Workers workers([&] {
     return Worker{pattern_of_workers->Clone(), NewLinearSolver(options.solver, symmetric, limits)};
   });
-  if (options.store != nullptr) {
-    options.store->Begin(RunOf(rays, options, *summary, backend->description(), count));
+  if (run.store != nullptr) {
+    run.store->Begin(RunOf(rays, options, *summary, backend->description(), count));
   }
   std::mutex merge_mutex;
-  int done = 0;
+  IterationProgress progress(run.progress, count);
   ParallelFor(count, threads, [&](int i) {
     const model::PixelRect& rect = rects[Index(i)];
     const BlockGeometry block = rays.Block(rect.x, rect.y, rect.width, rect.height);
-    std::optional<SolvedBlock> solved = FromStore(options, i, block, input.image.channels);
+    std::optional<SolvedBlock> solved =
+        FromStore(run.store, options, i, block, input.image.channels);
     const bool is_found = solved.has_value();
     if (!is_found) {
       Worker worker = workers.Take();
@@ -461,7 +467,7 @@ model::LightField EstimateByBlocks(const EstimateInput& input, const BlockOption
           MakeBlockSystem(rays, block, options, *options.ridge, worker.kernels.get());
       solved = SolveBlock(system, options, rect, &worker);
       workers.GiveBack(std::move(worker));
-      if (options.store != nullptr) options.store->Keep(i, *solved);
+      if (run.store != nullptr) run.store->Keep(i, *solved);
     }
     summary->blocks[Index(i)] = solved->report;
     const std::lock_guard<std::mutex> lock(merge_mutex);
@@ -469,8 +475,7 @@ model::LightField EstimateByBlocks(const EstimateInput& input, const BlockOption
       merging->AddBlock(block, static_cast<int>(channel), solved->channels[channel]);
     }
     summary->blocks_from_store += is_found ? 1 : 0;
-    ++done;
-    if (options.progress) options.progress(done, count);
+    progress.Count();
   });
   std::vector<float> values = merging->FinishWhole();
   const BlockGeometry whole = rays.Block(0, 0, input.image.width_px, input.image.height_px);

@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <utility>
 
 #include "estimator/views/input_checks.h"
+#include "estimator/views/option_checks.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/parallel.h"
 #include "thicklens/base/residual_guard.h"
@@ -28,52 +28,35 @@ std::string MessageOf(const FunctionalOptions& options, const FunctionalSummary&
 }  // namespace
 
 bool FunctionalOptions::IsValid(std::string* why) const {
-  const auto fail = [why](std::string reason) {
-    if (why != nullptr) *why = std::move(reason);
-    return false;
-  };
-  if (!(gamma > 0) || !std::isfinite(gamma)) {
-    return fail(fmt::format("gamma is {}: it must be finite and > 0", gamma));
-  }
-  if (ridge && (!(*ridge > 0) || !std::isfinite(*ridge))) {
-    return fail(fmt::format("ridge is {}: it must be finite and > 0", *ridge));
-  }
-  if (!(tolerance > 0) || !(tolerance < 1)) {
-    return fail(fmt::format("tolerance is {}: it must be > 0 and < 1", tolerance));
-  }
-  if (max_iterations < 1) {
-    return fail(fmt::format("max_iterations is {}: it must be >= 1", max_iterations));
-  }
-  if (threads < 0) return fail(fmt::format("threads is {}: it must be >= 0", threads));
-  if (memory_limit_mib && !(*memory_limit_mib > 0)) {
-    return fail(fmt::format("memory_limit_mib is {}: it must be > 0", *memory_limit_mib));
-  }
-  return true;
+  return IsPositive("gamma", gamma, why) && IsPositive("ridge", ridge, why) &&
+         IsTolerance("tolerance", tolerance, why) &&
+         IsAtLeast(1, "max_iterations", max_iterations, why);
 }
 
 void StartRun(const std::string& solver, const EstimateInput& input,
-              const FunctionalOptions& options, FunctionalSummary* summary) {
-  std::string why;
-  if (!options.IsValid(&why)) throw Error(solver + ": " + why);
+              const FunctionalOptions& options, const SolverRun& run, FunctionalSummary* summary) {
+  CheckOptions(solver, options);
+  CheckRun(solver, run, RunUse::kNone);
   CheckInput(input);
   *summary = FunctionalSummary();
-  summary->threads = ResolveThreads(options.threads);
+  summary->threads = ResolveThreads(run.threads);
+  summary->device = "cpu";
   summary->gamma = options.gamma;
   summary->ridge = options.ridge.value_or(1e-2 / static_cast<double>(input.weights.size()));
 }
 
-void RequireMemory(const FunctionalOptions& options, double bytes) {
-  if (!options.memory_limit_mib || bytes <= *options.memory_limit_mib * kBytesPerMib) return;
+void RequireMemory(const SolverRun& run, double bytes) {
+  if (!run.memory_limit_mib || bytes <= *run.memory_limit_mib * kBytesPerMib) return;
   throw Error(
       fmt::format("memory limit {:.0f} MiB: all rays of the image together need {:.0f} MiB; the "
                   "limit must be at least as large, or use fewer views or a smaller image",
-                  *options.memory_limit_mib, std::ceil(bytes / kBytesPerMib)));
+                  *run.memory_limit_mib, std::ceil(bytes / kBytesPerMib)));
 }
 
 void FillOrigin(const std::string& method, const FunctionalSummary& summary, bool falloff,
                 model::LightFieldOrigin* origin) {
   origin->method = method;
-  origin->device = "cpu";
+  origin->device = summary.device;
   origin->gamma = summary.gamma;
   origin->ridge = summary.ridge;
   origin->iterations = summary.iterations;

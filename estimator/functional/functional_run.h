@@ -9,12 +9,12 @@ namespace thicklens::estimator {
 
 // Steps that the solvers of the functional for a whole image have in common.
 
-// Throws Error for options (naming the solver) and inputs that do not fit. Sets the fields of the
-// summary that are known at the start.
+// Throws Error for options and a run (naming the solver) and inputs that do not fit. Sets the
+// fields of the summary that are known at the start.
 void StartRun(const std::string& solver, const EstimateInput& input,
-              const FunctionalOptions& options, FunctionalSummary* summary);
-// Throws Error if the options allow fewer bytes.
-void RequireMemory(const FunctionalOptions& options, double bytes);
+              const FunctionalOptions& options, const SolverRun& run, FunctionalSummary* summary);
+// Throws Error if the run allows fewer bytes.
+void RequireMemory(const SolverRun& run, double bytes);
 void FillOrigin(const std::string& method, const FunctionalSummary& summary, bool falloff,
                 model::LightFieldOrigin* origin);
 // Writes the message of the summary; its iterations and residual are known. Throws Error if the

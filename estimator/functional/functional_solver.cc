@@ -132,7 +132,7 @@ double LeastRayBytes(const EstimateInput& input, int kinds) {
 // The options and the input are checked already.
 template <typename Real>
 model::LightField SolveFunctional(const EstimateInput& input, const FunctionalOptions& options,
-                                  FunctionalSummary* summary) {
+                                  const SolverRun& run, FunctionalSummary* summary) {
   const auto start = Clock::now();
   const int threads = summary->threads;
   const auto views = static_cast<int>(input.weights.size());
@@ -141,11 +141,11 @@ model::LightField SolveFunctional(const EstimateInput& input, const FunctionalOp
       input.grid ? LandingStepPx(*input.camera, *input.grid) : Eigen::Vector2d::Zero();
   const bool same_rays = ShowsSameRays(input, landing_step_px);
   const double fixed_bytes = ResidentBytes() + FixedBytes<Real>(input, threads);
-  RequireMemory(options, fixed_bytes + LeastRayBytes<Real>(input, same_rays ? 1 : 2));
+  RequireMemory(run, fixed_bytes + LeastRayBytes<Real>(input, same_rays ? 1 : 2));
 
   const int iterations = ExpectedIterations(options, summary->ridge, views);
   const int made_views = same_rays ? views : 2 * views;
-  IterationProgress progress(options.progress, made_views + channels * (iterations + views));
+  IterationProgress progress(run.progress, made_views + channels * (iterations + views));
   const auto count = [&] { progress.Count(); };
   SceneRays<Real> rays(PhotographDisparity(input.disparity, landing_step_px), input.weights,
                        threads, count);
@@ -158,7 +158,7 @@ model::LightField SolveFunctional(const EstimateInput& input, const FunctionalOp
   const SceneRays<Real>& shown_rays = same_rays ? rays : *other_rays;
   const double bytes = fixed_bytes + rays.bytes() + (same_rays ? 0 : other_rays->bytes());
   summary->predicted_memory_mib = bytes / kBytesPerMib;
-  RequireMemory(options, bytes);
+  RequireMemory(run, bytes);
 
   const bool falloff = options.falloff && input.camera.has_value();
   const model::LinearImage radiance =
@@ -203,10 +203,12 @@ model::LightField SolveFunctional(const EstimateInput& input, const FunctionalOp
 }  // namespace
 
 model::LightField EstimateFunctional(const EstimateInput& input, const FunctionalOptions& options,
-                                     FunctionalSummary* summary) {
-  StartRun("functional solver", input, options, summary);
+                                     const SolverRun& run, FunctionalSummary* summary) {
+  FunctionalSummary unused;
+  if (summary == nullptr) summary = &unused;
+  StartRun("functional solver", input, options, run, summary);
   const auto solve = options.double_precision ? SolveFunctional<double> : SolveFunctional<float>;
-  model::LightField light_field = solve(input, options, summary);
+  model::LightField light_field = solve(input, options, run, summary);
   EndRun("functional", options, summary);
   return light_field;
 }

@@ -172,15 +172,15 @@ std::vector<std::vector<float>> IrradianceOfViews(const EstimateInput& input, in
 // The options and the input are checked already.
 template <typename Real>
 model::LightField SolveOnGrid(const EstimateInput& input, const FunctionalOptions& options,
-                              FunctionalSummary* summary) {
+                              const SolverRun& run, FunctionalSummary* summary) {
   const auto start = Clock::now();
   const int threads = summary->threads, channels = input.image.channels;
   const bool falloff = options.falloff && input.camera.has_value();
   const double fixed_bytes = ResidentBytes() + FixedBytes<Real>(input, threads);
-  RequireMemory(options, fixed_bytes + LeastGridBytes(input, falloff));
+  RequireMemory(run, fixed_bytes + LeastGridBytes(input, falloff));
 
   const int iterations = ExpectedIterations(options, summary->ridge);
-  IterationProgress progress(options.progress, 2 + channels * iterations);
+  IterationProgress progress(run.progress, 2 + channels * iterations);
   std::vector<std::vector<float>> disparity;
   model::LightField light_field = WarpToAllViews(input, falloff, threads, &disparity);
   progress.Count();
@@ -192,7 +192,7 @@ model::LightField SolveOnGrid(const EstimateInput& input, const FunctionalOption
       threads);
   const double bytes = fixed_bytes + links.bytes() + photograph.bytes();
   summary->predicted_memory_mib = bytes / kBytesPerMib;
-  RequireMemory(options, bytes);
+  RequireMemory(run, bytes);
   GridSystem<Real> system(&photograph, &links, &image, options.gamma, summary->ridge, threads);
   progress.Count();
   summary->setup_seconds = SecondsSince(start);
@@ -223,10 +223,12 @@ model::LightField SolveOnGrid(const EstimateInput& input, const FunctionalOption
 }  // namespace
 
 model::LightField EstimateOnGrid(const EstimateInput& input, const FunctionalOptions& options,
-                                 FunctionalSummary* summary) {
-  StartRun("grid solver", input, options, summary);
+                                 const SolverRun& run, FunctionalSummary* summary) {
+  FunctionalSummary unused;
+  if (summary == nullptr) summary = &unused;
+  StartRun("grid solver", input, options, run, summary);
   const auto solve = options.double_precision ? SolveOnGrid<double> : SolveOnGrid<float>;
-  model::LightField light_field = solve(input, options, summary);
+  model::LightField light_field = solve(input, options, run, summary);
   EndRun("grid", options, summary);
   return light_field;
 }

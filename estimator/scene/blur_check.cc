@@ -11,7 +11,7 @@
 #include "estimator/scene/blur_trials.h"
 #include "estimator/scene/scene_radiance.h"
 #include "estimator/views/input_checks.h"
-#include "thicklens/base/error.h"
+#include "estimator/views/option_checks.h"
 #include "thicklens/base/iteration_progress.h"
 #include "thicklens/base/parallel.h"
 #include "thicklens/base/run_cost.h"
@@ -155,20 +155,12 @@ std::string MessageOf(const BlurCheck& check) {
 }  // namespace
 
 bool BlurCheckOptions::IsValid(std::string* why) const {
-  const auto fail = [why](std::string reason) {
-    if (why != nullptr) *why = std::move(reason);
-    return false;
-  };
-  if (threads < 0) return fail(fmt::format("threads is {}: it must be >= 0", threads));
-  if (memory_limit_mib && !(*memory_limit_mib > 0)) {
-    return fail(fmt::format("memory_limit_mib is {}: it must be > 0", *memory_limit_mib));
-  }
-  return true;
+  return IsAtLeast(0, "threads", threads, why) &&
+         IsPositive("memory_limit_mib", memory_limit_mib, why);
 }
 
 BlurCheck CheckBlur(const EstimateInput& input, const BlurCheckOptions& options) {
-  std::string why;
-  if (!options.IsValid(&why)) throw Error("blur check: " + why);
+  CheckOptions("blur check", options);
   CheckInput(input);
   const auto start = Clock::now();
   const double spread = SpreadOf(input.weights);

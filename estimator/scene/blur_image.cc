@@ -71,10 +71,8 @@ SceneProjection<float> ProjectionWithin(const Eigen::ArrayXXd& weights,
   EstimateInput forecast;
   forecast.image = {width_px, height_px, image->image.channels, {}};
   forecast.weights = weights;
-  SceneOptions scene;
-  scene.threads = options.threads;
   ReturnFreedMemory(memory_limit_mib);
-  const SceneMemory memory(forecast, scene, {},
+  const SceneMemory memory(forecast, SceneOptions(), options.threads, {},
                            ReachPx(image->disparity, 0, static_cast<int>(weights.rows())));
   const auto fits = [&](int rows, const ProjectionBytes& projection) {
     return memory.MostBytes(rows, projection) <= *memory_limit_mib * kBytesPerMib;

@@ -76,11 +76,11 @@ void AddRows(const model::LinearImage& solved, const SceneBand& band, model::Lin
 
 template <typename Real>
 SceneBandRun<Real>::SceneBandRun(const EstimateInput& input, const SceneOptions& options,
-                                 kernels::Backend* backend, const SceneMemory& memory, int reach_px,
+                                 const SolverRun& run, const SceneMemory& memory, int reach_px,
                                  int iterations, IterationProgress* progress, SceneSummary* summary)
     : input_(input),
       options_(options),
-      backend_(backend),
+      run_(run),
       memory_(memory),
       reach_px_(reach_px),
       iterations_(iterations),
@@ -98,9 +98,9 @@ SolvedScene SceneBandRun<Real>::Solve(const model::LinearImage& photograph, bool
   }
   if (options_.prior == Prior::kPatches) guide_slope_ = ShadingGuideSlope(input_.disparity);
   int count = std::min(options_.least_bands, height_px);
-  if (options_.memory_limit_mib) {
+  if (run_.memory_limit_mib) {
     per_pixel_ = memory_.LargestPerPixel();
-    if (MostBytes(count, per_pixel_) > *options_.memory_limit_mib * kBytesPerMib) {
+    if (MostBytes(count, per_pixel_) > *run_.memory_limit_mib * kBytesPerMib) {
       per_pixel_ = TakenSample(photograph).per_pixel;
       count = BandsFor(per_pixel_);
     }
@@ -125,7 +125,7 @@ double SceneBandRun<Real>::MostBytes(int count, const ProjectionBytes& per_pixel
 
 template <typename Real>
 int SceneBandRun<Real>::BandsFor(const ProjectionBytes& per_pixel) const {
-  const double limit = *options_.memory_limit_mib * kBytesPerMib;
+  const double limit = *run_.memory_limit_mib * kBytesPerMib;
   const int least = std::min(options_.least_bands, input_.image.height_px);
   const int most = std::max(least, input_.image.height_px / kMinRows);
   double needed = MostBytes(least, per_pixel);
@@ -137,13 +137,14 @@ int SceneBandRun<Real>::BandsFor(const ProjectionBytes& per_pixel) const {
   throw Error(fmt::format(
       "memory limit {:.0f} MiB: with any number of bands {:.0f} MiB are needed; the limit must be "
       "at least as large, or use fewer views or threads, or a smaller image",
-      *options_.memory_limit_mib, std::ceil(needed / kBytesPerMib)));
+      *run_.memory_limit_mib, std::ceil(needed / kBytesPerMib)));
 }
 
 template <typename Real>
 typename SceneRadiance<Real>::Run SceneBandRun<Real>::RunFor(const SceneOptions& options) const {
   typename Radiance::Run run{input_, options};
-  run.backend = backend_;
+  run.backend = run_.backend;
+  run.memory_limit_mib = run_.memory_limit_mib;
   run.threads = summary_->threads;
   run.noise_sigma = summary_->noise_sigma;
   run.mean_slope = mean_slope_;
@@ -168,7 +169,7 @@ double SceneBandRun<Real>::Prepare(const model::LinearImage& photograph, const S
   double seconds = 0;
   if (start == Start::kFound) {
     seconds = radiance->FindStart(rows, disparity);
-    ReturnFreedMemory(options_.memory_limit_mib);
+    ReturnFreedMemory(run_.memory_limit_mib);
   }
   radiance->Prepare(rows, disparity, band);
   return seconds;
@@ -225,7 +226,7 @@ double SceneBandRun<Real>::StrengthFor(const model::LinearImage& photograph,
 
 template <typename Real>
 bool SceneBandRun<Real>::IsWithinLimit(double bytes) const {
-  return !options_.memory_limit_mib || bytes <= *options_.memory_limit_mib * kBytesPerMib;
+  return !run_.memory_limit_mib || bytes <= *run_.memory_limit_mib * kBytesPerMib;
 }
 
 template <typename Real>
@@ -233,7 +234,7 @@ double SceneBandRun<Real>::PredictedMib(double bytes, int rows, const Projection
                                         double kept_bundle_bytes) const {
   const double with_freed =
       memory_.MostBytes(rows, projection, kept_bundle_bytes, SceneMemory::Freed::kStays);
-  const double staying = std::min(with_freed, StayingBytes(options_.memory_limit_mib));
+  const double staying = std::min(with_freed, StayingBytes(run_.memory_limit_mib));
   return std::max(bytes, staying) / kBytesPerMib;
 }
 
@@ -280,7 +281,7 @@ std::optional<SolvedScene> SceneBandRun<Real>::SolveIn(int count,
   if (wants_confidence) whole.of_points.reserve(input_.disparity.disparity.size());
   for (std::size_t i = 0; i < bands.size(); ++i) {
     const SceneBand& band = bands[i];
-    ReturnFreedMemory(options_.memory_limit_mib);  // memory of the band above
+    ReturnFreedMemory(run_.memory_limit_mib);  // memory of the band above
     typename Radiance::Run run = RunFor(options);
     run.confidence = wants_confidence;
     run.bundle = MayKeepBundle(count);

@@ -24,7 +24,7 @@ template <typename Real>
 class SceneBandRun {
  public:
   // All arguments are kept by reference. `iterations` is the part of the progress for the bands.
-  SceneBandRun(const EstimateInput& input, const SceneOptions& options, kernels::Backend* backend,
+  SceneBandRun(const EstimateInput& input, const SceneOptions& options, const SolverRun& run,
                const SceneMemory& memory, int reach_px, int iterations, IterationProgress* progress,
                SceneSummary* summary);
 
@@ -64,7 +64,7 @@ class SceneBandRun {
 
   const EstimateInput& input_;
   const SceneOptions& options_;
-  kernels::Backend* backend_;
+  const SolverRun& run_;
   const SceneMemory& memory_;
   const int reach_px_, iterations_;
   IterationProgress* progress_;

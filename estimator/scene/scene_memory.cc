@@ -6,7 +6,6 @@
 
 #include "estimator/projection/angular_bundle.h"
 #include "estimator/scene/guided_shading.h"
-#include "thicklens/base/parallel.h"
 #include "thicklens/base/run_cost.h"
 #include "thicklens/estimator/view_geometry.h"
 #include "thicklens/kernels/image_filter.h"
@@ -40,7 +39,7 @@ constexpr double kRendererBytes = 3;
 
 }  // namespace
 
-SceneMemory::SceneMemory(const EstimateInput& input, const SceneOptions& options,
+SceneMemory::SceneMemory(const EstimateInput& input, const SceneOptions& options, int threads,
                          const Keeps& keeps, int reach_px)
     : before_(ResidentBytes() + kSmallBytes),
       width_px_(input.image.width_px),
@@ -49,7 +48,7 @@ SceneMemory::SceneMemory(const EstimateInput& input, const SceneOptions& options
       u_count_(static_cast<int>(input.weights.cols())),
       v_count_(static_cast<int>(input.weights.rows())),
       visible_views_(static_cast<int>((input.weights > 0).count())),
-      threads_(ResolveThreads(options.threads)),
+      threads_(threads),
       reach_px_(reach_px),
       real_(options.double_precision ? sizeof(double) : sizeof(float)),
       patches_(options.prior == Prior::kPatches),

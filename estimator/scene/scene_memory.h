@@ -26,8 +26,8 @@ class SceneMemory {
   };
   // Must be constructed before the estimate begins. `reach_px`: number of rows that the bundle of a
   // pixel reaches up and down.
-  SceneMemory(const EstimateInput& input, const SceneOptions& options, const Keeps& keeps,
-              int reach_px);
+  SceneMemory(const EstimateInput& input, const SceneOptions& options, int threads,
+              const Keeps& keeps, int reach_px);
 
   // Returns the maximum for bands of at most `rows` rows, with `projection` as the memory of H.
   // `kept_bundle_bytes` are the views of the bundle that are kept from the making of H until they

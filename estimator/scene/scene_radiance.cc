@@ -12,6 +12,7 @@
 #include "estimator/scene/scene_patches.h"
 #include "estimator/scene/scene_strength.h"
 #include "thicklens/base/run_cost.h"
+#include "thicklens/kernels/device.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -78,10 +79,11 @@ double SceneRadiance<Real>::FindStart(const model::LinearImage& photograph,
   options.prior = SolvedFirst(options.prior);
   options.strength = CoarseStrength(options.prior, options.strength);
   if (options.strength_rule == StrengthRule::kGcv) options.strength_rule = StrengthRule::kAuto;
-  const std::function<void(int, int)> report = [this](int, int) { run_.progress->Report(); };
+  const ProgressFunction report = [this](int, int) { run_.progress->Report(); };
   IterationProgress progress(report, 1);
   Run run{half, options};
   run.backend = run_.backend;
+  run.memory_limit_mib = run_.memory_limit_mib;
   run.threads = run_.threads;
   run.noise_sigma = EncodedNoiseSigma(half.image, half.transfer).value_or(kDefaultNoise / 2);
   run.mean_slope = run_.mean_slope;
@@ -106,9 +108,9 @@ void SceneRadiance<Real>::Prepare(const model::LinearImage& photograph,
   projection.visible_fraction = run_.confidence;
   projection.bundle = run_.bundle;
   projection.progress = [this] { run_.progress->Report(); };
-  projection.freed = [this] { ReturnFreedMemory(run_.options.memory_limit_mib); };
+  projection.freed = [this] { ReturnFreedMemory(run_.memory_limit_mib); };
   projection_ = MakeSceneProjection<Real>(disparity, run_.input.weights, projection);
-  ReturnFreedMemory(run_.options.memory_limit_mib);
+  ReturnFreedMemory(run_.memory_limit_mib);
 
   data_ = DataTermOf(projection_, photograph, run_.threads);
   slope_squared_ = SlopeSquared(photograph);

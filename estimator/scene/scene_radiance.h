@@ -2,6 +2,7 @@
 #define THICKLENS_ESTIMATOR_SCENE_SCENE_RADIANCE_H_
 
 #include <cstddef>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -35,6 +36,7 @@ class SceneRadiance {
     const EstimateInput& input;
     const SceneOptions& options;
     kernels::Backend* backend = nullptr;
+    std::optional<double> memory_limit_mib = std::nullopt;
     int threads = 1;
     double noise_sigma = 0;  // of encoded values
     double guide_slope = 0;  // of the whole depth; for patches

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <utility>
 
@@ -12,11 +11,13 @@
 #include "estimator/scene/scene_memory.h"
 #include "estimator/scene/scene_views.h"
 #include "estimator/views/input_checks.h"
+#include "estimator/views/option_checks.h"
 #include "estimator/views/ray_landing.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/iteration_progress.h"
 #include "thicklens/base/parallel.h"
 #include "thicklens/base/run_cost.h"
+#include "thicklens/kernels/device.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -55,10 +56,11 @@ void FillOrigin(const SceneOptions& options, const SceneSummary& summary, bool f
 // The returned light field has its views only without a sink.
 template <typename Real>
 model::LightField EstimateIn(const EstimateInput& input, const SceneOptions& options,
-                             const SceneViewSink* sink, kernels::Backend* backend,
-                             SceneSummary* summary, SceneMaps* maps) {
+                             const SolverRun& how, SceneSummary* summary, SceneMaps* maps) {
   const auto start = Clock::now();
-  summary->threads = ResolveThreads(options.threads);
+  kernels::Backend* const backend = how.backend;
+  const SceneViewSink* const sink = how.sink;
+  summary->threads = ResolveThreads(how.threads);
   summary->prior = options.prior;
   summary->device = backend != nullptr ? backend->name() : "cpu";
   const bool falloff = options.falloff && input.camera.has_value();
@@ -71,14 +73,14 @@ model::LightField EstimateIn(const EstimateInput& input, const SceneOptions& opt
   keeps.light_field = sink == nullptr;
   keeps.device = backend != nullptr && backend->is_opencl();
   if (sink != nullptr) keeps.sink_bytes = sink->bytes;
-  ReturnFreedMemory(options.memory_limit_mib);
-  const SceneMemory memory(input, options, keeps, reach_px);
+  ReturnFreedMemory(how.memory_limit_mib);
+  const SceneMemory memory(input, options, summary->threads, keeps, reach_px);
   const int iterations = std::min(options.max_iterations, UsualIterations(options.prior));
-  IterationProgress progress(options.progress, iterations + static_cast<int>(input.weights.size()));
+  IterationProgress progress(how.progress, iterations + static_cast<int>(input.weights.size()));
 
   const std::optional<double> noise = EncodedNoiseSigma(input.image, input.transfer);
   summary->noise_sigma = noise.value_or(kDefaultNoise);
-  SceneBandRun<Real> run(input, options, backend, memory, reach_px, iterations, &progress, summary);
+  SceneBandRun<Real> run(input, options, how, memory, reach_px, iterations, &progress, summary);
   std::optional<model::LinearImage> without_falloff;
   if (falloff) {
     without_falloff = WithoutFalloff(input.image, *input.grid, input.camera_of_falloff(),
@@ -88,7 +90,7 @@ model::LightField EstimateIn(const EstimateInput& input, const SceneOptions& opt
   const bool wants_confidence = sink != nullptr ? sink->wants_confidence : maps != nullptr;
   SolvedScene solved = run.Solve(falloff ? *without_falloff : input.image, wants_confidence, maps);
   without_falloff.reset();
-  ReturnFreedMemory(options.memory_limit_mib);
+  ReturnFreedMemory(how.memory_limit_mib);
 
   const auto views_start = Clock::now();
   if (sink == nullptr) {
@@ -115,22 +117,6 @@ model::LightField EstimateIn(const EstimateInput& input, const SceneOptions& opt
   FillOrigin(options, *summary, falloff, &light_field.origin);
   if (maps != nullptr) maps->radiance = std::move(solved.radiance);
   return light_field;
-}
-
-model::LightField Estimate(const EstimateInput& input, const SceneOptions& options,
-                           const SceneViewSink* sink, kernels::Backend* backend,
-                           SceneSummary* summary, SceneMaps* maps) {
-  std::string why;
-  if (!options.IsValid(&why)) throw Error("scene solver: " + why);
-  if (options.double_precision && backend != nullptr && !backend->has_double()) {
-    throw Error(fmt::format(
-        "device {}: it does not support double precision; use the device cpu, or single precision",
-        backend->name()));
-  }
-  CheckInput(input);
-  *summary = SceneSummary();
-  return options.double_precision ? EstimateIn<double>(input, options, sink, backend, summary, maps)
-                                  : EstimateIn<float>(input, options, sink, backend, summary, maps);
 }
 
 }  // namespace
@@ -163,36 +149,30 @@ double UsualTolerance(Prior prior) {
 }
 
 bool SceneOptions::IsValid(std::string* why) const {
-  const auto fail = [why](std::string reason) {
-    if (why != nullptr) *why = std::move(reason);
-    return false;
-  };
-  if (strength_rule == StrengthRule::kGiven && (!(strength > 0) || !std::isfinite(strength))) {
-    return fail(fmt::format("strength is {}: it must be finite and > 0", strength));
-  }
-  if (tolerance && (!(*tolerance > 0) || !(*tolerance < 1))) {
-    return fail(fmt::format("tolerance is {}: it must be > 0 and < 1", *tolerance));
-  }
-  if (max_iterations < 1) {
-    return fail(fmt::format("max_iterations is {}: it must be >= 1", max_iterations));
-  }
-  if (least_bands < 1) return fail(fmt::format("least_bands is {}: it must be >= 1", least_bands));
-  if (threads < 0) return fail(fmt::format("threads is {}: it must be >= 0", threads));
-  if (memory_limit_mib && !(*memory_limit_mib > 0)) {
-    return fail(fmt::format("memory_limit_mib is {}: it must be > 0", *memory_limit_mib));
-  }
-  return true;
+  return IsEnumerator(Prior::kPatches, "prior", prior, why) &&
+         IsEnumerator(StrengthRule::kGiven, "strength_rule", strength_rule, why) &&
+         (strength_rule == StrengthRule::kGiven ? IsPositive("strength", strength, why)
+                                                : IsNonNegative("strength", strength, why)) &&
+         IsTolerance("tolerance", tolerance, why) &&
+         IsAtLeast(1, "max_iterations", max_iterations, why) &&
+         IsAtLeast(1, "least_bands", least_bands, why);
 }
 
 model::LightField EstimateScene(const EstimateInput& input, const SceneOptions& options,
-                                SceneSummary* summary, SceneMaps* maps, kernels::Backend* backend) {
-  return Estimate(input, options, nullptr, backend, summary, maps);
-}
-
-model::LightField EstimateSceneViews(const EstimateInput& input, const SceneOptions& options,
-                                     const SceneViewSink& sink, SceneSummary* summary,
-                                     SceneMaps* maps, kernels::Backend* backend) {
-  return Estimate(input, options, &sink, backend, summary, maps);
+                                const SolverRun& run, SceneSummary* summary, SceneMaps* maps) {
+  CheckOptions("scene solver", options);
+  CheckRun("scene solver", run, RunUse::kSink);
+  if (options.double_precision && run.backend != nullptr && !run.backend->has_double()) {
+    throw Error(fmt::format(
+        "device {}: it does not support double precision; use the device cpu, or single precision",
+        run.backend->name()));
+  }
+  CheckInput(input);
+  SceneSummary unused;
+  if (summary == nullptr) summary = &unused;
+  *summary = SceneSummary();
+  const auto estimate = options.double_precision ? EstimateIn<double> : EstimateIn<float>;
+  return estimate(input, options, run, summary, maps);
 }
 
 }  // namespace thicklens::estimator

@@ -8,6 +8,7 @@
 
 #include "estimator/views/surface_taps.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/kernels/device.h"
 
 namespace thicklens::estimator {
 namespace {

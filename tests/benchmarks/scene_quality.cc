@@ -90,9 +90,10 @@ Row Measure(const Simulated& simulated, const std::string& scene, double noise_g
   const estimator::EstimateInput& input = simulated.input;
   estimator::SceneOptions options;
   options.prior = estimator::PriorFromName(prior);
-  options.threads = arguments.threads;
+  estimator::SolverRun run;
+  run.threads = arguments.threads;
   estimator::SceneSummary summary;
-  const model::LightField estimate = estimator::EstimateScene(input, options, &summary, nullptr);
+  const model::LightField estimate = estimator::EstimateScene(input, options, run, &summary);
   const estimator::DibrInput dibr{estimator::WithoutFalloff(input.image, *input.grid, *input.camera,
                                                             input.weights, arguments.threads),
                                   input.disparity};

@@ -116,25 +116,26 @@ TEST(CancelledEstimate, TheSceneSolverStops) {
   for (const Prior prior : {Prior::kRidge, Prior::kTotalVariation, Prior::kPatches}) {
     ExpectCancelledAtEachStep([&](const std::function<void(int, int)>& progress) {
       SceneOptions options;
+      SolverRun run;
       options.prior = prior;
-      options.threads = 1;
-      options.progress = progress;
+      run.threads = 1;
+      run.progress = progress;
       SceneSummary summary;
-      EstimateScene(input, options, &summary, nullptr);
+      EstimateScene(input, options, run, &summary);
     });
   }
 }
 
 TEST(CancelledEstimate, TheBlockSolverStops) {
   const EstimateInput input = RandomInput(40, 36, 0.5F, 1.5F);
-  const auto backend = kernels::OpenBackend(kernels::ParseDeviceRequest("cpu"), nullptr);
   ExpectCancelledAtEachStep([&](const std::function<void(int, int)>& progress) {
     BlockOptions options;
+    SolverRun run;
     options.block_px = 8;
-    options.threads = 1;
-    options.progress = progress;
+    run.threads = 1;
+    run.progress = progress;
     BlockSummary summary;
-    EstimateByBlocks(input, options, backend.get(), &summary);
+    EstimateByBlocks(input, options, run, &summary);
   });
 }
 
@@ -142,11 +143,11 @@ TEST(CancelledEstimate, TheFunctionalAndTheGridSolverStop) {
   const EstimateInput input = RandomInput(40, 36, 0.5F, 1.5F);
   for (const auto& solve : {EstimateFunctional, EstimateOnGrid}) {
     ExpectCancelledAtEachStep([&](const std::function<void(int, int)>& progress) {
-      FunctionalOptions options;
-      options.threads = 1;
-      options.progress = progress;
+      SolverRun run;
+      run.threads = 1;
+      run.progress = progress;
       FunctionalSummary summary;
-      solve(input, options, &summary);
+      solve(input, {}, run, &summary);
     });
   }
 }

@@ -61,11 +61,10 @@ void ExpectBandByBand(const Estimator& estimate, double accuracy) {
 }
 
 TEST(ManyChannels, TheBlockSolverTakesEachBandAlone) {
-  const auto backend = kernels::OpenBackend(kernels::ParseDeviceRequest("cpu"), nullptr);
   ExpectBandByBand(
-      [&](const EstimateInput& input) {
+      [](const EstimateInput& input) {
         BlockSummary summary;
-        return EstimateByBlocks(input, {}, backend.get(), &summary);
+        return EstimateByBlocks(input, {}, {}, &summary);
       },
       0);
 }
@@ -75,7 +74,7 @@ TEST(ManyChannels, TheFunctionalTakesEachBandAlone) {
     ExpectBandByBand(
         [&](const EstimateInput& input) {
           FunctionalSummary summary;
-          return estimate(input, {}, &summary);
+          return estimate(input, {}, {}, &summary);
         },
         0);
   }
@@ -98,7 +97,7 @@ TEST(ManyChannels, TheSceneSolverTakesEachBandAlone) {
         options.tolerance = 1e-9;
         options.max_iterations = 2000;
         SceneSummary summary;
-        return EstimateScene(input, options, &summary, nullptr);
+        return EstimateScene(input, options, {}, &summary);
       },
       1e-6);
 }
@@ -107,7 +106,7 @@ TEST(ManyChannels, TheSceneSolverWithItsDefaultsKeepsSixBands) {
   const EstimateInput input = InputOf(6);
   SceneSummary summary;
   SceneMaps maps;
-  const model::LightField found = EstimateScene(input, {}, &summary, &maps);
+  const model::LightField found = EstimateScene(input, {}, {}, &summary, &maps);
   std::string why;
   EXPECT_TRUE(found.IsValid(&why)) << why;
   EXPECT_EQ(found.channels, 6);

@@ -18,6 +18,7 @@
 #include "estimator/scene/scene_data.h"
 #include "estimator/scene/scene_priors.h"
 #include "estimator/scene/scene_system.h"
+#include "tests/estimator/solver_runs.h"
 #include "thicklens/estimator/block_solver.h"
 #include "thicklens/estimator/functional_solver.h"
 #include "thicklens/estimator/grid_solver.h"
@@ -164,29 +165,30 @@ struct Way {
   std::function<std::vector<float>(const EstimateInput& input, int threads)> run;
 };
 
-FunctionalOptions FunctionalOf(bool double_precision, int threads) {
+FunctionalOptions FunctionalOf(bool double_precision) {
   FunctionalOptions options;
   options.gamma = kGamma;
   options.ridge = kRidge;
   options.double_precision = double_precision;
   options.tolerance = double_precision ? 1e-11 : 1e-6;
   options.max_iterations = 5000;
-  options.threads = threads;
   return options;
 }
 
 std::vector<Way> FunctionalWays(bool double_precision) {
   std::vector<Way> ways;
-  ways.push_back(
-      {"functional", [=](const EstimateInput& input, int threads) {
-         FunctionalSummary summary;
-         return EstimateFunctional(input, FunctionalOf(double_precision, threads), &summary).values;
-       }});
-  ways.push_back(
-      {"grid", [=](const EstimateInput& input, int threads) {
-         FunctionalSummary summary;
-         return EstimateOnGrid(input, FunctionalOf(double_precision, threads), &summary).values;
-       }});
+  ways.push_back({"functional", [=](const EstimateInput& input, int threads) {
+                    FunctionalSummary summary;
+                    return EstimateFunctional(input, FunctionalOf(double_precision),
+                                              RunOnThreads(threads), &summary)
+                        .values;
+                  }});
+  ways.push_back({"grid", [=](const EstimateInput& input, int threads) {
+                    FunctionalSummary summary;
+                    return EstimateOnGrid(input, FunctionalOf(double_precision),
+                                          RunOnThreads(threads), &summary)
+                        .values;
+                  }});
   return ways;
 }
 
@@ -202,16 +204,14 @@ std::vector<Way> BlockWays(int block_px) {
            options.block_px = block_px;
            options.tolerance = 1e-12;
            options.max_iterations = 5000;
-           options.threads = threads;
            BlockSummary summary;
-           const auto reference = kernels::OpenBackend(kernels::ParseDeviceRequest("cpu"), nullptr);
-           return EstimateByBlocks(input, options, reference.get(), &summary).values;
+           return EstimateByBlocks(input, options, RunOnThreads(threads), &summary).values;
          }});
   }
   return ways;
 }
 
-SceneOptions SceneOf(Prior prior, bool double_precision, int threads) {
+SceneOptions SceneOf(Prior prior, bool double_precision) {
   SceneOptions options;
   options.prior = prior;
   options.strength_rule = StrengthRule::kGiven;
@@ -220,7 +220,6 @@ SceneOptions SceneOf(Prior prior, bool double_precision, int threads) {
   options.max_iterations = 1000;
   options.double_precision = double_precision;
   options.slope_weights = false;
-  options.threads = threads;
   return options;
 }
 
@@ -228,9 +227,9 @@ Way SceneWay(Prior prior, bool double_precision, kernels::Backend* backend = nul
   return {"scene " + PriorName(prior) + (backend ? " on a device" : ""),
           [=](const EstimateInput& input, int threads) {
             SceneSummary summary;
-            return EstimateScene(input, SceneOf(prior, double_precision, threads), &summary,
-                                 nullptr, backend)
-                .values;
+            SolverRun run = RunOnThreads(threads);
+            run.backend = backend;
+            return EstimateScene(input, SceneOf(prior, double_precision), run, &summary).values;
           }};
 }
 

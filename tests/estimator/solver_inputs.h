@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "thicklens/estimator/estimate_input.h"
+#include "thicklens/estimator/solver_run.h"
 #include "thicklens/model/light_field_grid.h"
 
 namespace thicklens::estimator::testing {
@@ -27,22 +28,23 @@ EstimateInput WithSolverCamera(EstimateInput input, const model::LightFieldPlane
                                const std::function<double(int x)>& depth_mm);
 
 // The steps that `solve` reports never go back and end with their total, which is returned; an
-// exception of the report leaves the solver. `solve` takes the options.
-template <typename Options, typename Solve>
-int ExpectStepsAreReported(Options options, const Solve& solve) {
+// exception of the report leaves the solver. `solve` takes the run.
+template <typename Solve>
+int ExpectStepsAreReported(const Solve& solve) {
+  SolverRun run;
   int last = 0, total = 0;
-  options.progress = [&](int done, int of) {
+  run.progress = [&](int done, int of) {
     EXPECT_GE(done, last);
     EXPECT_LE(done, of);
     last = done;
     total = of;
   };
-  solve(options);
+  solve(run);
   EXPECT_EQ(last, total);
-  options.progress = [](int done, int of) {
+  run.progress = [](int done, int of) {
     if (2 * done > of) throw std::runtime_error("enough");
   };
-  EXPECT_THROW(solve(options), std::runtime_error);
+  EXPECT_THROW(solve(run), std::runtime_error);
   return total;
 }
 

@@ -18,7 +18,7 @@
 #include "thicklens/base/parallel.h"
 #include "thicklens/estimator/compare.h"
 #include "thicklens/estimator/render.h"
-#include "thicklens/kernels/device.h"
+#include "thicklens/estimator/solve.h"
 #include "thicklens/model/encoded_values.h"
 #include "tools/bench/bench_loop.h"
 #include "tools/bench/bench_machine.h"
@@ -58,19 +58,18 @@ struct GammaRow {
   bool IsRefused() const { return !(rcond >= estimator::BlockOptions().rcond_min); }
 };
 
-void Run(const BenchScene& scene, const BenchGammaOptions& options, kernels::Backend* backend,
-         GammaRow* row) {
+void Run(const BenchScene& scene, const BenchGammaOptions& options, GammaRow* row) {
   estimator::BlockOptions blocks;
   blocks.block_px = kSourceBlockPx;
   blocks.gamma = row->gamma;
   blocks.ridge = row->ridge;
   blocks.rcond_min = 0;  // shows the results that `estimate` would refuse
-  blocks.threads = options.common.threads;
-  blocks.progress = [](int, int) { ThrowIfCancelled(); };
-  estimator::BlockSummary summary;
+  estimator::SolverRun run;
+  run.threads = options.common.threads;
+  estimator::SolverSummary summary;
   model::LightField estimate;
   try {
-    estimate = estimator::EstimateByBlocks(scene.input, blocks, backend, &summary);
+    estimate = estimator::Solve(scene.input, blocks, run, &summary);
   } catch (const Interrupted&) {
     throw;
   } catch (const Error& error) {
@@ -122,8 +121,6 @@ json RowJson(const GammaRow& row) {
 }
 
 CommandResult BenchGamma(const BenchGammaOptions& options) {
-  const auto backend =
-      kernels::OpenBackend(kernels::ParseDeviceRequest("cpu"), nullptr, ThrowIfCancelled);
   const BenchScene scene =
       MakeBenchScene(options.size_px, options.size_px, options.views, options.views, options.seed,
                      options.common.threads, [](int, int) { ThrowIfCancelled(); });
@@ -139,9 +136,9 @@ CommandResult BenchGamma(const BenchGammaOptions& options) {
   {
     ProgressLine progress("measuring", options.common.quiet);
     RunPlan(SourcePlan(estimator::DefaultBlockSolver()), scene.input, options.common.threads,
-            backend.get());  // not counted, so that no row has a cold start
+            nullptr);  // not counted, so that no row has a cold start
     MeasureInRounds(options.repeat, rows.size(), &progress, [&](int, std::size_t i) {
-      if (rows[i].failure.empty()) Run(scene, options, backend.get(), &rows[i]);
+      if (rows[i].failure.empty()) Run(scene, options, &rows[i]);
     });
   }
   std::string text = fmt::format(

@@ -6,15 +6,16 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <memory>
+#include <optional>
 #include <type_traits>
 #include <utility>
+#include <variant>
 
 #include "thicklens/base/memory_available.h"
 #include "thicklens/base/parallel.h"
-#include "thicklens/estimator/block_solver.h"
 #include "thicklens/estimator/block_store.h"
-#include "thicklens/estimator/functional_solver.h"
-#include "thicklens/estimator/grid_solver.h"
+#include "thicklens/estimator/solve.h"
 #include "thicklens/kernels/device.h"
 
 namespace thicklens {
@@ -23,10 +24,6 @@ namespace {
 // No part of an image that is solved for as a whole is larger: the memory grows, and nothing gets
 // better by it.
 constexpr double kMaxBandPixels = 3e6;
-
-std::optional<double> SceneMemoryLimitMib(const EstimateOptions& options) {
-  return options.memory_limit_mib ? options.memory_limit_mib : UsualMemoryLimitMib();
-}
 
 std::shared_ptr<kernels::Backend> Open(const std::string& device, RunScope* run) {
   std::string notice;
@@ -82,14 +79,6 @@ estimator::BlockSolver LinearOf(BlockSolver::Linear linear) {
   return estimator::BlockSolver::kViennaCl;
 }
 
-template <typename Summary>
-void TakeIterations(const Summary& from, SolverSummary* to) {
-  to->message = from.message;
-  to->iterations = from.iterations;
-  to->converged = from.converged;
-  to->relative_residual = from.relative_residual;
-}
-
 // Takes the views of SceneSolver for a sink of the interface.
 estimator::SceneViewSink SinkOf(ViewSink* sink, double values) {
   estimator::SceneViewSink views;
@@ -103,13 +92,8 @@ estimator::SceneViewSink SinkOf(ViewSink* sink, double values) {
   return views;
 }
 
-Solved SolveScene(const SceneSolver& solver, const PreparedProblem& prepared,
-                  const EstimateOptions& options, ViewSink* sink, EstimateDiagnostics* diagnostics,
-                  RunScope* run) {
-  const estimator::EstimateInput& input = *prepared.input;
-  const bool falloff = prepared.effects.on.Has(Effect::kFalloff);
-  // A device is worth its start where it is asked for.
-  const auto backend = Open(options.device == "auto" ? "cpu" : options.device, run);
+estimator::SolverOptions OptionsOf(const SceneSolver& solver, const PreparedProblem& prepared) {
+  const auto pixels = static_cast<double>(prepared.input->disparity.disparity.size());
   estimator::SceneOptions settings;
   settings.prior = PriorOf(solver.prior);
   settings.strength_rule = RuleOf(solver.strength_rule);
@@ -117,54 +101,12 @@ Solved SolveScene(const SceneSolver& solver, const PreparedProblem& prepared,
   settings.tolerance = solver.tolerance;
   settings.max_iterations = solver.max_iterations;
   settings.double_precision = solver.double_precision;
-  settings.falloff = falloff;
-  settings.threads = run->threads();
-  settings.memory_limit_mib = SceneMemoryLimitMib(options);
-  settings.least_bands =
-      std::max(1, static_cast<int>(std::ceil(static_cast<double>(input.disparity.disparity.size()) /
-                                             kMaxBandPixels)));
-  settings.progress = run->ProgressOf("estimating");
-  Solved solved;
-  if (solver.check_blur) {
-    estimator::BlurCheckOptions check;
-    check.falloff = falloff;
-    check.threads = run->threads();
-    check.memory_limit_mib = SceneMemoryLimitMib(options);
-    check.progress = run->ProgressOf("checking the blur");
-    solved.blur = estimator::CheckBlur(input, check);
-  }
-  estimator::SceneSummary scene;
-  solved.maps.emplace();
-  // Hidden rays that are inpainted need all views.
-  solved.views_in_sink = sink != nullptr && options.hidden_rays == HiddenRays::kSolver;
-  solved.light_field =
-      solved.views_in_sink
-          ? estimator::EstimateSceneViews(
-                input, settings, SinkOf(sink, static_cast<double>(input.image.values.size())),
-                &scene, &*solved.maps, backend.get())
-          : estimator::EstimateScene(input, settings, &scene, &*solved.maps, backend.get());
-  solved.maps->radiance = {};  // the middle of the light field contains it
-  TakeIterations(scene, &solved.summary);
-  solved.summary.setup_seconds = scene.setup_seconds;
-  solved.summary.solve_seconds = scene.solve_seconds;
-  solved.summary.views_seconds = scene.views_seconds;
-  solved.summary.predicted_memory_mib = scene.predicted_memory_mib;
-  solved.summary.device = scene.device;
-  diagnostics->strength = scene.strength;
-  diagnostics->strength_rule = solver.strength_rule;
-  diagnostics->noise_sigma = scene.noise_sigma;
-  diagnostics->residual_rms = scene.residual_rms;
-  diagnostics->row_share = scene.row_share;
-  diagnostics->occluded_fraction = scene.occluded_fraction;
-  diagnostics->bands = scene.bands;
-  diagnostics->reweightings = scene.reweightings;
-  return solved;
+  settings.falloff = prepared.effects.on.Has(Effect::kFalloff);
+  settings.least_bands = std::max(1, static_cast<int>(std::ceil(pixels / kMaxBandPixels)));
+  return settings;
 }
 
-Solved SolveBlocks(const BlockSolver& solver, const PreparedProblem& prepared,
-                   const EstimateOptions& options, EstimateDiagnostics* diagnostics,
-                   RunScope* run) {
-  const auto backend = Open(options.device, run);
+estimator::SolverOptions OptionsOf(const BlockSolver& solver, const PreparedProblem& prepared) {
   estimator::BlockOptions settings;
   settings.solver = LinearOf(solver.linear);
   settings.stencil = solver.stencil == BlockSolver::Stencil::kWarp ? estimator::Stencil::kWarp
@@ -176,36 +118,12 @@ Solved SolveBlocks(const BlockSolver& solver, const PreparedProblem& prepared,
   settings.block_px = solver.block_px;
   if (solver.tolerance) settings.tolerance = *solver.tolerance;
   if (solver.max_iterations) settings.max_iterations = *solver.max_iterations;
-  settings.memory_limit_mib = options.memory_limit_mib;
   settings.falloff = prepared.effects.on.Has(Effect::kFalloff);
-  settings.threads = run->threads();
-  settings.progress = run->ProgressOf("estimating");
-  settings.store = solver.store.get();
-  estimator::BlockSummary blocks;
-  Solved solved;
-  solved.light_field =
-      estimator::EstimateByBlocks(*prepared.input, settings, backend.get(), &blocks);
-  TakeIterations(blocks, &solved.summary);
-  solved.summary.rcond_min = blocks.rcond_min;
-  if (blocks.rcond_min) solved.summary.iterations.reset();  // a direct solver has none
-  solved.summary.setup_seconds = blocks.setup_seconds;
-  solved.summary.solve_seconds = blocks.solve_seconds;
-  solved.summary.predicted_memory_mib = blocks.predicted_memory_mib;
-  solved.summary.device = blocks.device;
-  diagnostics->gamma = blocks.gamma;
-  diagnostics->ridge = diagnostics->strength = blocks.ridge;
-  diagnostics->block_px = blocks.block_px;
-  diagnostics->blocks_from_store = blocks.blocks_from_store;
-  for (const estimator::BlockReport& block : blocks.blocks) {
-    solved.blocks.push_back({block.x, block.y, block.width_px, block.height_px, block.unknowns,
-                             block.iterations, block.rcond, block.relative_residual});
-  }
-  return solved;
+  return settings;
 }
 
-Solved SolveFunctional(const FunctionalSolver& solver, bool on_grid,
-                       const PreparedProblem& prepared, const EstimateOptions& options,
-                       EstimateDiagnostics* diagnostics, RunScope* run) {
+estimator::FunctionalOptions FunctionalOf(const FunctionalSolver& solver,
+                                          const PreparedProblem& prepared) {
   estimator::FunctionalOptions settings;
   settings.gamma = solver.gamma;
   settings.ridge = solver.ridge;
@@ -213,20 +131,121 @@ Solved SolveFunctional(const FunctionalSolver& solver, bool on_grid,
   settings.max_iterations = solver.max_iterations;
   settings.double_precision = solver.double_precision;
   settings.falloff = prepared.effects.on.Has(Effect::kFalloff);
-  settings.threads = run->threads();
-  settings.memory_limit_mib = options.memory_limit_mib;
-  settings.progress = run->ProgressOf("estimating");
-  const auto estimate = on_grid ? estimator::EstimateOnGrid : estimator::EstimateFunctional;
-  estimator::FunctionalSummary functional;
+  return settings;
+}
+
+estimator::SolverOptions OptionsOf(const FunctionalSolver& solver,
+                                   const PreparedProblem& prepared) {
+  return FunctionalOf(solver, prepared);
+}
+
+estimator::SolverOptions OptionsOf(const GridSolver& solver, const PreparedProblem& prepared) {
+  return estimator::GridOptions{FunctionalOf(solver, prepared)};
+}
+
+void TakeDiagnostics(const estimator::SceneDiagnostics& found, EstimateDiagnostics* diagnostics) {
+  diagnostics->strength = found.strength;
+  diagnostics->noise_sigma = found.noise_sigma;
+  diagnostics->residual_rms = found.residual_rms;
+  diagnostics->row_share = found.row_share;
+  diagnostics->occluded_fraction = found.occluded_fraction;
+  diagnostics->bands = found.bands;
+  diagnostics->reweightings = found.reweightings;
+}
+
+void TakeDiagnostics(const estimator::BlockDiagnostics& found, EstimateDiagnostics* diagnostics) {
+  diagnostics->gamma = found.gamma;
+  diagnostics->ridge = diagnostics->strength = found.ridge;
+  diagnostics->block_px = found.block_px;
+  diagnostics->blocks_from_store = found.blocks_from_store;
+}
+
+void TakeDiagnostics(const estimator::FunctionalDiagnostics& found,
+                     EstimateDiagnostics* diagnostics) {
+  diagnostics->gamma = found.gamma;
+  diagnostics->ridge = diagnostics->strength = found.ridge;
+}
+
+void TakeDiagnostics(std::monostate /*none*/, EstimateDiagnostics* /*diagnostics*/) {}
+
+void TakeSummary(const estimator::SolverSummary& found, Solved* solved) {
+  SolverSummary& summary = solved->summary;
+  summary.message = found.message;
+  summary.iterations = found.iterations;
+  summary.converged = found.converged;
+  summary.relative_residual = found.relative_residual;
+  summary.rcond_min = found.rcond_min;
+  summary.setup_seconds = found.setup_seconds;
+  summary.solve_seconds = found.solve_seconds;
+  summary.views_seconds = found.views_seconds;
+  summary.predicted_memory_mib = found.predicted_memory_mib;
+  summary.device = found.device;
+  for (const estimator::BlockReport& block : found.blocks) {
+    solved->blocks.push_back({block.x, block.y, block.width_px, block.height_px, block.unknowns,
+                              block.iterations, block.rcond, block.relative_residual});
+  }
+}
+
+// What one run of a solver of the library needs until its end.
+struct LibraryRun {
+  std::shared_ptr<kernels::Backend> backend;
+  std::optional<estimator::SceneViewSink> views;
+  estimator::SolverRun how;
+};
+
+// Complete the run by what only this solver uses, and do what comes before it.
+void CompleteRun(const SceneSolver& solver, const PreparedProblem& prepared,
+                 const EstimateOptions& options, ViewSink* sink, RunScope* run, LibraryRun* library,
+                 Solved* solved) {
+  const estimator::EstimateInput& input = *prepared.input;
+  // A device is worth its start where it is asked for.
+  library->backend = Open(options.device == "auto" ? "cpu" : options.device, run);
+  std::optional<double>& memory_limit_mib = library->how.memory_limit_mib;
+  if (!memory_limit_mib) memory_limit_mib = UsualMemoryLimitMib();
+  if (solver.check_blur) {
+    estimator::BlurCheckOptions check;
+    check.falloff = prepared.effects.on.Has(Effect::kFalloff);
+    check.threads = run->threads();
+    check.memory_limit_mib = memory_limit_mib;
+    check.progress = run->ProgressOf("checking the blur");
+    solved->blur = estimator::CheckBlur(input, check);
+  }
+  solved->maps.emplace();
+  // Hidden rays that are inpainted need all views.
+  solved->views_in_sink = sink != nullptr && options.hidden_rays == HiddenRays::kSolver;
+  if (!solved->views_in_sink) return;
+  library->views = SinkOf(sink, static_cast<double>(input.image.values.size()));
+  library->how.sink = &*library->views;
+}
+
+void CompleteRun(const BlockSolver& solver, const PreparedProblem& /*prepared*/,
+                 const EstimateOptions& options, ViewSink* /*sink*/, RunScope* run,
+                 LibraryRun* library, Solved* /*solved*/) {
+  library->backend = Open(options.device, run);
+  library->how.store = solver.store.get();
+}
+
+void CompleteRun(const FunctionalSolver& /*solver*/, const PreparedProblem& /*prepared*/,
+                 const EstimateOptions& /*options*/, ViewSink* /*sink*/, RunScope* /*run*/,
+                 LibraryRun* /*library*/, Solved* /*solved*/) {}
+
+template <typename Given>
+Solved SolveByLibrary(const Given& solver, const PreparedProblem& prepared,
+                      const EstimateOptions& options, ViewSink* sink,
+                      EstimateDiagnostics* diagnostics, RunScope* run) {
+  LibraryRun library;
+  library.how.threads = run->threads();
+  library.how.memory_limit_mib = options.memory_limit_mib;
+  library.how.progress = run->ProgressOf("estimating");
   Solved solved;
-  solved.light_field = estimate(*prepared.input, settings, &functional);
-  TakeIterations(functional, &solved.summary);
-  solved.summary.setup_seconds = functional.setup_seconds;
-  solved.summary.solve_seconds = functional.solve_seconds;
-  solved.summary.views_seconds = functional.views_seconds;
-  solved.summary.predicted_memory_mib = functional.predicted_memory_mib;
-  diagnostics->gamma = functional.gamma;
-  diagnostics->ridge = diagnostics->strength = functional.ridge;
+  CompleteRun(solver, prepared, options, sink, run, &library, &solved);
+  library.how.backend = library.backend.get();
+  estimator::SolverSummary summary;
+  solved.light_field = estimator::Solve(*prepared.input, OptionsOf(solver, prepared), library.how,
+                                        &summary, solved.maps ? &*solved.maps : nullptr);
+  if (solved.maps) solved.maps->radiance = {};  // the middle of the light field contains it
+  TakeSummary(summary, &solved);
+  std::visit([&](const auto& found) { TakeDiagnostics(found, diagnostics); }, summary.diagnostics);
   return solved;
 }
 
@@ -281,22 +300,19 @@ Solved Solve(const PreparedProblem& prepared, const EstimateOptions& options, Vi
   Solved solved = std::visit(
       [&](const auto& solver) -> Solved {
         using Given = std::decay_t<decltype(solver)>;
-        if constexpr (std::is_same_v<Given, SceneSolver>) {
-          return SolveScene(solver, prepared, options, sink, diagnostics, run);
-        } else if constexpr (std::is_same_v<Given, BlockSolver>) {
-          return SolveBlocks(solver, prepared, options, diagnostics, run);
-        } else if constexpr (std::is_same_v<Given, FunctionalSolver>) {
-          return SolveFunctional(solver, false, prepared, options, diagnostics, run);
-        } else if constexpr (std::is_same_v<Given, GridSolver>) {
-          return SolveFunctional(solver, true, prepared, options, diagnostics, run);
-        } else if constexpr (std::is_same_v<Given, std::shared_ptr<const Solver>>) {
+        if constexpr (std::is_same_v<Given, std::shared_ptr<const Solver>>) {
           return SolveByProgram(*solver, prepared, run);
+        } else if constexpr (!std::is_same_v<Given, SolverChooser>) {
+          return SolveByLibrary(solver, prepared, options, sink, diagnostics, run);
         } else {
           throw Error("solver: the chooser has not been asked");
         }
       },
       options.solver);
   diagnostics->predicted_memory_mib = solved.summary.predicted_memory_mib;
+  if (const auto* scene = std::get_if<SceneSolver>(&options.solver)) {
+    diagnostics->strength_rule = scene->strength_rule;
+  }
   return solved;
 }
 

@@ -10,6 +10,9 @@
 #include <utility>
 
 #include "thicklens/base/error.h"
+#include "thicklens/estimator/block_solver.h"
+#include "thicklens/estimator/functional_solver.h"
+#include "thicklens/estimator/scene_solver.h"
 #include "tools/options/option_values.h"
 #include "tools/options/quality_target_options.h"
 
@@ -368,76 +371,6 @@ void CheckEstimateUsage(const EstimateOptions& options) {
         "--profile is only used by --quality, --within or --psnr-loss, and none of them is given");
   RequireBesideLightField("--report", options.report_folder, options);
   RequireBesideLightField("--checkpoint", options.checkpoint_path, options);
-}
-
-estimator::SceneOptions SceneOptionsOf(const EstimateOptions& options, const model::EffectSet& on,
-                                       Progress progress) {
-  estimator::SceneOptions solver;
-  if (options.prior) solver.prior = estimator::PriorFromName(*options.prior);
-  const std::string strength = options.strength.value_or("auto");
-  if (strength == "gcv") {
-    solver.strength_rule = estimator::StrengthRule::kGcv;
-  } else if (strength != "auto") {
-    solver.strength_rule = estimator::StrengthRule::kGiven;
-    solver.strength = PositiveNumber(strength).value_or(0);
-  }
-  if (options.tolerance) solver.tolerance = *options.tolerance;
-  if (options.max_iterations) solver.max_iterations = *options.max_iterations;
-  solver.double_precision = options.double_precision;
-  solver.falloff = on.Has(model::Effect::kFalloff);
-  solver.threads = options.common.threads;
-  solver.memory_limit_mib = options.memory_limit_mib;
-  solver.progress = std::move(progress);
-  std::string why;
-  if (!solver.IsValid(&why)) throw Error(why);
-  return solver;
-}
-
-estimator::BlurCheckOptions BlurCheckOptionsOf(const EstimateOptions& options,
-                                               const model::EffectSet& on, Progress progress) {
-  estimator::BlurCheckOptions check;
-  check.falloff = on.Has(model::Effect::kFalloff);
-  check.threads = options.common.threads;
-  check.memory_limit_mib = options.memory_limit_mib;
-  check.progress = std::move(progress);
-  return check;
-}
-
-estimator::BlockOptions BlockOptionsOf(const EstimateOptions& options, const model::EffectSet& on,
-                                       Progress progress) {
-  estimator::BlockOptions solver;
-  if (options.block_solver) solver.solver = estimator::BlockSolverFromName(*options.block_solver);
-  if (options.stencil) solver.stencil = estimator::StencilFromName(*options.stencil);
-  if (options.splat == "nearest") solver.splat = kernels::Splat::kNearest;
-  if (options.gamma) solver.gamma = *options.gamma;
-  solver.ridge = options.ridge;
-  if (options.tolerance) solver.tolerance = *options.tolerance;
-  if (options.max_iterations) solver.max_iterations = *options.max_iterations;
-  solver.block_px = options.block_px;
-  solver.memory_limit_mib = options.memory_limit_mib;
-  solver.falloff = on.Has(model::Effect::kFalloff);
-  solver.threads = options.common.threads;
-  solver.progress = std::move(progress);
-  std::string why;
-  if (!solver.IsValid(&why)) throw Error(why);
-  return solver;
-}
-
-estimator::FunctionalOptions FunctionalOptionsOf(const EstimateOptions& options,
-                                                 const model::EffectSet& on, Progress progress) {
-  estimator::FunctionalOptions solver;
-  if (options.gamma) solver.gamma = *options.gamma;
-  solver.ridge = options.ridge;
-  if (options.tolerance) solver.tolerance = *options.tolerance;
-  if (options.max_iterations) solver.max_iterations = *options.max_iterations;
-  solver.double_precision = options.double_precision;
-  solver.falloff = on.Has(model::Effect::kFalloff);
-  solver.threads = options.common.threads;
-  solver.memory_limit_mib = options.memory_limit_mib;
-  solver.progress = std::move(progress);
-  std::string why;
-  if (!solver.IsValid(&why)) throw Error(why);
-  return solver;
 }
 
 }  // namespace thicklens::tools

@@ -2,16 +2,11 @@
 #define THICKLENS_TOOLS_OPTIONS_ESTIMATE_OPTIONS_H_
 
 #include <CLI/CLI.hpp>
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "thicklens/estimator/block_solver.h"
-#include "thicklens/estimator/blur_check.h"
-#include "thicklens/estimator/functional_solver.h"
 #include "thicklens/estimator/plan_choice.h"
-#include "thicklens/estimator/scene_solver.h"
 #include "tools/options/command_frame.h"
 #include "tools/options/effect_options.h"
 #include "tools/options/light_field_options.h"
@@ -65,18 +60,6 @@ void AddEstimateOptions(CLI::App* command, EstimateOptions* options);
 void CheckEstimateUsage(const EstimateOptions& options);
 // The part of CheckEstimateUsage for the solver's own options.
 void CheckSolverUsage(const EstimateOptions& options);
-
-// Return the given options and the solver's defaults for the others. `on` lists the effects of the
-// photograph that the solver must take into account. They throw Error for invalid options.
-using Progress = std::function<void(int done, int total)>;
-estimator::SceneOptions SceneOptionsOf(const EstimateOptions& options, const model::EffectSet& on,
-                                       Progress progress);
-estimator::BlurCheckOptions BlurCheckOptionsOf(const EstimateOptions& options,
-                                               const model::EffectSet& on, Progress progress);
-estimator::BlockOptions BlockOptionsOf(const EstimateOptions& options, const model::EffectSet& on,
-                                       Progress progress);
-estimator::FunctionalOptions FunctionalOptionsOf(const EstimateOptions& options,
-                                                 const model::EffectSet& on, Progress progress);
 
 }  // namespace thicklens::tools
 

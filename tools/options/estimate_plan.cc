@@ -4,34 +4,15 @@
 
 #include <utility>
 
-#include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/memory_available.h"
 #include "thicklens/base/stopwatch.h"
-#include "thicklens/estimator/functional_solver.h"
-#include "thicklens/estimator/grid_solver.h"
-#include "thicklens/estimator/scene_solver.h"
+#include "thicklens/estimator/solve.h"
 
 namespace thicklens::tools {
 namespace {
 
 using nlohmann::json;
-
-void StopWhenAsked(int /*done*/, int /*total*/) { ThrowIfCancelled(); }
-
-template <typename Summary>
-void TakeIterations(const Summary& summary, PlanRun* run) {
-  run->iterations = summary.iterations;
-  run->converged = summary.converged;
-  run->relative_residual = summary.relative_residual;
-}
-
-template <typename Summary>
-void TakeSeconds(const Summary& summary, PlanRun* run) {
-  run->setup_seconds = summary.setup_seconds;
-  run->solve_seconds = summary.solve_seconds;
-  run->views_seconds = summary.views_seconds;
-}
 
 template <typename Value>
 Value FieldOf(const json& fields, const char* name, const std::string& where) {
@@ -50,6 +31,31 @@ std::optional<Value> OptionalFieldOf(const json& fields, const char* name,
   const auto found = fields.find(name);
   if (found == fields.end() || found->is_null()) return std::nullopt;
   return FieldOf<Value>(fields, name, where);
+}
+
+// Returns the options of the plan's solver; what the plan does not state has the solver's default.
+estimator::SolverOptions SolverOptionsOf(const estimator::EstimatePlan& plan) {
+  if (plan.solver == "scene") {
+    estimator::SceneOptions scene;
+    if (!plan.prior.empty()) scene.prior = estimator::PriorFromName(plan.prior);
+    scene.tolerance = plan.tolerance;
+    scene.double_precision = plan.double_precision;
+    return scene;
+  }
+  if (plan.solver == "blocks") {
+    estimator::BlockOptions blocks;
+    if (!plan.block_solver.empty()) {
+      blocks.solver = estimator::BlockSolverFromName(plan.block_solver);
+    }
+    blocks.tolerance = plan.tolerance.value_or(blocks.tolerance);
+    blocks.block_px = plan.block_px;
+    return blocks;
+  }
+  estimator::FunctionalOptions functional;
+  functional.tolerance = plan.tolerance.value_or(functional.tolerance);
+  functional.double_precision = plan.double_precision;
+  if (plan.solver == "grid") return estimator::GridOptions{functional};
+  return functional;
 }
 
 }  // namespace
@@ -116,13 +122,8 @@ estimator::EstimatePlan PlanFromJson(const json& fields, const std::string& wher
   ApplyPlan(plan, &options);
   try {
     CheckSolverUsage(options);
-    if (plan.solver == "scene") {
-      SceneOptionsOf(options, {}, {});
-    } else if (plan.solver == "blocks") {
-      BlockOptionsOf(options, {}, {});
-    } else {
-      FunctionalOptionsOf(options, {}, {});
-    }
+    std::string why;
+    if (!estimator::IsValid(SolverOptionsOf(plan), &why)) throw Error(why);
   } catch (const Error& error) {
     throw Error(fmt::format("{}: {}", where, error.what()));
   }
@@ -146,37 +147,23 @@ void ApplyPlan(const estimator::EstimatePlan& plan, EstimateOptions* options) {
 
 PlanRun RunPlan(const estimator::EstimatePlan& plan, const estimator::EstimateInput& input,
                 int threads, kernels::Backend* backend) {
-  EstimateOptions options;
-  ApplyPlan(plan, &options);
-  options.common.threads = threads;
-  const model::EffectSet on = {model::Effect::kFalloff};
-  PlanRun run;
+  estimator::SolverRun how;
+  how.threads = threads;
+  how.backend = backend;
   if (plan.solver == "scene") {
-    estimator::SceneSummary summary;
-    estimator::SceneOptions scene = SceneOptionsOf(options, on, StopWhenAsked);
-    scene.memory_limit_mib = UsualMemoryLimitMib();  // which `estimate` respects as well
-    run.light_field = estimator::EstimateScene(input, scene, &summary, nullptr, backend);
-    TakeSeconds(summary, &run);
-    TakeIterations(summary, &run);
-    run.device = summary.device;
-  } else if (plan.solver == "blocks") {
-    estimator::BlockSummary summary;
-    run.light_field = estimator::EstimateByBlocks(input, BlockOptionsOf(options, on, StopWhenAsked),
-                                                  backend, &summary);
-    run.setup_seconds = summary.setup_seconds;
-    run.solve_seconds = summary.solve_seconds;
-    run.relative_residual = summary.relative_residual;
-    run.rcond = summary.rcond_min;
-    run.device = summary.device;
-    if (!summary.rcond_min) TakeIterations(summary, &run);
-  } else {
-    const auto estimate =
-        plan.solver == "grid" ? estimator::EstimateOnGrid : estimator::EstimateFunctional;
-    estimator::FunctionalSummary summary;
-    run.light_field = estimate(input, FunctionalOptionsOf(options, on, StopWhenAsked), &summary);
-    TakeSeconds(summary, &run);
-    TakeIterations(summary, &run);
+    how.memory_limit_mib = UsualMemoryLimitMib();  // which `estimate` respects as well
   }
+  estimator::SolverSummary summary;
+  PlanRun run;
+  run.light_field = estimator::Solve(input, SolverOptionsOf(plan), how, &summary);
+  run.setup_seconds = summary.setup_seconds;
+  run.solve_seconds = summary.solve_seconds;
+  run.views_seconds = summary.views_seconds;
+  run.iterations = summary.iterations;
+  run.converged = summary.converged;
+  run.relative_residual = summary.relative_residual;
+  run.rcond = summary.rcond_min;
+  if (plan.solver == "scene" || plan.solver == "blocks") run.device = summary.device;
   return run;
 }
 

@@ -33,8 +33,8 @@ struct PlanRun {
   std::optional<double> rcond;              // direct solvers only
   std::string device;                       // solvers blocks and scene only
 };
-// Uses the plan as given; fall-off is applied if there is a camera. `backend` computes the plan. An
-// interrupt stops it.
+// Uses the plan as given; fall-off is applied if there is a camera. `backend` computes the plan;
+// null: the processor. An interrupt stops it.
 PlanRun RunPlan(const estimator::EstimatePlan& plan, const estimator::EstimateInput& input,
                 int threads, kernels::Backend* backend);
 // Runs the baseline: the photograph warped by its depth.

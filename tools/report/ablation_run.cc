@@ -10,7 +10,7 @@
 #include "thicklens/calib/calibrate.h"
 #include "thicklens/estimator/compare.h"
 #include "thicklens/estimator/estimate_input.h"
-#include "thicklens/estimator/scene_solver.h"
+#include "thicklens/estimator/solve.h"
 #include "thicklens/io/scene_pixels.h"
 #include "thicklens/io/simulated_sweep.h"
 #include "thicklens/model/light_field_grid.h"
@@ -39,11 +39,11 @@ double PsnrDbOfEstimate(const model::SceneToEstimate& scene, int threads) {
   if (scene.on.Has(Effect::kDefocus)) {
     estimator::SceneOptions options;
     options.falloff = falloff;
-    options.threads = threads;
-    options.memory_limit_mib = UsualMemoryLimitMib();
-    options.progress = [&scene](int, int) { scene.tell(); };
-    estimator::SceneSummary summary;
-    estimate = estimator::EstimateScene(input, options, &summary, nullptr);
+    estimator::SolverRun run;
+    run.threads = threads;
+    run.memory_limit_mib = UsualMemoryLimitMib();
+    run.progress = [&scene](int, int) { scene.tell(); };
+    estimate = estimator::Solve(input, options, run, nullptr);
   } else {
     estimate = estimator::WarpedLightField(input, falloff, threads);
   }

@@ -21,6 +21,7 @@
 
 #include "support/error_message.h"
 #include "tests/estimator/solver_inputs.h"
+#include "tests/estimator/solver_runs.h"
 #include "thicklens/estimator/block_store.h"
 #include "thicklens/estimator/render.h"
 #include "thicklens/kernels/device.h"
@@ -35,10 +36,6 @@ using ::testing::HasSubstr;
 using testing::NoiseInput;
 using testing::WithSolverCamera;
 using thicklens::testing::ErrorOf;
-
-std::shared_ptr<kernels::Backend> NewReferenceBackend() {
-  return kernels::OpenBackend(kernels::ParseDeviceRequest("cpu"), nullptr);
-}
 
 std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
@@ -200,7 +197,6 @@ double LargestDifference(const std::vector<float>& a, const std::vector<float>& 
 BlockOptions OneBlock() {
   BlockOptions options;
   options.block_px = 1000;
-  options.threads = 1;
   return options;
 }
 
@@ -217,8 +213,7 @@ void ExpectDenseSolution(const EstimateInput& input, BlockOptions options) {
   const Eigen::VectorXd expected = normal.ldlt().solve(right);
 
   BlockSummary summary;
-  const auto backend = NewReferenceBackend();
-  const model::LightField found = EstimateByBlocks(input, options, backend.get(), &summary);
+  const model::LightField found = EstimateByBlocks(input, options, RunOnThreads(1), &summary);
   EXPECT_LT((AllOfIt(found.values) - expected).lpNorm<Eigen::Infinity>(), 2e-6);
   EXPECT_LT(summary.relative_residual, 1e-12);
   EXPECT_GT(summary.rcond_min.value_or(0), 1e-5);
@@ -269,8 +264,7 @@ TEST(BlockSolver, AConstantImageHasAConstantLightField) {
     options.stencil = stencil;
     options.block_px = 8;
     BlockSummary summary;
-    const model::LightField found =
-        EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary);
+    const model::LightField found = EstimateByBlocks(input, options, {}, &summary);
     for (int channel = 0; channel < 3; ++channel) {
       const std::size_t begin = found.ViewStart(channel, 0, 0);
       for (std::size_t i = 0; i < 9 * found.view_size(); ++i) {
@@ -285,10 +279,10 @@ TEST(BlockSolver, OneThreadAndTwoGiveTheSameBits) {
   std::vector<float> first;
   for (const int threads : {1, 2, 3}) {
     BlockOptions options;
-    options.threads = threads;
+    SolverRun run;
+    run.threads = threads;
     BlockSummary summary;
-    const model::LightField found =
-        EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary);
+    const model::LightField found = EstimateByBlocks(input, options, run, &summary);
     EXPECT_EQ(summary.blocks.size(), 9u);  // 3 x 3 blocks of 16 px, those at the border smaller
     if (first.empty()) first = found.values;
     EXPECT_EQ(found.values, first);
@@ -298,7 +292,7 @@ TEST(BlockSolver, OneThreadAndTwoGiveTheSameBits) {
 TEST(BlockSolver, AFactorServesAllChannels) {
   const EstimateInput colour = MakeInput({20, 18, 3, 3, 3, 1.1, -0.7, 0, 4});
   BlockSummary summary;
-  const model::LightField all = EstimateByBlocks(colour, {}, NewReferenceBackend().get(), &summary);
+  const model::LightField all = EstimateByBlocks(colour, {}, {}, &summary);
   for (int channel = 0; channel < 3; ++channel) {
     EstimateInput grey = colour;
     grey.image.channels = 1;
@@ -306,7 +300,7 @@ TEST(BlockSolver, AFactorServesAllChannels) {
     for (std::size_t i = Index(channel); i < colour.image.values.size(); i += 3) {
       grey.image.values.push_back(colour.image.values[i]);
     }
-    const model::LightField one = EstimateByBlocks(grey, {}, NewReferenceBackend().get(), &summary);
+    const model::LightField one = EstimateByBlocks(grey, {}, {}, &summary);
     const auto begin =
         all.values.begin() + static_cast<std::ptrdiff_t>(all.ViewStart(channel, 0, 0));
     EXPECT_TRUE(std::equal(one.values.begin(), one.values.end(), begin)) << channel;
@@ -323,7 +317,7 @@ TEST(BlockSolver, SolversAgree) {
     options.tolerance = 1e-12;
     options.max_iterations = 5000;
     BlockSummary summary;
-    found.push_back(EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary));
+    found.push_back(EstimateByBlocks(input, options, {}, &summary));
     EXPECT_EQ(found.back().origin.block_solver, BlockSolverName(solver));
     // Stored in float, 6e-8 for values below 1; the solutions themselves agree to 1e-8 and better.
     EXPECT_LT(LargestDifference(found.back().values, found.front().values), 1.3e-7);
@@ -343,8 +337,7 @@ TEST(BlockSolver, IterationsThatAreCutShortSaySo) {
     options.solver = solver;
     options.max_iterations = 3;
     BlockSummary summary;
-    const model::LightField found =
-        EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary);
+    const model::LightField found = EstimateByBlocks(input, options, {}, &summary);
     EXPECT_FALSE(summary.converged);
     EXPECT_GT(summary.relative_residual, options.tolerance);
     EXPECT_LE(summary.relative_residual, 1);
@@ -362,10 +355,9 @@ TEST(BlockSolver, DeviceAndReferenceAgree) {
     options.stencil = stencil;
     options.rcond_min = 0;
     BlockSummary summary;
-    const model::LightField there = EstimateByBlocks(input, options, device.get(), &summary);
+    const model::LightField there = EstimateByBlocks(input, options, RunOn(device.get()), &summary);
     EXPECT_THAT(summary.device, HasSubstr("opencl"));
-    const model::LightField here =
-        EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary);
+    const model::LightField here = EstimateByBlocks(input, options, {}, &summary);
     EXPECT_LT(LargestDifference(there.values, here.values), 1.3e-7);
   }
 }
@@ -378,23 +370,20 @@ TEST(BlockSolver, WithoutARidgeTheResidualIsPerfectAndTheLightFieldIsNot) {
   BlockOptions options;
   options.solver = BlockSolver::kUmfpack;
   BlockSummary summary;
-  const model::LightField good =
-      EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary);
+  const model::LightField good = EstimateByBlocks(input, options, {}, &summary);
   const double good_range = AllOfIt(good.values).lpNorm<Eigen::Infinity>();
   EXPECT_LT(good_range, 6);
 
   options.ridge = 0;
-  EXPECT_THAT(
-      ErrorOf([&] { EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary); }),
-      AllOf(HasSubstr("block of 16x16 px at (0, 0)"), HasSubstr("rcond is"),
-            HasSubstr("at least 1e-12"), HasSubstr("ridge")));
+  EXPECT_THAT(ErrorOf([&] { EstimateByBlocks(input, options, {}, &summary); }),
+              AllOf(HasSubstr("block of 16x16 px at (0, 0)"), HasSubstr("rcond is"),
+                    HasSubstr("at least 1e-12"), HasSubstr("ridge")));
 
   options.rcond_min = 0;  // the guard is off
-  const model::LightField garbage =
-      EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary);
+  const model::LightField garbage = EstimateByBlocks(input, options, {}, &summary);
   EXPECT_LT(summary.rcond_min.value_or(1), 1e-12);
   EXPECT_LT(summary.relative_residual, 1e-8);
-  const auto kernels = NewReferenceBackend()->NewFloat();
+  const auto kernels = kernels::NewReference<float>();
   const model::LinearImage again =
       Photograph(garbage, input.weights, nullptr, nullptr, kernels.get(), 1);
   const double reprojection =
@@ -408,8 +397,7 @@ TEST(BlockSolver, RefusesWhatCannotBeMeant) {
   const EstimateInput good = MakeInput({});
   BlockSummary summary;
   const auto message = [&](const EstimateInput& input, const BlockOptions& options) {
-    return ErrorOf(
-        [&] { EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary); });
+    return ErrorOf([&] { EstimateByBlocks(input, options, {}, &summary); });
   };
   BlockOptions options;
   options.gamma = 0;
@@ -450,7 +438,7 @@ TEST(BlockSolver, RefusesWhatCannotBeMeant) {
 
 TEST(BlockSolver, BlocksLargerThanTheImageAreTheImage) {
   BlockSummary summary;
-  EstimateByBlocks(MakeInput({}), OneBlock(), NewReferenceBackend().get(), &summary);
+  EstimateByBlocks(MakeInput({}), OneBlock(), {}, &summary);
   EXPECT_EQ(summary.block_px, 12);
   ASSERT_EQ(summary.blocks.size(), 1u);
   EXPECT_EQ(summary.blocks[0].width_px, 12);
@@ -460,41 +448,39 @@ TEST(BlockSolver, BlocksLargerThanTheImageAreTheImage) {
 TEST(BlockSolver, TheMemoryLimitChoosesTheBlocks) {
   const EstimateInput input = MakeInput({64, 48, 1, 3, 3, 1.1, -0.7, 0, 4});
   BlockOptions options;
-  options.memory_limit_mib = 1;
+  SolverRun run;
+  run.memory_limit_mib = 1;
   BlockSummary summary;
-  EXPECT_THAT(
-      ErrorOf([&] { EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary); }),
-      AllOf(HasSubstr("memory limit 1 MiB"), HasSubstr("must be at least")));
-  options.memory_limit_mib = 1e5;
-  EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary);
+  EXPECT_THAT(ErrorOf([&] { EstimateByBlocks(input, options, run, &summary); }),
+              AllOf(HasSubstr("memory limit 1 MiB"), HasSubstr("must be at least")));
+  run.memory_limit_mib = 1e5;
+  EstimateByBlocks(input, options, run, &summary);
   EXPECT_EQ(summary.block_px, 64);
   const double all = summary.predicted_memory_mib;
   // Known to be too much from smaller blocks.
   options.block_px = 64;
-  options.memory_limit_mib = 0.7 * all;
-  EXPECT_THAT(
-      ErrorOf([&] { EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary); }),
-      AllOf(HasSubstr("blocks of 64 px need"), HasSubstr("or use smaller blocks")));
-  options.memory_limit_mib.reset();
+  run.memory_limit_mib = 0.7 * all;
+  EXPECT_THAT(ErrorOf([&] { EstimateByBlocks(input, options, run, &summary); }),
+              AllOf(HasSubstr("blocks of 64 px need"), HasSubstr("or use smaller blocks")));
+  run.memory_limit_mib.reset();
   options.block_px = 4;
-  EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary);
+  EstimateByBlocks(input, options, run, &summary);
   EXPECT_EQ(summary.block_px, 4);
   EXPECT_LT(summary.predicted_memory_mib, all);
   options.block_px.reset();
-  options.memory_limit_mib =
-      summary.predicted_memory_mib + 0.5 * (all - summary.predicted_memory_mib);
-  EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary);
+  run.memory_limit_mib = summary.predicted_memory_mib + 0.5 * (all - summary.predicted_memory_mib);
+  EstimateByBlocks(input, options, run, &summary);
   EXPECT_GT(summary.block_px, 4);
   EXPECT_LT(summary.block_px, 64);
-  EXPECT_LE(summary.predicted_memory_mib, *options.memory_limit_mib);
+  EXPECT_LE(summary.predicted_memory_mib, *run.memory_limit_mib);
 }
 
 TEST(BlockSolver, ProgressCountsBlocksAndMayStop) {
   const EstimateInput input = MakeInput({40, 37, 1, 3, 3, 1.1, -0.7, 0.6, 4});
-  BlockOptions options;
+  SolverRun run;
   int calls = 0;
   int last = 0;
-  options.progress = [&](int done, int total) {
+  run.progress = [&](int done, int total) {
     EXPECT_EQ(total, 9);
     EXPECT_EQ(done, last + 1);
     last = done;
@@ -502,12 +488,11 @@ TEST(BlockSolver, ProgressCountsBlocksAndMayStop) {
   };
   BlockSummary summary;
   EXPECT_EQ(summary.message, "not run");
-  EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary);
+  EstimateByBlocks(input, {}, run, &summary);
   EXPECT_EQ(calls, 9);
   EXPECT_THAT(summary.message, HasSubstr("9 blocks of 16 px"));
-  options.progress = [](int, int) { throw Interrupted(); };
-  EXPECT_THROW(EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary),
-               Interrupted);
+  run.progress = [](int, int) { throw Interrupted(); };
+  EXPECT_THROW(EstimateByBlocks(input, {}, run, &summary), Interrupted);
 }
 
 // Keeps blocks as floats, as a file does, and counts.
@@ -552,29 +537,27 @@ TEST(BlockSolver, GoesOnFromTheBlocksOfAStoreToTheSameBits) {
     BlockOptions options;
     options.solver = solver;
     options.block_px = 5;
-    options.threads = 2;
+    SolverRun run;
+    run.threads = 2;
     BlockSummary whole;
-    const model::LightField expected =
-        EstimateByBlocks(input, options, NewReferenceBackend().get(), &whole);
+    const model::LightField expected = EstimateByBlocks(input, options, run, &whole);
     ASSERT_EQ(whole.blocks.size(), 8U);
     EXPECT_EQ(whole.blocks_from_store, 0);
 
     StoreInMemory store;
-    options.store = &store;
-    options.progress = [](int done, int) {
+    run.store = &store;
+    run.progress = [](int done, int) {
       if (done >= 3) throw std::runtime_error("stop");
     };
     BlockSummary cut;
-    EXPECT_THROW(EstimateByBlocks(input, options, NewReferenceBackend().get(), &cut),
-                 std::runtime_error);
+    EXPECT_THROW(EstimateByBlocks(input, options, run, &cut), std::runtime_error);
     const int kept = store.kept;
     ASSERT_GE(kept, 3);
     ASSERT_LT(kept, 8);
 
-    options.progress = {};
+    run.progress = {};
     BlockSummary resumed;
-    const model::LightField found =
-        EstimateByBlocks(input, options, NewReferenceBackend().get(), &resumed);
+    const model::LightField found = EstimateByBlocks(input, options, run, &resumed);
     EXPECT_EQ(found.values, expected.values);
     EXPECT_EQ(resumed.blocks_from_store, kept);
     EXPECT_EQ(store.kept, 8);
@@ -592,12 +575,12 @@ TEST(BlockSolver, BlocksOfAStoreThatCannotBeAreSolvedAgain) {
   const EstimateInput input = MakeInput({});
   BlockOptions options;
   options.block_px = 6;
+  SolverRun run;
   BlockSummary summary;
-  const model::LightField expected =
-      EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary);
+  const model::LightField expected = EstimateByBlocks(input, options, run, &summary);
   StoreInMemory right;
-  options.store = &right;
-  EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary);
+  run.store = &right;
+  EstimateByBlocks(input, options, run, &summary);
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   const std::vector<std::function<void(SolvedBlock*)>> damages = {
       [](SolvedBlock* block) { block->report.x += 6; },
@@ -619,9 +602,8 @@ TEST(BlockSolver, BlocksOfAStoreThatCannotBeAreSolvedAgain) {
     StoreInMemory store;
     store.blocks = right.blocks;
     damages[i](&store.blocks.at(1));
-    options.store = &store;
-    const model::LightField found =
-        EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary);
+    run.store = &store;
+    const model::LightField found = EstimateByBlocks(input, options, run, &summary);
     EXPECT_EQ(found.values, expected.values);
     EXPECT_EQ(store.kept, 1);
     EXPECT_EQ(summary.blocks_from_store, static_cast<int>(right.blocks.size()) - 1);
@@ -633,18 +615,18 @@ TEST(BlockSolver, AStoreGetsEverythingThatBlocksDependOn) {
   MadeUp made_up;
   made_up.width_px = made_up.height_px = 8;
   const model::LightFieldPlanes planes{0, 780};
-  const auto reported = [](const EstimateInput& input, BlockOptions options) {
+  const auto reported = [](const EstimateInput& input, const BlockOptions& options,
+                           int threads = 0) {
     StoreInMemory store;
-    options.store = &store;
+    SolverRun run = RunOnThreads(threads);
+    run.store = &store;
     BlockSummary summary;
-    EstimateByBlocks(input, options, NewReferenceBackend().get(), &summary);
+    EstimateByBlocks(input, options, run, &summary);
     return std::make_pair(store.settings, store.data_bytes);
   };
   const EstimateInput usual = MakeCameraInput(made_up, planes, 800, 1);
   const auto of_usual = reported(usual, {});
-  BlockOptions threads;
-  threads.threads = 2;
-  EXPECT_EQ(reported(usual, threads), of_usual) << "the result does not depend on them";
+  EXPECT_EQ(reported(usual, {}, 2), of_usual) << "the result does not depend on them";
 
   const std::vector<std::function<void(BlockOptions*)>> settings = {
       [](BlockOptions* o) { o->gamma = 2; },
@@ -696,8 +678,7 @@ TEST(BlockSolver, AStoreGetsEverythingThatBlocksDependOn) {
 TEST(BlockSolver, RaysBesideTheImageKeepThePrior) {
   const EstimateInput input = MakeCameraInput({}, {0, 500}, 700, 10);
   BlockSummary summary;
-  const model::LightField found =
-      EstimateByBlocks(input, {}, NewReferenceBackend().get(), &summary);
+  const model::LightField found = EstimateByBlocks(input, {}, {}, &summary);
   const model::LightField prior = WarpedLightField(input, true, 1);
   int beside = 0;
   for (int k = 0; k < 3; ++k) {
@@ -717,8 +698,8 @@ TEST(BlockSolver, TheLightFieldSaysHowItWasMade) {
   options.gamma = 2;
   options.ridge = 0.01;
   BlockSummary summary;
-  const model::LightField found = EstimateByBlocks(MakeCameraInput({}, {0, 800}, 700, 25), options,
-                                                   NewReferenceBackend().get(), &summary);
+  const model::LightField found =
+      EstimateByBlocks(MakeCameraInput({}, {0, 800}, 700, 25), options, {}, &summary);
   EXPECT_EQ(found.origin.method, "blocks");
   EXPECT_EQ(found.origin.gamma, 2);
   EXPECT_EQ(found.origin.ridge, 0.01);

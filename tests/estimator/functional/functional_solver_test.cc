@@ -15,6 +15,7 @@
 #include "support/error_message.h"
 #include "tests/estimator/plain_rays.h"
 #include "tests/estimator/solver_inputs.h"
+#include "tests/estimator/solver_runs.h"
 #include "thicklens/model/light_field.h"
 
 namespace thicklens::estimator {
@@ -78,7 +79,6 @@ Eigen::VectorXd DenseRays(const Eigen::MatrixXd& h, const Eigen::VectorXd& photo
 FunctionalOptions Precise() {
   FunctionalOptions options;
   options.tolerance = 1e-5;  // float reaches this tolerance reliably
-  options.threads = 1;
   return options;
 }
 
@@ -90,7 +90,7 @@ void ExpectDenseSolution(const EstimateInput& input, const DisparityMap& photogr
   const auto u_count = static_cast<int>(input.weights.cols());
   const auto v_count = static_cast<int>(input.weights.rows());
   FunctionalSummary summary;
-  const model::LightField found = EstimateFunctional(input, options, &summary);
+  const model::LightField found = EstimateFunctional(input, options, RunOnThreads(1), &summary);
   EXPECT_TRUE(summary.converged) << summary.message;
   EXPECT_LE(summary.relative_residual, options.tolerance);
   EXPECT_GT(summary.iterations, 2);
@@ -175,7 +175,7 @@ TEST(FunctionalSolver, TendsToAnEvenRadianceWithARidge) {
   options.gamma = 1e5;
   options.ridge = 0.02 / 9;
   FunctionalSummary summary;
-  const model::LightField found = EstimateFunctional(input, options, &summary);
+  const model::LightField found = EstimateFunctional(input, options, RunOnThreads(1), &summary);
 
   const Eigen::MatrixXd rays = PhotographMatrix(input.disparity, input.weights);
   const Eigen::Index pixels = rays.rows();
@@ -201,7 +201,7 @@ TEST(FunctionalSolver, AConstantImageHasAConstantLightField) {
     input.image.values[i] = 0.2F * static_cast<float>(i % 3);
   }
   FunctionalSummary summary;
-  const model::LightField found = EstimateFunctional(input, Precise(), &summary);
+  const model::LightField found = EstimateFunctional(input, Precise(), RunOnThreads(1), &summary);
   for (int channel = 0; channel < 3; ++channel) {
     for (std::size_t i = found.ViewStart(channel, 0, 0);
          i < found.ViewStart(channel, 0, 0) + 9 * found.view_size(); ++i) {
@@ -244,7 +244,7 @@ TEST(FunctionalSolver, IsNearerToTheTruthThanTheWarpedPhotograph) {
     input.disparity.disparity[Index(i)] = static_cast<float>(kDisparity);
   }
   FunctionalSummary summary;
-  const model::LightField found = EstimateFunctional(input, {}, &summary);
+  const model::LightField found = EstimateFunctional(input, {}, {}, &summary);
   const model::LightField warped = WarpedLightField(input, true, 1);
   const auto squared_error = [&](const model::LightField& light_field) {
     double sum = 0;
@@ -267,13 +267,10 @@ TEST(FunctionalSolver, IsNearerToTheTruthThanTheWarpedPhotograph) {
 
 TEST(FunctionalSolver, SameBitsOnAnyNumberOfThreads) {
   const EstimateInput input = MakeInput(101, 67, 3, GaussianWeights(5, 3));
-  FunctionalOptions options;
-  options.threads = 1;
   FunctionalSummary summary;
-  const model::LightField one = EstimateFunctional(input, options, &summary);
+  const model::LightField one = EstimateFunctional(input, {}, RunOnThreads(1), &summary);
   for (const int threads : {2, 3}) {
-    options.threads = threads;
-    EXPECT_EQ(EstimateFunctional(input, options, &summary).values, one.values);
+    EXPECT_EQ(EstimateFunctional(input, {}, RunOnThreads(threads), &summary).values, one.values);
     EXPECT_EQ(summary.threads, threads);
   }
 }
@@ -283,9 +280,9 @@ TEST(FunctionalSolver, FloatIsAsGoodAsDouble) {
   FunctionalOptions options;
   options.tolerance = 1e-5;
   FunctionalSummary in_float, in_double;
-  const model::LightField one = EstimateFunctional(input, options, &in_float);
+  const model::LightField one = EstimateFunctional(input, options, {}, &in_float);
   options.double_precision = true;
-  const model::LightField other = EstimateFunctional(input, options, &in_double);
+  const model::LightField other = EstimateFunctional(input, options, {}, &in_double);
   EXPECT_NE(one.values, other.values);
   for (std::size_t i = 0; i < one.values.size(); ++i) {
     ASSERT_NEAR(one.values[i], other.values[i], 1e-4) << i;
@@ -296,7 +293,7 @@ TEST(FunctionalSolver, TheLightFieldHasItsOrigin) {
   const EstimateInput input = MakeCameraInput(20, 10);
   FunctionalSummary summary;
   EXPECT_EQ(summary.message, "not run");
-  const model::LightField found = EstimateFunctional(input, {}, &summary);
+  const model::LightField found = EstimateFunctional(input, {}, {}, &summary);
   std::string why;
   EXPECT_TRUE(found.IsValid(&why)) << why;
   EXPECT_EQ(found.origin.method, "functional");
@@ -315,7 +312,7 @@ TEST(FunctionalSolver, MissingConvergenceIsReported) {
   options.max_iterations = 2;
   options.tolerance = 1e-4;
   FunctionalSummary summary;
-  EstimateFunctional(input, options, &summary);
+  EstimateFunctional(input, options, {}, &summary);
   EXPECT_FALSE(summary.converged);
   EXPECT_EQ(summary.iterations, 2);
   EXPECT_GT(summary.relative_residual, 1e-4);
@@ -323,7 +320,7 @@ TEST(FunctionalSolver, MissingConvergenceIsReported) {
   // Float cannot reach this tolerance, so the solver stops and reports that.
   options.max_iterations = 100000;
   options.tolerance = 1e-12;
-  EstimateFunctional(input, options, &summary);
+  EstimateFunctional(input, options, {}, &summary);
   EXPECT_FALSE(summary.converged);
   EXPECT_LT(summary.relative_residual, 1e-5);
   EXPECT_LT(summary.iterations, 2000);
@@ -331,22 +328,22 @@ TEST(FunctionalSolver, MissingConvergenceIsReported) {
 
 TEST(FunctionalSolver, CountsItsStepsAndStopsOnRequest) {
   const EstimateInput input = MakeInput(40, 30, 3, GaussianWeights(3, 3));
-  const int steps = ExpectStepsAreReported(FunctionalOptions(), [&](const auto& options) {
+  const int steps = ExpectStepsAreReported([&](const SolverRun& run) {
     FunctionalSummary summary;
-    EstimateFunctional(input, options, &summary);
+    EstimateFunctional(input, {}, run, &summary);
   });
   EXPECT_GT(steps, 9 * 4);
 }
 
 TEST(FunctionalSolver, RefusesMoreMemoryThanItMayHave) {
   const EstimateInput input = MakeInput(200, 200, 1, GaussianWeights(7, 7));
-  FunctionalOptions options;
-  options.memory_limit_mib = 10;
+  SolverRun run;
+  run.memory_limit_mib = 10;
   FunctionalSummary summary;
-  EXPECT_THAT(ErrorOf([&] { EstimateFunctional(input, options, &summary); }),
+  EXPECT_THAT(ErrorOf([&] { EstimateFunctional(input, {}, run, &summary); }),
               HasSubstr("memory limit 10 MiB"));
-  options.memory_limit_mib = 10000;
-  EstimateFunctional(input, options, &summary);
+  run.memory_limit_mib = 10000;
+  EstimateFunctional(input, {}, run, &summary);
   EXPECT_LT(summary.predicted_memory_mib, 10000);
   // A plane and a disparity for each of the rays, and the light field.
   EXPECT_GT(summary.predicted_memory_mib, 200.0 * 200 * 49 * 3 * 4 / (1 << 20));
@@ -358,7 +355,7 @@ TEST(FunctionalSolver, RefusesOptionsThatDoNotFit) {
   const auto error = [&](const std::function<void(FunctionalOptions*)>& change) {
     FunctionalOptions options;
     change(&options);
-    return ErrorOf([&] { EstimateFunctional(input, options, &summary); });
+    return ErrorOf([&] { EstimateFunctional(input, options, {}, &summary); });
   };
   EXPECT_THAT(error([](auto* o) { o->gamma = 0; }), HasSubstr("gamma is 0"));
   EXPECT_THAT(error([](auto* o) { o->gamma = kNan; }), HasSubstr("gamma is nan"));
@@ -367,11 +364,11 @@ TEST(FunctionalSolver, RefusesOptionsThatDoNotFit) {
   EXPECT_THAT(error([](auto* o) { o->tolerance = 1; }), HasSubstr("tolerance is 1"));
   EXPECT_THAT(error([](auto* o) { o->tolerance = 0; }), HasSubstr("tolerance is 0"));
   EXPECT_THAT(error([](auto* o) { o->max_iterations = 0; }), HasSubstr("max_iterations is 0"));
-  EXPECT_THAT(error([](auto* o) { o->threads = -1; }), HasSubstr("threads is -1"));
-  EXPECT_THAT(error([](auto* o) { o->memory_limit_mib = 0; }), HasSubstr("memory_limit_mib is 0"));
+  EXPECT_THAT(ErrorOf([&] { EstimateFunctional(input, {}, RunOnThreads(-1), &summary); }),
+              HasSubstr("functional solver: threads is -1"));
   EstimateInput holes = input;
   holes.disparity.disparity[3] = static_cast<float>(kNan);
-  EXPECT_THAT(ErrorOf([&] { EstimateFunctional(holes, {}, &summary); }), HasSubstr("holes"));
+  EXPECT_THAT(ErrorOf([&] { EstimateFunctional(holes, {}, {}, &summary); }), HasSubstr("holes"));
 }
 
 }  // namespace

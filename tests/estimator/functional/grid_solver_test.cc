@@ -21,6 +21,7 @@
 #include "estimator/views/warped_views.h"
 #include "support/error_message.h"
 #include "tests/estimator/solver_inputs.h"
+#include "tests/estimator/solver_runs.h"
 #include "thicklens/kernels/device.h"
 #include "thicklens/model/light_field.h"
 
@@ -216,7 +217,6 @@ FunctionalOptions Precise() {
   options.double_precision = true;
   options.tolerance = 1e-11;
   options.max_iterations = 10000;
-  options.threads = 1;
   return options;
 }
 
@@ -226,17 +226,15 @@ model::LightField OneBlock(const EstimateInput& input, const FunctionalOptions& 
   blocks.gamma = options.gamma;
   blocks.ridge = options.ridge;
   blocks.falloff = options.falloff;
-  blocks.threads = 1;
   blocks.block_px = std::max(input.image.width_px, input.image.height_px);
   BlockSummary summary;
-  const auto backend = kernels::OpenBackend(kernels::ParseDeviceRequest("cpu"), nullptr);
-  return EstimateByBlocks(input, blocks, backend.get(), &summary);
+  return EstimateByBlocks(input, blocks, RunOnThreads(1), &summary);
 }
 
 void ExpectOneBlock(const EstimateInput& input, const FunctionalOptions& options,
                     double accuracy = 2e-6) {
   FunctionalSummary summary;
-  const model::LightField found = EstimateOnGrid(input, options, &summary);
+  const model::LightField found = EstimateOnGrid(input, options, RunOnThreads(1), &summary);
   EXPECT_TRUE(summary.converged) << summary.message;
   const model::LightField expected = OneBlock(input, options);
   ASSERT_EQ(found.values.size(), expected.values.size());
@@ -315,14 +313,14 @@ TEST(GridSolver, MinimisesTheFunctional) {
   options.gamma = kGamma;
   options.ridge = kRidge;
   FunctionalSummary summary;
-  const model::LightField found = EstimateOnGrid(input, options, &summary);
+  const model::LightField found = EstimateOnGrid(input, options, RunOnThreads(1), &summary);
   EXPECT_TRUE(summary.converged);
   for (int i = 0; i < kRays; ++i) ASSERT_NEAR(found.values[Index(i)], expected[i], 1e-6) << i;
 
   // If the solver stops early, the reported residual is that of the answer in this system.
   options.max_iterations = 7;
   options.double_precision = false;
-  const model::LightField early = EstimateOnGrid(input, options, &summary);
+  const model::LightField early = EstimateOnGrid(input, options, RunOnThreads(1), &summary);
   EXPECT_FALSE(summary.converged);
   EXPECT_EQ(summary.iterations, 7);
   const Eigen::VectorXd answer =
@@ -337,7 +335,7 @@ TEST(GridSolver, TheReportedResidualIsThatOfTheBlocksSystem) {
   FunctionalOptions options = Precise();
   options.max_iterations = 4;
   FunctionalSummary summary;
-  const model::LightField found = EstimateOnGrid(input, options, &summary);
+  const model::LightField found = EstimateOnGrid(input, options, RunOnThreads(1), &summary);
   const RayField field(input, true, 1);
   const auto kernels = kernels::NewReference<double>();
   const BlockSystem system =
@@ -362,7 +360,7 @@ TEST(GridSolver, AConstantImageHasAConstantLightField) {
   FunctionalOptions options;
   options.tolerance = 1e-5;
   FunctionalSummary summary;
-  const model::LightField found = EstimateOnGrid(input, options, &summary);
+  const model::LightField found = EstimateOnGrid(input, options, RunOnThreads(1), &summary);
   for (int channel = 0; channel < 3; ++channel) {
     const std::size_t start = found.ViewStart(channel, 0, 0);
     for (std::size_t i = start; i < start + 9 * found.view_size(); ++i) {
@@ -376,12 +374,10 @@ TEST(GridSolver, SameBitsOnAnyNumberOfThreads) {
        {Occluded(301, 37, 3, GaussianWeights(5, 3)), WithCamera(91, 70, 500)}) {
     FunctionalOptions options;
     options.max_iterations = 15;
-    options.threads = 1;
     FunctionalSummary summary;
-    const model::LightField one = EstimateOnGrid(input, options, &summary);
+    const model::LightField one = EstimateOnGrid(input, options, RunOnThreads(1), &summary);
     for (const int threads : {2, 3}) {
-      options.threads = threads;
-      EXPECT_EQ(EstimateOnGrid(input, options, &summary).values, one.values);
+      EXPECT_EQ(EstimateOnGrid(input, options, RunOnThreads(threads), &summary).values, one.values);
       EXPECT_EQ(summary.threads, threads);
     }
   }
@@ -389,7 +385,7 @@ TEST(GridSolver, SameBitsOnAnyNumberOfThreads) {
 
 TEST(GridSolver, TheLightFieldHasItsOrigin) {
   FunctionalSummary summary;
-  const model::LightField found = EstimateOnGrid(WithCamera(20, 12, 500), {}, &summary);
+  const model::LightField found = EstimateOnGrid(WithCamera(20, 12, 500), {}, {}, &summary);
   std::string why;
   EXPECT_TRUE(found.IsValid(&why)) << why;
   EXPECT_EQ(found.origin.method, "grid");
@@ -406,9 +402,9 @@ TEST(GridSolver, TheLightFieldHasItsOrigin) {
 
 TEST(GridSolver, CountsItsStepsAndStopsOnRequest) {
   const EstimateInput input = Occluded(40, 30, 3, GaussianWeights(3, 3));
-  const int steps = ExpectStepsAreReported(FunctionalOptions(), [&](const auto& options) {
+  const int steps = ExpectStepsAreReported([&](const SolverRun& run) {
     FunctionalSummary summary;
-    EstimateOnGrid(input, options, &summary);
+    EstimateOnGrid(input, {}, run, &summary);
   });
   EXPECT_GT(steps, 30);
 }
@@ -416,18 +412,19 @@ TEST(GridSolver, CountsItsStepsAndStopsOnRequest) {
 TEST(GridSolver, RefusesMoreMemoryThanItMayHave) {
   const EstimateInput input = Occluded(200, 200, 1, GaussianWeights(7, 7));
   FunctionalOptions options;
-  options.memory_limit_mib = 10;
+  SolverRun run;
+  run.memory_limit_mib = 10;
   FunctionalSummary summary;
-  EXPECT_THAT(ErrorOf([&] { EstimateOnGrid(input, options, &summary); }),
+  EXPECT_THAT(ErrorOf([&] { EstimateOnGrid(input, options, run, &summary); }),
               AllOf(HasSubstr("memory limit 10 MiB"), HasSubstr("at least as large")));
-  options.memory_limit_mib = 10000;
+  run.memory_limit_mib = 10000;
   options.max_iterations = 1;
-  EstimateOnGrid(input, options, &summary);
+  EstimateOnGrid(input, options, run, &summary);
   // Four vectors, the light field and a disparity for each of the rays.
   const double rays_mib = 200.0 * 200 * 49 * 4 / (1 << 20);
   EXPECT_GT(summary.predicted_memory_mib, 6 * rays_mib);
   options.double_precision = true;
-  EstimateOnGrid(input, options, &summary);
+  EstimateOnGrid(input, options, run, &summary);
   EXPECT_GT(summary.predicted_memory_mib, 10 * rays_mib);
 }
 
@@ -435,9 +432,10 @@ TEST(GridSolver, RefusesOptionsThatDoNotFit) {
   FunctionalOptions options;
   options.ridge = 0;
   FunctionalSummary summary;
-  EXPECT_THAT(
-      ErrorOf([&] { EstimateOnGrid(Occluded(8, 7, 1, GaussianWeights(3, 3)), options, &summary); }),
-      HasSubstr("grid solver: ridge is 0"));
+  EXPECT_THAT(ErrorOf([&] {
+                EstimateOnGrid(Occluded(8, 7, 1, GaussianWeights(3, 3)), options, {}, &summary);
+              }),
+              HasSubstr("grid solver: ridge is 0"));
 }
 
 }  // namespace

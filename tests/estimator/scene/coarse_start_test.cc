@@ -124,11 +124,11 @@ TEST(CoarseStart, SavesIterations) {
   SceneSummary summary;
   SceneMaps large, small;
   const Strips of_256 = BlurredStrips(256), of_255 = BlurredStrips(255);
-  EstimateScene(of_256.input, options, &summary, &large);
-  EstimateScene(of_255.input, options, &summary, &small);
+  EstimateScene(of_256.input, options, {}, &summary, &large);
+  EstimateScene(of_255.input, options, {}, &summary, &small);
   EXPECT_LT(RmsError(large.radiance, of_256.truth), 0.85 * RmsError(small.radiance, of_255.truth));
   options.max_iterations = 300;
-  EstimateScene(of_256.input, options, &summary, &large);
+  EstimateScene(of_256.input, options, {}, &summary, &large);
   EXPECT_TRUE(summary.converged);
   EXPECT_LE(summary.relative_residual, options.tolerance_or_usual());
 }

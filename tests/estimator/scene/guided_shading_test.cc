@@ -272,7 +272,7 @@ double PsnrOf(const Scene& scene, Prior prior, const SceneOptions& usual = {}) {
   options.prior = prior;
   options.falloff = false;
   SceneSummary summary;
-  const model::LightField found = EstimateScene(scene.input, options, &summary, nullptr);
+  const model::LightField found = EstimateScene(scene.input, options, {}, &summary);
   EXPECT_TRUE(summary.converged) << summary.message;
   return CompareLightFields(scene.truth, found, 8, std::nullopt, 2).mean.psnr_db;
 }

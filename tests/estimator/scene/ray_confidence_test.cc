@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "support/error_message.h"
+#include "tests/estimator/solver_runs.h"
 #include "thicklens/estimator/estimate_checks.h"
 #include "thicklens/estimator/scene_solver.h"
 
@@ -144,11 +145,9 @@ TEST(RayConfidence, IsThatOfThePointAndNothingWhereThereIsNone) {
 
 TEST(RayConfidence, ComesWithTheSceneSolver) {
   const EstimateInput input = Card();
-  SceneOptions options;
-  options.threads = 2;
   SceneSummary summary;
   SceneMaps maps;
-  EstimateScene(input, options, &summary, &maps);
+  EstimateScene(input, {}, RunOnThreads(2), &summary, &maps);
   const std::vector<Confidence> of_points = PointConfidence(input, 1);
   ASSERT_EQ(maps.confidence.size(), 9 * of_points.size());
   for (int l = 0; l < 3; ++l) {

@@ -16,6 +16,7 @@
 
 #include "support/error_message.h"
 #include "support/sanitizers.h"
+#include "tests/estimator/solver_runs.h"
 #include "thicklens/base/error.h"
 #include "thicklens/estimator/scene_solver.h"
 
@@ -65,12 +66,13 @@ struct Solved {
   SceneSummary summary;
   SceneMaps maps;
 };
-Solved SolvedIn(const EstimateInput& input, SceneOptions options, int bands) {
+// So little work is not worth more than one thread.
+Solved SolvedIn(const EstimateInput& input, SceneOptions options, int bands, int threads = 1) {
   options.least_bands = bands;
-  if (options.threads == 0) options.threads = 1;  // so little work is not worth more
-  Solved run;
-  run.light_field = EstimateScene(input, options, &run.summary, &run.maps);
-  return run;
+  Solved solved;
+  solved.light_field =
+      EstimateScene(input, options, RunOnThreads(threads), &solved.summary, &solved.maps);
+  return solved;
 }
 
 // The largest difference of encoded values, in levels of 8 bits.
@@ -161,10 +163,8 @@ TEST(SceneBands, DoNotDependOnTheNumberOfThreads) {
   const EstimateInput input = CardBeforeWall(48, 160, 3);
   SceneOptions options;
   options.prior = Prior::kRidge;
-  options.threads = 1;
-  const Solved first = SolvedIn(input, options, 3);
-  options.threads = 3;
-  EXPECT_EQ(SolvedIn(input, options, 3).light_field.values, first.light_field.values);
+  const Solved first = SolvedIn(input, options, 3, 1);
+  EXPECT_EQ(SolvedIn(input, options, 3, 3).light_field.values, first.light_field.values);
 }
 
 TEST(SceneBands, CoverEachRowOnce) {
@@ -203,37 +203,35 @@ TEST(SceneBands, AreAsManyAsTheMemoryAsksFor) {
   SceneOptions options;
   options.prior = Prior::kRidge;
   options.tolerance = 5e-5;  // the default tolerance leaves a larger error than bands make
-  options.threads = 1;
   std::vector<float> middle;
   SceneViewSink sink;
   sink.take = [&](int k, int l, const model::LinearImage& view, const std::vector<Confidence>&) {
     if (k == 1 && l == 1) middle = view.values;
   };
+  SolverRun run = RunTo(sink);
+  run.threads = 1;
   SceneSummary whole, bands;
-  EstimateSceneViews(input, options, sink, &whole, nullptr);
+  EstimateScene(input, options, run, &whole);
   const std::vector<float> of_whole = middle;
-  options.memory_limit_mib = 1;
-  const std::string refusal =
-      ErrorOf([&] { EstimateSceneViews(input, options, sink, &bands, nullptr); });
+  run.memory_limit_mib = 1;
+  const std::string refusal = ErrorOf([&] { EstimateScene(input, options, run, &bands); });
   ASSERT_THAT(refusal, HasSubstr("memory limit 1 MiB: with any number of bands "));
   ASSERT_THAT(refusal, HasSubstr("must be at least as large"));
   const double least = std::stod(refusal.substr(refusal.find("of bands ") + 9));
   ASSERT_LT(least + 5, whole.predicted_memory_mib);
-  options.memory_limit_mib = (least + whole.predicted_memory_mib) / 2;
-  EstimateSceneViews(input, options, sink, &bands, nullptr);
+  run.memory_limit_mib = (least + whole.predicted_memory_mib) / 2;
+  EstimateScene(input, options, run, &bands);
   EXPECT_GT(bands.bands, 1);
-  EXPECT_LE(bands.predicted_memory_mib, *options.memory_limit_mib);
+  EXPECT_LE(bands.predicted_memory_mib, *run.memory_limit_mib);
   ASSERT_EQ(middle.size(), of_whole.size());
   for (std::size_t i = 0; i < middle.size(); ++i) ASSERT_NEAR(middle[i], of_whole[i], 1e-3) << i;
 }
 
 TEST(SceneViews, ComeOneByOneAndAreTheLightField) {
   const EstimateInput input = CardBeforeWall(40, 36, 3);
-  SceneOptions options;
-  options.threads = 3;
   SceneSummary summary, of_all;
   SceneMaps maps;
-  const model::LightField all = EstimateScene(input, options, &of_all, &maps);
+  const model::LightField all = EstimateScene(input, {}, RunOnThreads(3), &of_all, &maps);
   std::mutex mutex;
   std::map<std::pair<int, int>, std::vector<model::LinearImage>> views;
   SceneViewSink sink;
@@ -245,7 +243,9 @@ TEST(SceneViews, ComeOneByOneAndAreTheLightField) {
                            maps.confidence.begin() + (l * 3 + k) * 40 * 36));
     EXPECT_EQ(confidence.size(), 40 * 36u);
   };
-  const model::LightField described = EstimateSceneViews(input, options, sink, &summary, nullptr);
+  SolverRun run = RunTo(sink);
+  run.threads = 3;
+  const model::LightField described = EstimateScene(input, {}, run, &summary);
   EXPECT_TRUE(described.values.empty());
   EXPECT_EQ(described.u_count, 3);
   EXPECT_EQ(described.v_count, 3);
@@ -262,7 +262,7 @@ TEST(SceneViews, ComeOneByOneAndAreTheLightField) {
   sink.take = [](int, int, const model::LinearImage&, const std::vector<Confidence>&) {
     throw Interrupted();
   };
-  EXPECT_THROW(EstimateSceneViews(input, options, sink, &summary, nullptr), Interrupted);
+  EXPECT_THROW(EstimateScene(input, {}, run, &summary), Interrupted);
 }
 
 }  // namespace

@@ -17,6 +17,7 @@
 
 #include "support/error_message.h"
 #include "support/test_cameras.h"
+#include "tests/estimator/solver_runs.h"
 #include "thicklens/base/error.h"
 #include "thicklens/estimator/compare.h"
 #include "thicklens/estimator/fill_holes.h"
@@ -112,7 +113,7 @@ TEST(SceneSolver, BeatsWarpingOnASimulatedScene) {
     options.prior = prior;
     SceneSummary summary;
     SceneMaps maps;
-    const model::LightField found = EstimateScene(simulated.input, options, &summary, &maps);
+    const model::LightField found = EstimateScene(simulated.input, options, {}, &summary, &maps);
     const double psnr = MeanPsnr(simulated.truth, found);
     EXPECT_GT(psnr, dibr + 1) << PriorName(prior);
     best = std::max(best, psnr);
@@ -160,7 +161,7 @@ TEST(SceneSolver, LosesLittleByHolesInTheDepth) {
   EXPECT_GT(filled, truth.disparity.size() / 20);
   SceneSummary summary;
   const auto psnr = [&] {
-    return MeanPsnr(SimulatedScene().truth, EstimateScene(input, {}, &summary, nullptr));
+    return MeanPsnr(SimulatedScene().truth, EstimateScene(input, {}, {}, &summary));
   };
   const double with_holes = psnr();
   input.disparity = truth;
@@ -187,9 +188,9 @@ TEST(SceneSolver, ADeviceGivesTheSameLightField) {
       options.double_precision = double_precision;
       options.tolerance = 1e-5;
       SceneSummary cpu, device;
-      const model::LightField expected = EstimateScene(simulated.input, options, &cpu, nullptr);
+      const model::LightField expected = EstimateScene(simulated.input, options, {}, &cpu);
       const model::LightField found =
-          EstimateScene(simulated.input, options, &device, nullptr, OpenClBackend());
+          EstimateScene(simulated.input, options, RunOn(OpenClBackend()), &device);
       double largest = 0, squares = 0;
       for (std::size_t i = 0; i < expected.values.size(); ++i) {
         const auto difference = static_cast<double>(std::abs(found.values[i] - expected.values[i]));
@@ -216,8 +217,8 @@ TEST(SceneSolver, ADeviceFindsTheSameStrength) {
   options.prior = Prior::kGradient;
   options.strength_rule = StrengthRule::kGcv;
   SceneSummary cpu, device;
-  EstimateScene(simulated.input, options, &cpu, nullptr);
-  EstimateScene(simulated.input, options, &device, nullptr, OpenClBackend());
+  EstimateScene(simulated.input, options, {}, &cpu);
+  EstimateScene(simulated.input, options, RunOn(OpenClBackend()), &device);
   EXPECT_NEAR(device.strength, cpu.strength, 0.02 * cpu.strength);
 }
 
@@ -248,7 +249,7 @@ TEST(SceneSolver, ADeviceWithoutDoubleIsRefusedForDoublePrecision) {
   SceneOptions options;
   options.double_precision = true;
   SceneSummary summary;
-  EXPECT_THAT(ErrorOf([&] { EstimateScene(MadeUp(1.3F), options, &summary, nullptr, &backend); }),
+  EXPECT_THAT(ErrorOf([&] { EstimateScene(MadeUp(1.3F), options, RunOn(&backend), &summary); }),
               AllOf(HasSubstr("opencl:7:7"), HasSubstr("does not support double precision"),
                     HasSubstr("cpu")));
 }
@@ -260,10 +261,10 @@ TEST(SceneSolver, CrossValidationFindsAStrengthAboutAsGood) {
     options.prior = prior;
     SceneSummary with_auto, with_gcv;
     const double of_auto =
-        MeanPsnr(simulated.truth, EstimateScene(simulated.input, options, &with_auto, nullptr));
+        MeanPsnr(simulated.truth, EstimateScene(simulated.input, options, {}, &with_auto));
     options.strength_rule = StrengthRule::kGcv;
     const double of_gcv =
-        MeanPsnr(simulated.truth, EstimateScene(simulated.input, options, &with_gcv, nullptr));
+        MeanPsnr(simulated.truth, EstimateScene(simulated.input, options, {}, &with_gcv));
     EXPECT_GT(of_gcv, of_auto - 0.7)
         << PriorName(prior) << " " << with_gcv.strength << " " << with_auto.strength;
     EXPECT_NE(with_gcv.strength, with_auto.strength);
@@ -276,9 +277,9 @@ TEST(SceneSolver, FloatIsAsGoodAsDouble) {
   SceneOptions options;
   SceneSummary summary;
   const double single =
-      MeanPsnr(simulated.truth, EstimateScene(simulated.input, options, &summary, nullptr));
+      MeanPsnr(simulated.truth, EstimateScene(simulated.input, options, {}, &summary));
   options.double_precision = true;
-  EXPECT_NEAR(MeanPsnr(simulated.truth, EstimateScene(simulated.input, options, &summary, nullptr)),
+  EXPECT_NEAR(MeanPsnr(simulated.truth, EstimateScene(simulated.input, options, {}, &summary)),
               single, 0.02);
 }
 
@@ -290,7 +291,7 @@ TEST(SceneSolver, AnImageWithoutBlurComesBack) {
     options.strength_rule = StrengthRule::kGiven;
     options.strength = 1e-6;
     SceneSummary summary;
-    const model::LightField found = EstimateScene(input, options, &summary, nullptr);
+    const model::LightField found = EstimateScene(input, options, {}, &summary);
     EXPECT_EQ(summary.strength, 1e-6);
     // The start of total variation is not taken for its answer, however close it is.
     EXPECT_EQ(summary.reweightings > 0, prior == Prior::kTotalVariation);
@@ -308,7 +309,7 @@ TEST(SceneSolver, AConstantImageHasAConstantLightField) {
     SceneOptions options;
     options.prior = prior;
     SceneSummary summary;
-    const model::LightField found = EstimateScene(input, options, &summary, nullptr);
+    const model::LightField found = EstimateScene(input, options, {}, &summary);
     for (const float value : found.values) ASSERT_NEAR(value, 0.4, 1e-3) << PriorName(prior);
   }
 }
@@ -317,10 +318,9 @@ TEST(SceneSolver, AnyNumberOfThreadsGivesTheSameBits) {
   const Simulated& simulated = SimulatedScene();
   std::vector<float> first;
   for (const int threads : {1, 2, 3}) {
-    SceneOptions options;
-    options.threads = threads;
     SceneSummary summary;
-    const model::LightField found = EstimateScene(simulated.input, options, &summary, nullptr);
+    const model::LightField found =
+        EstimateScene(simulated.input, {}, RunOnThreads(threads), &summary);
     EXPECT_EQ(summary.threads, threads);
     if (first.empty()) first = found.values;
     EXPECT_EQ(found.values, first) << threads;
@@ -332,7 +332,7 @@ TEST(SceneSolver, SaysThatItDidNotConverge) {
   options.max_iterations = 7;
   options.tolerance = 1e-6;
   SceneSummary summary;
-  const model::LightField found = EstimateScene(MadeUp(1.3F), options, &summary, nullptr);
+  const model::LightField found = EstimateScene(MadeUp(1.3F), options, {}, &summary);
   EXPECT_EQ(summary.iterations, 7);
   EXPECT_FALSE(summary.converged);
   EXPECT_GT(summary.relative_residual, 1e-6);
@@ -344,7 +344,7 @@ TEST(SceneSolver, SaysWhenItAssumesTheNoise) {
   EstimateInput input = MadeUp(0.4F, 1);
   for (float& value : input.image.values) value = 0.0005F;
   SceneSummary summary;
-  EstimateScene(input, {}, &summary, nullptr);
+  EstimateScene(input, {}, {}, &summary);
   EXPECT_THAT(summary.message, HasSubstr("1/255 is assumed"));
   EXPECT_NEAR(summary.noise_sigma, 1.0 / 255, 1e-12);
 }
@@ -353,7 +353,7 @@ TEST(SceneSolver, MapsShowBlurAndWhatIsOccluded) {
   const EstimateInput input = MadeUp(1.5F, 1);
   SceneSummary summary;
   SceneMaps maps;
-  const model::LightField found = EstimateScene(input, {}, &summary, &maps);
+  const model::LightField found = EstimateScene(input, {}, {}, &summary, &maps);
   // Three places a step of 1.5 px apart: variance 2/3 of its square.
   for (const float sigma : maps.blur_sigma_px) EXPECT_NEAR(sigma, 1.5 * std::sqrt(2.0 / 3), 1e-5);
   ASSERT_EQ(maps.residual.size(), 40 * 36u);
@@ -377,7 +377,7 @@ TEST(SceneSolver, ViewsAreTheRadianceWarped) {
   for (const EstimateInput& input : {simulated, off_focus}) {
     SceneSummary summary;
     SceneMaps maps;
-    const model::LightField found = EstimateScene(input, {}, &summary, &maps);
+    const model::LightField found = EstimateScene(input, {}, {}, &summary, &maps);
     for (const auto& [k, l] : {std::pair{0, 0}, {2, 2}, {4, 1}, {1, 3}}) {
       EXPECT_EQ(
           model::ViewImage(found, k, l).values,
@@ -403,32 +403,33 @@ TEST(SceneSolver, GivesConfidenceToASinkThatWantsIt) {
       ++views;
     };
     SceneSummary summary;
-    EstimateSceneViews(input, {}, sink, &summary, nullptr);
+    EstimateScene(input, {}, RunTo(sink), &summary);
     EXPECT_EQ(views, 9);
   }
 }
 
 TEST(SceneSolver, ProgressNeverGoesBackAndMayStop) {
-  SceneOptions options;
+  SolverRun run;
   int last = 0, all = 0;
-  options.progress = [&](int done, int total) {
+  run.progress = [&](int done, int total) {
     EXPECT_GE(done, last);
     EXPECT_LE(done, total);
     last = done;
     all = total;
   };
   SceneSummary summary;
-  EstimateScene(MadeUp(1.3F), options, &summary, nullptr);
+  EstimateScene(MadeUp(1.3F), {}, run, &summary);
   EXPECT_EQ(last, all);
   EXPECT_GT(all, 9);
-  options.progress = [](int, int) { throw Interrupted(); };
-  EXPECT_THROW(EstimateScene(MadeUp(1.3F), options, &summary, nullptr), Interrupted);
+  run.progress = [](int, int) { throw Interrupted(); };
+  EXPECT_THROW(EstimateScene(MadeUp(1.3F), {}, run, &summary), Interrupted);
 }
 
 TEST(SceneSolver, RefusesWhatItCannotUse) {
   SceneSummary summary;
+  SolverRun run;
   const auto message = [&](const EstimateInput& input, const SceneOptions& options) {
-    return ErrorOf([&] { EstimateScene(input, options, &summary, nullptr); });
+    return ErrorOf([&] { EstimateScene(input, options, run, &summary); });
   };
   const EstimateInput good = MadeUp(0.5F);
   EstimateInput input = good;
@@ -457,10 +458,10 @@ TEST(SceneSolver, RefusesWhatItCannotUse) {
   options.max_iterations = 0;
   EXPECT_THAT(message(good, options), HasSubstr("max_iterations is 0"));
   options = {};
-  options.memory_limit_mib = 1;
+  run.memory_limit_mib = 1;
   EXPECT_THAT(message(good, options),
               AllOf(HasSubstr("memory limit 1 MiB"), HasSubstr("must be at least")));
-  options.memory_limit_mib = 1e5;
+  run.memory_limit_mib = 1e5;
   EXPECT_EQ(message(good, options), "(no error)");
   EXPECT_GT(summary.predicted_memory_mib, 1);
 }

@@ -2,19 +2,16 @@
 #define THICKLENS_ESTIMATOR_BLOCK_SOLVER_H_
 
 #include <cstdint>
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "thicklens/estimator/estimate_input.h"
-#include "thicklens/kernels/device.h"
+#include "thicklens/estimator/solver_run.h"
 #include "thicklens/kernels/kernels.h"
 #include "thicklens/model/light_field.h"
 
 namespace thicklens::estimator {
-
-class BlockStore;
 
 // The solver of the linear system of one block.
 enum class BlockSolver {
@@ -51,22 +48,17 @@ struct BlockOptions {
   kernels::Splat splat = kernels::Splat::kBilinear;
   double gamma = 1;             // > 0
   std::optional<double> ridge;  // mu, >= 0; default 1e-2/(U V)
-  // Edge of the square blocks, px. Default: 16, or the largest edge that `memory_limit_mib` allows.
+  // Edge of the square blocks, px, >= 1. Default: 16, or the largest edge that the memory limit of
+  // the run allows.
   std::optional<int> block_px;
-  std::optional<double> memory_limit_mib;  // limit for the whole process
-  double rcond_min = 1e-12;                // smallest rcond that is accepted of direct solvers
+  double rcond_min = 1e-12;  // smallest rcond that is accepted of direct solvers, >= 0, < 1
   // Limits of iterative solvers: the relative residual of a block at which they stop, > 0, < 1, and
   // the maximum number of iterations for one channel of a block, >= 1.
   double tolerance = 1e-6;
   int max_iterations = 1000;
   bool falloff = true;  // applies the irradiance of [S12] if there is a camera
-  int threads = 0;      // 0: one per core
-  // Called when a block is finished, from any thread, but never by two threads at once. May throw
-  // to stop the estimate.
-  std::function<void(int done, int total)> progress;
-  // keeps finished blocks and finds them again; not owned; null: no store
-  BlockStore* store = nullptr;
 
+  // Returns false, and the reason in `why` (may be null), if a member is not in its range.
   bool IsValid(std::string* why) const;
 };
 
@@ -80,25 +72,19 @@ struct BlockReport {
   double relative_residual = 0;  // |N x - b|/|b|, recomputed; the maximum over the channels
 };
 
-struct BlockSummary {
-  std::string message = "not run";
+// How the blocks were solved.
+struct BlockDiagnostics {
   int block_px = 0;
-  std::vector<BlockReport> blocks;
-  int blocks_from_store = 0;  // number of `blocks` that came from the store; the others were solved
+  int blocks_from_store = 0;  // number of blocks that came from the store; the others were solved
   double gamma = 0, ridge = 0;
-  std::optional<double> rcond_min;  // minimum over the blocks; absent for iterative solvers
-  double relative_residual = 0;     // maximum over the blocks
+};
+
+// The predicted memory has a margin: it is what the process held before, the light field, and for
+// each thread a block as large as the most demanding of a few analysed blocks.
+struct BlockSummary : SolverResult, BlockDiagnostics {
   int iterations = 0;               // iterative solvers: the maximum over the blocks
-  // whether the largest residual is within the tolerance; direct solvers: always true
-  bool converged = false;
-  double setup_seconds = 0;  // geometry of the views, the prior and the choice of the block size
-  double solve_seconds = 0;
-  // Maximum memory that the whole process is expected to hold, with a margin: what it held before,
-  // the light field, and for each thread a block as large as the most demanding of a few analysed
-  // blocks.
-  double predicted_memory_mib = 0;
-  int threads = 0;
-  std::string device;
+  std::optional<double> rcond_min;  // minimum over the blocks; absent for iterative solvers
+  std::vector<BlockReport> blocks;  // row by row
 };
 
 // Estimates the light field of one photograph block by block; each block is solved on its own:
@@ -112,12 +98,13 @@ struct BlockSummary {
 // leave a block are lost. The result does not depend on the number of threads. An iterative solver
 // that does not converge leaves what it has reached: see `converged`.
 //
-// Throws Error for options and inputs that do not fit, for a block whose factor is singular or
-// whose rcond is below the limit (the message names the block), for iterations that end with a
-// relative residual of 10 or more, and for a memory limit that blocks of BlockOptions::block_px, or
-// without it the smallest blocks, exceed.
+// The systems are made on the backend of the run; a store of the run keeps the blocks. `summary`
+// may be null. Throws Error for options and inputs that do not fit, for a block whose factor is
+// singular or whose rcond is below the limit (the message names the block), for iterations that end
+// with a relative residual of 10 or more, and for a memory limit that blocks of
+// BlockOptions::block_px, or without it the smallest blocks, exceed.
 model::LightField EstimateByBlocks(const EstimateInput& input, const BlockOptions& options,
-                                   kernels::Backend* backend, BlockSummary* summary);
+                                   const SolverRun& run, BlockSummary* summary);
 
 }  // namespace thicklens::estimator
 

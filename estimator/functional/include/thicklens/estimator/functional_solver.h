@@ -1,11 +1,11 @@
 #ifndef THICKLENS_ESTIMATOR_FUNCTIONAL_SOLVER_H_
 #define THICKLENS_ESTIMATOR_FUNCTIONAL_SOLVER_H_
 
-#include <functional>
 #include <optional>
 #include <string>
 
 #include "thicklens/estimator/estimate_input.h"
+#include "thicklens/estimator/solver_run.h"
 
 namespace thicklens::estimator {
 
@@ -15,28 +15,19 @@ struct FunctionalOptions {
   double tolerance = 1e-3;      // relative residual at which conjugate gradients stop, > 0, < 1
   int max_iterations = 1000;    // limit for each channel, >= 1
   bool double_precision = false;
-  bool falloff = true;                     // applies the irradiance of [S12] if there is a camera
-  int threads = 0;                         // 0: one per core
-  std::optional<double> memory_limit_mib;  // limit for the whole process
-  // Called for each view and each iteration, from any thread, but never by two threads at once. May
-  // throw to stop the estimate.
-  std::function<void(int done, int total)> progress;
+  bool falloff = true;  // applies the irradiance of [S12] if there is a camera
 
+  // Returns false, and the reason in `why` (may be null), if a member is not in its range.
   bool IsValid(std::string* why) const;
 };
 
-struct FunctionalSummary {
-  std::string message = "not run";
-  int iterations = 0;      // maximum over the channels
-  bool converged = false;  // whether all channels reached the tolerance
-  // |b - S y|/|b| of the system S y = b below, recomputed from the solution; the maximum over the
-  // channels.
-  double relative_residual = 0;
+struct FunctionalDiagnostics {
   double gamma = 0, ridge = 0;
-  double setup_seconds = 0, solve_seconds = 0, views_seconds = 0;
-  // Maximum memory that the whole process is expected to hold, with what it held before.
-  double predicted_memory_mib = 0;
-  int threads = 0;
+};
+
+// The relative residual is |b - S y|/|b| of the system S y = b below.
+struct FunctionalSummary : SolverResult, FunctionalDiagnostics {
+  int iterations = 0;  // maximum over the channels
 };
 
 // Estimates the light field of one photograph with the functional of EstimateByBlocks, but for the
@@ -53,11 +44,11 @@ struct FunctionalSummary {
 // Limit case: as gamma grows, R(p, .) becomes even. That is EstimateScene with a ridge of U V mu, a
 // linear H and no pixel weights. Each view shows R(., k) by its depth.
 //
-// Throws Error for options and inputs that do not fit, for a memory limit that is too low, and for
-// iterations that end with a relative residual of 10 or more. The result does not depend on the
-// number of threads.
+// `summary` may be null. Throws Error for options and inputs that do not fit, for a memory limit
+// that is too low, and for iterations that end with a relative residual of 10 or more. The result
+// does not depend on the number of threads.
 model::LightField EstimateFunctional(const EstimateInput& input, const FunctionalOptions& options,
-                                     FunctionalSummary* summary);
+                                     const SolverRun& run, FunctionalSummary* summary);
 
 }  // namespace thicklens::estimator
 

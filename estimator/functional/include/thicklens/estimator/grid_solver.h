@@ -6,6 +6,9 @@
 
 namespace thicklens::estimator {
 
+// The options of EstimateOnGrid, a type of their own to tell the solver by (SolverOptions).
+struct GridOptions : FunctionalOptions {};
+
 // Estimates the light field of one photograph with the functional of EstimateByBlocks, on the same
 // two-plane grid and with the same H, D (in the warp form) and L0, but for the whole image at once.
 // The solution minimises
@@ -19,11 +22,11 @@ namespace thicklens::estimator {
 // EstimateFunctional solves nearly the same problem in far fewer. summary->relative_residual is
 // that of the system above.
 //
-// Throws Error for options and inputs that do not fit, for a memory limit that is too low, and for
-// iterations that end with a relative residual of 10 or more. The result does not depend on the
-// number of threads.
+// `summary` may be null. Throws Error for options and inputs that do not fit, for a memory limit
+// that is too low, and for iterations that end with a relative residual of 10 or more. The result
+// does not depend on the number of threads.
 model::LightField EstimateOnGrid(const EstimateInput& input, const FunctionalOptions& options,
-                                 FunctionalSummary* summary);
+                                 const SolverRun& run, FunctionalSummary* summary);
 
 }  // namespace thicklens::estimator
 

@@ -8,7 +8,7 @@
 
 #include "thicklens/estimator/estimate_input.h"
 #include "thicklens/estimator/ray_confidence.h"
-#include "thicklens/kernels/device.h"
+#include "thicklens/estimator/solver_run.h"
 
 namespace thicklens::estimator {
 
@@ -37,8 +37,9 @@ enum class StrengthRule {
 struct SceneOptions {
   Prior prior = Prior::kTotalVariation;
   StrengthRule strength_rule = StrengthRule::kAuto;
-  double strength =
-      0;  // strength of the prior in its own unit (see EstimateScene); only for kGiven, > 0
+  // Strength of the prior in its own unit (see EstimateScene): finite and > 0 for kGiven; the other
+  // rules do not use it, and it is finite and >= 0.
+  double strength = 0;
   // Relative residual at which conjugate gradients stop, > 0, < 1. Absent: UsualTolerance.
   std::optional<double> tolerance;
   // Maximum number of conjugate-gradient iterations, for all solves of one strength together; >= 1.
@@ -53,41 +54,33 @@ struct SceneOptions {
   // in EstimateFunctional.
   bool cubic = true;
   bool falloff = true;  // use the irradiance of [S12] if there is a camera
-  int threads = 0;      // 0: one per core
-  // Limit for the whole process. Where the whole image needs more, it is solved in bands.
-  std::optional<double> memory_limit_mib;
   int least_bands = 1;  // minimum number of bands, >= 1
-  // Called from any thread, one at a time, for each iteration and each view, and repeatedly between
-  // them. May throw to stop.
-  std::function<void(int done, int total)> progress;
 
   double tolerance_or_usual() const { return tolerance.value_or(UsualTolerance(prior)); }
+  // Returns false, and the reason in `why` (may be null), if a member is not in its range.
   bool IsValid(std::string* why) const;
 };
 
-struct SceneSummary {
-  std::string message = "not run";
+// What the scene solver found besides the light field.
+struct SceneDiagnostics {
   Prior prior = Prior::kTotalVariation;
   double strength = 0;
   double noise_sigma = 0;  // of encoded values in [0, 1], as found in the photograph
-  int iterations = 0;      // conjugate-gradient iterations at full size, for all strengths together
   int reweightings = 0;    // of total variation: one per iteration, after the first few
-  bool converged = false;  // whether the last system converged to the tolerance
-  // |A r - b|/|b| of the last system, recomputed from the answer.
-  double relative_residual = 0;
   // The share of the photograph's pixels that have a row of their own in H (occlusions, steep
   // surfaces), and the share of the aperture's rays that show points hidden from the centre view.
   double row_share = 0, occluded_fraction = 0;
   // Rms over the photograph of (H r - I), in encoded values; noise alone would give about
   // noise_sigma.
   double residual_rms = 0;
-  double setup_seconds = 0, solve_seconds = 0, views_seconds = 0;
-  double predicted_memory_mib = 0;
-  int threads = 0;
-  std::string device;  // device of the iterations
   // Number of parts in which the image was solved, from top to bottom. The iterations and the
   // relative residual are the maximum over the parts.
   int bands = 1;
+};
+
+// Convergence and residual are those of the last system; the device is that of the iterations.
+struct SceneSummary : SolverResult, SceneDiagnostics {
+  int iterations = 0;  // conjugate-gradient iterations at full size, for all strengths together
 };
 
 // Maps of the estimate's quality. All have the size of the image except the last.
@@ -96,7 +89,7 @@ struct SceneMaps {
   std::vector<float> residual;  // H r - I in encoded values, the channels' mean
   std::vector<float> occluded_fraction;  // share of the aperture that sees a pixel past an edge
   std::vector<float> blur_sigma_px;      // blur of the photograph, by the depth
-  // Confidence of all rays, view by view, row by row; set only by EstimateScene.
+  // Confidence of all rays, view by view, row by row; empty if a sink gets the views.
   std::vector<Confidence> confidence;
 };
 
@@ -127,20 +120,20 @@ struct SceneMaps {
 //              variances without their noise; lambda = 1e-3 (255 sigma)^1.5
 //   kGcv       the minimum of generalised cross-validation near that, the trace times 1.4
 //
-// The iteration starts from the estimate at half the size. It is computed on the backend (null: in
-// C++ on the processor). The result does not depend on the number of threads. `summary` and `maps`
-// receive the results. Throws Error for options and inputs that do not fit, for a memory limit that
-// is too low, and for errors of a device.
+// The iteration starts from the estimate at half the size. It is computed on the backend of the
+// run, and the views go to its sink if there is one. The result does not depend on the number of
+// threads. `summary` and `maps` receive the results; both may be null. Throws Error for options and
+// inputs that do not fit, for a memory limit that is too low, and for errors of a device.
 //
 // Bands use the noise and the strength of the whole photograph (kAuto samples parts of it, kGcv
 // uses the band in the middle). Each band is solved with enough rows around it that no seam is
 // visible: the differences due to bands are within those that the tolerance permits.
 model::LightField EstimateScene(const EstimateInput& input, const SceneOptions& options,
-                                SceneSummary* summary, SceneMaps* maps,
-                                kernels::Backend* backend = nullptr);
+                                const SolverRun& run, SceneSummary* summary,
+                                SceneMaps* maps = nullptr);
 
 // Receives the views one by one as they are made: each once, in any order, from several threads at
-// the same time. May throw to stop.
+// the same time. An exception that it throws ends the estimate.
 struct SceneViewSink {
   // `confidence` is empty unless wants_confidence is set.
   std::function<void(int k, int l, const model::LinearImage& view,
@@ -149,10 +142,6 @@ struct SceneViewSink {
   double bytes = 0;  // memory that the sink needs per view while it processes it
   bool wants_confidence = true;
 };
-// Computes EstimateScene without ever holding all views; the returned light field has no views.
-model::LightField EstimateSceneViews(const EstimateInput& input, const SceneOptions& options,
-                                     const SceneViewSink& sink, SceneSummary* summary,
-                                     SceneMaps* maps, kernels::Backend* backend = nullptr);
 
 // Returns the standard deviation of the noise of encoded values in [0, 1], quantisation included
 // [D97]. For each 16 x 16 block with a mean of 12/255 to 243/255 it takes the rms of (p00 - p10 -

@@ -1,0 +1,58 @@
+#ifndef THICKLENS_ESTIMATOR_SOLVER_RUN_H_
+#define THICKLENS_ESTIMATOR_SOLVER_RUN_H_
+
+#include <optional>
+#include <string>
+
+#include "thicklens/base/progress.h"
+
+namespace thicklens::kernels {
+class Backend;
+}  // namespace thicklens::kernels
+
+namespace thicklens::estimator {
+
+class BlockStore;
+struct SceneViewSink;
+
+// How a solver is run. What it solves is in its options. Every solver is called with the problem,
+// its options, the run and the summary, in this order. It is cancelled by the CancelScope of the
+// calling thread (thicklens/base/cancel.h).
+struct SolverRun {
+  int threads = 0;  // >= 0; 0: one per core
+  // Limit for the whole process, finite, > 0. The scene solver then solves in as many bands as it
+  // needs, and the block solver chooses the size of its blocks. A solver that needs more refuses.
+  std::optional<double> memory_limit_mib;
+  // The device that computes; null: the processor. The solvers of the functional for a whole image
+  // always compute on the processor.
+  kernels::Backend* backend = nullptr;
+  ProgressFunction progress;
+  BlockStore* store = nullptr;  // keeps finished blocks and finds them again; block solver only
+  // Gets the views one by one as they are made, so that they are never held all together. The light
+  // field that is returned has no views. Scene solver only.
+  const SceneViewSink* sink = nullptr;
+
+  // Returns false, and the reason in `why` (may be null), if a member is not in its range.
+  bool IsValid(std::string* why) const;
+};
+
+// What every solver reports of its result.
+struct SolverResult {
+  std::string message = "not run";
+  // Whether the iterations reached their tolerance; direct solvers: true.
+  bool converged = false;
+  // |A x - b|/|b| of the solved system, recomputed from the solution; the maximum over the parts in
+  // which it was solved (channels, blocks, bands).
+  double relative_residual = 0;
+  double setup_seconds = 0;  // geometry, priors, and the choice of the parts
+  double solve_seconds = 0;
+  double views_seconds = 0;  // making the views from the solution; 0 where they are the solution
+  // Maximum memory that the whole process is expected to hold, including what it held before.
+  double predicted_memory_mib = 0;
+  int threads = 0;
+  std::string device;
+};
+
+}  // namespace thicklens::estimator
+
+#endif  // THICKLENS_ESTIMATOR_SOLVER_RUN_H_
