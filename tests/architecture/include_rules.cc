@@ -179,6 +179,29 @@ void CheckIncludes(const Judge& judge, const std::string& path, const std::strin
   }
 }
 
+struct QuotedInclude {
+  int line = 0;
+  std::string header;
+};
+
+std::vector<QuotedInclude> QuotedIncludes(const std::string& text) {
+  static const std::regex directive(
+      R"re(^\s*#\s*(?:include|include_next|import)\s*"([^"]+)".*$)re");
+  std::vector<QuotedInclude> includes;
+  std::istringstream lines(text);
+  std::string line;
+  for (int number = 1; std::getline(lines, line); ++number) {
+    std::smatch found;
+    if (std::regex_match(line, found, directive)) includes.push_back({number, found[1]});
+  }
+  return includes;
+}
+
+bool LiesInOneOf(const Names& folders, const std::string& path) {
+  return std::any_of(folders.begin(), folders.end(),
+                     [&](const std::string& folder) { return StartsWith(path, folder + "/"); });
+}
+
 }  // namespace
 
 bool IsSource(const std::string& path) {
@@ -209,6 +232,30 @@ std::vector<std::string> Violations(const SourceTree& tree, const RoomsTable& ta
     CheckIncludes(Judge(tree, public_headers, table, path, *room), path, text, &violations);
   }
   return violations;
+}
+
+std::vector<std::string> PrivateIncludes(const SourceTree& tree, const std::string& client,
+                                         const Names& libraries) {
+  Names left;
+  for (const auto& entry : tree) {
+    if (StartsWith(entry.first, client + "/") && IsSource(entry.first)) left.push_back(entry.first);
+  }
+  std::set<std::string> seen(left.begin(), left.end());
+  std::set<std::string> found;
+  while (!left.empty()) {
+    const std::string path = left.back();
+    left.pop_back();
+    for (const QuotedInclude& include : QuotedIncludes(tree.at(path))) {
+      // A public header is included by another name than its path.
+      if (tree.count(include.header) == 0) continue;
+      if (LiesInOneOf(libraries, include.header)) {
+        found.insert(path + ":" + std::to_string(include.line) + ": includes " + include.header);
+      } else if (seen.insert(include.header).second) {
+        left.push_back(include.header);
+      }
+    }
+  }
+  return {found.begin(), found.end()};
 }
 
 }  // namespace thicklens::architecture

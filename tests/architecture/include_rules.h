@@ -20,6 +20,12 @@ bool IsSource(const std::string& path);
 // and every public header in a wrong place, each as "file:line: what is wrong; what is allowed".
 std::vector<std::string> Violations(const SourceTree& tree, const RoomsTable& table);
 
+// Returns every include of a private header of a library in the files below the folder `client`,
+// and in the private headers that they include directly or through others, each as "file:line:
+// includes header". `libraries` are the folders of the libraries, for example "model".
+std::vector<std::string> PrivateIncludes(const SourceTree& tree, const std::string& client,
+                                         const Names& libraries);
+
 }  // namespace thicklens::architecture
 
 #endif  // THICKLENS_TESTS_ARCHITECTURE_INCLUDE_RULES_H_

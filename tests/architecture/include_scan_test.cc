@@ -35,6 +35,16 @@ TEST(IncludeScan, EveryIncludeOfTheRepositoryIsAllowed) {
   EXPECT_THAT(Lines(Violations(tree, table)), IsEmpty());
 }
 
+// The command line is a client of the libraries as any other program is: what it needs is public.
+TEST(IncludeScan, TheCommandsIncludeNoPrivateHeaderOfALibrary) {
+  const SourceTree tree = ReadRepository(RepositoryTable().Modules());
+  ASSERT_EQ(tree.count("tools/commands/calibrate.cc"), 1U);
+  EXPECT_THAT(Lines(PrivateIncludes(
+                  tree, "tools/commands",
+                  {"model", "kernels", "calib", "estimator", "tools/io", "tools/interface"})),
+              IsEmpty());
+}
+
 TEST(IncludeScan, EveryRoomHasSources) {
   const RoomsTable table = RepositoryTable();
   std::set<std::string> found;
@@ -167,6 +177,22 @@ INSTANTIATE_TEST_SUITE_P(
         Planted{"OpenClCode", "fits/src/a.cl", "<Eigen/Core>", "ceres/, CLI/"},
         Planted{"OtherExtension", "glass/image/a.hpp", "<boost/any.hpp>", "yaml-cpp/"}),
     [](const auto& planted) { return std::string(planted.param.name); });
+
+TEST(IncludeScanner, FindsPrivateHeadersOfLibrariesAlsoThroughOthers) {
+  const SourceTree tree = {
+      {"program/commands/a.cc",
+       "#include <vector>\n#include \"thicklens/glass/camera.h\"\n#include \"program/words.h\"\n"},
+      {"program/commands/b.cc", "#include \"glass/optics/secret.h\"\n"},
+      {"program/words.h", "#include \"program/words.h\"\n\n # include \"program/io/codec.h\"\n"},
+      {"program/words.cc", "#include \"glass/optics/secret.h\"\n"},  // included by nobody
+      {"program/io/codec.h", "#include \"glass/optics/secret.h\"\n"},
+      {"glass/optics/secret.h", ""},
+      {"glass/optics/include/thicklens/glass/camera.h", "#include \"glass/optics/secret.h\"\n"}};
+  EXPECT_THAT(PrivateIncludes(tree, "program/commands", {"glass", "program/io"}),
+              ElementsAre("program/commands/b.cc:1: includes glass/optics/secret.h",
+                          "program/words.h:3: includes program/io/codec.h"));
+  EXPECT_THAT(PrivateIncludes(tree, "program/commands", {"other"}), IsEmpty());
+}
 
 TEST(IncludeScanner, RefusesFilesInTheWrongPlace) {
   EXPECT_THAT(Violations({{"glass/a.cc", ""},

@@ -16,9 +16,9 @@
 #include "thicklens/base/printable_text.h"
 #include "thicklens/estimator/blas.h"
 #include "thicklens/estimator/block_solver.h"
+#include "thicklens/io/image_io.h"
 #include "thicklens/kernels/device.h"
 #include "tools/commands/commands.h"
-#include "tools/io/opencv_codecs.h"
 #include "tools/options/command_frame.h"
 #include "tools/options/light_field_options.h"
 #include "tools/stress/stress_suite.h"
@@ -103,7 +103,7 @@ void ExamineDevice(const DoctorOptions& options, Findings* findings) {
 
 void ExamineImageFiles(Findings* findings) {
   try {
-    io::LoadedOpenCvCodecs();
+    io::RequireImageCodecs();
     findings->image_files = "PNG; JPEG, TIFF, EXR, BMP and PNM by OpenCV";
   } catch (const Error& error) {
     findings->image_files = "PNG only";

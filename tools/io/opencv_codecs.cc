@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "thicklens/base/error.h"
+#include "thicklens/io/image_io.h"
 
 namespace thicklens::io {
 namespace {
@@ -64,5 +65,7 @@ const OpenCvCodecs& LoadedOpenCvCodecs() {
   static const OpenCvCodecs* const codecs = Load();
   return *codecs;
 }
+
+void RequireImageCodecs() { LoadedOpenCvCodecs(); }
 
 }  // namespace thicklens::io

@@ -12,6 +12,9 @@ namespace thicklens::io {
 // channels; never rotated. Throws Error that begins with `name`.
 cv::Mat DecodeImage(const std::string& bytes, const std::string& name);
 cv::Mat ReadImageFile(const std::string& path);
+// Throws Error if the library that reads JPEG, TIFF, EXR, BMP and PNM files and writes JPEG is
+// missing from the program's installation. PNG files need no such library.
+void RequireImageCodecs();
 
 model::EncodedImage ToEncodedImage(const cv::Mat& image);
 // Returns the first three of four channels, and other images unchanged: alpha contains no light.
