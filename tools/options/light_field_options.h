@@ -57,7 +57,7 @@ void AddDepthOptions(CLI::App* command, DepthOptions* options);
 // Throws UsageError if the kind is not given, z or range have no unit, or disparity has one.
 model::DepthConvention ConventionOf(const DepthOptions& options);
 
-// The same as the interface takes it.
+// Likewise in the form of the interface.
 DepthMeaning DepthMeaningOf(const DepthOptions& options);
 
 // The option --aperture-shape; for an empty text the result is `otherwise`.

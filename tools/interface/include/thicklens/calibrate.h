@@ -38,7 +38,7 @@ struct CalibrateOptions {
 using CalibrationSummary = calib::CalibrationSummary;
 using CalibrationDiagnostics = calib::CalibrationDiagnostics;
 
-// What was found, with one record per frame, and the camera that has it.
+// Everything that a calibration found, with one record per frame, and the camera that has it.
 struct Calibration : calib::Calibration {
   // The sweep's camera with the calibrated values and their evidence (hash of the frames, version,
   // date). Without a calibration if it was refused.

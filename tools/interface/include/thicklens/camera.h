@@ -21,7 +21,7 @@ THICKLENS_EXPORT Camera ReadCamera(const std::string& path);
 // Throws Error if the camera is not valid or the file cannot be written.
 THICKLENS_EXPORT void WriteCamera(const std::string& path, const Camera& camera);
 
-// What the camera's file assumes, one line each: former names, and numbers that are neither
+// Remarks on the camera's file, one line each: former names, and assumed numbers that are neither
 // published nor measured.
 THICKLENS_EXPORT std::vector<std::string> NoticesOf(const Camera& camera);
 

@@ -37,7 +37,7 @@ struct ExplainOptions {
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 
-// What a camera does at some depths.
+// The blur and the effects of a camera at some depths.
 struct CameraExplanation {
   DepthRange depth_range;  // given, or of the map
   model::Explanation camera;

@@ -54,9 +54,9 @@ THICKLENS_EXPORT std::size_t WriteLightField(const std::string& folder,
                                              LightFieldFormat format = LightFieldFormat::kPng,
                                              const RunControl& run = {});
 
-// The same in two steps, for a folder that is to be claimed before a long computation, or that gets
-// other files too: the name is claimed, views and description are written below it, and Commit of
-// the folder (thicklens/base/output_file.h) puts it in place. Throws Error.
+// Both steps of WriteLightField, for a folder that is claimed before a long computation or that
+// gets other files too: the name is claimed, views and description are written below it, and Commit
+// of the folder (thicklens/base/output_file.h) puts it in place. Throws Error.
 THICKLENS_EXPORT OutputFolder
 ClaimLightFieldFolder(const std::string& folder, LightFieldFormat format = LightFieldFormat::kPng);
 THICKLENS_EXPORT std::size_t WriteLightField(OutputFolder* folder, const LightField& light_field,

@@ -35,8 +35,8 @@ THICKLENS_EXPORT SceneSimulation ReadSceneSimulation(const std::string& path);
 THICKLENS_EXPORT Sweep SimulateSweep(const SweepSimulation& simulation, const std::string& folder,
                                      bool unknown_offset = false, const RunControl& run = {});
 
-// The same in steps, for a folder that is claimed before a long computation, or that gets other
-// files too: the name is claimed, the frames are written below it as they are rendered and the
+// Both steps of it, for a folder that is claimed before a long computation or that gets other files
+// too: the name is claimed, the frames are written below it as they are rendered and the
 // descriptions after them, and Commit of the folder (thicklens/base/output_file.h) puts it in
 // place.
 struct SimulatedSweep {

@@ -72,7 +72,7 @@ THICKLENS_EXPORT Sweep ReadSweep(const std::string& path, const SweepOverrides& 
 THICKLENS_EXPORT Sweep ReadSweepFolder(const std::string& folder, const std::string& readings_csv,
                                        const SweepOverrides& overrides, const RunControl& run = {});
 
-// What was assumed about the sweep and its camera, one line each: what Calibrate reports before it
+// Assumptions about the sweep and its camera, one line each, which Calibrate reports before it
 // measures.
 THICKLENS_EXPORT std::vector<std::string> NoticesOf(const Sweep& sweep);
 
