@@ -2,59 +2,17 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
-#include <limits>
+#include <tuple>
 #include <vector>
 
 #include "thicklens/base/error.h"
-#include "thicklens/estimator/fill_holes.h"
 #include "thicklens/kernels/device.h"
 #include "tools/options/option_values.h"
-#include "tools/options/with_file_context.h"
 
 namespace thicklens::tools {
 namespace {
 
 constexpr int kMaxGrid = 1000;
-
-// Returns the step between views on the aperture in mm along u, or along v if u has one view.
-double ApertureStepMm(const model::LightFieldGrid& grid, const model::Camera& camera) {
-  const Eigen::Vector2d step = model::ApertureStepsMm(grid, camera);
-  return std::abs(step.x() != 0 ? step.x() : step.y());
-}
-
-estimator::DisparityMap WithoutHoles(const estimator::DisparityMap& map,
-                                     const model::LinearImage& image, double at_infinity,
-                                     PreparedDepth* prepared) {
-  for (const float disparity : map.disparity) prepared->was_hole.push_back(std::isnan(disparity));
-  return estimator::FillHoles(map, image, &prepared->holes, at_infinity);
-}
-
-void RequireSize(const model::RawDepthMap& map, const std::string& map_name,
-                 const model::LinearImage& image) {
-  if (map.width_px == image.width_px && map.height_px == image.height_px) return;
-  throw Error(fmt::format("{}: it is {}x{} px, the image is {}x{} px: the sizes must be equal",
-                          map_name, map.width_px, map.height_px, image.width_px, image.height_px));
-}
-
-PreparedDepth PrepareByCamera(const model::RawDepthMap& map, const std::string& map_name,
-                              model::DepthConvention convention, const model::LinearImage& image,
-                              const model::Camera& camera, const model::LightFieldGrid& grid) {
-  if (convention.kind == model::DepthKind::kDisparity)
-    convention.aperture_step_mm = ApertureStepMm(grid, camera);
-  // Only the size of the image matters here.
-  model::LinearImage empty{map.width_px, map.height_px, 1, {}};
-  empty.values.assign(map.values.size(), 0.0F);
-  const model::Scene scene = model::MakeScene(camera, std::move(empty), map, convention, map_name);
-  PreparedDepth prepared;
-  prepared.depth = scene.depth;
-  prepared.disparity = WithFileContext(map_name, [&] {
-    return WithoutHoles(
-        estimator::DisparityOnGrid(grid, scene.depth_mm, map.width_px, map.height_px), image,
-        estimator::DisparityAtInfinity(grid), &prepared);
-  });
-  return prepared;
-}
 
 }  // namespace
 
@@ -229,27 +187,6 @@ void AddDeviceOption(CLI::App* command, std::string* text) {
       ->check(is_device)
       ->capture_default_str()
       ->type_name("DEVICE");
-}
-
-PreparedDepth PrepareDepth(const model::RawDepthMap& map, const std::string& map_name,
-                           const DepthOptions& options, const model::LinearImage& image,
-                           const model::Camera* camera, const model::LightFieldGrid* grid) {
-  const model::DepthConvention convention = ConventionOf(options);
-  RequireSize(map, map_name, image);
-  if (camera != nullptr) return PrepareByCamera(map, map_name, convention, image, *camera, *grid);
-  if (convention.kind != model::DepthKind::kDisparity) {
-    throw UsageError(
-        fmt::format("--depth-kind {}: millimetres need a camera (--camera CAMERA.yaml); without a "
-                    "camera the map must be a disparity",
-                    options.kind));
-  }
-  PreparedDepth prepared;
-  prepared.disparity = WithFileContext(map_name, [&] {
-    return WithoutHoles(estimator::DisparityFromMap(map, convention.disparity_scale,
-                                                    convention.disparity_offset_px),
-                        image, -std::numeric_limits<double>::infinity(), &prepared);
-  });
-  return prepared;
 }
 
 }  // namespace thicklens::tools

@@ -2,18 +2,13 @@
 #define THICKLENS_TOOLS_OPTIONS_LIGHT_FIELD_OPTIONS_H_
 
 #include <CLI/CLI.hpp>
-#include <cstddef>
 #include <optional>
 #include <string>
 #include <utility>
-#include <vector>
 
 #include "thicklens/depth.h"
-#include "thicklens/estimator/view_geometry.h"
 #include "thicklens/io/light_field_io.h"
 #include "thicklens/light_field.h"
-#include "thicklens/model/camera.h"
-#include "thicklens/model/light_field_grid.h"
 #include "thicklens/model/scene.h"
 
 namespace thicklens::tools {
@@ -66,20 +61,6 @@ model::ApertureShape ApertureShapeOr(const std::string& text, model::ApertureSha
 
 // --device auto|cpu|opencl[:PLATFORM[:DEVICE]].
 void AddDeviceOption(CLI::App* command, std::string* text);
-
-// The disparity of a photograph's pixels on the grid of its light field, without holes.
-struct PreparedDepth {
-  estimator::DisparityMap disparity;            // filled
-  std::size_t holes = 0;                        // number of filled holes
-  std::vector<bool> was_hole;                   // per pixel
-  std::optional<model::DepthStatistics> depth;  // in mm, if there is a camera
-};
-// Prepares a depth map. Without a camera the map must be a disparity, otherwise UsageError is
-// thrown. With a camera, `grid` is that of its light field, and model::MakeScene checks the map.
-// The sizes must be those of `image`. Throws Error.
-PreparedDepth PrepareDepth(const model::RawDepthMap& map, const std::string& map_name,
-                           const DepthOptions& options, const model::LinearImage& image,
-                           const model::Camera* camera, const model::LightFieldGrid* grid);
 
 }  // namespace thicklens::tools
 
