@@ -19,13 +19,13 @@
 namespace thicklens {
 namespace {
 
-std::string NameOf(const LightField& light_field) {
+std::string LightFieldName(const LightField& light_field) {
   return light_field.source.empty() ? "light field" : light_field.source;
 }
 
 Image ImageOf(model::LinearImage image, const LightField& light_field) {
   if (image.channels != 1 && image.channels != 3) {
-    throw Error(fmt::format("{}: 1 or 3 channels are expected, found {}", NameOf(light_field),
+    throw Error(fmt::format("{}: 1 or 3 channels are expected, found {}", LightFieldName(light_field),
                             image.channels));
   }
   return Image::FromLight(image.width_px, image.height_px,
@@ -113,7 +113,7 @@ estimator::Vignetting VignettingOf(const RenderAperture& aperture, const LightFi
   throw Error(fmt::format(
       "{}: its UV plane lies off the aperture and its weights belong to no known shape, so that "
       "the aperture between the views is unknown: {}leave out the effect vignetting ({})",
-      NameOf(light_field), give, run.Option("effects.without")));
+      LightFieldName(light_field), give, run.Option("effects.without")));
 }
 
 // Light that the views do not contain cannot be restored by weights.
@@ -179,7 +179,7 @@ Image Refocus(const LightField& light_field, const FocusOptions& options, const 
     if (!light_field.camera) {
       throw Error(
           fmt::format("{} {} mm: {} has no camera, so that depths in mm are unknown; give {}",
-                      run.Option("depth_mm"), *options.depth_mm, NameOf(light_field),
+                      run.Option("depth_mm"), *options.depth_mm, LightFieldName(light_field),
                       run.Option("disparity_px")));
     }
     disparity_px = estimator::DisparityAtDepthPx(light_field, *options.depth_mm);

@@ -7,11 +7,15 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "support/error_message.h"
+#include "support/temporary_folder.h"
 #include "thicklens/base/error.h"
 #include "thicklens/opencv.h"
 
 namespace thicklens {
 namespace {
+
+using testing::ErrorOf;
 
 TEST(ImageTest, BlueFirstIsRearranged) {
   const Image image = Image::FromEncoded(2, 1, ChannelOrder::kBgr, 8, {1, 2, 3, 4, 5, 6});
@@ -35,6 +39,33 @@ TEST(ImageTest, MatricesKeepTheirColoursInBothOrders) {
   const cv::Mat back = MatFromImage(image, ChannelOrder::kBgr);
   EXPECT_EQ(cv::countNonZero(back.reshape(1) != mat.reshape(1)), 0);
   EXPECT_EQ(MatFromImage(image, ChannelOrder::kRgb).at<cv::Vec3b>(1, 1), cv::Vec3b(30, 20, 10));
+}
+
+TEST(ImageTest, ARectangleKeepsCurveAndName) {
+  const Image image = Image::FromEncoded(3, 2, ChannelOrder::kGrey, 8, {1, 2, 3, 4, 5, 6},
+                                         TransferCurve::Linear(), "a.png");
+  const Image part = image.Cropped({1, 0, 2, 2});
+  EXPECT_EQ(part.width_px(), 2);
+  EXPECT_EQ(part.encoded().values, (std::vector<std::uint16_t>{2, 3, 5, 6}));
+  ASSERT_TRUE(part.transfer());
+  EXPECT_EQ(part.transfer()->Name(), TransferCurve::Linear().Name());
+  EXPECT_EQ(part.source(), "a.png");
+  EXPECT_EQ(ErrorOf([&] { image.Cropped({2, 0, 2, 2}); }).rfind("a.png: ", 0), 0U);
+}
+
+TEST(ImageTest, TheBytesOfAFileAreThoseThatAreWritten) {
+  const testing::TemporaryFolder folder;
+  const Image light =
+      Image::FromLight(2, 1, ChannelOrder::kGrey, {0.25F, 1.5F}, TransferCurve::Linear());
+  ImageFileOptions options;
+  options.bits = 16;
+  options.description = "two pixels";
+  const EncodedImageFile file = EncodeImage(light, options);
+  EXPECT_EQ(file.clipped_values, 1U);
+  EXPECT_EQ(WriteImage(folder / "a.png", light, options), 1U);
+  EXPECT_EQ(testing::ContentOf(folder / "a.png"), file.png);
+  EXPECT_EQ(ReadImage(folder / "a.png").encoded().values,
+            (std::vector<std::uint16_t>{16384, 65535}));
 }
 
 TEST(ImageTest, RefusesWhatDoesNotFit) {

@@ -257,6 +257,73 @@ TEST(InterfaceOptionsTest, RenderNumbersAreFinite) {
                     {kNan, kInfinity, -kInfinity});
 }
 
+TEST(InterfaceOptionsTest, ExplainNeedsDepths) {
+  ExpectRefused(ExplainOptions(), "depth_range");  // neither a range nor a map
+  ExplainOptions range;
+  for (const double near_mm : {kNan, kInfinity, 0.0, -1.0}) {
+    range.depth_range = DepthRange{near_mm, 1000};
+    ExpectRefused(range, "depth_range.near_mm");
+  }
+  for (const double far_mm : {kNan, 100.0, 99.0, -kInfinity}) {
+    range.depth_range = DepthRange{100, far_mm};
+    ExpectRefused(range, "depth_range.far_mm");
+  }
+  range.depth_range = DepthRange{100, kInfinity};
+  ExpectValid(range);
+  range.depth = DepthMap{1, 1, {1}, false, {DepthKind::kZ, LengthUnit::kMillimetre}, ""};
+  ExpectRefused(range, "depth_range");
+  ExplainOptions map;
+  map.depth = DepthMap{1, 1, {1}, false, {DepthKind::kDisparity}, ""};
+  ExpectRefused(map, "depth.meaning.kind");
+}
+
+TEST(InterfaceOptionsTest, ExplainNumbersAreInTheirRange) {
+  ExplainOptions options;
+  options.depth_range = DepthRange{100, 1000};
+  for (const double value : {kNan, kInfinity, -1.0}) {
+    ExplainOptions wrong = options;
+    wrong.full_well_electrons = value;
+    ExpectRefused(wrong, "full_well_electrons");
+    wrong = options;
+    wrong.full_well_electrons = 1000;
+    wrong.read_noise_electrons = value;
+    ExpectRefused(wrong, "read_noise_electrons");
+    wrong = options;
+    wrong.bench = model::BenchConditions{};
+    wrong.bench->flicker = value;
+    ExpectRefused(wrong, "bench.flicker");
+    wrong.bench = model::BenchConditions{};
+    wrong.bench->drift_sigma_px = value;
+    ExpectRefused(wrong, "bench.drift_sigma_px");
+    wrong.bench = model::BenchConditions{};
+    wrong.bench->reading_sigma_mm = value;
+    ExpectRefused(wrong, "bench.reading_sigma_mm");
+  }
+  ExplainOptions wrong = options;
+  wrong.read_noise_electrons = 3;  // without the electrons at full scale
+  ExpectRefused(wrong, "read_noise_electrons");
+  wrong = options;
+  wrong.bench = model::BenchConditions{};
+  wrong.measure_costs = true;
+  ExpectRefused(wrong, "measure_costs");
+  for (const double tilt_deg : {kNan, 90.0, -90.0}) {
+    wrong.bench->tilt_deg = tilt_deg;
+    ExpectRefused(wrong, "bench.tilt_deg");
+  }
+  wrong = options;
+  for (const int count : {0, 1, 10001}) {
+    wrong.depth_count = count;
+    ExpectRefused(wrong, "depth_count");
+  }
+  wrong = options;
+  for (const int bits : {0, 33}) {
+    wrong.bits = bits;
+    ExpectRefused(wrong, "bits");
+  }
+  ExpectEachRefused(options, &ExplainOptions::uv_depth_mm, "uv_depth_mm",
+                    {kNan, kInfinity, -kInfinity});
+}
+
 TEST(InterfaceOptionsTest, CompareBorderIsBounded) {
   CompareOptions options;
   for (const int border_px : {-1, 100001}) {

@@ -96,6 +96,23 @@ TEST(ReadingOptions, AreHandedOn) {
   EXPECT_EQ(reading.crop->height, 3);
 }
 
+TEST(ReadingOptions, AreHandedToTheInterface) {
+  ReadingOptions options;
+  EXPECT_FALSE(LightFieldReadOptionsOf(options).inner_views);
+  options.grid = 9;
+  options.sparse = true;
+  options.views.text = "3x5";
+  options.crop.text = "0,1,2,3";
+  const LightFieldReadOptions reading = LightFieldReadOptionsOf(options);
+  EXPECT_EQ(reading.hci_grid, 9);
+  EXPECT_TRUE(reading.allow_missing_views);
+  ASSERT_TRUE(reading.inner_views);
+  EXPECT_EQ(reading.inner_views->u, 3);
+  EXPECT_EQ(reading.inner_views->v, 5);
+  ASSERT_TRUE(reading.crop);
+  EXPECT_EQ(reading.crop->height, 3);
+}
+
 TEST(DepthOptions, KindAndUnitAreNotGuessed) {
   const auto message = [](const DepthOptions& options) {
     return UsageErrorOf([&] { ConventionOf(options); });
@@ -112,6 +129,23 @@ TEST(DepthOptions, KindAndUnitAreNotGuessed) {
   EXPECT_THAT(message(options), HasSubstr("--disparity-scale"));
   EXPECT_EQ(ConventionOf(KindAndUnit("range", "tum5000")).unit_mm, 0.2);
   EXPECT_EQ(ConventionOf(KindAndUnit("range", "m")).kind, model::DepthKind::kRange);
+}
+
+TEST(DepthOptions, AreHandedToTheInterface) {
+  for (const char* unit : {"mm", "cm", "m", "tum5000"}) {
+    const DepthMeaning meaning = DepthMeaningOf(KindAndUnit("range", unit));
+    EXPECT_EQ(meaning.kind, DepthKind::kRange);
+    EXPECT_EQ(LengthUnitName(meaning.unit), unit);
+    EXPECT_TRUE(meaning.IsValid(nullptr));
+  }
+  DepthOptions options = KindAndUnit("disparity", "");
+  options.disparity_scale = 2;
+  options.disparity_offset_px = -0.5;
+  const DepthMeaning disparity = DepthMeaningOf(options);
+  EXPECT_EQ(disparity.unit, LengthUnit::kNone);
+  EXPECT_EQ(disparity.disparity_scale, 2);
+  EXPECT_EQ(disparity.disparity_offset_px, -0.5);
+  EXPECT_TRUE(disparity.IsValid(nullptr));
 }
 
 TEST(ApertureShapeOption, HasADefault) {

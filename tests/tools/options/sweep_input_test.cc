@@ -115,6 +115,34 @@ TEST_F(SweepInputTest, OneFloorIsEnough) {
   EXPECT_THROW(ReadSweepInput(arguments_), UsageError);
 }
 
+// Messages of the interface name the option as it is typed.
+TEST_F(SweepInputTest, AnOffsetIsNeededForItsStandardDeviation) {
+  arguments_.offset_sigma_mm = 0.5;
+  EXPECT_EQ(ErrorOf([&] { ReadSweepInput(arguments_); }),
+            "--offset-sigma-mm: the offset itself is missing, give --offset-mm");
+  arguments_.offset_mm = "unknown";
+  EXPECT_EQ(ErrorOf([&] { ReadSweepInput(arguments_); }),
+            "--offset-sigma-mm: an unknown offset has no standard deviation");
+  EXPECT_THROW(ReadSweepInput(arguments_), UsageError);
+  arguments_.offset_mm = "12.5";
+  const thicklens::Sweep input = ReadSweepInput(arguments_);
+  EXPECT_EQ(input.description.offset_mm.value().value, 12.5);
+  EXPECT_EQ(input.description.offset_mm.value().sigma, 0.5);
+}
+
+TEST_F(SweepInputTest, AFolderNeedsReadingsAndACamera) {
+  arguments_.input = folder_ / "frames";
+  folder_.Put("frames/a.png");
+  EXPECT_THAT(ErrorOf([&] { ReadSweepInput(arguments_); }), HasSubstr("needs --readings"));
+  arguments_.readings_csv = folder_.Put("readings.csv", "file,reading\na.png,1\n");
+  EXPECT_THAT(ErrorOf([&] { ReadSweepInput(arguments_); }), StartsWith("--camera: "));
+  EXPECT_THROW(ReadSweepInput(arguments_), UsageError);
+  arguments_.camera_path = folder_ / "camera.yaml";
+  EXPECT_EQ(ReadSweepInput(arguments_).description.frames.size(), 1U);
+  arguments_.input = folder_ / "sweep.yaml";
+  EXPECT_THAT(ErrorOf([&] { ReadSweepInput(arguments_); }), HasSubstr("is not a folder"));
+}
+
 TEST_F(SweepInputTest, ThePeriodOfTheTargetComesThrough) {
   Sweep("target_period_mm: 5\n");
   EXPECT_EQ(ReadSweepInput(arguments_).description.target_period_mm.value(), 5);
