@@ -25,8 +25,8 @@ std::string LightFieldName(const LightField& light_field) {
 
 Image ImageOf(model::LinearImage image, const LightField& light_field) {
   if (image.channels != 1 && image.channels != 3) {
-    throw Error(fmt::format("{}: 1 or 3 channels are expected, found {}", LightFieldName(light_field),
-                            image.channels));
+    throw Error(fmt::format("{}: 1 or 3 channels are expected, found {}",
+                            LightFieldName(light_field), image.channels));
   }
   return Image::FromLight(image.width_px, image.height_px,
                           image.channels == 1 ? ChannelOrder::kGrey : ChannelOrder::kRgb,
