@@ -10,7 +10,7 @@
 namespace thicklens::model {
 namespace {
 
-constexpr int kBlockPx = 8;
+constexpr int kPlaceBlockPx = 8;
 
 class DepthBlocks {
  public:
@@ -24,8 +24,8 @@ class DepthBlocks {
     EffectSite place;
     bool found = false;
     double steepest = 0;
-    for (int y = y0; y < std::min(y0 + kBlockPx, scene_.image.height_px); ++y) {
-      for (int x = x0; x < std::min(x0 + kBlockPx, scene_.image.width_px); ++x) {
+    for (int y = y0; y < std::min(y0 + kPlaceBlockPx, scene_.image.height_px); ++y) {
+      for (int x = x0; x < std::min(x0 + kPlaceBlockPx, scene_.image.width_px); ++x) {
         const double here = InverseDepth(x, y);
         if (std::isnan(here)) continue;
         if (!found || std::abs(here - focus_) > std::abs(1 / place.depth_mm - focus_)) {
@@ -70,9 +70,9 @@ class DepthBlocks {
 std::vector<EffectSite> PlacesOfDepth(const Camera& camera, const Scene& scene) {
   const DepthBlocks blocks(camera, scene);
   std::vector<EffectSite> places;
-  for (int y = 0; y < scene.image.height_px; y += kBlockPx) {
+  for (int y = 0; y < scene.image.height_px; y += kPlaceBlockPx) {
     ThrowIfCancelled();
-    for (int x = 0; x < scene.image.width_px; x += kBlockPx) {
+    for (int x = 0; x < scene.image.width_px; x += kPlaceBlockPx) {
       if (const auto place = blocks.PlaceOf(x, y)) places.push_back(*place);
     }
   }

@@ -39,7 +39,7 @@ Camera CameraOfPitch(double pixel_pitch_mm, double aperture_radius_mm = 4) {
                              CentredSensor(kRenderWidthPx, kRenderHeightPx, pixel_pitch_mm));
 }
 
-RenderSummary SummaryOf(const LightField& field, const PhotographOptions& options = {}) {
+RenderSummary RenderSummaryOf(const LightField& field, const PhotographOptions& options = {}) {
   RenderSummary summary;
   RenderPhotograph(field, options, {}, &summary);
   return summary;
@@ -56,20 +56,20 @@ std::string FieldOfOptionError(const std::function<void()>& work) {
 
 TEST(RenderInterfaceTest, APhotographTakesTheEffectsThatMatter) {
   const EffectSet kept = {Effect::kDefocus, Effect::kApertureShape};
-  const RenderSummary relative = SummaryOf(UniformField({}));
+  const RenderSummary relative = RenderSummaryOf(UniformField({}));
   EXPECT_EQ(relative.effects.on, kept);
   EXPECT_TRUE(relative.effects.findings.empty());
-  const RenderSummary wide = SummaryOf(UniformField(CameraOfPitch(0.2)));
+  const RenderSummary wide = RenderSummaryOf(UniformField(CameraOfPitch(0.2)));
   EXPECT_EQ(wide.effects.on, kept.With({Effect::kThickness, Effect::kFalloff}));
   for (const model::LargestEffectImpact& finding : wide.effects.findings) {
     EXPECT_FALSE(kept.Has(finding.effect)) << model::EffectName(finding.effect);
   }
-  EXPECT_EQ(SummaryOf(UniformField(CameraOfPitch(0.001, 0.05))).effects.on, kept);
+  EXPECT_EQ(RenderSummaryOf(UniformField(CameraOfPitch(0.001, 0.05))).effects.on, kept);
   LightField off_aperture = UniformField(CameraOfPitch(0.01));
   off_aperture.grid = model::GridOnPlanes(*off_aperture.camera, {20, 780}, 3, 3);
-  EXPECT_TRUE(SummaryOf(off_aperture).effects.on.Has(Effect::kVignetting));
+  EXPECT_TRUE(RenderSummaryOf(off_aperture).effects.on.Has(Effect::kVignetting));
   off_aperture.grid = model::GridOnPlanes(*off_aperture.camera, {1e-4, 800 - 1e-4}, 3, 3);
-  EXPECT_FALSE(SummaryOf(off_aperture).effects.on.Has(Effect::kVignetting));
+  EXPECT_FALSE(RenderSummaryOf(off_aperture).effects.on.Has(Effect::kVignetting));
 }
 
 TEST(RenderInterfaceTest, EffectsThatTheModelLacksAreRefused) {
@@ -77,32 +77,32 @@ TEST(RenderInterfaceTest, EffectsThatTheModelLacksAreRefused) {
   PhotographOptions vignetting;
   vignetting.effects.base = EffectSelection::Base::kGiven;
   vignetting.effects.given = {Effect::kVignetting};
-  EXPECT_EQ(FieldOfOptionError([&] { SummaryOf(field, vignetting); }), "effects.given");
+  EXPECT_EQ(FieldOfOptionError([&] { RenderSummaryOf(field, vignetting); }), "effects.given");
   PhotographOptions noise;
   noise.effects.without = {Effect::kReadNoise};
-  EXPECT_EQ(FieldOfOptionError([&] { SummaryOf(field, noise); }), "effects.without");
-  EXPECT_THAT(ErrorOf([&] { SummaryOf(field, noise); }), HasSubstr("read-noise"));
+  EXPECT_EQ(FieldOfOptionError([&] { RenderSummaryOf(field, noise); }), "effects.without");
+  EXPECT_THAT(ErrorOf([&] { RenderSummaryOf(field, noise); }), HasSubstr("read-noise"));
   PhotographOptions tolerance;
   tolerance.effects.tolerance = model::EffectTolerance{};
-  EXPECT_EQ(FieldOfOptionError([&] { SummaryOf(UniformField({}), tolerance); }),
+  EXPECT_EQ(FieldOfOptionError([&] { RenderSummaryOf(UniformField({}), tolerance); }),
             "effects.tolerance");
 }
 
 TEST(RenderInterfaceTest, TheApertureIsThatOfTheOptionsOrTheEffects) {
   const LightField field = UniformField({});
-  EXPECT_EQ(SummaryOf(field).aperture_shape, "own");
-  EXPECT_EQ(SummaryOf(field).aperture_from, "light-field");
+  EXPECT_EQ(RenderSummaryOf(field).aperture_shape, "own");
+  EXPECT_EQ(RenderSummaryOf(field).aperture_from, "light-field");
   PhotographOptions options;
   options.aperture.shape = model::ApertureShape::kDisc;
-  EXPECT_EQ(SummaryOf(field, options).aperture_shape, "disc");
-  EXPECT_EQ(SummaryOf(field, options).aperture_from, "option");
+  EXPECT_EQ(RenderSummaryOf(field, options).aperture_shape, "disc");
+  EXPECT_EQ(RenderSummaryOf(field, options).aperture_from, "option");
   options = {};
   options.effects.base = EffectSelection::Base::kGiven;
-  const RenderSummary none = SummaryOf(field, options);
+  const RenderSummary none = RenderSummaryOf(field, options);
   EXPECT_TRUE(none.effects.on.empty());
   EXPECT_EQ(none.aperture_shape, "pinhole");
   options.effects.given = {Effect::kDefocus};
-  EXPECT_EQ(SummaryOf(field, options).aperture_shape, "gaussian");
+  EXPECT_EQ(RenderSummaryOf(field, options).aperture_shape, "gaussian");
 }
 
 // A program names its own options in the messages.
