@@ -7,6 +7,7 @@
 #include <cmath>
 #include <mutex>
 #include <set>
+#include <utility>
 
 #include "calib/calibrate/focus_solution.h"
 #include "calib/fit/blur_measurement.h"
@@ -531,9 +532,17 @@ bool HasEnoughFrames(const FocusSweep& sweep, std::string* why) {
 
 bool CalibrationOptions::IsValid(std::string* why) const {
   if (threads < 0) return Fail(why, fmt::format("threads must be >= 0, found {}", threads));
-  if (!(checks.max_saturated_fraction >= 0)) {
-    return Fail(why, fmt::format("checks.max_saturated_fraction must be >= 0, found {}",
-                                 checks.max_saturated_fraction));
+  const std::pair<const char*, double> numbers[] = {
+      {"min_mean_encoded", checks.min_mean_encoded},
+      {"max_saturated_fraction", checks.max_saturated_fraction},
+      {"max_black_fraction", checks.max_black_fraction},
+      {"min_relative_contrast", checks.min_relative_contrast},
+      {"min_gradient_to_noise", checks.min_gradient_to_noise},
+      {"min_coarse_texture", checks.min_coarse_texture},
+  };
+  for (const auto& [name, value] : numbers) {
+    if (value >= 0 && std::isfinite(value)) continue;
+    return Fail(why, fmt::format("checks.{} must be finite and >= 0, found {}", name, value));
   }
   return true;
 }
