@@ -186,7 +186,7 @@ void TakeSummary(const estimator::SolverSummary& found, Solved* solved) {
   }
 }
 
-// What one run of a solver of the library needs until its end.
+// Objects that a run of one of the library's solvers needs until its end.
 struct LibraryRun {
   std::shared_ptr<kernels::Backend> backend;
   std::optional<estimator::SceneViewSink> views;

@@ -72,7 +72,7 @@ struct BlockReport {
   double relative_residual = 0;  // |N x - b|/|b|, recomputed; the maximum over the channels
 };
 
-// How the blocks were solved.
+// Findings of the block solver besides the light field.
 struct BlockDiagnostics {
   int block_px = 0;
   int blocks_from_store = 0;  // number of blocks that came from the store; the others were solved

@@ -6,7 +6,8 @@
 
 namespace thicklens::estimator {
 
-// The options of EstimateOnGrid, a type of their own to tell the solver by (SolverOptions).
+// The options of EstimateOnGrid. They have a type of their own because the type selects the solver
+// (SolverOptions).
 struct GridOptions : FunctionalOptions {};
 
 // Estimates the light field of one photograph with the functional of EstimateByBlocks, on the same

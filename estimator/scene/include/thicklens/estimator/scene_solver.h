@@ -61,7 +61,7 @@ struct SceneOptions {
   bool IsValid(std::string* why) const;
 };
 
-// What the scene solver found besides the light field.
+// Findings of the scene solver besides the light field.
 struct SceneDiagnostics {
   Prior prior = Prior::kTotalVariation;
   double strength = 0;

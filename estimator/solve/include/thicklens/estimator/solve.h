@@ -24,7 +24,7 @@ std::string SolverName(const SolverOptions& options);  // "scene", "blocks", "fu
 // the options is not in its range. NaN and infinities never are.
 bool IsValid(const SolverOptions& options, std::string* why);
 
-// What one solver alone finds. std::monostate: no solver has run.
+// Findings that one solver alone has. std::monostate: no solver has run.
 using SolverDiagnostics =
     std::variant<std::monostate, SceneDiagnostics, BlockDiagnostics, FunctionalDiagnostics>;
 

@@ -15,9 +15,9 @@ namespace thicklens::estimator {
 class BlockStore;
 struct SceneViewSink;
 
-// How a solver is run. What it solves is in its options. Every solver is called with the problem,
-// its options, the run and the summary, in this order. It is cancelled by the CancelScope of the
-// calling thread (thicklens/base/cancel.h).
+// The way in which a solver is run; what it solves is in its options. Every solver is called with
+// the problem, its options, the run and the summary, in this order. It is cancelled by the
+// CancelScope of the calling thread (thicklens/base/cancel.h).
 struct SolverRun {
   int threads = 0;  // >= 0; 0: one per core
   // Limit for the whole process, finite, > 0. The scene solver then solves in as many bands as it
@@ -36,7 +36,7 @@ struct SolverRun {
   bool IsValid(std::string* why) const;
 };
 
-// What every solver reports of its result.
+// The part of the summary that all solvers have.
 struct SolverResult {
   std::string message = "not run";
   // Whether the iterations reached their tolerance; direct solvers: true.
