@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "calib/calibrate/focus_solution.h"
+#include "calib/edges/edge_blur.h"
 #include "calib/fit/blur_measurement.h"
 #include "calib/fit/source_recipe.h"
 #include "calib/registration/change_of_reference.h"
@@ -19,6 +20,7 @@
 #include "calib/registration/scale_causes.h"
 #include "calib/registration/scale_tracking.h"
 #include "calib/sharpness/sharpest_reading.h"
+#include "calib/sharpness/sharpness.h"
 #include "calib/sharpness/sharpness_peak.h"
 #include "calib/sweep/frame_selection.h"
 #include "calib/sweep/frame_store.h"
@@ -29,8 +31,6 @@
 #include "thicklens/base/error.h"
 #include "thicklens/base/parallel.h"
 #include "thicklens/base/validity.h"
-#include "thicklens/calib/edge_blur.h"
-#include "thicklens/calib/sharpness.h"
 #include "thicklens/model/pupil_law.h"
 
 namespace thicklens::calib {

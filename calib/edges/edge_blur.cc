@@ -1,4 +1,4 @@
-#include "thicklens/calib/edge_blur.h"
+#include "calib/edges/edge_blur.h"
 
 #include <cmath>
 #include <vector>

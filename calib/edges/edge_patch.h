@@ -5,8 +5,8 @@
 #include <opencv2/core/mat.hpp>
 #include <optional>
 
+#include "calib/edges/edge_spread.h"
 #include "calib/sharpness/edge_pixels.h"
-#include "thicklens/calib/edge_spread.h"
 
 namespace thicklens::calib {
 

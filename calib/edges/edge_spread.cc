@@ -1,4 +1,4 @@
-#include "thicklens/calib/edge_spread.h"
+#include "calib/edges/edge_spread.h"
 
 #include <algorithm>
 #include <cmath>

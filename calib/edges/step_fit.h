@@ -4,8 +4,8 @@
 #include <cmath>
 #include <optional>
 
+#include "calib/edges/edge_spread.h"
 #include "calib/edges/feature_pixels.h"
-#include "thicklens/calib/edge_spread.h"
 
 namespace thicklens::calib {
 

@@ -10,10 +10,10 @@
 #include <utility>
 #include <vector>
 
+#include "calib/edges/edge_spread.h"
 #include "calib/edges/feature_pixels.h"
 #include "calib/edges/step_fit.h"
 #include "thicklens/base/cancel.h"
-#include "thicklens/calib/edge_spread.h"
 #include "thicklens/model/camera.h"
 
 namespace thicklens::calib {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "thicklens/calib/edge_spread.h"
+#include "calib/edges/edge_spread.h"
 
 namespace thicklens::calib {
 namespace {

@@ -8,9 +8,9 @@
 #include <numeric>
 #include <set>
 
+#include "calib/edges/edge_spread.h"
 #include "calib/fit/blur_examples.h"
 #include "thicklens/base/parallel.h"
-#include "thicklens/calib/edge_spread.h"
 
 namespace thicklens::calib {
 namespace {

@@ -7,12 +7,12 @@
 #include <vector>
 
 #include "calib/fit/blur_fit.h"
+#include "calib/registration/image_scale.h"
 #include "calib/spectrum/spectral_estimator.h"
 #include "calib/spectrum/spectral_options.h"
 #include "calib/sweep/frame_store.h"
 #include "thicklens/calib/calibration.h"
 #include "thicklens/calib/focus_sweep.h"
-#include "thicklens/calib/image_scale.h"
 
 namespace thicklens::calib {
 

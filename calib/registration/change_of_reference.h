@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "thicklens/calib/image_scale.h"
+#include "calib/registration/image_scale.h"
 
 namespace thicklens::calib {
 

@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "thicklens/calib/image_scale.h"
+#include "calib/registration/image_scale.h"
 
 namespace thicklens::calib {
 

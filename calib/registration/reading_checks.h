@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "calib/registration/image_scale.h"
 #include "thicklens/calib/calibration.h"
 #include "thicklens/calib/focus_sweep.h"
-#include "thicklens/calib/image_scale.h"
 
 namespace thicklens::calib {
 

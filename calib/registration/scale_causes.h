@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "calib/registration/blur_slope.h"
+#include "calib/registration/image_scale.h"
 #include "thicklens/calib/diagnosis.h"
 #include "thicklens/calib/focus_sweep.h"
-#include "thicklens/calib/image_scale.h"
 
 namespace thicklens::calib {
 

@@ -7,9 +7,9 @@
 #include <set>
 
 #include "calib/registration/cancel_callback.h"
+#include "calib/registration/image_scale.h"
 #include "calib/registration/radial_distortion.h"
 #include "thicklens/base/statistics.h"
-#include "thicklens/calib/image_scale.h"
 
 namespace thicklens::calib {
 namespace {

@@ -4,8 +4,8 @@
 #include <optional>
 #include <vector>
 
+#include "calib/registration/image_scale.h"
 #include "thicklens/calib/focus_sweep.h"
-#include "thicklens/calib/image_scale.h"
 
 namespace thicklens::calib {
 

@@ -4,7 +4,7 @@
 #include <opencv2/core/mat.hpp>
 #include <optional>
 
-#include "thicklens/calib/image_scale.h"
+#include "calib/registration/image_scale.h"
 
 namespace thicklens::calib {
 

@@ -4,9 +4,9 @@
 #include <opencv2/core.hpp>
 #include <string>
 
-#include "thicklens/calib/edge_blur.h"
-#include "thicklens/calib/image_scale.h"
-#include "thicklens/calib/sharpness.h"
+#include "calib/edges/edge_blur.h"
+#include "calib/registration/image_scale.h"
+#include "calib/sharpness/sharpness.h"
 #include "thicklens/model/sweep_simulator.h"
 
 namespace thicklens {

@@ -1,5 +1,5 @@
 // The laws that relate the image scale to the readings, tested on synthetic samples.
-#include "thicklens/calib/image_scale.h"
+#include "calib/registration/image_scale.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

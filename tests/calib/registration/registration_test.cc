@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "calib/registration/image_scale.h"
 #include "tests/calib/registration/wave_image.h"
 #include "tests/calib/simulated_sweep.h"
-#include "thicklens/calib/image_scale.h"
 
 namespace thicklens::calib {
 namespace {

@@ -1,4 +1,4 @@
-#include "thicklens/calib/sharpness.h"
+#include "calib/sharpness/sharpness.h"
 
 #include <gtest/gtest.h>
 

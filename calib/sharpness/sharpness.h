@@ -1,5 +1,5 @@
-#ifndef THICKLENS_CALIB_SHARPNESS_H_
-#define THICKLENS_CALIB_SHARPNESS_H_
+#ifndef THICKLENS_CALIB_SHARPNESS_SHARPNESS_H_
+#define THICKLENS_CALIB_SHARPNESS_SHARPNESS_H_
 
 #include <opencv2/core/mat.hpp>
 #include <vector>
@@ -34,4 +34,4 @@ std::vector<SharpnessIndex> MeanEdgeSlopes(const cv::Mat& grey, const SharpnessO
 
 }  // namespace thicklens::calib
 
-#endif  // THICKLENS_CALIB_SHARPNESS_H_
+#endif  // THICKLENS_CALIB_SHARPNESS_SHARPNESS_H_

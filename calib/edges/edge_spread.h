@@ -1,5 +1,5 @@
-#ifndef THICKLENS_CALIB_EDGE_SPREAD_H_
-#define THICKLENS_CALIB_EDGE_SPREAD_H_
+#ifndef THICKLENS_CALIB_EDGES_EDGE_SPREAD_H_
+#define THICKLENS_CALIB_EDGES_EDGE_SPREAD_H_
 
 #include <Eigen/Core>
 #include <opencv2/core/mat.hpp>
@@ -71,4 +71,4 @@ std::optional<FrameEdgeSpread> MeasureEdgeSpread(const cv::Mat& grey, model::Psf
 
 }  // namespace thicklens::calib
 
-#endif  // THICKLENS_CALIB_EDGE_SPREAD_H_
+#endif  // THICKLENS_CALIB_EDGES_EDGE_SPREAD_H_

@@ -1,5 +1,5 @@
-#ifndef THICKLENS_CALIB_IMAGE_SCALE_H_
-#define THICKLENS_CALIB_IMAGE_SCALE_H_
+#ifndef THICKLENS_CALIB_REGISTRATION_IMAGE_SCALE_H_
+#define THICKLENS_CALIB_REGISTRATION_IMAGE_SCALE_H_
 
 #include <Eigen/Core>
 #include <opencv2/core/mat.hpp>
@@ -71,4 +71,4 @@ ScaleModel FitScaleModel(const std::vector<ScaleSample>& samples, int reference_
 
 }  // namespace thicklens::calib
 
-#endif  // THICKLENS_CALIB_IMAGE_SCALE_H_
+#endif  // THICKLENS_CALIB_REGISTRATION_IMAGE_SCALE_H_

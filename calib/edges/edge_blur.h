@@ -1,5 +1,5 @@
-#ifndef THICKLENS_CALIB_EDGE_BLUR_H_
-#define THICKLENS_CALIB_EDGE_BLUR_H_
+#ifndef THICKLENS_CALIB_EDGES_EDGE_BLUR_H_
+#define THICKLENS_CALIB_EDGES_EDGE_BLUR_H_
 
 #include <opencv2/core/mat.hpp>
 #include <optional>
@@ -22,4 +22,4 @@ std::optional<SourceEdgeBlur> MeasureSourceEdgeBlur(const cv::Mat& grey);
 
 }  // namespace thicklens::calib
 
-#endif  // THICKLENS_CALIB_EDGE_BLUR_H_
+#endif  // THICKLENS_CALIB_EDGES_EDGE_BLUR_H_
