@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "estimator/depth/surface_plane.h"
-#include "thicklens/estimator/view_geometry.h"
+#include "thicklens/estimator/disparity_map.h"
 
 namespace thicklens::estimator {
 

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "thicklens/estimator/view_geometry.h"
+#include "thicklens/estimator/disparity_map.h"
 #include "thicklens/kernels/kernels.h"
 
 namespace thicklens::estimator {

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "thicklens/estimator/view_geometry.h"
+#include "thicklens/estimator/disparity_map.h"
 
 namespace thicklens::estimator {
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "estimator/projection/angular_bundle.h"
-#include "thicklens/estimator/view_geometry.h"
+#include "thicklens/estimator/disparity_map.h"
 
 namespace thicklens::estimator {
 

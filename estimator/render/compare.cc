@@ -12,6 +12,7 @@
 
 #include "thicklens/base/error.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/estimator/view_geometry.h"
 
 namespace thicklens::estimator {
 namespace {

@@ -17,6 +17,7 @@
 #include "thicklens/base/index.h"
 #include "thicklens/base/parallel.h"
 #include "thicklens/base/run_cost.h"
+#include "thicklens/estimator/view_geometry.h"
 
 namespace thicklens::estimator {
 namespace {

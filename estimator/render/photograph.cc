@@ -15,6 +15,7 @@
 #include "thicklens/base/index.h"
 #include "thicklens/base/parallel.h"
 #include "thicklens/estimator/render.h"
+#include "thicklens/kernels/kernels.h"
 
 namespace thicklens::estimator {
 namespace {

@@ -1,7 +1,7 @@
 #ifndef THICKLENS_ESTIMATOR_SCENE_COARSE_START_H_
 #define THICKLENS_ESTIMATOR_SCENE_COARSE_START_H_
 
-#include "thicklens/estimator/view_geometry.h"
+#include "thicklens/estimator/disparity_map.h"
 #include "thicklens/model/scene.h"
 
 namespace thicklens::estimator {

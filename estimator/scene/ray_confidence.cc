@@ -15,6 +15,7 @@
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/parallel.h"
 #include "thicklens/estimator/estimate_checks.h"
+#include "thicklens/estimator/view_geometry.h"
 
 namespace thicklens::estimator {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "thicklens/estimator/view_geometry.h"
+#include "thicklens/estimator/disparity_map.h"
 #include "thicklens/model/scene.h"
 
 namespace thicklens::estimator {

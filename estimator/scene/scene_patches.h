@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "estimator/scene/scene_priors.h"
-#include "thicklens/estimator/view_geometry.h"
+#include "thicklens/estimator/disparity_map.h"
 #include "thicklens/model/transfer_curve.h"
 
 namespace thicklens::estimator {

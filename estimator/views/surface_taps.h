@@ -4,7 +4,7 @@
 #include <array>
 #include <cstddef>
 
-#include "thicklens/estimator/view_geometry.h"
+#include "thicklens/estimator/disparity_map.h"
 
 namespace thicklens::estimator {
 

@@ -8,6 +8,7 @@
 #include "estimator/views/ray_irradiance.h"
 #include "thicklens/base/index.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/estimator/view_geometry.h"
 
 namespace thicklens::estimator {
 model::LinearImage WithoutFalloff(const model::LinearImage& photograph,

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "thicklens/kernels/device.h"
+#include "thicklens/kernels/kernels.h"
 
 namespace thicklens::kernels {
 namespace {

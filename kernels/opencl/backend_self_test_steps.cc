@@ -6,6 +6,7 @@
 
 #include "kernels/opencl/backend_self_test.h"
 #include "thicklens/base/index.h"
+#include "thicklens/kernels/radiance_steps.h"
 
 namespace thicklens::kernels {
 namespace {

@@ -5,6 +5,8 @@
 #include <vector>
 
 #include "kernels/opencl/backend_self_test.h"
+#include "thicklens/kernels/kernels.h"
+#include "thicklens/kernels/view_warp.h"
 
 namespace thicklens::kernels {
 namespace {

@@ -12,6 +12,9 @@
 #include "kernels/opencl/opencl_device.h"
 #include "kernels/opencl/opencl_program.h"
 #include "thicklens/base/error.h"
+#include "thicklens/kernels/kernels.h"
+#include "thicklens/kernels/radiance_steps.h"
+#include "thicklens/kernels/view_warp.h"
 
 namespace thicklens::kernels {
 namespace {

@@ -14,6 +14,7 @@
 #include "thicklens/base/parallel.h"
 #include "thicklens/estimator/view_geometry.h"
 #include "thicklens/kernels/device.h"
+#include "thicklens/kernels/view_warp.h"
 
 namespace thicklens::estimator {
 namespace {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "thicklens/estimator/view_geometry.h"
+
 namespace thicklens::estimator::testing {
 
 namespace {

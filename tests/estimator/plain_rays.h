@@ -4,7 +4,7 @@
 #include <Eigen/Dense>
 #include <cstddef>
 
-#include "thicklens/estimator/view_geometry.h"
+#include "thicklens/estimator/disparity_map.h"
 
 namespace thicklens::estimator::testing {
 

@@ -24,6 +24,7 @@
 #include "thicklens/estimator/grid_solver.h"
 #include "thicklens/estimator/scene_solver.h"
 #include "thicklens/kernels/device.h"
+#include "thicklens/kernels/radiance_steps.h"
 #include "thicklens/model/light_field.h"
 
 namespace thicklens::estimator {

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "support/test_cameras.h"
-#include "thicklens/estimator/view_geometry.h"
+#include "thicklens/estimator/disparity_map.h"
 
 namespace thicklens::estimator::testing {
 

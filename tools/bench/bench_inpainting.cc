@@ -18,6 +18,7 @@
 #include "thicklens/base/stopwatch.h"
 #include "thicklens/estimator/compare.h"
 #include "thicklens/estimator/inpaint.h"
+#include "thicklens/estimator/view_geometry.h"
 #include "thicklens/kernels/device.h"
 #include "thicklens/model/encoded_values.h"
 #include "tools/bench/bench_loop.h"

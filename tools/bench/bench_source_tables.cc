@@ -8,6 +8,7 @@
 
 #include "thicklens/base/stopwatch.h"
 #include "thicklens/estimator/render.h"
+#include "thicklens/kernels/kernels.h"
 #include "thicklens/model/light_field_grid.h"
 #include "thicklens/model/thick_lens.h"
 #include "tools/bench/bench_solvers.h"

@@ -18,7 +18,7 @@
 #include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/base/utc_time.h"
-#include "thicklens/estimator/view_geometry.h"
+#include "thicklens/estimator/disparity_map.h"
 #include "thicklens/io/aperture_statement.h"
 #include "thicklens/io/depth_io.h"
 #include "thicklens/io/image_io.h"

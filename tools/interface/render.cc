@@ -11,6 +11,7 @@
 #include "thicklens/estimator/render.h"
 #include "thicklens/io/aperture_statement.h"
 #include "thicklens/kernels/device.h"
+#include "thicklens/kernels/kernels.h"
 #include "thicklens/model/effect_impact.h"
 #include "tools/interface/effects_choice.h"
 #include "tools/interface/run_scope.h"

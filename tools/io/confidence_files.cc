@@ -4,6 +4,7 @@
 
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/estimator/view_geometry.h"
 
 namespace thicklens::io {
 

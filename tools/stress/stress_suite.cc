@@ -16,6 +16,7 @@
 #include "thicklens/base/deprecation.h"
 #include "thicklens/base/error.h"
 #include "thicklens/kernels/device.h"
+#include "thicklens/kernels/kernels.h"
 #include "tools/options/deprecated_names.h"
 #include "tools/options/option_values.h"
 #include "tools/system/build_info.h"

@@ -24,7 +24,9 @@
 #include "tests/estimator/solver_runs.h"
 #include "thicklens/estimator/block_store.h"
 #include "thicklens/estimator/render.h"
+#include "thicklens/estimator/view_geometry.h"
 #include "thicklens/kernels/device.h"
+#include "thicklens/kernels/kernels.h"
 #include "thicklens/model/light_field.h"
 
 namespace thicklens::estimator {

@@ -23,6 +23,7 @@
 #include "tests/estimator/solver_inputs.h"
 #include "tests/estimator/solver_runs.h"
 #include "thicklens/kernels/device.h"
+#include "thicklens/kernels/kernels.h"
 #include "thicklens/model/light_field.h"
 
 namespace thicklens::estimator {

@@ -14,6 +14,7 @@
 #include "estimator/views/ray_landing.h"
 #include "support/error_message.h"
 #include "support/test_cameras.h"
+#include "thicklens/kernels/kernels.h"
 #include "thicklens/model/camera.h"
 #include "thicklens/model/light_field.h"
 #include "thicklens/model/light_field_grid.h"

@@ -13,6 +13,7 @@
 #include "support/error_message.h"
 #include "support/test_cameras.h"
 #include "thicklens/estimator/render.h"
+#include "thicklens/kernels/kernels.h"
 #include "thicklens/model/effect_impact.h"
 #include "thicklens/model/effect_selection.h"
 #include "thicklens/model/scene_simulator.h"

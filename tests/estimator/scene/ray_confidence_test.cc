@@ -12,6 +12,7 @@
 #include "tests/estimator/solver_runs.h"
 #include "thicklens/estimator/estimate_checks.h"
 #include "thicklens/estimator/scene_solver.h"
+#include "thicklens/estimator/view_geometry.h"
 
 namespace thicklens::estimator {
 namespace {

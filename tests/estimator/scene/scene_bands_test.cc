@@ -19,6 +19,7 @@
 #include "tests/estimator/solver_runs.h"
 #include "thicklens/base/error.h"
 #include "thicklens/estimator/scene_solver.h"
+#include "thicklens/estimator/view_geometry.h"
 
 namespace thicklens::estimator {
 namespace {

@@ -21,7 +21,11 @@
 #include "thicklens/base/error.h"
 #include "thicklens/estimator/compare.h"
 #include "thicklens/estimator/fill_holes.h"
+#include "thicklens/estimator/view_geometry.h"
 #include "thicklens/kernels/device.h"
+#include "thicklens/kernels/kernels.h"
+#include "thicklens/kernels/radiance_steps.h"
+#include "thicklens/kernels/view_warp.h"
 #include "thicklens/model/scene_simulator.h"
 
 namespace thicklens::estimator {

@@ -14,6 +14,7 @@
 #include "support/error_message.h"
 #include "tests/estimator/views/plain_views.h"
 #include "thicklens/estimator/view_geometry.h"
+#include "thicklens/kernels/kernels.h"
 #include "thicklens/kernels/view_warp.h"
 
 namespace thicklens::estimator {

@@ -10,6 +10,9 @@
 #include <vector>
 
 #include "thicklens/kernels/device.h"
+#include "thicklens/kernels/kernels.h"
+#include "thicklens/kernels/radiance_steps.h"
+#include "thicklens/kernels/view_warp.h"
 
 namespace thicklens::kernels {
 namespace {

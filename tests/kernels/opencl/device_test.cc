@@ -25,6 +25,7 @@
 #include "support/error_message.h"
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
+#include "thicklens/kernels/kernels.h"
 
 namespace thicklens::kernels {
 namespace {

@@ -21,6 +21,7 @@
 #include "kernels/opencl/opencl_program.h"
 #include "support/error_message.h"
 #include "thicklens/kernels/device.h"
+#include "thicklens/kernels/kernels.h"
 
 namespace thicklens::kernels {
 namespace {

@@ -10,7 +10,7 @@
 
 #include "estimator/projection/scene_projection.h"
 #include "thicklens/estimator/compare.h"
-#include "thicklens/estimator/view_geometry.h"
+#include "thicklens/estimator/disparity_map.h"
 #include "thicklens/io/depth_io.h"
 #include "thicklens/io/light_field_io.h"
 #include "thicklens/model/encoded_values.h"

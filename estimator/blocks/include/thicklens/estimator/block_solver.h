@@ -8,7 +8,7 @@
 
 #include "thicklens/estimator/estimate_input.h"
 #include "thicklens/estimator/solver_run.h"
-#include "thicklens/kernels/kernels.h"
+#include "thicklens/kernels/splat.h"
 #include "thicklens/model/light_field.h"
 
 namespace thicklens::estimator {

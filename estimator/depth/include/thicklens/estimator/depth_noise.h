@@ -1,7 +1,7 @@
 #ifndef THICKLENS_ESTIMATOR_DEPTH_NOISE_H_
 #define THICKLENS_ESTIMATOR_DEPTH_NOISE_H_
 
-#include "thicklens/estimator/view_geometry.h"
+#include "thicklens/estimator/disparity_map.h"
 
 namespace thicklens::estimator {
 

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <limits>
 
-#include "thicklens/estimator/view_geometry.h"
+#include "thicklens/estimator/disparity_map.h"
 #include "thicklens/model/scene.h"
 
 namespace thicklens::estimator {

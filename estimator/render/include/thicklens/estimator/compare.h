@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "thicklens/estimator/view_geometry.h"
+#include "thicklens/estimator/disparity_map.h"
 #include "thicklens/model/encoded_values.h"
 #include "thicklens/model/light_field.h"
 #include "thicklens/model/scene.h"

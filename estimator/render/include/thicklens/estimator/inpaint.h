@@ -5,7 +5,7 @@
 #include <string>
 
 #include "thicklens/base/progress.h"
-#include "thicklens/estimator/view_geometry.h"
+#include "thicklens/estimator/disparity_map.h"
 #include "thicklens/model/light_field.h"
 
 namespace thicklens::estimator {

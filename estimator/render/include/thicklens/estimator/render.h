@@ -4,8 +4,12 @@
 #include <Eigen/Core>
 
 #include "thicklens/estimator/aperture_weights.h"
-#include "thicklens/kernels/kernels.h"
 #include "thicklens/model/light_field.h"
+
+namespace thicklens::kernels {
+template <typename Real>
+class Kernels;
+}  // namespace thicklens::kernels
 
 namespace thicklens::estimator {
 

@@ -7,9 +7,10 @@
 #include <vector>
 
 #include "thicklens/estimator/estimate_input.h"
-#include "thicklens/estimator/view_geometry.h"
 
 namespace thicklens::estimator {
+
+struct CompactView;
 
 // How well a photograph shows one ray of its light field, as one byte:
 //

@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <optional>
 
-#include "thicklens/estimator/view_geometry.h"
+#include "thicklens/estimator/disparity_map.h"
 #include "thicklens/model/camera.h"
 #include "thicklens/model/light_field.h"
 #include "thicklens/model/light_field_grid.h"

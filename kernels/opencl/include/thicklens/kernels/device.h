@@ -7,11 +7,18 @@
 #include <string>
 #include <vector>
 
-#include "thicklens/kernels/kernels.h"
-#include "thicklens/kernels/radiance_steps.h"
-#include "thicklens/kernels/view_warp.h"
-
 namespace thicklens::kernels {
+
+// What a backend computes with: for the modules of thicklens, which include the headers that define
+// these (kernels.h, radiance_steps.h, view_warp.h). They are not installed.
+template <typename Real>
+class Kernels;
+template <typename Real>
+class RadianceSteps;
+template <typename Real>
+struct DataTerm;
+class ViewWarp;
+struct SurfaceImage;
 
 // The device that the user requests for the kernels.
 struct DeviceRequest {

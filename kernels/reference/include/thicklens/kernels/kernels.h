@@ -7,14 +7,9 @@
 #include <vector>
 
 #include "thicklens/kernels/sparse.h"
+#include "thicklens/kernels/splat.h"
 
 namespace thicklens::kernels {
-
-// The unit impulse g of [M16] that distributes a ray from its landing point to the pixels.
-enum class Splat {
-  kNearest,   // all of it to the nearest pixel, floor(position + 1/2)
-  kBilinear,  // shared by the two nearest pixels of each axis, by distance
-};
 
 // The rays and pixels of one block of an image, as plain numbers. One step of s or t is one pixel.
 //

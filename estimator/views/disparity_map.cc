@@ -1,4 +1,4 @@
-#include "thicklens/estimator/view_geometry.h"
+#include "thicklens/estimator/disparity_map.h"
 
 #include <fmt/format.h>
 
