@@ -18,21 +18,20 @@ namespace {
 constexpr char kLibrary[] = THICKLENS_OPENCV_CODECS;
 constexpr char kEntry[] = "ThicklensOpenCvCodecs";
 
-// Looks beside the program and where it is installed, as the program's own search path states. Only
-// absolute folders of that path are used, so that a library of this name in the current folder is
-// never loaded. Returns an empty path if no folder has the library.
-std::string LibraryPath() {
-  void* const program = dlopen(nullptr, RTLD_LAZY);
-  if (program == nullptr) return "";
+// Looks where the search path of the program or of a shared library states; null is no such object.
+// Only absolute folders of that path are used, so that a library of this name in the current folder
+// is never loaded. Returns an empty path if no folder has the library.
+std::string PathBySearchPathOf(void* object) {
+  if (object == nullptr) return "";
   Dl_serinfo size{};
   std::string found;
-  if (dlinfo(program, RTLD_DI_SERINFOSIZE, &size) == 0) {
+  if (dlinfo(object, RTLD_DI_SERINFOSIZE, &size) == 0) {
     // The length is known only at run time: the array at its end is longer than its type states.
     std::vector<std::max_align_t> room(size.dls_size / sizeof(std::max_align_t) + 1);
     auto* const paths = reinterpret_cast<Dl_serinfo*>(room.data());  // NOLINT: as dlinfo has it
     *paths = size;
-    if (dlinfo(program, RTLD_DI_SERINFOSIZE, paths) == 0 &&
-        dlinfo(program, RTLD_DI_SERINFO, paths) == 0) {
+    if (dlinfo(object, RTLD_DI_SERINFOSIZE, paths) == 0 &&
+        dlinfo(object, RTLD_DI_SERINFO, paths) == 0) {
       for (unsigned i = 0; i < paths->dls_cnt && found.empty(); ++i) {
         const std::filesystem::path folder = (&paths->dls_serpath[0] + i)->dls_name;
         std::error_code ignored;
@@ -41,7 +40,17 @@ std::string LibraryPath() {
       }
     }
   }
-  dlclose(program);
+  dlclose(object);
+  return found;
+}
+
+// Looks beside the program and where it is installed, and then likewise for the shared library that
+// contains this function, whose programs need not know of the library.
+std::string LibraryPath() {
+  std::string found = PathBySearchPathOf(dlopen(nullptr, RTLD_LAZY));
+  Dl_info here{};
+  if (found.empty() && dladdr(&kLibrary, &here) != 0 && here.dli_fname != nullptr)
+    found = PathBySearchPathOf(dlopen(here.dli_fname, RTLD_LAZY | RTLD_NOLOAD));
   return found;
 }
 

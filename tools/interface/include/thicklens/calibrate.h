@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/calib/calibration.h"
 #include "thicklens/camera.h"
-#include "thicklens/export.h"
 #include "thicklens/run.h"
 #include "thicklens/sweep.h"
 

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/depth.h"
-#include "thicklens/export.h"
 #include "thicklens/image.h"
 #include "thicklens/light_field.h"
 #include "thicklens/run.h"

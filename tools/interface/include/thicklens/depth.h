@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "thicklens/export.h"
+#include "thicklens/base/export.h"
 #include "thicklens/model/light_field.h"
 #include "thicklens/model/scene.h"
 

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "thicklens/export.h"
+#include "thicklens/base/export.h"
 #include "thicklens/model/effect_selection.h"
 
 namespace thicklens {

@@ -16,7 +16,7 @@
 #include "thicklens/estimator/blur_check.h"
 #include "thicklens/estimator/inpaint.h"
 #include "thicklens/estimator/scene_solver.h"
-#include "thicklens/export.h"
+#include "thicklens/base/export.h"
 #include "thicklens/image.h"
 #include "thicklens/light_field.h"
 #include "thicklens/run.h"

@@ -7,7 +7,7 @@
 #include "thicklens/camera.h"
 #include "thicklens/depth.h"
 #include "thicklens/effects.h"
-#include "thicklens/export.h"
+#include "thicklens/base/export.h"
 #include "thicklens/model/effect_costs.h"
 #include "thicklens/model/explanation.h"
 #include "thicklens/run.h"

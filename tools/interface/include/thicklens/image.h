@@ -8,7 +8,7 @@
 #include <variant>
 #include <vector>
 
-#include "thicklens/export.h"
+#include "thicklens/base/export.h"
 #include "thicklens/model/light_field.h"
 #include "thicklens/model/scene.h"
 #include "thicklens/model/transfer_curve.h"

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "thicklens/base/output_file.h"
-#include "thicklens/export.h"
+#include "thicklens/base/export.h"
 #include "thicklens/image.h"
 #include "thicklens/model/light_field.h"
 #include "thicklens/run.h"

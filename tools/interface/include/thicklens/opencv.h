@@ -8,7 +8,7 @@
 #include <string>
 
 #include "thicklens/calib/focus_sweep.h"
-#include "thicklens/export.h"
+#include "thicklens/base/export.h"
 #include "thicklens/image.h"
 #include "thicklens/sweep.h"
 

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/camera.h"
 #include "thicklens/effects.h"
-#include "thicklens/export.h"
 #include "thicklens/image.h"
 #include "thicklens/light_field.h"
 #include "thicklens/run.h"

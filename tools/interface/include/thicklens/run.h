@@ -7,7 +7,7 @@
 
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
-#include "thicklens/export.h"
+#include "thicklens/base/export.h"
 
 // How a long call is run: the one protocol for threads, cancellation, progress and notices. It
 // never changes a result. Every function of this interface that may take longer than 0.2 s takes a

@@ -9,7 +9,7 @@
 #include "thicklens/camera.h"
 #include "thicklens/depth.h"
 #include "thicklens/effects.h"
-#include "thicklens/export.h"
+#include "thicklens/base/export.h"
 #include "thicklens/image.h"
 #include "thicklens/light_field.h"
 #include "thicklens/model/scene_simulator.h"

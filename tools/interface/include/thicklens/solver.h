@@ -8,8 +8,8 @@
 #include <variant>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/camera.h"
-#include "thicklens/export.h"
 #include "thicklens/image.h"
 #include "thicklens/light_field.h"
 #include "thicklens/run.h"

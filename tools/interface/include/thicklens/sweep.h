@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/camera.h"
-#include "thicklens/export.h"
 #include "thicklens/image.h"
 #include "thicklens/model/sweep_file.h"
 #include "thicklens/run.h"

@@ -4,7 +4,7 @@
 #include "thicklens/calib/verification.h"
 #include "thicklens/calibrate.h"
 #include "thicklens/camera.h"
-#include "thicklens/export.h"
+#include "thicklens/base/export.h"
 #include "thicklens/run.h"
 #include "thicklens/sweep.h"
 

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "thicklens/export.h"
+#include "thicklens/base/export.h"
 
 // The version of the headers with which a program is compiled. CMake reads it here.
 #define THICKLENS_VERSION_MAJOR 0

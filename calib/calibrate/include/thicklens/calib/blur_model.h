@@ -4,19 +4,20 @@
 #include <Eigen/Core>
 #include <optional>
 
+#include "thicklens/base/export.h"
 #include "thicklens/calib/calibration.h"
 #include "thicklens/calib/focus_sweep.h"
 #include "thicklens/model/sweep_file.h"
 
 namespace thicklens::calib {
 
-bool IsDepth(double depth_mm);  // finite and in front of the camera
-bool HasBlur(const FrameMeasurement& frame);
+THICKLENS_EXPORT bool IsDepth(double depth_mm);  // finite and in front of the camera
+THICKLENS_EXPORT bool HasBlur(const FrameMeasurement& frame);
 
 // Blur by the fitted law, sigma = sqrt(S0 + (kappa r_defocus/p)^2), px for each axis, without the
 // pixel box. The law is exact for all depths z > 0; at z = zf it is the floor. The sweep must
 // outlive the object.
-class BlurModel {
+class THICKLENS_EXPORT BlurModel {
  public:
   // Returns nothing if the fit gave no image distance or no blur ratio that a lens can have.
   static std::optional<BlurModel> Of(const FocusSweep& sweep, const Calibration& calibration);

@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "thicklens/base/export.h"
 #include "thicklens/base/progress.h"
 #include "thicklens/calib/calibration.h"
 #include "thicklens/calib/focus_sweep.h"
@@ -20,23 +21,24 @@ struct CalibrationOptions {
   int threads = 0;            // 0: one per core
   ProgressFunction progress;  // called from time to time
 
-  bool IsValid(std::string* why) const;
+  THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 
 // Whether a calibration can be attempted at all: counts the frames and the different readings,
 // without opening a frame. If not, `why` receives the reason.
-bool HasEnoughFrames(const FocusSweep& sweep, std::string* why);
+THICKLENS_EXPORT bool HasEnoughFrames(const FocusSweep& sweep, std::string* why);
 
 // Runs the quality checks, the estimators and both methods. Bad data give a Calibration whose
 // outcome is kRefused or kPartial, with the reason. A wrong file or setting throws Error, and a
 // cancelled CancelScope throws Interrupted.
-Calibration Calibrate(const FocusSweep& sweep, const CalibrationOptions& options);
+THICKLENS_EXPORT Calibration Calibrate(const FocusSweep& sweep, const CalibrationOptions& options);
 
 // Returns the camera with the calibrated values, as it is written to a file. The manufacturer's
 // values are unchanged. With `use_source_recipe`, d1 and kappa are those of the paper's recipe;
 // their sigmas are 0 because the recipe has no error estimate, not because they are exact.
-model::Camera CalibratedCamera(const model::Camera& camera, const Calibration& calibration,
-                               bool use_source_recipe);
+THICKLENS_EXPORT model::Camera CalibratedCamera(const model::Camera& camera,
+                                                const Calibration& calibration,
+                                                bool use_source_recipe);
 
 }  // namespace thicklens::calib
 

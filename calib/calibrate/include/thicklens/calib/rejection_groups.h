@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/calib/calibration.h"
 
 namespace thicklens::calib {
@@ -23,7 +24,8 @@ struct RejectionGroup {
 };
 
 // Returns the groups in the order in which their kinds appear in the sweep.
-std::vector<RejectionGroup> RejectionGroups(const std::vector<FrameMeasurement>& frames);
+THICKLENS_EXPORT std::vector<RejectionGroup> RejectionGroups(
+    const std::vector<FrameMeasurement>& frames);
 
 }  // namespace thicklens::calib
 

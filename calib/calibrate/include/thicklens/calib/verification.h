@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/calib/calibrate.h"
 #include "thicklens/calib/focus_sweep.h"
 #include "thicklens/model/camera.h"
@@ -23,18 +24,18 @@ struct VerificationOptions {
   double needed_blur_px = 0.5;
   double needed_blur_ratio = 0.1;
 
-  bool IsValid(std::string* why) const;
+  THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 
 // One quantity, with its stored and its new value.
 struct ComparedParameter {
   std::string name;  // as in files: "image_distance_mm"
   model::Estimate stored, found;
-  double difference = 0;        // found minus stored
-  double systematic_sigma = 0;  // part of sigma from the new sweep's systematic parts
-  double sigma = 0;             // standard deviation of the difference, in all
-  double deviation() const;     // difference over sigma; 0 if sigma is 0
-  bool counted = false;         // included in the joint chi-square
+  double difference = 0;                      // found minus stored
+  double systematic_sigma = 0;                // part of sigma from the new sweep's systematic parts
+  double sigma = 0;                           // standard deviation of the difference, in all
+  THICKLENS_EXPORT double deviation() const;  // difference over sigma; 0 if sigma is 0
+  bool counted = false;                       // included in the joint chi-square
   std::string why_not_counted;
   // The smallest change of this parameter alone that the joint test finds in 95 % of the cases. It
   // is 0 where the parameter is not counted.
@@ -42,7 +43,8 @@ struct ComparedParameter {
 };
 
 enum class Verdict { kHolds, kDoesNotHold, kUndetermined };
-std::string VerdictName(Verdict verdict);  // "holds", "does-not-hold", "cannot-tell"
+// "holds", "does-not-hold", "cannot-tell".
+THICKLENS_EXPORT std::string VerdictName(Verdict verdict);
 
 struct Verification {
   Verdict verdict = Verdict::kUndetermined;
@@ -62,13 +64,14 @@ struct Verification {
 // even distribution over their intervals, except those that the numbers of the camera file cause:
 // they move both calibrations alike. The depth of focus follows from d1: it is listed and not
 // counted. Throws Error if `stored` has no calibration or if the options are not valid.
-Verification VerifyCalibration(const model::Camera& stored, const FocusSweep& sweep,
-                               const Calibration& found, const VerificationOptions& options);
+THICKLENS_EXPORT Verification VerifyCalibration(const model::Camera& stored,
+                                                const FocusSweep& sweep, const Calibration& found,
+                                                const VerificationOptions& options);
 
 // ChiSquareTail returns P(chi^2 >= x) for a number of degrees of freedom (>= 1). ChiSquareExceeded
 // returns the x that is exceeded with probability p in (0, 1).
-double ChiSquareTail(double x, int degrees_of_freedom);
-double ChiSquareExceeded(double p, int degrees_of_freedom);
+THICKLENS_EXPORT double ChiSquareTail(double x, int degrees_of_freedom);
+THICKLENS_EXPORT double ChiSquareExceeded(double p, int degrees_of_freedom);
 
 }  // namespace thicklens::calib
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/calib/diagnosis.h"
 #include "thicklens/calib/frame_statistics.h"
 #include "thicklens/model/camera.h"
@@ -214,7 +215,7 @@ struct BlurFit {
 };
 
 enum class Outcome { kOk, kPartial, kRefused };
-std::string OutcomeName(Outcome outcome);
+THICKLENS_EXPORT std::string OutcomeName(Outcome outcome);
 
 // The result of a calibration for people and programs: what was found, and whether it can be used.
 struct CalibrationSummary {
@@ -234,7 +235,7 @@ struct CalibrationSummary {
   double seconds = 0;
 
   // One line: outcome, d1, zf and kappa with their sigmas, frames, time.
-  std::string BriefReport() const;
+  THICKLENS_EXPORT std::string BriefReport() const;
 };
 
 // Evidence behind the result: intermediate results, alternatives, causes.

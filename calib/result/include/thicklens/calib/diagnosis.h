@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/model/camera.h"
 
 namespace thicklens::calib {
@@ -30,13 +31,13 @@ struct Diagnosis {
   std::string separates;         // observation that would distinguish these causes
 
   // Whether the cause is named, and whether it is the only named one.
-  bool Names(const std::string& cause) const;
-  bool NamesOnly(const std::string& cause) const;
+  THICKLENS_EXPORT bool Names(const std::string& cause) const;
+  THICKLENS_EXPORT bool NamesOnly(const std::string& cause) const;
 };
 
 // Sorts the causes and counts those to be named: none where the best one is not significant;
 // otherwise all within kDecisive of it.
-void SortCauses(Diagnosis* diagnosis);
+THICKLENS_EXPORT void SortCauses(Diagnosis* diagnosis);
 
 // The reading at which a sweep is sharpest: the peak of the normalised sharpness against the
 // reading. It needs no camera, no bench zero and no direction.
@@ -72,9 +73,9 @@ struct FrameStructureFinding {
 
   // Whether the structure exceeds four standard deviations and is large enough to matter to
   // registrations.
-  bool HasVignetting() const;
-  bool HasBands() const;
-  bool HasFixedStructure() const;
+  THICKLENS_EXPORT bool HasVignetting() const;
+  THICKLENS_EXPORT bool HasBands() const;
+  THICKLENS_EXPORT bool HasFixedStructure() const;
 };
 
 }  // namespace thicklens::calib

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/model/camera.h"
 #include "thicklens/model/sweep_file.h"
 
@@ -33,25 +34,28 @@ struct FocusSweep {
 
   // True if a calibration can be attempted: the camera and the values are possible. Otherwise `why`
   // (unless it is null) receives the reason.
-  bool IsValid(std::string* why) const;
+  THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 
 // Makes a FocusSweep from its description. The caller sets `read_frame`. Throws Error if the
 // description takes its floor from the calibration of another camera.
-FocusSweep MakeFocusSweep(const model::SweepFile& file, const model::Camera& camera);
+THICKLENS_EXPORT FocusSweep MakeFocusSweep(const model::SweepFile& file,
+                                           const model::Camera& camera);
 
 // Returns the region of interest of a stored frame. Throws an Error that names the frame if its
 // size is not the sensor's, or if its depth or channels are not those of FrameReader.
-cv::Mat RegionOf(const cv::Mat& stored, const FocusSweep& sweep, std::size_t index);
+THICKLENS_EXPORT cv::Mat RegionOf(const cv::Mat& stored, const FocusSweep& sweep,
+                                  std::size_t index);
 
 // Returns the region as linear grey light in [0, 1], CV_32F (0.2126 R + 0.7152 G + 0.0722 B).
 // Throws as RegionOf does.
-cv::Mat LinearGrey(const cv::Mat& stored, const FocusSweep& sweep, std::size_t index);
+THICKLENS_EXPORT cv::Mat LinearGrey(const cv::Mat& stored, const FocusSweep& sweep,
+                                    std::size_t index);
 
 // Returns one channel of the linear light, CV_32F: 0 red, 1 green, 2 blue; a frame with one channel
 // has 0 alone. Throws as RegionOf does, and also if the frame has no such channel.
-cv::Mat LinearChannel(const cv::Mat& stored, const FocusSweep& sweep, std::size_t index,
-                      int channel);
+THICKLENS_EXPORT cv::Mat LinearChannel(const cv::Mat& stored, const FocusSweep& sweep,
+                                       std::size_t index, int channel);
 
 }  // namespace thicklens::calib
 

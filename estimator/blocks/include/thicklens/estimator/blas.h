@@ -3,20 +3,22 @@
 
 #include <string>
 
+#include "thicklens/base/export.h"
+
 namespace thicklens::estimator {
 
 // Describes in one line which BLAS this process uses: its name, its version and settings where the
 // library reports them, and its file; "none" if the process has no BLAS. The choice is made when
 // the program starts: it is the first library with a dgemm_, and for Debian's libblas.so.3 the one
 // that update-alternatives names.
-std::string BlasDescription();
+THICKLENS_EXPORT std::string BlasDescription();
 
 // While an object of this class exists, OpenBLAS uses one thread for each call: the blocks already
 // occupy all cores, and the order of a sum must not depend on the number of cores. The setting
 // belongs to the process, not to the thread, so create the object before threads start. The
 // destructor restores the former number. Reference BLAS and Debian's ATLAS have no threads and need
 // nothing.
-class OneBlasThread {
+class THICKLENS_EXPORT OneBlasThread {
  public:
   OneBlasThread();
   ~OneBlasThread();
@@ -36,7 +38,7 @@ class OneBlasThread {
 // short that they may not have started: such a thread retries forever, and waiting for it would
 // never end. If the program sets another number later, OpenBLAS starts new threads. Another BLAS
 // needs nothing.
-void KeepBlasToOneThread();
+THICKLENS_EXPORT void KeepBlasToOneThread();
 
 }  // namespace thicklens::estimator
 

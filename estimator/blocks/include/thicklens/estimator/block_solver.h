@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/estimator/estimate_input.h"
 #include "thicklens/estimator/solver_run.h"
 #include "thicklens/kernels/splat.h"
@@ -26,12 +27,12 @@ enum class BlockSolver {
 };
 // The names are "umfpack", "cholmod", "eigen", "cg", "bicgstab" and "viennacl". Throws Error for
 // another name.
-BlockSolver BlockSolverFromName(const std::string& name);
-std::string BlockSolverName(BlockSolver solver);
-bool IsBuiltIn(BlockSolver solver);  // whether this build has it
-std::vector<BlockSolver> BuiltInBlockSolvers();
-bool IsIterative(BlockSolver solver);
-BlockSolver DefaultBlockSolver();
+THICKLENS_EXPORT BlockSolver BlockSolverFromName(const std::string& name);
+THICKLENS_EXPORT std::string BlockSolverName(BlockSolver solver);
+THICKLENS_EXPORT bool IsBuiltIn(BlockSolver solver);  // whether this build has it
+THICKLENS_EXPORT std::vector<BlockSolver> BuiltInBlockSolvers();
+THICKLENS_EXPORT bool IsIterative(BlockSolver solver);
+THICKLENS_EXPORT BlockSolver DefaultBlockSolver();
 
 // The discretisation of the smoothness over the rays of one scene point.
 enum class Stencil {
@@ -39,8 +40,8 @@ enum class Stencil {
   kSource,  // G as six explicit finite differences; not symmetric where the depth varies
 };
 // The names are "warp" and "source". Throws Error for another name.
-Stencil StencilFromName(const std::string& name);
-std::string StencilName(Stencil stencil);
+THICKLENS_EXPORT Stencil StencilFromName(const std::string& name);
+THICKLENS_EXPORT std::string StencilName(Stencil stencil);
 
 struct BlockOptions {
   BlockSolver solver = DefaultBlockSolver();
@@ -59,7 +60,7 @@ struct BlockOptions {
   bool falloff = true;  // applies the irradiance of [S12] if there is a camera
 
   // Returns false, and the reason in `why` (may be null), if a member is not in its range.
-  bool IsValid(std::string* why) const;
+  THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 
 struct BlockReport {
@@ -103,8 +104,9 @@ struct BlockSummary : SolverResult, BlockDiagnostics {
 // singular or whose rcond is below the limit (the message names the block), for iterations that end
 // with a relative residual of 10 or more, and for a memory limit that blocks of
 // BlockOptions::block_px, or without it the smallest blocks, exceed.
-model::LightField EstimateByBlocks(const EstimateInput& input, const BlockOptions& options,
-                                   const SolverRun& run, BlockSummary* summary);
+THICKLENS_EXPORT model::LightField EstimateByBlocks(const EstimateInput& input,
+                                                    const BlockOptions& options,
+                                                    const SolverRun& run, BlockSummary* summary);
 
 }  // namespace thicklens::estimator
 

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/estimator/block_solver.h"
 
 namespace thicklens::estimator {
@@ -35,7 +36,7 @@ struct SolvedBlock {
 
 // Keeps the blocks of a long run, so that another run can continue where the first one was
 // interrupted. An exception of a member function ends the estimate.
-class BlockStore {
+class THICKLENS_EXPORT BlockStore {
  public:
   virtual ~BlockStore() = default;
   // Called once, before all blocks.

@@ -1,6 +1,7 @@
 #ifndef THICKLENS_ESTIMATOR_DEPTH_NOISE_H_
 #define THICKLENS_ESTIMATOR_DEPTH_NOISE_H_
 
+#include "thicklens/base/export.h"
 #include "thicklens/estimator/disparity_map.h"
 
 namespace thicklens::estimator {
@@ -24,7 +25,7 @@ struct SmoothedDepth {
 // Derived here [D94]. `noise_px`: standard deviation, px per view step (of the larger of the two
 // steps), > 0, as DepthNoisePx finds it. The result does not depend on the number of threads.
 // Throws Error if the map has holes or noise_px is not > 0.
-SmoothedDepth SmoothDepth(const DisparityMap& map, double noise_px, int threads);
+THICKLENS_EXPORT SmoothedDepth SmoothDepth(const DisparityMap& map, double noise_px, int threads);
 
 }  // namespace thicklens::estimator
 

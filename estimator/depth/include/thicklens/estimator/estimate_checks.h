@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/estimator/view_geometry.h"
 
 namespace thicklens::estimator {
@@ -26,7 +27,8 @@ struct StepCheck {
 // Measures how far apart neighbouring views of one point land in the photograph. D is the
 // disparity, and q the distance between the sample and the landing point of a ray of the next view
 // (LightField::landing_step_px). Holes are left out.
-StepCheck CheckSteps(const DisparityMap& map, const Eigen::Vector2d& landing_step_px);
+THICKLENS_EXPORT StepCheck CheckSteps(const DisparityMap& map,
+                                      const Eigen::Vector2d& landing_step_px);
 
 // Returns the standard deviation of the noise of a disparity from pixel to pixel, px per view step
 // (the larger of the two steps), where the disparity is smooth. It is the median absolute second
@@ -35,7 +37,7 @@ StepCheck CheckSteps(const DisparityMap& map, const Eigen::Vector2d& landing_ste
 // counts as 0.6 c, and edges are few. Maps with wide quantisation steps have a median of 0. Noise
 // that is smooth over several pixels is not detected. Absent if the map is smaller than 3 px on
 // both axes or holes leave no three neighbours.
-std::optional<double> DepthNoisePx(const DisparityMap& map);
+THICKLENS_EXPORT std::optional<double> DepthNoisePx(const DisparityMap& map);
 
 // A part of the photograph that the estimate does not explain; position and size in px.
 struct ResidualPatch {
@@ -49,9 +51,9 @@ struct ResidualPatch {
 // wrong, so that the blur is assumed too wide. (Too narrow a blur fits and is not detected.)
 // `residual`: H r - I in encoded values; `occluded_fraction`: as in SceneMaps. Throws Error for
 // sizes that do not fit.
-std::vector<ResidualPatch> ResidualPatches(const std::vector<float>& residual,
-                                           const std::vector<float>& occluded_fraction,
-                                           int width_px, int height_px, double noise_sigma);
+THICKLENS_EXPORT std::vector<ResidualPatch> ResidualPatches(
+    const std::vector<float>& residual, const std::vector<float>& occluded_fraction, int width_px,
+    int height_px, double noise_sigma);
 
 // Share of unexplained blocks (UnexplainedShare) above which the estimate as a whole does not
 // explain the photograph.
@@ -62,9 +64,10 @@ constexpr double kMaxUnexplained = 0.2;
 // channels less. Where many blocks have more, the photograph has details that the assumed blur
 // would have removed. Absent if fewer than a tenth of all blocks count. Throws Error for sizes that
 // do not fit.
-std::optional<double> UnexplainedShare(const std::vector<float>& residual,
-                                       const std::vector<float>& occluded_fraction, int width_px,
-                                       int height_px, double noise_sigma);
+THICKLENS_EXPORT std::optional<double> UnexplainedShare(const std::vector<float>& residual,
+                                                        const std::vector<float>& occluded_fraction,
+                                                        int width_px, int height_px,
+                                                        double noise_sigma);
 
 }  // namespace thicklens::estimator
 

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <limits>
 
+#include "thicklens/base/export.h"
 #include "thicklens/estimator/disparity_map.h"
 #include "thicklens/model/scene.h"
 
@@ -24,9 +25,9 @@ namespace thicklens::estimator {
 // filled pixels. No filled value is below both the smallest known value and `at_infinity`, the
 // disparity of an infinitely far point, where that is known. Throws Error if all values are holes,
 // the sizes differ, or a value of the image is not finite.
-DisparityMap FillHoles(const DisparityMap& map, const model::LinearImage& image,
-                       std::size_t* filled,
-                       double at_infinity = -std::numeric_limits<double>::infinity());
+THICKLENS_EXPORT DisparityMap
+FillHoles(const DisparityMap& map, const model::LinearImage& image, std::size_t* filled,
+          double at_infinity = -std::numeric_limits<double>::infinity());
 
 }  // namespace thicklens::estimator
 

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "thicklens/base/export.h"
 #include "thicklens/estimator/estimate_input.h"
 #include "thicklens/estimator/solver_run.h"
 
@@ -18,7 +19,7 @@ struct FunctionalOptions {
   bool falloff = true;  // applies the irradiance of [S12] if there is a camera
 
   // Returns false, and the reason in `why` (may be null), if a member is not in its range.
-  bool IsValid(std::string* why) const;
+  THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 
 struct FunctionalDiagnostics {
@@ -47,8 +48,10 @@ struct FunctionalSummary : SolverResult, FunctionalDiagnostics {
 // `summary` may be null. Throws Error for options and inputs that do not fit, for a memory limit
 // that is too low, and for iterations that end with a relative residual of 10 or more. The result
 // does not depend on the number of threads.
-model::LightField EstimateFunctional(const EstimateInput& input, const FunctionalOptions& options,
-                                     const SolverRun& run, FunctionalSummary* summary);
+THICKLENS_EXPORT model::LightField EstimateFunctional(const EstimateInput& input,
+                                                      const FunctionalOptions& options,
+                                                      const SolverRun& run,
+                                                      FunctionalSummary* summary);
 
 }  // namespace thicklens::estimator
 

@@ -1,6 +1,7 @@
 #ifndef THICKLENS_ESTIMATOR_GRID_SOLVER_H_
 #define THICKLENS_ESTIMATOR_GRID_SOLVER_H_
 
+#include "thicklens/base/export.h"
 #include "thicklens/estimator/estimate_input.h"
 #include "thicklens/estimator/functional_solver.h"
 
@@ -26,8 +27,9 @@ struct GridOptions : FunctionalOptions {};
 // `summary` may be null. Throws Error for options and inputs that do not fit, for a memory limit
 // that is too low, and for iterations that end with a relative residual of 10 or more. The result
 // does not depend on the number of threads.
-model::LightField EstimateOnGrid(const EstimateInput& input, const FunctionalOptions& options,
-                                 const SolverRun& run, FunctionalSummary* summary);
+THICKLENS_EXPORT model::LightField EstimateOnGrid(const EstimateInput& input,
+                                                  const FunctionalOptions& options,
+                                                  const SolverRun& run, FunctionalSummary* summary);
 
 }  // namespace thicklens::estimator
 

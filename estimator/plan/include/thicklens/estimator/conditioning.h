@@ -3,6 +3,7 @@
 
 #include <optional>
 
+#include "thicklens/base/export.h"
 #include "thicklens/estimator/block_solver.h"
 #include "thicklens/estimator/functional_solver.h"
 
@@ -21,13 +22,14 @@ struct Conditioning {
   std::optional<double> float_error, double_error;
 
   // largest/smallest; infinite if `smallest` is not above 0.
-  double condition() const;
+  THICKLENS_EXPORT double condition() const;
 };
 
 // Conditioning of the system of EstimateByBlocks with the whole image as one block. The options
 // give gamma, ridge, stencil, splat and fall-off. Throws Error for more than 4000 unknowns (pixels
 // times views), and for options and inputs that do not fit.
-Conditioning ConditioningOfBlock(const EstimateInput& input, const BlockOptions& options);
+THICKLENS_EXPORT Conditioning ConditioningOfBlock(const EstimateInput& input,
+                                                  const BlockOptions& options);
 
 // Conditioning of Id + H A^-1 H^T, the system of EstimateFunctional in scene-ray form, with one
 // unknown for each pixel [D117]. Its smallest eigenvalue is at least 1, and its largest is at most
@@ -35,7 +37,8 @@ Conditioning ConditioningOfBlock(const EstimateInput& input, const BlockOptions&
 // rays of a point, divided by mu. With mu' = U V mu the largest eigenvalue then tends to 1 +
 // |H1|^2/mu', where H1 forms the photograph of points whose rays are equal. Throws Error for more
 // than 4000 pixels, and for options and inputs that do not fit.
-Conditioning ConditioningOfSceneRays(const EstimateInput& input, const FunctionalOptions& options);
+THICKLENS_EXPORT Conditioning ConditioningOfSceneRays(const EstimateInput& input,
+                                                      const FunctionalOptions& options);
 
 }  // namespace thicklens::estimator
 

@@ -4,6 +4,8 @@
 #include <optional>
 #include <string>
 
+#include "thicklens/base/export.h"
+
 namespace thicklens::estimator {
 
 // One way to a light field: what determines how it is computed, but not what is
@@ -20,7 +22,7 @@ struct EstimatePlan {
 
 // Returns a unique name, as a user would type it: "scene tv", "scene tv, tolerance 0.01", "blocks
 // umfpack 16 px".
-std::string PlanName(const EstimatePlan& plan);
+THICKLENS_EXPORT std::string PlanName(const EstimatePlan& plan);
 
 }  // namespace thicklens::estimator
 

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/estimator/estimate_plan.h"
 #include "thicklens/estimator/time_model.h"
 
@@ -33,11 +34,11 @@ struct EstimateProfile {
   std::string from;     // the file it was read from, or "the profile that ships"
   bool is_own = false;  // measured by the user, not the default profile
 
-  double best_psnr_db() const;
+  THICKLENS_EXPORT double best_psnr_db() const;
   // Returns whether the user measured it with that build, on such a processor and with as many
   // threads.
-  bool WasMeasuredBy(const std::string& build_here, const std::string& processor_here,
-                     int threads_here) const;
+  THICKLENS_EXPORT bool WasMeasuredBy(const std::string& build_here,
+                                      const std::string& processor_here, int threads_here) const;
   double LossDb(const PlanProfile& plan) const { return best_psnr_db() - plan.psnr_db; }
 };
 

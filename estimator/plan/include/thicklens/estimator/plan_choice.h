@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "thicklens/base/export.h"
 #include "thicklens/estimator/estimate_profile.h"
 #include "thicklens/estimator/time_model.h"
 
@@ -37,9 +38,9 @@ struct PlanChoice {
 // If both limits are given, the choice is the fastest plan that satisfies both. Throws Error if no
 // plan does, and names the nearest. `spent_seconds` is the time that reading and finding the ratio
 // took; it counts toward the limit.
-PlanChoice ChoosePlan(const EstimateProfile& profile, const QualityTarget& target,
-                      const std::string& target_text, const Workload& load, double speed_ratio,
-                      double spent_seconds = 0);
+THICKLENS_EXPORT PlanChoice ChoosePlan(const EstimateProfile& profile, const QualityTarget& target,
+                                       const std::string& target_text, const Workload& load,
+                                       double speed_ratio, double spent_seconds = 0);
 
 }  // namespace thicklens::estimator
 

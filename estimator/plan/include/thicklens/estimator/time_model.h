@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/estimator/estimate_input.h"
 
 namespace thicklens::estimator {
@@ -29,7 +30,7 @@ struct PartSeconds {
 
 // Returns the properties of a photograph, its depth and its views that determine how long an
 // estimate takes. `file_seconds` is measured by the caller.
-Workload WorkloadOf(const EstimateInput& input, double file_seconds);
+THICKLENS_EXPORT Workload WorkloadOf(const EstimateInput& input, double file_seconds);
 
 struct TimedWorkload {
   Workload load;
@@ -39,7 +40,7 @@ struct TimedWorkload {
 
 // Seconds of a run from the start of reading its files [D120], as a sum of terms, none of them
 // negative. Pixels are in millions.
-class TimeModel {
+class THICKLENS_EXPORT TimeModel {
  public:
   // The terms are in the order of the profile's file, whose schema changes with it. s is the blur's
   // sigma in px.
@@ -80,11 +81,11 @@ using TimesOfPlans = std::vector<std::vector<TimedWorkload>>;
 // not. Each model has the least sum of squared errors, relative to the whole time, with no
 // coefficient below 0. Throws Error for fewer than two images, times that are not above 0, parts
 // that do not fit their times, or plans with different images.
-std::vector<TimeModel> FitTimeModels(const TimesOfPlans& plans);
+THICKLENS_EXPORT std::vector<TimeModel> FitTimeModels(const TimesOfPlans& plans);
 
 // Returns for each plan and image the ratio of predicted to measured time. The prediction is made
 // when the image has been read, by the model from the images of all other sizes.
-std::vector<std::vector<double>> LeftOutRatios(const TimesOfPlans& plans);
+THICKLENS_EXPORT std::vector<std::vector<double>> LeftOutRatios(const TimesOfPlans& plans);
 
 }  // namespace thicklens::estimator
 

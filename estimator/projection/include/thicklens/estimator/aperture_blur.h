@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 
+#include "thicklens/base/export.h"
 #include "thicklens/model/camera.h"
 #include "thicklens/model/light_field_grid.h"
 
@@ -22,8 +23,10 @@ struct ApertureBlur {
 // Measures the blur of an aperture. `weights`: V x U, >= 0, any positive sum. `falloff`: the camera
 // whose irradiance the rays have; null: none. Throws Error if the weights differ in size from the
 // grid's views, if one is below 0, or if their sum is not positive.
-ApertureBlur MeasureApertureBlur(const model::LightFieldGrid& grid, const model::Camera& camera,
-                                 const Eigen::ArrayXXd& weights, const model::Camera* falloff);
+THICKLENS_EXPORT ApertureBlur MeasureApertureBlur(const model::LightFieldGrid& grid,
+                                                  const model::Camera& camera,
+                                                  const Eigen::ArrayXXd& weights,
+                                                  const model::Camera* falloff);
 
 }  // namespace thicklens::estimator
 

@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/model/light_field.h"
 
 namespace thicklens::estimator {
@@ -19,20 +20,22 @@ namespace thicklens::estimator {
 // R view steps. For R = 0, and for an aperture that meets no view, the weight goes to the view (or
 // views) nearest to the centre. Absent views have the weight 0. Throws Error for an invalid light
 // field and for a radius that is negative, not finite or, with a camera, larger than r.
-Eigen::ArrayXXd WeightsForRadius(const model::LightField& light_field, double radius);
+THICKLENS_EXPORT Eigen::ArrayXXd WeightsForRadius(const model::LightField& light_field,
+                                                  double radius);
 
 // Whether the light field's UV plane lies off the aperture.
-bool IsOffAperture(const model::LightField& light_field);
+THICKLENS_EXPORT bool IsOffAperture(const model::LightField& light_field);
 
 // Returns the shape whose model::ApertureWeights equal the light field's own weights within 1e-6,
 // apart from absent views, or nothing if no shape fits. Several shapes may fit a few views; the
 // shape of the camera's PSF is then preferred.
-std::optional<model::ApertureShape> ShapeOfWeights(const model::LightField& light_field);
+THICKLENS_EXPORT std::optional<model::ApertureShape> ShapeOfWeights(
+    const model::LightField& light_field);
 
 // Returns how far the centre of the rays of a pixel moves across the aperture at most, relative to
 // half of the width that the views of one pixel cover there: this share of their light is missing
 // on one side. Needs a grid and a camera.
-double MaxPupilShift(const model::LightField& light_field);
+THICKLENS_EXPORT double MaxPupilShift(const model::LightField& light_field);
 
 // Weighting of a ray by the place where it crosses the aperture: the weight of `shape` at that
 // place, in view steps on the aperture, times the share that the smaller aperture of
@@ -46,8 +49,9 @@ struct Vignetting {
 // Returns the weight of every ray of the view (k, l), T x S numbers row by row, 1 in the middle of
 // the aperture. From [S10]: the ray (s, t, u, v) crosses at a = ((zl + d0) u - zl s)/d0. A view
 // step is that of model::ApertureStepsMm. Needs a grid and a camera.
-std::vector<float> ApertureTransmissionMap(const model::LightField& light_field,
-                                           const Vignetting& vignetting, int k, int l);
+THICKLENS_EXPORT std::vector<float> ApertureTransmissionMap(const model::LightField& light_field,
+                                                            const Vignetting& vignetting, int k,
+                                                            int l);
 
 }  // namespace thicklens::estimator
 

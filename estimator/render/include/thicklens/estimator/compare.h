@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/estimator/disparity_map.h"
 #include "thicklens/model/encoded_values.h"
 #include "thicklens/model/light_field.h"
@@ -36,13 +37,13 @@ struct ImageScores {
 // An edge pixel has at least half of the gradient that one pixel in a hundred of the reference
 // exceeds, and at least 2/255 per px (a fixed multiple of the noise of 8-bit values). If the other
 // image has no gradient at all at an edge pixel, an edge was lost and the pixel counts 0.
-ImageScores CompareImages(const model::EncodedValues& reference, const model::EncodedValues& other,
-                          int border_px);
+THICKLENS_EXPORT ImageScores CompareImages(const model::EncodedValues& reference,
+                                           const model::EncodedValues& other, int border_px);
 
 // CIE94 difference of two colours in L*, a*, b*; the first one is the reference.
-double DeltaE94(const Eigen::Vector3d& reference_lab, const Eigen::Vector3d& lab);
+THICKLENS_EXPORT double DeltaE94(const Eigen::Vector3d& reference_lab, const Eigen::Vector3d& lab);
 // Converts sRGB in [0, 1] to CIE L*a*b* for D65 and the 2-degree observer.
-Eigen::Vector3d LabOf(const Eigen::Vector3d& srgb);
+THICKLENS_EXPORT Eigen::Vector3d LabOf(const Eigen::Vector3d& srgb);
 
 struct ViewScores {
   int u = 0, v = 0;  // indices k, l
@@ -70,9 +71,10 @@ struct DibrInput {
 // that --views selects inner views), if no view is present in both, if `dibr` does not fit the
 // views, or if both light fields have grids whose view steps differ by more than 5 %: inner views
 // of a camera's larger light field are not those of its smaller one.
-LightFieldScores CompareLightFields(const model::LightField& reference,
-                                    const model::LightField& other, int border_px,
-                                    const std::optional<DibrInput>& dibr, int threads);
+THICKLENS_EXPORT LightFieldScores CompareLightFields(const model::LightField& reference,
+                                                     const model::LightField& other, int border_px,
+                                                     const std::optional<DibrInput>& dibr,
+                                                     int threads);
 
 }  // namespace thicklens::estimator
 

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <string>
 
+#include "thicklens/base/export.h"
 #include "thicklens/base/progress.h"
 #include "thicklens/estimator/disparity_map.h"
 #include "thicklens/model/light_field.h"
@@ -16,7 +17,7 @@ struct InpaintOptions {
   // Called for each visited view. If it throws, the light field is partly filled.
   ProgressFunction progress;
 
-  bool IsValid(std::string* why) const;
+  THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 
 struct InpaintSummary {
@@ -42,8 +43,8 @@ struct InpaintSummary {
 // border of the centre view are not holes, because they have no surroundings to continue from.
 // `map` belongs to the centre view and has no holes. Absent views are left out. Throws Error for
 // options and sizes that do not fit, and for an invalid light field.
-void InpaintOccludedRays(const DisparityMap& map, const InpaintOptions& options,
-                         model::LightField* light_field, InpaintSummary* summary);
+THICKLENS_EXPORT void InpaintOccludedRays(const DisparityMap& map, const InpaintOptions& options,
+                                          model::LightField* light_field, InpaintSummary* summary);
 
 }  // namespace thicklens::estimator
 

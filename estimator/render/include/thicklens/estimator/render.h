@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 
+#include "thicklens/base/export.h"
 #include "thicklens/estimator/aperture_weights.h"
 #include "thicklens/model/light_field.h"
 
@@ -27,31 +28,36 @@ namespace thicklens::estimator {
 // vector instructions; the numbers equal those of the kernels except for rounding. Throws Error for
 // an invalid light field, for weights that do not fit, and if all rays of a pixel are outside of
 // the aperture.
-model::LinearImage Photograph(const model::LightField& light_field, const Eigen::ArrayXXd& weights,
-                              const model::Camera* falloff, const Vignetting* vignetting,
-                              kernels::Kernels<float>* kernels, int threads);
+THICKLENS_EXPORT model::LinearImage Photograph(const model::LightField& light_field,
+                                               const Eigen::ArrayXXd& weights,
+                                               const model::Camera* falloff,
+                                               const Vignetting* vignetting,
+                                               kernels::Kernels<float>* kernels, int threads);
 
 // Refocuses the photograph [D98]: shifts the views so that points of the given disparity (px per
 // view step) coincide, and averages them with `weights`. Interpolation is bicubic between samples.
 // Where the shift moves some views out of the image, the mean is over the others; where it moves
 // all of them out, the result is black. Throws Error for an invalid light field, for weights that
 // do not fit, and for a disparity that is not finite.
-model::LinearImage Refocus(const model::LightField& light_field, double disparity_u_px,
-                           double disparity_v_px, const Eigen::ArrayXXd& weights, int threads);
+THICKLENS_EXPORT model::LinearImage Refocus(const model::LightField& light_field,
+                                            double disparity_u_px, double disparity_v_px,
+                                            const Eigen::ArrayXXd& weights, int threads);
 // Returns the disparity -m of the light field's grid at a depth from the aperture plane, for each
 // axis, in px per view step. Throws Error without a camera and at the depth of the UV plane.
-Eigen::Vector2d DisparityAtDepthPx(const model::LightField& light_field, double depth_mm);
+THICKLENS_EXPORT Eigen::Vector2d DisparityAtDepthPx(const model::LightField& light_field,
+                                                    double depth_mm);
 
 // Returns all views side by side, (0, 0) at the top left, with `gap_px` (>= 0) black pixels between
 // them. Throws Error for an invalid light field.
-model::LinearImage Mosaic(const model::LightField& light_field, int gap_px);
+THICKLENS_EXPORT model::LinearImage Mosaic(const model::LightField& light_field, int gap_px);
 
 // Return epipolar-plane images: row t of all views of the view row l, one above the other, each
 // repeated to a height of `repeat_px` (>= 1); or column s of all views of the view column k, side
 // by side. They throw Error for an invalid light field or index.
-model::LinearImage EpipolarRow(const model::LightField& light_field, int t, int l, int repeat_px);
-model::LinearImage EpipolarColumn(const model::LightField& light_field, int s, int k,
-                                  int repeat_px);
+THICKLENS_EXPORT model::LinearImage EpipolarRow(const model::LightField& light_field, int t, int l,
+                                                int repeat_px);
+THICKLENS_EXPORT model::LinearImage EpipolarColumn(const model::LightField& light_field, int s,
+                                                   int k, int repeat_px);
 
 }  // namespace thicklens::estimator
 

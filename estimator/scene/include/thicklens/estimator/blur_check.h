@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/base/progress.h"
 #include "thicklens/estimator/estimate_input.h"
 
@@ -44,7 +45,7 @@ struct BlurCheckOptions {
   std::optional<double> memory_limit_mib;
   ProgressFunction progress;  // called for each trial and repeatedly between trials
 
-  bool IsValid(std::string* why) const;
+  THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 
 struct BlurCheck {
@@ -67,7 +68,7 @@ struct BlurCheck {
 // Solves once for the photograph, at half its size unless it is small, and six to sixteen times
 // more if blocks remain unexplained. Throws Error for options and inputs that do not fit, and for a
 // memory limit that is too low. The result does not depend on the number of threads.
-BlurCheck CheckBlur(const EstimateInput& input, const BlurCheckOptions& options);
+THICKLENS_EXPORT BlurCheck CheckBlur(const EstimateInput& input, const BlurCheckOptions& options);
 
 }  // namespace thicklens::estimator
 

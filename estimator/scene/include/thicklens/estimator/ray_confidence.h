@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/estimator/estimate_input.h"
 
 namespace thicklens::estimator {
@@ -26,10 +27,10 @@ constexpr Confidence kFilledIn = 0;
 
 // Returns the confidence of a point. `visible_fraction` is the share of the aperture by its
 // weights, 0 to 1; `blur_sigma_px` is the standard deviation of its blur.
-Confidence ConfidenceOfPoint(double visible_fraction, double blur_sigma_px);
+THICKLENS_EXPORT Confidence ConfidenceOfPoint(double visible_fraction, double blur_sigma_px);
 // Returns the share to half a 126th; 0 for a ray that is filled in.
-double VisibleFractionOf(Confidence confidence);
-bool IsResolved(Confidence confidence);
+THICKLENS_EXPORT double VisibleFractionOf(Confidence confidence);
+THICKLENS_EXPORT bool IsResolved(Confidence confidence);
 
 // Shares of many rays, sum 1.
 struct ConfidenceShares {
@@ -40,18 +41,18 @@ struct ConfidenceShares {
 };
 // Converts counts to shares. `counts`: the number of rays with each confidence. All shares are 0 if
 // there are no rays.
-ConfidenceShares SharesOf(const std::array<std::size_t, 256>& counts);
+THICKLENS_EXPORT ConfidenceShares SharesOf(const std::array<std::size_t, 256>& counts);
 
 // Returns the confidence of each point of the centre view from the depth alone, without a solver. A
 // ray sees the point if the disparity rendered into its view agrees, to 0.3 px per view step, at a
 // pixel around the place where the ray meets the photograph. Throws Error for inputs that do not
 // fit.
-std::vector<Confidence> PointConfidence(const EstimateInput& input, int threads);
+THICKLENS_EXPORT std::vector<Confidence> PointConfidence(const EstimateInput& input, int threads);
 
 // Returns the confidence of the rays of one rendered view from that of the points. A boundary
 // sample has the confidence of the point at its middle.
-std::vector<Confidence> RayConfidence(const std::vector<Confidence>& of_points,
-                                      const CompactView& view);
+THICKLENS_EXPORT std::vector<Confidence> RayConfidence(const std::vector<Confidence>& of_points,
+                                                       const CompactView& view);
 
 }  // namespace thicklens::estimator
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/estimator/estimate_input.h"
 #include "thicklens/estimator/ray_confidence.h"
 #include "thicklens/estimator/solver_run.h"
@@ -20,13 +21,13 @@ enum class Prior {
   kPatches,  // as kTotalVariation; also its patches of 8 x 8 px consist of few waves, and relief is
              // shaded
 };
-Prior PriorFromName(
+THICKLENS_EXPORT Prior PriorFromName(
     const std::string& name);  // "ridge", "gradient", "tv", "patches"; throws Error for other names
-std::string PriorName(Prior prior);
+THICKLENS_EXPORT std::string PriorName(Prior prior);
 
 // Returns the tolerance below which little is gained: 1e-4 for total variation and patches, 1e-3
 // for the others.
-double UsualTolerance(Prior prior);
+THICKLENS_EXPORT double UsualTolerance(Prior prior);
 
 enum class StrengthRule {
   kAuto,   // from the photograph's noise
@@ -58,7 +59,7 @@ struct SceneOptions {
 
   double tolerance_or_usual() const { return tolerance.value_or(UsualTolerance(prior)); }
   // Returns false, and the reason in `why` (may be null), if a member is not in its range.
-  bool IsValid(std::string* why) const;
+  THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 
 // Findings of the scene solver besides the light field.
@@ -128,9 +129,9 @@ struct SceneMaps {
 // Bands use the noise and the strength of the whole photograph (kAuto samples parts of it, kGcv
 // uses the band in the middle). Each band is solved with enough rows around it that no seam is
 // visible: the differences due to bands are within those that the tolerance permits.
-model::LightField EstimateScene(const EstimateInput& input, const SceneOptions& options,
-                                const SolverRun& run, SceneSummary* summary,
-                                SceneMaps* maps = nullptr);
+THICKLENS_EXPORT model::LightField EstimateScene(const EstimateInput& input,
+                                                 const SceneOptions& options, const SolverRun& run,
+                                                 SceneSummary* summary, SceneMaps* maps = nullptr);
 
 // Receives the views one by one as they are made: each once, in any order, from several threads at
 // the same time. An exception that it throws ends the estimate.
@@ -146,8 +147,8 @@ struct SceneViewSink {
 // Returns the standard deviation of the noise of encoded values in [0, 1], quantisation included
 // [D97]. For each 16 x 16 block with a mean of 12/255 to 243/255 it takes the rms of (p00 - p10 -
 // p01 + p11)/2, and of these the 25th percentile. Absent if there is no such block.
-std::optional<double> EncodedNoiseSigma(const model::LinearImage& image,
-                                        const model::TransferCurve& transfer);
+THICKLENS_EXPORT std::optional<double> EncodedNoiseSigma(const model::LinearImage& image,
+                                                         const model::TransferCurve& transfer);
 
 }  // namespace thicklens::estimator
 

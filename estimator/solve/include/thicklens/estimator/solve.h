@@ -6,6 +6,7 @@
 #include <variant>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/estimator/block_solver.h"
 #include "thicklens/estimator/estimate_input.h"
 #include "thicklens/estimator/functional_solver.h"
@@ -19,10 +20,11 @@ namespace thicklens::estimator {
 // One interface to all solvers of this module. The type of the options selects the solver.
 using SolverOptions = std::variant<SceneOptions, BlockOptions, FunctionalOptions, GridOptions>;
 
-std::string SolverName(const SolverOptions& options);  // "scene", "blocks", "functional", "grid"
+THICKLENS_EXPORT std::string SolverName(
+    const SolverOptions& options);  // "scene", "blocks", "functional", "grid"
 // Returns false, and the field, its value and the constraint in `why` (may be null), if a member of
 // the options is not in its range. NaN and infinities never are.
-bool IsValid(const SolverOptions& options, std::string* why);
+THICKLENS_EXPORT bool IsValid(const SolverOptions& options, std::string* why);
 
 // Findings that one solver alone has. std::monostate: no solver has run.
 using SolverDiagnostics =
@@ -43,8 +45,9 @@ struct SolverSummary : SolverResult {
 // Throws Error, which names the solver, for options, a run, maps and a problem that do not fit, and
 // for what the solver refuses. Throws Interrupted if the token of the thread's CancelScope was
 // cancelled.
-model::LightField Solve(const EstimateInput& problem, const SolverOptions& options,
-                        const SolverRun& run, SolverSummary* summary, SceneMaps* maps = nullptr);
+THICKLENS_EXPORT model::LightField Solve(const EstimateInput& problem, const SolverOptions& options,
+                                         const SolverRun& run, SolverSummary* summary,
+                                         SceneMaps* maps = nullptr);
 
 }  // namespace thicklens::estimator
 

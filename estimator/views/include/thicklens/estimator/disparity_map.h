@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/model/light_field_grid.h"
 #include "thicklens/model/scene.h"
 
@@ -26,15 +27,17 @@ struct DisparityMap {
 // Converts depths (mm) to the disparity of the samples of a grid [D16]: disparity * step = -m, with
 // m of model::SlopeOnGrid. A depth of NaN becomes a hole. Throws Error unless every other depth is
 // beyond the UV plane (where nearer points have a larger disparity).
-DisparityMap DisparityOnGrid(const model::LightFieldGrid& grid, const std::vector<float>& depth_mm,
-                             int width_px, int height_px);
+THICKLENS_EXPORT DisparityMap DisparityOnGrid(const model::LightFieldGrid& grid,
+                                              const std::vector<float>& depth_mm, int width_px,
+                                              int height_px);
 // Converts a map to px per view step: scale * value + offset. NaN and infinities are holes, and so
 // is 0 in an integer map. Throws Error if all values are holes, if the scale is 0, or if the scale
 // or the offset is not finite.
-DisparityMap DisparityFromMap(const model::RawDepthMap& map, double scale, double offset_px);
+THICKLENS_EXPORT DisparityMap DisparityFromMap(const model::RawDepthMap& map, double scale,
+                                               double offset_px);
 
 // Returns the disparity on that grid of an infinitely far point, in the unit of DisparityOnGrid.
-double DisparityAtInfinity(const model::LightFieldGrid& grid);
+THICKLENS_EXPORT double DisparityAtInfinity(const model::LightFieldGrid& grid);
 
 }  // namespace thicklens::estimator
 

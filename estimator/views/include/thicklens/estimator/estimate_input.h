@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <optional>
 
+#include "thicklens/base/export.h"
 #include "thicklens/estimator/disparity_map.h"
 #include "thicklens/model/camera.h"
 #include "thicklens/model/light_field.h"
@@ -33,13 +34,15 @@ struct EstimateInput {
 // Returns the radiance of a photograph: each pixel is divided by the value that the irradiance
 // fall-off of [S12] leaves of a uniform radiance 1 at that pixel (FalloffOfImage). Throws Error
 // if the weights (V x U) do not fit the grid.
-model::LinearImage WithoutFalloff(const model::LinearImage& photograph,
-                                  const model::LightFieldGrid& grid, const model::Camera& camera,
-                                  const Eigen::ArrayXXd& weights, int threads);
+THICKLENS_EXPORT model::LinearImage WithoutFalloff(const model::LinearImage& photograph,
+                                                   const model::LightFieldGrid& grid,
+                                                   const model::Camera& camera,
+                                                   const Eigen::ArrayXXd& weights, int threads);
 
 // Returns the image warped to every view: the prior of the estimate and the baseline DIBR.
 // `falloff`: the fall-off is divided out of the image first if the input has a camera.
-model::LightField WarpedLightField(const EstimateInput& input, bool falloff, int threads);
+THICKLENS_EXPORT model::LightField WarpedLightField(const EstimateInput& input, bool falloff,
+                                                    int threads);
 
 }  // namespace thicklens::estimator
 

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "thicklens/base/export.h"
 #include "thicklens/base/progress.h"
 
 namespace thicklens::kernels {
@@ -33,7 +34,7 @@ struct SolverRun {
   const SceneViewSink* sink = nullptr;
 
   // Returns false, and the reason in `why` (may be null), if a member is not in its range.
-  bool IsValid(std::string* why) const;
+  THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 
 // The part of the summary that all solvers have.

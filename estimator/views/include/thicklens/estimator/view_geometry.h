@@ -7,6 +7,7 @@
 #include <memory>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/estimator/disparity_map.h"
 #include "thicklens/kernels/row_warper.h"
 #include "thicklens/kernels/view_warp.h"
@@ -50,11 +51,11 @@ struct CompactView {
   std::vector<Boundary> boundary;  // sorted by index
 
   // Returns the entry of a sample that must be hidden.
-  const Occluded& OccludedAt(std::size_t index) const;
+  THICKLENS_EXPORT const Occluded& OccludedAt(std::size_t index) const;
 };
 
 // Sets `view`; its memory is reused where it is large enough.
-void Expand(const CompactView& compact, ViewDisparity* view);
+THICKLENS_EXPORT void Expand(const CompactView& compact, ViewDisparity* view);
 
 // Renders the disparity into the view at (a, b) steps. (0, 0) gives the map itself. Throws Error if
 // the map has holes or a wrong count of values, or if (a, b) is not finite.
@@ -94,13 +95,13 @@ void Expand(const CompactView& compact, ViewDisparity* view);
 // and at its own source if it does not. An occluded sample that shares its pixel with no nearer
 // surface is mixed with the visible share of its own surface. Of several shares the largest counts,
 // and of equal shares the nearer; shares less than 0.01 are ignored. Derived here [D91].
-ViewDisparity RenderDisparity(const DisparityMap& map, double a, double b);
+THICKLENS_EXPORT ViewDisparity RenderDisparity(const DisparityMap& map, double a, double b);
 
 struct SupportedPixels;  // defined in hole_filler.h
 
 // RenderDisparity for many views of one map: data that all views need is computed once. Several
 // threads may render at the same time.
-class DisparityRenderer {
+class THICKLENS_EXPORT DisparityRenderer {
  public:
   // Throws Error if the map has holes or a wrong count of values. The map is kept by reference and
   // must outlive the renderer.
@@ -122,12 +123,12 @@ class DisparityRenderer {
 // with its disparity to 0.3 px per view step. Otherwise it is bilinear from the taps that agree,
 // renormalised. Hidden samples take the value of their background source. The share of the other
 // surface in boundary samples is bilinear. Throws Error if the sizes of image, map and view differ.
-model::LinearImage WarpImage(const model::LinearImage& image, const DisparityMap& map,
-                             const ViewDisparity& view);
+THICKLENS_EXPORT model::LinearImage WarpImage(const model::LinearImage& image,
+                                              const DisparityMap& map, const ViewDisparity& view);
 
 // WarpImage for many views of one image: data that all views need is computed once. Several
 // threads may warp at the same time.
-class ImageWarper {
+class THICKLENS_EXPORT ImageWarper {
  public:
   // The map is kept by reference and must outlive the warper; the image is copied. Throws Error if
   // the sizes of image and map differ.

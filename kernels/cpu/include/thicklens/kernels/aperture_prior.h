@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <vector>
 
+#include "thicklens/base/export.h"
+
 namespace thicklens::kernels {
 
 // A = gamma D^T D + mu over the U x V aperture samples of one scene point. D takes the differences
@@ -13,7 +15,7 @@ namespace thicklens::kernels {
 // derived here [D116]: a difference with free ends is one of a sequence that is mirrored at its
 // ends.
 template <typename Real>
-class AperturePrior {
+class THICKLENS_EXPORT AperturePrior {
  public:
   // gamma >= 0, mu > 0. Throws Error for more than 64 samples along an axis.
   AperturePrior(int u_count, int v_count, double gamma, double mu);

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/kernels/cell_disparity.h"
 
 namespace thicklens::kernels {
@@ -15,7 +16,7 @@ namespace thicklens::kernels {
 // get the same numbers for it: a sample on the wrong side of the edge for one cell is on the right
 // side for the other.
 struct PixelRow {
-  explicit PixelRow(std::size_t width_px);
+  THICKLENS_EXPORT explicit PixelRow(std::size_t width_px);
 
   Corners corners() const { return {offset_x.data(), offset_y.data(), disparity}; }
   Bounds bounds() const { return {first_x.data(), last_x.data(), first_y.data(), last_y.data()}; }
@@ -27,8 +28,8 @@ struct PixelRow {
 
 // Sets offset = -disparity * shift, clamped to +-limit_px, which must exceed the width and the
 // height of the view.
-void PlacePixels(const float* disparity, float shift_x, float shift_y, float limit_px,
-                 PixelRow* row);
+THICKLENS_EXPORT void PlacePixels(const float* disparity, float shift_x, float shift_y,
+                                  float limit_px, PixelRow* row);
 
 // Number of samples of the view in the rectangle around a cell.
 enum class CellSamples : std::int32_t {
@@ -41,7 +42,7 @@ enum class CellSamples : std::int32_t {
 
 // The cells between two rows of pixels: one for each pixel but the last.
 struct CellRow {
-  explicit CellRow(std::size_t width_px);
+  THICKLENS_EXPORT explicit CellRow(std::size_t width_px);
 
   std::vector<CellSamples> samples;
   // The first and the last sample: its index relative to that of the cell's top left pixel, and the
@@ -50,7 +51,8 @@ struct CellRow {
   std::vector<float> first_disparity, last_disparity;
 };
 
-void SampleCells(const PixelRow& upper, const PixelRow& lower, const ViewRow& view, CellRow* cells);
+THICKLENS_EXPORT void SampleCells(const PixelRow& upper, const PixelRow& lower, const ViewRow& view,
+                                  CellRow* cells);
 
 }  // namespace thicklens::kernels
 

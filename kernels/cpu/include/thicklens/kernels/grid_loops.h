@@ -3,6 +3,8 @@
 
 #include <cstddef>
 
+#include "thicklens/base/export.h"
+
 namespace thicklens::kernels {
 
 // The innermost loop of D on the grid.
@@ -27,7 +29,7 @@ constexpr std::size_t kLongestRun = 256;
 
 // Adds gamma * D^T D L of the links of a run to the sums.
 template <typename Real>
-void AddLinks(Real gamma, const LinkRun<Real>& run);
+THICKLENS_EXPORT void AddLinks(Real gamma, const LinkRun<Real>& run);
 
 }  // namespace thicklens::kernels
 

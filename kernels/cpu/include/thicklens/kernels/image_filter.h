@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "thicklens/base/export.h"
+
 namespace thicklens::kernels {
 
 // Linear maps from images to images of the same size in which every pixel of the result has its own
@@ -46,7 +48,7 @@ struct PixelCsr {
 // Returns the same weights sorted by the pixels that they read: (R^T y)(pixel) = sum weight
 // y(index). The entries of a row have the order of their original rows.
 template <typename Real>
-PixelCsr<Real> Transposed(const PixelCsr<Real>& rows);
+THICKLENS_EXPORT PixelCsr<Real> Transposed(const PixelCsr<Real>& rows);
 
 // Number of adjacent pixels that are read together.
 constexpr int kPixelsOfRun = 8;
@@ -94,13 +96,13 @@ struct PixelBlockedCsr {
 };
 // Sets `band` and `read` from all other fields.
 template <typename Real>
-void SetBands(PixelBlockedCsr<Real>* runs);
+THICKLENS_EXPORT void SetBands(PixelBlockedCsr<Real>* runs);
 // Conversions between the two forms: RunsOf puts entries that follow each other into one run;
 // RowsOf leaves out weights of 0.
 template <typename Real>
-PixelBlockedCsr<Real> RunsOf(const PixelCsr<Real>& rows, int width_px);
+THICKLENS_EXPORT PixelBlockedCsr<Real> RunsOf(const PixelCsr<Real>& rows, int width_px);
 template <typename Real>
-PixelCsr<Real> RowsOf(const PixelBlockedCsr<Real>& runs);
+THICKLENS_EXPORT PixelCsr<Real> RowsOf(const PixelBlockedCsr<Real>& runs);
 
 // The image to which a map is applied (ImageOut: its result): `channels` planes of equal size,
 // `plane_stride` numbers apart. The memory is not owned.
@@ -122,29 +124,30 @@ struct ImageOut {
 // functions use up to `threads` threads (>= 1) and give the same bits for any number of threads.
 // Input and output must not overlap. Sizes and order are not tested; use Check for this.
 template <typename Real>
-void Apply(const VaryingFilter<Real>& filter, const ImageIn<Real>& x, const ImageOut<Real>& y,
-           int threads);
+THICKLENS_EXPORT void Apply(const VaryingFilter<Real>& filter, const ImageIn<Real>& x,
+                            const ImageOut<Real>& y, int threads);
 template <typename Real>
-void ApplyTransposed(const VaryingFilter<Real>& filter, const ImageIn<Real>& x,
-                     const ImageOut<Real>& y, int threads);
+THICKLENS_EXPORT void ApplyTransposed(const VaryingFilter<Real>& filter, const ImageIn<Real>& x,
+                                      const ImageOut<Real>& y, int threads);
 template <typename Real>
-void ApplyRuns(const PixelBlockedCsr<Real>& runs, const ImageIn<Real>& x, const ImageOut<Real>& y,
-               int threads);
+THICKLENS_EXPORT void ApplyRuns(const PixelBlockedCsr<Real>& runs, const ImageIn<Real>& x,
+                                const ImageOut<Real>& y, int threads);
 // Computes x += R^T y.
 template <typename Real>
-void AddTransposed(const PixelBlockedCsr<Real>& runs, const ImageIn<Real>& y,
-                   const ImageOut<Real>& x, int threads);
+THICKLENS_EXPORT void AddTransposed(const PixelBlockedCsr<Real>& runs, const ImageIn<Real>& y,
+                                    const ImageOut<Real>& x, int threads);
 
 // Throws Error, which names the field, if sizes or indices do not fit or a number is not finite.
 template <typename Real>
-void Check(const VaryingFilter<Real>& filter);
+THICKLENS_EXPORT void Check(const VaryingFilter<Real>& filter);
 template <typename Real>
-void Check(const PixelCsr<Real>& rows);
+THICKLENS_EXPORT void Check(const PixelCsr<Real>& rows);
 
 // Returns the sum of x y w over `count` numbers (w may be null: 1). It is added in double, in an
 // order that does not depend on `threads`.
 template <typename Real>
-double Dot(const Real* x, const Real* y, const Real* w, std::size_t count, int threads);
+THICKLENS_EXPORT double Dot(const Real* x, const Real* y, const Real* w, std::size_t count,
+                            int threads);
 
 }  // namespace thicklens::kernels
 

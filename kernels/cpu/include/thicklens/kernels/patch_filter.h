@@ -3,6 +3,8 @@
 
 #include <vector>
 
+#include "thicklens/base/export.h"
+
 namespace thicklens::kernels {
 
 // Removes noise from an image under the assumption that its patches are sums of few cosines [L13]
@@ -18,8 +20,9 @@ namespace thicklens::kernels {
 // The result does not depend on the number of threads, and a row of it depends only on the 7 rows
 // above and below.
 template <typename Real>
-std::vector<Real> FilterPatches(int width_px, int height_px, int channels,
-                                const std::vector<Real>& image, double threshold, int threads);
+THICKLENS_EXPORT std::vector<Real> FilterPatches(int width_px, int height_px, int channels,
+                                                 const std::vector<Real>& image, double threshold,
+                                                 int threads);
 
 }  // namespace thicklens::kernels
 

@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <vector>
 
+#include "thicklens/base/export.h"
+
 namespace thicklens::kernels {
 
 // The innermost loops of H on the grid, between a row of the samples of views and rows of the
@@ -31,8 +33,9 @@ struct SharedRow {
 // Adds to each row pixels[x] += share * (sum over the taps) for begin <= x < end. `rays` are the
 // rays of a row of views; `row_start` is the first sample of the row in each view.
 template <typename Real>
-void AddTaps(const std::vector<PixelTap<Real>>& taps, const Real* rays, std::size_t row_start,
-             std::size_t begin, std::size_t end, const std::array<SharedRow<Real>, 2>& rows);
+THICKLENS_EXPORT void AddTaps(const std::vector<PixelTap<Real>>& taps, const Real* rays,
+                              std::size_t row_start, std::size_t begin, std::size_t end,
+                              const std::array<SharedRow<Real>, 2>& rows);
 
 // A pixel that a ray lands on; for neighbouring rays, the pixel of the first ray.
 template <typename Real>
@@ -44,8 +47,8 @@ struct RayPixel {
 // Adds rays[i] += irradiance[i] * (sum over the pixels, one to four, of weight * pixel[i]) for i <
 // count. `irradiance` may be null and is then 1.
 template <typename Real>
-void AddPixels(const std::vector<RayPixel<Real>>& pixels, const float* irradiance,
-               std::size_t count, Real* rays);
+THICKLENS_EXPORT void AddPixels(const std::vector<RayPixel<Real>>& pixels, const float* irradiance,
+                                std::size_t count, Real* rays);
 
 }  // namespace thicklens::kernels
 

@@ -3,6 +3,8 @@
 
 #include <cstdint>
 
+#include "thicklens/base/export.h"
+
 namespace thicklens::kernels {
 
 // The rays of one view through one row of a photograph's pixels, and where the axes of a separable
@@ -28,7 +30,7 @@ struct ProductRow {
 
 // Sets is_product[x] to 0 where the separable fan misplaces the ray or reads beyond the photograph
 // or off the ray's surface. The result is the same on every processor.
-void CheckProducts(const ProductRow& row, std::int32_t* is_product);
+THICKLENS_EXPORT void CheckProducts(const ProductRow& row, std::int32_t* is_product);
 
 }  // namespace thicklens::kernels
 

@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/kernels/image_filter.h"
 
 namespace thicklens::kernels {
@@ -83,7 +84,7 @@ struct ResidualSums {
 // ApplyNormalOperator, UpdateSolution. A prior may be set at any time and applies from the next
 // UpdateResidual on. Throws Error for errors of a device.
 template <typename Real>
-class RadianceSteps {
+class THICKLENS_EXPORT RadianceSteps {
  public:
   virtual ~RadianceSteps() = default;
 
@@ -115,7 +116,8 @@ class RadianceSteps {
 // Returns the C++ implementation for the processor, which is the specification. `data` is kept by
 // reference. The result does not depend on the number of threads.
 template <typename Real>
-std::unique_ptr<RadianceSteps<Real>> NewCpuRadianceSteps(const DataTerm<Real>& data);
+THICKLENS_EXPORT std::unique_ptr<RadianceSteps<Real>> NewCpuRadianceSteps(
+    const DataTerm<Real>& data);
 
 }  // namespace thicklens::kernels
 

@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "thicklens/base/export.h"
+
 namespace thicklens::kernels {
 
 // The innermost loops over the rays of a view. They process kRaysTogether rays together, and the
@@ -30,11 +32,11 @@ struct RayRow {
 // pixels, for the rays in runs. `row` is the same row of that image. May write kRaysTogether - 1
 // numbers after each run and read as many after the image's last number.
 template <typename Real>
-void WarpRow(const RayRow<Real>& rays, const Real* row, Real* warped);
+THICKLENS_EXPORT void WarpRow(const RayRow<Real>& rays, const Real* row, Real* warped);
 // Applies the transpose of WarpRow: adds to the image. May read kRaysTogether - 1 numbers after the
 // last value, and touch (not change) as many after the image's last number.
 template <typename Real>
-void SpreadRow(const RayRow<Real>& rays, const Real* values, Real* row);
+THICKLENS_EXPORT void SpreadRow(const RayRow<Real>& rays, const Real* values, Real* row);
 
 }  // namespace thicklens::kernels
 

@@ -6,13 +6,14 @@
 #include <cstdint>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/kernels/view_warp.h"
 
 namespace thicklens::kernels {
 
 // Reads one image for rows of views, with the interpolation of ViewWarp and vector instructions.
 // Several threads may use an object at once.
-class RowWarper {
+class THICKLENS_EXPORT RowWarper {
  public:
   // Where the samples of a row are read: the pixels before their positions, and the remaining
   // fractions. The memory can be used for many rows.

@@ -1,6 +1,8 @@
 #ifndef THICKLENS_KERNELS_SEEN_ROW_H_
 #define THICKLENS_KERNELS_SEEN_ROW_H_
 
+#include "thicklens/base/export.h"
+
 namespace thicklens::kernels {
 
 // The rays of one view from a row of the centre view's points. The ray of a point of disparity d
@@ -17,7 +19,7 @@ struct VisibleRow {
 // Adds the view's weight to the share of each point whose ray is not occluded: the ray is inside
 // the view, to half a pixel, and one of the pixels around it has the disparity of the point, to
 // `same_surface`; or the point's flag is set. The result is the same on every processor.
-void AddVisible(const VisibleRow& row, float* share);
+THICKLENS_EXPORT void AddVisible(const VisibleRow& row, float* share);
 
 }  // namespace thicklens::kernels
 

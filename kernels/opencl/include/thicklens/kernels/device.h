@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/base/export.h"
+
 namespace thicklens::kernels {
 
 // What a backend computes with: for the modules of thicklens, which include the headers that define
@@ -33,7 +35,7 @@ struct DeviceRequest {
 };
 // Parses "auto", "cpu", "opencl", "opencl:PLATFORM" or "opencl:PLATFORM:DEVICE". Throws Error for
 // any other text.
-DeviceRequest ParseDeviceRequest(const std::string& text);
+THICKLENS_EXPORT DeviceRequest ParseDeviceRequest(const std::string& text);
 
 struct DeviceDescription {
   int platform = 0;  // indices in OpenCL's list
@@ -63,10 +65,11 @@ struct DeviceSurvey {
 // `stop` (may be empty) is called several times a second during the survey. If the user requests
 // cancellation, it throws Interrupted; the child is then ended, the exception propagates, and no
 // result is kept.
-const DeviceSurvey& SurveyDevices(bool again = false, const std::function<void()>& stop = {});
+THICKLENS_EXPORT const DeviceSurvey& SurveyDevices(bool again = false,
+                                                   const std::function<void()>& stop = {});
 
 // A place where kernels are computed: a device with its compiled program, or the C++ reference.
-class Backend {
+class THICKLENS_EXPORT Backend {
  public:
   virtual ~Backend() = default;
   virtual bool is_opencl() const = 0;
@@ -87,8 +90,9 @@ class Backend {
 // build, the build log. A device is tried in a child process with a small kernel before this
 // process uses it (in this process if it already uses another device). The function must be called
 // before anything else in the process uses OpenCL. `stop` is that of SurveyDevices.
-std::shared_ptr<Backend> OpenBackend(const DeviceRequest& request, std::string* notice,
-                                     const std::function<void()>& stop = {});
+THICKLENS_EXPORT std::shared_ptr<Backend> OpenBackend(const DeviceRequest& request,
+                                                      std::string* notice,
+                                                      const std::function<void()>& stop = {});
 
 // Maximum relative differences between a backend and the reference over all kernels, for a small
 // problem with odd sizes, empty rows and borders.
@@ -100,7 +104,7 @@ struct BackendSelfTest {
   bool agrees = false;      // both errors are within their limits
   std::string worst;        // kernel with the largest difference; empty if there is none
 };
-BackendSelfTest RunBackendSelfTest(Backend* backend);
+THICKLENS_EXPORT BackendSelfTest RunBackendSelfTest(Backend* backend);
 
 }  // namespace thicklens::kernels
 

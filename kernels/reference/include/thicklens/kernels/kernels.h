@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/kernels/sparse.h"
 #include "thicklens/kernels/splat.h"
 
@@ -49,7 +50,7 @@ inline int RaySlots(const BlockGeometry& block, Splat splat) {
 // only by rounding. An object is used by one thread at a time; Clone makes one for another thread.
 // Throws Error for arguments whose sizes do not fit, and for errors of the device.
 template <typename Real>
-class Kernels {
+class THICKLENS_EXPORT Kernels {
  public:
   virtual ~Kernels() = default;
   virtual std::unique_ptr<Kernels> Clone() const = 0;
@@ -117,7 +118,7 @@ class Kernels {
 
 // Returns the specification in plain C++.
 template <typename Real>
-std::unique_ptr<Kernels<Real>> NewReference();
+THICKLENS_EXPORT std::unique_ptr<Kernels<Real>> NewReference();
 
 }  // namespace thicklens::kernels
 

@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "thicklens/base/export.h"
+
 namespace thicklens::kernels {
 
 // A sparse matrix with a fixed number of slots per row. Kernels fill it with one item per row or
@@ -43,18 +45,18 @@ struct CsrPattern {
 
 // Removes unused slots and sorts each row; entries of the same column are added.
 template <typename Real>
-CsrMatrix<Real> Compress(const EllMatrix<Real>& ell);
+THICKLENS_EXPORT CsrMatrix<Real> Compress(const EllMatrix<Real>& ell);
 
 template <typename Real>
-CsrMatrix<Real> Transpose(const CsrMatrix<Real>& matrix);
+THICKLENS_EXPORT CsrMatrix<Real> Transpose(const CsrMatrix<Real>& matrix);
 
 // Returns the pattern of A^T A + Id: symmetric, with the whole diagonal.
 template <typename Real>
-CsrPattern NormalPattern(const CsrMatrix<Real>& a);
+THICKLENS_EXPORT CsrPattern NormalPattern(const CsrMatrix<Real>& a);
 template <typename Real>
-CsrPattern PatternOf(const CsrMatrix<Real>& a);
+THICKLENS_EXPORT CsrPattern PatternOf(const CsrMatrix<Real>& a);
 // Returns the union of two patterns of the same size. Throws Error if the sizes differ.
-CsrPattern SumPattern(const CsrPattern& a, const CsrPattern& b);
+THICKLENS_EXPORT CsrPattern SumPattern(const CsrPattern& a, const CsrPattern& b);
 
 }  // namespace thicklens::kernels
 

@@ -5,6 +5,8 @@
 #include <memory>
 #include <vector>
 
+#include "thicklens/base/export.h"
+
 namespace thicklens::kernels {
 
 // An image of surfaces. Pixels whose disparities differ by at most `tolerance` (in the unit of the
@@ -48,7 +50,7 @@ struct ViewSources {
 // if all 16 surrounding pixels belong to the sample's surface. Otherwise it is the mean of those of
 // the four surrounding pixels that belong to it, with bilinear weights. If none does, it is the one
 // of the four whose disparity is nearest. Several threads may use an object at once.
-class ViewWarp {
+class THICKLENS_EXPORT ViewWarp {
  public:
   virtual ~ViewWarp() = default;
   // Sets `values` in the order of SurfaceImage and resizes them. Throws Error for sizes and
@@ -58,7 +60,7 @@ class ViewWarp {
 
 // Returns the plain C++ implementation, which is the specification for devices. Keeps the data of
 // the image by reference. Throws Error for sizes that do not fit.
-std::unique_ptr<ViewWarp> NewReferenceWarp(const SurfaceImage& image);
+THICKLENS_EXPORT std::unique_ptr<ViewWarp> NewReferenceWarp(const SurfaceImage& image);
 
 }  // namespace thicklens::kernels
 

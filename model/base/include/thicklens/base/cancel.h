@@ -4,6 +4,7 @@
 #include <atomic>
 
 #include "thicklens/base/error.h"
+#include "thicklens/base/export.h"
 
 // Cancellation of a computation. The caller makes a CancelToken and a CancelScope:
 //
@@ -43,7 +44,8 @@ class CancelToken {
 };
 
 namespace internal {
-inline thread_local const CancelToken* cancel_token = nullptr;
+// One variable in all libraries and the program.
+THICKLENS_EXPORT inline thread_local const CancelToken* cancel_token = nullptr;
 }  // namespace internal
 
 // The token that the computations of this thread check; null: none.

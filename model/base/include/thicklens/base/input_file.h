@@ -5,6 +5,8 @@
 #include <functional>
 #include <string>
 
+#include "thicklens/base/export.h"
+
 namespace thicklens {
 
 // Every input is a regular file (ordinary, with a size) of limited size. A folder, a named pipe, a
@@ -17,19 +19,20 @@ constexpr std::uint64_t kMaxTextBytes = std::uint64_t{64} << 20;
 constexpr std::uint64_t kMaxInputBytes = std::uint64_t{4} << 30;
 
 // Returns the whole content of a text file. Throws Error, which names the path and the reason.
-std::string ReadTextFile(const std::string& path);
+THICKLENS_EXPORT std::string ReadTextFile(const std::string& path);
 
 // Returns the whole content of a file that is no input of the run, such as an older output that is
 // about to be replaced. Unlike ReadWholeFile (output_file.h) and ReadTextFile it does not call the
 // InputWatch. Throws Error, which names the path and the reason, also above `most_bytes`.
-std::string ReadOwnFile(const std::string& path, std::uint64_t most_bytes = kMaxInputBytes);
+THICKLENS_EXPORT std::string ReadOwnFile(const std::string& path,
+                                         std::uint64_t most_bytes = kMaxInputBytes);
 
 // Throws Error unless the path leads to a regular file. Opens nothing.
-void RequireRegularFile(const std::string& path);
+THICKLENS_EXPORT void RequireRegularFile(const std::string& path);
 
 // The kind of a file in words: "a folder", "a named pipe", "a socket", ...; "a file" for a regular
 // one. `mode` is st_mode of stat(2).
-std::string KindOfFile(unsigned mode);
+THICKLENS_EXPORT std::string KindOfFile(unsigned mode);
 
 // A function that is called with the path of each input before it is read, and with the path of
 // each file that an input names as soon as the name is read. The calls may come from any thread.
@@ -37,9 +40,9 @@ std::string KindOfFile(unsigned mode);
 // for the whole process; empty: none.
 using InputWatch = std::function<void(const std::string& path)>;
 // Sets the InputWatch. Must not be called while another thread reads.
-void WatchInputs(InputWatch watch);
+THICKLENS_EXPORT void WatchInputs(InputWatch watch);
 // Calls the InputWatch. Readers of files that name other files call this function.
-void ReportInput(const std::string& path);
+THICKLENS_EXPORT void ReportInput(const std::string& path);
 
 }  // namespace thicklens
 

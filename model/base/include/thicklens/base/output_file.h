@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/base/export.h"
+
 namespace thicklens {
 
 // An output file that becomes visible either completely or not at all.
@@ -21,7 +23,7 @@ namespace thicklens {
 // A file that cannot be replaced, because it is a mount point or its folder is not writable, is
 // overwritten in place at Commit. A full disk leaves this file unchanged as well if the file system
 // can reserve space.
-class OutputFile {
+class THICKLENS_EXPORT OutputFile {
  public:
   explicit OutputFile(const std::string& path);  // throws Error
   ~OutputFile();
@@ -48,7 +50,7 @@ class OutputFile {
 // writable, gets its new content at Commit, entry by entry, from a part folder within it. The older
 // marker is removed first, then the older content; the new marker comes last. "lost+found" in the
 // folder is not touched. The next run removes what a killed run left there.
-class OutputFolder {
+class THICKLENS_EXPORT OutputFolder {
  public:
   OutputFolder(const std::string& path, const std::string& marker_file,
                const std::vector<std::string>& own_entries = {});
@@ -73,11 +75,11 @@ class OutputFolder {
 };
 
 // Writes a file by OutputFile in one step. Throws Error.
-void WriteFileAtomically(const std::string& path, const std::string& content);
+THICKLENS_EXPORT void WriteFileAtomically(const std::string& path, const std::string& content);
 
 // Returns the whole content of an input file. Throws Error, which names the path and the reason.
 // input_file.h describes which files are refused and declares the reader of text files.
-std::string ReadWholeFile(const std::string& path);
+THICKLENS_EXPORT std::string ReadWholeFile(const std::string& path);
 
 }  // namespace thicklens
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <string>
 
+#include "thicklens/base/export.h"
+
 namespace thicklens {
 
 // Throws Error if the final relative residual [D118] |N x - b|/|b| of the iterations is 10 or more,
@@ -11,8 +13,8 @@ namespace thicklens {
 // iterations conjugate gradients may be above 1 with an iterate that is better than their start.
 // Below 10 an unconverged solution is usable, and its summary reports it. `advice` says how to make
 // the iterations converge.
-void RequireProgress(const std::string& solver, double relative_residual, int iterations,
-                     const std::string& advice);
+THICKLENS_EXPORT void RequireProgress(const std::string& solver, double relative_residual,
+                                      int iterations, const std::string& advice);
 
 // Returns the larger residual; NaN counts as larger than every number.
 inline double LargerResidual(double a, double b) { return a >= b || std::isnan(a) ? a : b; }

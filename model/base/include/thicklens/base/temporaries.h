@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/base/export.h"
+
 // The list of the files and folders that a process has made and will remove or rename before it
 // ends: the unfinished outputs and the temporary folders. A process that must end while a library
 // computes, so that no destructor runs in time, removes them by AbandonOutputs.
@@ -16,7 +18,7 @@ enum class Abandon { kWhole, kIfEmpty };
 
 // The entry of one file or folder in the list of this process. Functions may be called from any
 // thread.
-class Temporary {
+class THICKLENS_EXPORT Temporary {
  public:
   Temporary() = default;  // no entry
   // `create` makes the file or folder and returns its path. It must be short and must not make
@@ -50,12 +52,12 @@ class Temporary {
 // returns the path of the replaced file or folder if that must still be removed, otherwise an empty
 // path. The result is the list entry of that path. If `put` returns std::nullopt, nothing was moved
 // and the result is std::nullopt as well.
-std::optional<Temporary> PutInPlace(const std::string& shown,
-                                    const std::function<std::optional<std::string>()>& put);
+THICKLENS_EXPORT std::optional<Temporary> PutInPlace(
+    const std::string& shown, const std::function<std::optional<std::string>()>& put);
 
 // The outputs that this process has moved to their targets, by their names for messages. Outputs in
 // temporary folders are not included.
-std::vector<std::string> OutputsInPlace();
+THICKLENS_EXPORT std::vector<std::string> OutputsInPlace();
 
 // Removes every file and folder in the list whose path still leads to the file or folder that was
 // made there, the newest first. Afterwards no output is moved to its target and no temporary is
@@ -64,7 +66,7 @@ std::vector<std::string> OutputsInPlace();
 // was available. An output that is being moved to its target is always waited for. The wait for a
 // thread that is about to create a temporary, and for folders in which other threads are still
 // making files, is limited to `limit_s`, in seconds.
-std::vector<std::string> AbandonOutputs(double limit_s);
+THICKLENS_EXPORT std::vector<std::string> AbandonOutputs(double limit_s);
 
 }  // namespace thicklens
 

@@ -3,10 +3,12 @@
 
 #include <string>
 
+#include "thicklens/base/export.h"
+
 namespace thicklens {
 
 // Returns the current time, UTC, as in 2026-01-31T12:00:00Z.
-std::string NowIso8601();
+THICKLENS_EXPORT std::string NowIso8601();
 
 }  // namespace thicklens
 

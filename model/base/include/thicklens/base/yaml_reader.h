@@ -8,6 +8,7 @@
 
 #include "thicklens/base/deprecation.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/export.h"
 
 namespace thicklens {
 
@@ -15,7 +16,7 @@ namespace thicklens {
 // Copies share the document, which lives as long as one of its nodes. Every Error names
 // file:line:column, the path of the field, the value found and the expected value. Every reader
 // throws Error if the node has the wrong type or value.
-class YamlNode {
+class THICKLENS_EXPORT YamlNode {
  public:
   // Read a file or a text that contains exactly one YAML document. `source_name` is the name of the
   // text in messages.
@@ -78,7 +79,7 @@ class YamlNode {
 };
 
 // The shortest text of a number that is read back to the same bits.
-std::string YamlNumber(double value);
+THICKLENS_EXPORT std::string YamlNumber(double value);
 
 }  // namespace thicklens
 

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/model/effect_selection.h"
 #include "thicklens/model/image_change.h"
 
@@ -39,9 +40,9 @@ struct AblationRun {
 };
 
 // Returns the effects of the reference: all effects instead of those that auto would choose.
-EffectSelectionOptions AllInsteadOfAuto(EffectSelectionOptions choice);
+THICKLENS_EXPORT EffectSelectionOptions AllInsteadOfAuto(EffectSelectionOptions choice);
 // Returns whether an effect belongs to readout and storage and is judged on encoded values.
-bool IsOfStorage(Effect effect);
+THICKLENS_EXPORT bool IsOfStorage(Effect effect);
 
 }  // namespace thicklens::model
 

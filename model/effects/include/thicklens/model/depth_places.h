@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/model/effect_impact.h"
 #include "thicklens/model/scene.h"
 
@@ -12,7 +13,7 @@ namespace thicklens::model {
 // from the axis, the depth of maximum blur, and, across the steepest step between neighbours in the
 // block, the depth on the other side. The photographed object is not known, so an edge between
 // black and white is assumed everywhere.
-std::vector<EffectSite> PlacesOfDepth(const Camera& camera, const Scene& scene);
+THICKLENS_EXPORT std::vector<EffectSite> PlacesOfDepth(const Camera& camera, const Scene& scene);
 
 }  // namespace thicklens::model
 

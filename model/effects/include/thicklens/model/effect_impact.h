@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/model/camera.h"
 #include "thicklens/model/effects.h"
 #include "thicklens/model/light_field_grid.h"
@@ -37,7 +38,7 @@ struct EffectConditions {
 
   // Returns true if all numbers are in their range and the camera has its image distance and blur
   // ratio. Otherwise `why`, if not null, gets the field, the value and the constraint.
-  bool IsValid(std::string* why) const;
+  THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 
 // A place of a scene and the radiance around it. The default is an edge between black and white
@@ -72,8 +73,8 @@ struct EffectImpact {
 // Impact of the effect at a place on an image that also has the effects `others`. Effects of a
 // bench do not change a single image. The derivation of each bound is at its function in
 // effects_of_*.cc. Throws Error if the conditions are not valid.
-EffectImpact ImpactAt(Effect effect, const EffectConditions& conditions, const EffectSite& place,
-                      const EffectSet& others);
+THICKLENS_EXPORT EffectImpact ImpactAt(Effect effect, const EffectConditions& conditions,
+                                       const EffectSite& place, const EffectSet& others);
 
 // The place where an effect has its largest impact, and that impact.
 struct LargestEffectImpact {
@@ -84,15 +85,16 @@ struct LargestEffectImpact {
 // One finding for each of `effects`, in their order, in an image with all the other `effects`.
 // Throws Error if the conditions are not valid or there is no place. `threads`: 0 means one per
 // core.
-std::vector<LargestEffectImpact> FindImpacts(const EffectConditions& conditions,
-                                             const std::vector<EffectSite>& places,
-                                             const EffectSet& effects, int threads = 1);
+THICKLENS_EXPORT std::vector<LargestEffectImpact> FindImpacts(const EffectConditions& conditions,
+                                                              const std::vector<EffectSite>& places,
+                                                              const EffectSet& effects,
+                                                              int threads = 1);
 
 // Black and white edges in the middle and in the farthest corner of the image, at depths from Ap
 // that are equally spaced in 1/z. With `occlusion` there are also edges at near_mm in front of
 // far_mm. Throws Error unless 0 < near_mm <= far_mm and near_mm is finite.
-std::vector<EffectSite> PlacesBetween(const Camera& camera, double near_mm, double far_mm,
-                                      bool occlusion);
+THICKLENS_EXPORT std::vector<EffectSite> PlacesBetween(const Camera& camera, double near_mm,
+                                                       double far_mm, bool occlusion);
 
 }  // namespace thicklens::model
 

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/model/effect_impact.h"
 #include "thicklens/model/effects.h"
 
@@ -21,18 +22,19 @@ struct EffectTolerance {
   std::optional<double> px;
 
   // Returns true if the limits are finite and > 0. Otherwise `why`, if not null, gets the reason.
-  bool IsValid(std::string* why) const;
+  THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 // The tolerance of a text such as "0.5gl" (grey levels) or "0.1px". Throws Error for other texts.
-EffectTolerance EffectToleranceFromText(const std::string& text);
+THICKLENS_EXPORT EffectTolerance EffectToleranceFromText(const std::string& text);
 
 // The subset of `effects` that the scene requires. The effects with the least impact are left out
 // one after the other while the tolerance allows it. Their bounds add up: each is the bound of
 // removing the effect from an image that already lacks the earlier ones. `threads`: 0 means one per
 // core. Throws Error if the tolerance or the conditions are not valid or there is no place.
-EffectSet RequiredEffects(const EffectConditions& conditions, const std::vector<EffectSite>& places,
-                          const EffectSet& effects, const EffectTolerance& tolerance,
-                          int threads = 1);
+THICKLENS_EXPORT EffectSet RequiredEffects(const EffectConditions& conditions,
+                                           const std::vector<EffectSite>& places,
+                                           const EffectSet& effects,
+                                           const EffectTolerance& tolerance, int threads = 1);
 
 // The user's choice of the effects of a forward model.
 struct EffectSelectionOptions {
@@ -50,9 +52,8 @@ struct EffectSelectionOptions {
 // Parses a choice. `effects` is "auto", "all", "none" or a list of names separated by commas.
 // `without` is a list of names, which may be empty. `tolerance` is a text for
 // EffectToleranceFromText; an empty text gives the default. Throws Error for other texts.
-EffectSelectionOptions EffectSelectionOptionsFromText(const std::string& effects,
-                                                      const std::string& without,
-                                                      const std::string& tolerance);
+THICKLENS_EXPORT EffectSelectionOptions EffectSelectionOptionsFromText(
+    const std::string& effects, const std::string& without, const std::string& tolerance);
 
 // Result of a choice.
 struct EffectSelection {
@@ -64,10 +65,10 @@ struct EffectSelection {
 // Applies a choice to the effects `of_model` of the forward model. `threads`: 0 means one per core.
 // Throws Error if the choice names an effect that the model lacks, if the conditions or (for kAuto)
 // the tolerance are not valid, or if there is no place.
-EffectSelection SelectEffects(const EffectSelectionOptions& choice,
-                              const EffectConditions& conditions,
-                              const std::vector<EffectSite>& places, const EffectSet& of_model,
-                              int threads = 1);
+THICKLENS_EXPORT EffectSelection SelectEffects(const EffectSelectionOptions& choice,
+                                               const EffectConditions& conditions,
+                                               const std::vector<EffectSite>& places,
+                                               const EffectSet& of_model, int threads = 1);
 
 // Record of a decision for files.
 struct EffectSelectionRecord {
@@ -75,7 +76,7 @@ struct EffectSelectionRecord {
   // Name and bound, grey levels, of each effect that is left out.
   std::vector<std::pair<std::string, double>> left_out_grey_levels;
 };
-EffectSelectionRecord RecordOf(const EffectSelection& decision);
+THICKLENS_EXPORT EffectSelectionRecord RecordOf(const EffectSelection& decision);
 
 }  // namespace thicklens::model
 

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/base/export.h"
+
 namespace thicklens::model {
 
 // The effects of image formation. They are independent of each other: a forward model without an
@@ -40,7 +42,8 @@ enum class EffectUnit {
   kGreyLevels,  // grey levels of encoded values, 255 at full scale
   kMm,          // millimetres of depth
 };
-std::string EffectUnitName(EffectUnit unit);  // "px", "relative", "grey-levels", "mm"
+// "px", "relative", "grey-levels", "mm".
+THICKLENS_EXPORT std::string EffectUnitName(EffectUnit unit);
 
 // Static description of an effect. The texts are literals and always valid.
 struct EffectFacts {
@@ -52,14 +55,14 @@ struct EffectFacts {
   bool random;  // true: the impact is a standard deviation over repeated exposures
 };
 
-const std::vector<EffectFacts>& AllEffects();  // in the order of the enumeration
-const EffectFacts& FactsOf(Effect effect);
-std::string EffectName(Effect effect);
+THICKLENS_EXPORT const std::vector<EffectFacts>& AllEffects();  // in the order of the enumeration
+THICKLENS_EXPORT const EffectFacts& FactsOf(Effect effect);
+THICKLENS_EXPORT std::string EffectName(Effect effect);
 // Inverse of EffectName. Throws Error, which lists the names, for any other name.
-Effect EffectFromName(const std::string& name);
+THICKLENS_EXPORT Effect EffectFromName(const std::string& name);
 
 // A set of effects.
-class EffectSet {
+class THICKLENS_EXPORT EffectSet {
  public:
   EffectSet() = default;
   EffectSet(std::initializer_list<Effect> effects) {
@@ -86,8 +89,9 @@ class EffectSet {
   std::uint32_t bits_ = 0;
 };
 // The set of a list of names separated by commas. Throws Error for an unknown name.
-EffectSet EffectSetFromNames(const std::string& names);
-std::string JoinedNames(const EffectSet& effects);  // separated by ", "; "none" if empty
+THICKLENS_EXPORT EffectSet EffectSetFromNames(const std::string& names);
+// The names, separated by ", "; "none" if the set is empty.
+THICKLENS_EXPORT std::string JoinedNames(const EffectSet& effects);
 
 }  // namespace thicklens::model
 

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/model/encoded_values.h"
 
 namespace thicklens::model {
@@ -21,7 +22,7 @@ struct ImageChange {
 };
 
 // Sums the differences over images.
-class ImageChangeAccumulator {
+class THICKLENS_EXPORT ImageChangeAccumulator {
  public:
   // Both must have one size and number of channels. Returns the rms of this image, grey levels.
   double Add(const EncodedValues& reference, const EncodedValues& other);
@@ -35,7 +36,8 @@ class ImageChangeAccumulator {
 };
 
 // Returns `other` minus the reference, as the mean of the channels, in grey levels; pixel by pixel.
-std::vector<float> GreyLevelDifference(const EncodedValues& reference, const EncodedValues& other);
+THICKLENS_EXPORT std::vector<float> GreyLevelDifference(const EncodedValues& reference,
+                                                        const EncodedValues& other);
 
 }  // namespace thicklens::model
 

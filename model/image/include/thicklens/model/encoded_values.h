@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/model/scene.h"
 #include "thicklens/model/transfer_curve.h"
 
@@ -17,9 +18,10 @@ struct EncodedValues {
   std::vector<float> values;
 };
 // Divides the encoded values by full scale and leaves alpha out.
-EncodedValues EncodedValuesOf(const EncodedImage& image);
+THICKLENS_EXPORT EncodedValues EncodedValuesOf(const EncodedImage& image);
 // Encodes by the transfer curve and clips to [0, 1], without rounding.
-EncodedValues EncodedValuesOf(const LinearImage& image, const TransferCurve& transfer);
+THICKLENS_EXPORT EncodedValues EncodedValuesOf(const LinearImage& image,
+                                               const TransferCurve& transfer);
 
 }  // namespace thicklens::model
 

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/model/camera.h"
 #include "thicklens/model/light_field_grid.h"
 #include "thicklens/model/scene.h"
@@ -78,28 +79,29 @@ struct LightField {
 
   // Returns true if the sizes, the weights, `present`, the grid and the camera agree. Otherwise
   // `why`, if not null, gets the field and the value.
-  bool IsValid(std::string* why) const;
+  THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 
 // A light field of the given sizes with all values 0, uniform weights and no grid. Throws Error
 // unless all sizes are >= 1.
-LightField MakeLightField(int s_count, int t_count, int u_count, int v_count, int channels);
+THICKLENS_EXPORT LightField MakeLightField(int s_count, int t_count, int u_count, int v_count,
+                                           int channels);
 
 // Copy of a light field without its values, which may be large. InnerViews and CropViews also
 // accept such a description and then return one.
-LightField DescriptionOf(const LightField& light_field);
+THICKLENS_EXPORT LightField DescriptionOf(const LightField& light_field);
 
 // Copy of one view as an image of S x T px, channels interleaved. Throws Error if the view does not
 // exist.
-LinearImage ViewImage(const LightField& light_field, int k, int l);
+THICKLENS_EXPORT LinearImage ViewImage(const LightField& light_field, int k, int l);
 // Replaces one view and marks it as present. Throws Error if the view does not exist or the size or
 // the channels of the image differ.
-void SetView(LightField* light_field, int k, int l, const LinearImage& image);
+THICKLENS_EXPORT void SetView(LightField* light_field, int k, int l, const LinearImage& image);
 
 // The central u x v views, with weights scaled to the sum 1. Throws Error unless each count is from
 // 1 to the present one and of the same parity (otherwise the middle would move), and unless the
 // views have some weight.
-LightField InnerViews(const LightField& light_field, int u_count, int v_count);
+THICKLENS_EXPORT LightField InnerViews(const LightField& light_field, int u_count, int v_count);
 
 // A rectangle of pixels, px; (x, y) is its top-left pixel.
 struct PixelRect {
@@ -108,13 +110,13 @@ struct PixelRect {
 // The rectangle `rect` of every view, of an image or of a depth map. The principal point of the
 // camera and the origin of the grid move with the rectangle. Each function throws Error if `rect`
 // is empty or not inside.
-LightField CropViews(const LightField& light_field, const PixelRect& rect);
-LinearImage CropImage(const LinearImage& image, const PixelRect& rect);
-EncodedImage CropImage(const EncodedImage& image, const PixelRect& rect);
-RawDepthMap CropDepth(const RawDepthMap& map, const PixelRect& rect);
+THICKLENS_EXPORT LightField CropViews(const LightField& light_field, const PixelRect& rect);
+THICKLENS_EXPORT LinearImage CropImage(const LinearImage& image, const PixelRect& rect);
+THICKLENS_EXPORT EncodedImage CropImage(const EncodedImage& image, const PixelRect& rect);
+THICKLENS_EXPORT RawDepthMap CropDepth(const RawDepthMap& map, const PixelRect& rect);
 // Copy of the camera whose sensor is only the rectangle `rect` of the sensor. Throws Error if
 // `rect` is empty or not inside the sensor.
-Camera CropCamera(const Camera& camera, const PixelRect& rect);
+THICKLENS_EXPORT Camera CropCamera(const Camera& camera, const PixelRect& rect);
 
 }  // namespace thicklens::model
 

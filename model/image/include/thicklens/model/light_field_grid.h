@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/model/camera.h"
 
 namespace thicklens::model {
@@ -27,54 +28,59 @@ struct ProjectionCoefficients {
   double p = 0;
   double q = 0;
 };
-ProjectionCoefficients ProjectionOf(const ThickLens& lens, double image_distance_mm,
-                                    const LightFieldPlanes& planes);
+THICKLENS_EXPORT ProjectionCoefficients ProjectionOf(const ThickLens& lens,
+                                                     double image_distance_mm,
+                                                     const LightFieldPlanes& planes);
 
 // Landing point of the ray on the sensor, mm from the optical axis: [S16], [M13]. The orientation
 // is that of the scene. The optical image is inverted, so that a positive coordinate is left of or
 // above the principal point in the encoded image.
-Eigen::Vector2d LandingPointMm(const ThickLens& lens, double image_distance_mm,
-                               const LightFieldPlanes& planes, const Ray& ray);
+THICKLENS_EXPORT Eigen::Vector2d LandingPointMm(const ThickLens& lens, double image_distance_mm,
+                                                const LightFieldPlanes& planes, const Ray& ray);
 
 // Landing point of the ray on the sensor, mm from the optical axis, computed from the ray's
 // crossing with the plane of focus and from the nodal points: [S14], [S15]. This independent
 // derivation checks [S16]. Throws Error for a focus at infinity, where it is undefined.
-Eigen::Vector2d LandingPointByNodalPointsMm(const ThickLens& lens, double image_distance_mm,
-                                            const LightFieldPlanes& planes, const Ray& ray);
+THICKLENS_EXPORT Eigen::Vector2d LandingPointByNodalPointsMm(const ThickLens& lens,
+                                                             double image_distance_mm,
+                                                             const LightFieldPlanes& planes,
+                                                             const Ray& ray);
 
 // Crossing of the ray with the aperture plane Ap, mm from the optical axis: [S10].
-Eigen::Vector2d ApertureCrossingMm(const LightFieldPlanes& planes, const Ray& ray);
+THICKLENS_EXPORT Eigen::Vector2d ApertureCrossingMm(const LightFieldPlanes& planes, const Ray& ray);
 
 // Position of the ray at the depth z, mm from the optical axis [D10]:
 // [s (z - zl) + u (zl + d0 - z)]/d0, and likewise for t, v. Throws Error unless z is finite.
-Eigen::Vector2d PositionAtDepthMm(const LightFieldPlanes& planes, const Ray& ray, double depth_mm);
+THICKLENS_EXPORT Eigen::Vector2d PositionAtDepthMm(const LightFieldPlanes& planes, const Ray& ray,
+                                                   double depth_mm);
 
 // Position of a landing point in the image, px [D11]: x = cx - i_x/p, y = cy - i_y/p.
-Eigen::Vector2d ImagePositionPx(const Sensor& sensor, const Eigen::Vector2d& landing_mm);
+THICKLENS_EXPORT Eigen::Vector2d ImagePositionPx(const Sensor& sensor,
+                                                 const Eigen::Vector2d& landing_mm);
 
 // cos(alpha) = 1/sqrt(1 + ((u - s)^2 + (v - t)^2)/d0^2), where alpha is the angle between the ray
 // in the scene and the axis: [S8] in a form that is finite at zl = 0.
-double CosAlpha(const LightFieldPlanes& planes, const Ray& ray);
+THICKLENS_EXPORT double CosAlpha(const LightFieldPlanes& planes, const Ray& ray);
 
 // cos(beta) of [S9], where beta is the angle between the ray behind the lens and the axis, with d1
 // measured from Ap. Erratum of the paper, kept: for rho != 0 the rear principal plane would be the
 // correct reference.
-double CosBeta(const ThickLens& lens, double image_distance_mm, const LightFieldPlanes& planes,
-               const Ray& ray);
+THICKLENS_EXPORT double CosBeta(const ThickLens& lens, double image_distance_mm,
+                                const LightFieldPlanes& planes, const Ray& ray);
 
 // Relative irradiance cos(alpha) cos^3(beta): the factor of [S12] that differs from ray to ray
 // ([S1], [S2], [S3], [S4], [S5], [S6], [S7], [S11]). The other factor, k/d1^2 ((zl + d0)/d0)^2
 // du dv, is a constant that the exposure determines [M11] (see LightFieldGrid).
-double RelativeIrradiance(const ThickLens& lens, double image_distance_mm,
-                          const LightFieldPlanes& planes, const Ray& ray);
+THICKLENS_EXPORT double RelativeIrradiance(const ThickLens& lens, double image_distance_mm,
+                                           const LightFieldPlanes& planes, const Ray& ray);
 
 // Transmission of the aperture [D12] at (a_u, a_v), mm from the axis; 1 at its centre.
 // Gaussian: the standard deviation is kappa r per axis, without a cut at r, so that the PSF is
 // exactly Gaussian with sigma = kappa r_defocus. Disc: 1 inside the radius 2 kappa r, 0 outside
 // (kappa = 0.5: the full aperture); its second moment is that of the Gaussian. Throws Error unless
 // kappa r is finite and >= 0.
-double ApertureTransmission(Psf psf, double blur_ratio, double aperture_radius_mm,
-                            const Eigen::Vector2d& crossing_mm);
+THICKLENS_EXPORT double ApertureTransmission(Psf psf, double blur_ratio, double aperture_radius_mm,
+                                             const Eigen::Vector2d& crossing_mm);
 
 // Weights of the views of a light field over the aperture [D13], before normalisation.
 enum class ApertureShape {
@@ -83,18 +89,18 @@ enum class ApertureShape {
   kDisc,      // 1 inside a^2/(U/2)^2 + b^2/(V/2)^2 <= 1, 0 outside
 };
 // The shape of the name "uniform", "gaussian" or "disc". Throws Error for any other name.
-ApertureShape ApertureShapeFromName(const std::string& name);
-std::string ApertureShapeName(ApertureShape shape);
-ApertureShape ApertureShapeOf(Psf psf);
+THICKLENS_EXPORT ApertureShape ApertureShapeFromName(const std::string& name);
+THICKLENS_EXPORT std::string ApertureShapeName(ApertureShape shape);
+THICKLENS_EXPORT ApertureShape ApertureShapeOf(Psf psf);
 
 // Weight, 1 in the middle, at any position of the aperture, in view steps from the middle; the
 // position need not be that of a view. The uniform weight is 1 up to half a step beyond the
 // outermost views and 0 outside.
-double ApertureWeightAt(ApertureShape shape, int u_count, int v_count,
-                        const Eigen::Vector2d& offset_steps);
+THICKLENS_EXPORT double ApertureWeightAt(ApertureShape shape, int u_count, int v_count,
+                                         const Eigen::Vector2d& offset_steps);
 
 // V x U weights of the views with the sum 1. Throws Error unless both counts are >= 1.
-Eigen::ArrayXXd ApertureWeights(ApertureShape shape, int u_count, int v_count);
+THICKLENS_EXPORT Eigen::ArrayXXd ApertureWeights(ApertureShape shape, int u_count, int v_count);
 
 // The directional samples of a light field whose UV plane is the aperture: U x V offsets
 // a_i = i - (U-1)/2 times `step`, each with a weight; the weights sum to 1.
@@ -117,11 +123,12 @@ struct ApertureSamples {
 };
 // Samples with the given V x U weights. Throws Error unless blur_ratio and aperture_radius_mm are
 // finite and >= 0 and the weights are >= 0 with the sum 1.
-ApertureSamples SampleAperture(const Eigen::ArrayXXd& weights, double blur_ratio,
-                               double aperture_radius_mm);
+THICKLENS_EXPORT ApertureSamples SampleAperture(const Eigen::ArrayXXd& weights, double blur_ratio,
+                                                double aperture_radius_mm);
 // Samples with the weights of the PSF's shape. Throws Error also unless u_count, v_count >= 1.
-ApertureSamples SampleAperture(Psf psf, double blur_ratio, double aperture_radius_mm, int u_count,
-                               int v_count);
+THICKLENS_EXPORT ApertureSamples SampleAperture(Psf psf, double blur_ratio,
+                                                double aperture_radius_mm, int u_count,
+                                                int v_count);
 
 // The sampling of a light field: the ray (i, j, k, l) passes through s_i, t_j on ST and u_k, v_l on
 // UV.
@@ -133,43 +140,43 @@ struct LightFieldGrid {
 
   // Returns true if the counts and the steps on ST are positive, the planes possible and all
   // numbers finite. Otherwise `why`, if not null, gets the field and the value.
-  bool IsValid(std::string* why) const;
+  THICKLENS_EXPORT bool IsValid(std::string* why) const;
 
-  Ray RayAt(int i, int j, int k, int l) const;
+  THICKLENS_EXPORT Ray RayAt(int i, int j, int k, int l) const;
 };
 
 // The default grid of a calibrated camera: UV is the aperture plane (zl = 0), ST the plane of focus
 // (d0 = zf, so that Q = 0 up to rounding), one step of s is one pixel (ds = p/|P|), S x T is the
 // size of the sensor, and the directional samples are those of SampleAperture. Throws Error if the
 // camera is not calibrated or is focused at infinity (where ST would be).
-LightFieldGrid DefaultGrid(const Camera& camera, int u_count, int v_count);
+THICKLENS_EXPORT LightFieldGrid DefaultGrid(const Camera& camera, int u_count, int v_count);
 
 // A grid on planes of the user's choice: one step of s is one pixel (ds = p/|P|). The directional
 // steps are such that, on any planes, the rays of the point on the axis in focus cross the aperture
 // in the steps of SampleAperture: du = da (zf - zl)/zf. Throws Error if the camera is not
 // calibrated, and for zl >= zf (P = 0 at zl = zf: the rays no longer separate the pixels),
 // zl + d0 <= 0 or d0 = 0.
-LightFieldGrid GridOnPlanes(const Camera& camera, const LightFieldPlanes& planes, int u_count,
-                            int v_count);
+THICKLENS_EXPORT LightFieldGrid GridOnPlanes(const Camera& camera, const LightFieldPlanes& planes,
+                                             int u_count, int v_count);
 
 // The grid on these planes for given samples, whose weights need not be those of the camera's PSF.
-LightFieldGrid GridOnPlanes(const Camera& camera, const LightFieldPlanes& planes,
-                            const ApertureSamples& samples);
+THICKLENS_EXPORT LightFieldGrid GridOnPlanes(const Camera& camera, const LightFieldPlanes& planes,
+                                             const ApertureSamples& samples);
 
 // Step between views on the aperture, mm, along u and v, for the rays through the point on the axis
 // in focus: a = u zf/(zf - zl), independent of d0. For the default grid these are the u and v steps
 // of the grid.
-Eigen::Vector2d ApertureStepsMm(const LightFieldGrid& grid, const Camera& camera);
+THICKLENS_EXPORT Eigen::Vector2d ApertureStepsMm(const LightFieldGrid& grid, const Camera& camera);
 
 // [D16] Slope m = (z - zl - d0) du/((z - zl) ds): the step of s, in samples, per view step at a
 // fixed scene point. For Q = 0 it is minus the disparity. Throws Error unless z > 0, and at z = zl,
 // where the slope is infinite.
-double SlopeOnGrid(const LightFieldGrid& grid, double depth_mm);
+THICKLENS_EXPORT double SlopeOnGrid(const LightFieldGrid& grid, double depth_mm);
 
 // [D17] Disparity d(z) = da c(z)/p, px per view step of `aperture_step_mm`; near positive, 0 in the
 // plane of focus. A scene point at x in the centre view is at x - a d in the view a. Throws Error
 // unless z > 0.
-double DisparityPx(const Camera& camera, double aperture_step_mm, double depth_mm);
+THICKLENS_EXPORT double DisparityPx(const Camera& camera, double aperture_step_mm, double depth_mm);
 
 }  // namespace thicklens::model
 

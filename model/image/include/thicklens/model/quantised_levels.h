@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/model/scene.h"
 #include "thicklens/model/transfer_curve.h"
 
@@ -13,7 +14,7 @@ namespace thicklens::model {
 
 // Table of the values that files store for linear light, for many images of one transfer curve. It
 // gives floor(Encode(light) (2^bits - 1) + 1/2), clipped, without a power function for each value.
-class QuantisedLevels {
+class THICKLENS_EXPORT QuantisedLevels {
  public:
   // Throws Error unless `bits` is 8 or 16.
   QuantisedLevels(const TransferCurve& transfer, int bits);
@@ -43,7 +44,7 @@ class QuantisedLevels {
 
 // Gives the same values as the other ToEncoded with the curve and the bits of `levels`. Throws
 // Error if the number of values does not fit the size.
-EncodedImage ToEncoded(const LinearImage& image, const QuantisedLevels& levels);
+THICKLENS_EXPORT EncodedImage ToEncoded(const LinearImage& image, const QuantisedLevels& levels);
 
 }  // namespace thicklens::model
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/model/camera.h"
 
 namespace thicklens::model {
@@ -39,18 +40,20 @@ struct LinearImage {
 
 // Decodes the encoded values. Throws Error if `bits` is not 8 or 16, the number of values does not
 // fit the size, or a value is above full scale.
-LinearImage ToLinear(const EncodedImage& image, const TransferCurve& transfer);
+THICKLENS_EXPORT LinearImage ToLinear(const EncodedImage& image, const TransferCurve& transfer);
 // Encodes, rounds and clips the values; NaN becomes 0. Throws Error if `bits` is not 8 or 16 or the
 // number of values does not fit the size.
-EncodedImage ToEncoded(const LinearImage& image, const TransferCurve& transfer, int bits);
+THICKLENS_EXPORT EncodedImage ToEncoded(const LinearImage& image, const TransferCurve& transfer,
+                                        int bits);
 // ToEncoded with normal noise, which is added to the encoded values before they are rounded.
 // `sigma` is its standard deviation in units of full scale; 0 gives ToEncoded. The seed alone
 // determines the noise. Throws Error also unless sigma is finite and >= 0.
-EncodedImage ToEncodedWithNoise(const LinearImage& image, const TransferCurve& transfer, int bits,
-                                double sigma, std::uint64_t seed);
+THICKLENS_EXPORT EncodedImage ToEncodedWithNoise(const LinearImage& image,
+                                                 const TransferCurve& transfer, int bits,
+                                                 double sigma, std::uint64_t seed);
 // Grey image 0.2126 R + 0.7152 G + 0.0722 B of three channels. One channel is returned unchanged;
 // the last of four channels (alpha) is ignored. Throws Error for other numbers of channels.
-LinearImage ToGrey(const LinearImage& image);
+THICKLENS_EXPORT LinearImage ToGrey(const LinearImage& image);
 
 // Meaning of the numbers of a depth map. The user states it; it is never guessed.
 enum class DepthKind {
@@ -59,7 +62,7 @@ enum class DepthKind {
   kDisparity,  // px per view step, near positive, 0 in the plane of focus
 };
 // The kind of the name "z", "range" or "disparity". Throws Error for any other name.
-DepthKind DepthKindFromName(const std::string& name);
+THICKLENS_EXPORT DepthKind DepthKindFromName(const std::string& name);
 
 // A depth map as read from a file: one number per pixel, rows from top to bottom.
 struct RawDepthMap {
@@ -78,7 +81,7 @@ struct DepthConvention {
 };
 // Millimetres per unit for the name "mm", "cm", "m" or "tum5000" (16-bit PNG of the TUM benchmark,
 // m x 5000). Throws Error for any other name.
-double DepthUnitMm(const std::string& name);
+THICKLENS_EXPORT double DepthUnitMm(const std::string& name);
 
 // Numbers of depths and holes in a depth map, and the depths from Ap.
 struct DepthStatistics {
@@ -103,8 +106,8 @@ struct Scene {
 // than its front focal point, or with a unit that is wrong by a factor of 1000); the latter message
 // states the minimum, median and maximum in mm. Throws Error also if the convention is invalid or
 // the camera lacks the calibration that range and disparity need.
-Scene MakeScene(const Camera& camera, LinearImage image, const RawDepthMap& map,
-                const DepthConvention& convention, const std::string& depth_name);
+THICKLENS_EXPORT Scene MakeScene(const Camera& camera, LinearImage image, const RawDepthMap& map,
+                                 const DepthConvention& convention, const std::string& depth_name);
 
 }  // namespace thicklens::model
 

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/model/thick_lens.h"
 #include "thicklens/model/transfer_curve.h"
 
@@ -23,7 +24,7 @@ struct Sensor {
 
   // Returns true if the sizes and the pitch are > 0 and all numbers are finite. Otherwise `why`, if
   // not null, gets the field, the constraint and the value.
-  bool IsValid(std::string* why) const;
+  THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 
 // Shape of the defocus point spread function (PSF) on the sensor, for the blur radius r_defocus and
@@ -33,7 +34,7 @@ enum class Psf {
   kDisc,      // uniform disc of radius 2 kappa r_defocus; its second-moment sigma is the same
 };
 // Name of the shape in files: "gaussian" or "disc".
-std::string PsfName(Psf psf);
+THICKLENS_EXPORT std::string PsfName(Psf psf);
 
 // A measured number and its standard deviation, both in the unit of the field that holds them.
 struct Estimate {
@@ -101,26 +102,27 @@ struct Camera {
 
   // Returns true if the numbers describe a possible camera. Otherwise `why`, if not null, gets the
   // field, the value and the constraint.
-  bool IsValid(std::string* why) const;
+  THICKLENS_EXPORT bool IsValid(std::string* why) const;
 
   // The calibrated values. Each function throws Error, which names the camera and the field, if the
   // value is absent.
-  double image_distance_mm() const;  // d1, from Ap to the sensor
-  double focus_depth_mm() const;     // zf, from Ap; computed from image_distance_mm by [S13]
-  double blur_ratio() const;         // kappa
+  THICKLENS_EXPORT double image_distance_mm() const;  // d1, from Ap to the sensor
+  THICKLENS_EXPORT double focus_depth_mm()
+      const;  // zf, from Ap; computed from image_distance_mm by [S13]
+  THICKLENS_EXPORT double blur_ratio() const;  // kappa
 
   // K/p, px per unit slope of the chief ray in front of the lens. A position in px from the
   // principal point, divided by K/p, is that slope. Throws Error if the image distance is absent.
-  double focal_scale_px() const;
+  THICKLENS_EXPORT double focal_scale_px() const;
 };
 
 // Paths of the fields that are marked `assumed`, for the notice that is printed once per run.
-std::vector<std::string> AssumedFields(const Camera& camera);
+THICKLENS_EXPORT std::vector<std::string> AssumedFields(const Camera& camera);
 
 // Copy of the camera with the thin lens of focal length f1, focused on the same plane. Its image
 // distance is f1 zf/(zf - f1), and every ray has the same landing point as before. Throws Error if
 // the image distance is absent.
-Camera ThinLensEquivalent(const Camera& camera);
+THICKLENS_EXPORT Camera ThinLensEquivalent(const Camera& camera);
 
 }  // namespace thicklens::model
 

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/model/camera.h"
 
 namespace thicklens::model {
@@ -66,10 +67,11 @@ struct Explanation {
 };
 
 // Returns `count` depths (>= 2), equally spaced in 1/z, where the blur changes by equal steps.
-std::vector<double> InverselySpacedDepthsMm(const DepthRange& range, int count);
+THICKLENS_EXPORT std::vector<double> InverselySpacedDepthsMm(const DepthRange& range, int count);
 
 // Throws Error naming the field if the camera has no image distance or no blur ratio.
-Explanation ExplainCamera(const Camera& camera, const DepthRange& range, int count);
+THICKLENS_EXPORT Explanation ExplainCamera(const Camera& camera, const DepthRange& range,
+                                           int count);
 
 }  // namespace thicklens::model
 

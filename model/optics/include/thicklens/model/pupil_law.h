@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/model/camera.h"
 #include "thicklens/model/thick_lens.h"
 
@@ -20,10 +21,10 @@ namespace thicklens::model {
 //                  behind the lens, as Abbe's sine condition requires for a Lambertian point
 // with tan(alpha) = |A|/zf and tan(beta) = |A|/d1. Real pupils follow none of these laws exactly.
 enum class PupilLaw { kUniform, kPaper, kCosineFourth, kSineCondition };
-const std::vector<PupilLaw>& AllPupilLaws();  // in the order of the enumeration
-std::string PupilLawName(PupilLaw law);       // "uniform", "paper", "cos4", "sine"
+THICKLENS_EXPORT const std::vector<PupilLaw>& AllPupilLaws();  // in the order of the enumeration
+THICKLENS_EXPORT std::string PupilLawName(PupilLaw law);       // "uniform", "paper", "cos4", "sine"
 // Inverse of PupilLawName. Throws Error, which lists the names, for any other name.
-PupilLaw PupilLawFromName(const std::string& name);
+THICKLENS_EXPORT PupilLaw PupilLawFromName(const std::string& name);
 
 // The optical quantities that a pupil law needs.
 struct PupilOptics {
@@ -34,7 +35,8 @@ struct PupilOptics {
   double defocus_scale_mm = 0;   // K = f1 zf/(zf - f1)
 };
 // Throws Error unless focus_depth_mm > f1.
-PupilOptics PupilOpticsOf(const ThickLens& lens, Psf psf, double blur_ratio, double focus_depth_mm);
+THICKLENS_EXPORT PupilOptics PupilOpticsOf(const ThickLens& lens, Psf psf, double blur_ratio,
+                                           double focus_depth_mm);
 
 // Largest sigma/d1 of a pupil. Wider pupils (wider than about f/0.8) are not described.
 inline constexpr double kWidestPupil = 0.3;
@@ -44,7 +46,7 @@ inline constexpr double kWidestPupil = 0.3;
 // The density is represented by rings, the nodes of a Gauss rule in A^2 (Laguerre for a Gaussian T,
 // Legendre for a disc), so that its transfer function is a sum of Bessel functions J0. Rays steeper
 // than 72 degrees behind the lens do not exist. Derived here [D25]; the tests check it by ray sums.
-class PupilProfile {
+class THICKLENS_EXPORT PupilProfile {
  public:
   // Transfer of a disc is computed from the rings up to `largest_x`. Throws Error unless sigma, zf
   // and d1 are > 0 and a T with that second moment exists.
@@ -93,8 +95,8 @@ class PupilProfile {
 // proportion to 1/(z (1 + c g)), and z (1 + c g) is a straight line in z whose zero is this depth.
 // Requires zf > f1 and kappa >= 0. A pupil wider than kWidestPupil is replaced by the widest one.
 // The result is 0 for the uniform law and for kappa = 0.
-double CentreOfPerspectiveMm(const ThickLens& lens, Psf psf, PupilLaw law, double blur_ratio,
-                             double focus_depth_mm);
+THICKLENS_EXPORT double CentreOfPerspectiveMm(const ThickLens& lens, Psf psf, PupilLaw law,
+                                              double blur_ratio, double focus_depth_mm);
 
 }  // namespace thicklens::model
 

@@ -3,6 +3,8 @@
 
 #include <string>
 
+#include "thicklens/base/export.h"
+
 namespace thicklens::model {
 
 // A thick lens: two principal planes and the focal lengths on both sides.
@@ -20,48 +22,51 @@ struct ThickLens {
 
   // Returns true if every number is finite and in its range. Otherwise `why`, if not null, gets the
   // field and the value.
-  bool IsValid(std::string* why) const;
+  THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 
 // The thin lens for comparison: f1 = f2 = the front focal length of `lens`, rho = 0, the same
 // aperture.
-ThickLens ThinLensEquivalent(const ThickLens& lens);
+THICKLENS_EXPORT ThickLens ThinLensEquivalent(const ThickLens& lens);
 
 // Image distance d1 = rho + f2 zf/(zf - f1), mm, for the plane of focus zf, mm. From [S13]:
 // 1 = f2/D + f1/zf. Throws Error unless zf > f1 (a nearer object has no real image). zf = +inf
 // gives rho + f2.
-double ImageDistanceMm(const ThickLens& lens, double focus_depth_mm);
+THICKLENS_EXPORT double ImageDistanceMm(const ThickLens& lens, double focus_depth_mm);
 
 // Depth of the plane of focus zf = f1 D/(D - f2), mm: the inverse of ImageDistanceMm. D = f2 gives
 // +inf (focus at infinity). Throws Error if D < f2, because such a sensor is in front of every
 // image.
-double FocusDepthMm(const ThickLens& lens, double image_distance_mm);
+THICKLENS_EXPORT double FocusDepthMm(const ThickLens& lens, double image_distance_mm);
 
 // [D2] d d1/d zf = -f2 f1/(zf - f1)^2, dimensionless: the factor by which an error of the focus
 // depth propagates to the image distance. Throws Error unless zf > f1.
-double ImageDistanceSlope(const ThickLens& lens, double focus_depth_mm);
+THICKLENS_EXPORT double ImageDistanceSlope(const ThickLens& lens, double focus_depth_mm);
 
 // Defocus scale K = f1 zf/(zf - f1) = f1 D/f2, mm; it is f1 for a focus at infinity. The signed
 // displacement on the sensor is the aperture position times c(z), c(z) = K (1/z - 1/zf). [D3]
-double DefocusScaleMm(const ThickLens& lens, double image_distance_mm);
+THICKLENS_EXPORT double DefocusScaleMm(const ThickLens& lens, double image_distance_mm);
 
 // Defocus per aperture c(z) = [f1 D - (D - f2) z]/(f2 z), dimensionless, positive for points nearer
 // than zf: the quotient of [S26] and [S25]. Throws Error unless depth_mm > 0.
-double DefocusPerAperture(const ThickLens& lens, double image_distance_mm, double depth_mm);
+THICKLENS_EXPORT double DefocusPerAperture(const ThickLens& lens, double image_distance_mm,
+                                           double depth_mm);
 
 // Blur radius r_defocus = |r c(z)|, mm on the sensor: [S25], [S26]. It is 0 in the plane of focus.
 // Throws Error unless depth_mm > 0.
-double BlurRadiusMm(const ThickLens& lens, double image_distance_mm, double depth_mm);
+THICKLENS_EXPORT double BlurRadiusMm(const ThickLens& lens, double image_distance_mm,
+                                     double depth_mm);
 
 // Magnification along the chief ray (through the centre of Ap), size on the sensor over size in the
 // scene, dimensionless: m = -f1 D/(f2 z) [D5]. The sign is negative because the image is inverted.
 // At z = zf this is the conjugate magnification. Throws Error unless depth_mm > 0.
-double ChiefRayMagnification(const ThickLens& lens, double image_distance_mm, double depth_mm);
+THICKLENS_EXPORT double ChiefRayMagnification(const ThickLens& lens, double image_distance_mm,
+                                              double depth_mm);
 
 // Positions of the nodal points from Ap, mm [D1]. N1 is f1 - f2 in front of Ap (positive toward the
 // scene); N2 is rho + f2 - f1 behind it (positive toward the sensor).
-double FrontNodalDepthMm(const ThickLens& lens);
-double RearNodalDistanceMm(const ThickLens& lens);
+THICKLENS_EXPORT double FrontNodalDepthMm(const ThickLens& lens);
+THICKLENS_EXPORT double RearNodalDistanceMm(const ThickLens& lens);
 
 // Depths from Ap between which the blur radius is at most a limit; far_mm may be +inf.
 struct DepthOfField {
@@ -71,8 +76,8 @@ struct DepthOfField {
 // Depth of field for the largest blur radius r_max, mm on the sensor, from
 // |1/z - 1/zf| <= r_max/(r K); derived here [D6]. A limit of 0 gives (zf, zf). Throws Error unless
 // the limit is >= 0.
-DepthOfField DepthOfFieldMm(const ThickLens& lens, double image_distance_mm,
-                            double max_blur_radius_mm);
+THICKLENS_EXPORT DepthOfField DepthOfFieldMm(const ThickLens& lens, double image_distance_mm,
+                                             double max_blur_radius_mm);
 
 }  // namespace thicklens::model
 

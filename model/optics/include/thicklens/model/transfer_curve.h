@@ -3,10 +3,12 @@
 
 #include <string>
 
+#include "thicklens/base/export.h"
+
 namespace thicklens::model {
 
 // The curve from linear light to the value that an image file stores. Both are in [0, 1].
-class TransferCurve {
+class THICKLENS_EXPORT TransferCurve {
  public:
   enum class Kind { kLinear, kSrgb, kGamma };
 

@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "thicklens/base/export.h"
 #include "thicklens/model/camera.h"
 
 namespace thicklens::model {
@@ -10,11 +11,11 @@ namespace thicklens::model {
 // The camera file, schema thicklens/camera/2 (docs/file-formats.md). A file of the schema
 // thicklens/camera/1 is accepted and converted. Unknown keys, wrong types and values out of range
 // throw Error with file:line:column; `source_name` is the file name in these messages.
-Camera ReadCamera(const std::string& path);
-Camera ParseCamera(const std::string& text, const std::string& source_name);
+THICKLENS_EXPORT Camera ReadCamera(const std::string& path);
+THICKLENS_EXPORT Camera ParseCamera(const std::string& text, const std::string& source_name);
 
 // The YAML text of a camera. Numbers read back from it have the same bits.
-std::string CameraToYaml(const Camera& camera);
+THICKLENS_EXPORT std::string CameraToYaml(const Camera& camera);
 
 }  // namespace thicklens::model
 

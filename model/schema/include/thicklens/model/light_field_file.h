@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "thicklens/base/export.h"
 #include "thicklens/model/light_field.h"
 
 namespace thicklens::model {
@@ -18,15 +19,15 @@ struct LightFieldDescription {
 
 // File name "view_VV_UU" of the view (k, l) without its extension. Each number has two digits, more
 // where needed.
-std::string ViewFileStem(int k, int l);
+THICKLENS_EXPORT std::string ViewFileStem(int k, int l);
 
 // Unknown keys, wrong types and values out of range throw Error with file:line:column;
 // `source_name` is the file name in these messages.
-LightFieldDescription ReadLightFieldDescription(const std::string& path);
-LightFieldDescription ParseLightFieldDescription(const std::string& text,
-                                                 const std::string& source_name);
+THICKLENS_EXPORT LightFieldDescription ReadLightFieldDescription(const std::string& path);
+THICKLENS_EXPORT LightFieldDescription ParseLightFieldDescription(const std::string& text,
+                                                                  const std::string& source_name);
 // The YAML text of a description. Throws Error if a number is not finite.
-std::string LightFieldDescriptionToYaml(const LightFieldDescription& description);
+THICKLENS_EXPORT std::string LightFieldDescriptionToYaml(const LightFieldDescription& description);
 
 }  // namespace thicklens::model
 

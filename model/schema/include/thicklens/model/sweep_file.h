@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/model/camera.h"
 #include "thicklens/model/effect_selection.h"
 
@@ -13,12 +14,12 @@ namespace thicklens::model {
 // Direction of the bench scale [D56]: z = offset + reading (away) or z = offset - reading (toward),
 // where z is the depth from Ap, mm.
 enum class BenchDirection { kAway, kToward };
-std::string BenchDirectionName(BenchDirection direction);
-double DirectionSign(BenchDirection direction);  // +1 away, -1 toward
+THICKLENS_EXPORT std::string BenchDirectionName(BenchDirection direction);
+THICKLENS_EXPORT double DirectionSign(BenchDirection direction);  // +1 away, -1 toward
 
 // Kind of the photographed target.
 enum class SweepTarget { kAuto, kTexture, kPrintedEdge, kKnifeEdge };
-std::string SweepTargetName(SweepTarget target);
+THICKLENS_EXPORT std::string SweepTargetName(SweepTarget target);
 
 // Prior knowledge of the lens floor, px: nothing, a value, or an interval.
 struct FloorKnowledge {
@@ -65,27 +66,29 @@ struct SweepFile {
 // invalid content, also for a row without a file, an image in `frames_dir` (or of `frames_glob`)
 // without a row, duplicate rows and readings that are no numbers. Assumptions about missing or
 // unusual content are added to `notices`, which may be null.
-SweepFile ReadSweep(const std::string& path, std::vector<std::string>* notices);
+THICKLENS_EXPORT SweepFile ReadSweep(const std::string& path, std::vector<std::string>* notices);
 
 // Copies value and sigma of calibration.blur_floor_px of a camera file to the floor of `sweep`.
 // Throws Error if the file contains no measured floor. The message begins with `place`, the place
 // where the path was given, with ": " at its end.
-void TakeFloorOfCalibration(const std::string& camera_path, const std::string& place,
-                            SweepFile* sweep);
+THICKLENS_EXPORT void TakeFloorOfCalibration(const std::string& camera_path,
+                                             const std::string& place, SweepFile* sweep);
 
 // Throws Error if the floor was taken from the calibration of another lens or pixel pitch than
 // `camera` has.
-void RequireFloorOfCamera(const SweepFile& sweep, const Camera& camera);
+THICKLENS_EXPORT void RequireFloorOfCamera(const SweepFile& sweep, const Camera& camera);
 
 // A sweep of a folder of images and a table of readings in mm; all other fields have their
 // defaults. The command `thicklens calibrate DIR --readings` uses it. Throws Error as ReadSweep
 // does for rows and images without partner; `notices` may be null.
-SweepFile SweepFromFolder(const std::string& folder, const std::string& readings_csv,
-                          const std::string& camera_path, std::vector<std::string>* notices);
+THICKLENS_EXPORT SweepFile SweepFromFolder(const std::string& folder,
+                                           const std::string& readings_csv,
+                                           const std::string& camera_path,
+                                           std::vector<std::string>* notices);
 
 // The YAML text of a sweep. Paths in `sweep` are written unchanged; they should therefore be
 // relative to the folder of the written file.
-std::string SweepToYaml(const SweepFile& sweep);
+THICKLENS_EXPORT std::string SweepToYaml(const SweepFile& sweep);
 
 // Parameters with which a sweep was simulated, schema thicklens/sweep-truth/1.
 struct SweepTruth {
@@ -108,8 +111,8 @@ struct SweepTruth {
   EffectSelectionRecord effects;  // written, but not read
 };
 // Throws Error with file:line:column for invalid content.
-SweepTruth ReadSweepTruth(const std::string& path);
-std::string SweepTruthToYaml(const SweepTruth& truth);
+THICKLENS_EXPORT SweepTruth ReadSweepTruth(const std::string& path);
+THICKLENS_EXPORT std::string SweepTruthToYaml(const SweepTruth& truth);
 
 }  // namespace thicklens::model
 

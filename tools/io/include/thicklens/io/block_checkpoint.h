@@ -10,6 +10,7 @@
 #include <optional>
 #include <string>
 
+#include "thicklens/base/export.h"
 #include "thicklens/estimator/block_store.h"
 #include "thicklens/io/journal_file.h"
 
@@ -17,7 +18,7 @@ namespace thicklens::io {
 
 // The blocks of `estimate --checkpoint FILE`: a journal whose first record describes the estimate
 // as JSON and whose other records hold one block each.
-class BlockCheckpoint final : public estimator::BlockStore {
+class THICKLENS_EXPORT BlockCheckpoint final : public estimator::BlockStore {
  public:
   // `version` names the program: blocks of another version are not used. `warn` is called once, by
   // Begin, if damaged blocks are left out. Throws Error if the file is not a checkpoint or is in

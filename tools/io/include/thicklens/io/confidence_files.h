@@ -3,18 +3,21 @@
 
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/estimator/ray_confidence.h"
 #include "thicklens/io/light_field_io.h"
 
 namespace thicklens::io {
 
 // Writes the confidence of all rays, view by view.
-void WriteConfidence(const std::vector<estimator::Confidence>& of_rays, int u_count, int width_px,
-                     int height_px, LightFieldWriter* writer);
+THICKLENS_EXPORT void WriteConfidence(const std::vector<estimator::Confidence>& of_rays,
+                                      int u_count, int width_px, int height_px,
+                                      LightFieldWriter* writer);
 
 // Writes the confidence of an estimate whose solver does not report it; it depends on the depth
 // alone.
-void WriteConfidence(const estimator::EstimateInput& input, int threads, LightFieldWriter* writer);
+THICKLENS_EXPORT void WriteConfidence(const estimator::EstimateInput& input, int threads,
+                                      LightFieldWriter* writer);
 
 }  // namespace thicklens::io
 

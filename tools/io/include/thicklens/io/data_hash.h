@@ -5,10 +5,12 @@
 #include <string>
 #include <string_view>
 
+#include "thicklens/base/export.h"
+
 namespace thicklens::io {
 
 // SHA-256 of data that arrives in pieces.
-class Sha256 {
+class THICKLENS_EXPORT Sha256 {
  public:
   Sha256();
   ~Sha256();
@@ -21,7 +23,7 @@ class Sha256 {
   std::unique_ptr<Impl> impl_;
 };
 
-std::string Sha256Hex(std::string_view bytes);
+THICKLENS_EXPORT std::string Sha256Hex(std::string_view bytes);
 
 }  // namespace thicklens::io
 

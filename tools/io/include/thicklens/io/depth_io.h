@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "thicklens/base/export.h"
 #include "thicklens/model/scene.h"
 
 namespace thicklens::io {
@@ -11,10 +12,10 @@ namespace thicklens::io {
 // has them), 8- or 16-bit PNG, 16-bit or float TIFF, float EXR. The rows of the result go top to
 // bottom. Throws Error that names the file, what was found and what is expected (for three
 // channels, a file that is no image, a broken header, missing values).
-model::RawDepthMap ReadDepthMap(const std::string& path);
+THICKLENS_EXPORT model::RawDepthMap ReadDepthMap(const std::string& path);
 
 // Encodes the map as a PFM file (little endian).
-std::string EncodePfm(const model::RawDepthMap& map);
+THICKLENS_EXPORT std::string EncodePfm(const model::RawDepthMap& map);
 
 }  // namespace thicklens::io
 

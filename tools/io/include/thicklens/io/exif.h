@@ -4,6 +4,8 @@
 #include <optional>
 #include <string>
 
+#include "thicklens/base/export.h"
+
 namespace thicklens::io {
 
 // A photograph's statements about the camera that took it. Absent: not stated, or not usable.
@@ -23,16 +25,17 @@ struct PhotoExif {
   int orientation = 1;  // 1 to 8; 1: as stored
 
   // Returns whether EXIF states nothing that can be compared with a camera file.
-  bool IsEmpty() const;
+  THICKLENS_EXPORT bool IsEmpty() const;
 };
 
 // Throws Error if the file cannot be read as an image with metadata. A photograph without EXIF
 // gives an empty result. `width_px` and `height_px` are those of the images that the camera file is
 // for.
-PhotoExif ReadPhotoExif(const std::string& path, int width_px, int height_px);
+THICKLENS_EXPORT PhotoExif ReadPhotoExif(const std::string& path, int width_px, int height_px);
 // Reads a file that need not be able to hold EXIF. The result is empty if it cannot, and if its
 // metadata is damaged; `why` then gets the reason.
-PhotoExif ReadExifIfAny(const std::string& path, int width_px, int height_px, std::string* why);
+THICKLENS_EXPORT PhotoExif ReadExifIfAny(const std::string& path, int width_px, int height_px,
+                                         std::string* why);
 
 }  // namespace thicklens::io
 

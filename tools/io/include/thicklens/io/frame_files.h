@@ -7,12 +7,13 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/model/sweep_file.h"
 
 namespace thicklens::io {
 
 // The image files of a sweep, read on request; several threads may read.
-class FrameFiles {
+class THICKLENS_EXPORT FrameFiles {
  public:
   explicit FrameFiles(std::vector<model::SweepFrame> frames);
 

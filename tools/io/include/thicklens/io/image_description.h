@@ -3,14 +3,16 @@
 
 #include <string>
 
+#include "thicklens/base/export.h"
+
 namespace thicklens::io {
 
 // Returns the bytes of a PNG file with a text (UTF-8) that describes the image: the text chunk
 // "Description", which programs show. The pixels do not change. Throws Error if `png` is no PNG
 // file.
-std::string WithDescription(const std::string& png, const std::string& text);
+THICKLENS_EXPORT std::string WithDescription(const std::string& png, const std::string& text);
 // Returns that text; empty if there is none. Throws Error that begins with `name`.
-std::string DescriptionOf(const std::string& png, const std::string& name);
+THICKLENS_EXPORT std::string DescriptionOf(const std::string& png, const std::string& name);
 
 }  // namespace thicklens::io
 

@@ -4,27 +4,28 @@
 #include <opencv2/core/mat.hpp>
 #include <string>
 
+#include "thicklens/base/export.h"
 #include "thicklens/model/scene.h"
 
 namespace thicklens::io {
 
 // Decodes the image in the bytes of a file, exactly as stored: 8 or 16 bit; 1, 3 (RGB) or 4 (RGBA)
 // channels; never rotated. Throws Error that begins with `name`.
-cv::Mat DecodeImage(const std::string& bytes, const std::string& name);
-cv::Mat ReadImageFile(const std::string& path);
+THICKLENS_EXPORT cv::Mat DecodeImage(const std::string& bytes, const std::string& name);
+THICKLENS_EXPORT cv::Mat ReadImageFile(const std::string& path);
 // Throws Error if the library that reads JPEG, TIFF, EXR, BMP and PNM files and writes JPEG is
 // missing from the program's installation. PNG files need no such library.
-void RequireImageCodecs();
+THICKLENS_EXPORT void RequireImageCodecs();
 
-model::EncodedImage ToEncodedImage(const cv::Mat& image);
+THICKLENS_EXPORT model::EncodedImage ToEncodedImage(const cv::Mat& image);
 // Returns the first three of four channels, and other images unchanged: alpha contains no light.
-model::EncodedImage WithoutAlpha(const model::EncodedImage& image);
+THICKLENS_EXPORT model::EncodedImage WithoutAlpha(const model::EncodedImage& image);
 
 // Encodes a PNG file of 1, 3 or 4 channels, 8 or 16 bit. The compression is light: a stronger one
 // takes much longer and hardly makes the noise of a photograph smaller.
-std::string EncodePng(const model::EncodedImage& image);
+THICKLENS_EXPORT std::string EncodePng(const model::EncodedImage& image);
 // Encodes bytes unchanged in one channel. Throws Error if they are not rows of that width.
-std::string EncodeBytesPng(const std::vector<std::uint8_t>& bytes, int width_px);
+THICKLENS_EXPORT std::string EncodeBytesPng(const std::vector<std::uint8_t>& bytes, int width_px);
 
 }  // namespace thicklens::io
 

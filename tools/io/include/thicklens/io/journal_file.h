@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/base/temporaries.h"
 
 namespace thicklens::io {
@@ -19,7 +20,7 @@ namespace thicklens::io {
 //
 // Format: a first line that states the kind of file; then for each record a line "record BYTES
 // SHA256", its bytes, and a newline.
-class JournalFile {
+class THICKLENS_EXPORT JournalFile {
  public:
   // Opens the file or creates it. `stop` is called from time to time and may throw. Throws Error if
   // the file is of another kind, damaged from its beginning, held by another run, or cannot be

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/model/light_field.h"
 #include "thicklens/model/quantised_levels.h"
@@ -29,7 +30,8 @@ struct LightFieldReading {
 // HCI light fields are relative, sRGB, with uniform weights. Throws Error that names the folder and
 // the view that is missing, broken or of another size. Unless `sparse` is set, a view that is
 // missing within the smallest rectangle that holds the others is such an Error.
-model::LightField ReadLightField(const std::string& folder, const LightFieldReading& reading);
+THICKLENS_EXPORT model::LightField ReadLightField(const std::string& folder,
+                                                  const LightFieldReading& reading);
 
 enum class ViewFormat {
   kPng,   // 16 bit, encoded by the light field's transfer curve, clipped
@@ -37,11 +39,11 @@ enum class ViewFormat {
 };
 // Entries that a folder of our layout may hold, for OutputFolder.
 extern const char kLightFieldMarker[];  // "lightfield.yaml"
-std::vector<std::string> LightFieldEntries();
+THICKLENS_EXPORT std::vector<std::string> LightFieldEntries();
 
 // Writes a light field of which only some views are in memory at a time. Views are written as they
 // are made, in any order and from several threads at once; their description follows at the end.
-class LightFieldWriter {
+class THICKLENS_EXPORT LightFieldWriter {
  public:
   // `folder` is not owned and must outlive the writer; the caller commits it.
   LightFieldWriter(const model::TransferCurve& transfer, ViewFormat format, OutputFolder* folder);
@@ -73,26 +75,27 @@ class LightFieldWriter {
 };
 
 // Writes all views that are present.
-void WriteViews(const model::LightField& light_field, LightFieldWriter* writer);
+THICKLENS_EXPORT void WriteViews(const model::LightField& light_field, LightFieldWriter* writer);
 
 // Writes views/view_VV_UU.png or .tiff, lightfield.yaml, and camera.yaml if there is a camera,
 // below the folder's staging path; the caller commits. Returns the number of clipped values.
-std::size_t WriteLightField(const model::LightField& light_field, ViewFormat format,
-                            OutputFolder* folder);
+THICKLENS_EXPORT std::size_t WriteLightField(const model::LightField& light_field,
+                                             ViewFormat format, OutputFolder* folder);
 
 // Writes the HCI layout: input_CamNNN.png (8 bit sRGB) and parameters.cfg, below the staging path.
 // Returns the number of clipped values.
 extern const char kHciMarker[];  // "parameters.cfg"
-std::size_t WriteHciLightField(const model::LightField& light_field, OutputFolder* folder);
+THICKLENS_EXPORT std::size_t WriteHciLightField(const model::LightField& light_field,
+                                                OutputFolder* folder);
 
 // Claims a folder for the HCI layout. The benchmark's own folders look the same, so a folder that
 // this program did not write is not replaced. Throws Error.
-OutputFolder ClaimHciFolder(const std::string& path);
+THICKLENS_EXPORT OutputFolder ClaimHciFolder(const std::string& path);
 
 // Counts the values that a file of 8 or 16 bits cannot hold: those more than half a level below 0
 // or above full scale, and NaN.
-std::size_t CountClipped(const model::LinearImage& image, const model::TransferCurve& transfer,
-                         int bits);
+THICKLENS_EXPORT std::size_t CountClipped(const model::LinearImage& image,
+                                          const model::TransferCurve& transfer, int bits);
 
 }  // namespace thicklens::io
 

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/model/effect_selection.h"
 #include "thicklens/model/explanation.h"
 #include "thicklens/model/scene_simulator.h"
@@ -25,10 +26,9 @@ struct EffectCosts {
 // of the image is that of the patch times the ratio of their pixels. From `sensor` only the noise
 // and the bits are used, not the camera, layers and effects. `tell` is called before each
 // simulation and may throw to stop. Throws Error for a camera or depths that cannot be simulated.
-EffectCosts MeasureEffectCosts(const Camera& camera, const DepthRange& range,
-                               const SceneSimulationOptions& sensor,
-                               const EffectSelection& decision,
-                               const std::function<void(int done, int total)>& tell);
+THICKLENS_EXPORT EffectCosts MeasureEffectCosts(
+    const Camera& camera, const DepthRange& range, const SceneSimulationOptions& sensor,
+    const EffectSelection& decision, const std::function<void(int done, int total)>& tell);
 
 }  // namespace thicklens::model
 

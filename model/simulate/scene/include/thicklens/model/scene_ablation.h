@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/model/ablation.h"
 #include "thicklens/model/camera.h"
 #include "thicklens/model/light_field.h"
@@ -52,9 +53,9 @@ using EstimatedPsnrDb = std::function<double(const SceneToEstimate&)>;
 // `pixels` are as in SceneSimulator. The reference is the image with all effects that
 // `scene.effects` does not exclude: auto counts as all. Deterministic effects are judged before
 // noise and rounding. Throws Error as SceneSimulator and the estimate do.
-SceneAblation AblateScene(const SceneSimulationOptions& scene,
-                          const std::vector<LayerPixels>& pixels, const EstimatedPsnrDb& estimate,
-                          const AblationRun& run);
+THICKLENS_EXPORT SceneAblation AblateScene(const SceneSimulationOptions& scene,
+                                           const std::vector<LayerPixels>& pixels,
+                                           const EstimatedPsnrDb& estimate, const AblationRun& run);
 
 }  // namespace thicklens::model
 

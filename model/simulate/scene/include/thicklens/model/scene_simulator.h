@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/base/progress.h"
 #include "thicklens/model/camera.h"
 #include "thicklens/model/effect_selection.h"
@@ -35,7 +36,8 @@ enum class TextureKind {
   kNoise,         // the amplitude decreases as 1/frequency
   kImage,         // an image of the user
 };
-std::string TextureKindName(TextureKind kind);  // "uniform", "sine", "checkerboard", ...
+THICKLENS_EXPORT std::string TextureKindName(
+    TextureKind kind);  // "uniform", "sine", "checkerboard", ...
 
 struct TextureOptions {
   TextureKind kind = TextureKind::kDeadLeaves;
@@ -122,7 +124,7 @@ struct LayerPixels {
 };
 
 // Returns the effects that an image of a scene can have.
-EffectSet ImageEffects();
+THICKLENS_EXPORT EffectSet ImageEffects();
 
 struct SceneSimulationOptions {
   // Image size, pitch and lens. The calibration gives d1, kappa and the lens floor (0 if absent).
@@ -145,12 +147,12 @@ struct SceneSimulationOptions {
   std::uint64_t seed = 1;
   std::vector<std::string> notices;  // of the file, one line each: names that are deprecated
 
-  bool IsValid(std::string* why) const;
+  THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 
 // Reads a file of the schema thicklens/simulate-scene/1 (docs/file-formats.md). Throws Error if it
 // is not valid.
-SceneSimulationOptions ReadSceneSimulation(const std::string& path);
+THICKLENS_EXPORT SceneSimulationOptions ReadSceneSimulation(const std::string& path);
 
 // The parameters of a simulated image.
 struct SceneTruth {
@@ -164,7 +166,8 @@ struct SceneTruth {
   double sampling_error_grey_levels = 0;  // rms, of the pixels where it is largest
   std::uint64_t seed = 0;
 };
-std::string SceneTruthToYaml(const SceneTruth& truth);  // schema thicklens/scene-truth/1
+THICKLENS_EXPORT std::string SceneTruthToYaml(
+    const SceneTruth& truth);  // schema thicklens/scene-truth/1
 
 // Control of a long computation.
 struct SceneRun {
@@ -190,7 +193,7 @@ struct SceneRun {
 // the highest frequencies, and that of the share of a pixel that an edge occludes is 0.005.
 //
 // All images are RGB. The same options give the same bits for any number of threads.
-class SceneSimulator {
+class THICKLENS_EXPORT SceneSimulator {
  public:
   // `pixels` has one entry per layer; missing entries are empty. The layers are drawn by `threads`
   // threads (0: one per core). The constructor throws Error if the options are not valid, an image

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/model/ablation.h"
 #include "thicklens/model/scene.h"
 #include "thicklens/model/sweep_simulator.h"
@@ -52,8 +53,9 @@ using CalibrateSweep = std::function<SweepCalibration(const SweepToCalibrate&)>;
 
 // The reference is as for AblateScene. Throws Error as SweepSimulator does, and if the sweep with
 // all effects has no calibration.
-SweepAblation AblateSweep(const SweepSimulationOptions& sweep, const LinearImage& target_image,
-                          const CalibrateSweep& calibrate, const AblationRun& run);
+THICKLENS_EXPORT SweepAblation AblateSweep(const SweepSimulationOptions& sweep,
+                                           const LinearImage& target_image,
+                                           const CalibrateSweep& calibrate, const AblationRun& run);
 
 }  // namespace thicklens::model
 

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/model/camera.h"
 #include "thicklens/model/effect_selection.h"
 #include "thicklens/model/pupil_law.h"
@@ -26,7 +27,7 @@ enum class TargetKind {
   kPrintedEdge,  // a slanted edge blurred by its ink: a Gaussian of ink_sigma_mm on the target
   kKnifeEdge,    // a slanted sharp edge
 };
-std::string TargetKindName(TargetKind kind);  // "dead-leaves", "pink-noise", ...
+THICKLENS_EXPORT std::string TargetKindName(TargetKind kind);  // "dead-leaves", "pink-noise", ...
 
 struct TargetOptions {
   TargetKind kind = TargetKind::kDeadLeaves;
@@ -76,23 +77,23 @@ struct SweepSimulationOptions {
   std::uint64_t seed = 1;
   std::vector<std::string> notices;  // of the file, one line each: names that are deprecated
 
-  bool IsValid(std::string* why) const;
+  THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 
 // Returns the effects that a simulated sweep can have. Diffraction is not among them because a lens
 // floor includes it.
-EffectSet SweepEffects();
+THICKLENS_EXPORT EffectSet SweepEffects();
 
 // Reads a file of the schema thicklens/simulate-sweep/1 (docs/file-formats.md). Throws Error if it
 // is not valid.
-SweepSimulationOptions ReadSweepSimulation(const std::string& path);
+THICKLENS_EXPORT SweepSimulationOptions ReadSweepSimulation(const std::string& path);
 
 // A bench sweep of a flat target, frame by frame, in grey. Each frame shows the target at its depth
 // through the exact transfer functions of defocus, lens floor and pixel box, at the image scale of
 // its chief rays. Each effect can be left out. Textures are periodic and band-limited by
 // definition: beyond the tile a frame sees its repetition. Edges have a closed form. Each column of
 // a tilted target is at its own depth, within about 0.01 px of its blur and position.
-class SweepSimulator {
+class THICKLENS_EXPORT SweepSimulator {
  public:
   // `target_image` is linear light; only kImage uses it. Throws Error if the options are not
   // valid.

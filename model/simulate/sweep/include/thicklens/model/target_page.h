@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/model/camera.h"
 
 namespace thicklens::model {
@@ -27,7 +28,7 @@ struct CameraView {
 };
 // Returns the view of the camera focused on a target at `distance_mm` from its aperture. Throws
 // Error if it cannot be focused there.
-CameraView ViewOfTarget(const Camera& camera, double distance_mm);
+THICKLENS_EXPORT CameraView ViewOfTarget(const Camera& camera, double distance_mm);
 
 struct TargetRequest {
   SheetSize sheet;
@@ -62,13 +63,13 @@ struct TargetPage {
   std::string choice;  // the choices and their reasons, in one line
 
   // Position of the edge at the height y: x = centre - (y - centre) tan(angle), mm.
-  double EdgeX(double y_mm) const;
+  THICKLENS_EXPORT double EdgeX(double y_mm) const;
 };
 constexpr double kLineHeight = 1.4;
 
 // Throws Error with the reason if no such page exists: the field does not fit the sheet, the print
 // method does not resolve the features, or the sheet has no room.
-TargetPage LayOutTarget(const TargetRequest& request);
+THICKLENS_EXPORT TargetPage LayOutTarget(const TargetRequest& request);
 
 }  // namespace thicklens::model
 

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/model/target_page.h"
 
 namespace thicklens::model {
@@ -17,10 +18,10 @@ struct TargetLeaf {
 // The radii are distributed as r^-3, so that every octave of sizes takes the same part of the area:
 // whatever the blur, some of the texture stays visible, and nothing repeats. Occluded leaves are
 // left out. The same page gives the same leaves on every machine.
-std::vector<TargetLeaf> DeadLeaves(const TargetPage& page);
+THICKLENS_EXPORT std::vector<TargetLeaf> DeadLeaves(const TargetPage& page);
 
 // The grey value where no leaf lies, on less than a thousandth of the area.
-int GreyBehindLeaves(const TargetPage& page);
+THICKLENS_EXPORT int GreyBehindLeaves(const TargetPage& page);
 
 }  // namespace thicklens::model
 
