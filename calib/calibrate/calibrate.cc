@@ -39,6 +39,7 @@ namespace {
 constexpr double kZeroReach = 2;        // sigmas by which one zero contradicts another
 constexpr double kZeroMoves = 0.1;      // share of the zero's sigma above which a shift matters
 constexpr double kFewRegistered = 0.8;  // share of the used frames; below it the light is checked
+constexpr int kMaxThreads = 1024;
 
 class Calibrator {
  public:
@@ -531,20 +532,11 @@ bool HasEnoughFrames(const FocusSweep& sweep, std::string* why) {
 }
 
 bool CalibrationOptions::IsValid(std::string* why) const {
-  if (threads < 0) return Fail(why, fmt::format("threads must be >= 0, found {}", threads));
-  const std::pair<const char*, double> numbers[] = {
-      {"min_mean_encoded", checks.min_mean_encoded},
-      {"max_saturated_fraction", checks.max_saturated_fraction},
-      {"max_black_fraction", checks.max_black_fraction},
-      {"min_relative_contrast", checks.min_relative_contrast},
-      {"min_gradient_to_noise", checks.min_gradient_to_noise},
-      {"min_coarse_texture", checks.min_coarse_texture},
-  };
-  for (const auto& [name, value] : numbers) {
-    if (value >= 0 && std::isfinite(value)) continue;
-    return Fail(why, fmt::format("checks.{} must be finite and >= 0, found {}", name, value));
+  if (!(threads >= 0 && threads <= kMaxThreads)) {
+    return Fail(why, fmt::format("threads is {}: it must be from 0 to {}", threads, kMaxThreads));
   }
-  return true;
+  std::string inner;
+  return checks.IsValid(&inner) || Fail(why, "checks." + inner);
 }
 
 Calibration Calibrate(const FocusSweep& sweep, const CalibrationOptions& options) {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "thicklens/base/error.h"
 #include "thicklens/base/validity.h"
@@ -309,8 +310,11 @@ bool VerificationOptions::IsValid(std::string* why) const {
   if (!(significance > 0 && significance < 1)) {
     return fails("significance", significance, "above 0 and below 1");
   }
-  if (!(needed_blur_px > 0)) return fails("needed_blur_px", needed_blur_px, "above 0");
-  if (!(needed_blur_ratio > 0)) return fails("needed_blur_ratio", needed_blur_ratio, "above 0");
+  const std::pair<const char*, double> changes[] = {{"needed_blur_px", needed_blur_px},
+                                                    {"needed_blur_ratio", needed_blur_ratio}};
+  for (const auto& [name, value] : changes) {
+    if (!(value > 0 && std::isfinite(value))) return fails(name, value, "finite and above 0");
+  }
   return true;
 }
 

@@ -70,6 +70,11 @@ void DecodeChannel(const cv::Mat& stored, int channel, const DecodeTable& decode
   }
 }
 
+// Whether value and sigma are numbers that can be used.
+bool IsKnown(const model::Estimate& estimate) {
+  return std::isfinite(estimate.value) && estimate.sigma >= 0 && std::isfinite(estimate.sigma);
+}
+
 }  // namespace
 
 bool FocusSweep::IsValid(std::string* why) const {
@@ -78,18 +83,37 @@ bool FocusSweep::IsValid(std::string* why) const {
   if (!camera.sensor.IsValid(&inner)) return Fail(why, "camera: sensor: " + inner);
   if (!read_frame) return Fail(why, "read_frame is not set");
   if (!(reading_sigma_mm >= 0) || !std::isfinite(reading_sigma_mm)) {
-    return Fail(why, fmt::format("reading_sigma_mm must be >= 0, found {}", reading_sigma_mm));
+    return Fail(
+        why, fmt::format("reading_sigma_mm must be finite and >= 0, found {}", reading_sigma_mm));
   }
-  if (offset_mm && !(std::isfinite(offset_mm->value) && offset_mm->sigma >= 0)) {
-    return Fail(why, fmt::format("offset_mm must be finite with sigma >= 0, found {} +- {}",
-                                 offset_mm->value, offset_mm->sigma));
+  if (offset_mm && !IsKnown(*offset_mm)) {
+    return Fail(why,
+                fmt::format("offset_mm must be finite with a finite sigma >= 0, found {} +- {}",
+                            offset_mm->value, offset_mm->sigma));
+  }
+  if (floor.given_px && !(IsKnown(*floor.given_px) && floor.given_px->value >= 0)) {
+    return Fail(why, fmt::format("floor.given_px must be finite and >= 0 with a finite sigma >= 0, "
+                                 "found {} +- {}",
+                                 floor.given_px->value, floor.given_px->sigma));
+  }
+  if (floor.from_px.has_value() != floor.to_px.has_value()) {
+    return Fail(why, "floor.from_px and floor.to_px must be both set or both absent");
+  }
+  if (floor.from_px &&
+      !(*floor.from_px >= 0 && *floor.from_px <= *floor.to_px && std::isfinite(*floor.to_px))) {
+    return Fail(why,
+                fmt::format("floor.from_px and floor.to_px must be finite with 0 <= from_px <= "
+                            "to_px, found {} and {}",
+                            *floor.from_px, *floor.to_px));
   }
   if (target_period_mm && !(*target_period_mm > 0 && std::isfinite(*target_period_mm))) {
-    return Fail(why, fmt::format("target_period_mm must be > 0, found {}", *target_period_mm));
+    return Fail(
+        why, fmt::format("target_period_mm must be finite and > 0, found {}", *target_period_mm));
   }
   for (const model::SweepFrame& frame : frames) {
     if (!std::isfinite(frame.reading_mm)) {
-      return Fail(why, fmt::format("{}: reading_mm must be finite", frame.image));
+      return Fail(why, fmt::format("{}: reading_mm must be finite, found {}", frame.image,
+                                   frame.reading_mm));
     }
   }
   if (roi.width > 0 && (roi.x < 0 || roi.y < 0 || roi.x + roi.width > camera.sensor.width_px ||

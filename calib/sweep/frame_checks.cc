@@ -10,12 +10,14 @@
 #include <limits>
 #include <numeric>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 #include <vector>
 
 #include "calib/sharpness/edge_pixels.h"
 #include "calib/sweep/clipping.h"
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/statistics.h"
+#include "thicklens/base/validity.h"
 
 namespace thicklens::calib {
 namespace {
@@ -169,6 +171,25 @@ double CoarseTexture(const cv::Mat& grey, const cv::Mat& slow, double noise_sigm
 }
 
 }  // namespace
+
+bool QualityCheckOptions::IsValid(std::string* why) const {
+  const std::pair<const char*, double> shares[] = {
+      {"min_mean_encoded", min_mean_encoded},
+      {"max_saturated_fraction", max_saturated_fraction},
+      {"max_black_fraction", max_black_fraction}};
+  for (const auto& [field, value] : shares) {
+    if (value >= 0 && value <= 1) continue;
+    return Fail(why, fmt::format("{} is {}: it must be from 0 to 1", field, value));
+  }
+  const std::pair<const char*, double> ratios[] = {{"min_relative_contrast", min_relative_contrast},
+                                                   {"min_gradient_to_noise", min_gradient_to_noise},
+                                                   {"min_coarse_texture", min_coarse_texture}};
+  for (const auto& [field, value] : ratios) {
+    if (value >= 0 && std::isfinite(value)) continue;
+    return Fail(why, fmt::format("{} is {}: it must be finite and >= 0", field, value));
+  }
+  return true;
+}
 
 std::string FailedCheck(const std::string& rejection) {
   std::string kind = rejection.substr(0, rejection.find_first_of(":,0123456789"));
