@@ -17,3 +17,26 @@ install(FILES "${PROJECT_BINARY_DIR}/thicklensConfig.cmake"
               "${PROJECT_SOURCE_DIR}/.cmake/FindSuiteSparse.cmake" DESTINATION ${package_dir})
 install(DIRECTORY "${PROJECT_SOURCE_DIR}/configs/" DESTINATION ${CMAKE_INSTALL_DATADIR}/thicklens)
 install(FILES "${PROJECT_SOURCE_DIR}/LICENSE" DESTINATION ${CMAKE_INSTALL_DOCDIR})
+
+# The same package with the shared libraries, for the test of the installation (ThicklensModule.cmake).
+if(THICKLENS_BUILDS_SHARED AND NOT THICKLENS_SHARED_LIBS)
+  function(thicklens_install_shared_component)
+    set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/thicklens-shared)
+    set(component COMPONENT thicklens_shared EXCLUDE_FROM_ALL)
+    set(THICKLENS_SHARED_LIBS ON)
+    install(
+      EXPORT thicklensSharedTargets
+      NAMESPACE thicklens::
+      FILE thicklensTargets.cmake
+      DESTINATION ${package_dir} ${component})
+    configure_package_config_file("${PROJECT_SOURCE_DIR}/.cmake/thicklensConfig.cmake.in"
+                                  "${PROJECT_BINARY_DIR}/shared/thicklensConfig.cmake"
+                                  INSTALL_DESTINATION ${package_dir}
+                                  PATH_VARS THICKLENS_LIBRARY_DIR)
+    install(FILES "${PROJECT_BINARY_DIR}/shared/thicklensConfig.cmake"
+                  "${PROJECT_BINARY_DIR}/thicklensConfigVersion.cmake" DESTINATION ${package_dir}
+            ${component})
+    install(TARGETS thicklens_opencv_codecs LIBRARY DESTINATION ${THICKLENS_LIBRARY_DIR} ${component})
+  endfunction()
+  thicklens_install_shared_component()
+endif()

@@ -66,8 +66,16 @@ function(thicklens_module name)
   if(THICKLENS_BUILDS_SHARED)
     thicklens_shared_library(${name})
     thicklens_module_headers(${target}_shared HEADERS ${ARG_HEADERS})
+    set_target_properties(${target}_shared PROPERTIES EXPORT_NAME ${name})
     if(THICKLENS_SHARED_LIBS)
       set(installed ${target}_shared)
+    else()
+      # The test of the installation installs this component from the build of the static libraries.
+      install(
+        TARGETS ${target}_shared
+        EXPORT thicklensSharedTargets
+        LIBRARY COMPONENT thicklens_shared EXCLUDE_FROM_ALL NAMELINK_COMPONENT thicklens_shared
+        FILE_SET HEADERS COMPONENT thicklens_shared EXCLUDE_FROM_ALL)
     endif()
   endif()
   add_library(thicklens::${name} ALIAS ${installed})

@@ -4,11 +4,13 @@
 #include <cstdint>
 #include <random>
 
+#include "thicklens/base/export.h"
+
 namespace thicklens {
 
 // Seeded random draws with the same sequence under every standard library. The standard specifies
 // std::mt19937_64 and std::seed_seq completely, but not the distributions of <random>.
-class RandomDraws {
+class THICKLENS_EXPORT RandomDraws {  // the library of model uses it as well
  public:
   // Purpose of the draws. Each purpose has its own stream, so that switching one effect on or off
   // does not change the draws of the others.

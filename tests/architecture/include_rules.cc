@@ -67,9 +67,11 @@ class Judge {
  public:
   // `public_headers` maps the name by which a header is included to its path.
   Judge(const SourceTree& tree, const std::map<std::string, std::string>& public_headers,
-        const RoomsTable& table, std::string path, std::string room)
+        const std::set<std::string>& internal_headers, const RoomsTable& table, std::string path,
+        std::string room)
       : tree_(tree),
         public_headers_(public_headers),
+        internal_headers_(internal_headers),
         table_(table),
         path_(std::move(path)),
         room_(std::move(room)) {}
@@ -94,8 +96,13 @@ class Judge {
  private:
   std::string OfPublic(const std::string& header) const {
     const auto found = public_headers_.find(header);
-    return found == public_headers_.end() ? "there is no such public header"
-                                          : OfArrow(found->second);
+    if (found == public_headers_.end()) return "there is no such public header";
+    const bool is_installed = IsPublic(path_) && internal_headers_.count(path_) == 0;
+    if (is_installed && internal_headers_.count(found->second) > 0) {
+      return "an installed header may not include an internal one, which is not installed (" +
+             found->second + ")";
+    }
+    return OfArrow(found->second);
   }
 
   // Returns nothing if the name of the header does not lead into a module of this repository.
@@ -140,6 +147,7 @@ class Judge {
 
   const SourceTree& tree_;
   const std::map<std::string, std::string>& public_headers_;
+  const std::set<std::string>& internal_headers_;
   const RoomsTable& table_;
   const std::string path_, room_;
 };
@@ -212,7 +220,8 @@ bool IsSource(const std::string& path) {
   return dot != std::string::npos && extensions.count(name.substr(dot)) > 0;
 }
 
-std::vector<std::string> Violations(const SourceTree& tree, const RoomsTable& table) {
+std::vector<std::string> Violations(const SourceTree& tree, const RoomsTable& table,
+                                    const std::set<std::string>& internal_headers) {
   const Names modules = table.Modules();
   std::map<std::string, std::string> public_headers;
   for (const auto& entry : tree) {
@@ -229,7 +238,8 @@ std::vector<std::string> Violations(const SourceTree& tree, const RoomsTable& ta
       continue;
     }
     CheckPlace(table, *room, path, &violations);
-    CheckIncludes(Judge(tree, public_headers, table, path, *room), path, text, &violations);
+    CheckIncludes(Judge(tree, public_headers, internal_headers, table, path, *room), path, text,
+                  &violations);
   }
   return violations;
 }

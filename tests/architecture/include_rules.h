@@ -2,6 +2,7 @@
 #define THICKLENS_TESTS_ARCHITECTURE_INCLUDE_RULES_H_
 
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -18,7 +19,9 @@ bool IsSource(const std::string& path);
 
 // Returns every include that the table does not allow, every source of a module that is in no room,
 // and every public header in a wrong place, each as "file:line: what is wrong; what is allowed".
-std::vector<std::string> Violations(const SourceTree& tree, const RoomsTable& table);
+// `internal_headers`: the paths of the public headers that are not installed.
+std::vector<std::string> Violations(const SourceTree& tree, const RoomsTable& table,
+                                    const std::set<std::string>& internal_headers = {});
 
 // Returns every include of a private header of a library in the files below the folder `client`,
 // and in the private headers that they include directly or through others, each as "file:line:

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <set>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -27,12 +28,23 @@ std::string Lines(const std::vector<std::string>& lines) {
   return joined;
 }
 
+// Returns the paths of the headers that CMake listed as internal.
+std::set<std::string> InternalHeaders() {
+  std::istringstream lines(ContentOf(THICKLENS_INTERNAL_HEADERS));
+  std::set<std::string> headers;
+  for (std::string line; std::getline(lines, line);) headers.insert(line);
+  return headers;
+}
+
 TEST(IncludeScan, EveryIncludeOfTheRepositoryIsAllowed) {
   const RoomsTable table = RepositoryTable();
   const SourceTree tree = ReadRepository(table.Modules());
   // An empty scan would pass as well.
   ASSERT_GT(tree.size(), 500U);
-  EXPECT_THAT(Lines(Violations(tree, table)), IsEmpty());
+  const std::set<std::string> internal_headers = InternalHeaders();
+  ASSERT_GT(internal_headers.size(), 5U);
+  for (const std::string& header : internal_headers) EXPECT_EQ(tree.count(header), 1U) << header;
+  EXPECT_THAT(Lines(Violations(tree, table, internal_headers)), IsEmpty());
 }
 
 // The command line is a client of the libraries as any other program is: what it needs is public.
@@ -192,6 +204,20 @@ TEST(IncludeScanner, FindsPrivateHeadersOfLibrariesAlsoThroughOthers) {
               ElementsAre("program/commands/b.cc:1: includes glass/optics/secret.h",
                           "program/words.h:3: includes program/io/codec.h"));
   EXPECT_THAT(PrivateIncludes(tree, "program/commands", {"other"}), IsEmpty());
+}
+
+TEST(IncludeScanner, RefusesAnInternalHeaderInAnInstalledOne) {
+  const std::string plumbing = "glass/base/include/thicklens/base/plumbing.h";
+  const std::string pipes = "glass/optics/include/thicklens/glass/pipes.h";
+  const std::string include = "#include \"thicklens/base/plumbing.h\"\n";
+  EXPECT_THAT(Violations({{plumbing, ""},
+                          {pipes, include},
+                          {"glass/optics/camera.cc", include},
+                          {"glass/optics/pupil.h", include},
+                          {"glass/optics/include/thicklens/glass/camera.h", include}},
+                         RoomsTable::Parse(kTable), {plumbing, pipes}),
+              ElementsAre(AllOf(StartsWith("glass/optics/include/thicklens/glass/camera.h:1: "),
+                                HasSubstr("may not include an internal one"))));
 }
 
 TEST(IncludeScanner, RefusesFilesInTheWrongPlace) {

@@ -1,7 +1,8 @@
 # Installs the build tree into a fresh prefix, then builds and runs a project that uses it.
 cmake_minimum_required(VERSION 3.25)
 
-foreach(name IN ITEMS build_dir config work_dir configs_dir bin data generator compiler architecture_test)
+foreach(name IN ITEMS build_dir config work_dir configs_dir bin data generator compiler architecture_test
+                       internal_headers)
   if("${${name}}" STREQUAL "")
     message(FATAL_ERROR "install test: give -D ${name}=...")
   endif()
@@ -39,11 +40,39 @@ foreach(file IN LISTS configs)
   endif()
 endforeach()
 
-run(${CMAKE_COMMAND} -S "${CMAKE_CURRENT_LIST_DIR}/consumer" -B "${work_dir}/consumer"
-    -G "${generator}" -D CMAKE_BUILD_TYPE=${config} -D CMAKE_CXX_COMPILER=${compiler}
-    -D "CMAKE_PREFIX_PATH=${prefix}")
-run(${CMAKE_COMMAND} --build "${work_dir}/consumer" --config ${config})
-run("${work_dir}/consumer/consumer")
+# run_consumer(<folder> <options for CMake...>): builds the project with the package, and runs its
+# programs, of which each links all libraries or only one.
+function(run_consumer folder)
+  run(${CMAKE_COMMAND} -S "${CMAKE_CURRENT_LIST_DIR}/consumer" -B "${folder}" -G "${generator}"
+      -D CMAKE_BUILD_TYPE=${config} -D CMAKE_CXX_COMPILER=${compiler} ${ARGN})
+  run(${CMAKE_COMMAND} --build "${folder}" --config ${config})
+  foreach(program IN ITEMS consumer only_base only_model only_kernels only_calib only_estimator only_io
+                           only_thicklens)
+    run(${CMAKE_COMMAND} -E chdir "${folder}" "./${program}")
+  endforeach()
+endfunction()
+run_consumer("${work_dir}/consumer" -D "CMAKE_PREFIX_PATH=${prefix}")
+
+# No internal header is installed.
+file(STRINGS "${internal_headers}" headers)
+foreach(header IN LISTS headers)
+  string(REGEX REPLACE "^.*/include/" "" header "${header}")
+  if(EXISTS "${prefix}/include/${header}")
+    message(FATAL_ERROR "installed, but internal: ${header}")
+  endif()
+endforeach()
+
+# The same with the shared libraries, in a prefix of their own so that no static one can be linked.
+if(shared)
+  set(shared_prefix "${work_dir}/shared_prefix")
+  run(${CMAKE_COMMAND} --install "${build_dir}" --config ${config} --component thicklens_shared
+      --prefix "${shared_prefix}")
+  run(${CMAKE_COMMAND} -E env "THICKLENS_INSTALLED=${shared_prefix}" "${architecture_test}"
+      --gtest_filter=ElfSearchPaths.*)
+  file(GLOB_RECURSE config_file "${shared_prefix}/thicklensConfig.cmake")
+  cmake_path(GET config_file PARENT_PATH config_dir)
+  run_consumer("${work_dir}/shared_consumer" -D "thicklens_DIR=${config_dir}")
+endif()
 
 # The examples of the documentation, and the program of the README, as a user builds and runs them.
 set(examples "${work_dir}/examples")

@@ -12,6 +12,34 @@
 namespace thicklens::architecture {
 namespace {
 
+// Calls use(symbol, name) for each symbol of the tables of one type (SHT_SYMTAB, SHT_DYNSYM) that
+// is not local.
+template <typename Use>
+void ForEachSymbol(const std::string& bytes, const Elf64_Ehdr& header, Elf64_Word type,
+                   const Use& use) {
+  // If a file has very many sections, their number is stored in the first one.
+  std::size_t sections = header.e_shnum;
+  if (sections == 0) {
+    const auto first = At<Elf64_Shdr>(bytes, header.e_shoff);
+    if (first) sections = first->sh_size;
+  }
+  for (std::size_t i = 0; i < sections; ++i) {
+    const auto section = At<Elf64_Shdr>(bytes, header.e_shoff + i * sizeof(Elf64_Shdr));
+    if (!section || section->sh_type != type) continue;
+    const auto names =
+        At<Elf64_Shdr>(bytes, header.e_shoff + section->sh_link * sizeof(Elf64_Shdr));
+    if (!names) continue;
+    for (std::size_t at = 0; at + sizeof(Elf64_Sym) <= section->sh_size; at += sizeof(Elf64_Sym)) {
+      const auto symbol = At<Elf64_Sym>(bytes, section->sh_offset + at);
+      if (!symbol) break;
+      if (ELF64_ST_BIND(symbol->st_info) == STB_LOCAL) continue;
+      use(*symbol, TextAt(bytes, names->sh_offset + symbol->st_name));
+    }
+  }
+}
+
+}  // namespace
+
 std::string Demangled(const std::string& name) {
   int status = 0;
   const std::unique_ptr<char, void (*)(void*)> text(
@@ -19,33 +47,24 @@ std::string Demangled(const std::string& name) {
   return status == 0 ? text.get() : name;
 }
 
-}  // namespace
-
 std::optional<ObjectSymbols> ReadObject(const std::string& bytes) {
   const auto header = HeaderOf(bytes);
   if (!header || header->e_type != ET_REL) return std::nullopt;
   ObjectSymbols symbols;
-  // If a file has very many sections, their number is stored in the first one.
-  std::size_t sections = header->e_shnum;
-  if (sections == 0) {
-    const auto first = At<Elf64_Shdr>(bytes, header->e_shoff);
-    if (first) sections = first->sh_size;
-  }
-  for (std::size_t i = 0; i < sections; ++i) {
-    const auto section = At<Elf64_Shdr>(bytes, header->e_shoff + i * sizeof(Elf64_Shdr));
-    if (!section || section->sh_type != SHT_SYMTAB) continue;
-    const auto names =
-        At<Elf64_Shdr>(bytes, header->e_shoff + section->sh_link * sizeof(Elf64_Shdr));
-    if (!names) continue;
-    for (std::size_t at = 0; at + sizeof(Elf64_Sym) <= section->sh_size; at += sizeof(Elf64_Sym)) {
-      const auto symbol = At<Elf64_Sym>(bytes, section->sh_offset + at);
-      if (!symbol) break;
-      if (ELF64_ST_BIND(symbol->st_info) == STB_LOCAL) continue;
-      const std::string name = TextAt(bytes, names->sh_offset + symbol->st_name);
-      (symbol->st_shndx == SHN_UNDEF ? symbols.used : symbols.defined).insert(name);
-    }
-  }
+  ForEachSymbol(bytes, *header, SHT_SYMTAB, [&](const Elf64_Sym& symbol, const std::string& name) {
+    (symbol.st_shndx == SHN_UNDEF ? symbols.used : symbols.defined).insert(name);
+  });
   return symbols;
+}
+
+std::optional<std::set<std::string>> ReadExportedSymbols(const std::string& bytes) {
+  const auto header = HeaderOf(bytes);
+  if (!header || header->e_type != ET_DYN) return std::nullopt;
+  std::set<std::string> exported;
+  ForEachSymbol(bytes, *header, SHT_DYNSYM, [&](const Elf64_Sym& symbol, const std::string& name) {
+    if (symbol.st_shndx != SHN_UNDEF) exported.insert(name);
+  });
+  return exported;
 }
 
 std::string SourceOfObject(const std::string& object) {

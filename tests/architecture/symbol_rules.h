@@ -20,6 +20,13 @@ struct ObjectSymbols {
 // Returns the symbols of an object file, or nothing if the file is not of this machine's kind.
 std::optional<ObjectSymbols> ReadObject(const std::string& bytes);
 
+// Returns the symbols that a shared library exports (mangled names), or nothing if the file is not
+// of this machine's kind.
+std::optional<std::set<std::string>> ReadExportedSymbols(const std::string& bytes);
+
+// Returns the name of a symbol in C++, or the symbol itself if it has none.
+std::string Demangled(const std::string& symbol);
+
 // Maps "model/base/CMakeFiles/thicklens_base.dir/parallel.cc.o" to "model/base/parallel.cc".
 // Returns an empty string for any other path.
 std::string SourceOfObject(const std::string& object);

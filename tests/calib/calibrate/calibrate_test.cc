@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -225,29 +224,6 @@ TEST(Calibrate, AWrongFocalLengthIsRefusedAsUnphysical) {
   // The radius of the aperture follows from the f-number.
   s.sweep.camera.lens.aperture_radius_mm *= 35.0 / 50;
   ExpectRefused(Calibrated(s), "which no lens has");
-}
-
-TEST(Calibrate, RefusesOptionsThatAreOutOfRange) {
-  double QualityCheckOptions::*const numbers[] = {
-      &QualityCheckOptions::min_mean_encoded,      &QualityCheckOptions::max_saturated_fraction,
-      &QualityCheckOptions::max_black_fraction,    &QualityCheckOptions::min_relative_contrast,
-      &QualityCheckOptions::min_gradient_to_noise, &QualityCheckOptions::min_coarse_texture};
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  std::string why;
-  for (const auto number : numbers) {
-    for (const double value : {std::nan(""), kInfinity, -kInfinity, -1.0}) {
-      CalibrationOptions options;
-      EXPECT_TRUE(options.IsValid(&why)) << why;
-      options.checks.*number = value;
-      EXPECT_FALSE(options.IsValid(&why));
-      EXPECT_FALSE(options.IsValid(nullptr));
-      EXPECT_THAT(why, AllOf(HasSubstr("must be finite and >= 0"), HasSubstr("checks.m")));
-    }
-  }
-  CalibrationOptions options;
-  options.threads = -1;
-  EXPECT_FALSE(options.IsValid(&why));
-  EXPECT_EQ(why, "threads must be >= 0, found -1");
 }
 
 TEST(Calibrate, StopsWhenProgressThrows) {

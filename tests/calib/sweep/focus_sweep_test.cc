@@ -55,7 +55,7 @@ TEST(FocusSweep, APeriodMustBePositive) {
   for (const double wrong : {0.0, -5.0, std::nan("")}) {
     sweep.target_period_mm = wrong;
     EXPECT_FALSE(sweep.IsValid(&why));
-    EXPECT_THAT(why, HasSubstr("target_period_mm must be > 0"));
+    EXPECT_THAT(why, HasSubstr("target_period_mm must be finite and > 0"));
   }
 }
 
