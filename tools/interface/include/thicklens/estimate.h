@@ -10,13 +10,13 @@
 #include <utility>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/camera.h"
 #include "thicklens/depth.h"
 #include "thicklens/effects.h"
 #include "thicklens/estimator/blur_check.h"
 #include "thicklens/estimator/inpaint.h"
 #include "thicklens/estimator/scene_solver.h"
-#include "thicklens/base/export.h"
 #include "thicklens/image.h"
 #include "thicklens/light_field.h"
 #include "thicklens/run.h"

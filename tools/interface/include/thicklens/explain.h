@@ -4,10 +4,10 @@
 #include <optional>
 #include <string>
 
+#include "thicklens/base/export.h"
 #include "thicklens/camera.h"
 #include "thicklens/depth.h"
 #include "thicklens/effects.h"
-#include "thicklens/base/export.h"
 #include "thicklens/model/effect_costs.h"
 #include "thicklens/model/explanation.h"
 #include "thicklens/run.h"

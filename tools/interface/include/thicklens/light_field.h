@@ -5,8 +5,8 @@
 #include <optional>
 #include <string>
 
-#include "thicklens/base/output_file.h"
 #include "thicklens/base/export.h"
+#include "thicklens/base/output_file.h"
 #include "thicklens/image.h"
 #include "thicklens/model/light_field.h"
 #include "thicklens/run.h"

@@ -7,8 +7,8 @@
 #include <optional>
 #include <string>
 
-#include "thicklens/calib/focus_sweep.h"
 #include "thicklens/base/export.h"
+#include "thicklens/calib/focus_sweep.h"
 #include "thicklens/image.h"
 #include "thicklens/sweep.h"
 

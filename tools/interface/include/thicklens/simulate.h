@@ -5,11 +5,11 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/base/export.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/camera.h"
 #include "thicklens/depth.h"
 #include "thicklens/effects.h"
-#include "thicklens/base/export.h"
 #include "thicklens/image.h"
 #include "thicklens/light_field.h"
 #include "thicklens/model/scene_simulator.h"

@@ -1,10 +1,10 @@
 #ifndef THICKLENS_VERIFY_H_
 #define THICKLENS_VERIFY_H_
 
+#include "thicklens/base/export.h"
 #include "thicklens/calib/verification.h"
 #include "thicklens/calibrate.h"
 #include "thicklens/camera.h"
-#include "thicklens/base/export.h"
 #include "thicklens/run.h"
 #include "thicklens/sweep.h"
 
