@@ -38,7 +38,7 @@ enum class ViewFormat {
   kTiff,  // float, linear light
 };
 // Entries that a folder of our layout may hold, for OutputFolder.
-extern const char kLightFieldMarker[];  // "lightfield.yaml"
+THICKLENS_EXPORT extern const char kLightFieldMarker[];  // "lightfield.yaml"
 THICKLENS_EXPORT std::vector<std::string> LightFieldEntries();
 
 // Writes a light field of which only some views are in memory at a time. Views are written as they
@@ -84,7 +84,7 @@ THICKLENS_EXPORT std::size_t WriteLightField(const model::LightField& light_fiel
 
 // Writes the HCI layout: input_CamNNN.png (8 bit sRGB) and parameters.cfg, below the staging path.
 // Returns the number of clipped values.
-extern const char kHciMarker[];  // "parameters.cfg"
+THICKLENS_EXPORT extern const char kHciMarker[];  // "parameters.cfg"
 THICKLENS_EXPORT std::size_t WriteHciLightField(const model::LightField& light_field,
                                                 OutputFolder* folder);
 
