@@ -3,15 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <cmath>
-#include <cstddef>
-#include <limits>
 #include <string>
 #include <utility>
-#include <vector>
 
-#include "support/error_message.h"
-#include "support/test_cameras.h"
 #include "thicklens/base/error.h"
 #include "tools/options/option_values.h"
 
@@ -19,13 +13,8 @@ namespace thicklens::tools {
 namespace {
 
 using ::testing::AllOf;
-using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
-using thicklens::testing::ErrorOf;
-
-constexpr float kHole = std::numeric_limits<float>::quiet_NaN();
-constexpr int kMapWidth = 3, kMapHeight = 2;
 
 // Returns the message of a UsageError; another Error, or none, fails the test.
 template <typename Call>
@@ -39,20 +28,6 @@ std::string UsageErrorOf(const Call& call) {
     return "";
   }
   return "(no error)";
-}
-
-model::Camera MapCamera() {
-  return thicklens::testing::SmallCamera(kMapWidth, kMapHeight, {1, 0.5});
-}
-
-model::RawDepthMap MapOf(std::vector<float> values) {
-  return {kMapWidth, kMapHeight, std::move(values), false};
-}
-
-// Tells nothing about surfaces.
-model::LinearImage GreyImage(int width_px = kMapWidth) {
-  return {width_px, kMapHeight, 1,
-          std::vector<float>(static_cast<std::size_t>(width_px * kMapHeight))};
 }
 
 DepthOptions KindAndUnit(const std::string& kind, const std::string& unit) {
