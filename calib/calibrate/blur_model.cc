@@ -54,7 +54,7 @@ std::optional<BlurModel> BlurModel::OfSide(const FocusSweep& sweep, const Calibr
 BlurModel BlurModel::OfTruth(const FocusSweep& sweep, const model::SweepTruth& truth) {
   BlurModel blur(sweep, truth.image_distance_mm);
   blur.floor_squared_px2_ = truth.blur_floor_px * truth.blur_floor_px;
-  // Whether defocus was simulated, the frames tell.
+  // The blur of the frames shows whether defocus was simulated.
   double product = 0, square = 0;
   for (const model::SweepTruth::Frame& frame : truth.frames) {
     if (!IsDepth(frame.depth_mm)) continue;
@@ -70,8 +70,9 @@ double BlurModel::SigmaPx(double depth_mm) const {
   return std::sqrt(floor_squared_px2_ + kappa_ * kappa_ * std::pow(SignedDefocusPx(depth_mm), 2));
 }
 
-// With the signed q = r c(z)/p and c(z) = [f1 D - (D - f2) z]/(f2 z): sigma^2 = S0 + (kappa q)^2,
-// so that d sigma/d z = kappa^2 q dq/dz / sigma, dc/dz = -f1 D/(f2 z^2) (derived here, [D88]).
+// The signed defocus is q = r c(z)/p with c(z) = [f1 D - (D - f2) z]/(f2 z), and sigma^2 = S0 +
+// (kappa q)^2. Therefore d sigma/d z = kappa^2 q dq/dz / sigma with dc/dz = -f1 D/(f2 z^2) (derived
+// here, [D88]).
 double BlurModel::SlopePxPerMm(double depth_mm) const {
   const model::ThickLens& lens = sweep_->camera.lens;
   const double sigma_px = SigmaPx(depth_mm);

@@ -12,7 +12,7 @@
 namespace thicklens::estimator {
 namespace {
 
-// Of the best plan's gain over warping.
+// Shares of the best plan's gain over warping that "draft" and "standard" require.
 constexpr double kDraftShare = 0.5, kStandardShare = 0.9;
 
 struct Offer {

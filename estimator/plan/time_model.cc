@@ -14,7 +14,7 @@
 namespace thicklens::estimator {
 namespace {
 
-// Of the views' places along one axis, in view steps squared.
+// The variance of the views' places along one axis, in view steps squared.
 double VarianceOf(const Eigen::ArrayXd& weights) {
   const Eigen::ArrayXd places =
       Eigen::ArrayXd::LinSpaced(weights.size(), 0, static_cast<double>(weights.size() - 1));
@@ -22,7 +22,7 @@ double VarianceOf(const Eigen::ArrayXd& weights) {
   return (weights * (places - mean).square()).sum();
 }
 
-// What the parts of a run can depend on.
+// The quantities that the time of each part of a run can depend on.
 constexpr std::array kSetupTerms = {TimeModel::kStart,       TimeModel::kViews,
                                     TimeModel::kPixels,      TimeModel::kPixelsChannels,
                                     TimeModel::kPixelsViews, TimeModel::kPixelsViewsBlur};

@@ -131,7 +131,8 @@ Explanation ExplainCamera(const Camera& camera, const DepthRange& range, int cou
     known.depth_of_field.push_back({radius_px, field.near_mm, field.far_mm});
   }
   known.thin = CompareWithThin(camera, known.image_distance_mm);
-  // From r f1/(zf - f1) = 1 px, the limit of r K |1/z - 1/zf| for z to infinity.
+  // The hyperfocal depth follows from r f1/(zf - f1) = 1 px, the limit of r K |1/z - 1/zf| for z to
+  // infinity.
   known.hyperfocal_mm = camera.lens.front_focal_length_mm *
                         (1 + camera.lens.aperture_radius_mm / camera.sensor.pixel_pitch_mm);
   // The aperture's image lies in the rear principal plane, of the aperture's own size.

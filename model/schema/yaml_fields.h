@@ -44,8 +44,8 @@ Value ReadNamed(const YamlNode& node, const std::vector<Value>& values,
   return values[i];
 }
 
-// The same for values of which one was renamed: its former name is accepted, and its first use adds
-// a line to `notices`.
+// Reads the name of one of these values, of which one was renamed: its former name is accepted, and
+// its first use adds a line to `notices`.
 template <typename Value>
 Value ReadNamed(const YamlNode& node, const std::vector<Value>& values,
                 std::string (*name_of)(Value), const RenamedWord& renamed,

@@ -97,8 +97,8 @@ struct BlurBench {
     return samples;
   }
 
-  // The same samples relative to the reference frame, whose variance is stated as `reference_px2`
-  // without an error. Its own error is in all the other samples.
+  // Returns the samples relative to the reference frame, whose variance is stated as
+  // `reference_px2` without an error. Its own error is in all the other samples.
   calib::BlurSamples Relative(double error_px2, double reference_px2, std::mt19937* random) const {
     calib::BlurSamples samples = Absolute(error_px2, 0, random);
     const auto r = static_cast<Eigen::Index>(reference);

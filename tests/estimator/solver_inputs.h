@@ -22,8 +22,8 @@ Eigen::ArrayXXd GaussianWeights(int u_count, int v_count);
 EstimateInput NoiseInput(int width_px, int height_px, int channels, const Eigen::ArrayXXd& weights,
                          const std::function<double(int x, int y)>& disparity, unsigned seed = 1);
 
-// The same input seen by testing::SolverCamera, with a grid on these planes and the depth of each
-// column. If the ST plane is not the plane of focus, rays land between the pixels.
+// Returns the input as testing::SolverCamera would see it, with a grid on these planes and the
+// depth of each column. If the ST plane is not the plane of focus, rays land between the pixels.
 EstimateInput WithSolverCamera(EstimateInput input, const model::LightFieldPlanes& planes,
                                const std::function<double(int x)>& depth_mm);
 

@@ -58,8 +58,7 @@ inline model::Camera TestCameraFocusedAt(double focus_depth_mm, const std::strin
   return TestCamera(name, lens, sensor, {model::ImageDistanceMm(lens, focus_depth_mm), 0},
                     blur_ratio);
 }
-// The same camera with a description of how it was calibrated. "assumed" means that nothing was
-// measured.
+// Adds a description of how the camera was calibrated. "assumed" means that nothing was measured.
 inline model::Camera WithMethod(model::Camera camera, const std::string& method = "assumed") {
   camera.calibration->evidence.method = method;
   return camera;

@@ -67,7 +67,7 @@ void Measure(const BenchSourceOptions& options, std::vector<SourceContender>* co
   std::vector<double> spent(contenders->size(), 0.0);
   MeasureInRounds(options.repeat, contenders->size(), &progress, [&](int, std::size_t i) {
     SourceContender& contender = (*contenders)[i];
-    // Of what takes so long, fewer runs tell as much as more.
+    // A contender that takes so long is measured less often: its times scatter relatively little.
     constexpr double kEnoughSeconds = 60;
     if (!contender.row.failure.empty() || !(spent[i] < kEnoughSeconds)) return;
     const Clock::time_point start = Clock::now();

@@ -180,7 +180,8 @@ estimator::TimedWorkload Timed(const estimator::Workload& load, const nlohmann::
   return {load, of("total"), parts};
 }
 
-// By the whole time, and of two the slower. One run, so that its parts are of that time.
+// Returns the run whose whole time is the median, and the slower of two. It is one run and not a
+// mean, so that its parts add up to its whole time.
 estimator::TimedWorkload MiddleRun(std::vector<estimator::TimedWorkload> runs) {
   const auto middle = runs.begin() + static_cast<std::ptrdiff_t>(runs.size() / 2);
   std::nth_element(runs.begin(), middle, runs.end(),

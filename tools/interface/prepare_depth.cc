@@ -1,4 +1,4 @@
-// From a depth map to the disparity of a photograph's pixels.
+// Converts a depth map to the disparity of a photograph's pixels.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -46,7 +46,7 @@ PreparedDepth PrepareByCamera(const DepthMap& map, const model::LinearImage& ima
   if (convention.kind == DepthKind::kDisparity) {
     convention.aperture_step_mm = ApertureStepMm(grid, camera);
   }
-  // Of the image, only its size counts here.
+  // Only the size of the image matters here.
   model::LinearImage empty{map.width_px, map.height_px, 1, {}};
   empty.values.assign(map.values.size(), 0.0F);
   const model::Scene scene =

@@ -11,7 +11,7 @@
 
 namespace thicklens {
 
-// What the steps before the solver make.
+// The result of the steps before the solver.
 struct PreparedProblem {
   std::shared_ptr<estimator::EstimateInput> input;
   model::EffectSelection effects;

@@ -1,4 +1,4 @@
-// What a program's own solver sees of a problem.
+// The view of a problem that a program's own solver gets.
 #include <fmt/format.h>
 
 #include <utility>

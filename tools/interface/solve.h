@@ -12,7 +12,7 @@
 
 namespace thicklens {
 
-// What a solver returns, with the maps of SceneSolver.
+// The result of a solver, with the maps of SceneSolver.
 struct Solved {
   LightField light_field;  // without values if the sink got the views
   SolverSummary summary;

@@ -179,7 +179,8 @@ std::string WorstKnownLine(const calib::BlurFit& blur) {
 
 std::string WidenedLine(const calib::BlurFit& blur) {
   constexpr double kWorthReporting = 2;
-  // With few frames chance alone reaches this, and the fit does not widen its errors for chance.
+  // If there are few frames, chance alone reaches this, and the fit does not widen its errors for
+  // chance.
   constexpr double kBeyondChance = 3.5;
   constexpr int kManyFrames = 20;
   if (!blur.done || !(blur.chi2_per_dof > kWorthReporting)) return "";

@@ -16,10 +16,12 @@
 namespace thicklens::model {
 namespace {
 
-// Frames below that are held, larger sweeps are simulated again where they are looked at.
+// The frames of a sweep up to this size are kept in memory; those of a larger one are simulated
+// each time that they are needed.
 constexpr double kMaxHeldBytes = 1 << 30;
 
-// What is made of each frame, held or made when it is asked for.
+// The results for each frame. They are computed once and kept if they fit into kMaxHeldBytes;
+// otherwise each is computed when it is asked for.
 template <typename Frame>
 class Frames {
  public:

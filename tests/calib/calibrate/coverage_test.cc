@@ -77,8 +77,8 @@ TEST(CoverageSlow, CaseI) { ExpectHonestErrors("i", 128, 14, 0); }
 TEST(CoverageSlow, CaseII) { ExpectHonestErrors("ii", 128, 14, 0); }
 TEST(CoverageSlow, CaseIII) { ExpectHonestErrors("iii", 128, 14, 0); }
 TEST(CoverageSlow, CaseIV) { ExpectHonestErrors("iv", 128, 14, 0); }
-// With white noise and seven frames, too few frames may show the same texture, so one sweep in a
-// hundred is refused.
+// In a sweep of seven frames with white noise, too few frames may show the same texture, so one
+// sweep in a hundred is refused.
 TEST(CoverageSlow, CaseV) { ExpectHonestErrors("v", 192, 40, 2); }
 
 // Fewer frames of the same sweep give the same results with larger errors. The difference is

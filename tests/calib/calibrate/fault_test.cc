@@ -156,9 +156,9 @@ TEST_P(WrongSweep, ReadingsOfCentimetresInMillimetresAreRefused) {
 INSTANTIATE_TEST_SUITE_P(LongLens, WrongSweep, ::testing::Values("ii"));
 INSTANTIATE_TEST_SUITE_P(SlowThickLens, WrongSweep, ::testing::Values("iii"));
 
-// With a focal length of 35 mm instead of 50, the blur law requires kappa = 0.975. Because the rim
-// fall-off of such a short lens darkens more, an aperture that looks so wide requires kappa = 1.00.
-// As a Gaussian this is more light than an aperture passes.
+// If the focal length is stated as 35 mm instead of 50, the blur law requires kappa = 0.975.
+// Because the rim fall-off of such a short lens darkens more, an aperture that looks so wide
+// requires kappa = 1.00. A Gaussian of this width contains more light than an aperture passes.
 TEST(WrongSweepOfALongLens, AWrongFocalLengthIsRefusedOrWarnedOf) {
   SimulatedSweep s = DeepCopy(Clean("ii"));
   model::ThickLens& lens = s.sweep.camera.lens;

@@ -140,7 +140,7 @@ TEST(FocusRegression, LeavesInCaseThree) { CheckLeaves(kLeaves[2], 1); }
 TEST(FocusRegression, LeavesInCaseFive) { CheckLeaves(kLeaves[4], 1); }
 TEST(FocusRegression, KnifeEdgeInCaseTwo) { CheckEdge(kEdge[1], 1); }
 TEST(FocusRegression, KnifeEdgeInCaseFive) { CheckEdge(kEdge[4], 1); }
-// With seed 3, two readings are off by 3.3 and 2 sigma, and so is kappa.
+// For seed 3, two readings are off by 3.3 and 2 sigma, and so is kappa.
 TEST(FocusRegression, SlowKnifeEdgesInCaseFiveScatterAsStated) { CheckEdges(kEdge[4], 20); }
 
 // An edge without noise crosses a sensor that is wide enough for the fall-off to darken its ends by

@@ -50,8 +50,8 @@ TEST(FitBlur, TwoDepthsDoNotFixThreeParameters) {
 TEST(FitBlur, TheWorstKnownCombinationIsNamedWithItsCorrelation) {
   const BlurBench bench = ExactBench();
   std::mt19937 random(1);
-  // With a texture alone, zf and the floor are almost completely correlated, because a wrong floor
-  // moves the focus.
+  // If there is only a texture, zf and the floor are almost completely correlated, because a wrong
+  // floor moves the focus.
   const BlurFitResult fit = FitBlur(WithTexture(bench, 1e-3, 0.5, &random));
   ASSERT_TRUE(fit.done);
   EXPECT_THAT(fit.weak_direction, HasSubstr("blur_floor_px"));

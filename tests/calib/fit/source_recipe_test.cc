@@ -46,7 +46,7 @@ TEST(RunSourceRecipe, IsTheSharpestFrameAndTheMeanOfRatios) {
   EXPECT_NEAR(recipe.image_distance_mm, 60, 1e-12);
   EXPECT_EQ(recipe.ratio_frames, 3);
   EXPECT_NEAR(recipe.blur_ratio, (9.0 / 80 + 7 * 31.0 / 400 + 20.0 / 100) / 3, 1e-12);
-  // By brightness, another frame is the sharpest.
+  // Another frame is the sharpest if the index is divided by the brightness.
   EXPECT_EQ(recipe.sharpest_normalised_frame, 4);
   EXPECT_EQ(recipe.normalised_focus_depth_mm, 310);
 }

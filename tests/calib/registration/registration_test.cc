@@ -135,8 +135,8 @@ TEST(Register, WithoutDistortionTheCubicTermIsNothing) {
   EXPECT_LT(found->cubic_sigma * kMiddlePx * kMiddlePx, 2e-3);
 }
 
-// With a known cubic term instead of a free one, the scatter is smaller and the answer is that of
-// the affine map.
+// If the cubic term is known instead of free, the scatter is smaller and the answer is that of the
+// affine map.
 TEST(FreeRegistration, AKnownCubicTermMakesTheScaleSurer) {
   const WaveImage texture(7);
   View view;

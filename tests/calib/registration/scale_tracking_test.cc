@@ -162,7 +162,7 @@ TEST(TrackScale, TicksOnceAFrame) {
   EXPECT_EQ(ticks, 3);
 }
 
-// With a wrong reading, the registration starts far off. The frame is registered nevertheless, so
+// If a reading is wrong, the registration starts far off. The frame is registered nevertheless, so
 // that the law can determine the error of the reading.
 TEST(TrackScale, AFrameWithAWrongReadingIsRegistered) {
   for (const std::size_t wrong : {std::size_t{3}, std::size_t{7}}) {  // 7: the reference

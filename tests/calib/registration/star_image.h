@@ -11,7 +11,7 @@ namespace thicklens::testing {
 
 // Parameters of a view of a star, which looks the same at every scale.
 struct StarView {
-  // Of its centre, relative to that of the image
+  // Rotation, and shift of the star's centre relative to that of the image.
   double rotation_rad = 0, shift_x = 0, shift_y = 0;
   double blur_px = 0.6;  // sigma of a Gaussian
   double gain = 1, offset = 0;

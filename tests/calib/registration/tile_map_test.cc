@@ -116,7 +116,7 @@ TEST(FitDisplacement, StatedVariancesCoverTheScatter) {
 TEST(FitDisplacement, RefusesWhatDoesNotFixTheMap) {
   const auto tiles = Tiles(Truth(), 0.01, 3);
   EXPECT_FALSE(FitDisplacement({tiles.begin(), tiles.begin() + 5}, Moment()));
-  // With vertical edges only, the shift along them is unknown.
+  // If all edges are vertical, the shift along them is unknown.
   auto edges = tiles;
   for (TileShift& tile : edges) tile.information(1, 1) = 0;
   EXPECT_FALSE(FitDisplacement(edges, Moment()));

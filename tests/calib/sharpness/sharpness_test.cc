@@ -50,8 +50,8 @@ TEST(MeanEdgeSlope, OfARampIsItsHeightOverTheWidthThatSmoothingLeaves) {
 }
 
 TEST(MeanEdgeSlope, FollowsTheGradientAcrossASlantedEdge) {
-  // The same edge is drawn vertically and at 30 degrees, because the distance is measured along the
-  // normal.
+  // One edge is drawn vertically and at 30 degrees. The slopes are equal, because the distance is
+  // measured along the normal.
   const double upright = MeanEdgeSlope(DrawnEdge(96, 0, 2, 0.2, 0.7), Above(0.02)).mean_edge_slope;
   const double slanted = MeanEdgeSlope(DrawnEdge(96, 30, 2, 0.2, 0.7), Above(0.02)).mean_edge_slope;
   EXPECT_NEAR(slanted / upright, 1, 0.1);
@@ -77,8 +77,8 @@ TEST(MeanEdgeSlope, GrowsWithBrightnessWhichIsWhyTheRawIndexMisleads) {
 }
 
 TEST(MeanEdgeSlope, ThresholdIsTheCallersAndDoesNotAdaptToTheFrame) {
-  // With sigma 2 px, smoothed by 1, the steepest gradient is 0.5/sqrt(2 pi 5) = 0.089 (reduced by
-  // the pixel).
+  // The edge has sigma 2 px and is smoothed by 1 px. Therefore its steepest gradient is
+  // 0.5/sqrt(2 pi 5) = 0.089 (reduced by the pixel).
   const cv::Mat edge = DrawnEdge(96, 5, 2, 0.2, 0.7);
   EXPECT_GT(MeanEdgeSlope(edge, Above(0.07)).edge_count, 50);
   EXPECT_EQ(MeanEdgeSlope(edge, Above(0.1)).edge_count, 0);

@@ -113,7 +113,7 @@ TEST(PlanRegion, WhereTooFewWouldBeLeftMoreBlurIsAllowed) {
   const auto middle = PlanRegion(Unread(Blurs(14, 0.7)), 1, {0, 0});
   ASSERT_TRUE(middle);
   EXPECT_EQ(middle->frames.size(), 9U);
-  // Of a short sweep all frames are needed.
+  // A short sweep needs all of its frames.
   const auto few = PlanRegion(Unread(Blurs(6, 1.8)), 1, {0, 0});
   ASSERT_TRUE(few);
   EXPECT_EQ(few->frames.size(), 6U);

@@ -109,7 +109,7 @@ TEST(FrameChecks, ABrightPlateauWithNoiseIsNoSaturation) {
   }
 }
 
-// With little noise, a bright plateau is narrow in the histogram. It is not clipped nevertheless.
+// A bright plateau with little noise is narrow in the histogram. It is not clipped nevertheless.
 TEST(FrameChecks, ABrightPlateauWithLittleNoiseIsNoSaturation) {
   for (const int bits : {8, 16}) {
     for (const double full_well : {2e4, 1e5, 4e5}) {
@@ -322,7 +322,7 @@ TEST(FrameChecks, TexturesNoiseAndSmallGainsAreNoMosaic) {
   cv::GaussianBlur(squares, squares, {}, 0.6);
   EXPECT_FALSE(Measure(noise).is_mosaic);
   EXPECT_FALSE(Measure(squares).is_mosaic);
-  // The same pixels, developed to three channels, are an image.
+  // These pixels, developed to three channels, are an image and no mosaic.
   const cv::Mat mosaic = Mosaic(Leaves(1), 0.5, 1, 0.6);
   cv::Mat colour;
   cv::merge(std::vector<cv::Mat>{mosaic, mosaic, mosaic}, colour);

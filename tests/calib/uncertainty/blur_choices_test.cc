@@ -137,7 +137,7 @@ TEST(CompareChoices, ExamplesAreTheNearestTheSharpestAndTheFarthest) {
   for (const auto direction : {model::BenchDirection::kAway, model::BenchDirection::kToward}) {
     SimulatedSweep simulated = Leaves();
     if (direction == model::BenchDirection::kToward) {
-      // The same images in another order, with the scale running in the other direction.
+      // The images are the same but in reverse order, and the scale runs in the other direction.
       simulated.sweep.direction = direction;
       std::reverse(simulated.truth.frames.begin(), simulated.truth.frames.end());
       for (std::size_t i = 0; i < kFrames; ++i)

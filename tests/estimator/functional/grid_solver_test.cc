@@ -281,7 +281,7 @@ TEST(GridSolver, MinimisesTheFunctional) {
   Eigen::MatrixXd h = Eigen::MatrixXd::Zero(kPixels, kRays);
   Eigen::MatrixXd normal = Eigen::MatrixXd::Identity(kRays, kRays) * kRidge;
   const auto add_difference = [&](int here, int near, int far) {
-    // With m = -0.4, the near sample is at the ray's own position less one and has the weight 0.4.
+    // If m = -0.4, the near sample is at the ray's own position less one and has the weight 0.4.
     Eigen::VectorXd row = Eigen::VectorXd::Zero(kRays);
     const double w = static_cast<float>(kDisparity);
     row[here] = -1;

@@ -1,4 +1,4 @@
-// What is chosen for a quality target, by a profile.
+// Tests which plan is chosen for a quality target from a profile.
 #include "thicklens/estimator/plan_choice.h"
 
 #include <gmock/gmock.h>
@@ -46,7 +46,7 @@ TEST(ChoosePlan, TakesTheFastestThatLosesNoMore) {
   EXPECT_EQ(ChosenFor({"", 4.0, 1.0}), "tv");
 }
 
-// What reading and the probe took is over by then.
+// The time that reading and the probe took counts against the target.
 TEST(ChoosePlan, CountsWhatIsSpent) {
   EXPECT_EQ(
       ChoosePlan(SampleProfile(), Within(4.2), "the target", kSampleWorkload, 1, 0.1).plan.prior,

@@ -80,7 +80,8 @@ TEST(TimeModel, IsFoundAgainFromExactTimes) {
   EXPECT_THAT(LeftOutRatios({laws.Timed(Loads(20, 2))}), ElementsAre(Each(DoubleNear(1, 1e-6))));
 }
 
-// By hand: 2 megapixels in three channels, 5 x 5 views, a blur of 3 px, files of 4 s.
+// The expected terms are computed by hand for 2 megapixels in three channels, 5 x 5 views, a blur
+// of 3 px and files of 4 s.
 TEST(TimeModel, IsTheSumOfItsTerms) {
   const std::map<TimeModel::Term, double> of_one = {
       {TimeModel::kStart, 1},

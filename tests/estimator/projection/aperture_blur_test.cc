@@ -103,8 +103,8 @@ TEST(ApertureBlur, InTheCornersIsReported) {
       model::SampleAperture(weights, camera.blur_ratio(), camera.lens.aperture_radius_mm));
   EXPECT_TRUE(MeasureApertureBlur(grid, camera, weights, nullptr).corner_change.isZero(1e-12));
   const ApertureBlur blur = MeasureApertureBlur(grid, camera, weights, &camera);
-  // The same sum, computed from the irradiance of the rays at the corner sample with ST in the
-  // plane of focus.
+  // The sum is computed independently, from the irradiance of the rays at the corner sample with ST
+  // in the plane of focus.
   double sum = 0, first = 0, second = 0;
   for (int l = 0; l < 7; ++l) {
     for (int k = 0; k < 7; ++k) {

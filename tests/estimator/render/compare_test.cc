@@ -334,7 +334,7 @@ TEST(CompareLightFields, AveragesTheMiddleViewsOfEvenCounts) {
 }
 
 TEST(CompareLightFields, MeansOfScoresAreMeans) {
-  // With only the centre view, all three scores are equal to those of CompareImages.
+  // If there is only the centre view, all three scores are equal to those of CompareImages.
   model::LightField reference = model::MakeLightField(24, 20, 1, 1, 3);
   model::LightField other = reference;
   const model::EncodedValues a = Noise(24, 20, 3, 5);
@@ -437,7 +437,7 @@ TEST(CompareLightFields, MeansOfEstimateAndBaselineAreOverTheSameViews) {
   model::LightField other = ShiftedTexture(texture, 1);
   model::SetView(&other, 0, 0, model::ViewImage(truth, 0, 0));
   model::SetView(&other, 1, 1, model::ViewImage(other, 0, 0));
-  // With a disparity of 1 px instead of 2, warping has no error in the middle only.
+  // If the disparity is 1 px instead of 2, only the middle view is warped without error.
   const LightFieldScores scores = CompareLightFields(truth, other, 6, DibrOf(texture, 1), 1);
   double own = 0, warped = 0;
   int count = 0;

@@ -116,8 +116,8 @@ double RmsError(const model::LinearImage& radiance, const std::vector<float>& tr
   return std::sqrt(sum / count);
 }
 
-// With the same few steps, an image just large enough for a start at half its size comes closer to
-// the scene than one just too small. With many steps, both end at the same solution.
+// After a few steps, an image just large enough for a start at half its size is closer to the scene
+// than one just too small. After many steps, both are at the same solution.
 TEST(CoarseStart, SavesIterations) {
   SceneOptions options;
   options.max_iterations = 15;

@@ -67,7 +67,7 @@ struct Made {
   MatrixXd photograph;  // a column a channel
 };
 
-// By default the image has more rows than a band.
+// Makes a random case. The default size has more rows than a band.
 Made MakeCase(int width = 7, int height = 20) {
   Made made;
   made.width = width;

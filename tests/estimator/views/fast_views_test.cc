@@ -105,7 +105,7 @@ void ExpectBoundarySamplesAlike(const ViewDisparity& view, const ViewDisparity& 
   EXPECT_GE(alike, 0.95 * static_cast<double>(plain.boundary.size()));
 }
 
-// The same sources as a list of all samples.
+// Returns the sources as a list of all samples.
 CompactView ListOf(const ViewDisparity& view) {
   CompactView list;
   list.width_px = view.width_px;

@@ -129,8 +129,8 @@ TEST(DisparityOnGrid, KeepsHolesAndRefusesDepthsThatAreNotBeyondTheUvPlane) {
               AllOf(HasSubstr("2 values"), HasSubstr("3x1")));
 }
 
-// By similar triangles a disparity is a straight line over 1/(depth beyond the UV plane), so two
-// depths determine that of infinity.
+// Similar triangles make the disparity linear in 1/(depth beyond the UV plane), so two depths
+// determine that of infinity.
 TEST(DisparityOnGrid, TendsToThatOfInfinity) {
   const model::LightFieldGrid grid = model::GridOnPlanes(BenchCamera(), {120, 300}, 3, 3);
   const DisparityMap map = DisparityOnGrid(grid, {500, 1000, 1e7F}, 3, 1);

@@ -179,7 +179,7 @@ TYPED_TEST(PatchFilterTest, TakesNoiseOut) {
   const double left = rms(FilterPatches(kWidth, kHeight, 3, noise, 0.03, 1));
   EXPECT_LT(left, 0.0016);
   EXPECT_GT(left, 0.0005);
-  // With the threshold 0 all noise is left.
+  // A threshold of 0 leaves all noise.
   EXPECT_NEAR(rms(FilterPatches(kWidth, kHeight, 3, noise, 0.0, 1)), rms(noise), 1e-6);
 }
 

@@ -59,7 +59,7 @@ TEST(SparseTest, CompressionSortsAndAddsUp) {
 
 TEST(SparseTest, CompressionIsTheSameMatrix) {
   for (std::uint32_t seed = 0; seed < 20; ++seed) {
-    // With one slot, the last column of a row is often the first one of the next row.
+    // If there is one slot, the last column of a row is often the first one of the next row.
     for (const int slots : {1, 2, 9}) {
       const EllMatrix<double> ell = ShuffledEll(13, 6, slots, seed);
       const CsrMatrix<double> csr = Compress(ell);

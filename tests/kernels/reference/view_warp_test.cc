@@ -198,7 +198,7 @@ TEST_P(ViewWarpTest, StaysOnItsSurface) {
   }
   HideAll(0.5F, 0, 0);
   const std::vector<float> warped = Warp();
-  // Of the pixels 5 and 6 only 5 is of the sample's surface
+  // Pixel 5 is part of the sample's surface, and pixel 6 is not.
   EXPECT_NEAR(warped[At(5, 4)], 0.25, 1e-6);
   EXPECT_NEAR(warped[At(4, 4)], 0.25, 1e-6);  // no bicubic taps past the edge
   HideAll(0.5F, 0, 1);

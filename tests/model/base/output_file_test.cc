@@ -399,7 +399,7 @@ TEST(OutputFolder, VanishedMeanwhileIsAnError) {
     OutputFolder dropped = std::move(output);
     EXPECT_THAT(ErrorOf([&] { dropped.Commit(); }), HasSubstr(why));
   }
-  // What another process created there is not removed.
+  // The folder that another process created there is not removed.
   EXPECT_TRUE(fs::exists(staging));
 }
 

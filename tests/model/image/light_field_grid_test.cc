@@ -158,7 +158,7 @@ TEST(LandingPoint, ScalingEveryLengthChangesNothingButTheUnit) {
       }
     }
   }
-  // The same camera in other units gives the same image: disparity and slope are in pixels.
+  // The image does not depend on the unit of length, because disparity and slope are in pixels.
   const Camera camera = BenchCamera();
   const LightFieldGrid grid = GridOnPlanes(camera, {100, 2000}, 7, 5);
   for (const double scale : {1e-3, 1e3}) {

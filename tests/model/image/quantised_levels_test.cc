@@ -69,7 +69,7 @@ TEST(QuantisedLevels, AnyLightHasItsStoredLevel) {
                               -kInfinity,
                               std::numeric_limits<float>::min(),
                               std::numeric_limits<float>::denorm_min()};
-  // The same number in each octave, evenly distributed.
+  // The values are spread evenly over the octaves and, in the second distribution, over [0, 1.01].
   std::uniform_real_distribution<float> octaves(-45, 1), even(0, 1.01F);
   for (int i = 0; i < 100000; ++i) {
     light.push_back(std::exp2(octaves(random)));

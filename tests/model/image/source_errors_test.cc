@@ -144,8 +144,8 @@ TEST(SourceErrors, AngleBehindTheLensIsMeasuredFromTheWrongPlane) {
     const double by_9 = CosBeta(lens, image_distance_mm, planes, ray);
     const double truth = traced_cos_beta(oracle);
     EXPECT_GT(std::abs(by_9 - truth), 1e-4);
-    // With crossed planes D is longer than d1, so that the ray of [S9] is too steep; otherwise it
-    // is too flat.
+    // If the planes are crossed, D is longer than d1, so that the ray of [S9] is too steep.
+    // Otherwise it is too flat.
     EXPECT_EQ(by_9 < truth, lens.lens_thickness_mm < 0);
     // The formula lacks the rear principal plane.
     const double rear_distance_mm = image_distance_mm - lens.lens_thickness_mm;
@@ -176,7 +176,7 @@ TEST(SourceErrors, InverseOfARankOneUpdateHasTheWrongSign) {
   EXPECT_TRUE(((c + d) * (c_inverse - correction)).isIdentity(1e-13));
   EXPECT_FALSE(((c + d) * (c_inverse + correction)).isIdentity(0.05));
 
-  // By hand: 1 + 1 has the inverse 1 - 1/2, not 1 + 1/2.
+  // The inverse of 1 + 1 is 1 - 1/2, not 1 + 1/2.
   const double by_23 = 1.0 + (1 / (1 + 1.0)) * 1.0;
   EXPECT_EQ(by_23, 1.5);
   EXPECT_EQ(1 / (1.0 + 1.0), 0.5);

@@ -120,7 +120,8 @@ TEST(ExplainCamera, SaysWhereTheThinLensHasNoPlaneOfFocus) {
 // The depth at which the two lenses differ by the limit follows from their formulas.
 TEST(ExplainCamera, SaysAtWhichDepthsThinIsAsGoodAsThick) {
   Camera camera = ThickCamera();
-  // With rho = K (1 - f2/f1) both lenses are the same but for that; 0.01 mm are more.
+  // If rho = K (1 - f2/f1), the thick lens and its thin equivalent agree; here rho is 0.01 mm
+  // larger.
   camera.lens = {50, 50.01, 50000 / 950.0 * (1 - 50.01 / 50) + 0.01, 10};
   camera.calibration->image_distance_mm->value = ImageDistanceMm(camera.lens, 1000);
   const ThickLens thin = ThinLensEquivalent(camera.lens);

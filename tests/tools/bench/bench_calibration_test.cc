@@ -105,7 +105,7 @@ std::vector<bool> Marked(std::vector<CalibrationRow> rows) {
 TEST(MarkFront, MarksWhatNoOtherRowBetters) {
   EXPECT_THAT(Marked({Row(1, 5), Row(2, 3), Row(3, 4), Row(4, 1), Row(4, 2), Row(5, 1)}),
               ElementsAre(true, true, false, true, false, false));
-  // Of two equal rows, neither is marked as better.
+  // Two equal rows are both marked.
   EXPECT_THAT(Marked({Row(1, 5), Row(1, 5)}), ElementsAre(true, true));
 }
 

@@ -168,7 +168,7 @@ TEST(BenchPartsTest, FewerPartsAreOfManyViewsAndStandForAsMuch) {
     image.rects.clear();
     image.parts.clear();
     image.sample.reset();
-    // Of the measurement; the scene's own number is sufficient for its parts
+    // The number of views of the measurement; the parts need only the scene's own number.
     image.views = views;
     Cut(full, &image);
     double pixels = 0;

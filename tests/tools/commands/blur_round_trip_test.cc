@@ -1,5 +1,5 @@
-// From a sweep to a camera to a photograph: the calibrated camera renders the blur that was
-// simulated, whatever law the pupil followed.
+// Tests the way from a sweep to a camera to a photograph: the calibrated camera renders the blur
+// that was simulated, whatever law the pupil followed.
 #include <gtest/gtest.h>
 
 #include <cmath>

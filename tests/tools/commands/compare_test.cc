@@ -348,7 +348,8 @@ TEST_F(CompareProgram, SaysWhatTheDisparityMeansByItsOptions) {
               HasSubstr("disparity"));
 }
 
-// With a camera, the disparity is converted to millimetres and back to the steps of the grid.
+// If a camera is given, the disparity is converted to millimetres and back to the steps of the
+// grid.
 TEST_F(CompareProgram, AsksWhatTheDepthMapOfACameraSays) {
   const model::Camera camera = WithMethod(
       TestCamera("small", WideLens(), TestSensor(kWide, kHigh, 0.006, {21.5, 17.5}), {16.3, 0}));

@@ -183,7 +183,7 @@ TEST_F(EstimateBandsTest, TheForecastHoldsForRoughDepthAndManyViews) {
 
 // A page shows all views, which are held for it; without one they never are.
 TEST_F(EstimateBandsTest, ViewsAreHeldForAPageOnly) {
-  // With so many views, they are most of the memory.
+  // So many views are most of the memory.
   *std::find(usual_.begin(), usual_.end(), "3x3") = "7x7";
   constexpr double kViewsMib = 7 * 7 * 3 * sizeof(float) * kW * kH / double{1 << 20};
   ASSERT_EQ(Run("streamed", {}).exit_code, 0);

@@ -408,7 +408,7 @@ TEST_F(EstimateSceneTest, NamesAPatchWhoseDepthIsWrong) {
   }
   EXPECT_THAT(summary["warnings"].dump(),
               AllOf(HasSubstr("not explained"), HasSubstr("grey levels")));
-  // With the right depth there is no message.
+  // The right depth causes no message.
   map.values.assign(map.values.size(), 0.0F);
   folder_.Put("bars.pfm", io::EncodePfm(map));
   EXPECT_THAT(Summary(arguments)["residual_patches"], IsEmpty());

@@ -29,7 +29,7 @@ TEST(ImageTest, AlphaStaysLast) {
   EXPECT_EQ(image.WithoutAlpha().encoded().values, (std::vector<std::uint16_t>{3, 2, 1}));
 }
 
-// What cv::imread gives, read with the wrong order, would change the grey by the difference of the
+// Reading an image of cv::imread in the wrong order would change the grey by the difference of the
 // weights of red and blue.
 TEST(ImageTest, MatricesKeepTheirColoursInBothOrders) {
   cv::Mat mat(2, 2, CV_8UC3, cv::Scalar(10, 20, 30));  // blue, green, red

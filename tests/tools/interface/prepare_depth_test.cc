@@ -1,4 +1,4 @@
-// From a depth map to the disparity of a photograph's pixels.
+// Tests how a depth map becomes the disparity of a photograph's pixels.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -302,7 +302,7 @@ TEST_F(EstimateTarget, IsTakenFromTheProfileAndHeldAgainstWhatItTook) {
 TEST_F(EstimateTarget, CountsReading) {
   estimator::EstimateProfile profile = SampleProfile();
   profile.plans = {SamplePlan("ridge", 1e-12, 40)};
-  // Of this machine, so that no probe is needed.
+  // The profile is that of this machine, so that no probe is needed.
   profile.processor = ProcessorName();
   profile.build = BuildInfo();
   profile.threads = 1;

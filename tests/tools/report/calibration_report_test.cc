@@ -349,7 +349,7 @@ TEST(CalibrationReport, ThumbnailsAreEncodedForTheScreen) {
   made.sweep.camera.sensor.transfer = model::TransferCurve::Srgb();
   EXPECT_THAT(page(), HasSubstr(shown(55)));
   made.sweep.camera.sensor.transfer = model::TransferCurve::Linear();
-  // By hand: 55/255 = 0.2157, 1.055 * 0.2157^(1/2.4) - 0.055 = 0.5020, * 255 = 128.
+  // Computed by hand: 55/255 = 0.2157, 1.055 * 0.2157^(1/2.4) - 0.055 = 0.5020, * 255 = 128.
   EXPECT_THAT(page(), HasSubstr(shown(128)));
 }
 
@@ -611,7 +611,7 @@ TEST(CalibrationReport, SaysWhereTheFramesLieOffTheModel) {
   const std::string widened =
       "The residuals of the frames exceed their errors (χ²/dof 2.5); the errors were widened";
   EXPECT_THAT(Page(made), HasSubstr(widened));
-  // With few frames chance may do as much, and no widening is reported.
+  // If there are few frames, chance may cause as much, and no widening is reported.
   made.calibration.diagnostics.blur.frames_used = 8;
   EXPECT_THAT(Page(made), HasSubstr("exceed their errors (χ²/dof 2.5)."));
 }

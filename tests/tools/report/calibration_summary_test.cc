@@ -50,7 +50,8 @@ TEST(Rounding, WithoutAnErrorShowsFiveDigits) {
 TEST(CalibrationText, PutsBothMethodsBesideTheTruth) {
   const MadeUpCalibration made = MakeUpCalibration(41, 320, 4);
   const std::string text = CalibrationText(made.sweep, made.calibration, &made.truth);
-  // By hand: d1 = 3 + 12.8 * 400/387.5 = 16.21290, and the fit is 0.0003 larger with sigma 0.0012.
+  // The true value is d1 = 3 + 12.8 * 400/387.5 = 16.21290. The fit is 0.0003 larger, and its sigma
+  // is 0.0012.
   const std::string d1 = LineWith(text, "image distance d1 [mm]");
   EXPECT_THAT(d1, HasSubstr("16.2132 +- 0.0012"));
   EXPECT_THAT(d1, HasSubstr("16.2089 .. 16.2159"));

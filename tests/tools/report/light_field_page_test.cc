@@ -762,7 +762,7 @@ TEST_F(ReportProgram, ShowsTheSweepAroundTheFocus) {
     std::vector<unsigned char> png;
     cv::imencode(".png", cv::Mat(60, 80, CV_8UC1, cv::Scalar(10 * i)), png);
     folder_.Put(fmt::format("sweep/f{}.png", i), {png.begin(), png.end()});
-    // From far to near, in focus at frame 5.
+    // The frames run from far to near and are in focus at frame 5.
     rows += fmt::format("  - {{image: f{}.png, reading_mm: {:.3f}}}\n", i,
                         focus_mm + 1000 - (focus_mm + 10.0 * (5 - i)) + 0.001);
   }

@@ -277,7 +277,7 @@ inline void RejectFrame(int index, const std::string& reason, calib::Calibration
   --calibration->summary.frames_used;
 }
 
-// The same sweep with a refused calibration.
+// Replaces the calibration by one that refused the same sweep.
 inline void RefuseAll(const std::string& reason, calib::Calibration* calibration) {
   calib::Calibration refused;
   refused.summary.reason = reason;

@@ -149,7 +149,7 @@ TEST(HeightFieldSceneTest, SlantedMapShowsTheSineWhereItsPlaneIsMet) {
       }
     }
   }
-  // The same comparison with all rays of the photograph, with and without occlusion.
+  // The comparison is repeated with all rays of the photograph, with and without occlusion.
   EffectSet on = {Effect::kDefocus, Effect::kPixelBox, Effect::kOcclusion};
   for (int i = 0; i < 2; ++i, on = on.Without({Effect::kOcclusion})) {
     const LinearImage image =

@@ -115,7 +115,8 @@ TEST(HeightFieldTest, RaysMeetWhatAMarchMeets) {
       EXPECT_GE(nearest, first - step - 1e-9);
       EXPECT_LE(farthest, last + step + 1e-9);
       if (nearest > first + 1e-9 || farthest < last - 1e-9) ++missed_by_march;
-      // From a shift between two roots, the next root in the direction of the crossing is found.
+      // A search that starts at a shift between two roots finds the next root in the direction of
+      // the crossing.
       const double middle = field.ShiftAt(ray.position_px);
       const ValueRange wide = {-2, 2};
       const double near_middle =

@@ -380,7 +380,7 @@ TEST(SweepSimulatorTest, DriftHasItsDeviationOnBothAxesAndScalesWithTheImage) {
   for (std::size_t i = 0; i < right.size(); ++i) product += right[i] * down[i] / 800;
   EXPECT_NEAR(product, 0, 4.5 * 2.25 / std::sqrt(800.0));
 
-  // The same displacement on the target appears smaller from a larger distance.
+  // A given displacement on the target appears smaller from a larger distance.
   SweepSimulationOptions options = StillOptions(301, 3, 330);
   options.target.kind = TargetKind::kKnifeEdge;
   options.target.edge_angle_deg = 0;
