@@ -173,7 +173,7 @@ TEST(SolveFocus, LightFramesAreWarnedOfByName) {
   EXPECT_TRUE(c.frame(8).in_blur_fit);
   EXPECT_THAT(c.calibration.summary.warnings,
               Contains(AllOf(StartsWith("1 of 31 frames"),
-                             HasSubstr("weigh less: frame-8.png (reading 340 mm"))));
+                             HasSubstr("have less weight: frame-8.png (reading 340 mm"))));
   EXPECT_THAT(c.calibration.summary.warnings, Contains(HasSubstr("deviate from the blur law")));
 }
 
