@@ -79,15 +79,15 @@ ImageFormer NewFormer(const kernels::BlockGeometry& whole, kernels::Splat splat,
   const std::size_t view_size = Index(whole.s_count) * Index(whole.t_count);
   return
       [&whole, splat, shares = std::move(shares), kernels, threads, view_size](const float* rays) {
-        std::vector<float> weighed(rays, rays + view_size * Index(whole.views()));
+        std::vector<float> weighted(rays, rays + view_size * Index(whole.views()));
         if (!shares.empty()) {
           ParallelFor(whole.views(), threads, [&](int view) {
             const std::vector<float>& share = shares[Index(view)];
-            float* values = weighed.data() + Index(view) * view_size;
+            float* values = weighted.data() + Index(view) * view_size;
             for (std::size_t i = 0; i < share.size(); ++i) values[i] *= share[i];
           });
         }
-        return kernels->FormImage(whole, splat, weighed);
+        return kernels->FormImage(whole, splat, weighted);
       };
 }
 

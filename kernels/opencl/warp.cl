@@ -95,13 +95,13 @@ float4 Shares(const Surfaces image, global const float* disparity, int x, int y,
   const float4 away = fabs((float4)(disparity[there], disparity[there + right],
                                     disparity[there + below], disparity[there + below + right]) -
                            d);
-  const float4 weighed = select(weight, (float4)(0), away > image.tolerance);
+  const float4 weighted = select(weight, (float4)(0), away > image.tolerance);
   float sum_of_weights = 0;
-  sum_of_weights += weighed.s0;
-  sum_of_weights += weighed.s1;
-  sum_of_weights += weighed.s2;
-  sum_of_weights += weighed.s3;
-  if (sum_of_weights > 0) return weighed / sum_of_weights;
+  sum_of_weights += weighted.s0;
+  sum_of_weights += weighted.s1;
+  sum_of_weights += weighted.s2;
+  sum_of_weights += weighted.s3;
+  if (sum_of_weights > 0) return weighted / sum_of_weights;
   // The first of the closest pixels.
   const float4 far = select(away, (float4)(INFINITY), weight == 0);
   const float closest = fmin(fmin(far.s0, far.s1), fmin(far.s2, far.s3));

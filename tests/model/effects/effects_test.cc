@@ -187,13 +187,13 @@ TEST(EffectsTest, DiffractionIsNotCountedTwice) {
 // The constants of the aperture's shape, integrated.
 TEST(EffectsTest, DiscAndGaussianDifferAsStated) {
   constexpr double kStep = 1e-4;
-  double not_shared = 0, farthest = 0, first = 0, second = 0, psi = 0, weighed = 0;
+  double not_shared = 0, farthest = 0, first = 0, second = 0, psi = 0, weighted = 0;
   for (int i = 90000; i >= 0; --i) {     // from outside, where psi is 0
     const double r = (i + 0.5) * kStep;  // sigmas
     const double difference = (r < 2 ? 1 / (4 * kPi) : 0) - std::exp(-r * r / 2) / (2 * kPi);
     const double within = std::min(r * r / 4, 1.0) - 1 + std::exp(-r * r / 2);
     not_shared += std::abs(difference) * kPi * r * kStep;
-    weighed += 2 / kPi * r * std::abs(difference) * 2 * kPi * r * kStep;
+    weighted += 2 / kPi * r * std::abs(difference) * 2 * kPi * r * kStep;
     first += std::abs(within) * kStep;
     psi -= within / (2 * kPi * r) * kStep;
     second += std::abs(psi) * 2 * kPi * r * kStep;
@@ -207,7 +207,7 @@ TEST(EffectsTest, DiscAndGaussianDifferAsStated) {
   EXPECT_NEAR(farthest, 0.0404, 1e-4);
   EXPECT_NEAR(first, 0.2216, 1e-4);
   EXPECT_NEAR(second, 0.0940, 1e-4);
-  EXPECT_NEAR(weighed, 0.587, 1e-3);
+  EXPECT_NEAR(weighted, 0.587, 1e-3);
 }
 
 // Images in closed form, blurred in closed form: never beyond the bound, and near it.
