@@ -52,13 +52,13 @@ class InputKinds : public ::testing::Test {
     made_->Put("sw.yaml",
                "schema: thicklens/simulate-sweep/1\ncamera: case.yaml\n"
                "truth: {focus_depth_mm: 300, blur_ratio: 0.45, blur_floor_px: 0.5}\n"
-               "size_px: [64, 64]\ntarget: {kind: picture, picture: frames/a.png}\n"
+               "size_px: [64, 64]\ntarget: {kind: image, image: frames/a.png}\n"
                "bench: {first_depth_mm: 290, step_mm: 4, frames: 6}\n");
     made_->Put("scene.yaml",
                "schema: thicklens/simulate-scene/1\ncamera: case.yaml\n"
                "truth: {focus_depth_mm: 300, blur_ratio: 0.45}\nsize_px: [64, 64]\n"
                "layers:\n  - plane: {depth_mm: 300}\n"
-               "    texture: {kind: picture, picture: frames/a.png}\n");
+               "    texture: {kind: image, image: frames/a.png}\n");
     made_->Put("record.json", "{}");
     made_->Put("page.html", "<html></html>");
   }
