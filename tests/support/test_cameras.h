@@ -85,7 +85,7 @@ inline model::Camera PhotographCamera(
 // that is not in the centre.
 inline model::Camera SolverCamera(int width_px, int height_px) {
   return WithMethod(TestCameraFocusedAt(
-      800, "made up", WideLens(6),
+      800, "simulated", WideLens(6),
       TestSensor(width_px, height_px, 0.02, {width_px / 2.0 - 0.3, height_px / 2.0})));
 }
 

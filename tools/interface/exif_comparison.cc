@@ -237,8 +237,8 @@ std::optional<ExifComparison> OrientationFinding(const io::PhotoExif& exif) {
   return ExifComparison{
       "orientation", fmt::format("{}", exif.orientation), "as stored",
       ExifComparison::Verdict::kUndecided,
-      "whether photograph, depth map and principal point are rotated alike cannot be "
-      "told"};
+      "EXIF does not show whether photograph, depth map and principal point are rotated "
+      "alike"};
 }
 
 }  // namespace

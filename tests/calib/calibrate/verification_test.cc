@@ -108,7 +108,7 @@ TEST(VerifyCalibration, UsesTheCorrelationOfBothMatrices) {
   along.diagnostics.covariance = (Eigen::Matrix2d() << 1e-4, 0.9e-4, 0.9e-4, 1e-4).finished();
   Calibration across = along;
   across.summary.blur_ratio->value = kRatio - 0.02;
-  // C = 2e-4 [1 .9; .9 1]: d^2/(2e-4)/(1 +- .9) * 2.
+  // C = 2e-4 [1 0.9; 0.9 1]: d^2/(2e-4)/(1 +- 0.9) * 2.
   const Verification one = VerifyCalibration(stored, {}, along, {});
   const Verification other = VerifyCalibration(stored, {}, across, {});
   EXPECT_NEAR(one.chi_square, 2 * 4e-4 / 2e-4 / 1.9, 1e-8);

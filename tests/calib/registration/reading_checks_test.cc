@@ -329,7 +329,7 @@ TEST(IsLoneEdge, AStatedEdgeWithoutAModelWhoseScalesAreFewOrInDisorder) {
     bench.law.contradicts_readings = false;
   }
   bench.law.kind = ScaleKind::kInverseDepth;
-  EXPECT_FALSE(IsLoneEdge(bench.sweep, 21, 6, bench.law)) << "a texture around it tells the scale";
+  EXPECT_FALSE(IsLoneEdge(bench.sweep, 21, 6, bench.law)) << "a texture around it shows the scale";
   bench.law.kind = ScaleKind::kUnknown;
   for (const auto target : {model::SweepTarget::kAuto, model::SweepTarget::kTexture}) {
     bench.sweep.target = target;

@@ -33,7 +33,7 @@ TEST(SortCauses, NamesTheBestAloneOnlyIfItIsSignificantAndFarAhead) {
   EXPECT_TRUE(d.NamesOnly("a"));
   EXPECT_EQ(named(100, 36, 20), 1U);
   EXPECT_TRUE(d.NamesOnly("b"));
-  EXPECT_EQ(named(100, 20, 35.9), 2U) << "not told apart";
+  EXPECT_EQ(named(100, 20, 35.9), 2U) << "not distinguished";
   EXPECT_TRUE(d.Names("a") && d.Names("b"));
   EXPECT_FALSE(d.NamesOnly("a"));
   EXPECT_EQ(named(35.9, 20, 90), 0U) << "not significant";

@@ -32,7 +32,7 @@ Calibration Plain(double zf_mm, double zf_sigma_mm, double zero_sigma_mm,
 TEST(WidenFocus, AddsToBothIntervals) {
   const model::ThickLens lens = BlurBench().lens;
   Calibration c = Plain(400, 0.1, 0, lens);
-  WidenFocus("a jump", 5, "mend it", lens, &c);
+  WidenFocus("a jump", 5, "fix it", lens, &c);
   EXPECT_NEAR(c.summary.focus_depth_mm->systematic->x(), 400 - 1 - 5, 1e-9);
   EXPECT_NEAR(c.summary.focus_depth_mm->systematic->y(), 400 + 2 + 5, 1e-9);
   const double d1_mm = c.summary.image_distance_mm->value;
@@ -43,7 +43,7 @@ TEST(WidenFocus, AddsToBothIntervals) {
               1e-9);
   ASSERT_EQ(c.diagnostics.systematic_parts.size(), 1U);
   EXPECT_EQ(c.diagnostics.systematic_parts[0].name, "a jump");
-  EXPECT_EQ(c.diagnostics.systematic_parts[0].remedy, "mend it");
+  EXPECT_EQ(c.diagnostics.systematic_parts[0].remedy, "fix it");
   EXPECT_NEAR(c.diagnostics.systematic_parts[0].focus_depth_mm.x(), -5, 1e-12);
   EXPECT_NEAR(c.diagnostics.systematic_parts[0].focus_depth_mm.y(), 5, 1e-12);
   EXPECT_EQ(c.diagnostics.systematic_parts[0].blur_ratio.norm(), 0);
@@ -55,7 +55,7 @@ TEST(WidenFocus, StopsShortOfTheFocalPoint) {
   const model::ThickLens lens = BlurBench().lens;
   for (const double move_mm : {387.4, 390.0, 5000.0}) {
     Calibration c = Plain(400, 0.1, 0, lens);
-    WidenFocus("a jump", move_mm, "mend it", lens, &c);
+    WidenFocus("a jump", move_mm, "fix it", lens, &c);
     EXPECT_NEAR(c.diagnostics.systematic_parts[0].image_distance_mm.y(),
                 3 + 101 * 12.8 - c.summary.image_distance_mm->value, 1e-6);
     EXPECT_NEAR(c.summary.focus_depth_mm->systematic->x(), 399 - (400 - 12.625), 1e-9);
@@ -63,7 +63,7 @@ TEST(WidenFocus, StopsShortOfTheFocalPoint) {
                 move_mm + 2, 1e-9);
   }
   Calibration c = Plain(400, 0.1, 0, lens);
-  WidenFocus("a jump", 387, "mend it", lens, &c);
+  WidenFocus("a jump", 387, "fix it", lens, &c);
   EXPECT_NEAR(c.diagnostics.systematic_parts[0].image_distance_mm.y(),
               3 + 12.8 * 13 / 0.5 - c.summary.image_distance_mm->value, 1e-6);
 }
@@ -73,7 +73,7 @@ TEST(WidenFocus, MakesNoIntervalWhereThereIsNone) {
   Calibration c = Plain(400, 0.1, 0, lens);
   c.summary.focus_depth_mm->systematic.reset();
   c.summary.image_distance_mm->systematic.reset();
-  WidenFocus("a jump", 5, "mend it", lens, &c);
+  WidenFocus("a jump", 5, "fix it", lens, &c);
   EXPECT_FALSE(c.summary.focus_depth_mm->systematic);
   EXPECT_FALSE(c.summary.image_distance_mm->systematic);
   EXPECT_EQ(c.diagnostics.systematic_parts.size(), 1U);
@@ -85,7 +85,7 @@ SystematicPart PartOfImageDistance(const std::string& name, double low_mm, doubl
   SystematicPart part;
   part.name = name;
   part.image_distance_mm = {low_mm, high_mm};
-  part.remedy = "mend " + name;
+  part.remedy = "fix " + name;
   return part;
 }
 
@@ -100,8 +100,8 @@ TEST(WidenFocus, TheAdviceNamesTheLargestShare) {
   };
   // WidenFocus itself adds 2.131e-6 mm.
   const Case cases[] = {
-      {0.001, 0.004, 0.3, "second is 50 % of the error of d1: mend second"},
-      {0.004, 0.001, 0.3, "first is 50 % of the error of d1: mend first"},
+      {0.001, 0.004, 0.3, "second is 50 % of the error of d1: fix second"},
+      {0.004, 0.001, 0.3, "first is 50 % of the error of d1: fix first"},
       {0.001, 0.001, 0.3, "noise and readings are 34 % of the error of d1: take more frames"},
       {0.0016, 0.001, 0.3, "noise and readings are 30 % of the error of d1"},
       {0.0017, 0.001, 0.3, "first is 30 % of the error of d1"},

@@ -34,7 +34,7 @@ constexpr double kFocusMm = 800, kRatio = 0.45, kRadiusMm = 6, kPitchMm = 0.008;
 
 model::Camera BenchCamera(model::Psf psf) {
   model::Camera camera = TestCameraFocusedAt(
-      kFocusMm, "made up", WideLens(kRadiusMm),
+      kFocusMm, "simulated", WideLens(kRadiusMm),
       CentredSensor(96, 8, kPitchMm, model::TransferCurve::Linear()), {kRatio, 0});
   camera.psf = psf;
   return WithMethod(camera);

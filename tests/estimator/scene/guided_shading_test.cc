@@ -223,7 +223,7 @@ struct Bumps {
 // `shading`: the bumps that its light shows. `relief`: those that it has.
 Scene ShadedScene(const Bumps& shading, const Bumps& guide) {
   model::SceneSimulationOptions options;
-  options.camera = WithMethod(TestCameraFocusedAt(800, "made up", WideLens(6),
+  options.camera = WithMethod(TestCameraFocusedAt(800, "simulated", WideLens(6),
                                                   CentredSensor(kSceneWidth, kSceneHeight, 0.008)));
   options.effects.base = model::EffectSelectionOptions::Base::kAll;
   options.effects.without = {model::Effect::kDiffraction};

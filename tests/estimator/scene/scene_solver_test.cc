@@ -50,7 +50,7 @@ struct Simulated {
 Simulated Simulate(bool falloff) {
   model::SceneSimulationOptions options;
   options.camera =
-      WithMethod(TestCameraFocusedAt(800, "made up", WideLens(6), CentredSensor(96, 80, 0.008)));
+      WithMethod(TestCameraFocusedAt(800, "simulated", WideLens(6), CentredSensor(96, 80, 0.008)));
   model::SceneLayer wall;
   wall.plane.depth_mm = 1100;
   wall.plane.slope = {0.5, 0};
@@ -232,7 +232,7 @@ class FloatOnly : public kernels::Backend {
   bool is_opencl() const override { return true; }
   bool has_double() const override { return false; }
   std::string name() const override { return "opencl:7:7"; }
-  std::string description() const override { return "made up"; }
+  std::string description() const override { return "simulated"; }
   std::unique_ptr<kernels::Kernels<float>> NewFloat() override { return nullptr; }
   std::unique_ptr<kernels::Kernels<double>> NewDouble() override { return nullptr; }
   std::unique_ptr<kernels::RadianceSteps<float>> NewSteps(
