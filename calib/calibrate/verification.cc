@@ -207,7 +207,7 @@ class Verifier {
         "of zf is therefore +- {:.3g} mm (correlation of d1 and bench zero {:.2f}){}",
         offset_sigma, focus->found.sigma, covariance / (d1_sigma * offset_sigma),
         options_.same_bench ? "; the stored bench zero is compared, too"
-                            : "; if the camera has not moved on the bench (--same-bench), or if "
+                            : "; if the camera has not moved on the bench (same_bench), or if "
                               "offset_mm is measured, a smaller change can be detected"));
   }
 

@@ -57,7 +57,7 @@ void RequireComparable(const model::LightField& reference, const model::LightFie
     return fmt::format("{} channel(s)", light_field.channels);
   };
   RequireEqual("number of views", counts(reference), counts(other),
-               " (--views selects inner views of both)");
+               " (select the inner views that both have)");
   RequireEqual("size of the views", size(reference), size(other), "");
   RequireEqual("channels", channels(reference), channels(other), "");
   RequireSameViewpoints(reference, other);

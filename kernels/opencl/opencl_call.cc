@@ -74,7 +74,7 @@ void OpenClQueue::CheckAllocation(const std::string& what, std::size_t bytes) co
   if (bytes > max_allocation_bytes_) {
     throw Error(
         fmt::format("device {}: {}: {} bytes are needed, but the device allows at most {} in one "
-                    "buffer; use --device cpu",
+                    "buffer; the device cpu has no such limit",
                     device_->name, what, bytes, max_allocation_bytes_));
   }
 }

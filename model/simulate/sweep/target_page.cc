@@ -82,7 +82,7 @@ SheetSize SheetFor(const SheetSize& sheet, const std::optional<CameraView>& view
   throw Error(fmt::format(
       "the camera sees {:.1f} x {:.1f} mm at {:g} mm; a pattern of {:.1f} x {:.1f} mm, which "
       "is 15 % larger, does not fit the sheet of {:g} x {:g} mm ({:.1f} x {:.1f} mm are "
-      "free): choose a larger sheet (--size) or a shorter distance",
+      "free): choose a larger sheet or a shorter distance",
       view->width_mm, view->height_mm, view->distance_mm, width_mm, height_mm, sheet.width_mm,
       sheet.height_mm, free.width, free.height));
 }
@@ -121,8 +121,8 @@ Feature GivenFeature(double feature_mm, const TargetRequest& request) {
   if (!(feature_mm >= request.finest_mm)) {
     throw Error(
         fmt::format("smallest feature: {:g} mm is below the {:g} mm that the print method "
-                    "resolves: choose a larger --feature-mm, or state a finer print method with "
-                    "--finest-mm",
+                    "resolves: choose a larger feature, or state a smaller finest_mm if the print "
+                    "method resolves it",
                     feature_mm, request.finest_mm));
   }
   if (!request.view) return {feature_mm, "as given"};
@@ -150,7 +150,7 @@ Feature FeatureForCamera(const CameraView& view, double finest_mm) {
   throw Error(
       fmt::format("features of 2 to 6 px at {:g} mm measure {:.2g} to {:.2g} mm on the target, "
                   "below the {:g} mm that the print method resolves: choose a larger distance "
-                  "({:.0f} mm or more) or a finer print method (--finest-mm)",
+                  "({:.0f} mm or more) or a finer print method (finest_mm)",
                   view.distance_mm, kFinestFeaturePx * view.px_mm, kMaxFeaturePx * view.px_mm,
                   finest_mm, std::ceil(farther_mm)));
 }
@@ -177,7 +177,7 @@ void RequirePossibleTexture(const SheetRectangle& pattern, double feature_mm) {
   if (!(pattern.width * pattern.height / (feature_mm * feature_mm) <= kMaxFeatures)) {
     throw Error(
         fmt::format("a pattern of {:.1f} x {:.1f} mm with features of {:g} mm would contain more "
-                    "than {:g} million of them: choose a larger --feature-mm or a smaller --size",
+                    "than {:g} million of them: choose larger features or a smaller sheet",
                     pattern.width, pattern.height, feature_mm, kMaxFeatures / 1e6));
   }
 }

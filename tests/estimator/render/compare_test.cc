@@ -478,7 +478,7 @@ TEST(CompareLightFields, RefusesWhatDoesNotFit) {
     return ErrorOf([&] { CompareLightFields(reference, other, border_px, dibr, 2); });
   };
   EXPECT_THAT(message(PlainLightField(5, 3), 0, std::nullopt),
-              AllOf(HasSubstr("3x3 views"), HasSubstr("5x3"), HasSubstr("--views")));
+              AllOf(HasSubstr("3x3 views"), HasSubstr("5x3"), HasSubstr("inner views")));
   EXPECT_THAT(message(model::MakeLightField(24, 21, 3, 3, 1), 0, std::nullopt),
               AllOf(HasSubstr("24x20 px"), HasSubstr("24x21 px")));
   EXPECT_THAT(message(model::MakeLightField(24, 20, 3, 3, 3), 0, std::nullopt),

@@ -220,7 +220,7 @@ TEST_F(CameraVerifyTest, AnUnknownBenchZeroIsReported) {
   offset_mm_ = "unknown";
   const ProgramResult result = Verify(*shared_ / "camera.yaml", Sweep(2));
   EXPECT_NE(result.exit_code, 2) << result.err;
-  EXPECT_THAT(result.out, AllOf(HasSubstr("bench zero is not stated"), HasSubstr("--same-bench")));
+  EXPECT_THAT(result.out, AllOf(HasSubstr("bench zero is not stated"), HasSubstr("(same_bench)")));
 }
 
 TEST_F(CameraVerifyTest, ACameraWithoutCalibrationIsRefused) {
