@@ -11,8 +11,8 @@
 
 namespace thicklens::kernels {
 
-// What a backend computes with: for the modules of thicklens, which include the headers that define
-// these (kernels.h, radiance_steps.h, view_warp.h). They are not installed.
+// These types are for the modules of thicklens. The headers that define them (kernels.h,
+// radiance_steps.h and view_warp.h) are not installed.
 template <typename Real>
 class Kernels;
 template <typename Real>
