@@ -11,7 +11,7 @@ namespace {
 bool Works() {
   const std::string bitmap(
       "BM\x3A\0\0\0\0\0\0\0\x36\0\0\0\x28\0\0\0\x01\0\0\0\x01\0\0\0\x01\0\x18\0"
-      "\0\0\0\0\x04\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\xFF\0\0\0",
+      "\0\0\0\0\x04\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\xFF\0\0\0",
       58);
   const auto pixel = thicklens::io::DecodeImage(bitmap, "one pixel").at<cv::Vec3b>(0, 0);
   return pixel[0] == 0 && pixel[2] == 255;
