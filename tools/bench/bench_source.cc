@@ -127,7 +127,7 @@ SourceImage Given(const BenchSourceOptions& options, int views) {
   EstimateOptions given = options.given;
   given.common = options.common;
   given.views.text = fmt::format("{0}x{0}", views);
-  given.ignore_exif = true;  // the times do not depend on it
+  given.ignore_exif = !given.camera_path.empty();  // the times do not depend on it
   const Problem problem = PrepareProblemOf(given);
   SourceImage image;
   image.name = std::filesystem::path(given.image_path).stem().string();

@@ -239,6 +239,7 @@ void EstimateInto(io::LightFieldWriter* writer, EstimateCall call, bool has_page
     io::WriteConfidence(estimate.confidence, light_field.u_count, light_field.s_count,
                         light_field.t_count, writer);
   }
+  if (auto& seconds = estimate.light_field.origin.seconds) *seconds += outcome->read_seconds;
   const std::size_t clipped = writer->Finish(light_field);
   outcome->files_seconds += SecondsSince(start);
   outcome->clipped_fraction =
@@ -253,10 +254,10 @@ CommandResult RunEstimate(const EstimateOptions& options) {
   SettingsOf(options);  // before anything is read
   if (options.memory_limit_mib) ReturnMemoryAtOnce();
   Outputs outputs(options);
-  const CommandRun run(options.common, EstimateOptionNames());
   EstimateOutcome outcome;
   std::optional<estimator::PlanChoice> choice;
-  WithOptionNames(run.names(), [&] {
+  WithOptionNames(EstimateOptionNames(), [&] {
+    const CommandRun run(options.common, EstimateOptionNames());  // its progress line ends with it
     EstimateCall call = ReadEstimateCall(options, run.control());
     ThrowIfCancelled();
     ContinueFrom(outputs.checkpoint, &call.settings);

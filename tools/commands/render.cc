@@ -358,7 +358,8 @@ CommandResult RenderImage(const RenderOptions& options) {
   file.seed = static_cast<std::uint64_t>(options.seed.value_or(0));
   file.description = Description(options, rendering);
   const Image& image = rendering.image;
-  const EncodedImageFile encoded = EncodeImage(image, file);
+  const EncodedImageFile encoded =
+      WithOptionNames(run.names(), [&] { return EncodeImage(image, file); });
   output.Commit(encoded.png);
 
   const double fraction = static_cast<double>(encoded.clipped_values) /

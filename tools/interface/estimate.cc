@@ -49,6 +49,7 @@ void FindConfidence(const estimator::EstimateInput& input, int threads, const Ta
   const auto u_count = static_cast<int>(input.weights.cols());
   const auto v_count = static_cast<int>(input.weights.rows());
   ParallelFor(u_count * v_count, threads, [&](int i) {
+    ThrowIfCancelled();
     const int k = i % u_count, l = i / u_count;
     const estimator::CompactView view =
         renderer.RenderCompact(k - (u_count - 1) / 2.0, l - (v_count - 1) / 2.0);
@@ -130,7 +131,6 @@ void CheckResult(const PreparedProblem& prepared, const Solved& solved,
 struct DepthFile {
   std::string name;  // in messages
   DepthMeaning meaning;
-  std::size_t value_count = 0;
 };
 
 // Returns the warnings about the result, one line each, with their numbers.
@@ -143,7 +143,7 @@ std::vector<std::string> WarningsOf(const DepthFile& depth, bool has_camera, con
   if (found.holes_share > kMaxHoles) {
     warnings.push_back(fmt::format(
         "{}: {} of its {} values are not depths: these areas are guessed from the others",
-        depth.name, found.holes_filled, depth.value_count));
+        depth.name, found.holes_filled, estimate.problem->disparity().size()));
   }
   if (found.coarse_share > 0) {
     warnings.push_back(fmt::format(
@@ -205,6 +205,18 @@ std::vector<std::string> WarningsOf(const DepthFile& depth, bool has_camera, con
 void GiveRays(const PreparedProblem& prepared, int threads, CountingSink* sink, Solved* solved,
               LightFieldEstimate* estimate) {
   LightField& light_field = estimate->light_field;
+  const auto give_view = [&](int k, int l) {
+    if (light_field.IsPresent(k, l)) sink->TakeView(k, l, model::ViewImage(light_field, k, l));
+  };
+  if (sink != nullptr && !solved->maps) {  // never the confidence of all rays at once
+    FindConfidence(*prepared.input, threads,
+                   [&](int k, int l, const std::vector<estimator::Confidence>& confidence) {
+                     give_view(k, l);
+                     sink->TakeConfidence(k, l, confidence, light_field.s_count);
+                   });
+    light_field.values = {};
+    return;
+  }
   const std::size_t view_size = light_field.view_size();
   const auto index = [&](int k, int l) {
     return static_cast<std::ptrdiff_t>(static_cast<std::size_t>(l * light_field.u_count + k) *
@@ -224,13 +236,13 @@ void GiveRays(const PreparedProblem& prepared, int threads, CountingSink* sink, 
   if (sink == nullptr || solved->views_in_sink) return;
   ParallelFor(light_field.u_count * light_field.v_count, threads, [&](int i) {
     const int k = i % light_field.u_count, l = i / light_field.u_count;
-    if (light_field.IsPresent(k, l)) sink->TakeView(k, l, model::ViewImage(light_field, k, l));
+    give_view(k, l);
     const auto first = estimate->confidence.begin() + index(k, l);
     sink->TakeConfidence(k, l, {first, first + static_cast<std::ptrdiff_t>(view_size)},
                          light_field.s_count);
   });
-  light_field.values.clear();
-  estimate->confidence.clear();
+  light_field.values = {};
+  estimate->confidence = {};
 }
 
 void FillSummary(const SolverSummary& solver, const AnySolver& chosen, const RunScope& run,
@@ -270,8 +282,7 @@ LightFieldEstimate Estimate(ViewSink* given_sink, Image photo, DepthMap depth,
   RequireValidEstimate(depth, camera, given, control);
   RunScope run(control);
   LightFieldEstimate estimate;
-  const DepthFile depth_file{depth.source.empty() ? "depth" : depth.source, depth.meaning,
-                             depth.values.size()};
+  const DepthFile depth_file{depth.source.empty() ? "depth" : depth.source, depth.meaning};
   PreparedProblem prepared =
       Prepare(std::move(photo), std::move(depth), camera, given, &estimate.diagnostics, &run);
   ThrowIfCancelled();

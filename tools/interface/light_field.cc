@@ -38,6 +38,7 @@ ChannelOrder OrderOf(const model::LinearImage& image) {
 
 LightField ReadLightField(const std::string& folder, const LightFieldReadOptions& options,
                           const RunControl& run) {
+  checks::RequireValid(run);
   checks::RequireValid(options);
   const RunScope scope(run);
   return io::ReadLightField(folder, ReadingOf(options));

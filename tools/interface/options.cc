@@ -28,6 +28,9 @@ constexpr int kMaxIterations = 1000000;
 constexpr int kMaxPixels = 100000;
 constexpr int kMaxViews = 99;   // one way; the number of rays is far beyond any memory before
 constexpr int kMaxGrid = 1000;  // row length of the HCI numbering
+constexpr char kOneView[] =
+    "1x1 is not a light field: one view is the image itself; at least two views are expected, e.g. "
+    "3x3";
 constexpr double kMaxLengthMm = 1e9;
 constexpr double kMaxMemoryMib = 1e9;
 
@@ -200,6 +203,17 @@ bool SceneSolver::IsValid(std::string* why) const {
          WholeBetween(why, "max_iterations", 1, kMaxIterations, max_iterations);
 }
 
+// The weight of the smoothness along scene points.
+static bool IsGamma(std::string* why, double gamma) {
+  if (gamma == 0) {
+    return Fail(
+        why, "gamma",
+        "a finite number > 0 is expected, found 0: only the ridge would then relate the rays "
+        "of a scene point, and the light field would not follow the scene's geometry");
+  }
+  return Positive(why, "gamma", gamma);
+}
+
 bool BlockSolver::IsValid(std::string* why) const {
   if (!OneOf(why, "linear", Linear::kViennaCl, linear)) return false;
   if (!OneOf(why, "stencil", Stencil::kPaper, stencil)) return false;
@@ -208,7 +222,7 @@ bool BlockSolver::IsValid(std::string* why) const {
     if (tolerance) return Fail(why, "tolerance", "is for iterative linear solvers only");
     if (max_iterations) return Fail(why, "max_iterations", "is for iterative linear solvers only");
   }
-  return Positive(why, "gamma", gamma) &&
+  return IsGamma(why, gamma) &&
          IfGiven(ridge, [why](double given) { return NonNegative(why, "ridge", given); }) &&
          IfGiven(
              block_px,
@@ -220,7 +234,7 @@ bool BlockSolver::IsValid(std::string* why) const {
 }
 
 bool FunctionalSolver::IsValid(std::string* why) const {
-  return Positive(why, "gamma", gamma) &&
+  return IsGamma(why, gamma) &&
          IfGiven(ridge, [why](double given) { return Positive(why, "ridge", given); }) &&
          Residual(why, "tolerance", tolerance) &&
          WholeBetween(why, "max_iterations", 1, kMaxIterations, max_iterations);
@@ -230,7 +244,7 @@ bool EstimateOptions::IsValid(std::string* why) const {
   if (views) {
     if (!AreViews(why, "views", *views)) return false;
     if (views->u * views->v < 2 && !aperture.views_of) {
-      return Fail(why, "views", "at least two are expected, found 1 x 1: one view is the image");
+      return Fail(why, "views", kOneView);
     }
   }
   if (crop && !IsRect(why, "crop", *crop)) return false;

@@ -73,8 +73,8 @@ PreparedDepth PrepareDepth(const DepthMap& map, const model::LinearImage& image,
   if (camera != nullptr) return PrepareByCamera(map, image, *camera, *grid);
   if (map.meaning.kind != DepthKind::kDisparity) {
     throw OptionError("depth.meaning.kind",
-                      "depth.meaning.kind: millimetres need a camera; without a camera the map "
-                      "must be a disparity");
+                      "depth.meaning.kind: millimetres need a camera file, and without one the "
+                      "map must be a disparity");
   }
   PreparedDepth prepared;
   prepared.disparity = WithFileContext(NameOf(map), [&] {

@@ -267,7 +267,7 @@ model::EffectSelection SelectEffects(const EstimateOptions& options,
     throw OptionError("effects",
                       "effects: defocus is what an estimate inverts and cannot be left out; the "
                       "image that is only warped by its depth is the baseline (DIBR) of a "
-                      "comparison");
+                      "comparison (thicklens compare --dibr)");
   }
   if (of_model.Has(Effect::kOcclusion) && options.effects.LeavesOut(Effect::kOcclusion)) {
     throw OptionError("effects",

@@ -35,6 +35,7 @@ class RunScope {
   }
 
   void Warn(const std::string& text) { Note(Notice::Level::kWarning, text); }
+  void Detail(const std::string& text) { Note(Notice::Level::kDetail, text); }
   void Inform(const std::string& text) { Note(Notice::Level::kInformation, text); }
   const std::vector<Notice>& notices() const { return notices_; }
 

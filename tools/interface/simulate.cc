@@ -69,6 +69,7 @@ SimulatedSweep SimulateSweep(const SweepSimulation& simulation, OutputFolder* fo
 
 Sweep SimulateSweep(const SweepSimulation& simulation, const std::string& folder,
                     bool unknown_offset, const RunControl& control) {
+  checks::RequireValid(control);
   OutputFolder output = ClaimSweepFolder(folder);
   SimulateSweep(simulation, &output, unknown_offset, control);
   {

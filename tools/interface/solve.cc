@@ -30,6 +30,7 @@ std::shared_ptr<kernels::Backend> Open(const std::string& device, RunScope* run)
   auto backend = kernels::OpenBackend(kernels::ParseDeviceRequest(device), &notice,
                                       [] { ThrowIfCancelled(); });
   if (!notice.empty()) run->Warn(notice);
+  run->Detail("device: " + backend->description());
   return backend;
 }
 
@@ -226,8 +227,10 @@ void CompleteRun(const BlockSolver& solver, const PreparedProblem& /*prepared*/,
 }
 
 void CompleteRun(const FunctionalSolver& /*solver*/, const PreparedProblem& /*prepared*/,
-                 const EstimateOptions& /*options*/, ViewSink* /*sink*/, RunScope* /*run*/,
-                 LibraryRun* /*library*/, Solved* /*solved*/) {}
+                 const EstimateOptions& /*options*/, ViewSink* /*sink*/, RunScope* run,
+                 LibraryRun* /*library*/, Solved* /*solved*/) {
+  run->Detail("device: cpu");
+}
 
 template <typename Given>
 Solved SolveByLibrary(const Given& solver, const PreparedProblem& prepared,

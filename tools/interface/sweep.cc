@@ -125,13 +125,14 @@ bool Sweep::IsValid(std::string* why) const {
   if (!checks::NonNegative(why, "description.reading_sigma_mm", description.reading_sigma_mm)) {
     return false;
   }
-  calib::FocusSweep sweep = calib::MakeFocusSweep(description, camera);
-  sweep.read_frame = [](std::size_t /*index*/) { return cv::Mat(); };  // not called
-  std::string reason;
-  if (!sweep.IsValid(&reason)) {
-    return checks::Fail(why, "description", reason);
+  try {
+    calib::FocusSweep sweep = calib::MakeFocusSweep(description, camera);
+    sweep.read_frame = [](std::size_t /*index*/) { return cv::Mat(); };  // not called
+    std::string reason;
+    return sweep.IsValid(&reason) || checks::Fail(why, "description", reason);
+  } catch (const Error& error) {  // the floor is of another camera
+    return checks::Fail(why, "description", error.what());
   }
-  return true;
 }
 
 Sweep ReadSweep(const std::string& path, const SweepOverrides& overrides,
@@ -163,8 +164,11 @@ Sweep ReadSweepFolder(const std::string& folder, const std::string& readings_csv
   checks::RequireValid(overrides);
   const RunScope run(control);
   if (overrides.camera_path.empty()) {
-    throw OptionError("camera_path",
-                      "camera_path: a folder with a table of readings also needs a camera");
+    throw OptionError(
+        "camera_path",
+        fmt::format("camera_path: {} is a folder with a table of readings, which also "
+                    "needs a camera file (thicklens camera init makes one)",
+                    folder));
   }
   Sweep sweep;
   model::SweepFile file =

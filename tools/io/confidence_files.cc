@@ -3,8 +3,6 @@
 #include <cstddef>
 
 #include "thicklens/base/cancel.h"
-#include "thicklens/base/parallel.h"
-#include "thicklens/estimator/view_geometry.h"
 
 namespace thicklens::io {
 
@@ -17,20 +15,6 @@ void WriteConfidence(const std::vector<estimator::Confidence>& of_rays, int u_co
     const auto first = of_rays.begin() + i * pixels;
     writer->WriteConfidence(i % u_count, i / u_count, {first, first + pixels}, width_px);
   }
-}
-
-void WriteConfidence(const estimator::EstimateInput& input, int threads, LightFieldWriter* writer) {
-  const std::vector<estimator::Confidence> of_points = estimator::PointConfidence(input, threads);
-  const estimator::DisparityRenderer renderer(input.disparity);
-  const auto u_count = static_cast<int>(input.weights.cols());
-  const auto v_count = static_cast<int>(input.weights.rows());
-  ParallelFor(u_count * v_count, ResolveThreads(threads), [&](int i) {
-    ThrowIfCancelled();
-    const int k = i % u_count, l = i / u_count;
-    const estimator::CompactView view =
-        renderer.RenderCompact(k - (u_count - 1) / 2.0, l - (v_count - 1) / 2.0);
-    writer->WriteConfidence(k, l, estimator::RayConfidence(of_points, view), view.width_px);
-  });
 }
 
 }  // namespace thicklens::io

@@ -100,7 +100,7 @@ EffectSelection EffectSelectionOf(const EffectOptions& options) {
                                                : EffectSelection::Base::kGiven;
   selection.given = choice.given;
   selection.without = choice.without;
-  if (options.tolerance && choice.base == Base::kAuto) selection.tolerance = choice.tolerance;
+  if (options.tolerance) selection.tolerance = choice.tolerance;
   return selection;
 }
 

@@ -26,7 +26,7 @@ CommandRun::CommandRun(const CommonOptions& options, OptionNames names)
     : names_(std::move(names)), quiet_(options.quiet) {
   control_.threads = options.threads;
   control_.progress = [this](const thicklens::Progress& progress) { Show(progress); };
-  control_.notice = ReportNotice;
+  control_.notice = [this](const Notice& notice) { Report(notice); };
   control_.option_name = [this](const std::string& field) { return names_(field); };
 }
 
@@ -40,12 +40,24 @@ void CommandRun::Show(const thicklens::Progress& progress) {
   line_->Show(progress.done, progress.total);
 }
 
+void CommandRun::Report(const Notice& notice) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  line_.reset();
+  ReportNotice(notice);
+}
+
 void ReportNotice(const Notice& notice) {
   const std::string text = PrintableUtf8(notice.text);
-  if (notice.level == Notice::Level::kWarning) {
-    spdlog::warn("{}", text);
-  } else {
-    spdlog::info("{}", text);
+  switch (notice.level) {
+    case Notice::Level::kDetail:
+      spdlog::debug("{}", text);
+      break;
+    case Notice::Level::kInformation:
+      spdlog::info("{}", text);
+      break;
+    case Notice::Level::kWarning:
+      spdlog::warn("{}", text);
+      break;
   }
 }
 

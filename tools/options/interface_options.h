@@ -55,6 +55,7 @@ class CommandRun {
 
  private:
   void Show(const thicklens::Progress& progress);
+  void Report(const Notice& notice);  // below the progress line, which it erases
 
   OptionNames names_;
   bool quiet_;

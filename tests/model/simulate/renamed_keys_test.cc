@@ -92,7 +92,7 @@ TEST_F(RenamedKeys, MessagesListPresentNamesOnly) {
   EXPECT_THAT(ErrorOf([&] { Scene("kind: noise, picture: a.png"); }),
               HasSubstr("unknown key 'picture'"));
   EXPECT_THAT(ErrorOf([&] { Sweep("kind: knife-edge, picture: a.png"); }),
-              HasSubstr("only a target of the kind 'image'"));
+              HasSubstr("only for a target of the kind 'image'"));
 }
 
 }  // namespace

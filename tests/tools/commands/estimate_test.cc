@@ -214,7 +214,7 @@ TEST_F(EstimateTest, OneViewAcrossIsReportedAndOneViewInAllIsRefused) {
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.err, HasSubstr("one view along u"));
   fs::remove_all(Output());
-  EXPECT_THAT(Refusal({Image(), Disparity(), "--depth-kind", "disparity", "--views", "1x1"}),
+  EXPECT_THAT(Refusal({Image(), Disparity(), "--depth-kind", "disparity", "--views", "1x1"}, 2),
               HasSubstr("1x1 is not a light field"));
 }
 
@@ -266,9 +266,9 @@ TEST_F(EstimateTest, HolesAreFilledAndCounted) {
 
 TEST_F(EstimateTest, SettingsThatCannotBe) {
   const Arguments good = AsDisparity(Image(), Disparity());
-  EXPECT_THAT(Refusal(With(good, {"--gamma", "0"})),
-              AllOf(HasSubstr("gamma is 0"), HasSubstr("geometry")));
-  EXPECT_THAT(Refusal(With(good, {"--gamma", "-1"})), HasSubstr("gamma is -1"));
+  EXPECT_THAT(Refusal(With(good, {"--gamma", "0"}), 2),
+              AllOf(HasSubstr("--gamma: "), HasSubstr("found 0"), HasSubstr("geometry")));
+  EXPECT_THAT(Refusal(With(good, {"--gamma", "-1"}), 2), HasSubstr("found -1"));
   const std::string json = folder_ / "refused.json";
   EXPECT_THAT(Refusal(With(good, {"--ridge", "0", "--json", json})),
               AllOf(HasSubstr("block of "), HasSubstr("rcond is "), HasSubstr("ridge")));

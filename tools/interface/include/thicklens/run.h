@@ -16,7 +16,8 @@ namespace thicklens {
 
 // An option whose value is not valid, or that contradicts another option. `field()` is the name of
 // the member, for example "solver.tolerance"; the message begins with it and states the value and
-// the constraint. It is thrown before any file is read or written.
+// the constraint. It is thrown as soon as the value can be judged, and before any output is
+// written.
 class THICKLENS_EXPORT OptionError : public Error {
  public:
   OptionError(std::string field, const std::string& message);
@@ -29,7 +30,8 @@ class THICKLENS_EXPORT OptionError : public Error {
 
 // A step of a long call.
 struct Progress {
-  std::string stage;  // "measuring", "checking the blur", "estimating", "inpainting", "rendering"
+  std::string stage;  // "measuring", "checking the blur", "estimating", "inpainting", "rendering",
+                      // "measuring costs"
   int done = 0;       // steps of the stage that are done, 0 to `total`
   int total = 0;      // steps of the stage, >= 1
 };
@@ -37,6 +39,7 @@ struct Progress {
 // A remark of a call on what it found or assumed. It does not end the call.
 struct Notice {
   enum class Level {
+    kDetail,       // for whoever examines a run: the device that computes
     kInformation,  // an assumption that is usually right
     kWarning,      // something that may make the result wrong
   };
@@ -53,7 +56,8 @@ struct RunControl {
   // Called for each step, from any thread, never by two threads at once. An exception that it
   // throws ends the call and is thrown by the call. Empty: none.
   std::function<void(const Progress&)> progress;
-  // Called with each notice when it arises, on the calling thread. The summaries also keep them.
+  // Called with each notice when it arises, on the calling thread. EstimateDiagnostics and
+  // LightFieldScores also keep them.
   // Empty: none.
   std::function<void(const Notice&)> notice;
   // How errors and notices name an option: it gets the path of the member ("sensor_origin",

@@ -14,11 +14,6 @@ THICKLENS_EXPORT void WriteConfidence(const std::vector<estimator::Confidence>& 
                                       int u_count, int width_px, int height_px,
                                       LightFieldWriter* writer);
 
-// Writes the confidence of an estimate whose solver does not report it; it depends on the depth
-// alone.
-THICKLENS_EXPORT void WriteConfidence(const estimator::EstimateInput& input, int threads,
-                                      LightFieldWriter* writer);
-
 }  // namespace thicklens::io
 
 #endif  // THICKLENS_IO_CONFIDENCE_FILES_H_
