@@ -36,6 +36,7 @@ class CancelToken {
  public:
   // May be called from any thread and from a signal handler.
   void Cancel() noexcept { is_cancelled_.store(true, std::memory_order_relaxed); }
+  // Returns true after Cancel.
   bool IsCancelled() const noexcept { return is_cancelled_.load(std::memory_order_relaxed); }
 
  private:
@@ -56,6 +57,7 @@ inline const CancelToken* CurrentCancelToken() noexcept { return internal::cance
 // which it was made, after the scopes that were made later.
 class CancelScope {
  public:
+  // Makes `token` (null: none) the token of this thread until the scope ends.
   explicit CancelScope(const CancelToken* token) noexcept : before_(internal::cancel_token) {
     internal::cancel_token = token;
   }

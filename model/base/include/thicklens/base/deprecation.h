@@ -7,7 +7,7 @@ namespace thicklens {
 
 // A key, value or option that was renamed. Its former name is accepted until version 1.0.
 struct RenamedWord {
-  std::string former, now;
+  std::string former, now;  // the name that is deprecated, and the present one
 };
 
 // The warning for somebody who uses the former name.

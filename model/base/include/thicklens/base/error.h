@@ -20,6 +20,7 @@ class THICKLENS_EXPORT Error : public std::runtime_error {
 // propagates. The text does not say what was written before: only the caller knows that.
 class THICKLENS_EXPORT Interrupted : public Error {
  public:
+  // Makes the error with the message "interrupted".
   Interrupted() : Error("interrupted") {}
 };
 

@@ -17,9 +17,12 @@ class IterationProgress {
   // `report` may be empty, may throw, and must outlive this.
   IterationProgress(const ProgressFunction& report, int total) : report_(report), total_(total) {}
 
+  // Reports the present count again. Throws Interrupted as every count does.
   void Report() { Advance(0); }
+  // Counts one step.
   void Count() { Advance(1); }
   void CountUpTo(int limit) { Advance(done_ < limit ? 1 : 0); }  // for a single counting thread
+  // Counts the steps up to `done`, if fewer are done.
   void SkipTo(int done) { Advance(std::max(0, done - done_)); }
 
  private:

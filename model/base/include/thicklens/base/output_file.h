@@ -52,12 +52,15 @@ class THICKLENS_EXPORT OutputFile {
 // folder is not touched. The next run removes what a killed run left there.
 class THICKLENS_EXPORT OutputFolder {
  public:
+  // Claims the name and makes the staging folder. Throws Error if the folder cannot be written, if
+  // another run is writing it, or if an entry would be lost.
   OutputFolder(const std::string& path, const std::string& marker_file,
                const std::vector<std::string>& own_entries = {});
   ~OutputFolder();
   OutputFolder(OutputFolder&&) noexcept;
   OutputFolder& operator=(OutputFolder&&) noexcept;
 
+  // The folder into which files are written before Commit.
   const std::string& staging_path() const;
   // Writes one file below the staging folder; `name` may begin with one folder. Throws Error.
   void Write(const std::string& name, const std::string& content);

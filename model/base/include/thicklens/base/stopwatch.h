@@ -6,8 +6,9 @@
 
 namespace thicklens {
 
-using Clock = std::chrono::steady_clock;
+using Clock = std::chrono::steady_clock;  // A clock that is never adjusted.
 
+// Returns the seconds between `start` and now.
 inline double SecondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }

@@ -21,6 +21,7 @@ class THICKLENS_EXPORT YamlNode {
   // Read a file or a text that contains exactly one YAML document. `source_name` is the name of the
   // text in messages.
   static YamlNode LoadFile(const std::string& path);
+  // Reads a text. `source_name` is its name in messages.
   static YamlNode Parse(const std::string& text, const std::string& source_name);
 
   // Returns true if this is a map whose key `schema` has the given value.
@@ -34,6 +35,7 @@ class THICKLENS_EXPORT YamlNode {
   void RequireKeys(const std::vector<std::string>& allowed,
                    const std::vector<RenamedWord>& renamed = {}) const;
 
+  // Returns whether the map has the key, whatever its value.
   bool Has(const std::string& key) const;
   YamlNode At(const std::string& key) const;                   // throws Error if absent
   std::optional<YamlNode> Find(const std::string& key) const;  // absent or null: nullopt
@@ -41,8 +43,11 @@ class THICKLENS_EXPORT YamlNode {
   // name adds a line to `notices`.
   std::optional<YamlNode> Find(const RenamedWord& key, std::vector<std::string>* notices) const;
 
+  // Returns whether the node is a map of keys and values.
   bool IsMap() const;
+  // Returns whether the node is a list.
   bool IsSequence() const;
+  // Returns whether the node is a single value.
   bool IsScalar() const;
   std::vector<YamlNode> Elements() const;                          // the elements of a sequence
   std::vector<YamlNode> ElementsExactly(std::size_t count) const;  // throws Error for other counts
@@ -51,9 +56,13 @@ class THICKLENS_EXPORT YamlNode {
   // magnitudes above 1e30 throw Error; a positive number must be at least 1e-30. `min` and `max`
   // are included.
   double Number() const;
+  // Returns a number that must be > 0.
   double PositiveNumber() const;
+  // Returns a number that must be >= 0.
   double NonNegativeNumber() const;
+  // Returns a whole number from `min` to `max`, both included.
   int Integer(int min, int max) const;
+  // Returns the value of "true" or "false".
   bool Boolean() const;
   std::string Text() const;                                          // a non-empty scalar
   std::string OneOf(const std::vector<std::string>& allowed) const;  // a scalar of the list

@@ -16,26 +16,28 @@ namespace thicklens::model {
 
 // The difference between two images, for display. Its unit is grey levels of encoded values.
 struct DifferenceImage {
-  int width_px = 0, height_px = 0;
-  std::vector<float> grey_levels;  // without the effect minus with it; empty: none
-  std::string of;                  // "the image", "frame 3, at 250 mm"
+  int width_px = 0, height_px = 0;  // size of the image, px
+  std::vector<float> grey_levels;   // without the effect minus with it; empty: none
+  std::string of;                   // "the image", "frame 3, at 250 mm"
 };
 
+// The change that one effect causes, found by a simulation without it.
 struct AblatedEffect {
-  Effect effect = Effect::kDefocus;
+  Effect effect = Effect::kDefocus;  // the effect that was left out
   // The effect does not occur, so it was not simulated again.
   bool absent = false;
   double bound_grey_levels = 0;  // bound of its change; for noise its standard deviation
-  bool kept_by_auto = true;
-  ImageChange image;  // over all frames of a sweep together
-  DifferenceImage difference;
-  double image_seconds = 0;  // simulation time without the effect
+  bool kept_by_auto = true;      // the choice kAuto would keep the effect
+  ImageChange image;             // over all frames of a sweep together
+  DifferenceImage difference;    // for display: the image, or one frame of a sweep
+  double image_seconds = 0;      // simulation time without the effect
 };
 
 // How ablations run. `progress` may throw to stop; it is called often, from several threads at
 // once.
 struct AblationRun {
   int threads = 0;  // 0: one per core
+  // Gets the steps that are done; empty: none.
   std::function<void(int done, int total)> progress;
 };
 

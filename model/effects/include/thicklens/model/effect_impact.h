@@ -29,11 +29,11 @@ struct EffectConditions {
   Camera camera;  // needs image distance and blur ratio; an absent blur floor is taken as 0
   // Planes of the light field from which the image is made; absent: UV is the aperture plane.
   std::optional<LightFieldPlanes> planes;
-  double wavelength_mm = 550e-6;
+  double wavelength_mm = 550e-6;         // wavelength of the light, mm, for diffraction
   int bits = 8;                          // bits per value of the encoded image
   double encoded_noise_grey_levels = 0;  // sd of the noise that is added to encoded values
   double full_well_electrons = 0;        // at full scale; 0: no noise in electrons is known
-  double read_noise_electrons = 0;
+  double read_noise_electrons = 0;       // standard deviation of the read noise, electrons
   std::optional<BenchConditions> bench;  // absent: a single image
 
   // Returns true if all numbers are in their range and the camera has its image distance and blur
@@ -56,7 +56,7 @@ struct EffectSite {
   // and `bright`, the largest `jump` between neighbours and, between jumps, the largest `slope` per
   // px and the largest `bend`, |d2L/dx2| + |d2L/dy2|, per px^2.
   double dark = 0, bright = 1;
-  double jump = 1, slope = 0, bend = 0;
+  double jump = 1, slope = 0, bend = 0;  // between neighbours; per px; per px^2
 };
 
 // Change of the image by one effect at one place.
@@ -78,9 +78,9 @@ THICKLENS_EXPORT EffectImpact ImpactAt(Effect effect, const EffectConditions& co
 
 // The place where an effect has its largest impact, and that impact.
 struct LargestEffectImpact {
-  Effect effect = Effect::kThickness;
-  EffectImpact impact;
-  EffectSite place;
+  Effect effect = Effect::kThickness;  // the effect that is judged
+  EffectImpact impact;                 // its largest change of the image
+  EffectSite place;                    // where it has this impact
 };
 // One finding for each of `effects`, in their order, in an image with all the other `effects`.
 // Throws Error if the conditions are not valid or there is no place. `threads`: 0 means one per

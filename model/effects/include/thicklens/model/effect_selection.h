@@ -38,16 +38,17 @@ THICKLENS_EXPORT EffectSet RequiredEffects(const EffectConditions& conditions,
 
 // The user's choice of the effects of a forward model.
 struct EffectSelectionOptions {
+  // The set of effects from which the choice starts.
   enum class Base {
     kAuto,   // the effects that the scene requires, within the tolerance
     kAll,    // all effects of the forward model
     kGiven,  // only the effects in `given`
   };
-  Base base = Base::kAuto;
-  EffectSet given;
-  EffectSet without;  // effects that are always excluded, on every base
-  EffectSet kept;     // effects that kAuto keeps regardless of their impact
-  EffectTolerance tolerance;
+  Base base = Base::kAuto;    // the set from which the choice starts
+  EffectSet given;            // the effects of kGiven; not used on other bases
+  EffectSet without;          // effects that are always excluded, on every base
+  EffectSet kept;             // effects that kAuto keeps regardless of their impact
+  EffectTolerance tolerance;  // the change that kAuto accepts
 };
 // Parses a choice. `effects` is "auto", "all", "none" or a list of names separated by commas.
 // `without` is a list of names, which may be empty. `tolerance` is a text for
@@ -76,6 +77,7 @@ struct EffectSelectionRecord {
   // Name and bound, grey levels, of each effect that is left out.
   std::vector<std::pair<std::string, double>> left_out_grey_levels;
 };
+// Returns the names of the effects of a decision and the bounds of those that are left out.
 THICKLENS_EXPORT EffectSelectionRecord RecordOf(const EffectSelection& decision);
 
 }  // namespace thicklens::model

@@ -47,16 +47,18 @@ THICKLENS_EXPORT std::string EffectUnitName(EffectUnit unit);
 
 // Static description of an effect. The texts are literals and always valid.
 struct EffectFacts {
-  Effect effect;
+  Effect effect;        // the effect that is described
   const char* name;     // "thickness", "defocus", "aperture-shape", ...
   const char* what;     // description in words
   const char* without;  // the model that replaces the effect when it is off
-  EffectUnit unit;
-  bool random;  // true: the impact is a standard deviation over repeated exposures
+  EffectUnit unit;      // unit of EffectImpact::amount
+  bool random;          // true: the impact is a standard deviation over repeated exposures
 };
 
 THICKLENS_EXPORT const std::vector<EffectFacts>& AllEffects();  // in the order of the enumeration
+// Returns the description of one effect.
 THICKLENS_EXPORT const EffectFacts& FactsOf(Effect effect);
+// Returns EffectFacts::name: "thickness", "defocus", ...
 THICKLENS_EXPORT std::string EffectName(Effect effect);
 // Inverse of EffectName. Throws Error, which lists the names, for any other name.
 THICKLENS_EXPORT Effect EffectFromName(const std::string& name);
@@ -65,18 +67,28 @@ THICKLENS_EXPORT Effect EffectFromName(const std::string& name);
 class THICKLENS_EXPORT EffectSet {
  public:
   EffectSet() = default;
+  // Makes a set of the listed effects.
   EffectSet(std::initializer_list<Effect> effects) {
     for (const Effect effect : effects) Add(effect);
   }
+  // The set of all effects of the enumeration.
   static EffectSet All();
 
+  // Returns whether the effect is in the set.
   bool Has(Effect effect) const { return (bits_ & BitOf(effect)) != 0; }
+  // Adds an effect; it may be in the set already.
   void Add(Effect effect) { bits_ |= BitOf(effect); }
+  // Removes an effect; it need not be in the set.
   void Remove(Effect effect) { bits_ &= ~BitOf(effect); }
+  // Returns the union of both sets.
   EffectSet With(const EffectSet& other) const { return EffectSet(bits_ | other.bits_); }
+  // Returns this set without the effects of the other one.
   EffectSet Without(const EffectSet& other) const { return EffectSet(bits_ & ~other.bits_); }
+  // Returns the intersection of both sets.
   EffectSet Both(const EffectSet& other) const { return EffectSet(bits_ & other.bits_); }
+  // Returns whether the set has no effect.
   bool empty() const { return bits_ == 0; }
+  // The effects of the set in the order of the enumeration.
   std::vector<Effect> Effects() const;
   std::vector<std::string> Names() const;  // in the order of the enumeration
 

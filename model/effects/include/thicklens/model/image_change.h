@@ -11,13 +11,14 @@ namespace thicklens::model {
 
 // Difference between two images, or two sets of images, of encoded values in 1/255 of full scale.
 struct ImageChange {
-  double rms_grey_levels = 0;
-  double largest_grey_levels = 0;
-  double psnr_db = 0;  // +inf where nothing changed
+  double rms_grey_levels = 0;      // rms over the pixels and channels, in 1/255 of full scale
+  double largest_grey_levels = 0;  // largest absolute difference, in 1/255 of full scale
+  double psnr_db = 0;              // +inf where nothing changed
   // Displacement of the reference in any one direction that would change it by the same rms:
   // rms(d)/rms(slope along one axis), for small displacements. NaN if the reference is flat.
   double as_shift_px = 0;
 
+  // Returns whether all values are equal.
   bool nothing() const { return largest_grey_levels == 0; }
 };
 
@@ -28,6 +29,7 @@ class THICKLENS_EXPORT ImageChangeAccumulator {
   double Add(const EncodedValues& reference, const EncodedValues& other);
   // Adds the sums of another meter.
   void Add(const ImageChangeAccumulator& other);
+  // Returns the difference over all images that were added.
   ImageChange Result() const;
 
  private:

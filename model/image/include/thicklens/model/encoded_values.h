@@ -12,10 +12,10 @@ namespace thicklens::model {
 // Encoded values of an image in [0, 1], on which image metrics are computed. Channels are
 // interleaved.
 struct EncodedValues {
-  int width_px = 0;
-  int height_px = 0;
-  int channels = 0;  // 1 (grey) or 3 (sRGB)
-  std::vector<float> values;
+  int width_px = 0;           // width, px
+  int height_px = 0;          // height, px
+  int channels = 0;           // 1 (grey) or 3 (sRGB)
+  std::vector<float> values;  // width * height * channels, rows from top to bottom
 };
 // Divides the encoded values by full scale and leaves alpha out.
 THICKLENS_EXPORT EncodedValues EncodedValuesOf(const EncodedImage& image);

@@ -13,7 +13,7 @@ namespace thicklens::model {
 // One ray of the two-plane light field, mm: (s, t) on ST, (u, v) on UV. In the orientation of the
 // scene, s and u are to the right, t and v down.
 struct Ray {
-  double s_mm = 0, t_mm = 0, u_mm = 0, v_mm = 0;
+  double s_mm = 0, t_mm = 0, u_mm = 0, v_mm = 0;  // positions from the optical axis, mm
 };
 
 // Positions of the two planes, mm from Ap: UV at depth zl, ST at depth zl + d0. Every function
@@ -25,9 +25,10 @@ struct LightFieldPlanes {
 
 // P and Q of [S17], [S18], dimensionless: the landing point is P s - Q u.
 struct ProjectionCoefficients {
-  double p = 0;
-  double q = 0;
+  double p = 0;  // P [S17], 0 at zl = zf
+  double q = 0;  // Q [S18], 0 with ST in the plane of focus
 };
+// Computes P and Q [S17], [S18] of the planes. Throws Error unless D = d1 - rho is finite and > 0.
 THICKLENS_EXPORT ProjectionCoefficients ProjectionOf(const ThickLens& lens,
                                                      double image_distance_mm,
                                                      const LightFieldPlanes& planes);
@@ -90,7 +91,9 @@ enum class ApertureShape {
 };
 // The shape of the name "uniform", "gaussian" or "disc". Throws Error for any other name.
 THICKLENS_EXPORT ApertureShape ApertureShapeFromName(const std::string& name);
+// Name of the shape: "uniform", "gaussian" or "disc".
 THICKLENS_EXPORT std::string ApertureShapeName(ApertureShape shape);
+// The shape of the aperture that has this PSF: kDisc for a disc, kGaussian for a Gaussian.
 THICKLENS_EXPORT ApertureShape ApertureShapeOf(Psf psf);
 
 // Weight, 1 in the middle, at any position of the aperture, in view steps from the middle; the
@@ -112,13 +115,15 @@ THICKLENS_EXPORT Eigen::ArrayXXd ApertureWeights(ApertureShape shape, int u_coun
 // contains the effect of [S12] there. An axis with one sample has no blur; its step is 0. (The
 // spacing 4 kappa r/U, a first guess, gives 12 % too little blur at U = 7.)
 struct ApertureSamples {
-  int u_count = 1;
-  int v_count = 1;
-  double u_step_mm = 0;
-  double v_step_mm = 0;
+  int u_count = 1;          // U, number of samples across
+  int v_count = 1;          // V, number of samples down
+  double u_step_mm = 0;     // step across on Ap, mm; 0 for one sample
+  double v_step_mm = 0;     // step down on Ap, mm; 0 for one sample
   Eigen::ArrayXXd weights;  // V x U, sum 1
 
+  // Steps to the right from the middle: i - (U-1)/2.
   double u_offset(int i) const { return i - (u_count - 1) / 2.0; }
+  // Steps down from the middle: j - (V-1)/2.
   double v_offset(int j) const { return j - (v_count - 1) / 2.0; }
 };
 // Samples with the given V x U weights. Throws Error unless blur_ratio and aperture_radius_mm are
@@ -133,8 +138,9 @@ THICKLENS_EXPORT ApertureSamples SampleAperture(Psf psf, double blur_ratio,
 // The sampling of a light field: the ray (i, j, k, l) passes through s_i, t_j on ST and u_k, v_l on
 // UV.
 struct LightFieldGrid {
-  int s_count = 0, t_count = 0, u_count = 0, v_count = 0;
-  LightFieldPlanes planes;
+  int s_count = 0, t_count = 0, u_count = 0, v_count = 0;  // S, T, U and V
+  LightFieldPlanes planes;                                 // depths of UV and ST from Ap
+  // Steps on ST (s, t) and on UV (u, v), mm.
   double s_step_mm = 0, t_step_mm = 0, u_step_mm = 0, v_step_mm = 0;
   Eigen::Vector2d st_origin_index{0, 0};  // index (i, j) of the optical axis on ST, not rounded
 
@@ -142,6 +148,8 @@ struct LightFieldGrid {
   // numbers finite. Otherwise `why`, if not null, gets the field and the value.
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
 
+  // Returns the ray (i, j, k, l): s = (i - st_origin_index.x) s_step_mm, u = (k - (U-1)/2)
+  // u_step_mm, and t and v likewise.
   THICKLENS_EXPORT Ray RayAt(int i, int j, int k, int l) const;
 };
 

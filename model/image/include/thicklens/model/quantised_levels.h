@@ -19,6 +19,7 @@ class THICKLENS_EXPORT QuantisedLevels {
   // Throws Error unless `bits` is 8 or 16.
   QuantisedLevels(const TransferCurve& transfer, int bits);
 
+  // The number of bits of a value, 8 or 16.
   int bits() const { return bits_; }
 
   // The encoded value of `light`, 1 at full scale. NaN gives 0.

@@ -14,22 +14,24 @@ namespace thicklens::model {
 // An image as a file stores it: integer values, rows from top to bottom, channels interleaved
 // (RGB).
 struct EncodedImage {
-  int width_px = 0;
-  int height_px = 0;
-  int channels = 0;
+  int width_px = 0;                   // width, px
+  int height_px = 0;                  // height, px
+  int channels = 0;                   // 1 (grey), 3 (RGB) or 4 (RGBA)
   int bits = 8;                       // 8 or 16; full scale is 2^bits - 1
   std::vector<std::uint16_t> values;  // width * height * channels
 
+  // The largest value, 2^bits - 1.
   double full_scale() const { return bits == 8 ? 255.0 : 65535.0; }
 };
 
 // An image in linear light, 1 at full scale; the order of the values is that of EncodedImage.
 struct LinearImage {
-  int width_px = 0;
-  int height_px = 0;
-  int channels = 0;
-  std::vector<float> values;
+  int width_px = 0;           // width, px
+  int height_px = 0;          // height, px
+  int channels = 0;           // number of values per pixel
+  std::vector<float> values;  // width * height * channels; may be outside [0, 1]
 
+  // The value of one channel of the pixel (x, y), which must exist.
   float at(int x, int y, int channel) const {
     return values[(static_cast<std::size_t>(y) * static_cast<std::size_t>(width_px) +
                    static_cast<std::size_t>(x)) *
@@ -66,18 +68,19 @@ THICKLENS_EXPORT DepthKind DepthKindFromName(const std::string& name);
 
 // A depth map as read from a file: one number per pixel, rows from top to bottom.
 struct RawDepthMap {
-  int width_px = 0;
-  int height_px = 0;
-  std::vector<float> values;
-  bool integer = false;  // true: the file format is integer, and 0 means "no data"
+  int width_px = 0;           // width, px
+  int height_px = 0;          // height, px
+  std::vector<float> values;  // width * height numbers, in the unit of the map
+  bool integer = false;       // true: the file format is integer, and 0 means "no data"
 };
 
+// How the numbers of a depth map are converted.
 struct DepthConvention {
-  DepthKind kind = DepthKind::kZ;
-  double unit_mm = 1;          // kZ, kRange: mm per unit of the map (tum5000: 0.2)
-  double disparity_scale = 1;  // kDisparity: disparity_px = scale * value + offset
-  double disparity_offset_px = 0;
-  double aperture_step_mm = 0;  // kDisparity: da, step on Ap between the views of the disparity
+  DepthKind kind = DepthKind::kZ;  // what the numbers mean
+  double unit_mm = 1;              // kZ, kRange: mm per unit of the map (tum5000: 0.2)
+  double disparity_scale = 1;      // kDisparity: disparity_px = scale * value + offset
+  double disparity_offset_px = 0;  // kDisparity: offset, px per view step
+  double aperture_step_mm = 0;     // kDisparity: da, step on Ap between the views of the disparity
 };
 // Millimetres per unit for the name "mm", "cm", "m" or "tum5000" (16-bit PNG of the TUM benchmark,
 // m x 5000). Throws Error for any other name.
@@ -85,16 +88,16 @@ THICKLENS_EXPORT double DepthUnitMm(const std::string& name);
 
 // Numbers of depths and holes in a depth map, and the depths from Ap.
 struct DepthStatistics {
-  std::size_t valid = 0;
-  std::size_t holes = 0;
+  std::size_t valid = 0;                         // number of pixels with a depth
+  std::size_t holes = 0;                         // number of pixels without one
   double min_mm = 0, median_mm = 0, max_mm = 0;  // over the valid depths; 0 if there are none
 };
 
 // An image in linear light with the depth of the surface that the chief ray of each pixel meets.
 struct Scene {
-  LinearImage image;
+  LinearImage image;            // linear light, 1 at full scale
   std::vector<float> depth_mm;  // z from Ap, one value per pixel of the image; NaN marks a hole
-  DepthStatistics depth;
+  DepthStatistics depth;        // of depth_mm
 };
 
 // Makes a scene of an image and its depth map. The map is converted to z by its convention:

@@ -13,14 +13,15 @@
 
 namespace thicklens::model {
 
+// The sensor: its size, its pixels and the curve by which it encodes light.
 struct Sensor {
-  int width_px = 0;
-  int height_px = 0;
-  double pixel_pitch_mm = 0;
+  int width_px = 0;           // width, px
+  int height_px = 0;          // height, px
+  double pixel_pitch_mm = 0;  // p, distance between the centres of adjacent pixels, mm
   // Position where the optical axis meets the sensor. The centre of the top-left pixel is (0, 0),
   // x is to the right, y down.
   Eigen::Vector2d principal_point_px{0, 0};
-  TransferCurve transfer;
+  TransferCurve transfer;  // from linear light to encoded values
 
   // Returns true if the sizes and the pitch are > 0 and all numbers are finite. Otherwise `why`, if
   // not null, gets the field, the constraint and the value.
@@ -38,8 +39,8 @@ THICKLENS_EXPORT std::string PsfName(Psf psf);
 
 // A measured number and its standard deviation, both in the unit of the field that holds them.
 struct Estimate {
-  double value = 0;
-  double sigma = 0;
+  double value = 0;  // the measured number
+  double sigma = 0;  // its standard deviation
 };
 
 // Reliability of a number that was typed in rather than measured.
@@ -50,24 +51,24 @@ struct Provenance {
 
 // A frame that was excluded from a calibration, and the reason.
 struct RejectedFrame {
-  std::string image;
-  std::string reason;
+  std::string image;   // file name of the frame
+  std::string reason;  // one line
 };
 
 // Origin of a calibration.
 struct Evidence {
-  std::string method;  // "assumed": nothing was measured
-  int frames_used = 0;
-  std::vector<RejectedFrame> frames_rejected;
-  std::optional<double> chi2_per_dof;
-  std::optional<Estimate> focus_depth_mm;
+  std::string method;                          // "assumed": nothing was measured
+  int frames_used = 0;                         // number of frames in the fit
+  std::vector<RejectedFrame> frames_rejected;  // in the order of the sweep
+  std::optional<double> chi2_per_dof;          // chi^2 of the blur fit per degree of freedom
+  std::optional<Estimate> focus_depth_mm;      // zf from Ap, mm [S13]
   // The PSF family whose second moment defines blur_ratio (PsfName; empty: not stated), and the
   // band of the fit: its largest 2 pi^2 sigma^2 nu^2, dimensionless.
   std::string blur_family;
-  std::optional<double> blur_band;
-  std::string data_sha256;  // hash of the bytes of the frames and of the readings
-  std::string version;      // version of thicklens
-  std::string date;         // ISO 8601
+  std::optional<double> blur_band;  // see blur_family
+  std::string data_sha256;          // hash of the bytes of the frames and of the readings
+  std::string version;              // version of thicklens
+  std::string date;                 // ISO 8601
 };
 
 // The part of a camera that `thicklens calibrate` adds. A parameter that did not converge is
@@ -77,25 +78,25 @@ struct CameraCalibration {
   // kappa, dimensionless: the second-moment sigma, per axis, of the defocus blur of a point on the
   // axis, divided by its blur radius.
   std::optional<Estimate> blur_ratio;
-  std::optional<Estimate> blur_floor_px;  // sqrt(S0)
-  std::optional<Estimate> bench_offset_mm;
+  std::optional<Estimate> blur_floor_px;    // sqrt(S0)
+  std::optional<Estimate> bench_offset_mm;  // depth from Ap of reading 0, mm
   // Covariance matrix of the parameters that `covariance_order` names, one row and one column for
   // each, in their units. Both are empty if no covariance is known.
   std::vector<std::string> covariance_order;
-  Eigen::MatrixXd covariance;
-  Evidence evidence;
+  Eigen::MatrixXd covariance;  // see covariance_order
+  Evidence evidence;           // what the values were measured from
 };
 
 // A thick lens with its sensor. It owns all its data; copies are independent.
 struct Camera {
-  std::string name;
-  ThickLens lens;
-  Sensor sensor;
-  Psf psf = Psf::kGaussian;
+  std::string name;          // name for messages and reports
+  ThickLens lens;            // lengths in mm from the principal planes
+  Sensor sensor;             // size, pitch, principal point, transfer curve
+  Psf psf = Psf::kGaussian;  // shape of the defocus blur
   // The key is the path of the field in the file, e.g. "lens.aperture_radius_mm"; an element of a
   // list is "sensor.principal_point_px[0]". Only fields with a statement are present.
   std::map<std::string, Provenance> statements;
-  std::optional<CameraCalibration> calibration;
+  std::optional<CameraCalibration> calibration;  // absent: not calibrated
   // Remarks on how the camera was read, one sentence each. They are not written to files.
   std::vector<std::string> notices;
   std::string source;  // the file that ReadCamera read; messages name it; not written to files

@@ -12,15 +12,15 @@ namespace thicklens::model {
 
 // Depths from Ap; far_mm may be +inf.
 struct DepthRange {
-  double near_mm = 0;
-  double far_mm = 0;
+  double near_mm = 0;  // the nearer end, mm from Ap
+  double far_mm = 0;   // the farther end, mm from Ap
 };
 
 // The blur and magnification of a calibrated camera at one depth.
 struct DepthRow {
-  double depth_mm = 0;  // may be +inf
-  double blur_radius_mm = 0;
-  double blur_radius_px = 0;
+  double depth_mm = 0;                // may be +inf
+  double blur_radius_mm = 0;          // r_defocus on the sensor, mm [S25]
+  double blur_radius_px = 0;          // the same in px
   double defocus_sigma_px = 0;        // kappa r_defocus/p
   double defocus_sigma_error_px = 0;  // its standard deviation from those of kappa and d1
   double sigma_px = 0;                // with the lens floor; without the pixel box
@@ -29,10 +29,11 @@ struct DepthRow {
   double thin_magnification = 0;      // likewise
 };
 
+// Depths from Ap between which the blur radius is at most a limit [D6].
 struct DepthOfFieldRow {
-  double blur_radius_px = 0;
-  double near_mm = 0;
-  double far_mm = 0;  // may be +inf
+  double blur_radius_px = 0;  // the limit, px
+  double near_mm = 0;         // the nearer end, mm from Ap
+  double far_mm = 0;          // may be +inf
 };
 
 // The camera treated as a thin lens (f1 = f2 = the front value, rho = 0) whose sensor does not
@@ -47,23 +48,24 @@ struct ThinComparison {
   // +inf.
   double alike_up_to_mm = 0;
 };
+// The difference of landing points, px, below which a thin and a thick lens count as alike.
 constexpr double kThinTolerancePx = 0.1;
 
 // What a calibrated camera does to points at several depths.
 struct Explanation {
-  std::string camera_name;
-  double front_focal_length_mm = 0;
-  double image_distance_mm = 0;
-  double image_distance_sigma_mm = 0;
-  double focus_depth_mm = 0;  // may be +inf
-  double blur_ratio = 0;
-  double blur_ratio_sigma = 0;
-  std::optional<double> blur_floor_px;
-  std::vector<DepthRow> rows;
-  std::vector<DepthOfFieldRow> depth_of_field;
+  std::string camera_name;              // Camera::name
+  double front_focal_length_mm = 0;     // f1, mm
+  double image_distance_mm = 0;         // d1 from Ap to the sensor, mm
+  double image_distance_sigma_mm = 0;   // its standard deviation, mm
+  double focus_depth_mm = 0;            // may be +inf
+  double blur_ratio = 0;                // kappa, dimensionless
+  double blur_ratio_sigma = 0;          // its standard deviation
+  std::optional<double> blur_floor_px;  // sigma of the lens floor, px; absent: not calibrated
+  std::vector<DepthRow> rows;           // one per depth, from near to far
+  std::vector<DepthOfFieldRow> depth_of_field;  // one per limit of the blur radius
   double hyperfocal_mm = 0;     // plane of focus whose blur radius at infinity is 1 px
   double working_f_number = 0;  // D/(2 r)
-  ThinComparison thin;
+  ThinComparison thin;          // the camera as a thin lens
 };
 
 // Returns `count` depths (>= 2), equally spaced in 1/z, where the blur changes by equal steps.

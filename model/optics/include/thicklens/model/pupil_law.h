@@ -59,22 +59,25 @@ class THICKLENS_EXPORT PupilProfile {
   // x = 100 on).
   double Transfer(double x) const;
 
+  // A ring of the pupil with a share of the light of the point.
   struct Ring {
     double radius = 0;  // radius on Ap divided by sigma
     double share = 0;   // share of the light; all shares sum to 1
   };
+  // The rings that represent the density of the light.
   const std::vector<Ring>& rings() const { return rings_; }
 
   // Edge of a disc: its radius R divided by sigma, and the density of the light over
   // u = (A/sigma)^2 at R^2 with its first two derivatives. There is no light beyond the edge.
   struct DiscEdge {
-    double radius = 0, density = 0, slope = 0, bend = 0;
+    double radius = 0, density = 0, slope = 0, bend = 0;  // R/sigma; density and its derivatives
   };
 
   // The sigma of T divided by sigma.
   double transmission_ratio() const { return transmission_ratio_; }
   // The mean of A divided by i for a point off the axis, to first order in i.
   double mean_per_landing() const { return mean_per_landing_; }
+  // The shape of T.
   Psf psf() const { return psf_; }
 
  private:

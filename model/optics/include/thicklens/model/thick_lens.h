@@ -66,12 +66,13 @@ THICKLENS_EXPORT double ChiefRayMagnification(const ThickLens& lens, double imag
 // Positions of the nodal points from Ap, mm [D1]. N1 is f1 - f2 in front of Ap (positive toward the
 // scene); N2 is rho + f2 - f1 behind it (positive toward the sensor).
 THICKLENS_EXPORT double FrontNodalDepthMm(const ThickLens& lens);
+// Distance of the rear nodal point N2 from Ap, mm: rho + f2 - f1, positive toward the sensor [D1].
 THICKLENS_EXPORT double RearNodalDistanceMm(const ThickLens& lens);
 
 // Depths from Ap between which the blur radius is at most a limit; far_mm may be +inf.
 struct DepthOfField {
-  double near_mm = 0;
-  double far_mm = 0;
+  double near_mm = 0;  // the nearer end, mm from Ap
+  double far_mm = 0;   // the farther end, mm from Ap
 };
 // Depth of field for the largest blur radius r_max, mm on the sensor, from
 // |1/z - 1/zf| <= r_max/(r K); derived here [D6]. A limit of 0 gives (zf, zf). Throws Error unless

@@ -12,6 +12,8 @@ namespace thicklens::model {
 // thicklens/camera/1 is accepted and converted. Unknown keys, wrong types and values out of range
 // throw Error with file:line:column; `source_name` is the file name in these messages.
 THICKLENS_EXPORT Camera ReadCamera(const std::string& path);
+// Reads the text of a camera file. `source_name` is the file name in messages. Throws Error as
+// ReadCamera does.
 THICKLENS_EXPORT Camera ParseCamera(const std::string& text, const std::string& source_name);
 
 // The YAML text of a camera. Numbers read back from it have the same bits.

@@ -24,6 +24,8 @@ THICKLENS_EXPORT std::string ViewFileStem(int k, int l);
 // Unknown keys, wrong types and values out of range throw Error with file:line:column;
 // `source_name` is the file name in these messages.
 THICKLENS_EXPORT LightFieldDescription ReadLightFieldDescription(const std::string& path);
+// Reads the text of a description. `source_name` is the file name in messages. Throws Error as
+// ReadLightFieldDescription does.
 THICKLENS_EXPORT LightFieldDescription ParseLightFieldDescription(const std::string& text,
                                                                   const std::string& source_name);
 // The YAML text of a description. Throws Error if a number is not finite.

@@ -14,32 +14,36 @@ namespace thicklens::model {
 // Direction of the bench scale [D56]: z = offset + reading (away) or z = offset - reading (toward),
 // where z is the depth from Ap, mm.
 enum class BenchDirection { kAway, kToward };
+// Name of the direction: "away" or "toward".
 THICKLENS_EXPORT std::string BenchDirectionName(BenchDirection direction);
 THICKLENS_EXPORT double DirectionSign(BenchDirection direction);  // +1 away, -1 toward
 
 // Kind of the photographed target.
 enum class SweepTarget { kAuto, kTexture, kPrintedEdge, kKnifeEdge };
+// Name of the kind: "auto", "texture", "printed-edge" or "knife-edge".
 THICKLENS_EXPORT std::string SweepTargetName(SweepTarget target);
 
 // Prior knowledge of the lens floor, px: nothing, a value, or an interval.
 struct FloorKnowledge {
-  std::optional<Estimate> given_px;
+  std::optional<Estimate> given_px;      // a value and its standard deviation, px
   std::optional<double> from_px, to_px;  // both or neither are present
 };
 
 // Origin of a given floor that was taken from another calibration. The floor is valid only for this
 // lens on these pixels.
 struct FloorOrigin {
-  std::string place;  // for messages: "sweep.yaml:4:17: blur_floor_px.from_calibration: "
-  std::string camera_path;
-  ThickLens lens;
-  double pixel_pitch_mm = 0;
+  std::string place;          // for messages: "sweep.yaml:4:17: blur_floor_px.from_calibration: "
+  std::string camera_path;    // the camera file with the other calibration
+  ThickLens lens;             // the lens of that camera
+  double pixel_pitch_mm = 0;  // its pixel pitch, mm
 };
 
+// The part of each frame that is measured.
 struct RegionOfInterest {
   int x = 0, y = 0, width = 0, height = 0;  // px; width 0: the whole field
 };
 
+// One frame of a sweep.
 struct SweepFrame {
   std::string image;      // path that can be opened
   double reading_mm = 0;  // what the scale of the bench shows; not a depth
@@ -48,18 +52,18 @@ struct SweepFrame {
 // A focus sweep as its file describes it, schema thicklens/sweep/1 (docs/file-formats.md).
 // All readings are in mm, independent of the unit in the file.
 struct SweepFile {
-  std::string source;       // name of the file, for messages
-  std::string camera_path;  // path that can be opened
-  double reading_sigma_mm = 0;
-  bool reading_sigma_stated = false;
+  std::string source;                 // name of the file, for messages
+  std::string camera_path;            // path that can be opened
+  double reading_sigma_mm = 0;        // standard deviation of the error of a reading, mm
+  bool reading_sigma_stated = false;  // false: the scatter about the law of image scale is used
   std::optional<Estimate> offset_mm;  // absent: unknown
-  BenchDirection direction = BenchDirection::kAway;
-  SweepTarget target = SweepTarget::kAuto;
-  FloorKnowledge floor;
-  std::optional<FloorOrigin> floor_origin;
-  std::optional<double> target_period_mm;  // period of a periodic target (docs/file-formats.md)
-  RegionOfInterest roi;
-  std::vector<SweepFrame> frames;  // in the order of the file
+  BenchDirection direction = BenchDirection::kAway;  // whether readings grow away from the camera
+  SweepTarget target = SweepTarget::kAuto;           // what was photographed
+  FloorKnowledge floor;                              // what is known of the lens floor
+  std::optional<FloorOrigin> floor_origin;  // present if another calibration gave the floor
+  std::optional<double> target_period_mm;   // period of a periodic target (docs/file-formats.md)
+  RegionOfInterest roi;                     // the part that is measured
+  std::vector<SweepFrame> frames;           // in the order of the file
 };
 
 // Reads the YAML file and, with `frames_csv`, the table. Throws Error with file:line:column for
@@ -92,26 +96,28 @@ THICKLENS_EXPORT std::string SweepToYaml(const SweepFile& sweep);
 
 // Parameters with which a sweep was simulated, schema thicklens/sweep-truth/1.
 struct SweepTruth {
-  double image_distance_mm = 0;
-  double focus_depth_mm = 0;
-  double blur_ratio = 0;
-  double blur_floor_px = 0;
-  double bench_offset_mm = 0;
-  double tilt_deg = 0;    // tilt of the target, as in TargetOptions
-  std::string pupil_law;  // PupilLawName; empty: not stated
+  double image_distance_mm = 0;  // d1 from Ap to the sensor, mm
+  double focus_depth_mm = 0;     // zf from Ap, mm
+  double blur_ratio = 0;         // kappa, dimensionless
+  double blur_floor_px = 0;      // sigma of the lens floor, px
+  double bench_offset_mm = 0;    // depth from Ap of reading 0, mm
+  double tilt_deg = 0;           // tilt of the target, as in TargetOptions
+  std::string pupil_law;         // PupilLawName; empty: not stated
+  // What is true of one frame.
   struct Frame {
-    std::string image;
+    std::string image;      // file name of the frame
     double depth_mm = 0;    // true z from Ap
     double reading_mm = 0;  // the reading of the bench with its error
     // Second-moment sigma of the blur, sqrt(floor^2 + (kappa r_defocus/p)^2), without the pixel
     // box.
     double blur_sigma_px = 0;
   };
-  std::vector<Frame> frames;
+  std::vector<Frame> frames;      // in the order of the sweep
   EffectSelectionRecord effects;  // written, but not read
 };
 // Throws Error with file:line:column for invalid content.
 THICKLENS_EXPORT SweepTruth ReadSweepTruth(const std::string& path);
+// The YAML text of the parameters.
 THICKLENS_EXPORT std::string SweepTruthToYaml(const SweepTruth& truth);
 
 }  // namespace thicklens::model

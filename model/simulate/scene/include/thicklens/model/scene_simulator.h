@@ -39,8 +39,9 @@ enum class TextureKind {
 THICKLENS_EXPORT std::string TextureKindName(
     TextureKind kind);  // "uniform", "sine", "checkerboard", ...
 
+// The radiance of a layer's surface.
 struct TextureOptions {
-  TextureKind kind = TextureKind::kDeadLeaves;
+  TextureKind kind = TextureKind::kDeadLeaves;  // what is painted on the surface
   // Mean radiance, RGB in linear light, 1 at full scale. An image (kImage) keeps its own colours.
   Eigen::Vector3d colour{0.5, 0.5, 0.5};
   // Value of (bright - dark)/(bright + dark) for a sine, an edge, squares and sectors. Leaves have
@@ -67,7 +68,7 @@ struct TextureOptions {
 // optical axis in mm. Its 1/z is linear in the image: (1 - slope . tan(angle of the chief
 // ray))/depth_mm.
 struct PlaneOptions {
-  double depth_mm = 0;
+  double depth_mm = 0;          // z on the optical axis, from Ap, mm
   Eigen::Vector2d slope{0, 0};  // mm of depth per mm to the right and down
 };
 
@@ -86,10 +87,12 @@ struct DepthMapOptions {
 // size. Its values are bilinear between pixel centres and constant beyond the outermost ones; a
 // position is inside where the value is at least half of full scale.
 struct OutlineOptions {
+  // The whole plane (kWhole), a rectangle, a disc, or what a mask image marks.
   enum class Shape { kWhole, kRectangle, kDisc, kMask };
+  // Image positions of chief rays (kPx), or positions on the plane (kMm).
   enum class Unit { kPx, kMm };
-  Shape shape = Shape::kWhole;
-  Unit unit = Unit::kPx;
+  Shape shape = Shape::kWhole;   // shape of the part
+  Unit unit = Unit::kPx;         // unit of the lengths below
   Eigen::Vector2d centre{0, 0};  // in `unit`, like `size` and `radius`
   Eigen::Vector2d size{0, 0};    // kRectangle only
   double radius = 0;             // kDisc only
@@ -107,13 +110,14 @@ struct GlossOptions {
   double strength = 0;              // radiance at the centre, the same in all channels; >= 0
 };
 
+// One surface of the scene with its outline, texture and gloss.
 struct SceneLayer {
-  std::string name;  // for messages; may be empty
-  PlaneOptions plane;
+  std::string name;                      // for messages; may be empty
+  PlaneOptions plane;                    // where the surface is
   std::optional<DepthMapOptions> depth;  // replaces the plane; the outline must then be whole
-  OutlineOptions outline;
-  TextureOptions texture;
-  std::vector<GlossOptions> gloss;
+  OutlineOptions outline;                // the part that is there
+  TextureOptions texture;                // its radiance
+  std::vector<GlossOptions> gloss;       // mirror images of lamps; may be empty
 };
 
 // Contents of the files that a layer names. A field is empty if the layer names no such file.
@@ -126,6 +130,7 @@ struct LayerPixels {
 // Returns the effects that an image of a scene can have.
 THICKLENS_EXPORT EffectSet ImageEffects();
 
+// What SceneSimulator simulates. The defaults are those of the file's schema.
 struct SceneSimulationOptions {
   // Image size, pitch and lens. The calibration gives d1, kappa and the lens floor (0 if absent).
   Camera camera;
@@ -134,19 +139,20 @@ struct SceneSimulationOptions {
   // Allowed rms error of the encoded values because of the finite number of rays, in 1/255 of full
   // scale. 0: all pixels get rays_per_pixel rays.
   double sampling_error_grey_levels = 0.2;
-  int rays_per_pixel = 600;  // maximum number
-  double wavelength_mm = 550e-6;
+  int rays_per_pixel = 600;       // maximum number
+  double wavelength_mm = 550e-6;  // wavelength of the light, mm, for diffraction
   // Sensor noise: electrons at full scale (0: no shot noise) and standard deviation of the read
   // noise.
   double full_well_electrons = 0, read_noise_electrons = 0;
   // Standard deviation of the noise of the encoded values, in 1/255 of full scale at 8 and 16 bits.
   double noise_sigma_grey_levels = 0;
-  int bits = 8;                  // 8 or 16
-  int u_count = 5, v_count = 5;  // numbers of views of the true light field
-  double uv_depth_mm = 0;        // depth of its UV plane; ST is in the plane of focus
-  std::uint64_t seed = 1;
+  int bits = 8;                      // 8 or 16
+  int u_count = 5, v_count = 5;      // numbers of views of the true light field
+  double uv_depth_mm = 0;            // depth of its UV plane; ST is in the plane of focus
+  std::uint64_t seed = 1;            // of textures and noise
   std::vector<std::string> notices;  // of the file, one line each: names that are deprecated
 
+  // Returns whether all members are valid. Otherwise `why`, if not null, gets the reason.
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 
@@ -156,23 +162,23 @@ THICKLENS_EXPORT SceneSimulationOptions ReadSceneSimulation(const std::string& p
 
 // The parameters of a simulated image.
 struct SceneTruth {
-  double image_distance_mm = 0;
-  double focus_depth_mm = 0;
-  double blur_ratio = 0;
-  double blur_floor_px = 0;
+  double image_distance_mm = 0;                        // d1 from Ap to the sensor, mm
+  double focus_depth_mm = 0;                           // zf from Ap, mm
+  double blur_ratio = 0;                               // kappa, dimensionless
+  double blur_floor_px = 0;                            // sigma of the lens floor, px
   double nearest_depth_mm = 0, farthest_depth_mm = 0;  // minimum and maximum of the depth map
-  double largest_blur_sigma_px = 0;  // maximum of defocus alone, over the depth map
-  EffectSelectionRecord effects;
+  double largest_blur_sigma_px = 0;       // maximum of defocus alone, over the depth map
+  EffectSelectionRecord effects;          // which effects the photograph has
   double sampling_error_grey_levels = 0;  // rms, of the pixels where it is largest
-  std::uint64_t seed = 0;
+  std::uint64_t seed = 0;                 // of textures and noise
 };
 THICKLENS_EXPORT std::string SceneTruthToYaml(
     const SceneTruth& truth);  // schema thicklens/scene-truth/1
 
 // Control of a long computation.
 struct SceneRun {
-  int threads = 0;  // 0: one per core
-  ProgressFunction progress;
+  int threads = 0;            // 0: one per core
+  ProgressFunction progress;  // gets the rows or views that are done; empty: none
 };
 
 // Image formation from a scene of textured surfaces to a photograph and its true light field by the
@@ -227,6 +233,7 @@ class THICKLENS_EXPORT SceneSimulator {
 
   // Returns the depth z, in mm, of the point that the chief ray of each pixel's centre meets.
   RawDepthMap RenderDepth() const;
+  // Returns the parameters of the image with the range of `depth`, which RenderDepth made.
   SceneTruth Truth(const RawDepthMap& depth) const;
 
   // Returns the radiance seen from one aperture position, mm, with effects_of_views() and with

@@ -15,37 +15,42 @@ namespace thicklens::model {
 
 // The ablation of a sweep and of the calibration from it.
 
+// The two calibrated values that an ablation compares, with their standard deviations.
 struct CalibratedValues {
-  double image_distance_mm = 0, image_distance_sigma_mm = 0;
-  double blur_ratio = 0, blur_ratio_sigma = 0;
+  double image_distance_mm = 0, image_distance_sigma_mm = 0;  // d1 from Ap to the sensor, mm
+  double blur_ratio = 0, blur_ratio_sigma = 0;                // kappa, dimensionless
 };
 
+// The change that one effect causes to the frames and to the calibration.
 struct AblatedSweepEffect : AblatedEffect {
   // Absent: the calibration was refused for the reason in `refusal`.
   std::optional<CalibratedValues> calibration;
-  std::string refusal;
-  double calibration_seconds = 0;
+  std::string refusal;             // empty if there is a calibration
+  double calibration_seconds = 0;  // time of the calibration without the effect
 };
 
+// The changes of all effects, and the reference that has all of them.
 struct SweepAblation {
-  EffectSet on;
-  int frames = 0;
-  double true_image_distance_mm = 0, true_blur_ratio = 0;
-  CalibratedValues calibration;
-  double image_seconds = 0, calibration_seconds = 0;
-  std::vector<AblatedSweepEffect> effects;
+  EffectSet on;    // effects of the sweep that is the reference
+  int frames = 0;  // number of frames
+  double true_image_distance_mm = 0, true_blur_ratio = 0;  // d1, mm, and kappa of the simulation
+  CalibratedValues calibration;                            // of the reference
+  double image_seconds = 0, calibration_seconds = 0;       // times of the reference
+  std::vector<AblatedSweepEffect> effects;                 // one per effect of the reference
 };
 
 // A simulated sweep that is to be calibrated.
 struct SweepToCalibrate {
-  const SweepSimulationOptions& options;
-  const SweepSimulator& simulator;
+  const SweepSimulationOptions& options;  // what was simulated
+  const SweepSimulator& simulator;        // gives camera and truth
+  // Returns the encoded frame of an index.
   std::function<EncodedImage(int frame)> stored_frame;
   std::function<void()> tell;  // to be called often; may throw to stop
 };
+// What a calibration of a simulated sweep found.
 struct SweepCalibration {
-  std::optional<CalibratedValues> values;
-  std::string refusal;  // the reason why there are no values
+  std::optional<CalibratedValues> values;  // absent: refused
+  std::string refusal;                     // the reason why there are no values
 };
 // Calibrates a sweep. It is a function of the caller, because the calibration is not part of this
 // module.

@@ -29,8 +29,9 @@ enum class TargetKind {
 };
 THICKLENS_EXPORT std::string TargetKindName(TargetKind kind);  // "dead-leaves", "pink-noise", ...
 
+// The flat target: its pattern, and how it stands.
 struct TargetOptions {
-  TargetKind kind = TargetKind::kDeadLeaves;
+  TargetKind kind = TargetKind::kDeadLeaves;  // what is on the target
   std::string image_path;  // path of the image (kImage), for messages and the record
   // Value of (bright - dark)/(bright + dark) for two-valued targets. Leaves have every grey between
   // the two. Noise has the relative standard deviation contrast/2. An image (kImage) keeps its
@@ -50,33 +51,35 @@ struct TargetOptions {
   double tilt_deg = 0;
 };
 
+// What SweepSimulator simulates. The defaults are those of the file's schema.
 struct SweepSimulationOptions {
-  Camera camera;  // image size, pitch, lens; its calibration gives d1, kappa and the floor
-  TargetOptions target;
+  Camera camera;         // image size, pitch, lens; its calibration gives d1, kappa and the floor
+  TargetOptions target;  // what is photographed
 
-  double first_depth_mm = 0;  // true z of the first frame
-  double step_mm = 0;         // step between frames, may be negative
-  int frame_count = 0;
-  double bench_offset_mm = 0;  // z = offset + reading or z = offset - reading
-  BenchDirection direction = BenchDirection::kAway;
-  double reading_sigma_mm = 0;  // sd of the error of each written reading
+  double first_depth_mm = 0;                         // true z of the first frame
+  double step_mm = 0;                                // step between frames, may be negative
+  int frame_count = 0;                               // number of frames
+  double bench_offset_mm = 0;                        // z = offset + reading or z = offset - reading
+  BenchDirection direction = BenchDirection::kAway;  // sign of the reading in z
+  double reading_sigma_mm = 0;                       // sd of the error of each written reading
 
-  double light_level = 0.5;        // mean linear grey at the plane of focus, of full scale
-  bool lamp_falloff = true;        // the irradiance of the target is proportional to (zf/z)^2
-  double flicker = 0;              // relative sd of the lamp, per frame
-  double drift_sigma_px = 0;       // sd of the lateral position of the target, per frame, at zf
-  double full_well_electrons = 0;  // shot noise: electrons at full scale; 0: no shot noise
-  double read_noise_electrons = 0;
-  int bits = 8;
+  double light_level = 0.5;         // mean linear grey at the plane of focus, of full scale
+  bool lamp_falloff = true;         // the irradiance of the target is proportional to (zf/z)^2
+  double flicker = 0;               // relative sd of the lamp, per frame
+  double drift_sigma_px = 0;        // sd of the lateral position of the target, per frame, at zf
+  double full_well_electrons = 0;   // shot noise: electrons at full scale; 0: no shot noise
+  double read_noise_electrons = 0;  // standard deviation of the read noise
+  int bits = 8;                     // 8 or 16 per encoded value
   // Distribution of the light of a point over the pupil; its second moment is (kappa r)^2 in any
   // case. If it is absent, the law of the paper is used where fall-off is on, and the uniform law
   // otherwise.
   std::optional<PupilLaw> pupil_law;
   // A choice of SweepEffects(); kAuto selects all of them.
   EffectSelectionOptions effects;
-  std::uint64_t seed = 1;
+  std::uint64_t seed = 1;            // of textures, noise and errors
   std::vector<std::string> notices;  // of the file, one line each: names that are deprecated
 
+  // Returns whether all members are valid. Otherwise `why`, if not null, gets the reason.
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 
@@ -110,7 +113,9 @@ class THICKLENS_EXPORT SweepSimulator {
   // applied. Thread safe; throws Error if the frame does not exist.
   EncodedImage RenderFrame(int frame_index) const;
 
+  // The parameters and the true depth, reading and blur of every frame.
   const SweepTruth& truth() const;
+  // The effects that the frames have.
   const EffectSelection& effects() const;
   // The camera of the options with which the encoded values must be interpreted. Its transfer curve
   // is linear if that effect is off, and its PSF is Gaussian if the effect aperture shape is off.

@@ -8,10 +8,11 @@
 
 namespace thicklens::model {
 
+// One disc of the texture.
 struct TargetLeaf {
   double x_mm = 0, y_mm = 0;  // on the sheet
-  double radius_mm = 0;
-  int grey = 0;  // 0 to 255, as stored
+  double radius_mm = 0;       // radius, mm
+  int grey = 0;               // 0 to 255, as stored
 };
 
 // The texture of a target: dead leaves, discs that occlude each other, from the back to the front.
