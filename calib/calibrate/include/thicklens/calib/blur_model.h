@@ -12,6 +12,7 @@
 namespace thicklens::calib {
 
 THICKLENS_EXPORT bool IsDepth(double depth_mm);  // finite and in front of the camera
+// Returns whether the blur of the frame was measured.
 THICKLENS_EXPORT bool HasBlur(const FrameMeasurement& frame);
 
 // Blur by the fitted law, sigma = sqrt(S0 + (kappa r_defocus/p)^2), px for each axis, without the
@@ -27,6 +28,7 @@ class THICKLENS_EXPORT BlurModel {
   // Returns the model that a simulated sweep was made with.
   static BlurModel OfTruth(const FocusSweep& sweep, const model::SweepTruth& truth);
 
+  // Sigma of the blur per axis at a depth z > 0 from Ap, mm; px.
   double SigmaPx(double depth_mm) const;
   // Derivative d sigma/d z, px per mm: the effect of an error of the reading on the blur. It is 0
   // at z = zf.
@@ -38,6 +40,7 @@ class THICKLENS_EXPORT BlurModel {
   // reading, for a frame of the fit.
   std::optional<double> ResidualSigmas(const FrameMeasurement& frame) const;
 
+  // Returns whether the floor is that of the frames because the fit has none.
   bool floor_from_frames() const { return floor_from_frames_; }
 
  private:

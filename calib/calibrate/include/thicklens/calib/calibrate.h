@@ -12,8 +12,9 @@
 
 namespace thicklens::calib {
 
+// What Calibrate computes, and how it is run.
 struct CalibrationOptions {
-  QualityCheckOptions checks;
+  QualityCheckOptions checks;  // limits of the quality checks
   // If false, only the paper's recipe and the sharpness peak are computed. Where the bench zero is
   // given they need no image scale, and no frame is registered: a wrong reading is not noticed.
   bool fit_blur = true;
@@ -21,6 +22,7 @@ struct CalibrationOptions {
   int threads = 0;            // 0: one per core
   ProgressFunction progress;  // called from time to time
 
+  // Returns whether all members are in their range. Otherwise `why`, if not null, gets the reason.
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 

@@ -13,13 +13,14 @@ namespace thicklens::calib {
 struct RejectionRun {
   int first = 0, last = 0;  // indices into the frames
   std::string detail;       // text of the reason beyond its kind: "mean 0.003 of full scale"
+  // The number of frames.
   int count() const { return last - first + 1; }
 };
 
 // All frames that were rejected for one kind of reason, anywhere in the sweep.
 struct RejectionGroup {
-  std::string kind;  // "dark"
-  int frames = 0;
+  std::string kind;                // "dark"
+  int frames = 0;                  // number of frames in all runs
   std::vector<RejectionRun> runs;  // in the sweep's order, none empty
 };
 

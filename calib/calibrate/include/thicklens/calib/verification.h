@@ -13,6 +13,7 @@ namespace thicklens::calib {
 
 // The check whether a stored calibration still holds, from a new sweep of the same camera.
 
+// The limits of the verdict.
 struct VerificationOptions {
   // The stored calibration does not hold if the joint chi-square exceeds the value that chance
   // exceeds in this share of the cases; 0.0027 is three sigma.
@@ -22,37 +23,41 @@ struct VerificationOptions {
   // The change of the blur that a sweep must be able to detect; otherwise its agreement proves
   // nothing. A change by d1 is in px of sigma, and a change of kappa is a share of kappa.
   double needed_blur_px = 0.5;
-  double needed_blur_ratio = 0.1;
+  double needed_blur_ratio = 0.1;  // share of kappa
 
+  // Returns whether all members are in their range. Otherwise `why`, if not null, gets the reason.
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 
 // One quantity, with its stored and its new value.
 struct ComparedParameter {
-  std::string name;  // as in files: "image_distance_mm"
-  model::Estimate stored, found;
+  std::string name;                           // as in files: "image_distance_mm"
+  model::Estimate stored, found;              // value of the file, value of the new sweep
   double difference = 0;                      // found minus stored
   double systematic_sigma = 0;                // part of sigma from the new sweep's systematic parts
   double sigma = 0;                           // standard deviation of the difference, in all
   THICKLENS_EXPORT double deviation() const;  // difference over sigma; 0 if sigma is 0
   bool counted = false;                       // included in the joint chi-square
-  std::string why_not_counted;
+  std::string why_not_counted;                // empty if it is counted
   // The smallest change of this parameter alone that the joint test finds in 95 % of the cases. It
   // is 0 where the parameter is not counted.
   double smallest_detectable = 0;
 };
 
+// The stored calibration agrees with the sweep (kHolds) or does not (kDoesNotHold), or the sweep
+// could not have detected a change (kUndetermined).
 enum class Verdict { kHolds, kDoesNotHold, kUndetermined };
 // "holds", "does-not-hold", "cannot-tell".
 THICKLENS_EXPORT std::string VerdictName(Verdict verdict);
 
+// The verdict, and the comparison behind it.
 struct Verification {
-  Verdict verdict = Verdict::kUndetermined;
-  std::string reason = "not run";
+  Verdict verdict = Verdict::kUndetermined;   // whether the calibration holds
+  std::string reason = "not run";             // one line: why this is the verdict
   std::vector<ComparedParameter> parameters;  // present in both: d1, zf, kappa, floor, bench zero
   int degrees_of_freedom = 0;                 // number of counted parameters
-  double chi_square = 0;
-  double p_value = 1;
+  double chi_square = 0;                      // joint chi^2 of the counted parameters
+  double p_value = 1;                         // probability that chance alone exceeds it
   // The blur, px of sigma, that the smallest detectable change of d1 causes at the depth of focus.
   double detectable_blur_px = 0;
   std::vector<std::string> warnings;  // one line each
@@ -71,6 +76,8 @@ THICKLENS_EXPORT Verification VerifyCalibration(const model::Camera& stored,
 // ChiSquareTail returns P(chi^2 >= x) for a number of degrees of freedom (>= 1). ChiSquareExceeded
 // returns the x that is exceeded with probability p in (0, 1).
 THICKLENS_EXPORT double ChiSquareTail(double x, int degrees_of_freedom);
+// Returns the x that chi^2 exceeds with probability p in (0, 1), for a number of degrees of freedom
+// (>= 1).
 THICKLENS_EXPORT double ChiSquareExceeded(double p, int degrees_of_freedom);
 
 }  // namespace thicklens::calib

@@ -17,8 +17,8 @@ namespace thicklens::calib {
 // A result with both kinds of error: sigma is the statistical standard deviation, and `systematic`
 // is an interval around the value.
 struct Result {
-  double value = 0;
-  double sigma = 0;
+  double value = 0;                           // the result, in the unit of the field's name
+  double sigma = 0;                           // statistical standard deviation
   std::optional<Eigen::Vector2d> systematic;  // (lo, hi), absolute values
 };
 
@@ -27,22 +27,22 @@ struct Result {
 // unit.
 struct SystematicPart {
   std::string name;  // "lens floor", "side of focus", "lens.front_focal_length_mm"
-  Eigen::Vector2d focus_depth_mm{0, 0};
-  Eigen::Vector2d image_distance_mm{0, 0};
-  Eigen::Vector2d blur_ratio{0, 0};
-  std::string remedy;  // action at the bench that would shrink this part
+  Eigen::Vector2d focus_depth_mm{0, 0};     // change of zf, mm
+  Eigen::Vector2d image_distance_mm{0, 0};  // change of d1, mm
+  Eigen::Vector2d blur_ratio{0, 0};         // change of kappa
+  std::string remedy;                       // action at the bench that would shrink this part
 };
 
 // The measurements on one frame. Depths are from Ap, and use the offset that was given or found.
 struct FrameMeasurement {
-  std::string image;
-  double reading_mm = 0;
-  double depth_mm = 0;
-  FrameStatistics statistics;
-  std::string rejection;             // empty if the frame is used
-  double mean_edge_slope = 0;        // MES, linear grey per px
-  double normalised_edge_slope = 0;  // MES over the frame's mean grey, per px
-  int edge_count = 0;
+  std::string image;                  // file name of the frame
+  double reading_mm = 0;              // what the scale of the bench shows
+  double depth_mm = 0;                // offset plus or minus reading
+  FrameStatistics statistics;         // levels, contrast and noise
+  std::string rejection;              // empty if the frame is used
+  double mean_edge_slope = 0;         // MES, linear grey per px
+  double normalised_edge_slope = 0;   // MES over the frame's mean grey, per px
+  int edge_count = 0;                 // number of edge pixels of the slopes
   double source_blur_sigma_px = 0;    // measured by the method of Zhuo and Sim, as in the paper
   double blur_sigma_px = 0;           // of lens and defocus, without pixel box and operator
   double blur_sigma_error_px = 0;     // its standard deviation
@@ -51,39 +51,39 @@ struct FrameMeasurement {
   double blur_fit_weight = 0;         // 0 to 1, from the robust loss
   std::optional<double> image_scale;  // relative to the reference frame
   double image_scale_sigma = 0;       // its standard deviation
-  bool in_scale_fit = false;
+  bool in_scale_fit = false;          // false: not registered, or rejected
   // The written reading minus the joint fit's estimate of it, and the standard deviation of this
   // difference. Both are 0 in frames that are not in the fit.
   double reading_error_mm = 0;
-  double reading_error_sigma_mm = 0;
+  double reading_error_sigma_mm = 0;  // see reading_error_mm
 };
 
 // Result of the paper's recipe: the depth of the sharpest frame, then the mean of sigma/r_defocus.
 // It has no error estimate because the recipe has none.
 struct SourceRecipe {
-  bool done = false;
-  std::string message = "not run";
-  int sharpest_frame = -1;  // index into frames
-  double focus_depth_mm = 0;
-  double image_distance_mm = 0;
-  double blur_ratio = 0;  // dominated by frames near focus (the ratio diverges there)
-  int ratio_frames = 0;   // frames in the mean; the sharpest has r_defocus = 0 and is left out
+  bool done = false;                // true if the recipe gave a result
+  std::string message = "not run";  // how it ended; without a result, the reason
+  int sharpest_frame = -1;          // index into frames
+  double focus_depth_mm = 0;        // depth from Ap of the sharpest frame
+  double image_distance_mm = 0;     // d1 of that depth [S13]
+  double blur_ratio = 0;            // dominated by frames near focus (the ratio diverges there)
+  int ratio_frames = 0;  // frames in the mean; the sharpest has r_defocus = 0 and is left out
   // Result of the same recipe with the index divided by the frame's mean grey.
   int sharpest_normalised_frame = -1;
-  double normalised_focus_depth_mm = 0;
+  double normalised_focus_depth_mm = 0;  // depth from Ap of that frame
 };
 
 // Peak of the normalised sharpness: a parabola is fitted to the logarithm over the top of the
 // curve.
 struct SharpnessPeak {
-  bool done = false;
-  std::string message = "not run";
-  double focus_depth_mm = 0;
-  double sigma_mm = 0;
-  int frames_used = 0;
+  bool done = false;                // true if a peak was found
+  std::string message = "not run";  // how it ended; without a result, the reason
+  double focus_depth_mm = 0;        // depth of the peak from Ap
+  double sigma_mm = 0;              // its standard deviation
+  int frames_used = 0;              // number of frames in the parabola
   // [D70] log(index) = c0 + c1 x + c2 x^2, x = (1/z - 1/z0) z0, z0 = reference_depth_mm.
   Eigen::Vector3d log_parabola{0, 0, 0};
-  double reference_depth_mm = 0;
+  double reference_depth_mm = 0;              // z0 from Ap
   double from_depth_mm = 0, to_depth_mm = 0;  // range of the fitted frames
 };
 
@@ -97,16 +97,16 @@ enum class ScaleKind {
 
 // The bench zero from the image scale: 1/scale = (offset + direction * reading)/z_reference.
 struct ScaleModel {
-  bool done = false;  // true if the offset was found; for kInverseDepth alone
-  std::string message = "not run";
-  ScaleKind kind = ScaleKind::kUnknown;
-  bool contradicts_readings = false;  // most of the registered frames agree with no law at all
+  bool done = false;                     // true if the offset was found; for kInverseDepth alone
+  std::string message = "not run";       // how it ended; without a result, the reason
+  ScaleKind kind = ScaleKind::kUnknown;  // the law that the scales follow
+  bool contradicts_readings = false;     // most of the registered frames agree with no law at all
   // Relative increase of 1/scale over the range of the readings: positive where the target looks
   // smaller at larger readings ("away"). It is present whenever enough frames were registered.
   std::optional<model::Estimate> change_over_sweep;
   bool shows_no_scale = false;  // the target (spokes) looks the same at any scale: not sought
-  int reference_frame = -1;
-  Result offset_mm;  // the bench zero: position of the aperture
+  int reference_frame = -1;     // index of the frame with scale 1; -1: none
+  Result offset_mm;             // the bench zero: position of the aperture
   // Depth, from the aperture, at which the size on the sensor goes to infinity. It is not 0 because
   // the light of a point off the axis spreads unevenly over the pupil
   // (model::CentreOfPerspectiveMm, by the paper's law). It is part of offset_mm.
@@ -116,9 +116,10 @@ struct ScaleModel {
   // Depth of the reference frame from the centre of perspective:
   // 1/scale = (line_zero_mm + direction * reading)/reference_depth_mm.
   double reference_depth_mm = 0;
+  // The bench zero as measured from the centre of perspective, mm.
   double line_zero_mm() const { return offset_mm.value - centre_mm; }
   double reading_rms_mm = 0;  // scatter of the readings about the law
-  int frames_used = 0;
+  int frames_used = 0;        // number of frames in the fit
   // Radial distortion that the registrations show, as the relative change of the image height at
   // the corner of the region (positive: pincushion). It is absent where too few registrations
   // determine it.
@@ -128,16 +129,16 @@ struct ScaleModel {
 // d1 from the image scale where a length on the target is known (sweep file: target_period_mm):
 // m = f1 D/(f2 z). It does not depend on sharpness.
 struct MagnificationCheck {
-  double period_px = 0;  // measured in the reference frame
-  double period_mm = 0;  // as stated
-  model::Estimate image_distance_mm;
+  double period_px = 0;               // measured in the reference frame
+  double period_mm = 0;               // as stated
+  model::Estimate image_distance_mm;  // d1 from Ap to the sensor
 };
 
 // The measured blur of one frame, for plots: an edge's profile, or the transfer relative to the
 // reference against frequency.
 struct BlurExample {
-  int frame = -1;  // index into frames
-  bool is_edge = false;
+  int frame = -1;                // index into frames
+  bool is_edge = false;          // true: a profile; false: a transfer
   std::vector<double> x;         // distance from the edge, px; or frequency, cycles per px
   std::vector<double> measured;  // edge: 0 dark to 1 bright; or transfer, 1 at frequency 0
   std::vector<double> gaussian;  // fit with a Gaussian, at x
@@ -146,30 +147,32 @@ struct BlurExample {
 
 // Result of a fit to the frames on one side of focus.
 struct SideFit {
-  bool done = false;
-  std::string message = "not run";
-  model::Estimate focus_depth_mm;
-  model::Estimate blur_ratio;
-  int frames_used = 0;
+  bool done = false;                // true if the fit gave a result
+  std::string message = "not run";  // how it ended; without a result, the reason
+  model::Estimate focus_depth_mm;   // zf from Ap
+  model::Estimate blur_ratio;       // kappa, dimensionless
+  int frames_used = 0;              // number of frames on this side
 };
 
 // Focus over the field, from the same fit on each tile of a regular grid.
 struct FieldTile {
   Eigen::Vector2d centre_px{0, 0};  // in the full image
-  bool done = false;
-  std::string message = "not run";
-  model::Estimate focus_depth_mm;
-  int cluster = 0;  // index into FieldMap::clusters
+  bool done = false;                // true if the tile was fitted
+  std::string message = "not run";  // how it ended; without a result, the reason
+  model::Estimate focus_depth_mm;   // zf of the tile, from Ap
+  int cluster = 0;                  // index into FieldMap::clusters
 };
+// Tiles whose depths of focus agree: a part of the target at one depth.
 struct DepthCluster {
-  model::Estimate focus_depth_mm;
-  int tiles = 0;
+  model::Estimate focus_depth_mm;  // mean zf of the tiles, from Ap
+  int tiles = 0;                   // number of tiles
 };
+// Depth of focus over the field of view.
 struct FieldMap {
-  bool done = false;
-  std::string message = "not run";
-  int columns = 0, rows = 0;
-  std::vector<FieldTile> tiles;  // row by row
+  bool done = false;                // true if enough tiles were fitted
+  std::string message = "not run";  // how it ended; without a result, the reason
+  int columns = 0, rows = 0;        // size of the grid, in tiles
+  std::vector<FieldTile> tiles;     // row by row
   // The model is zf(x, y) = centre + tilt + curvature; its terms are absent where too few tiles
   // were fitted. The tilts are the angles in degrees between the target and the sensor about the
   // vertical and the horizontal axis: positive where the target's right side, or its bottom, is
@@ -182,19 +185,19 @@ struct FieldMap {
 
 // Result of a fit to one colour channel.
 struct ChannelFocus {
-  std::string name;  // "red", "green", "blue"
-  bool done = false;
-  std::string message = "not run";
-  model::Estimate focus_depth_mm;
+  std::string name;                 // "red", "green", "blue"
+  bool done = false;                // true if the channel was fitted
+  std::string message = "not run";  // how it ended; without a result, the reason
+  model::Estimate focus_depth_mm;   // zf of this colour, from Ap
 };
 
 // The fit of sigma^2 = S0 + A (1/z - 1/zf)^2 by Ceres in (zf, kappa, floor). The bench zero is
 // held, and its error is propagated to the results.
 struct BlurFit {
-  bool done = false;
-  std::string message = "not run";
-  double chi2_per_dof = 0;
-  int frames_used = 0;
+  bool done = false;                      // true if the fit gave a result
+  std::string message = "not run";        // how it ended; without a result, the reason
+  double chi2_per_dof = 0;                // chi^2 of the frames per degree of freedom
+  int frames_used = 0;                    // number of frames in the fit
   std::vector<std::string> undetermined;  // parameters that the data do not fix
   std::string weak_direction;             // the combination of parameters that is least certain
   double weak_correlation = 0;            // correlation of these parameters
@@ -203,7 +206,7 @@ struct BlurFit {
   // frequencies up to this value of 2 pi^2 sigma^2 nu^2, where sigma is the blur beyond that of the
   // sharpest frame.
   model::Psf family = model::Psf::kGaussian;
-  std::optional<double> band;
+  std::optional<double> band;  // absent: not from spectra
   // Change of the family's shape at constant second moment, applied where the frames show it beyond
   // doubt: H exp(4 tails u^2), u = 2 pi^2 sigma^2 nu^2. A pupil that obeys the sine condition has
   // about (kappa r/d1)^2/2. 0: no change.
@@ -214,7 +217,9 @@ struct BlurFit {
   double outside_mm = 0;  // distance of the focus outside the sweep; 0: inside
 };
 
+// A complete result (kOk), one that lacks a parameter (kPartial), or none (kRefused).
 enum class Outcome { kOk, kPartial, kRefused };
+// Name of the outcome: "ok", "partial" or "refused".
 THICKLENS_EXPORT std::string OutcomeName(Outcome outcome);
 
 // The result of a calibration for people and programs: what was found, and whether it can be used.
@@ -231,8 +236,8 @@ struct CalibrationSummary {
   double chi2_per_dof = 0;                  // of the blur fit; 0: there is none
   // In the blur fit, or, before the fit, the frames that passed the quality checks.
   int frames_used = 0;
-  int frames_rejected = 0;
-  double seconds = 0;
+  int frames_rejected = 0;  // frames that failed a check
+  double seconds = 0;       // time of the calibration
 
   // One line: outcome, d1, zf and kappa with their sigmas, frames, time.
   THICKLENS_EXPORT std::string BriefReport() const;
@@ -242,7 +247,7 @@ struct CalibrationSummary {
 struct CalibrationDiagnostics {
   // Covariance of the named parameters, in their units; sigma^2 is on the diagonal.
   std::vector<std::string> covariance_order;
-  Eigen::MatrixXd covariance;
+  Eigen::MatrixXd covariance;  // one row and column per name; empty: none
 
   // Results that are determined even where the rest is refused. They need neither camera nor bench
   // zero.
@@ -252,23 +257,24 @@ struct CalibrationDiagnostics {
   std::optional<model::Estimate> focus_reading_mm;
   // The symptoms whose causes were compared, with the causes that are named.
   std::vector<Diagnosis> diagnoses;
-  FrameStructureFinding structure;
+  FrameStructureFinding structure;  // vignetting, bands and dust of the frames
 
-  SourceRecipe paper_recipe;
-  SharpnessPeak sharpness;
-  ScaleModel scale;
-  BlurFit blur;
-  SideFit nearer, farther;  // fits of the frames on each side of focus
-  FieldMap field;
-  std::vector<ChannelFocus> channels;  // of colour frames
-  std::optional<MagnificationCheck> magnification;
-  std::vector<SystematicPart> systematic_parts;  // sorted by their part of d1, the largest first
-  std::string advice;                            // how to shrink the largest error, and to what
+  SourceRecipe paper_recipe;                        // the paper's method, for comparison
+  SharpnessPeak sharpness;                          // depth of focus by sharpness alone
+  ScaleModel scale;                                 // the bench zero from the image scale
+  BlurFit blur;                                     // the fit behind the results
+  SideFit nearer, farther;                          // fits of the frames on each side of focus
+  FieldMap field;                                   // focus over the field
+  std::vector<ChannelFocus> channels;               // of colour frames
+  std::optional<MagnificationCheck> magnification;  // present if the target's period is stated
+  std::vector<SystematicPart> systematic_parts;     // sorted by their part of d1, the largest first
+  std::string advice;                               // how to shrink the largest error, and to what
 };
 
+// Everything that a calibration found.
 struct Calibration {
-  CalibrationSummary summary;
-  CalibrationDiagnostics diagnostics;
+  CalibrationSummary summary;            // the result
+  CalibrationDiagnostics diagnostics;    // the evidence behind it
   std::vector<FrameMeasurement> frames;  // one record per frame, in the sweep's order
   std::vector<BlurExample> examples;     // blur of the nearest, sharpest and farthest frame
 };

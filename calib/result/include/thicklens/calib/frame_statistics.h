@@ -20,8 +20,8 @@ struct FrameStatistics {
   // The corresponding values at the dark end. A backlit edge is normally black on one side: there
   // the black pixels fill one side of a straight line.
   double black_fraction = 0;
-  double black_level = 0;
-  bool black_is_one_side = false;
+  double black_level = 0;          // encoded value of that clipping; 0 if there is none
+  bool black_is_one_side = false;  // the black pixels fill one side of a line
   bool is_mosaic = false;          // one channel, in which the colours of a filter alternate
   std::uint64_t content_hash = 0;  // equal for equal pixels: shows a repeated image
 };

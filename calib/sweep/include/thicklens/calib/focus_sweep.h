@@ -21,16 +21,16 @@ using FrameReader = std::function<cv::Mat(std::size_t index)>;
 // A sweep that is ready to be measured. The frames are streamed through `read_frame`; they are
 // never all held in memory.
 struct FocusSweep {
-  model::Camera camera;  // d1 and kappa need not be known
-  std::vector<model::SweepFrame> frames;
-  FrameReader read_frame;
-  double reading_sigma_mm = 0;
+  model::Camera camera;                      // d1 and kappa need not be known
+  std::vector<model::SweepFrame> frames;     // in the order of the sweep
+  FrameReader read_frame;                    // set by the caller
+  double reading_sigma_mm = 0;               // standard deviation of a reading, mm; 0: not stated
   std::optional<model::Estimate> offset_mm;  // absent: found from the image scale
-  model::BenchDirection direction = model::BenchDirection::kAway;
-  model::SweepTarget target = model::SweepTarget::kAuto;
-  model::FloorKnowledge floor;
-  std::optional<double> target_period_mm;  // period of a periodic target
-  model::RegionOfInterest roi;
+  model::BenchDirection direction = model::BenchDirection::kAway;  // sign of the reading in z
+  model::SweepTarget target = model::SweepTarget::kAuto;  // kind of the target, if it is stated
+  model::FloorKnowledge floor;                            // what is known of the lens floor, px
+  std::optional<double> target_period_mm;                 // period of a periodic target
+  model::RegionOfInterest roi;                            // the part of the frames that is measured
 
   // True if a calibration can be attempted: the camera and the values are possible. Otherwise `why`
   // (unless it is null) receives the reason.

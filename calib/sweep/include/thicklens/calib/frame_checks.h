@@ -16,9 +16,12 @@ namespace thicklens::calib {
 THICKLENS_EXPORT std::string FailedCheck(const std::string& rejection);
 // Kinds of rejection that the light causes.
 inline constexpr char kKindDark[] = "dark";
+// The kind of a frame with too many black pixels.
 inline constexpr char kKindBlack[] = "black";
+// The kind of a frame with too many saturated pixels.
 inline constexpr char kKindSaturated[] = "saturated";
 
+// The limits of the quality checks of a frame.
 struct QualityCheckOptions {
   double min_mean_encoded = 4.0 / 255;   // dark below this
   double max_saturated_fraction = 0.05;  // saturated above this
