@@ -12,8 +12,8 @@ constexpr float kEdgeTolerancePx = 1e-5F;
 
 // A corner of a cell as seen from a sample.
 struct Corner {
-  float x, y;  // px
-  float disparity;
+  float x, y;       // px
+  float disparity;  // disparity of the corner's pixel
 };
 
 // These functions take and return values: unlike std::min, their loops become vector instructions.
@@ -57,9 +57,9 @@ inline __attribute__((always_inline)) float CellDisparity(const Corner& p00, con
 // A row of pixels: their positions in the view, px from the pixel in the centre view, and their
 // disparities.
 struct Corners {
-  const float* offset_x;
-  const float* offset_y;
-  const float* disparity;
+  const float* offset_x;   // to the right, px
+  const float* offset_y;   // down, px
+  const float* disparity;  // in the unit of the map
 };
 
 // Disparity of the cell between the pixels x and x + 1 of two rows, at the sample (dx, dy) from its
@@ -80,21 +80,22 @@ inline __attribute__((always_inline)) float CellDisparity(const Corners& upper,
 // left of (above) the pixel's position in the view, and the last one that is not right of (below)
 // it, within the tolerance.
 struct Bounds {
-  const float* first_x;
-  const float* last_x;
-  const float* first_y;
-  const float* last_y;
+  const float* first_x;  // first sample across
+  const float* last_x;   // last sample across
+  const float* first_y;  // first sample down
+  const float* last_y;   // last sample down
 };
 
+// A row of a view, and the size of the view.
 struct ViewRow {
-  int y;
+  int y;                    // index of the row
   int width_px, height_px;  // of the view
 };
 
 // Range of samples relative to the top left pixel of a cell, inclusive; empty if left > right or
 // above > below.
 struct Rectangle {
-  float left, right, above, below;
+  float left, right, above, below;  // px from the pixel; right and below are included
 };
 
 // Returns the range around the cell between the pixels x and x + 1 of the row and the next row,

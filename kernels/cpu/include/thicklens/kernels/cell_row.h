@@ -16,9 +16,12 @@ namespace thicklens::kernels {
 // get the same numbers for it: a sample on the wrong side of the edge for one cell is on the right
 // side for the other.
 struct PixelRow {
+  // Makes a row of `width_px` pixels without positions.
   THICKLENS_EXPORT explicit PixelRow(std::size_t width_px);
 
+  // The positions and disparities of the pixels, not owned by the result.
   Corners corners() const { return {offset_x.data(), offset_y.data(), disparity}; }
+  // The bounds of the pixels, not owned by the result.
   Bounds bounds() const { return {first_x.data(), last_x.data(), first_y.data(), last_y.data()}; }
 
   const float* disparity = nullptr;                     // in the unit of the map
@@ -42,15 +45,17 @@ enum class CellSamples : std::int32_t {
 
 // The cells between two rows of pixels: one for each pixel but the last.
 struct CellRow {
+  // Makes the cells of rows of `width_px` pixels.
   THICKLENS_EXPORT explicit CellRow(std::size_t width_px);
 
-  std::vector<CellSamples> samples;
+  std::vector<CellSamples> samples;  // number of samples of each cell
   // The first and the last sample: its index relative to that of the cell's top left pixel, and the
   // disparity of the cell there. Undefined for cells without samples and for odd cells.
   std::vector<std::int32_t> first, last;
-  std::vector<float> first_disparity, last_disparity;
+  std::vector<float> first_disparity, last_disparity;  // -infinity where the sample is outside
 };
 
+// Finds the samples of all cells between the rows `upper` (row view.y) and `lower` (the next one).
 THICKLENS_EXPORT void SampleCells(const PixelRow& upper, const PixelRow& lower, const ViewRow& view,
                                   CellRow* cells);
 

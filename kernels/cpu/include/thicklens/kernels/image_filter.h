@@ -15,6 +15,7 @@ namespace thicklens::kernels {
 // Linear maps from images to images of the same size in which every pixel of the result has its own
 // weights. Images are planes, one per channel, rows top to bottom.
 
+// Direction of a filter: along a row (kAcross) or along a column (kDown).
 enum class Axis { kAcross, kDown };
 
 // Number of pixels of a row that share a radius: [0, 64), [64, 128), ...
@@ -24,14 +25,15 @@ constexpr int kFilterBlockPx = 64;
 // coefficient reaches beyond the image: c_n(p) = 0 where p + n e is outside (tested by Check).
 template <typename Real>
 struct VaryingFilter {
-  Axis axis = Axis::kAcross;
-  int width_px = 0, height_px = 0;
+  Axis axis = Axis::kAcross;        // direction e
+  int width_px = 0, height_px = 0;  // size of the image, px
   // Radius of each block; the blocks of a row from left to right, row after row.
   std::vector<std::int32_t> radius_px;
   std::vector<std::size_t> start;  // start of each block's coefficients; one more than there are
                                    // blocks
   std::vector<Real> coefficients;  // of each block [n + radius][kFilterBlockPx]; 0 beyond the row
 
+  // Number of blocks of a row; the last one may be shorter.
   int blocks_in_row() const { return (width_px + kFilterBlockPx - 1) / kFilterBlockPx; }
 };
 
@@ -42,8 +44,8 @@ struct PixelCsr {
   int pixels = 0;                   // number of pixels of the image
   std::vector<std::int32_t> pixel;  // ascending, without duplicates
   std::vector<std::int64_t> start;  // first entry of each row; one more than there are rows
-  std::vector<std::int32_t> index;
-  std::vector<Real> weight;
+  std::vector<std::int32_t> index;  // pixel that each entry reads
+  std::vector<Real> weight;         // weight of each entry
 };
 // Returns the same weights sorted by the pixels that they read: (R^T y)(pixel) = sum weight
 // y(index). The entries of a row have the order of their original rows.
@@ -58,12 +60,15 @@ constexpr int kPixelsOfRun = 8;
 template <typename T>
 struct DefaultInitAllocator : std::allocator<T> {
   DefaultInitAllocator() = default;
+  // Converts from the allocator of another type, as the standard library requires.
   template <typename U>
   DefaultInitAllocator(const DefaultInitAllocator<U>&) noexcept {}
+  // The allocator of another type, as the standard library requires.
   template <typename U>
   struct rebind {
-    using other = DefaultInitAllocator<U>;
+    using other = DefaultInitAllocator<U>;  // the allocator of U
   };
+  // Constructs a number; without arguments it stays uninitialised.
   template <typename U, typename... Arguments>
   void construct(U* at, Arguments&&... arguments) {
     if constexpr (sizeof...(Arguments) > 0) new (at) U(std::forward<Arguments>(arguments)...);
@@ -75,7 +80,7 @@ struct DefaultInitAllocator : std::allocator<T> {
 // are stride_px() apart. Its weights may be 0, and are 0 beyond the row of the image.
 template <typename Real>
 struct PixelBlockedCsr {
-  int width_px = 0, height_px = 0;
+  int width_px = 0, height_px = 0;  // size of the image, px
   std::vector<std::int32_t> pixel;  // pixel of each row: ascending, without duplicates
   std::vector<std::int64_t> run;    // first run of each row; one more than there are rows
   std::vector<std::int32_t> index;  // first pixel of each run
@@ -88,7 +93,7 @@ struct PixelBlockedCsr {
   struct Part {
     std::int32_t first = 0, last = 0;  // indices of pixels: [first, last)
   };
-  std::vector<Part> read;
+  std::vector<Part> read;  // all parts that runs read
 
   // Every row has space behind it for a run that begins in it. The stride is an odd number of parts
   // of 64 bytes (of floats), so that rows and planes do not share one place of a cache.
@@ -101,6 +106,7 @@ THICKLENS_EXPORT void SetBands(PixelBlockedCsr<Real>* runs);
 // RowsOf leaves out weights of 0.
 template <typename Real>
 THICKLENS_EXPORT PixelBlockedCsr<Real> RunsOf(const PixelCsr<Real>& rows, int width_px);
+// Converts runs to entries; see RunsOf.
 template <typename Real>
 THICKLENS_EXPORT PixelCsr<Real> RowsOf(const PixelBlockedCsr<Real>& runs);
 
@@ -108,15 +114,16 @@ THICKLENS_EXPORT PixelCsr<Real> RowsOf(const PixelBlockedCsr<Real>& runs);
 // `plane_stride` numbers apart. The memory is not owned.
 template <typename Real>
 struct ImageIn {
-  const Real* values = nullptr;
-  std::ptrdiff_t plane_stride = 0;
-  int channels = 1;
+  const Real* values = nullptr;     // first number of the first plane
+  std::ptrdiff_t plane_stride = 0;  // numbers from plane to plane
+  int channels = 1;                 // number of planes
 };
+// The result of a map; see ImageIn.
 template <typename Real>
 struct ImageOut {
-  Real* values = nullptr;
-  std::ptrdiff_t plane_stride = 0;
-  int channels = 1;
+  Real* values = nullptr;           // first number of the first plane
+  std::ptrdiff_t plane_stride = 0;  // numbers from plane to plane
+  int channels = 1;                 // number of planes
 };
 
 // Each function below sets its whole result, with two exceptions: ApplyRuns sets only the pixels
@@ -126,9 +133,11 @@ struct ImageOut {
 template <typename Real>
 THICKLENS_EXPORT void Apply(const VaryingFilter<Real>& filter, const ImageIn<Real>& x,
                             const ImageOut<Real>& y, int threads);
+// Computes y = F^T x; see Apply.
 template <typename Real>
 THICKLENS_EXPORT void ApplyTransposed(const VaryingFilter<Real>& filter, const ImageIn<Real>& x,
                                       const ImageOut<Real>& y, int threads);
+// Computes y = R x at the pixels that have a row; see Apply.
 template <typename Real>
 THICKLENS_EXPORT void ApplyRuns(const PixelBlockedCsr<Real>& runs, const ImageIn<Real>& x,
                                 const ImageOut<Real>& y, int threads);

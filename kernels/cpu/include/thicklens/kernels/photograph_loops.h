@@ -16,18 +16,18 @@ namespace thicklens::kernels {
 // sample x + `sample_of_first` of the row.
 template <typename Real>
 struct PixelTap {
-  Real weight = 0;
+  Real weight = 0;  // weight of the ray
   // start of the view's rays, after those of the first view in its row of views
   std::size_t view_start = 0;
-  std::ptrdiff_t sample_of_first = 0;
-  const float* irradiance = nullptr;  // of the view's samples; null, then for all taps: 1
+  std::ptrdiff_t sample_of_first = 0;  // sample of the row for pixel 0
+  const float* irradiance = nullptr;   // of the view's samples; null, then for all taps: 1
 };
 
 // A row of the photograph that gets `share` of a row of rays.
 template <typename Real>
 struct SharedRow {
   Real* pixels = nullptr;  // null: there is none
-  Real share = 0;
+  Real share = 0;          // share of the row
 };
 
 // Adds to each row pixels[x] += share * (sum over the taps) for begin <= x < end. `rays` are the
@@ -40,8 +40,8 @@ THICKLENS_EXPORT void AddTaps(const std::vector<PixelTap<Real>>& taps, const Rea
 // A pixel that a ray lands on; for neighbouring rays, the pixel of the first ray.
 template <typename Real>
 struct RayPixel {
-  Real weight = 0;
-  const Real* pixel = nullptr;
+  Real weight = 0;              // weight of the pixel
+  const Real* pixel = nullptr;  // pixel of ray 0
 };
 
 // Adds rays[i] += irradiance[i] * (sum over the pixels, one to four, of weight * pixel[i]) for i <

@@ -24,27 +24,29 @@ struct ImageMap {
 // of a RadianceSteps.
 template <typename Real>
 struct FilteredMap {
+  // A filter along rows, followed by one along columns.
   struct Product {
-    const VaryingFilter<Real>* across = nullptr;
-    const VaryingFilter<Real>* down = nullptr;
+    const VaryingFilter<Real>* across = nullptr;  // applied first
+    const VaryingFilter<Real>* down = nullptr;    // applied to the result of `across`
   };
-  std::vector<Product> products;  // none: every pixel has a row
-  const PixelBlockedCsr<Real>* rows = nullptr;
+  std::vector<Product> products;                // none: every pixel has a row
+  const PixelBlockedCsr<Real>* rows = nullptr;  // rows of single pixels
 };
 
 // The data term that all systems of one photograph share: sum_x W(x) |H r - I|^2, with the same
 // weights in all channels.
 template <typename Real>
 struct DataTerm {
-  int width_px = 0, height_px = 0, channels = 0;
-  ImageMap<Real> projection;     // the map H
-  FilteredMap<Real> filters;     // H as numbers; only for a device
-  std::vector<Real> photograph;  // photograph I, planar
-  std::vector<Real> weight;      // weight W, one plane
-  std::vector<Real> row_norm2;   // sum_j H_ij^2 of each pixel i: small if the pixel is a mean of
-                                 // many
-  int threads = 1;
+  int width_px = 0, height_px = 0, channels = 0;  // of the photograph
+  ImageMap<Real> projection;                      // the map H
+  FilteredMap<Real> filters;                      // H as numbers; only for a device
+  std::vector<Real> photograph;                   // photograph I, planar
+  std::vector<Real> weight;                       // weight W, one plane
+  std::vector<Real> row_norm2;  // sum_j H_ij^2 of each pixel i: small if the pixel is a mean of
+                                // many
+  int threads = 1;              // number of threads, >= 1
 
+  // Number of pixels of one plane.
   std::size_t pixels() const {
     return static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px);
   }
@@ -57,7 +59,7 @@ template <typename Real>
 struct QuadraticPrior {
   std::vector<Real> gradient_weight;  // one plane; empty: 0
   std::vector<Real> tikhonov_weight;  // one plane, > 0
-  bool target_is_photograph = false;
+  bool target_is_photograph = false;  // true: `target` is the photograph
   std::vector<Real> target = {};  // used unless target_is_photograph; planar, with the number of
                                   // channels of the solution; empty: 0
 };
@@ -66,10 +68,11 @@ struct QuadraticPrior {
 // the sum over channels and both differences of s^2 |dr|^2.
 template <typename Real>
 struct TotalVariation {
-  const std::vector<Real>* slope_squared = nullptr;  // s^2, one plane
-  double strength = 0, eps = 0, tikhonov_weight = 0;
+  const std::vector<Real>* slope_squared = nullptr;   // s^2, one plane
+  double strength = 0, eps = 0, tikhonov_weight = 0;  // the constants of the prior, >= 0
 };
 
+// Sums over the residual r = b - (H^T W H + P) x, all channels together.
 struct ResidualSums {
   double squared = 0;         // value of |r|^2
   double preconditioned = 0;  // value of r . M^-1 r
@@ -88,6 +91,7 @@ class THICKLENS_EXPORT RadianceSteps {
  public:
   virtual ~RadianceSteps() = default;
 
+  // Sets a quadratic prior.
   virtual void SetPrior(const QuadraticPrior<Real>& prior) = 0;
   // Stores s^2 and the numbers. The prior does not change until ReweightVariation.
   virtual void SetVariation(const TotalVariation<Real>& variation) = 0;
@@ -110,6 +114,7 @@ class THICKLENS_EXPORT RadianceSteps {
 
   // Return H x and H^T y, for any number of planes up to the photograph's number of channels.
   virtual std::vector<Real> Project(const std::vector<Real>& x) = 0;
+  // Returns H^T y; see Project.
   virtual std::vector<Real> ProjectTransposed(const std::vector<Real>& y) = 0;
 };
 

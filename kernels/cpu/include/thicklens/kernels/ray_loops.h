@@ -21,11 +21,11 @@ struct RayRun {
 // The ray x comes from the point at disparity[x] * (shift_x, shift_y), px, from its pixel.
 template <typename Real>
 struct RayRow {
-  const Real* disparity = nullptr;
-  Real shift_x = 0, shift_y = 0;
-  const RayRun* first = nullptr;
-  const RayRun* last = nullptr;
-  std::ptrdiff_t width_px = 0;
+  const Real* disparity = nullptr;  // of the rays of the row
+  Real shift_x = 0, shift_y = 0;    // px per unit of disparity
+  const RayRun* first = nullptr;    // first run of the row
+  const RayRun* last = nullptr;     // behind the last run of the row
+  std::ptrdiff_t width_px = 0;      // width of the image, px
 };
 
 // Sets warped[x] to the value of the image at the point that ray x comes from, linear between the

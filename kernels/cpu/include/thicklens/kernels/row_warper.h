@@ -18,10 +18,11 @@ class THICKLENS_EXPORT RowWarper {
   // Where the samples of a row are read: the pixels before their positions, and the remaining
   // fractions. The memory can be used for many rows.
   struct Places {
+    // Makes places for rows of `width_px` samples.
     explicit Places(int width_px);
 
-    std::vector<std::int32_t> x, y;
-    std::vector<float> fraction_x, fraction_y;
+    std::vector<std::int32_t> x, y;             // pixel before the position
+    std::vector<float> fraction_x, fraction_y;  // 0 to 1, from that pixel
   };
 
   // Copies the values of the image and keeps its disparities by reference. The counts of both must

@@ -8,12 +8,12 @@ namespace thicklens::kernels {
 // The rays of one view from a row of the centre view's points. The ray of a point of disparity d
 // meets the view at its pixel less shift * d. No index of a pixel may exceed 2^31.
 struct VisibleRow {
-  int width_px, height_px, y;
+  int width_px, height_px, y;     // size of the view, px; index of the row
   float shift_x, shift_y;         // shift of the view, px per unit of disparity
   const float* points_disparity;  // disparity of the row
   const float* view_disparity;    // disparity of the view; NaN: hidden
   const unsigned char* known;     // flags of the row
-  float same_surface, weight;
+  float same_surface, weight;     // allowed difference of disparities; weight of the view
 };
 
 // Adds the view's weight to the share of each point whose ray is not occluded: the ray is inside

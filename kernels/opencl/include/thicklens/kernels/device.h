@@ -24,34 +24,37 @@ struct SurfaceImage;
 
 // The device that the user requests for the kernels.
 struct DeviceRequest {
+  // What kind of device is requested.
   enum class Kind {
     kAuto,    // the best OpenCL device that works, or the C++ reference if none works
     kCpu,     // the C++ reference; OpenCL is not used
     kOpenCl,  // OpenCL or an error
   };
-  Kind kind = Kind::kAuto;
-  int platform = -1;  // -1: the best
-  int device = -1;
+  Kind kind = Kind::kAuto;  // the kind; kOpenCl may name platform and device
+  int platform = -1;        // -1: the best
+  int device = -1;          // index in the platform; -1: the best
 };
 // Parses "auto", "cpu", "opencl", "opencl:PLATFORM" or "opencl:PLATFORM:DEVICE". Throws Error for
 // any other text.
 THICKLENS_EXPORT DeviceRequest ParseDeviceRequest(const std::string& text);
 
+// What OpenCL reports of one device.
 struct DeviceDescription {
-  int platform = 0;  // indices in OpenCL's list
-  int device = 0;
-  std::string platform_name, platform_version;
-  std::string name, version, driver_version;
-  std::string type;  // "cpu", "gpu", "accelerator", "other"
-  int compute_units = 0;
-  bool has_double = false;
-  std::uint64_t global_memory_bytes = 0;
-  std::uint64_t max_allocation_bytes = 0;
-  std::uint64_t local_memory_bytes = 0;
-  std::uint64_t max_work_group = 0;
-  std::string problem;  // reason why it cannot be used; empty if it can
+  int platform = 0;                             // indices in OpenCL's list
+  int device = 0;                               // index in the platform
+  std::string platform_name, platform_version;  // as the platform reports them
+  std::string name, version, driver_version;    // as the device reports them
+  std::string type;                             // "cpu", "gpu", "accelerator", "other"
+  int compute_units = 0;                        // number of compute units
+  bool has_double = false;                      // whether kernels can use double
+  std::uint64_t global_memory_bytes = 0;        // memory of the device
+  std::uint64_t max_allocation_bytes = 0;       // largest single buffer
+  std::uint64_t local_memory_bytes = 0;         // memory that a work group shares
+  std::uint64_t max_work_group = 0;             // largest number of items of a work group
+  std::string problem;                          // reason why it cannot be used; empty if it can
 };
 
+// The OpenCL devices of this machine.
 struct DeviceSurvey {
   std::vector<DeviceDescription> devices;  // devices of all platforms, usable or not
   // Platforms without a device, a broken driver, a crash or a hang, one line each, with advice.
@@ -72,13 +75,18 @@ THICKLENS_EXPORT const DeviceSurvey& SurveyDevices(bool again = false,
 class THICKLENS_EXPORT Backend {
  public:
   virtual ~Backend() = default;
+  // Returns whether kernels run on an OpenCL device.
   virtual bool is_opencl() const = 0;
+  // Returns whether kernels can use double.
   virtual bool has_double() const = 0;
   virtual std::string name() const = 0;         // "cpu", "opencl:0:0"
   virtual std::string description() const = 0;  // for users: device, platform, versions
   // NewDouble and NewSteps for double throw Error if the device has no double.
   virtual std::unique_ptr<Kernels<float>> NewFloat() = 0;
+  // Makes kernels for double. Throws Error if the device has no double.
   virtual std::unique_ptr<Kernels<double>> NewDouble() = 0;
+  // Makes the steps of conjugate gradients; `data` is kept by reference. For double it throws Error
+  // if the device has no double.
   virtual std::unique_ptr<RadianceSteps<float>> NewSteps(const DataTerm<float>& data) = 0;
   virtual std::unique_ptr<RadianceSteps<double>> NewSteps(const DataTerm<double>& data) = 0;
   // Keeps the data of the image by reference.
@@ -97,13 +105,14 @@ THICKLENS_EXPORT std::shared_ptr<Backend> OpenBackend(const DeviceRequest& reque
 // Maximum relative differences between a backend and the reference over all kernels, for a small
 // problem with odd sizes, empty rows and borders.
 struct BackendSelfTest {
-  double float_limit = 1e-4;
-  double double_limit = 1e-10;
-  double float_error = 0;
-  double double_error = 0;  // NaN if the device has no double
-  bool agrees = false;      // both errors are within their limits
-  std::string worst;        // kernel with the largest difference; empty if there is none
+  double float_limit = 1e-4;    // largest accepted error in float
+  double double_limit = 1e-10;  // largest accepted error in double
+  double float_error = 0;       // found error in float
+  double double_error = 0;      // NaN if the device has no double
+  bool agrees = false;          // both errors are within their limits
+  std::string worst;            // kernel with the largest difference; empty if there is none
 };
+// Compares all kernels of the backend with the reference. Throws Error for errors of the device.
 THICKLENS_EXPORT BackendSelfTest RunBackendSelfTest(Backend* backend);
 
 }  // namespace thicklens::kernels

@@ -21,17 +21,22 @@ namespace thicklens::kernels {
 // x - s_shift[k], t = first_y + y - t_shift[l]. It exists if that is a sample of the light field.
 // Blocks therefore share no ray.
 struct BlockGeometry {
-  int first_x = 0, first_y = 0;  // first pixel of the block in the image
-  int width_px = 0, height_px = 0;
-  int s_count = 0, t_count = 0;  // sizes of the whole light field
-  int u_count = 0, v_count = 0;
+  int first_x = 0, first_y = 0;                // first pixel of the block in the image
+  int width_px = 0, height_px = 0;             // size of the block, px
+  int s_count = 0, t_count = 0;                // sizes of the whole light field
+  int u_count = 0, v_count = 0;                // numbers of views
   std::vector<int> s_shift, t_shift;           // per u, per v
   std::vector<double> s_fraction, t_fraction;  // per u, per v
   std::vector<double> view_weight;             // at v * u_count + u; >= 0
 
+  // Number of pixels of the block.
   int pixels() const { return width_px * height_px; }
+  // Number of views, U V.
   int views() const { return u_count * v_count; }
+  // Number of rays of the block, with those that do not exist.
   int rays() const { return pixels() * views(); }
+  // Returns whether the ray of view (k, l) that lands nearest to pixel (x, y) of the block is a
+  // sample of the light field.
   bool Exists(int k, int l, int x, int y) const {
     const int s = first_x + x - s_shift[static_cast<std::size_t>(k)];
     const int t = first_y + y - t_shift[static_cast<std::size_t>(l)];
@@ -53,6 +58,7 @@ template <typename Real>
 class THICKLENS_EXPORT Kernels {
  public:
   virtual ~Kernels() = default;
+  // Makes an object on the same device for another thread.
   virtual std::unique_ptr<Kernels> Clone() const = 0;
 
   // First half of H: the rays that land on each pixel of the block. Element slot * pixels + pixel
@@ -91,6 +97,7 @@ class THICKLENS_EXPORT Kernels {
 
   // Return A x and A^T x.
   virtual std::vector<Real> Multiply(const CsrMatrix<Real>& a, const std::vector<Real>& x) = 0;
+  // Returns A^T x.
   virtual std::vector<Real> MultiplyTransposed(const CsrMatrix<Real>& a,
                                                const std::vector<Real>& x) = 0;
 

@@ -14,32 +14,34 @@ namespace thicklens::kernels {
 // at slot * rows + row; column -1 marks an unused slot.
 template <typename Real>
 struct EllMatrix {
-  int rows = 0;
-  int columns = 0;
-  int slots = 0;
-  std::vector<std::int32_t> column;
-  std::vector<Real> value;
+  int rows = 0;                      // number of rows
+  int columns = 0;                   // number of columns
+  int slots = 0;                     // slots of each row
+  std::vector<std::int32_t> column;  // rows * slots numbers; -1: unused
+  std::vector<Real> value;           // rows * slots numbers
 };
 
 // Compressed rows; columns ascend within a row, without duplicates.
 template <typename Real>
 struct CsrMatrix {
-  int rows = 0;
-  int columns = 0;
+  int rows = 0;                         // number of rows
+  int columns = 0;                      // number of columns
   std::vector<std::int64_t> row_start;  // rows + 1 numbers
-  std::vector<std::int32_t> column;
-  std::vector<Real> value;
+  std::vector<std::int32_t> column;     // column of each entry
+  std::vector<Real> value;              // value of each entry
 
+  // Number of stored entries.
   std::int64_t entries() const { return row_start.empty() ? 0 : row_start.back(); }
 };
 
 // The positions of the entries of a matrix, without values.
 struct CsrPattern {
-  int rows = 0;
-  int columns = 0;
-  std::vector<std::int64_t> row_start;
-  std::vector<std::int32_t> column;
+  int rows = 0;                         // number of rows
+  int columns = 0;                      // number of columns
+  std::vector<std::int64_t> row_start;  // rows + 1 numbers
+  std::vector<std::int32_t> column;     // column of each entry, ascending in a row
 
+  // Number of entries.
   std::int64_t entries() const { return row_start.empty() ? 0 : row_start.back(); }
 };
 
@@ -47,12 +49,14 @@ struct CsrPattern {
 template <typename Real>
 THICKLENS_EXPORT CsrMatrix<Real> Compress(const EllMatrix<Real>& ell);
 
+// Returns A^T.
 template <typename Real>
 THICKLENS_EXPORT CsrMatrix<Real> Transpose(const CsrMatrix<Real>& matrix);
 
 // Returns the pattern of A^T A + Id: symmetric, with the whole diagonal.
 template <typename Real>
 THICKLENS_EXPORT CsrPattern NormalPattern(const CsrMatrix<Real>& a);
+// Returns the positions of the stored entries of A.
 template <typename Real>
 THICKLENS_EXPORT CsrPattern PatternOf(const CsrMatrix<Real>& a);
 // Returns the union of two patterns of the same size. Throws Error if the sizes differ.

@@ -12,10 +12,10 @@ namespace thicklens::kernels {
 // An image of surfaces. Pixels whose disparities differ by at most `tolerance` (in the unit of the
 // disparity) belong to one surface. The vectors are not owned.
 struct SurfaceImage {
-  int width_px = 0, height_px = 0, channels = 0;
+  int width_px = 0, height_px = 0, channels = 0;  // size, px; values per pixel
   const std::vector<float>* values = nullptr;     // row by row, the channels of a pixel together
   const std::vector<float>* disparity = nullptr;  // one per pixel, finite
-  float tolerance = 0;
+  float tolerance = 0;                            // in the unit of the disparity
 };
 
 // A sample of a view that does not show the point at its disparity.
@@ -29,7 +29,7 @@ struct OccludedSample {
 // the value at another place. The latter is the mean of those of the four surrounding pixels that
 // belong to the surface there.
 struct BoundarySample {
-  std::int32_t index = 0;
+  std::int32_t index = 0;  // at y width + x
   OccludedSample other;  // displacement and disparity of the other place; its index is that of the
                          // sample whose displacement is used
   float share = 0;       // 0 to 1
