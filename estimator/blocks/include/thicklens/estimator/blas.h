@@ -20,6 +20,7 @@ THICKLENS_EXPORT std::string BlasDescription();
 // nothing.
 class THICKLENS_EXPORT OneBlasThread {
  public:
+  // Sets the number of threads of OpenBLAS to one.
   OneBlasThread();
   ~OneBlasThread();
   OneBlasThread(const OneBlasThread&) = delete;

@@ -28,10 +28,14 @@ enum class BlockSolver {
 // The names are "umfpack", "cholmod", "eigen", "cg", "bicgstab" and "viennacl". Throws Error for
 // another name.
 THICKLENS_EXPORT BlockSolver BlockSolverFromName(const std::string& name);
+// Name of the solver, as BlockSolverFromName accepts it.
 THICKLENS_EXPORT std::string BlockSolverName(BlockSolver solver);
 THICKLENS_EXPORT bool IsBuiltIn(BlockSolver solver);  // whether this build has it
+// The solvers that this build has, in the order of the enumeration.
 THICKLENS_EXPORT std::vector<BlockSolver> BuiltInBlockSolvers();
+// Returns whether the solver iterates and thus has no factor.
 THICKLENS_EXPORT bool IsIterative(BlockSolver solver);
+// KUmfpack if this build has it, otherwise kEigen.
 THICKLENS_EXPORT BlockSolver DefaultBlockSolver();
 
 // The discretisation of the smoothness over the rays of one scene point.
@@ -41,14 +45,16 @@ enum class Stencil {
 };
 // The names are "warp" and "source". Throws Error for another name.
 THICKLENS_EXPORT Stencil StencilFromName(const std::string& name);
+// Name of the discretisation: "warp" or "source".
 THICKLENS_EXPORT std::string StencilName(Stencil stencil);
 
+// The options of EstimateByBlocks.
 struct BlockOptions {
-  BlockSolver solver = DefaultBlockSolver();
-  Stencil stencil = Stencil::kWarp;
-  kernels::Splat splat = kernels::Splat::kBilinear;
-  double gamma = 1;             // > 0
-  std::optional<double> ridge;  // mu, >= 0; default 1e-2/(U V)
+  BlockSolver solver = DefaultBlockSolver();         // solves the system of each block
+  Stencil stencil = Stencil::kWarp;                  // discretisation of the smoothness
+  kernels::Splat splat = kernels::Splat::kBilinear;  // which pixels a ray reaches
+  double gamma = 1;                                  // > 0
+  std::optional<double> ridge;                       // mu, >= 0; default 1e-2/(U V)
   // Edge of the square blocks, px, >= 1. Default: 16, or the largest edge that the memory limit of
   // the run allows.
   std::optional<int> block_px;
@@ -56,17 +62,18 @@ struct BlockOptions {
   // Limits of iterative solvers: the relative residual of a block at which they stop, > 0, < 1, and
   // the maximum number of iterations for one channel of a block, >= 1.
   double tolerance = 1e-6;
-  int max_iterations = 1000;
-  bool falloff = true;  // applies the irradiance of [S12] if there is a camera
+  int max_iterations = 1000;  // see tolerance
+  bool falloff = true;        // applies the irradiance of [S12] if there is a camera
 
   // Returns false, and the reason in `why` (may be null), if a member is not in its range.
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 
+// How one block was solved.
 struct BlockReport {
-  int x = 0, y = 0, width_px = 0, height_px = 0;
-  int unknowns = 0;
-  std::int64_t entries = 0;  // stored entries of the system's matrix
+  int x = 0, y = 0, width_px = 0, height_px = 0;  // top-left pixel, and size, px
+  int unknowns = 0;                               // number of rays that are solved for
+  std::int64_t entries = 0;                       // stored entries of the system's matrix
   // The solver's own estimate from the diagonal of its factor; absent for iterative solvers.
   std::optional<double> rcond;
   int iterations = 0;            // maximum over the channels
@@ -75,9 +82,9 @@ struct BlockReport {
 
 // Findings of the block solver besides the light field.
 struct BlockDiagnostics {
-  int block_px = 0;
-  int blocks_from_store = 0;  // number of blocks that came from the store; the others were solved
-  double gamma = 0, ridge = 0;
+  int block_px = 0;             // edge of the blocks, px
+  int blocks_from_store = 0;    // number of blocks that came from the store; the others were solved
+  double gamma = 0, ridge = 0;  // gamma and mu
 };
 
 // The predicted memory has a margin: it is what the process held before, the light field, and for

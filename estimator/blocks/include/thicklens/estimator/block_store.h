@@ -19,16 +19,16 @@ struct BlockRun {
   std::vector<std::pair<std::string, std::string>> settings;
   // Bulk numbers as they lie in memory. The views are valid until Begin returns.
   struct Data {
-    std::string name;
-    std::vector<std::string_view> bytes;
+    std::string name;                     // what the numbers are, for messages
+    std::vector<std::string_view> bytes;  // parts that follow each other
   };
-  std::vector<Data> data;
-  int blocks = 0;
+  std::vector<Data> data;  // all numbers of the problem
+  int blocks = 0;          // number of blocks
 };
 
 // Radiance of the rays of one block, as EstimateByBlocks finds it.
 struct SolvedBlock {
-  BlockReport report;
+  BlockReport report;  // how the block was solved
   // One vector for each channel, of report.unknowns numbers. The light field holds these numbers as
   // floats, so a store may keep them as floats.
   std::vector<std::vector<double>> channels;
@@ -43,6 +43,7 @@ class THICKLENS_EXPORT BlockStore {
   virtual void Begin(const BlockRun& run) = 0;
   // Find and Keep are called from any thread, several at a time. Blocks are numbered row by row.
   virtual std::optional<SolvedBlock> Find(int block) = 0;
+  // Stores a solved block; see Find.
   virtual void Keep(int block, const SolvedBlock& solved) = 0;
 };
 

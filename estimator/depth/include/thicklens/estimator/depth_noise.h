@@ -10,8 +10,9 @@ namespace thicklens::estimator {
 // step.
 constexpr double kSmoothedNoisePx = 0.02;
 
+// A map whose noise was reduced.
 struct SmoothedDepth {
-  DisparityMap map;
+  DisparityMap map;  // the smoothed map
   // Standard deviation of the noise that remains, px per view step (rms over the pixels), for noise
   // that is independent from pixel to pixel.
   double noise_left_px = 0;

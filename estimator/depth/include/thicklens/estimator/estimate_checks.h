@@ -20,6 +20,7 @@ constexpr double kLargestDepthNoisePx = 0.05;
 // for T = 7.7 px.
 constexpr double kUnresolvedBlurSigmaPx = 3;
 
+// How far apart neighbouring views land in the photograph.
 struct StepCheck {
   double largest_px = 0;  // maximum of |D step - q| over the pixels and both axes
   double share = 0;       // share of the pixels beyond kLargestStepPx
@@ -41,8 +42,8 @@ THICKLENS_EXPORT std::optional<double> DepthNoisePx(const DisparityMap& map);
 
 // A part of the photograph that the estimate does not explain; position and size in px.
 struct ResidualPatch {
-  int x = 0, y = 0, width_px = 0, height_px = 0;
-  double rms = 0;  // rms of the residual, in encoded values
+  int x = 0, y = 0, width_px = 0, height_px = 0;  // top-left pixel, and size
+  double rms = 0;                                 // rms of the residual, in encoded values
 };
 // Returns the blocks of 32 x 32 px (less at the right and lower border) whose residual has an rms
 // of more than four times the noise and more than four times the rms of the median block, sorted by

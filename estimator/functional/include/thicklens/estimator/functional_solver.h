@@ -10,20 +10,22 @@
 
 namespace thicklens::estimator {
 
+// The options of EstimateFunctional.
 struct FunctionalOptions {
-  double gamma = 1;             // > 0
-  std::optional<double> ridge;  // mu, > 0; default 1e-2/(U V)
-  double tolerance = 1e-3;      // relative residual at which conjugate gradients stop, > 0, < 1
-  int max_iterations = 1000;    // limit for each channel, >= 1
-  bool double_precision = false;
-  bool falloff = true;  // applies the irradiance of [S12] if there is a camera
+  double gamma = 1;               // > 0
+  std::optional<double> ridge;    // mu, > 0; default 1e-2/(U V)
+  double tolerance = 1e-3;        // relative residual at which conjugate gradients stop, > 0, < 1
+  int max_iterations = 1000;      // limit for each channel, >= 1
+  bool double_precision = false;  // compute in double
+  bool falloff = true;            // applies the irradiance of [S12] if there is a camera
 
   // Returns false, and the reason in `why` (may be null), if a member is not in its range.
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 
+// The weights that the functional had.
 struct FunctionalDiagnostics {
-  double gamma = 0, ridge = 0;
+  double gamma = 0, ridge = 0;  // gamma and mu
 };
 
 // The relative residual is |b - S y|/|b| of the system S y = b below.

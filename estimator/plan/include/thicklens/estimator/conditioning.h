@@ -12,7 +12,7 @@ namespace thicklens::estimator {
 // Conditioning of a linear system, computed from its dense matrix: for small images, to show and to
 // test, not to estimate with.
 struct Conditioning {
-  int unknowns = 0;
+  int unknowns = 0;  // number of rows of the matrix
   // Extreme eigenvalues; extreme singular values if the matrix is not symmetric. `smallest` is 0 or
   // below where rounding decides it.
   double smallest = 0, largest = 0;

@@ -11,13 +11,13 @@ namespace thicklens::estimator {
 // One way to a light field: what determines how it is computed, but not what is
 // computed.
 struct EstimatePlan {
-  std::string solver = "scene";
+  std::string solver = "scene";     // "scene", "blocks", "functional" or "grid"
   std::string prior;                // solver scene only; otherwise empty
   std::string block_solver;         // solver blocks only; otherwise empty
   std::optional<double> tolerance;  // absent: the solver's default
-  bool double_precision = false;
-  std::optional<int> block_px;
-  bool on_opencl = false;
+  bool double_precision = false;    // compute in double
+  std::optional<int> block_px;      // edge of a block, px; solver blocks only
+  bool on_opencl = false;           // on the best OpenCL device instead of the processor
 };
 
 // Returns a unique name, as a user would type it: "scene tv", "scene tv, tolerance 0.01", "blocks

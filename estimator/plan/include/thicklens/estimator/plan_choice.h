@@ -16,11 +16,13 @@ struct QualityTarget {
   std::optional<double> within_s;      // limit for the whole program
   std::optional<double> psnr_loss_db;  // relative to the best plan of the profile
 
+  // Returns whether any target is given.
   bool has_value() const { return !quality.empty() || within_s || psnr_loss_db; }
 };
 
+// The chosen plan, and what it is expected to cost.
 struct PlanChoice {
-  EstimatePlan plan;
+  EstimatePlan plan;            // the chosen plan
   double expected_seconds = 0;  // of the whole run, including the time that has passed already
   double loss_db = 0;           // below the best plan of the profile
   double median_error = 0;      // relative error of the predicted times

@@ -11,8 +11,8 @@ namespace thicklens::estimator {
 
 // Quantities known before an estimate that determine its time.
 struct Workload {
-  double megapixels = 0;
-  int channels = 1;
+  double megapixels = 0;     // size of the photograph, in 10^6 px
+  int channels = 1;          // of the photograph
   int views = 0;             // U V
   double blur_sigma_px = 0;  // of the photograph by its depth, root mean square over the pixels
   // Seconds that one thread needs to encode the files of all views, which depend on the content.
@@ -32,8 +32,9 @@ struct PartSeconds {
 // estimate takes. `file_seconds` is measured by the caller.
 THICKLENS_EXPORT Workload WorkloadOf(const EstimateInput& input, double file_seconds);
 
+// A workload with the time that it took.
 struct TimedWorkload {
-  Workload load;
+  Workload load;       // what was estimated
   double seconds = 0;  // of the whole run, > 0
   PartSeconds parts;   // none below 0; their sum is at most the whole
 };
@@ -59,13 +60,18 @@ class THICKLENS_EXPORT TimeModel {
     kPixelsChannelsIterations,  // times s / (0.2 + s), on scene points: iterations level off sooner
     kPixelsViewsBlurArea,       // times s^2: pixels that a blur reaches
   };
-  static constexpr int kTerms = kPixelsViewsBlurArea + 1;
+  static constexpr int kTerms = kPixelsViewsBlurArea + 1;  // The number of terms.
+  // One coefficient per term, in the order of the enumeration.
   using Terms = Eigen::Matrix<double, kTerms, 1>;
 
+  // Makes a model that predicts no time at all.
   TimeModel() : coefficients_(Terms::Zero()) {}
+  // Makes a model of these coefficients.
   explicit TimeModel(const Terms& coefficients) : coefficients_(coefficients) {}
 
+  // Predicted time of a whole run, s.
   double Seconds(const Workload& load) const;
+  // The coefficients of the terms.
   const Terms& coefficients() const { return coefficients_; }
 
  private:

@@ -42,8 +42,8 @@ THICKLENS_EXPORT double MaxPupilShift(const model::LightField& light_field);
 // WeightsForRadius leaves. An axis along which the views have no step has no influence. `radius_mm`
 // must not be 0, which is a single view; without a value the aperture is the captured one.
 struct Vignetting {
-  model::ApertureShape shape = model::ApertureShape::kGaussian;
-  std::optional<double> radius_mm;
+  model::ApertureShape shape = model::ApertureShape::kGaussian;  // shape of the captured aperture
+  std::optional<double> radius_mm;                               // R of the smaller aperture, mm
 };
 
 // Returns the weight of every ray of the view (k, l), T x S numbers row by row, 1 in the middle of

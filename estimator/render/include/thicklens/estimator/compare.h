@@ -14,6 +14,7 @@
 
 namespace thicklens::estimator {
 
+// How close an image is to its reference.
 struct ImageScores {
   double psnr_db = 0;                    // +inf for equal images
   double ssim = 0;                       // NaN if the image is smaller than the SSIM window
@@ -45,10 +46,11 @@ THICKLENS_EXPORT double DeltaE94(const Eigen::Vector3d& reference_lab, const Eig
 // Converts sRGB in [0, 1] to CIE L*a*b* for D65 and the 2-degree observer.
 THICKLENS_EXPORT Eigen::Vector3d LabOf(const Eigen::Vector3d& srgb);
 
+// The scores of one view.
 struct ViewScores {
-  int u = 0, v = 0;  // indices k, l
-  ImageScores scores;
-  std::optional<ImageScores> dibr;
+  int u = 0, v = 0;                 // indices k, l
+  ImageScores scores;               // of the second light field
+  std::optional<ImageScores> dibr;  // of the baseline
 };
 // Scores of all views, with means over groups of views. The mean of PSNRs is over the finite ones
 // (inf if there are none), so that views equal to the reference do not hide the others. With a
@@ -58,13 +60,13 @@ struct LightFieldScores {
   // Means over all views, over the views nearest to the middle (one for odd counts, two or four for
   // even counts), and over the views farthest from it (the four corners, unless they are missing).
   ImageScores mean, centre, corner;
-  std::optional<ImageScores> dibr_mean, dibr_centre, dibr_corner;
+  std::optional<ImageScores> dibr_mean, dibr_centre, dibr_corner;  // of the baseline
 };
 
 // Input of the baseline, depth-image-based rendering (DIBR): a photograph and its disparity.
 struct DibrInput {
-  model::LinearImage photograph;
-  DisparityMap disparity;  // without holes
+  model::LinearImage photograph;  // linear light
+  DisparityMap disparity;         // without holes
 };
 // Compares two light fields view by view, with values as the reference's transfer curve would store
 // them. Throws Error if sizes, counts or channels differ (the message gives the counts and says

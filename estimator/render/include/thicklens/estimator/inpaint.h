@@ -11,22 +11,25 @@
 
 namespace thicklens::estimator {
 
+// How InpaintOccludedRays fills holes.
 struct InpaintOptions {
   double radius_px = 3;  // radius of the neighbourhood that Telea's method uses, > 0
   int threads = 0;       // 0: one per core
   // Called for each visited view. If it throws, the light field is partly filled.
   ProgressFunction progress;
 
+  // Returns whether all members are in their range. Otherwise `why`, if not null, gets the reason.
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 
+// What InpaintOccludedRays did.
 struct InpaintSummary {
-  std::string message = "not run";
+  std::string message = "not run";  // how it ended, one line
   std::size_t holes = 0;    // occluded rays: they show something that the centre view does not
   std::size_t filled = 0;   // holes that the method filled in their own view
   std::size_t carried = 0;  // holes filled from the view in which their point was filled
   int views_visited = 0;    // views that still had holes to fill
-  double seconds = 0;
+  double seconds = 0;       // time of the inpainting
 };
 
 // Inpaints occluded background as in section 6 of the supplement [D99]. It replaces what the solver

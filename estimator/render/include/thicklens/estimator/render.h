@@ -56,6 +56,8 @@ THICKLENS_EXPORT model::LinearImage Mosaic(const model::LightField& light_field,
 // by side. They throw Error for an invalid light field or index.
 THICKLENS_EXPORT model::LinearImage EpipolarRow(const model::LightField& light_field, int t, int l,
                                                 int repeat_px);
+// Returns column s of all views of the view column k, side by side, each repeated to a width of
+// `repeat_px` (>= 1). Throws Error for an invalid light field or index.
 THICKLENS_EXPORT model::LinearImage EpipolarColumn(const model::LightField& light_field, int s,
                                                    int k, int repeat_px);
 

@@ -26,7 +26,7 @@ namespace thicklens::estimator {
 // plane of focus makes the blur too wide on one side of it; where the unexplained blocks are on
 // that side alone, a narrower blur explains them as well. Derived here [D109].
 struct BlurTrial {
-  double blur_scale = 1;
+  double blur_scale = 1;  // tested blur over the given one
   double focus_offset_px =
       0;  // px per view step, on the axis of the larger step; nearer is positive
   // Cross-validation score: the mean over the blocks, relative to that of the given blur. Blocks
@@ -38,6 +38,7 @@ struct BlurTrial {
   double compared_share = 0;  // share of the photograph's pixels in informative blocks
 };
 
+// How CheckBlur is run.
 struct BlurCheckOptions {
   bool falloff = true;  // use the irradiance of [S12] if there is a camera
   int threads = 0;      // 0: one per core
@@ -45,15 +46,17 @@ struct BlurCheckOptions {
   std::optional<double> memory_limit_mib;
   ProgressFunction progress;  // called for each trial and repeatedly between trials
 
+  // Returns whether all members are in their range. Otherwise `why`, if not null, gets the reason.
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 
+// What CheckBlur found.
 struct BlurCheck {
-  std::string message = "not run";
-  double noise_sigma = 0;      // of encoded values, in the image that was checked
-  int blocks = 0;              // number of informative blocks
-  int unexplained_blocks = 0;  // number of these that the given blur leaves unexplained
-  std::vector<BlurTrial> trials;
+  std::string message = "not run";  // how it ended, one line
+  double noise_sigma = 0;           // of encoded values, in the image that was checked
+  int blocks = 0;                   // number of informative blocks
+  int unexplained_blocks = 0;       // number of these that the given blur leaves unexplained
+  std::vector<BlurTrial> trials;    // the blurs and planes of focus that were tested
   // The widest blur and the smallest offset of the trials that do about as well as the best. If
   // both are set, the photograph does not decide between them.
   std::optional<BlurTrial> narrower_blur, other_focus;
@@ -61,8 +64,8 @@ struct BlurCheck {
   bool narrower_blur_at_end = false, other_focus_at_end = false;
   int width_px = 0, height_px = 0;  // size of the part that was checked, in px of the halved image
   int halvings = 0;                 // number of times that the image was halved
-  int iterations = 0;
-  double seconds = 0;
+  int iterations = 0;               // of all solves together
+  double seconds = 0;               // time of the check
 };
 
 // Solves once for the photograph, at half its size unless it is small, and six to sixteen times

@@ -23,6 +23,7 @@ struct CompactView;
 // aperture that sees the point: points with 127 and 255 are seen by the whole aperture, and the
 // others in part, past an edge or the image's border.
 using Confidence = std::uint8_t;
+// The confidence of a ray that shows no point of the centre view.
 constexpr Confidence kFilledIn = 0;
 
 // Returns the confidence of a point. `visible_fraction` is the share of the aperture by its
@@ -30,6 +31,7 @@ constexpr Confidence kFilledIn = 0;
 THICKLENS_EXPORT Confidence ConfidenceOfPoint(double visible_fraction, double blur_sigma_px);
 // Returns the share to half a 126th; 0 for a ray that is filled in.
 THICKLENS_EXPORT double VisibleFractionOf(Confidence confidence);
+// Returns whether the blur of the point can be undone.
 THICKLENS_EXPORT bool IsResolved(Confidence confidence);
 
 // Shares of many rays, sum 1.
@@ -37,7 +39,7 @@ struct ConfidenceShares {
   double visible = 0;         // seen by more than 99 % of the aperture, and resolved
   double partly_visible = 0;  // seen by less, and resolved
   double blurred = 0;         // blurred too strongly for details
-  double filled_in = 0;
+  double filled_in = 0;       // filled in with the background
 };
 // Converts counts to shares. `counts`: the number of rays with each confidence. All shares are 0 if
 // there are no rays.

@@ -23,21 +23,24 @@ enum class Prior {
 };
 THICKLENS_EXPORT Prior PriorFromName(
     const std::string& name);  // "ridge", "gradient", "tv", "patches"; throws Error for other names
+// Name of the prior: "ridge", "gradient", "tv" or "patches".
 THICKLENS_EXPORT std::string PriorName(Prior prior);
 
 // Returns the tolerance below which little is gained: 1e-4 for total variation and patches, 1e-3
 // for the others.
 THICKLENS_EXPORT double UsualTolerance(Prior prior);
 
+// How the strength of the prior is chosen.
 enum class StrengthRule {
   kAuto,   // from the photograph's noise
   kGcv,    // generalised cross-validation
   kGiven,  // SceneOptions::strength
 };
 
+// The options of EstimateScene.
 struct SceneOptions {
-  Prior prior = Prior::kTotalVariation;
-  StrengthRule strength_rule = StrengthRule::kAuto;
+  Prior prior = Prior::kTotalVariation;              // assumption about the radiance
+  StrengthRule strength_rule = StrengthRule::kAuto;  // how its strength is chosen
   // Strength of the prior in its own unit (see EstimateScene): finite and > 0 for kGiven; the other
   // rules do not use it, and it is finite and >= 0.
   double strength = 0;
@@ -45,7 +48,7 @@ struct SceneOptions {
   std::optional<double> tolerance;
   // Maximum number of conjugate-gradient iterations, for all solves of one strength together; >= 1.
   int max_iterations = 200;
-  bool double_precision = false;
+  bool double_precision = false;  // compute in double
   // Compare encoded values, as the eye and the metrics do. False: the mean slope s is used
   // everywhere.
   bool slope_weights = true;
@@ -57,6 +60,7 @@ struct SceneOptions {
   bool falloff = true;  // use the irradiance of [S12] if there is a camera
   int least_bands = 1;  // minimum number of bands, >= 1
 
+  // The tolerance, or UsualTolerance of the prior if it is absent.
   double tolerance_or_usual() const { return tolerance.value_or(UsualTolerance(prior)); }
   // Returns false, and the reason in `why` (may be null), if a member is not in its range.
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
@@ -64,10 +68,10 @@ struct SceneOptions {
 
 // Findings of the scene solver besides the light field.
 struct SceneDiagnostics {
-  Prior prior = Prior::kTotalVariation;
-  double strength = 0;
-  double noise_sigma = 0;  // of encoded values in [0, 1], as found in the photograph
-  int reweightings = 0;    // of total variation: one per iteration, after the first few
+  Prior prior = Prior::kTotalVariation;  // the prior of the estimate
+  double strength = 0;                   // its strength, in its own unit
+  double noise_sigma = 0;                // of encoded values in [0, 1], as found in the photograph
+  int reweightings = 0;  // of total variation: one per iteration, after the first few
   // The share of the photograph's pixels that have a row of their own in H (occlusions, steep
   // surfaces), and the share of the aperture's rays that show points hidden from the centre view.
   double row_share = 0, occluded_fraction = 0;
@@ -140,8 +144,8 @@ struct SceneViewSink {
   std::function<void(int k, int l, const model::LinearImage& view,
                      const std::vector<Confidence>& confidence)>
       take;
-  double bytes = 0;  // memory that the sink needs per view while it processes it
-  bool wants_confidence = true;
+  double bytes = 0;              // memory that the sink needs per view while it processes it
+  bool wants_confidence = true;  // the sink uses `confidence`
 };
 
 // Returns the standard deviation of the noise of encoded values in [0, 1], quantisation included

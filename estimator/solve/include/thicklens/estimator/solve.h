@@ -30,11 +30,12 @@ THICKLENS_EXPORT bool IsValid(const SolverOptions& options, std::string* why);
 using SolverDiagnostics =
     std::variant<std::monostate, SceneDiagnostics, BlockDiagnostics, FunctionalDiagnostics>;
 
+// How the estimate ended, for every solver in one form.
 struct SolverSummary : SolverResult {
   std::string solver;               // its SolverName
   std::optional<int> iterations;    // the maximum over the parts; absent: a direct solver
   std::optional<double> rcond_min;  // the minimum over the blocks of a direct solver
-  SolverDiagnostics diagnostics;
+  SolverDiagnostics diagnostics;    // what this solver alone reports
   std::vector<BlockReport> blocks;  // block solver only; row by row
 };
 

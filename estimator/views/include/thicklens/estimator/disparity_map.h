@@ -13,8 +13,8 @@ namespace thicklens::estimator {
 // The depth of an image in the only form that the rays of its light field need: the displacement of
 // each scene point between views.
 struct DisparityMap {
-  int width_px = 0;
-  int height_px = 0;
+  int width_px = 0;   // width, px
+  int height_px = 0;  // height, px
   // One number per pixel, row by row; nearer points have larger values. The scene point at sample x
   // of the centre view is at x - disparity * (a step.x, b step.y) in the view (a, b). NaN marks a
   // hole.

@@ -16,16 +16,18 @@ namespace thicklens::estimator {
 
 // The data that an estimate starts from. Valid inputs satisfy CheckInput (input_checks.h).
 struct EstimateInput {
-  model::LinearImage image;
-  DisparityMap disparity;   // without holes, of the image's size
-  Eigen::ArrayXXd weights;  // V x U, sum 1, >= 0
+  model::LinearImage image;  // photograph, linear light
+  DisparityMap disparity;    // without holes, of the image's size
+  Eigen::ArrayXXd weights;   // V x U, sum 1, >= 0
+  // Of the photograph's encoded values.
   model::TransferCurve transfer = model::TransferCurve::Srgb();
   // Either both are set or neither is. The S x T samples of the grid are the size of the image.
   std::optional<model::LightFieldGrid> grid;
-  std::optional<model::Camera> camera;
+  std::optional<model::Camera> camera;          // calibrated
   std::optional<model::Camera> falloff_camera;  // camera of the fall-off if it differs from
                                                 // `camera`, for example a thin lens
 
+  // The camera of the fall-off; one of the two must be present.
   const model::Camera& camera_of_falloff() const {
     return falloff_camera ? *falloff_camera : *camera;
   }

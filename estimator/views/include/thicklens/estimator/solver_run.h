@@ -28,7 +28,7 @@ struct SolverRun {
   // The device that computes; null: the processor. The solvers of the functional for a whole image
   // always compute on the processor.
   kernels::Backend* backend = nullptr;
-  ProgressFunction progress;
+  ProgressFunction progress;    // gets the steps that are done; empty: none
   BlockStore* store = nullptr;  // keeps finished blocks and finds them again; block solver only
   // Gets the views one by one as they are made, so that they are never held all together. The light
   // field that is returned has no views. Scene solver only.
@@ -40,19 +40,19 @@ struct SolverRun {
 
 // The part of the summary that all solvers have.
 struct SolverResult {
-  std::string message = "not run";
+  std::string message = "not run";  // how it ended, one line
   // Whether the iterations reached their tolerance; direct solvers: true.
   bool converged = false;
   // |A x - b|/|b| of the solved system, recomputed from the solution; the maximum over the parts in
   // which it was solved (channels, blocks, bands).
   double relative_residual = 0;
   double setup_seconds = 0;  // geometry, priors, and the choice of the parts
-  double solve_seconds = 0;
+  double solve_seconds = 0;  // time of the solution
   double views_seconds = 0;  // making the views from the solution; 0 where they are the solution
   // Maximum memory that the whole process is expected to hold, including what it held before.
   double predicted_memory_mib = 0;
-  int threads = 0;
-  std::string device;
+  int threads = 0;     // number of threads that computed
+  std::string device;  // "cpu", "opencl:0:0"
 };
 
 }  // namespace thicklens::estimator

@@ -15,6 +15,7 @@
 
 namespace thicklens::estimator {
 
+// Whether a sample of a view shows a point of the centre view.
 enum class Visibility : std::uint8_t {
   kVisible,   // the sample shows a point of the centre view
   kOccluded,  // no point of the centre view is visible here; disparity and source are of the
@@ -23,10 +24,10 @@ enum class Visibility : std::uint8_t {
 
 // The content of a view: one disparity for each of its samples.
 struct ViewDisparity {
-  int width_px = 0;
-  int height_px = 0;
-  std::vector<float> disparity;  // in the unit of the DisparityMap
-  std::vector<Visibility> visibility;
+  int width_px = 0;                    // width, px
+  int height_px = 0;                   // height, px
+  std::vector<float> disparity;        // in the unit of the DisparityMap
+  std::vector<Visibility> visibility;  // one per sample
   // Displacement from the sample to its source in the centre view, px: its source is at sample +
   // (source_x, source_y). For kVisible the displacement is disparity * (a step.x, b step.y). For
   // kOccluded it leads to the background: either the source of the sample that shows the
@@ -41,14 +42,14 @@ struct ViewDisparity {
 // A ViewDisparity in less memory (a third, where few samples are hidden or mixed). The displacement
 // to the source of a visible sample follows from its disparity.
 struct CompactView {
-  using Occluded = kernels::OccludedSample;
-  using Boundary = kernels::BoundarySample;
-  int width_px = 0;
-  int height_px = 0;
-  Eigen::Vector2d shift{0, 0};     // px per unit of disparity
-  std::vector<float> disparity;    // NaN: hidden
-  std::vector<Occluded> occluded;  // sorted by index
-  std::vector<Boundary> boundary;  // sorted by index
+  using Occluded = kernels::OccludedSample;  // a sample that shows the background
+  using Boundary = kernels::BoundarySample;  // a sample that two surfaces share
+  int width_px = 0;                          // width, px
+  int height_px = 0;                         // height, px
+  Eigen::Vector2d shift{0, 0};               // px per unit of disparity
+  std::vector<float> disparity;              // NaN: hidden
+  std::vector<Occluded> occluded;            // sorted by index
+  std::vector<Boundary> boundary;            // sorted by index
 
   // Returns the entry of a sample that must be hidden.
   THICKLENS_EXPORT const Occluded& OccludedAt(std::size_t index) const;
@@ -108,7 +109,10 @@ class THICKLENS_EXPORT DisparityRenderer {
   explicit DisparityRenderer(const DisparityMap& map);
   explicit DisparityRenderer(const DisparityMap&& map) = delete;
 
+  // Renders the view at (a, b) steps, as RenderDisparity does. Throws Error if (a, b) is not
+  // finite.
   ViewDisparity Render(double a, double b) const;
+  // Renders the same view in less memory.
   CompactView RenderCompact(double a, double b) const;
 
  private:
@@ -135,6 +139,7 @@ class THICKLENS_EXPORT ImageWarper {
   ImageWarper(const model::LinearImage& image, const DisparityMap& map);
   ImageWarper(const model::LinearImage& image, const DisparityMap&& map) = delete;
 
+  // Warps the image to a view, as WarpImage does.
   model::LinearImage Warp(const ViewDisparity& view) const;
   // Warps into `warped`, whose memory is reused where it is large enough.
   void Warp(const CompactView& view, model::LinearImage* warped) const;
