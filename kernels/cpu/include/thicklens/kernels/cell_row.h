@@ -36,11 +36,11 @@ THICKLENS_EXPORT void PlacePixels(const float* disparity, float shift_x, float s
 
 // Number of samples of the view in the rectangle around a cell.
 enum class CellSamples : std::int32_t {
-  kNone,
-  kOne,
-  kTwo,
-  kSeveral,
-  kOdd,  // at least one sample, and a part of the cell is flipped or degenerate
+  kNone,     // no sample
+  kOne,      // a single sample
+  kTwo,      // two samples
+  kSeveral,  // more than two samples
+  kOdd,      // at least one sample, and a part of the cell is flipped or degenerate
 };
 
 // The cells between two rows of pixels: one for each pixel but the last.

@@ -13,26 +13,28 @@ namespace thicklens::model {
 // The effects of image formation. They are independent of each other: a forward model without an
 // effect does what EffectFacts::without states, and spends no time on the effect.
 enum class Effect {
-  kThickness,
-  kDefocus,
-  kApertureShape,
-  kFalloff,
-  kVignetting,
-  kOcclusion,
-  kPixelBox,
-  kLensFloor,
-  kDiffraction,
-  kShotNoise,
-  kReadNoise,
-  kQuantisation,
-  kTransferCurve,
+  kThickness,      // two principal planes, compared with the thin lens
+  kDefocus,        // blur of objects outside the plane of focus
+  kApertureShape,  // the edge of a disc-shaped aperture
+  kFalloff,        // irradiance cos(alpha) cos^3(beta) toward the corners
+  kVignetting,     // rays that the aperture blocks if the UV plane is elsewhere
+  kOcclusion,      // near objects hide far ones from parts of the lens
+  kPixelBox,       // a pixel is the mean over its square
+  kLensFloor,      // blur of the lens in its plane of focus
+  kDiffraction,    // blur by the wave nature of light
+  kShotNoise,      // electrons arrive one by one
+  kReadNoise,      // noise of the sensor's electronics
+  kQuantisation,   // rounding of encoded values
+  kTransferCurve,  // encoding of linear light
+
   // The remaining effects belong to a bench that moves a target from frame to frame.
-  kLampFalloff,
-  kFlicker,
-  kMagnification,
-  kDrift,
-  kTilt,
-  kReadingError,
+
+  kLampFalloff,    // a lamp beside the camera lights far targets less
+  kFlicker,        // the lamp changes from frame to frame
+  kMagnification,  // a farther target is smaller in the image
+  kDrift,          // the target moves sideways from frame to frame
+  kTilt,           // one side of the target is nearer than the other
+  kReadingError,   // error of the bench's readings
 };
 
 // Unit of an impact.

@@ -24,7 +24,7 @@ namespace thicklens::model {
 // has at half a cycle per px 0.7 % of the amplitude of an infinitely sharp edge, and less at higher
 // frequencies.
 enum class TextureKind {
-  kUniform,
+  kUniform,  // the same radiance everywhere
   kSine,  // colour (1 + contrast cos(2 pi (X cos(angle) + Y sin(angle))/period)), (X, Y) as below
   // colour (1 + contrast erf(d/(sqrt(2) sigma))), where d is the distance behind a straight line
   // through the middle (TextureOptions)

@@ -18,14 +18,14 @@ namespace thicklens::model {
 
 // The flat target in front of the camera.
 enum class TargetKind {
-  kDeadLeaves,
-  kPinkNoise,
-  kWhiteNoise,
-  kCheckerboard,
-  kSiemensStar,
-  kImage,        // an image of the user
-  kPrintedEdge,  // a slanted edge blurred by its ink: a Gaussian of ink_sigma_mm on the target
-  kKnifeEdge,    // a slanted sharp edge
+  kDeadLeaves,    // discs of many sizes that occlude each other
+  kPinkNoise,     // noise whose amplitude decreases as 1/frequency
+  kWhiteNoise,    // noise with the same amplitude at all frequencies
+  kCheckerboard,  // bright and dark squares
+  kSiemensStar,   // bright and dark sectors around the middle
+  kImage,         // an image of the user
+  kPrintedEdge,   // a slanted edge blurred by its ink: a Gaussian of ink_sigma_mm on the target
+  kKnifeEdge,     // a slanted sharp edge
 };
 THICKLENS_EXPORT std::string TargetKindName(TargetKind kind);  // "dead-leaves", "pink-noise", ...
 
