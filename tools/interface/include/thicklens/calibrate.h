@@ -14,6 +14,7 @@
 
 namespace thicklens {
 
+// Which of the two results becomes the camera's calibration.
 enum class CalibrationMethod {
   kFit,    // joint fit of the blur of all frames, with uncertainties
   kPaper,  // the paper's recipe: the sharpest frame, then the mean of sigma/r; no uncertainty
@@ -25,17 +26,21 @@ enum class OnRefusal {
   kReturn,  // it returns a Calibration with its refusal, whose camera has no calibration
 };
 
+// The options of Calibrate.
 struct CalibrateOptions {
-  CalibrationMethod method = CalibrationMethod::kFit;
+  CalibrationMethod method = CalibrationMethod::kFit;  // the result that becomes the calibration
   // Also fit tiles of the field and colour channels: tilt, curvature, focus per colour.
   bool map_field = true;
-  OnRefusal on_refusal = OnRefusal::kThrow;
+  OnRefusal on_refusal = OnRefusal::kThrow;  // what a refusal does
 
+  // Returns whether all members are valid. Otherwise `why`, if not null, gets the field, the value
+  // and the constraint.
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 
 // The results, and the evidence behind them (thicklens/calib/calibration.h says what each is).
 using CalibrationSummary = calib::CalibrationSummary;
+// The evidence behind the results, in full.
 using CalibrationDiagnostics = calib::CalibrationDiagnostics;
 
 // Everything that a calibration found, with one record per frame, and the camera that has it.
@@ -51,8 +56,10 @@ struct Calibration : calib::Calibration {
 // A sweep that determines no camera. The message is the reason.
 class THICKLENS_EXPORT CalibrationRefused : public Error {
  public:
+  // Makes the error of a refused calibration, which must not be null.
   explicit CalibrationRefused(std::shared_ptr<const Calibration> calibration);
   ~CalibrationRefused() override;
+  // What was found before the refusal; valid as long as the error.
   const Calibration& calibration() const { return *calibration_; }
 
  private:

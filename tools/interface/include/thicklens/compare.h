@@ -22,19 +22,21 @@ struct ImageScores {
   std::optional<double> macade_standin;  // absent if the reference has no edges
 };
 
+// The scores of one view.
 struct ViewScores {
-  int k = 0, l = 0;  // index of the view
-  ImageScores scores;
+  int k = 0, l = 0;                 // index of the view
+  ImageScores scores;               // of the other light field
   std::optional<ImageScores> dibr;  // the baseline
 };
 
+// The scores of all views, and their means.
 struct LightFieldScores {
   int u_count = 0, v_count = 0, width_px = 0, height_px = 0;  // of the views that were compared
   // Over all views, the middle ones, the outermost ones. The mean of PSNRs is over the finite ones.
   ImageScores mean, centre, corner;
-  std::optional<ImageScores> dibr_mean, dibr_centre, dibr_corner;
-  std::vector<ViewScores> views;  // the views that both have
-  std::vector<Notice> notices;
+  std::optional<ImageScores> dibr_mean, dibr_centre, dibr_corner;  // of the baseline, likewise
+  std::vector<ViewScores> views;                                   // the views that both have
+  std::vector<Notice> notices;  // remarks on the call, in their order
 
   // One line: mean PSNR, SSIM and dE94, and that of the baseline.
   THICKLENS_EXPORT std::string BriefReport() const;
@@ -42,15 +44,18 @@ struct LightFieldScores {
 
 // The baseline of a comparison: a photograph warped to each view by its depth (DIBR).
 struct Baseline {
-  Image photo;
-  DepthMap depth;
+  Image photo;                 // the photograph that is warped
+  DepthMap depth;              // its depth
   bool remove_falloff = true;  // divide the fall-off [S12] out of the photograph, with a camera
 };
 
+// The options of CompareImages and CompareLightFields.
 struct CompareOptions {
-  int border_px = 0;  // 0 to 100000; a border that is left out
-  std::optional<Baseline> baseline;
+  int border_px = 0;                 // 0 to 100000; a border that is left out
+  std::optional<Baseline> baseline;  // of light fields only; absent: none
 
+  // Returns whether all members are valid. Otherwise `why`, if not null, gets the field, the value
+  // and the constraint.
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 

@@ -15,36 +15,39 @@ namespace thicklens {
 // displacement in px per view step, positive for near points, 0 in the plane of focus.
 using DepthKind = model::DepthKind;
 
+// Unit of the numbers of a depth map.
 enum class LengthUnit {
   kNone,        // not stated; a disparity has no unit
   kMillimetre,  // 1 mm per unit of the map
-  kCentimetre,
-  kMetre,
-  kTum5000,  // metres times 5000, as the TUM benchmark stores them: 0.2 mm per unit
+  kCentimetre,  // 10 mm per unit of the map
+  kMetre,       // 1000 mm per unit of the map
+  kTum5000,     // metres times 5000, as the TUM benchmark stores them: 0.2 mm per unit
 };
 THICKLENS_EXPORT std::string LengthUnitName(LengthUnit unit);  // "mm", "cm", "m", "tum5000", ""
 
 // What the numbers of a map mean. It is stated by the user and never guessed: kind and unit of a
 // map in kZ or kRange have no default.
 struct DepthMeaning {
-  DepthKind kind = DepthKind::kZ;
+  DepthKind kind = DepthKind::kZ;       // what the numbers are
   LengthUnit unit = LengthUnit::kNone;  // kZ and kRange need one, kDisparity has none
   // Only for kDisparity: disparity_px = disparity_scale * value + disparity_offset_px. The scale
   // is finite and not 0, the offset finite.
   double disparity_scale = 1;
-  double disparity_offset_px = 0;
+  double disparity_offset_px = 0;  // px per view step
 
+  // Returns whether kind, unit, scale and offset are stated and fit each other. Otherwise `why`, if
+  // not null, gets the reason.
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 
 // A depth map: one number per pixel, rows from top to bottom. NaN and infinities are holes; so is 0
 // in maps of whole numbers, and in kZ and kRange.
 struct DepthMap {
-  int width_px = 0, height_px = 0;
-  std::vector<float> values;
-  bool is_integer = false;  // the file's type is integer, so that 0 means "no data"
-  DepthMeaning meaning;
-  std::string source;  // file that it was read from; messages name it
+  int width_px = 0, height_px = 0;  // size, px
+  std::vector<float> values;        // width * height numbers
+  bool is_integer = false;          // the file's type is integer, so that 0 means "no data"
+  DepthMeaning meaning;             // what the numbers mean
+  std::string source;               // file that it was read from; messages name it
 
   // Returns a rectangle of the map, px. Throws Error if it is empty or not inside.
   THICKLENS_EXPORT DepthMap Cropped(const model::PixelRect& rect) const;

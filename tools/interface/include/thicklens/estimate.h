@@ -27,16 +27,17 @@ namespace thicklens {
 // How the aperture of the photograph weighs the views. Without a statement the camera's PSF says it
 // and, without a camera, the weights are equal, which a notice reports.
 struct ApertureOptions {
-  std::optional<model::ApertureShape> shape;
+  std::optional<model::ApertureShape> shape;  // weights of this shape
   // Take the positions of the views (and, if they are stated, their weights) from this light field.
   std::shared_ptr<const ApertureViews> views_of;
 };
 
 // The sensor pixel of the image's top-left pixel, px; for an image of a part of the sensor.
 struct SensorOrigin {
-  int x = 0, y = 0;
+  int x = 0, y = 0;  // column and row of the sensor, px
 };
 
+// What a contradiction between EXIF and camera does.
 enum class ExifCheck {
   kRequire,  // throw Error if the photograph's EXIF contradicts the camera
   kIgnore,   // report contradictions as notices
@@ -54,15 +55,15 @@ struct EstimateOptions {
   std::optional<ViewCounts> views;
   std::optional<PixelRect> crop;  // take only this rectangle of photograph and depth, px
   std::optional<SensorOrigin> sensor_origin;  // needs a camera; 0 to 100000 px
-  ExifCheck exif = ExifCheck::kRequire;
-  ApertureOptions aperture;
+  ExifCheck exif = ExifCheck::kRequire;       // what a contradiction does
+  ApertureOptions aperture;                   // weights of the views
   // Depth of the ST plane from Ap, mm, 0 < st_depth_mm <= 1e9; absent: the plane of focus. Needs a
   // camera.
   std::optional<double> st_depth_mm;
-  bool smooth_depth = true;  // smooth a noisy depth along its surfaces [D94]
-  EffectSelection effects;
-  AnySolver solver = SceneSolver{};
-  HiddenRays hidden_rays = HiddenRays::kSolver;
+  bool smooth_depth = true;                      // smooth a noisy depth along its surfaces [D94]
+  EffectSelection effects;                       // effects that the estimate models
+  AnySolver solver = SceneSolver{};              // how the light field is computed
+  HiddenRays hidden_rays = HiddenRays::kSolver;  // how hidden rays are filled
   // "auto", "cpu", "opencl", "opencl:PLATFORM" or "opencl:PLATFORM:DEVICE". auto: the processor for
   // SceneSolver, the best device for BlockSolver.
   std::string device = "auto";
@@ -77,11 +78,13 @@ struct EstimateOptions {
 
 // ---- What comes back.
 
+// Time of the parts of an estimate, s.
 struct EstimateSeconds {
-  double prepare = 0;  // camera, aperture, depth, effects
-  double setup = 0, blur_check = 0, solve = 0;
-  double views = 0;  // making the views, and inpainting
-  double sink = 0;   // giving views and confidence to a ViewSink; shared among the threads
+  double prepare = 0;                           // camera, aperture, depth, effects
+  double setup = 0, blur_check = 0, solve = 0;  // of the solver, and of check_blur
+  double views = 0;                             // making the views, and inpainting
+  double sink = 0;  // giving views and confidence to a ViewSink; shared among the threads
+  // The sum of all parts, s.
   double total() const { return prepare + setup + blur_check + solve + views + sink; }
 };
 
@@ -90,17 +93,20 @@ struct EstimateSummary {
   std::string message = "not run";  // of the solver
   std::string solver;               // "scene", "blocks", "functional", "grid" or a program's own
   std::string prior;                // of SceneSolver; otherwise empty
+  // Numbers of views across and down, size of a view, and its channels.
   int u_count = 0, v_count = 0, width_px = 0, height_px = 0, channels = 0;
-  std::optional<int> iterations;
-  bool converged = false;
+  std::optional<int> iterations;  // absent: a direct solver
+  bool converged = false;         // the iterations reached their tolerance; direct: true
+  // Residual of the system relative to its right side, recomputed; smallest reciprocal condition
+  // number of the blocks of a direct solver.
   std::optional<double> relative_residual, rcond_min;
-  std::string device;
-  int threads = 0;
+  std::string device;                // that computed: "cpu", "opencl:0:0"
+  int threads = 0;                   // number of threads that computed
   std::vector<std::string> effects;  // names of the effects that were taken into account
   // Why the result is partial: the iterations did not converge. Empty: it is complete.
   std::string partial_reason;
   std::vector<std::string> warnings;  // what may make the result wrong, one line each
-  EstimateSeconds seconds;
+  EstimateSeconds seconds;            // where the time went
 
   // One line: solver, views, size, residual, time, and the number of warnings.
   THICKLENS_EXPORT std::string BriefReport() const;
@@ -109,14 +115,15 @@ struct EstimateSummary {
 // One quantity in which the photograph's EXIF and the camera were compared, both as text with
 // units: "35 mm", "50 +- 0.1 mm".
 struct ExifComparison {
+  // Whether the two values can be of one photograph.
   enum class Verdict {
-    kAgrees,
+    kAgrees,       // both are equal within rounding
     kUndecided,    // the difference is within rounding and nominal values, or cannot be compared
     kContradicts,  // the photograph is of another lens, setting or sensor
   };
-  std::string quantity, photo, camera;
-  Verdict verdict = Verdict::kAgrees;
-  std::string remark;  // what a disagreement may mean
+  std::string quantity, photo, camera;  // name, and the two values
+  Verdict verdict = Verdict::kAgrees;   // whether they agree
+  std::string remark;                   // what a disagreement may mean
 };
 
 THICKLENS_EXPORT std::string ExifVerdictName(ExifComparison::Verdict verdict);  // "agrees", ...
@@ -124,76 +131,82 @@ THICKLENS_EXPORT std::string ExifVerdictName(ExifComparison::Verdict verdict);  
 // What SceneSolver::check_blur proposes, in the numbers that a user can change: those of the map of
 // disparities, or those of the camera. Nothing of it is applied. Absent: not proposed.
 struct BlurProposal {
+  // A blur that explains the photograph better.
   struct NarrowerBlur {
     // Either the meaning of the map for which the blur is as narrow as proposed, or kappa.
     std::optional<double> disparity_scale, disparity_offset_px, blur_ratio;
   };
+  // A plane of focus that explains the photograph better.
   struct OtherFocus {
     // Either the offset of the disparities, px per view step, or the plane of focus, mm from Ap,
     // which may be infinite.
     std::optional<double> disparity_offset_px, focus_depth_mm;
   };
-  std::optional<NarrowerBlur> narrower_blur;
-  std::optional<OtherFocus> other_focus;
+  std::optional<NarrowerBlur> narrower_blur;  // the proposed blur
+  std::optional<OtherFocus> other_focus;      // the proposed plane of focus
 };
 
 // A part of the photograph that the estimate does not explain, px; rms in encoded values, 1 at full
 // scale.
 struct UnexplainedPatch {
-  int x = 0, y = 0, width_px = 0, height_px = 0;
-  double residual_rms = 0;
+  int x = 0, y = 0, width_px = 0, height_px = 0;  // top-left pixel, and size, px
+  double residual_rms = 0;                        // rms of H r - I, in encoded values
 };
 
 // How far the estimate can be trusted, and what its input was like.
 struct EstimateDiagnostics {
-  TransferCurve transfer = TransferCurve::Srgb();
-  std::string transfer_from;  // "image", "camera" or "assumed"
-  bool has_exif = false;      // EXIF was found and compared
-  std::vector<ExifComparison> exif;
-  std::string aperture_shape;  // "uniform", "gaussian", "disc", ...
-  std::string aperture_from;   // "option", "light-field", "camera", "assumed"
+  TransferCurve transfer = TransferCurve::Srgb();  // curve by which the photograph was decoded
+  std::string transfer_from;                       // "image", "camera" or "assumed"
+  bool has_exif = false;                           // EXIF was found and compared
+  std::vector<ExifComparison> exif;                // one per compared quantity
+  std::string aperture_shape;                      // "uniform", "gaussian", "disc", ...
+  std::string aperture_from;                       // "option", "light-field", "camera", "assumed"
   std::optional<double> aperture_calibrated_sigma_mm;  // kappa r, with a camera
   Eigen::Vector2d aperture_sigma_mm{0, 0};             // that the views have, along u and v [D30]
   Eigen::Vector2d aperture_corner_change{0, 0};  // relative change of it in the corners, largest
-  model::EffectSelection effects;
-  std::optional<model::DepthStatistics> depth;  // mm from Ap, with a camera
-  std::size_t holes_filled = 0;
-  double holes_share = 0;
+  model::EffectSelection effects;                // chosen effects, and their impacts
+  std::optional<model::DepthStatistics> depth;   // mm from Ap, with a camera
+  std::size_t holes_filled = 0;                  // number of pixels of the map
+  double holes_share = 0;                        // the same over all pixels
   std::pair<double, double> disparity_range_px{0, 0};         // px per view step
   std::optional<double> depth_noise_px, depth_noise_left_px;  // px per view step [D93], [D94]
   double largest_step_px = 0;  // displacement between neighbouring views
   double coarse_share = 0;     // share of the pixels whose step is above 3 px
   std::optional<double> strength, noise_sigma, residual_rms;  // noise, residual in encoded values
+  // Shares of SceneSolver: pixels with a row of their own in H, rays past edges, blocks that stay
+  // unexplained.
   std::optional<double> row_share, occluded_fraction, unexplained_share;
   std::vector<UnexplainedPatch> patches;      // by descending residual
   std::optional<StrengthRule> strength_rule;  // of SceneSolver
-  int bands = 1;
-  int reweightings = 0;
-  double predicted_memory_mib = 0;
-  std::optional<double> gamma, ridge;
-  std::optional<int> block_px;
-  int blocks_from_store = 0;  // of BlockSolver::store
+  int bands = 1;                              // parts in which the image was solved
+  int reweightings = 0;                       // of total variation
+  double predicted_memory_mib = 0;            // of the whole process
+  std::optional<double> gamma, ridge;         // gamma and mu of the functional
+  std::optional<int> block_px;                // edge of a block, px
+  int blocks_from_store = 0;                  // of BlockSolver::store
   // Shares of all rays: seen by the whole aperture, in part, blurred too strongly for details, and
   // filled in. The sum is 1.
   double rays_visible = 0, rays_partly_visible = 0, rays_blurred = 0, rays_filled_in = 0;
   std::optional<estimator::InpaintSummary> inpainting;  // of HiddenRays::kTelea
   std::optional<estimator::BlurCheck> blur_check;       // of SceneSolver::check_blur
   BlurProposal blur_proposal;                           // that follows from it
-  std::vector<Notice> notices;
+  std::vector<Notice> notices;                          // remarks on the call, in their order
 };
 
 // One block of BlockSolver: position and size in px.
 struct BlockRecord {
+  // Top-left pixel and size; number of rays that are solved for; iterations, 0 for direct solvers.
   int x = 0, y = 0, width_px = 0, height_px = 0, unknowns = 0, iterations = 0;
-  std::optional<double> rcond;
-  double relative_residual = 0;
+  std::optional<double> rcond;   // reciprocal condition number; direct solvers
+  double relative_residual = 0;  // recomputed from the solution
 };
 
+// The estimated light field, and everything known of it.
 struct LightFieldEstimate {
-  LightField light_field;
-  EstimateSummary summary;
-  EstimateDiagnostics diagnostics;
-  std::vector<BlockRecord> blocks;
+  LightField light_field;           // U x V views of S x T px, linear light
+  EstimateSummary summary;          // the result in numbers
+  EstimateDiagnostics diagnostics;  // how far to trust it
+  std::vector<BlockRecord> blocks;  // of BlockSolver, row by row
   // What the solver started from: the photograph in linear light, its disparity, weights and grid.
   std::optional<Problem> problem;
   std::vector<bool> was_hole;  // per pixel of the depth map: its value was filled in
@@ -210,6 +223,7 @@ struct LightFieldEstimate {
 class THICKLENS_EXPORT ViewSink {
  public:
   virtual ~ViewSink();
+  // Gets the view (k, l), linear light.
   virtual void TakeView(int k, int l, const model::LinearImage& view) = 0;
   // One byte per ray of the view, row by row.
   virtual void TakeConfidence(int k, int l, const std::vector<std::uint8_t>& confidence,

@@ -16,14 +16,15 @@ namespace thicklens {
 
 using DepthRange = model::DepthRange;  // mm from Ap; far_mm may be infinite
 
+// The options of ExplainCamera.
 struct ExplainOptions {
   // Exactly one: a range, 0 < near < far; or the depth map of the scene, of the sensor's size, in
   // kZ or kRange.
   std::optional<DepthRange> depth_range;
-  std::optional<DepthMap> depth;
-  int depth_count = 9;  // of the table, equally spaced in 1/depth; 2 to 10000
-  EffectSelection effects;
-  int bits = 8;  // per encoded value, 1 to 32
+  std::optional<DepthMap> depth;  // see depth_range
+  int depth_count = 9;            // of the table, equally spaced in 1/depth; 2 to 10000
+  EffectSelection effects;        // the effects that are judged
+  int bits = 8;                   // per encoded value, 1 to 32
   // Electrons at full scale, 0: unknown; standard deviation of the read noise in electrons, which
   // needs the former. Finite and >= 0.
   double full_well_electrons = 0, read_noise_electrons = 0;
@@ -34,15 +35,17 @@ struct ExplainOptions {
   std::optional<double> uv_depth_mm;
   bool measure_costs = false;  // takes some seconds; not with a bench
 
+  // Returns whether all members are valid. Otherwise `why`, if not null, gets the field, the value
+  // and the constraint.
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 
 // The blur and the effects of a camera at some depths.
 struct CameraExplanation {
-  DepthRange depth_range;  // given, or of the map
-  model::Explanation camera;
+  DepthRange depth_range;          // given, or of the map
+  model::Explanation camera;       // blur and depth of field
   model::EffectSelection effects;  // with the largest impact of each effect at these depths
-  std::optional<model::EffectCosts> costs;
+  std::optional<model::EffectCosts> costs;  // present if measure_costs was set
 };
 
 // Explains blur, depth of field and effects of a calibrated camera: `thicklens explain`. `options`

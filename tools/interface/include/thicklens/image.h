@@ -44,12 +44,16 @@ class THICKLENS_EXPORT Image {
   static Image FromLight(int width_px, int height_px, ChannelOrder order, std::vector<float> values,
                          TransferCurve transfer = TransferCurve::Srgb(), std::string source = "");
 
+  // Width, px.
   int width_px() const;
+  // Height, px.
   int height_px() const;
   int channels() const;        // 1, 3 or 4
   ChannelOrder order() const;  // kGrey, kRgb or kRgba
+  // Returns whether the values are linear light rather than encoded.
   bool is_linear() const { return std::holds_alternative<model::LinearImage>(pixels_); }
   int bits() const;  // 8 or 16; 32 for linear light
+  // The stated curve between light and encoded values; absent: not stated.
   const std::optional<TransferCurve>& transfer() const { return transfer_; }
   // The file that ReadImage read, or the name that was given; empty: none. Messages name it.
   const std::string& source() const { return source_; }
@@ -59,6 +63,7 @@ class THICKLENS_EXPORT Image {
   // The values, channels interleaved in the order order(). encoded() throws Error for linear light,
   // light() for encoded values.
   const model::EncodedImage& encoded() const;
+  // The values as linear light; see encoded().
   const model::LinearImage& light() const;
 
   // Returns the image in linear light. Encoded values are decoded by `transfer`; it has no effect
@@ -85,6 +90,7 @@ class THICKLENS_EXPORT Image {
 THICKLENS_EXPORT Image ReadImage(const std::string& path,
                                  std::optional<TransferCurve> transfer = std::nullopt);
 
+// The options of WriteImage and EncodeImage.
 struct ImageFileOptions {
   int bits = 8;  // 8 or 16, of linear light; encoded values keep their own
   // Standard deviation of normal noise that is added to the encoded values before rounding, in
@@ -94,11 +100,13 @@ struct ImageFileOptions {
   // Written into the file as its description; empty: none.
   std::string description;
 
+  // Returns whether all members are valid. Otherwise `why`, if not null, gets the field, the value
+  // and the constraint.
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 // The bytes of a PNG file.
 struct EncodedImageFile {
-  std::string png;
+  std::string png;  // all bytes of the file
   // Values of linear light half a level or more beyond the range, or NaN; 0 for encoded values.
   std::size_t clipped_values = 0;
 };

@@ -21,17 +21,20 @@ using PixelRect = model::PixelRect;  // px; (x, y) is the top-left pixel
 
 // Numbers of views across and down, each from 1 to 99.
 struct ViewCounts {
-  int u = 0, v = 0;
+  int u = 0, v = 0;  // across, down
 };
 
+// What is read of a light field's folder.
 struct LightFieldReadOptions {
   // Row length of the HCI numbering input_CamNNN.png, 1 to 1000; 0: parameters.cfg says it, or the
   // views are a full square.
   int hci_grid = 0;
-  bool allow_missing_views = false;
+  bool allow_missing_views = false;       // any set of views may be present
   std::optional<ViewCounts> inner_views;  // take only these views in the middle
   std::optional<PixelRect> crop;          // take only this rectangle of each view
 
+  // Returns whether all members are valid. Otherwise `why`, if not null, gets the field, the value
+  // and the constraint.
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 
@@ -41,6 +44,7 @@ THICKLENS_EXPORT LightField ReadLightField(const std::string& folder,
                                            const LightFieldReadOptions& options = {},
                                            const RunControl& run = {});
 
+// How the views are stored.
 enum class LightFieldFormat {
   kPng,   // views of 16 bits, encoded by the light field's transfer curve and clipped
   kTiff,  // views in float, linear light, not clipped
@@ -59,6 +63,8 @@ THICKLENS_EXPORT std::size_t WriteLightField(const std::string& folder,
 // of the folder (thicklens/base/output_file.h) puts it in place. Throws Error.
 THICKLENS_EXPORT OutputFolder
 ClaimLightFieldFolder(const std::string& folder, LightFieldFormat format = LightFieldFormat::kPng);
+// Writes views and description into a claimed folder; the caller commits it. Returns the number of
+// clipped values. Throws Error.
 THICKLENS_EXPORT std::size_t WriteLightField(OutputFolder* folder, const LightField& light_field,
                                              LightFieldFormat format = LightFieldFormat::kPng,
                                              const RunControl& run = {});

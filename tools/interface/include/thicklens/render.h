@@ -17,19 +17,24 @@ namespace thicklens {
 
 // The aperture of a rendered image: one of the two, or the light field's own weights.
 struct RenderAperture {
-  std::optional<model::ApertureShape> shape;
+  std::optional<model::ApertureShape> shape;  // weights of this shape; excludes a radius
   // Finite and >= 0. With a camera: mm, at most the captured radius [D23]; without: view steps.
   std::optional<double> radius;
 
+  // Returns whether at most one member is set and the radius is in its range. Otherwise `why`, if
+  // not null, gets the reason.
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 
+// The options of RenderPhotograph.
 struct PhotographOptions {
-  RenderAperture aperture;
-  EffectSelection effects;
+  RenderAperture aperture;  // the weights of the views
+  EffectSelection effects;  // of the photograph
   // As EstimateOptions::device.
   std::string device = "auto";
 
+  // Returns whether all members are valid. Otherwise `why`, if not null, gets the field, the value
+  // and the constraint.
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 
@@ -45,7 +50,7 @@ struct RenderSummary {
   // do not state their depths; they have none at all without a camera.
   model::EffectSelection effects;
   std::string device, device_description;  // that rendered it: "cpu", "opencl:0:0"
-  std::vector<Notice> notices;
+  std::vector<Notice> notices;             // remarks on the call, in their order
 };
 
 // Each function returns linear light with the light field's transfer curve, ready for WriteImage.
@@ -58,12 +63,15 @@ THICKLENS_EXPORT Image RenderPhotograph(const LightField& light_field,
                                         const RunControl& run = {},
                                         RenderSummary* summary = nullptr);
 
+// The options of Refocus.
 struct FocusOptions {
   // Exactly one: the depth to focus at, mm from Ap, finite, > 0, with a camera; or a disparity, px
   // per view step along u, finite.
   std::optional<double> depth_mm, disparity_px;
-  RenderAperture aperture;
+  RenderAperture aperture;  // the weights of the views
 
+  // Returns whether exactly one focus is stated and all members are valid. Otherwise `why`, if not
+  // null, gets the field, the value and the constraint.
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 // Shifts the views so that points at that depth coincide, and averages them [D98].
@@ -77,6 +85,7 @@ THICKLENS_EXPORT Image RenderMosaic(const LightField& light_field, int gap_px = 
 // column k, side by side; each repeated `repeat_px` >= 1 times.
 THICKLENS_EXPORT Image RenderEpipolarRow(const LightField& light_field, int t, int l,
                                          int repeat_px = 8);
+// Column s of all views in the view column k, side by side, each repeated `repeat_px` >= 1 times.
 THICKLENS_EXPORT Image RenderEpipolarColumn(const LightField& light_field, int s, int k,
                                             int repeat_px = 8);
 

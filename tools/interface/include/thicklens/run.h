@@ -20,8 +20,10 @@ namespace thicklens {
 // written.
 class THICKLENS_EXPORT OptionError : public Error {
  public:
+  // Makes the error of the member `field`, whose name the message must begin with.
   OptionError(std::string field, const std::string& message);
   ~OptionError() override;
+  // The path of the member.
   const std::string& field() const { return field_; }
 
  private:
@@ -38,15 +40,17 @@ struct Progress {
 
 // A remark of a call on what it found or assumed. It does not end the call.
 struct Notice {
+  // How much a notice matters.
   enum class Level {
     kDetail,       // for whoever examines a run: the device that computes
     kInformation,  // an assumption that is usually right
     kWarning,      // something that may make the result wrong
   };
-  Level level = Level::kWarning;
-  std::string text;  // one line
+  Level level = Level::kWarning;  // how much it matters
+  std::string text;               // one line
 };
 
+// Threads, cancelling, progress and notices of one call.
 struct RunControl {
   int threads = 0;  // maximum number of threads, 0 to 1024; 0: one per core
   // A cancelled token ends the call, which throws Interrupted at its next safe point

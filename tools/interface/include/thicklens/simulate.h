@@ -21,11 +21,13 @@ namespace thicklens {
 
 // What is simulated; the members, units and defaults are those of the model's simulators.
 using SweepSimulation = model::SweepSimulationOptions;
+// A scene of textured surfaces, and the camera that photographs it.
 using SceneSimulation = model::SceneSimulationOptions;
 
 // Read files of the schemas thicklens/simulate-sweep/1 and thicklens/simulate-scene/1. They throw
 // Error with file:line:column.
 THICKLENS_EXPORT SweepSimulation ReadSweepSimulation(const std::string& path);
+// Reads a file of the schema thicklens/simulate-scene/1. Throws Error with file:line:column.
 THICKLENS_EXPORT SceneSimulation ReadSceneSimulation(const std::string& path);
 
 // Simulates a focus sweep and writes it into a folder: frames/, camera.yaml (without calibration),
@@ -35,39 +37,45 @@ THICKLENS_EXPORT SceneSimulation ReadSceneSimulation(const std::string& path);
 THICKLENS_EXPORT Sweep SimulateSweep(const SweepSimulation& simulation, const std::string& folder,
                                      bool unknown_offset = false, const RunControl& run = {});
 
-// Both steps of it, for a folder that is claimed before a long computation or that gets other files
-// too: the name is claimed, the frames are written below it as they are rendered and the
-// descriptions after them, and Commit of the folder (thicklens/base/output_file.h) puts it in
-// place.
+// What was simulated of a sweep.
 struct SimulatedSweep {
-  model::SweepTruth truth;
-  model::EffectSelection effects;
-  int bits = 0;  // of the frames' values
+  model::SweepTruth truth;         // parameters, and depth and blur of each frame
+  model::EffectSelection effects;  // the effects that the frames have
+  int bits = 0;                    // of the frames' values
 };
+// The first step of SimulateSweep, for a folder that is claimed before a long computation or that
+// gets other files too. The frames are then written below it as they are rendered and the
+// descriptions after them, and Commit of the folder (thicklens/base/output_file.h) puts it in
+// place. Throws Error if the folder cannot be written or holds what this program did not write.
 THICKLENS_EXPORT OutputFolder ClaimSweepFolder(const std::string& folder);
+// Writes frames and descriptions into a claimed folder; the caller commits it. Throws Error for
+// options that are not valid.
 THICKLENS_EXPORT SimulatedSweep SimulateSweep(const SweepSimulation& simulation,
                                               OutputFolder* folder, bool unknown_offset = false,
                                               const RunControl& run = {});
 
 // A simulated photograph with its depth (kZ, mm from Ap), camera and truth.
 struct SimulatedPhotograph {
-  Image photo;  // encoded
-  DepthMap depth;
-  Camera camera;  // with the true calibration
-  model::SceneTruth truth;
-  model::EffectSelection effects;
+  Image photo;                     // encoded
+  DepthMap depth;                  // kZ, mm from Ap
+  Camera camera;                   // with the true calibration
+  model::SceneTruth truth;         // parameters of the scene
+  model::EffectSelection effects;  // the effects that the photograph has
   // Largest rms error of the encoded values by the finite number of rays, in 1/255 of full scale.
   double sampling_error_grey_levels = 0;
-  double mean_rays_per_pixel = 0;
+  double mean_rays_per_pixel = 0;  // number of simulated rays
 };
+// Simulates the photograph of a scene. The simulation's seed determines every bit. Throws Error for
+// options that are not valid, and Interrupted.
 THICKLENS_EXPORT SimulatedPhotograph SimulatePhotograph(const SceneSimulation& simulation,
                                                         const RunControl& run = {});
-// The true light field of the same scene: its views have no defocus and no fall-off. `scene`, if
-// not null, gets what is true of the scene.
+// What is true of a scene whose views were simulated.
 struct SimulatedScene {
-  model::SceneTruth truth;
-  EffectSet effects_of_views;
+  model::SceneTruth truth;     // parameters of the scene
+  EffectSet effects_of_views;  // the effects that the views have
 };
+// Simulates the true light field of a scene: its views have no defocus and no fall-off. `scene` may
+// be null. Throws Error for options that are not valid, and Interrupted.
 THICKLENS_EXPORT LightField SimulateLightField(const SceneSimulation& simulation,
                                                const RunControl& run = {},
                                                SimulatedScene* scene = nullptr);

@@ -46,19 +46,21 @@ struct Sweep {
 
 // Statements that replace those of the sweep's file. An absent or empty value keeps the file's.
 struct SweepOverrides {
-  std::string camera_path;
-  std::string truth_path;
+  std::string camera_path;                // another camera file
+  std::string truth_path;                 // the truth of a simulated sweep
   bool offset_unknown = false;            // the bench zero is to be found from the image scale
   std::optional<double> offset_mm;        // finite
   std::optional<double> offset_sigma_mm;  // finite, >= 0; needs an offset
-  std::optional<model::BenchDirection> direction;
-  std::optional<double> reading_sigma_mm;  // finite, >= 0
-  bool floor_unknown = false;
-  std::optional<Measured> floor_px;    // value and sigma finite and >= 0
-  std::string floor_from_calibration;  // a camera file; excludes floor_px and floor_unknown
-  std::optional<model::SweepTarget> target;
+  std::optional<model::BenchDirection> direction;  // sign of the reading in z
+  std::optional<double> reading_sigma_mm;          // finite, >= 0
+  bool floor_unknown = false;                      // the lens floor is to be found
+  std::optional<Measured> floor_px;                // value and sigma finite and >= 0
+  std::string floor_from_calibration;          // a camera file; excludes floor_px and floor_unknown
+  std::optional<model::SweepTarget> target;    // kind of the target
   std::optional<model::RegionOfInterest> roi;  // px, inside the sensor
 
+  // Returns whether all statements are in their range and do not contradict each other. Otherwise
+  // `why`, if not null, gets the field, the value and the constraint.
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 

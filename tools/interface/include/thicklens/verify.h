@@ -10,7 +10,7 @@
 
 namespace thicklens {
 
-using VerifyOptions = calib::VerificationOptions;
+using VerifyOptions = calib::VerificationOptions;  // The limits of the verdict.
 
 // Whether a stored calibration still holds: the verdict with its reason, and every compared
 // parameter (thicklens/calib/verification.h).

@@ -29,10 +29,12 @@ class THICKLENS_EXPORT BlockCheckpoint final : public estimator::BlockStore {
   BlockCheckpoint(const BlockCheckpoint&) = delete;
   BlockCheckpoint& operator=(const BlockCheckpoint&) = delete;
 
+  // The path as given to the constructor.
   const std::string& path() const { return journal_.path(); }
   // Settings of the run that left blocks in the file: the edge of its blocks, and the --device that
   // computes as it did.
   std::optional<int> block_px() const;
+  // The --device that computes as that run did; absent: no run left blocks.
   std::optional<std::string> device() const;
   // Number of blocks that the current run could continue from. The function never blocks: it is
   // called when the process ends, while a disk may delay the thread that keeps a block.
@@ -40,7 +42,9 @@ class THICKLENS_EXPORT BlockCheckpoint final : public estimator::BlockStore {
 
   // Throws Error if the file belongs to another estimate, and says what differs.
   void Begin(const estimator::BlockRun& run) override;
+  // Returns a block that is in the file; absent: it is not.
   std::optional<estimator::SolvedBlock> Find(int block) override;
+  // Appends a solved block to the file.
   void Keep(int block, const estimator::SolvedBlock& solved) override;
 
   // Call this when the light field is complete. Returns whether the file could be removed.

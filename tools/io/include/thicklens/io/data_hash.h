@@ -12,8 +12,10 @@ namespace thicklens::io {
 // SHA-256 of data that arrives in pieces.
 class THICKLENS_EXPORT Sha256 {
  public:
+  // Starts a hash of no data.
   Sha256();
   ~Sha256();
+  // Appends bytes to the data.
   void Add(std::string_view bytes);
   // Call this once, at the end. Returns lower-case hexadecimal, as sha256sum prints it.
   std::string Hex();
@@ -23,6 +25,7 @@ class THICKLENS_EXPORT Sha256 {
   std::unique_ptr<Impl> impl_;
 };
 
+// The SHA-256 of the bytes, in lower-case hexadecimal.
 THICKLENS_EXPORT std::string Sha256Hex(std::string_view bytes);
 
 }  // namespace thicklens::io

@@ -10,19 +10,19 @@ namespace thicklens::io {
 
 // A photograph's statements about the camera that took it. Absent: not stated, or not usable.
 struct PhotoExif {
-  std::optional<double> focal_length_mm;
-  std::optional<double> f_number;
-  std::optional<double> pixel_pitch_mm;
-  std::string why_no_pitch;  // set if pixel_pitch_mm is absent
-  std::string model;
+  std::optional<double> focal_length_mm;  // focal length of the lens, mm
+  std::optional<double> f_number;         // focal length over the diameter of the aperture
+  std::optional<double> pixel_pitch_mm;   // of the image's pixels, mm
+  std::string why_no_pitch;               // set if pixel_pitch_mm is absent
+  std::string model;                      // name of the camera; empty: not stated
   // Distance that the lens was focused at; infinite if EXIF says so.
   std::optional<double> subject_distance_mm;
   std::optional<double> focal_length_35mm;  // equivalent of a frame of 36 x 24 mm
   std::optional<double> digital_zoom;       // ratio; 1: none
   // The image as the camera made it, before it was scaled or cropped.
   std::optional<int> made_width_px, made_height_px;
-  std::optional<double> made_pixel_pitch_mm;
-  int orientation = 1;  // 1 to 8; 1: as stored
+  std::optional<double> made_pixel_pitch_mm;  // of the pixels of that image
+  int orientation = 1;                        // 1 to 8; 1: as stored
 
   // Returns whether EXIF states nothing that can be compared with a camera file.
   THICKLENS_EXPORT bool IsEmpty() const;

@@ -15,6 +15,7 @@ namespace thicklens::io {
 // The image files of a sweep, read on request; several threads may read.
 class THICKLENS_EXPORT FrameFiles {
  public:
+  // Takes the paths of the frames; opens none.
   explicit FrameFiles(std::vector<model::SweepFrame> frames);
 
   cv::Mat Read(std::size_t index);  // throws Error naming the file

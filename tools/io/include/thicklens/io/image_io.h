@@ -12,11 +12,13 @@ namespace thicklens::io {
 // Decodes the image in the bytes of a file, exactly as stored: 8 or 16 bit; 1, 3 (RGB) or 4 (RGBA)
 // channels; never rotated. Throws Error that begins with `name`.
 THICKLENS_EXPORT cv::Mat DecodeImage(const std::string& bytes, const std::string& name);
+// Reads the file and decodes it as DecodeImage does. Throws Error that names the path.
 THICKLENS_EXPORT cv::Mat ReadImageFile(const std::string& path);
 // Throws Error if the library that reads JPEG, TIFF, EXR, BMP and PNM files and writes JPEG is
 // missing from the program's installation. PNG files need no such library.
 THICKLENS_EXPORT void RequireImageCodecs();
 
+// Copies the values of a matrix as ReadImageFile returns it.
 THICKLENS_EXPORT model::EncodedImage ToEncodedImage(const cv::Mat& image);
 // Returns the first three of four channels, and other images unchanged: alpha contains no light.
 THICKLENS_EXPORT model::EncodedImage WithoutAlpha(const model::EncodedImage& image);

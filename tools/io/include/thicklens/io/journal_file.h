@@ -30,6 +30,7 @@ class THICKLENS_EXPORT JournalFile {
   JournalFile(const JournalFile&) = delete;
   JournalFile& operator=(const JournalFile&) = delete;
 
+  // The path as given to the constructor.
   const std::string& path() const { return path_; }
   std::size_t size() const;  // number of records
   // Number of bytes that were left out when the file was opened.

@@ -33,12 +33,14 @@ struct LightFieldReading {
 THICKLENS_EXPORT model::LightField ReadLightField(const std::string& folder,
                                                   const LightFieldReading& reading);
 
+// How the views are stored.
 enum class ViewFormat {
   kPng,   // 16 bit, encoded by the light field's transfer curve, clipped
   kTiff,  // float, linear light
 };
-// Entries that a folder of our layout may hold, for OutputFolder.
+// The file that marks a folder of our layout, for OutputFolder.
 THICKLENS_EXPORT extern const char kLightFieldMarker[];  // "lightfield.yaml"
+// The names of all files and folders that a light field may have.
 THICKLENS_EXPORT std::vector<std::string> LightFieldEntries();
 
 // Writes a light field of which only some views are in memory at a time. Views are written as they
@@ -48,6 +50,7 @@ class THICKLENS_EXPORT LightFieldWriter {
   // `folder` is not owned and must outlive the writer; the caller commits it.
   LightFieldWriter(const model::TransferCurve& transfer, ViewFormat format, OutputFolder* folder);
 
+  // Writes the view (k, l), linear light. Throws Error.
   void WriteView(int k, int l, const model::LinearImage& view);
   // Writes one byte for each ray, row by row (docs/file-formats.md). Call it for all views or for
   // none.
@@ -82,9 +85,10 @@ THICKLENS_EXPORT void WriteViews(const model::LightField& light_field, LightFiel
 THICKLENS_EXPORT std::size_t WriteLightField(const model::LightField& light_field,
                                              ViewFormat format, OutputFolder* folder);
 
-// Writes the HCI layout: input_CamNNN.png (8 bit sRGB) and parameters.cfg, below the staging path.
-// Returns the number of clipped values.
+// The file that marks a folder of the HCI layout.
 THICKLENS_EXPORT extern const char kHciMarker[];  // "parameters.cfg"
+// Writes the HCI layout, input_CamNNN.png (8 bit sRGB) and parameters.cfg, below the staging path.
+// Returns the number of clipped values.
 THICKLENS_EXPORT std::size_t WriteHciLightField(const model::LightField& light_field,
                                                 OutputFolder* folder);
 
