@@ -75,7 +75,9 @@ struct BlockSolver {
     kWarp,   // D L = L(i + m, k + 1) - L(i, k)
     kPaper,  // the paper's six explicit differences; not symmetric where the depth varies
   };
-  enum class Splat { kBilinear, kNearest };  // which pixels a ray reaches
+  // Which pixels a ray reaches [M16]: the two nearest of each axis, by distance (kBilinear), or the
+  // nearest one (kNearest).
+  enum class Splat { kBilinear, kNearest };
   Linear linear = Linear::kDefault;          // solves the system of each block
   Stencil stencil = Stencil::kWarp;          // discretisation of the smoothness
   Splat splat = Splat::kBilinear;            // which pixels a ray reaches
