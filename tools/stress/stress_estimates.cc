@@ -87,10 +87,14 @@ std::vector<StressCase> Gammas() {
   std::vector<StressCase> cases;
   cases.push_back(WithSetting("gamma-0", "only the ridge links the rays of a point",
                               "refused: gamma, and that it must be above 0", {"--gamma", "0"},
-                              IsSmooth, [](const Way&) { return Refused({"gamma is 0"}); }));
+                              IsSmooth, [](const Way&) {
+                                return Refused({"--gamma", "> 0", "found 0"});
+                              }));
   cases.push_back(WithSetting("gamma-negative", "the functional has no minimum",
                               "refused: gamma, and that it must be above 0", {"--gamma", "-1"},
-                              IsSmooth, [](const Way&) { return Refused({"gamma is -1"}); }));
+                              IsSmooth, [](const Way&) {
+                                return Refused({"--gamma", "> 0", "found -1"});
+                              }));
   for (const char* gamma : {"1e-12", "1e-6", "1e-3"}) {
     cases.push_back(WithSetting(
         std::string("gamma-") + gamma,
@@ -133,14 +137,15 @@ std::vector<StressCase> Ridges() {
       "refused: the ridge, and that it must be above 0", {"--ridge", "0"},
       [](const Way& way) { return way.solver == "functional" || way.solver == "grid"; },
       [](const Way&) {
-        return Refused({"ridge is 0", "> 0"});
+        return Refused({"--ridge", "> 0", "found 0"});
       }));
   cases.push_back(Either("ridge-0-iterative", "iterations on a singular system", {"--ridge", "0"},
                          IsIterativeBlocks, 0.6));
   cases.push_back(WithSetting("ridge-negative", "the functional has no minimum",
                               "refused: the ridge, and that it must not be below 0",
-                              {"--ridge", "-1"}, IsSmooth,
-                              [](const Way&) { return Refused({"ridge is -1"}); }));
+                              {"--ridge", "-1"}, IsSmooth, [](const Way&) {
+                                return Refused({"--ridge", "found -1"});
+                              }));
   cases.push_back(WithSetting("ridge-1e-14-direct", "the condition is 1e13 and more",
                               "refused: rcond, and its limit", {"--ridge", "1e-14"}, IsDirect,
                               [](const Way&) {

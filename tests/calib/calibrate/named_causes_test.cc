@@ -53,7 +53,7 @@ TEST(Reason, ReadingsInInchesWithAStatedErrorAreStillAskedAbout) {
   EXPECT_EQ(c.summary.outcome, Outcome::kRefused);
   EXPECT_THAT(c.summary.reason,
               AllOf(StartsWith("the image scale puts the target at 1"),
-                    HasSubstr("that the readings are in mm? With readings in inches"),
+                    HasSubstr("that the readings are in mm. With readings in inches"),
                     Not(HasSubstr("does not follow"))));
   ExpectSharpestAt(c, 110 / 25.4, 0.03);
 }

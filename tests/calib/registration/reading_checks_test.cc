@@ -240,8 +240,8 @@ TEST(ReasonOfUnknownOffset, TheReasonHasAdvice) {
   Bench bench;
   bench.law.message = "the image scale does not change";
   EXPECT_EQ(ReasonOfUnknownOffset(bench.law),
-            "offset_mm is not stated and was not found: the image scale does not change; to do "
-            "without the image scale, state offset_mm");
+            "offset_mm is not stated and could not be determined: the image scale does not change; "
+            "to calibrate without the image scale, state offset_mm");
   EXPECT_THAT(ReasonOfUnknownOffset(StarModel()),
               AllOf(HasSubstr("looks the same at every scale"),
                     HasSubstr("state offset_mm, or use a texture")));

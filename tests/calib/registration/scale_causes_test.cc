@@ -240,11 +240,10 @@ TEST(UnitAdvice, PutsTheQuestionWithTheUnitThatFits) {
   const ScaleModel law = LawOf(samples, sweep);
   std::vector<FrameMeasurement> frames(samples.size());
   for (const ScaleSample& sample : samples) frames[sample.frame].image_scale = sample.scale;
-  EXPECT_THAT(
-      UnitAdvice(sweep, frames, law, CompareScaleCauses(samples, sweep)),
-      AllOf(
-          StartsWith("the image scale puts the target at 11.2 to 12.4 mm"),
-          HasSubstr("that the readings are in mm? With readings in inches it is at about 300 mm")));
+  EXPECT_THAT(UnitAdvice(sweep, frames, law, CompareScaleCauses(samples, sweep)),
+              AllOf(StartsWith("the image scale puts the target at 11.2 to 12.4 mm"),
+                    HasSubstr("that the readings are in mm. With readings in inches the target is "
+                              "at about 300 mm")));
 }
 
 // A wrong given zero is not reported as a moving lens.

@@ -53,7 +53,7 @@ TEST(FrameChecks, AGoodFramePasses) {
 }
 
 TEST(FrameChecks, ADarkFrameIsNamedDark) {
-  EXPECT_THAT(ReasonFor(cv::Mat::zeros(128, 128, CV_8U)), StartsWith("dark: mean 0.000"));
+  EXPECT_THAT(ReasonFor(cv::Mat::zeros(128, 128, CV_8U)), StartsWith("dark: the mean is 0.000"));
   // A whole image that is 1/60 as bright.
   cv::Mat dim;
   Leaves(1).convertTo(dim, CV_8U, 1.0 / 60);

@@ -143,9 +143,10 @@ TEST(TooFewUsable, CountsEveryKindMostFramesFirst) {
   for (const std::size_t i : {1U, 3U, 5U, 6U})
     frames[i].rejection = "reading off by " + std::to_string(i) + ".0 mm, or frame damaged";
   FrameSelection selection(&frames);
-  EXPECT_EQ(selection.KeepUnrejected(),
-            "4 of 9 frames can be used, 5 are needed. Rejected: reading off (4 frames), blank (1 "
-            "frame), such as frame-1.png: reading off by 1.0 mm, or frame damaged");
+  EXPECT_EQ(
+      selection.KeepUnrejected(),
+      "4 of 9 frames can be used, but 5 are needed. Rejected: reading off (4 frames), blank (1 "
+      "frame), such as frame-1.png: reading off by 1.0 mm, or frame damaged");
 }
 
 TEST(TooFewUsable, SaysSoWhereReadingsAreEqual) {

@@ -187,10 +187,11 @@ TEST(AddSystematicParts, SidesThatCannotBeComparedAreReportedWithTheirFrames) {
   bench.reference = 4;
   FocusCase c = FocusCase(bench).WithTexture(kErrorPx2).WithTrueFloor();
   c.Solve();
-  EXPECT_THAT(c.calibration.summary.warnings,
-              Contains(AllOf(
-                  HasSubstr("cannot be compared"),
-                  HasSubstr("nearer: 5 frames on this side, 6 are needed; farther: 26 frames"))));
+  EXPECT_THAT(
+      c.calibration.summary.warnings,
+      Contains(AllOf(
+          HasSubstr("cannot be compared"),
+          HasSubstr("nearer: 5 frames are on this side, but 6 are needed; farther: 26 frames"))));
   EXPECT_EQ(c.Part("side of focus"), nullptr);
 }
 

@@ -190,7 +190,7 @@ TEST(RunInSubprocess, CatchesWhatIsPrintedAndTellsItsLastLine) {
       kLongS);
   EXPECT_EQ(::testing::internal::GetCapturedStdout(), "");
   EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
-  EXPECT_THAT(outcome.failure, ::testing::EndsWith("last words: second: cause"));
+  EXPECT_THAT(outcome.failure, ::testing::EndsWith("the last line of its output: second: cause"));
 }
 
 // A grandchild that outlives the child must not block the parent.

@@ -266,7 +266,7 @@ TEST_P(ViewWarpTest, KeepsChannelsApart) {
 
 TEST_P(ViewWarpTest, RefusesWhatDoesNotFit) {
   of_view_.pop_back();
-  EXPECT_THAT(ErrorOf([&] { Warp(); }), HasSubstr("disparity of a view: 107 numbers"));
+  EXPECT_THAT(ErrorOf([&] { Warp(); }), HasSubstr("disparity of a view: it has 107 numbers"));
   of_view_.push_back(0);
   for (const std::int32_t index : {-1, 108}) {
     occluded_ = {{index, 0, 0, 0}};

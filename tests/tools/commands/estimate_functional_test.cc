@@ -188,8 +188,10 @@ TEST_P(EstimateFunctionalTest, OptionsOfOthersAreAUsageError) {
 }
 
 TEST_P(EstimateFunctionalTest, SettingsThatCannotBe) {
-  EXPECT_THAT(Refusal(With(Usual(), {"--gamma", "0"}), 1), HasSubstr("gamma is 0"));
-  EXPECT_THAT(Refusal(With(Usual(), {"--ridge", "0"}), 1), HasSubstr("ridge is 0"));
+  EXPECT_THAT(Refusal(With(Usual(), {"--gamma", "0"}), 2),
+              HasSubstr("--gamma: a finite number > 0 is expected, found 0"));
+  EXPECT_THAT(Refusal(With(Usual(), {"--ridge", "0"}), 2),
+              HasSubstr("--ridge: a finite number > 0 is expected, found 0"));
   EXPECT_THAT(Refusal(With(Usual(), {"--tolerance", "1"}), 2),
               HasSubstr("--tolerance: must be above 0 and below 1"));
   EXPECT_THAT(Refusal(With(Usual(), {"--memory-limit", "5"}), 1),

@@ -78,11 +78,11 @@ struct BlockSolver {
   // Which pixels a ray reaches [M16]: the two nearest of each axis, by distance (kBilinear), or the
   // nearest one (kNearest).
   enum class Splat { kBilinear, kNearest };
-  Linear linear = Linear::kDefault;          // solves the system of each block
-  Stencil stencil = Stencil::kWarp;          // discretisation of the smoothness
-  Splat splat = Splat::kBilinear;            // which pixels a ray reaches
-  double gamma = 1;                          // finite, > 0
-  std::optional<double> ridge;               // mu, finite, >= 0; absent: 0.01/(U V)
+  Linear linear = Linear::kDefault;  // solves the system of each block
+  Stencil stencil = Stencil::kWarp;  // discretisation of the smoothness
+  Splat splat = Splat::kBilinear;    // which pixels a ray reaches
+  double gamma = 1;                  // finite, > 0
+  std::optional<double> ridge;       // mu, finite, >= 0; absent: 0.01/(U V)
   std::optional<int> block_px;  // edge of a block, 1 to 100000; absent: 16, or what memory allows
   // Only for the iterative kCg, kBicgstab and kViennaCl: 0 < tolerance < 1, iterations 1 to
   // 1000000 for one channel of a block; absent: 1e-6 and 1000.

@@ -18,8 +18,8 @@ struct SceneViewSink;
 
 // The way in which a solver is run; what it solves is in its options. Every solver is called with
 // the problem, its options, the run and the summary, in this order. It is cancelled by the
-// CancelScope of the calling thread (thicklens/base/cancel.h). Backend, store and sink are not owned
-// and must outlive the call.
+// CancelScope of the calling thread (thicklens/base/cancel.h). Backend, store and sink are not
+// owned and must outlive the call.
 struct SolverRun {
   int threads = 0;  // >= 0; 0: one per core
   // Limit for the whole process, finite, > 0. The scene solver then solves in as many bands as it
