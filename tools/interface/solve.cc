@@ -258,7 +258,7 @@ Solved SolveByProgram(const Solver& solver, const PreparedProblem& prepared, Run
   Solved solved;
   const auto start = std::chrono::steady_clock::now();
   solved.light_field = solver.Solve(problem, run->control(), &solved.summary);
-  // What the solver does not count as set-up or views is its solve.
+  // Time that the solver does not count as set-up or views is its solve.
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
   solved.summary.solve_seconds =
       std::max(0.0, seconds.count() - solved.summary.setup_seconds - solved.summary.views_seconds);

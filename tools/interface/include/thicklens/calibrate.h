@@ -59,7 +59,7 @@ class THICKLENS_EXPORT CalibrationRefused : public Error {
   // Makes the error of a refused calibration, which must not be null.
   explicit CalibrationRefused(std::shared_ptr<const Calibration> calibration);
   ~CalibrationRefused() override;
-  // What was found before the refusal; valid as long as the error.
+  // The findings before the refusal; valid as long as the error.
   const Calibration& calibration() const { return *calibration_; }
 
  private:

@@ -25,8 +25,8 @@ enum class LengthUnit {
 };
 THICKLENS_EXPORT std::string LengthUnitName(LengthUnit unit);  // "mm", "cm", "m", "tum5000", ""
 
-// What the numbers of a map mean. It is stated by the user and never guessed: kind and unit of a
-// map in kZ or kRange have no default.
+// The meaning of the numbers of a map. It is stated by the user and never guessed: kind and unit of
+// a map in kZ or kRange have no default.
 struct DepthMeaning {
   DepthKind kind = DepthKind::kZ;       // what the numbers are
   LengthUnit unit = LengthUnit::kNone;  // kZ and kRange need one, kDisparity has none

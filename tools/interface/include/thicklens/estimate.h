@@ -37,7 +37,7 @@ struct SensorOrigin {
   int x = 0, y = 0;  // column and row of the sensor, px
 };
 
-// What a contradiction between EXIF and camera does.
+// The consequence of a contradiction between EXIF and camera.
 enum class ExifCheck {
   kRequire,  // throw Error if the photograph's EXIF contradicts the camera
   kIgnore,   // report contradictions as notices
@@ -207,7 +207,8 @@ struct LightFieldEstimate {
   EstimateSummary summary;          // the result in numbers
   EstimateDiagnostics diagnostics;  // how far to trust it
   std::vector<BlockRecord> blocks;  // of BlockSolver, row by row
-  // What the solver started from: the photograph in linear light, its disparity, weights and grid.
+  // The problem that the solver started from: the photograph in linear light, its disparity,
+  // weights and grid.
   std::optional<Problem> problem;
   std::vector<bool> was_hole;  // per pixel of the depth map: its value was filled in
   // Per pixel of the photograph, from SceneSolver: residual, occluded fraction and blur. Without

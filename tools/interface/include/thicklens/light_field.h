@@ -24,7 +24,7 @@ struct ViewCounts {
   int u = 0, v = 0;  // across, down
 };
 
-// What is read of a light field's folder.
+// The part of a light field's folder that is read.
 struct LightFieldReadOptions {
   // Row length of the HCI numbering input_CamNNN.png, 1 to 1000; 0: parameters.cfg says it, or the
   // views are a full square.

@@ -19,7 +19,7 @@
 
 namespace thicklens {
 
-// What is simulated; the members, units and defaults are those of the model's simulators.
+// The settings of simulations; the members, units and defaults are those of the model's simulators.
 using SweepSimulation = model::SweepSimulationOptions;
 // A scene of textured surfaces, and the camera that photographs it.
 using SceneSimulation = model::SceneSimulationOptions;
@@ -37,7 +37,7 @@ THICKLENS_EXPORT SceneSimulation ReadSceneSimulation(const std::string& path);
 THICKLENS_EXPORT Sweep SimulateSweep(const SweepSimulation& simulation, const std::string& folder,
                                      bool unknown_offset = false, const RunControl& run = {});
 
-// What was simulated of a sweep.
+// The result of simulating a sweep.
 struct SimulatedSweep {
   model::SweepTruth truth;         // parameters, and depth and blur of each frame
   model::EffectSelection effects;  // the effects that the frames have
@@ -69,7 +69,7 @@ struct SimulatedPhotograph {
 // options that are not valid, and Interrupted.
 THICKLENS_EXPORT SimulatedPhotograph SimulatePhotograph(const SceneSimulation& simulation,
                                                         const RunControl& run = {});
-// What is true of a scene whose views were simulated.
+// The true values of a scene whose views were simulated.
 struct SimulatedScene {
   model::SceneTruth truth;     // parameters of the scene
   EffectSet effects_of_views;  // the effects that the views have

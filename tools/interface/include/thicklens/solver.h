@@ -96,7 +96,7 @@ struct BlockSolver {
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 
-// The same functional for the whole image, on the rays of scene points [D115].
+// Minimises the functional of BlockSolver for the whole image, on the rays of scene points [D115].
 struct FunctionalSolver {
   double gamma = 1;               // finite, > 0
   std::optional<double> ridge;    // mu, finite, > 0; absent: 0.01/(U V)
@@ -108,12 +108,12 @@ struct FunctionalSolver {
   // the value and the constraint.
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
-// The same functional for the whole image, on the two-plane grid of BlockSolver [D113].
+// Minimises that functional for the whole image, on the two-plane grid of BlockSolver [D113].
 struct GridSolver : FunctionalSolver {};
 
 // ---- Solvers of a program.
 
-// What a solver starts from: the photograph in linear light, its disparity without holes and
+// The input of a solver: the photograph in linear light, its disparity without holes and
 // smoothed, the weights of the views and, with a camera, the grid. Immutable; copies are cheap.
 class THICKLENS_EXPORT Problem {
  public:

@@ -27,7 +27,7 @@ class THICKLENS_EXPORT FrameSource {
 // A focus sweep: photographs of one flat target at known readings of a bench. The frames are read
 // one by one while they are measured; they are never all in memory.
 struct Sweep {
-  // What the sweep's file describes: frames, readings in mm, offset, direction, target, floor and
+  // The content of the sweep's file: frames, readings in mm, offset, direction, target, floor and
   // region (thicklens/model/sweep_file.h).
   model::SweepFile description;
   // The camera without calibration; its lens and sensor are used.
@@ -36,7 +36,7 @@ struct Sweep {
   std::shared_ptr<const FrameSource> frames;
   // The truth of a simulated sweep, if it is known; a calibration does not use it.
   std::optional<model::SweepTruth> truth;
-  // What was assumed when the sweep was read, one line each.
+  // The assumptions that were made when the sweep was read, one line each.
   std::vector<std::string> notices;
 
   // Returns true if a calibration can be attempted: the camera, the readings and the options of

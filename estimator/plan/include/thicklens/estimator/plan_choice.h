@@ -10,7 +10,7 @@
 
 namespace thicklens::estimator {
 
-// What the user asks of an estimate in place of a solver.
+// The target that a user sets for an estimate in place of a solver.
 struct QualityTarget {
   std::string quality;                 // "draft", "standard", "best"; empty: not given
   std::optional<double> within_s;      // limit for the whole program

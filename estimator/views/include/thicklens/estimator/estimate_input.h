@@ -19,7 +19,7 @@ struct EstimateInput {
   model::LinearImage image;  // photograph, linear light
   DisparityMap disparity;    // without holes, of the image's size
   Eigen::ArrayXXd weights;   // V x U, sum 1, >= 0
-  // Of the photograph's encoded values.
+  // The curve of the photograph's encoded values.
   model::TransferCurve transfer = model::TransferCurve::Srgb();
   // Either both are set or neither is. The S x T samples of the grid are the size of the image.
   std::optional<model::LightFieldGrid> grid;

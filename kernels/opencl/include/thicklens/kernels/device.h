@@ -24,7 +24,7 @@ struct SurfaceImage;
 
 // The device that the user requests for the kernels.
 struct DeviceRequest {
-  // What kind of device is requested.
+  // The kind of device that is requested.
   enum class Kind {
     kAuto,    // the best OpenCL device that works, or the C++ reference if none works
     kCpu,     // the C++ reference; OpenCL is not used

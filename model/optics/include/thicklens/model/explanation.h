@@ -51,7 +51,7 @@ struct ThinComparison {
 // The difference of landing points, px, below which a thin and a thick lens count as alike.
 constexpr double kThinTolerancePx = 0.1;
 
-// What a calibrated camera does to points at several depths.
+// The effect of a calibrated camera on points at several depths.
 struct Explanation {
   std::string camera_name;              // Camera::name
   double front_focal_length_mm = 0;     // f1, mm

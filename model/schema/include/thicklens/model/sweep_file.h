@@ -103,7 +103,7 @@ struct SweepTruth {
   double bench_offset_mm = 0;    // depth from Ap of reading 0, mm
   double tilt_deg = 0;           // tilt of the target, as in TargetOptions
   std::string pupil_law;         // PupilLawName; empty: not stated
-  // What is true of one frame.
+  // The true values of one frame.
   struct Frame {
     std::string image;      // file name of the frame
     double depth_mm = 0;    // true z from Ap

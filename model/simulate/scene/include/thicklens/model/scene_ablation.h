@@ -39,7 +39,7 @@ struct SceneAblation {
   EncodedImage image;                              // the photograph of the reference
 };
 
-// What an estimate starts from, and the true views at the places of its grid.
+// The input of an estimate, and the true views at the places of its grid.
 struct SceneToEstimate {
   const EncodedImage& photograph;  // the simulated photograph
   const Camera& camera;            // the camera with its true calibration

@@ -47,7 +47,7 @@ struct SweepToCalibrate {
   std::function<EncodedImage(int frame)> stored_frame;
   std::function<void()> tell;  // to be called often; may throw to stop
 };
-// What a calibration of a simulated sweep found.
+// The result of a calibration of a simulated sweep.
 struct SweepCalibration {
   std::optional<CalibratedValues> values;  // absent: refused
   std::string refusal;                     // the reason why there are no values

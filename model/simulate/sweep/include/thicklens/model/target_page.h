@@ -30,7 +30,7 @@ struct CameraView {
 // Error if it cannot be focused there.
 THICKLENS_EXPORT CameraView ViewOfTarget(const Camera& camera, double distance_mm);
 
-// What a target must fulfil.
+// The conditions that a target must fulfil.
 struct TargetRequest {
   SheetSize sheet;                   // paper on which it is printed
   std::optional<double> feature_mm;  // diameter of the smallest disc; absent: chosen automatically
