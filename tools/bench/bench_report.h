@@ -13,7 +13,8 @@ namespace thicklens::tools {
 
 void AddBenchReportOption(CLI::App* command, std::string* folder);
 
-// The folder of a price list: a page, a machine-readable table, and the page's figures as files.
+// The folder of a table of time and error: a page, a machine-readable table, and the page's figures
+// as files.
 class BenchReport {
  public:
   explicit BenchReport(const std::string& folder);  // claims the folder; empty: none. Throws Error

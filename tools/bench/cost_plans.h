@@ -7,7 +7,7 @@
 
 namespace thicklens::tools {
 
-// The choices that the price list combines.
+// The choices that `bench accuracy` combines.
 struct PlanGrid {
   bool full = false;       // combines each choice with each other, not one after the other
   bool opencl = false;     // a device is present

@@ -1,4 +1,4 @@
-// The price list's front, figures and files.
+// Tests the front, the figures and the files of the tables of time and error.
 #include "tools/bench/cost_rows.h"
 
 #include <gmock/gmock.h>
