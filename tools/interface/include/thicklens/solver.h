@@ -117,7 +117,7 @@ struct GridSolver : FunctionalSolver {};
 // smoothed, the weights of the views and, with a camera, the grid. Immutable; copies are cheap.
 class THICKLENS_EXPORT Problem {
  public:
-  // Makes the problem of an input, which must not be null.
+  // Makes the problem of an input. Throws Error if it is null.
   explicit Problem(std::shared_ptr<const estimator::EstimateInput> input);
 
   // Width of the photograph and of each view, px.

@@ -53,8 +53,8 @@ struct SweepOverrides {
   std::optional<double> offset_sigma_mm;  // finite, >= 0; needs an offset
   std::optional<model::BenchDirection> direction;  // sign of the reading in z
   std::optional<double> reading_sigma_mm;          // finite, >= 0
-  bool floor_unknown = false;                      // the lens floor is to be found
-  std::optional<Measured> floor_px;                // value and sigma finite and >= 0
+  bool floor_unknown = false;                  // discards what the file states of the lens floor
+  std::optional<Measured> floor_px;            // value and sigma finite and >= 0
   std::string floor_from_calibration;          // a camera file; excludes floor_px and floor_unknown
   std::optional<model::SweepTarget> target;    // kind of the target
   std::optional<model::RegionOfInterest> roi;  // px, inside the sensor

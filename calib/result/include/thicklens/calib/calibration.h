@@ -51,7 +51,7 @@ struct FrameMeasurement {
   double blur_fit_weight = 0;         // 0 to 1, from the robust loss
   std::optional<double> image_scale;  // relative to the reference frame
   double image_scale_sigma = 0;       // its standard deviation
-  bool in_scale_fit = false;          // false: not registered, or rejected
+  bool in_scale_fit = false;          // false: not registered, rejected, or no offset was found
   // The written reading minus the joint fit's estimate of it, and the standard deviation of this
   // difference. Both are 0 in frames that are not in the fit.
   double reading_error_mm = 0;
@@ -164,7 +164,7 @@ struct FieldTile {
 };
 // Tiles whose depths of focus agree: a part of the target at one depth.
 struct DepthCluster {
-  model::Estimate focus_depth_mm;  // mean zf of the tiles, from Ap
+  model::Estimate focus_depth_mm;  // weighted mean of the tiles, from Ap
   int tiles = 0;                   // number of tiles
 };
 // Depth of focus over the field of view.
