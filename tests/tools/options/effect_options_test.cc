@@ -1,6 +1,9 @@
 #include "tools/options/effect_options.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include <string>
 
 #include "tools/options/option_values.h"
 
@@ -22,14 +25,16 @@ TEST(EffectOptions, AreHandedToTheInterface) {
 }
 
 // The interface refuses a tolerance where it has no effect, but the command line accepts it.
-TEST(EffectOptions, AToleranceIsForAutoOnly) {
+TEST(EffectOptions, AToleranceIsHandedOnAndRefusedWithoutAuto) {
   EffectOptions options;
   options.tolerance = "0.25gl";
   ASSERT_TRUE(EffectSelectionOf(options).tolerance);
   EXPECT_EQ(EffectSelectionOf(options).tolerance->grey_levels, 0.25);
-  options.effects = "all";
-  EXPECT_FALSE(EffectSelectionOf(options).tolerance);
   EXPECT_TRUE(EffectSelectionOf(options).IsValid(nullptr));
+  options.effects = "all";
+  std::string why;
+  EXPECT_FALSE(EffectSelectionOf(options).IsValid(&why));
+  EXPECT_THAT(why, ::testing::HasSubstr("tolerance"));
 }
 
 }  // namespace
