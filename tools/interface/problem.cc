@@ -116,21 +116,13 @@ void CheckExif(const PhotoFile& photo, const Camera& camera, const PhotoSize& si
                   photo.name, NameOf(camera), contradictions, run->Option("exif")));
 }
 
-void NoteAssumedFields(const Camera& camera, RunScope* run) {
-  for (const std::string& notice : camera.notices) run->Warn(notice);
-  const std::vector<std::string> fields = model::AssumedFields(camera);
-  if (fields.empty()) return;
-  run->Warn(fmt::format("camera '{}': assumed, neither published nor measured: {}", camera.name,
-                        fmt::join(fields, ", ")));
-}
-
 // The camera behind an image of the full size, which may be a part of its sensor, and of that the
 // crop.
 Camera CameraFor(const PhotoFile& photo, const std::optional<TransferCurve>& transfer, int width_px,
                  int height_px, Camera camera, const EstimateOptions& options,
                  EstimateDiagnostics* diagnostics, RunScope* run) {
   if (transfer) camera.sensor.transfer = *transfer;
-  NoteAssumedFields(camera, run);
+  for (const std::string& notice : NoticesOf(camera)) run->Warn(notice);
   CheckExif(photo, camera, {width_px, height_px, options.sensor_origin.has_value()}, options.exif,
             diagnostics, run);
   if (options.sensor_origin) {

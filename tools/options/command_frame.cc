@@ -18,6 +18,7 @@
 #include "thicklens/base/parallel.h"
 #include "thicklens/base/printable_text.h"
 #include "thicklens/base/temporaries.h"
+#include "thicklens/camera.h"
 #include "tools/options/deprecated_names.h"
 #include "tools/options/option_values.h"
 #include "tools/options/run_files.h"
@@ -131,11 +132,7 @@ void ReportDeprecated(const CommonOptions& options, const std::vector<std::strin
 }
 
 void ReportAssumedFields(const model::Camera& camera) {
-  for (const std::string& notice : camera.notices) spdlog::warn("{}", PrintableUtf8(notice));
-  const std::vector<std::string> fields = model::AssumedFields(camera);
-  if (fields.empty()) return;
-  spdlog::warn("camera '{}': assumed, neither published nor measured: {}",
-               PrintableUtf8(camera.name), fmt::join(fields, ", "));
+  for (const std::string& notice : NoticesOf(camera)) spdlog::warn("{}", PrintableUtf8(notice));
 }
 
 }  // namespace thicklens::tools

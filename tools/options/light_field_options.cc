@@ -164,10 +164,6 @@ void AddApertureShapeOption(CLI::App* command, std::string* text) {
       ->type_name("SHAPE");
 }
 
-model::ApertureShape ApertureShapeOr(const std::string& text, model::ApertureShape otherwise) {
-  return text.empty() ? otherwise : model::ApertureShapeFromName(text);
-}
-
 void AddDeviceOption(CLI::App* command, std::string* text) {
   if (text->empty()) *text = "auto";
   const CLI::Validator is_device(

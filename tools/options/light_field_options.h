@@ -55,9 +55,8 @@ model::DepthConvention ConventionOf(const DepthOptions& options);
 // Likewise in the form of the interface.
 DepthMeaning DepthMeaningOf(const DepthOptions& options);
 
-// The option --aperture-shape; for an empty text the result is `otherwise`.
+// The option --aperture-shape.
 void AddApertureShapeOption(CLI::App* command, std::string* text);
-model::ApertureShape ApertureShapeOr(const std::string& text, model::ApertureShape otherwise);
 
 // --device auto|cpu|opencl[:PLATFORM[:DEVICE]].
 void AddDeviceOption(CLI::App* command, std::string* text);

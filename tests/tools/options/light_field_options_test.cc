@@ -123,11 +123,5 @@ TEST(DepthOptions, AreHandedToTheInterface) {
   EXPECT_TRUE(disparity.IsValid(nullptr));
 }
 
-TEST(ApertureShapeOption, HasADefault) {
-  EXPECT_EQ(ApertureShapeOr("", model::ApertureShape::kDisc), model::ApertureShape::kDisc);
-  EXPECT_EQ(ApertureShapeOr("uniform", model::ApertureShape::kDisc),
-            model::ApertureShape::kUniform);
-}
-
 }  // namespace
 }  // namespace thicklens::tools

@@ -69,10 +69,10 @@ struct DibrInput {
   DisparityMap disparity;         // without holes
 };
 // Compares two light fields view by view, with values as the reference's transfer curve would store
-// them. Throws Error if sizes, counts or channels differ (the message gives the counts and says
-// that --views selects inner views), if no view is present in both, if `dibr` does not fit the
-// views, or if both light fields have grids whose view steps differ by more than 5 %: inner views
-// of a camera's larger light field are not those of its smaller one.
+// them. Throws Error if sizes, counts or channels differ (the message gives the counts), if no view
+// is present in both, if `dibr` does not fit the views, or if both light fields have grids whose
+// view steps differ by more than 5 %: inner views of a camera's larger light field are not those of
+// its smaller one.
 THICKLENS_EXPORT LightFieldScores CompareLightFields(const model::LightField& reference,
                                                      const model::LightField& other, int border_px,
                                                      const std::optional<DibrInput>& dibr,
