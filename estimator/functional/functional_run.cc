@@ -14,7 +14,7 @@
 namespace thicklens::estimator {
 namespace {
 
-std::string MessageOf(const FunctionalOptions& options, const FunctionalSummary& summary) {
+std::string MessageOf(const WholeImageOptions& options, const FunctionalSummary& summary) {
   std::string message = fmt::format("gamma {:.3g}, ridge {:.3g}, {} iterations", summary.gamma,
                                     summary.ridge, summary.iterations);
   if (!summary.converged) {
@@ -27,14 +27,14 @@ std::string MessageOf(const FunctionalOptions& options, const FunctionalSummary&
 
 }  // namespace
 
-bool FunctionalOptions::IsValid(std::string* why) const {
+bool WholeImageOptions::IsValid(std::string* why) const {
   return IsPositive("gamma", gamma, why) && IsPositive("ridge", ridge, why) &&
          IsTolerance("tolerance", tolerance, why) &&
          IsAtLeast(1, "max_iterations", max_iterations, why);
 }
 
 void StartRun(const std::string& solver, const EstimateInput& input,
-              const FunctionalOptions& options, const SolverRun& run, FunctionalSummary* summary) {
+              const WholeImageOptions& options, const SolverRun& run, FunctionalSummary* summary) {
   CheckOptions(solver, options);
   CheckRun(solver, run, RunUse::kNone);
   CheckInput(input);
@@ -65,7 +65,7 @@ void FillOrigin(const std::string& method, const FunctionalSummary& summary, boo
   if (falloff) origin->effects.emplace_back("falloff");
 }
 
-void EndRun(const std::string& solver, const FunctionalOptions& options,
+void EndRun(const std::string& solver, const WholeImageOptions& options,
             FunctionalSummary* summary) {
   RequireProgress(
       solver, summary->relative_residual, summary->iterations,

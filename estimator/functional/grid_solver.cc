@@ -27,7 +27,7 @@ namespace thicklens::estimator {
 namespace {
 
 // Expected iterations of conjugate gradients, measured: the eigenvalues are many and evenly spread.
-int ExpectedIterations(const FunctionalOptions& options, double ridge) {
+int ExpectedIterations(const GridOptions& options, double ridge) {
   const double ratio = 1 + 8 * options.gamma / ridge;
   return static_cast<int>(std::clamp(0.25 * std::sqrt(ratio) * std::log(2 / options.tolerance), 1.0,
                                      static_cast<double>(options.max_iterations)));
@@ -171,7 +171,7 @@ std::vector<std::vector<float>> IrradianceOfViews(const EstimateInput& input, in
 
 // The options and the input are checked already.
 template <typename Real>
-model::LightField SolveOnGrid(const EstimateInput& input, const FunctionalOptions& options,
+model::LightField SolveOnGrid(const EstimateInput& input, const GridOptions& options,
                               const SolverRun& run, FunctionalSummary* summary) {
   const auto start = Clock::now();
   const int threads = summary->threads, channels = input.image.channels;
@@ -222,7 +222,7 @@ model::LightField SolveOnGrid(const EstimateInput& input, const FunctionalOption
 
 }  // namespace
 
-model::LightField EstimateOnGrid(const EstimateInput& input, const FunctionalOptions& options,
+model::LightField EstimateOnGrid(const EstimateInput& input, const GridOptions& options,
                                  const SolverRun& run, FunctionalSummary* summary) {
   FunctionalSummary unused;
   if (summary == nullptr) summary = &unused;

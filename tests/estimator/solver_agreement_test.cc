@@ -166,8 +166,9 @@ struct Way {
   std::function<std::vector<float>(const EstimateInput& input, int threads)> run;
 };
 
-FunctionalOptions FunctionalOf(bool double_precision) {
-  FunctionalOptions options;
+template <typename Options>
+Options OptionsOf(bool double_precision) {
+  Options options;
   options.gamma = kGamma;
   options.ridge = kRidge;
   options.double_precision = double_precision;
@@ -180,13 +181,13 @@ std::vector<Way> FunctionalWays(bool double_precision) {
   std::vector<Way> ways;
   ways.push_back({"functional", [=](const EstimateInput& input, int threads) {
                     FunctionalSummary summary;
-                    return EstimateFunctional(input, FunctionalOf(double_precision),
+                    return EstimateFunctional(input, OptionsOf<FunctionalOptions>(double_precision),
                                               RunOnThreads(threads), &summary)
                         .values;
                   }});
   ways.push_back({"grid", [=](const EstimateInput& input, int threads) {
                     FunctionalSummary summary;
-                    return EstimateOnGrid(input, FunctionalOf(double_precision),
+                    return EstimateOnGrid(input, OptionsOf<GridOptions>(double_precision),
                                           RunOnThreads(threads), &summary)
                         .values;
                   }});

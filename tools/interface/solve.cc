@@ -123,9 +123,9 @@ estimator::SolverOptions OptionsOf(const BlockSolver& solver, const PreparedProb
   return settings;
 }
 
-estimator::FunctionalOptions FunctionalOf(const FunctionalSolver& solver,
+estimator::WholeImageOptions WholeImageOf(const FunctionalSolver& solver,
                                           const PreparedProblem& prepared) {
-  estimator::FunctionalOptions settings;
+  estimator::WholeImageOptions settings;
   settings.gamma = solver.gamma;
   settings.ridge = solver.ridge;
   settings.tolerance = solver.tolerance;
@@ -137,11 +137,11 @@ estimator::FunctionalOptions FunctionalOf(const FunctionalSolver& solver,
 
 estimator::SolverOptions OptionsOf(const FunctionalSolver& solver,
                                    const PreparedProblem& prepared) {
-  return FunctionalOf(solver, prepared);
+  return estimator::FunctionalOptions{WholeImageOf(solver, prepared)};
 }
 
 estimator::SolverOptions OptionsOf(const GridSolver& solver, const PreparedProblem& prepared) {
-  return estimator::GridOptions{FunctionalOf(solver, prepared)};
+  return estimator::GridOptions{WholeImageOf(solver, prepared)};
 }
 
 void TakeDiagnostics(const estimator::SceneDiagnostics& found, EstimateDiagnostics* diagnostics) {

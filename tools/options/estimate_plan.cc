@@ -51,11 +51,11 @@ estimator::SolverOptions SolverOptionsOf(const estimator::EstimatePlan& plan) {
     blocks.block_px = plan.block_px;
     return blocks;
   }
-  estimator::FunctionalOptions functional;
-  functional.tolerance = plan.tolerance.value_or(functional.tolerance);
-  functional.double_precision = plan.double_precision;
-  if (plan.solver == "grid") return estimator::GridOptions{functional};
-  return functional;
+  estimator::WholeImageOptions whole;
+  whole.tolerance = plan.tolerance.value_or(whole.tolerance);
+  whole.double_precision = plan.double_precision;
+  if (plan.solver == "grid") return estimator::GridOptions{whole};
+  return estimator::FunctionalOptions{whole};
 }
 
 }  // namespace

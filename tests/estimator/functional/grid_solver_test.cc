@@ -213,15 +213,15 @@ TEST(GridLinks, AreSymmetric) {
   }
 }
 
-FunctionalOptions Precise() {
-  FunctionalOptions options;
+GridOptions Precise() {
+  GridOptions options;
   options.double_precision = true;
   options.tolerance = 1e-11;
   options.max_iterations = 10000;
   return options;
 }
 
-model::LightField OneBlock(const EstimateInput& input, const FunctionalOptions& options) {
+model::LightField OneBlock(const EstimateInput& input, const GridOptions& options) {
   BlockOptions blocks;
   blocks.solver = BlockSolver::kEigen;
   blocks.gamma = options.gamma;
@@ -232,7 +232,7 @@ model::LightField OneBlock(const EstimateInput& input, const FunctionalOptions& 
   return EstimateByBlocks(input, blocks, RunOnThreads(1), &summary);
 }
 
-void ExpectOneBlock(const EstimateInput& input, const FunctionalOptions& options,
+void ExpectOneBlock(const EstimateInput& input, const GridOptions& options,
                     double accuracy = 2e-6) {
   FunctionalSummary summary;
   const model::LightField found = EstimateOnGrid(input, options, RunOnThreads(1), &summary);
@@ -252,7 +252,7 @@ TEST(GridSolver, IsOneBlockAsLargeAsTheImage) {
 }
 
 TEST(GridSolver, IsOneBlockForOtherStrengthsAndColours) {
-  FunctionalOptions options = Precise();
+  GridOptions options = Precise();
   options.gamma = 0.05;
   options.ridge = 0.02;
   ExpectOneBlock(Occluded(14, 11, 3, GaussianWeights(3, 3)), options);
@@ -262,7 +262,7 @@ TEST(GridSolver, IsOneBlockForOtherStrengthsAndColours) {
 }
 
 TEST(GridSolver, IsOneBlockInFloat) {
-  FunctionalOptions options = Precise();
+  GridOptions options = Precise();
   options.double_precision = false;
   options.tolerance = 1e-5;
   ExpectOneBlock(Occluded(23, 17, 1, GaussianWeights(3, 3)), options, 1e-3);
@@ -310,7 +310,7 @@ TEST(GridSolver, MinimisesTheFunctional) {
       kRidge * Eigen::Map<const Eigen::VectorXf>(prior.values.data(), kRays).cast<double>();
   const Eigen::VectorXd expected = normal.ldlt().solve(right);
 
-  FunctionalOptions options = Precise();
+  GridOptions options = Precise();
   options.gamma = kGamma;
   options.ridge = kRidge;
   FunctionalSummary summary;
@@ -333,7 +333,7 @@ TEST(GridSolver, MinimisesTheFunctional) {
 // Rays that land beside the image are no unknowns.
 TEST(GridSolver, TheReportedResidualIsThatOfTheBlocksSystem) {
   const EstimateInput input = WithCamera(17, 12, 250);
-  FunctionalOptions options = Precise();
+  GridOptions options = Precise();
   options.max_iterations = 4;
   FunctionalSummary summary;
   const model::LightField found = EstimateOnGrid(input, options, RunOnThreads(1), &summary);
@@ -358,7 +358,7 @@ TEST(GridSolver, AConstantImageHasAConstantLightField) {
   for (std::size_t i = 0; i < input.image.values.size(); ++i) {
     input.image.values[i] = 0.2F * static_cast<float>(i % 3 + 1);
   }
-  FunctionalOptions options;
+  GridOptions options;
   options.tolerance = 1e-5;
   FunctionalSummary summary;
   const model::LightField found = EstimateOnGrid(input, options, RunOnThreads(1), &summary);
@@ -373,7 +373,7 @@ TEST(GridSolver, AConstantImageHasAConstantLightField) {
 TEST(GridSolver, SameBitsOnAnyNumberOfThreads) {
   for (const EstimateInput& input :
        {Occluded(301, 37, 3, GaussianWeights(5, 3)), WithCamera(91, 70, 500)}) {
-    FunctionalOptions options;
+    GridOptions options;
     options.max_iterations = 15;
     FunctionalSummary summary;
     const model::LightField one = EstimateOnGrid(input, options, RunOnThreads(1), &summary);
@@ -412,7 +412,7 @@ TEST(GridSolver, CountsItsStepsAndStopsOnRequest) {
 
 TEST(GridSolver, RefusesMoreMemoryThanItMayHave) {
   const EstimateInput input = Occluded(200, 200, 1, GaussianWeights(7, 7));
-  FunctionalOptions options;
+  GridOptions options;
   SolverRun run;
   run.memory_limit_mib = 10;
   FunctionalSummary summary;
@@ -430,7 +430,7 @@ TEST(GridSolver, RefusesMoreMemoryThanItMayHave) {
 }
 
 TEST(GridSolver, RefusesOptionsThatDoNotFit) {
-  FunctionalOptions options;
+  GridOptions options;
   options.ridge = 0;
   FunctionalSummary summary;
   EXPECT_THAT(ErrorOf([&] {

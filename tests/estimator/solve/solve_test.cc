@@ -116,11 +116,13 @@ TEST(Solve, IsTheBlockSolverBitForBit) {
 
 TEST(Solve, IsTheFunctionalAndTheGridSolverBitForBit) {
   const EstimateInput input = SmallInput();
-  FunctionalOptions options;
-  options.gamma = 0.5;
+  WholeImageOptions whole;
+  whole.gamma = 0.5;
+  const FunctionalOptions options{whole};
+  const GridOptions grid_options{whole};
   FunctionalSummary functional, grid;
   const model::LightField by_functional = EstimateFunctional(input, options, {}, &functional);
-  const model::LightField on_grid = EstimateOnGrid(input, options, {}, &grid);
+  const model::LightField on_grid = EstimateOnGrid(input, grid_options, {}, &grid);
   ASSERT_NE(by_functional.values, on_grid.values);
   SolverSummary found;
   ExpectRays(Solve(input, options, {}, &found), by_functional);
@@ -128,7 +130,7 @@ TEST(Solve, IsTheFunctionalAndTheGridSolverBitForBit) {
   EXPECT_EQ(found.solver, "functional");
   EXPECT_EQ(found.iterations, functional.iterations);
   EXPECT_EQ(std::get<FunctionalDiagnostics>(found.diagnostics).gamma, 0.5);
-  ExpectRays(Solve(input, GridOptions{options}, {}, &found), on_grid);
+  ExpectRays(Solve(input, grid_options, {}, &found), on_grid);
   ExpectResult(found, grid);
   EXPECT_EQ(found.solver, "grid");
   EXPECT_EQ(found.iterations, grid.iterations);

@@ -10,8 +10,8 @@
 
 namespace thicklens::estimator {
 
-// The options of EstimateFunctional.
-struct FunctionalOptions {
+// The options of the two solvers that take the whole image at once and have no blocks.
+struct WholeImageOptions {
   double gamma = 1;               // > 0
   std::optional<double> ridge;    // mu, > 0; default 1e-2/(U V)
   double tolerance = 1e-3;        // relative residual at which conjugate gradients stop, > 0, < 1
@@ -22,6 +22,10 @@ struct FunctionalOptions {
   // Returns false, and the reason in `why` (may be null), if a member is not in its range.
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
+
+// The options of EstimateFunctional. They have a type of their own because the type selects the
+// solver (SolverOptions).
+struct FunctionalOptions : WholeImageOptions {};
 
 // The weights that the functional had.
 struct FunctionalDiagnostics {

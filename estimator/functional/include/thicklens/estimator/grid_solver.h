@@ -9,7 +9,7 @@ namespace thicklens::estimator {
 
 // The options of EstimateOnGrid. They have a type of their own because the type selects the solver
 // (SolverOptions).
-struct GridOptions : FunctionalOptions {};
+struct GridOptions : WholeImageOptions {};
 
 // Estimates the light field of one photograph with the functional of EstimateByBlocks, on the same
 // two-plane grid and with the same H, D (in the warp form) and L0, but for the whole image at once.
@@ -28,8 +28,8 @@ struct GridOptions : FunctionalOptions {};
 // that is too low, and for iterations that end with a relative residual of 10 or more. The result
 // does not depend on the number of threads.
 THICKLENS_EXPORT model::LightField EstimateOnGrid(const EstimateInput& input,
-                                                  const FunctionalOptions& options,
-                                                  const SolverRun& run, FunctionalSummary* summary);
+                                                  const GridOptions& options, const SolverRun& run,
+                                                  FunctionalSummary* summary);
 
 }  // namespace thicklens::estimator
 
