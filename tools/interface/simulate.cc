@@ -14,6 +14,7 @@
 #include "thicklens/io/simulated_sweep.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/version.h"
+#include "tools/interface/ablation_files.h"
 #include "tools/interface/run_scope.h"
 #include "tools/interface/validation.h"
 
@@ -38,7 +39,7 @@ SceneSimulation ReadSceneSimulation(const std::string& path) {
 OutputFolder ClaimSweepFolder(const std::string& folder) {
   return OutputFolder(
       folder, kTruthFile,
-      {"frames", "sweep.yaml", "camera.yaml", kTruthFile, "attribution.html", "attribution.csv"});
+      {"frames", "sweep.yaml", "camera.yaml", kTruthFile, kAblationPage, kAblationTable});
 }
 
 SimulatedSweep SimulateSweep(const SweepSimulation& simulation, OutputFolder* folder,

@@ -84,7 +84,7 @@ void WriteFloatTiff(const model::LinearImage& image, const std::string& path,
   const std::size_t bytes = image.values.size() * sizeof(float);
   if (bytes > std::numeric_limits<std::uint32_t>::max() - kRoomForDirectory) {
     throw Error(fmt::format(
-        "{}: {}x{} px take {} bytes, but a TIFF file holds at most 4 GiB; --format png is "
+        "{}: {}x{} px take {} bytes, but a TIFF file holds at most 4 GiB; PNG files are "
         "smaller",
         shown_name, image.width_px, image.height_px, bytes));
   }

@@ -99,8 +99,9 @@ std::string Listed(const std::vector<std::string>& names) {
 }
 
 Error MissingViews(const std::string& folder, const std::vector<std::string>& names) {
-  return Error(fmt::format("{}: missing: {}; --sparse accepts a light field with views missing",
-                           folder, Listed(names)));
+  return Error(
+      fmt::format("{}: missing: {}; the option sparse accepts a light field with views missing",
+                  folder, Listed(names)));
 }
 
 // ---- The layout of thicklens.
@@ -209,7 +210,7 @@ int HciRowLength(const std::string& folder) {
     }
     return static_cast<int>(value);
   }
-  throw Error(fmt::format("{}: num_cams_x is missing; add it, or give --grid N", path));
+  throw Error(fmt::format("{}: num_cams_x is missing; add it, or set the option grid", path));
 }
 
 int InferredRowLength(const std::string& folder, const std::vector<int>& numbers) {
@@ -219,7 +220,7 @@ int InferredRowLength(const std::string& folder, const std::vector<int>& numbers
   if (edge * edge == count && numbers.back() == count - 1) return edge;
   throw Error(
       fmt::format("{}: {} views from {} to {} do not form a full square, and there is no {}: "
-                  "--grid N must state how many views the numbering counts per row",
+                  "the option grid must state how many views the numbering counts per row",
                   folder, count, HciFile(numbers.front()), HciFile(numbers.back()), kHciMarker));
 }
 

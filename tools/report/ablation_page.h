@@ -4,6 +4,7 @@
 #include <string>
 
 #include "thicklens/base/output_file.h"
+#include "tools/interface/ablation_files.h"
 #include "tools/report/ablation_table.h"
 
 namespace thicklens::tools {
@@ -12,9 +13,7 @@ namespace thicklens::tools {
 std::string AblationPage(const Ablation& ablation, const std::string& name,
                          const std::string& version, const std::string& date);
 
-// Writes the page and the machine-readable table into a folder; `name` says what was simulated.
-inline constexpr char kAblationPage[] = "attribution.html";
-inline constexpr char kAblationTable[] = "attribution.csv";
+// Writes kAblationPage and kAblationTable into a folder; `name` says what was simulated.
 void WriteAblation(const Ablation& ablation, const std::string& name, OutputFolder* folder);
 
 }  // namespace thicklens::tools

@@ -219,7 +219,7 @@ TEST_F(LightFieldFolder, MissingViewsNeedAWord) {
     light_field.values[light_field.ViewStart(0, 2, 1) + i] = 0;
   const std::string folder = Write(light_field, ViewFormat::kTiff);
   EXPECT_FALSE(fs::exists(folder + "/views/view_01_02.tiff"));
-  EXPECT_THAT(Refusal(folder), AllOf(HasSubstr("view (2, 1)"), HasSubstr("--sparse")));
+  EXPECT_THAT(Refusal(folder), AllOf(HasSubstr("view (2, 1)"), HasSubstr("the option sparse")));
   LightFieldReading reading;
   reading.sparse = true;
   const model::LightField back = ReadLightField(folder, reading);
@@ -377,16 +377,17 @@ TEST_F(LightFieldFolder, ARectangleInsideTheGridIsALightField) {
 
 TEST_F(LightFieldFolder, TheGridIsNotGuessed) {
   const std::string folder = PutNumbered(Rectangle());
-  EXPECT_THAT(Refusal(folder), AllOf(HasSubstr("6 views"), HasSubstr("--grid")));
+  EXPECT_THAT(Refusal(folder), AllOf(HasSubstr("6 views"), HasSubstr("the option grid")));
   LightFieldReading reading;
   reading.grid = 8;  // 13 and 20 are at other positions then
   EXPECT_THAT(Refusal(folder, reading), HasSubstr("missing: input_Cam"));
   // The number of views is a square, but their numbering is not that of a square.
-  EXPECT_THAT(Refusal(PutNumbered({11, 12, 20, 21})), HasSubstr("--grid"));
+  EXPECT_THAT(Refusal(PutNumbered({11, 12, 20, 21})), HasSubstr("the option grid"));
   folder_.Put("numbered/parameters.cfg", "[extrinsics]\nnum_cams_x = nine\n");
   EXPECT_THAT(Refusal(folder), AllOf(HasSubstr("parameters.cfg:2"), HasSubstr("'nine'")));
   folder_.Put("numbered/parameters.cfg", "[extrinsics]\n");
-  EXPECT_THAT(Refusal(folder), AllOf(HasSubstr("num_cams_x is missing"), HasSubstr("--grid")));
+  EXPECT_THAT(Refusal(folder),
+              AllOf(HasSubstr("num_cams_x is missing"), HasSubstr("the option grid")));
 }
 
 TEST_F(LightFieldFolder, AMissingHciViewIsNamedUnlessSparse) {
@@ -395,7 +396,7 @@ TEST_F(LightFieldFolder, AMissingHciViewIsNamedUnlessSparse) {
   reading.grid = 9;
   EXPECT_THAT(Refusal(folder, reading),
               AllOf(HasSubstr("input_Cam021.png"), HasSubstr("input_Cam029.png"),
-                    HasSubstr("input_Cam030.png"), HasSubstr("--sparse")));
+                    HasSubstr("input_Cam030.png"), HasSubstr("the option sparse")));
   reading.sparse = true;
   const model::LightField light_field = ReadLightField(folder, reading);
   EXPECT_EQ(light_field.present,
@@ -473,7 +474,7 @@ void ExpectDisparitySign(const model::LightField& light_field, const model::RawD
 TEST(LightFieldData, ReadsAntinous) {
   const std::string folder = std::string(THICKLENS_SHARED_DATA_DIR) + "/lf_antinous";
   if (!fs::exists(folder)) GTEST_SKIP() << folder << " is not there";
-  EXPECT_THAT(ErrorOf([&] { ReadLightField(folder, {}); }), HasSubstr("--grid"));
+  EXPECT_THAT(ErrorOf([&] { ReadLightField(folder, {}); }), HasSubstr("the option grid"));
   LightFieldReading reading;
   reading.grid = 9;
   const model::LightField light_field = ReadLightField(folder, reading);
