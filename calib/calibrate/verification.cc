@@ -10,6 +10,7 @@
 
 #include "thicklens/base/error.h"
 #include "thicklens/base/validity.h"
+#include "thicklens/calib/focus_sweep.h"
 #include "thicklens/model/thick_lens.h"
 
 namespace thicklens::calib {

@@ -3,6 +3,10 @@
 
 #include "thicklens/thicklens.h"
 
+#ifdef OPENCV_CORE_MAT_HPP
+#error "thicklens/thicklens.h includes OpenCV; thicklens/opencv.h is the header that may"
+#endif
+
 namespace {
 
 // The exceptions of the interface are caught by their own type and by the base library's.

@@ -11,6 +11,7 @@
 
 #include "support/test_cameras.h"
 #include "thicklens/base/error.h"
+#include "thicklens/calib/focus_sweep.h"
 #include "thicklens/model/thick_lens.h"
 
 namespace thicklens::calib {

@@ -5,11 +5,12 @@
 #include <vector>
 
 #include "thicklens/base/export.h"
-#include "thicklens/calib/calibrate.h"
-#include "thicklens/calib/focus_sweep.h"
+#include "thicklens/calib/calibration.h"
 #include "thicklens/model/camera.h"
 
 namespace thicklens::calib {
+
+struct FocusSweep;  // thicklens/calib/focus_sweep.h, which needs OpenCV's headers
 
 // The check whether a stored calibration still holds, from a new sweep of the same camera.
 
