@@ -16,7 +16,12 @@ install(FILES "${PROJECT_BINARY_DIR}/thicklensConfig.cmake"
               "${PROJECT_BINARY_DIR}/thicklensConfigVersion.cmake"
               "${PROJECT_SOURCE_DIR}/.cmake/FindSuiteSparse.cmake" DESTINATION ${package_dir})
 install(DIRECTORY "${PROJECT_SOURCE_DIR}/configs/" DESTINATION ${CMAKE_INSTALL_DATADIR}/thicklens)
-install(FILES "${PROJECT_SOURCE_DIR}/LICENSE" DESTINATION ${CMAKE_INSTALL_DOCDIR})
+# The comments of the headers refer to these documents.
+install(
+  FILES "${PROJECT_SOURCE_DIR}/LICENSE" "${PROJECT_SOURCE_DIR}/docs/api.md"
+        "${PROJECT_SOURCE_DIR}/docs/equations.md" "${PROJECT_SOURCE_DIR}/docs/file-formats.md"
+  DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(DIRECTORY "${PROJECT_SOURCE_DIR}/docs/examples" DESTINATION ${CMAKE_INSTALL_DOCDIR})
 
 # The same package with the shared libraries, for the test of the installation (ThicklensModule.cmake).
 if(THICKLENS_BUILDS_SHARED AND NOT THICKLENS_SHARED_LIBS)

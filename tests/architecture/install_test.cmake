@@ -74,6 +74,13 @@ if(shared)
   run_consumer("${work_dir}/shared_consumer" -D "thicklens_DIR=${config_dir}")
 endif()
 
+# The documents that the comments of the headers refer to.
+foreach(document api.md equations.md file-formats.md examples/CMakeLists.txt)
+  if(NOT EXISTS "${prefix}/share/doc/thicklens/${document}")
+    message(FATAL_ERROR "${document} is not installed in share/doc/thicklens")
+  endif()
+endforeach()
+
 # The examples of the documentation, and the program of the README, as a user builds and runs them.
 set(examples "${work_dir}/examples")
 run(${CMAKE_COMMAND} -S "${configs_dir}/../docs/examples" -B "${examples}" -G "${generator}"
