@@ -17,7 +17,9 @@ namespace {
 Prior PriorOf(const std::string& name) {
   if (name == "ridge") return Prior::kRidge;
   if (name == "gradient") return Prior::kGradient;
-  return name == "patches" ? Prior::kPatches : Prior::kTotalVariation;
+  if (name == "patches") return Prior::kPatches;
+  if (name == "tv") return Prior::kTotalVariation;
+  throw UsageError("--prior: ridge, gradient, tv or patches is expected, found '" + name + "'");
 }
 
 SceneSolver SceneSolverOf(const EstimateOptions& options) {
