@@ -71,8 +71,10 @@ class THICKLENS_EXPORT CalibrationRefused : public Error {
 // is what `thicklens calibrate` does. Deterministic: the result does not depend on the number of
 // threads, except the date in the evidence.
 //
-// Throws OptionError for options that are not valid, CalibrationRefused as the options say, Error
-// for frames that cannot be read, and Interrupted.
+// A sweep that determines only some of the values gives a Calibration whose `summary.outcome` is
+// kPartial and whose `summary.reason` says which are missing; nothing is thrown. Throws OptionError
+// for options that are not valid, CalibrationRefused as the options say, Error for frames that
+// cannot be read, and Interrupted.
 THICKLENS_EXPORT Calibration Calibrate(const Sweep& sweep, const CalibrateOptions& options,
                                        const RunControl& run = {});
 

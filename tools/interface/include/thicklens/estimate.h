@@ -49,7 +49,9 @@ enum class HiddenRays {
   kTelea,   // by the inpainting of section 6 of the supplement [D99], for comparison
 };
 
-// Everything of `thicklens estimate` that determines its result, with the same defaults.
+// Everything of `thicklens estimate` that determines its result, with the same defaults. Only the
+// choice of a solver for a limit of time or quality (--within, --quality, --psnr-loss) is left to
+// the caller, who gives a SolverChooser as the solver.
 struct EstimateOptions {
   // Numbers of views, at least two in all. Absent: 7 x 7, or those of aperture.views_of.
   std::optional<ViewCounts> views;
@@ -245,9 +247,9 @@ class THICKLENS_EXPORT ViewSink {
 //
 // Photograph and depth are taken by value: whoever moves them there does not hold them twice while
 // the light field is solved for. The result does not depend on the number of threads. Throws
-// OptionError for options, Error for
-// inputs that do not fit each other (sizes, units, EXIF that contradicts the camera, disparities
-// larger than the image) and for what the solver refuses, and Interrupted.
+// OptionError for options, Error for inputs that do not fit each other (sizes, units, EXIF that
+// contradicts the camera, disparities larger than the image) and for what the solver refuses, and
+// Interrupted.
 THICKLENS_EXPORT LightFieldEstimate EstimateLightField(Image photo, DepthMap depth,
                                                        const std::optional<Camera>& camera,
                                                        const EstimateOptions& options,
@@ -270,7 +272,8 @@ THICKLENS_EXPORT Problem PrepareProblem(Image photo, DepthMap depth,
                                         const RunControl& run = {});
 
 // Writes the light field with its confidence as `thicklens estimate` does, completely or not at
-// all. Returns the number of clipped values.
+// all. The HCI layout has no place for a confidence, a camera or weights. Returns the number of
+// clipped values.
 THICKLENS_EXPORT std::size_t WriteLightField(const std::string& folder,
                                              const LightFieldEstimate& estimate,
                                              LightFieldFormat format = LightFieldFormat::kPng,

@@ -10,8 +10,10 @@
 #include "thicklens/base/export.h"
 
 // How a long call is run: the one protocol for threads, cancellation, progress and notices. It
-// never changes a result. Every function of this interface that may take longer than 0.2 s takes a
-// RunControl as its last argument.
+// never changes a result. The functions that may take long have a RunControl parameter. Those that
+// read, write or compare single images have none; they take up to some seconds for a large image.
+// Calibrating, verifying, estimating, simulating and explaining report their progress; the other
+// functions report none.
 namespace thicklens {
 
 // An option whose value is not valid, or that contradicts another option. `field()` is the name of
@@ -57,12 +59,13 @@ struct RunControl {
   // (thicklens/base/cancel.h). Null: the token of the calling thread's CancelScope, if it has one.
   // Not owned.
   const CancelToken* cancel = nullptr;
-  // Called for each step, from any thread, never by two threads at once. An exception that it
-  // throws ends the call and is thrown by the call. Empty: none.
+  // Called for each step, from any thread, never by two threads at once. A stage that has
+  // to do a step again reports it again. An exception that the function throws ends the call and is
+  // thrown by the call. Empty: none.
   std::function<void(const Progress&)> progress;
-  // Called with each notice when it arises, on the calling thread. EstimateDiagnostics and
-  // LightFieldScores also keep them.
-  // Empty: none.
+  // Called with each notice when it arises, on the calling thread. EstimateDiagnostics,
+  // LightFieldScores and RenderSummary also keep them. The warnings of a calibration are in its
+  // summary. Empty: none.
   std::function<void(const Notice&)> notice;
   // How errors and notices name an option: it gets the path of the member ("sensor_origin",
   // "depth.meaning.unit") and returns the name that the program's user knows ("--sensor-origin").
