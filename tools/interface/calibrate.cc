@@ -3,6 +3,7 @@
 #include <string>
 #include <utility>
 
+#include "thicklens/base/error.h"
 #include "thicklens/base/utc_time.h"
 #include "thicklens/calib/calibrate.h"
 #include "thicklens/version.h"
@@ -22,10 +23,15 @@ std::string RefusalOf(const calib::Calibration& found, CalibrationMethod method)
   return found.summary.outcome == calib::Outcome::kRefused ? found.summary.reason : "";
 }
 
+const std::string& MessageOf(const std::shared_ptr<const Calibration>& calibration) {
+  if (calibration == nullptr) throw Error("calibration: a calibration is expected, found null");
+  return calibration->refusal;
+}
+
 }  // namespace
 
 CalibrationRefused::CalibrationRefused(std::shared_ptr<const Calibration> calibration)
-    : Error(calibration->refusal), calibration_(std::move(calibration)) {}
+    : Error(MessageOf(calibration)), calibration_(std::move(calibration)) {}
 CalibrationRefused::~CalibrationRefused() = default;
 
 Calibration Calibrate(const Sweep& sweep, const CalibrateOptions& options, const RunControl& run) {

@@ -107,6 +107,8 @@ LightFieldScores CompareLightFields(LightField reference, LightField other, Comp
                                     const RunControl& control) {
   checks::RequireValid(control);
   checks::RequireValid(options);
+  checks::RequireValidInput(NameOr(reference.source, "reference"), reference);
+  checks::RequireValidInput(NameOr(other.source, "other"), other);
   RunScope run(control);
   if (!reference.source.empty() && !other.source.empty()) {
     if (const auto warning =

@@ -34,6 +34,26 @@ ChannelOrder OrderOf(const model::LinearImage& image) {
   throw Error(fmt::format("image: 1 or 3 channels are expected, found {}", image.channels));
 }
 
+void RequireValid(const LightField& light_field) {
+  checks::RequireValidInput(light_field.source.empty() ? "light field" : light_field.source,
+                            light_field);
+}
+
+void RequireFormat(LightFieldFormat format) {
+  checks::RequireOneOf("format", LightFieldFormat::kHci, format);
+}
+
+// The confidence has one byte for each ray, or is absent.
+void RequireFittingConfidence(const LightFieldEstimate& estimate) {
+  const LightField& light_field = estimate.light_field;
+  const std::size_t rays = light_field.ViewStart(1, 0, 0);
+  if (estimate.confidence.empty() || estimate.confidence.size() == rays) return;
+  throw Error(fmt::format(
+      "confidence: {} bytes are expected ({}x{} views of {}x{} rays), or none, found {}", rays,
+      light_field.u_count, light_field.v_count, light_field.s_count, light_field.t_count,
+      estimate.confidence.size()));
+}
+
 }  // namespace
 
 LightField ReadLightField(const std::string& folder, const LightFieldReadOptions& options,
@@ -51,19 +71,26 @@ ApertureViews ReadApertureViews(const std::string& folder, const LightFieldReadO
 }
 
 Image ViewOf(const LightField& light_field, int k, int l) {
+  RequireValid(light_field);
   model::LinearImage view = model::ViewImage(light_field, k, l);
+  if (!light_field.IsPresent(k, l)) throw Error(fmt::format("view ({}, {}) is missing", k, l));
   const ChannelOrder order = OrderOf(view);
   return Image::FromLight(view.width_px, view.height_px, order, std::move(view.values),
                           light_field.transfer, fmt::format("view ({}, {})", k, l));
 }
 
 OutputFolder ClaimLightFieldFolder(const std::string& folder, LightFieldFormat format) {
+  RequireFormat(format);
   if (format == LightFieldFormat::kHci) return io::ClaimHciFolder(folder);
   return OutputFolder(folder, io::kLightFieldMarker, io::LightFieldEntries());
 }
 
 std::size_t WriteLightField(OutputFolder* folder, const LightField& light_field,
                             LightFieldFormat format, const RunControl& run) {
+  checks::RequireValid(run);
+  RequireFormat(format);
+  if (folder == nullptr) throw Error("folder: a claimed folder is expected, found null");
+  RequireValid(light_field);
   const RunScope scope(run);
   if (format == LightFieldFormat::kHci) return io::WriteHciLightField(light_field, folder);
   return io::WriteLightField(
@@ -73,6 +100,9 @@ std::size_t WriteLightField(OutputFolder* folder, const LightField& light_field,
 
 std::size_t WriteLightField(const std::string& folder, const LightField& light_field,
                             LightFieldFormat format, const RunControl& run) {
+  checks::RequireValid(run);
+  RequireFormat(format);
+  RequireValid(light_field);
   const RunScope scope(run);
   OutputFolder output = ClaimLightFieldFolder(folder, format);
   const std::size_t clipped = WriteLightField(&output, light_field, format, run);
@@ -83,7 +113,11 @@ std::size_t WriteLightField(const std::string& folder, const LightField& light_f
 
 std::size_t WriteLightField(const std::string& folder, const LightFieldEstimate& estimate,
                             LightFieldFormat format, const RunControl& run) {
+  checks::RequireValid(run);
+  RequireFormat(format);
   const LightField& light_field = estimate.light_field;
+  RequireValid(light_field);
+  RequireFittingConfidence(estimate);
   if (format == LightFieldFormat::kHci || estimate.confidence.empty()) {
     return WriteLightField(folder, light_field, format, run);
   }

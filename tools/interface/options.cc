@@ -34,15 +34,6 @@ constexpr char kOneView[] =
 constexpr double kMaxLengthMm = 1e9;
 constexpr double kMaxMemoryMib = 1e9;
 
-// An enumerator that a cast made of a number without a name is not valid.
-template <typename Enum>
-bool OneOf(std::string* why, const std::string& field, Enum last, Enum value) {
-  using Number = std::underlying_type_t<Enum>;
-  const auto number = static_cast<Number>(value);
-  return (number >= 0 && number <= static_cast<Number>(last)) ||
-         Unexpected(why, field, "an enumerator", static_cast<int>(number));
-}
-
 bool IsRect(std::string* why, const std::string& field, const PixelRect& rect) {
   return WholeBetween(why, field + ".x", 0, kMaxPixels, rect.x) &&
          WholeBetween(why, field + ".y", 0, kMaxPixels, rect.y) &&

@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/base/parallel.h"
 #include "thicklens/base/utc_time.h"
@@ -45,6 +46,7 @@ OutputFolder ClaimSweepFolder(const std::string& folder) {
 SimulatedSweep SimulateSweep(const SweepSimulation& simulation, OutputFolder* folder,
                              bool unknown_offset, const RunControl& control) {
   checks::RequireValid(control);
+  if (folder == nullptr) throw Error("folder: a claimed folder is expected, found null");
   const RunScope run(control);
   const model::SweepSimulator simulator(simulation, io::ReadTargetImage(simulation.target));
   const auto& frames = simulator.truth().frames;

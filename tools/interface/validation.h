@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 #include <string>
+#include <type_traits>
 #include <utility>
 
 #include "thicklens/run.h"
@@ -51,6 +52,15 @@ inline bool WholeBetween(std::string* why, const std::string& field, int lo, int
          Unexpected(why, field, fmt::format("a whole number from {} to {}", lo, hi).c_str(), value);
 }
 
+// An enumerator that a cast made of a number without a name is not valid.
+template <typename Enum>
+bool OneOf(std::string* why, const std::string& field, Enum last, Enum value) {
+  using Number = std::underlying_type_t<Enum>;
+  const auto number = static_cast<Number>(value);
+  return (number >= 0 && number <= static_cast<Number>(last)) ||
+         Unexpected(why, field, "an enumerator", static_cast<int>(number));
+}
+
 // Applies a check to a value that may be absent; an absent one is valid.
 template <typename Value, typename CheckOne>
 bool IfGiven(const std::optional<Value>& value, const CheckOne& check) {
@@ -72,6 +82,20 @@ void RequireValid(const Options& options) {
   std::string why;
   if (options.IsValid(&why)) return;
   throw OptionError(why.substr(0, why.find(':')), why);
+}
+
+// Throws OptionError unless the argument `field` of a call is an enumerator.
+template <typename Enum>
+void RequireOneOf(const std::string& field, Enum last, Enum value) {
+  std::string why;
+  if (!OneOf(&why, field, last, value)) throw OptionError(field, why);
+}
+
+// Throws Error, which begins with `name`, unless the light field, camera or other input is valid.
+template <typename Input>
+void RequireValidInput(const std::string& name, const Input& input) {
+  std::string why;
+  if (!input.IsValid(&why)) throw Error(fmt::format("{}: {}", name, why));
 }
 
 }  // namespace thicklens::checks

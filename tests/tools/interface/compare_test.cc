@@ -62,5 +62,17 @@ TEST(CompareInterfaceTest, TheBaselineFitsTheViewsAndIsNamed) {
   EXPECT_THAT(ErrorOf([&] { CompareImages(image, image, options); }), HasSubstr("baseline"));
 }
 
+TEST(CompareInterfaceTest, BothLightFieldsMustBeValid) {
+  LightField empty = SteppedField(3, "");
+  empty.values.clear();
+  EXPECT_THAT(ErrorOf([&] { CompareLightFields(SteppedField(3, ""), empty); }),
+              StartsWith("other: values: 0 values"));
+  EXPECT_THAT(ErrorOf([&] { CompareLightFields(empty, SteppedField(3, "")); }),
+              StartsWith("reference: values: 0 values"));
+  empty.source = "fields/window";
+  EXPECT_THAT(ErrorOf([&] { CompareLightFields(SteppedField(3, ""), empty); }),
+              StartsWith("fields/window: values: 0 values"));
+}
+
 }  // namespace
 }  // namespace thicklens

@@ -56,7 +56,7 @@ struct Calibration : calib::Calibration {
 // A sweep that determines no camera. The message is the reason.
 class THICKLENS_EXPORT CalibrationRefused : public Error {
  public:
-  // Makes the error of a refused calibration, which must not be null.
+  // Makes the error of a refused calibration. Throws Error if it is null.
   explicit CalibrationRefused(std::shared_ptr<const Calibration> calibration);
   ~CalibrationRefused() override;
   // The findings before the refusal; valid as long as the error.

@@ -53,7 +53,8 @@ enum class LightFieldFormat {
 
 // Writes a light field into a folder, completely or not at all. The confidence of an estimate is
 // written only by WriteLightField(folder, estimate) of estimate.h. A folder that this program did
-// not write is not replaced. Returns the number of clipped values. Throws Error.
+// not write is not replaced. Returns the number of clipped values. Throws OptionError for a format
+// that is no enumerator, and Error, also for a light field that is not valid.
 THICKLENS_EXPORT std::size_t WriteLightField(const std::string& folder,
                                              const LightField& light_field,
                                              LightFieldFormat format = LightFieldFormat::kPng,
@@ -61,16 +62,18 @@ THICKLENS_EXPORT std::size_t WriteLightField(const std::string& folder,
 
 // Both steps of WriteLightField, for a folder that is claimed before a long computation or that
 // gets other files too: the name is claimed, views and description are written below it, and Commit
-// of the folder (thicklens/base/output_file.h) puts it in place. Throws Error.
+// of the folder (thicklens/base/output_file.h) puts it in place. Throws OptionError and Error.
 THICKLENS_EXPORT OutputFolder
 ClaimLightFieldFolder(const std::string& folder, LightFieldFormat format = LightFieldFormat::kPng);
 // Writes views and description into a claimed folder; the caller commits it. Returns the number of
-// clipped values. Throws Error.
+// clipped values. Throws OptionError, and Error, also for a folder that is null.
 THICKLENS_EXPORT std::size_t WriteLightField(OutputFolder* folder, const LightField& light_field,
                                              LightFieldFormat format = LightFieldFormat::kPng,
                                              const RunControl& run = {});
 
-// The view (k, l) as an image in linear light. Throws Error if there is no such view.
+// The view (k, l) as an image in linear light. Throws Error if the light field is not valid, if it
+// has other channels than 1 (grey) or 3 (RGB), which an image cannot have, and if there is no such
+// view or it is not present.
 THICKLENS_EXPORT Image ViewOf(const LightField& light_field, int k, int l);
 
 // The positions of views on the aperture and the share of each in a photograph, taken from another

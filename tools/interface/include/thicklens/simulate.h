@@ -49,7 +49,7 @@ struct SimulatedSweep {
 // place. Throws Error if the folder cannot be written or holds what this program did not write.
 THICKLENS_EXPORT OutputFolder ClaimSweepFolder(const std::string& folder);
 // Writes frames and descriptions into a claimed folder; the caller commits it. Throws Error for
-// options that are not valid.
+// options that are not valid and for a folder that is null.
 THICKLENS_EXPORT SimulatedSweep SimulateSweep(const SweepSimulation& simulation,
                                               OutputFolder* folder, bool unknown_offset = false,
                                               const RunControl& run = {});
