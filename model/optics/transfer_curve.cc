@@ -21,6 +21,13 @@ double DecodeSrgb(double stored) {
 
 }  // namespace
 
+TransferCurve TransferCurve::Gamma(double gamma) {
+  if (!(gamma > 0) || !std::isfinite(gamma)) {
+    throw Error(fmt::format("gamma: a finite number > 0 is expected, found {}", gamma));
+  }
+  return TransferCurve(Kind::kGamma, gamma);
+}
+
 TransferCurve TransferCurve::FromName(const std::string& name) {
   if (name == "linear") return Linear();
   if (name == "srgb") return Srgb();

@@ -6,6 +6,7 @@
 #include <limits>
 #include <string>
 
+#include "support/error_message.h"
 #include "thicklens/base/error.h"
 
 namespace thicklens::model {
@@ -34,6 +35,16 @@ TEST(TransferCurve, UnknownNameListsThePossibleOnes) {
       }
     }
   }
+}
+
+TEST(TransferCurve, AnExponentIsFiniteAndPositive) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  for (const double gamma : {0.0, -1.0, kInfinity, std::numeric_limits<double>::quiet_NaN()}) {
+    const std::string message = testing::ErrorOf([gamma] { TransferCurve::Gamma(gamma); });
+    EXPECT_EQ(message.rfind("gamma: a finite number > 0 is expected, found ", 0), 0U) << message;
+  }
+  EXPECT_EQ(testing::ErrorOf([] { TransferCurve::Gamma(-1.5); }),
+            "gamma: a finite number > 0 is expected, found -1.5");
 }
 
 // Tabulated values of the standard, computed elsewhere.

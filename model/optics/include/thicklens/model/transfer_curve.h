@@ -19,8 +19,8 @@ class THICKLENS_EXPORT TransferCurve {
   static TransferCurve Linear() { return TransferCurve(Kind::kLinear, 1); }
   // The curve of IEC 61966-2-1.
   static TransferCurve Srgb() { return TransferCurve(Kind::kSrgb, 1); }
-  // The curve stored = light^(1/gamma); `gamma` must be > 0.
-  static TransferCurve Gamma(double gamma) { return TransferCurve(Kind::kGamma, gamma); }
+  // The curve stored = light^(1/gamma). Throws Error unless `gamma` is finite and > 0.
+  static TransferCurve Gamma(double gamma);
 
   // The curve of the name "linear", "srgb" or "gamma-2.2". Throws Error, which lists these names,
   // for any other.
