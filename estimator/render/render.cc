@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <string>
 #include <utility>
 #include <vector>
@@ -22,6 +23,7 @@ namespace {
 
 // Positions whose difference, relative or in px, is smaller are equal except for rounding.
 constexpr double kRounding = 1e-9;
+constexpr int kMaxImageSizePx = 100000;  // one way, as for images of files
 
 void CheckIndex(const char* name, int value, int count) {
   if (value >= 0 && value < count) return;
@@ -112,9 +114,32 @@ void CopySample(const model::LightField& light_field, int k, int l, int s, int t
   }
 }
 
-void CheckRepeat(int repeat_px) {
-  if (repeat_px >= 1) return;
-  throw Error(fmt::format("repeat_px is {}: it must be >= 1", repeat_px));
+// The image has `views` lines, each repeated.
+void CheckRepeat(int repeat_px, int views) {
+  const int most = std::max(1, kMaxImageSizePx / views);
+  if (repeat_px >= 1 && repeat_px <= most) return;
+  throw Error(
+      fmt::format("repeat_px is {}: it must be from 1 to {} for {} views", repeat_px, most, views));
+}
+
+// The largest gap between `views` views, one way, with which a mosaic is not too large. Throws
+// Error if it is too large without a gap.
+int LargestGapPx(int views, int view_px) {
+  const std::int64_t free_px = kMaxImageSizePx - static_cast<std::int64_t>(views) * view_px;
+  if (free_px < 0) {
+    throw Error(fmt::format("{} views of {} px side by side: they must not exceed {} px", views,
+                            view_px, kMaxImageSizePx));
+  }
+  return static_cast<int>(views > 1 ? free_px / (views - 1) : free_px);
+}
+
+void CheckGap(const model::LightField& light_field, int gap_px) {
+  const int most = std::min(LargestGapPx(light_field.u_count, light_field.s_count),
+                            LargestGapPx(light_field.v_count, light_field.t_count));
+  if (gap_px >= 0 && gap_px <= most) return;
+  throw Error(fmt::format("gap_px is {}: it must be from 0 to {} for {}x{} views of {}x{} px",
+                          gap_px, most, light_field.u_count, light_field.v_count,
+                          light_field.s_count, light_field.t_count));
 }
 
 }  // namespace
@@ -159,7 +184,7 @@ Eigen::Vector2d DisparityAtDepthPx(const model::LightField& light_field, double 
 
 model::LinearImage Mosaic(const model::LightField& light_field, int gap_px) {
   CheckLightField(light_field);
-  if (gap_px < 0) throw Error(fmt::format("gap_px is {}: it must be >= 0", gap_px));
+  CheckGap(light_field, gap_px);
   const int step_x = light_field.s_count + gap_px;
   const int step_y = light_field.t_count + gap_px;
   model::LinearImage mosaic =
@@ -181,7 +206,7 @@ model::LinearImage EpipolarRow(const model::LightField& light_field, int t, int 
   CheckLightField(light_field);
   CheckIndex("row t", t, light_field.t_count);
   CheckIndex("view row l", l, light_field.v_count);
-  CheckRepeat(repeat_px);
+  CheckRepeat(repeat_px, light_field.u_count);
   model::LinearImage image =
       BlackImage(light_field.s_count, light_field.u_count * repeat_px, light_field.channels);
   for (int y = 0; y < image.height_px; ++y) {
@@ -198,7 +223,7 @@ model::LinearImage EpipolarColumn(const model::LightField& light_field, int s, i
   CheckLightField(light_field);
   CheckIndex("column s", s, light_field.s_count);
   CheckIndex("view column k", k, light_field.u_count);
-  CheckRepeat(repeat_px);
+  CheckRepeat(repeat_px, light_field.v_count);
   model::LinearImage image =
       BlackImage(light_field.v_count * repeat_px, light_field.t_count, light_field.channels);
   for (int t = 0; t < light_field.t_count; ++t) {

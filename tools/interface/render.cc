@@ -129,6 +129,20 @@ void WarnOfShiftedPupil(const LightField& light_field, RunScope* run) {
       light_field.grid->planes.uv_depth_mm, shift));
 }
 
+// Views that are shifted by more than their size show nothing.
+void RequireDisparityInside(const LightField& light_field, const FocusOptions& options,
+                            const Eigen::Vector2d& disparity_px, const RunScope& run) {
+  const int size_px = std::max(light_field.s_count, light_field.t_count);
+  if ((disparity_px.array().abs() <= size_px).all()) return;
+  const std::string focus =
+      options.depth_mm ? fmt::format("{} {} mm", run.Option("depth_mm"), *options.depth_mm)
+                       : fmt::format("{} {}", run.Option("disparity_px"), *options.disparity_px);
+  throw Error(fmt::format(
+      "{}: the disparity in focus is ({:.4g}, {:.4g}) px per view step, but it must be within the "
+      "{} px of the views of {}",
+      focus, disparity_px.x(), disparity_px.y(), size_px, LightFieldName(light_field)));
+}
+
 }  // namespace
 
 Image RenderPhotograph(const LightField& light_field, const PhotographOptions& options,
@@ -173,6 +187,7 @@ Image Refocus(const LightField& light_field, const FocusOptions& options, const 
               RenderSummary* summary) {
   checks::RequireValid(control);
   checks::RequireValid(options);
+  checks::RequireValidInput(LightFieldName(light_field), light_field);
   const RunScope run(control);
   RenderSummary found;
   Eigen::Vector2d& disparity_px = found.disparity_px;
@@ -191,6 +206,7 @@ Image Refocus(const LightField& light_field, const FocusOptions& options, const 
       disparity_px.y() *= light_field.grid->v_step_mm / light_field.grid->u_step_mm;
     }
   }
+  RequireDisparityInside(light_field, options, disparity_px, run);
   Image image =
       ImageOf(estimator::Refocus(light_field, disparity_px.x(), disparity_px.y(),
                                  WeightsOf(options.aperture, light_field, &found), control.threads),

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <string>
 
@@ -116,6 +117,40 @@ TEST(RenderInterfaceTest, AFocusInMillimetresNeedsACamera) {
   EXPECT_THAT(ErrorOf([&] { Refocus(field, focus, run); }),
               AllOf(StartsWith("--depth_mm 800 mm: fields/window has no camera"),
                     HasSubstr("give --disparity_px")));
+}
+
+TEST(RenderInterfaceTest, ImagesOfManyPixelsAreRefused) {
+  const LightField field = UniformField({});
+  EXPECT_EQ(RenderMosaic(field, 10).width_px(), 3 * kRenderWidthPx + 2 * 10);
+  for (const int gap_px : {49941, 2000000000, std::numeric_limits<int>::max()}) {
+    EXPECT_THAT(ErrorOf([&] { RenderMosaic(field, gap_px); }),
+                HasSubstr("it must be from 0 to 49910 for 3x3 views of 60x40 px"));
+  }
+  EXPECT_EQ(RenderEpipolarRow(field, 0, 0, 33333).height_px(), 99999);
+  EXPECT_EQ(RenderEpipolarColumn(field, 0, 0, 33333).width_px(), 99999);
+  for (const int repeat_px : {33334, 2000000000, std::numeric_limits<int>::max()}) {
+    EXPECT_THAT(ErrorOf([&] { RenderEpipolarRow(field, 0, 0, repeat_px); }),
+                HasSubstr("it must be from 1 to 33333 for 3 views"));
+    EXPECT_THAT(ErrorOf([&] { RenderEpipolarColumn(field, 0, 0, repeat_px); }),
+                HasSubstr("it must be from 1 to 33333 for 3 views"));
+  }
+  const LightField wide = model::MakeLightField(60000, 1, 2, 1, 1);
+  EXPECT_THAT(ErrorOf([&] { RenderMosaic(wide, 0); }), HasSubstr("2 views of 60000 px"));
+}
+
+TEST(RenderInterfaceTest, AFocusThatShiftsViewsByMoreThanTheirSizeIsRefused) {
+  FocusOptions focus;
+  focus.disparity_px = kRenderWidthPx;
+  EXPECT_EQ(Refocus(UniformField({}), focus).width_px(), kRenderWidthPx);
+  for (const double disparity_px : {60.001, -61.0, 1e300}) {
+    focus.disparity_px = disparity_px;
+    EXPECT_THAT(ErrorOf([&] { Refocus(UniformField({}), focus); }),
+                AllOf(StartsWith("disparity_px "), HasSubstr("within the 60 px")));
+  }
+  focus.disparity_px.reset();
+  focus.depth_mm = 1e-300;
+  EXPECT_THAT(ErrorOf([&] { Refocus(UniformField(CameraOfPitch(0.01)), focus); }),
+              AllOf(StartsWith("depth_mm 1e-300 mm: "), HasSubstr("within the 60 px")));
 }
 
 }  // namespace

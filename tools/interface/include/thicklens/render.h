@@ -74,18 +74,21 @@ struct FocusOptions {
   // null, gets the field, the value and the constraint.
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
-// Shifts the views so that points at that depth coincide, and averages them [D98].
+// Shifts the views so that points at that depth coincide, and averages them [D98]. Throws Error for
+// a depth without a camera, and for a disparity, px per view step, above the size of the views.
 THICKLENS_EXPORT Image Refocus(const LightField& light_field, const FocusOptions& options,
                                const RunControl& run = {}, RenderSummary* summary = nullptr);
 
-// All views side by side, (0, 0) at the top left, with `gap_px` >= 0 black pixels between them.
+// All views side by side, (0, 0) at the top left, with `gap_px` >= 0 black pixels between them. The
+// image may have 100000 px each way.
 THICKLENS_EXPORT Image RenderMosaic(const LightField& light_field, int gap_px = 2);
 
 // Row t of all views in the view row l, one above the other, or column s of all views in the view
-// column k, side by side; each repeated `repeat_px` >= 1 times.
+// column k, side by side; each repeated `repeat_px` >= 1 times, to 100000 px at most.
 THICKLENS_EXPORT Image RenderEpipolarRow(const LightField& light_field, int t, int l,
                                          int repeat_px = 8);
-// Column s of all views in the view column k, side by side, each repeated `repeat_px` >= 1 times.
+// Column s of all views in the view column k, side by side, each repeated `repeat_px` >= 1 times,
+// to 100000 px at most.
 THICKLENS_EXPORT Image RenderEpipolarColumn(const LightField& light_field, int s, int k,
                                             int repeat_px = 8);
 

@@ -48,16 +48,17 @@ THICKLENS_EXPORT Eigen::Vector2d DisparityAtDepthPx(const model::LightField& lig
                                                     double depth_mm);
 
 // Returns all views side by side, (0, 0) at the top left, with `gap_px` (>= 0) black pixels between
-// them. Throws Error for an invalid light field.
+// them. Throws Error for an invalid light field and for a mosaic of more than 100000 px one way.
 THICKLENS_EXPORT model::LinearImage Mosaic(const model::LightField& light_field, int gap_px);
 
 // Return epipolar-plane images: row t of all views of the view row l, one above the other, each
 // repeated to a height of `repeat_px` (>= 1); or column s of all views of the view column k, side
-// by side. They throw Error for an invalid light field or index.
+// by side. They throw Error for an invalid light field or index, and if the repeated lines need
+// more than 100000 px.
 THICKLENS_EXPORT model::LinearImage EpipolarRow(const model::LightField& light_field, int t, int l,
                                                 int repeat_px);
 // Returns column s of all views of the view column k, side by side, each repeated to a width of
-// `repeat_px` (>= 1). Throws Error for an invalid light field or index.
+// `repeat_px` (>= 1). Throws Error as EpipolarRow does.
 THICKLENS_EXPORT model::LinearImage EpipolarColumn(const model::LightField& light_field, int s,
                                                    int k, int repeat_px);
 
