@@ -96,10 +96,12 @@ ImageScores CompareImages(const Image& reference, const Image& other,
                           const CompareOptions& options) {
   checks::RequireValid(options);
   if (options.baseline) throw OptionError("baseline", "baseline: is for light fields");
+  // Their errors name the image themselves.
+  const model::EncodedImage& of_reference = reference.encoded();
+  const model::EncodedImage& of_other = other.encoded();
   return WithFileContext(NameOr(other.source(), "image"), [&] {
-    return ScoresOf(estimator::CompareImages(model::EncodedValuesOf(reference.encoded()),
-                                             model::EncodedValuesOf(other.encoded()),
-                                             options.border_px));
+    return ScoresOf(estimator::CompareImages(model::EncodedValuesOf(of_reference),
+                                             model::EncodedValuesOf(of_other), options.border_px));
   });
 }
 

@@ -51,6 +51,11 @@ void RequireSize(int width_px, int height_px, int channels, std::size_t values,
   }
 }
 
+void RequireBits(const std::string& where, int bits) {
+  if (bits == 8 || bits == 16) return;
+  throw Error(fmt::format("{}: 8 or 16 bits are expected, found {}", where, bits));
+}
+
 // Puts red first.
 template <typename Value>
 void ArrangeChannels(ChannelOrder order, std::vector<Value>* values) {
@@ -74,10 +79,7 @@ Image Image::FromEncoded(int width_px, int height_px, ChannelOrder order, int bi
                          std::string source) {
   const int channels = ChannelsOf(order);
   RequireSize(width_px, height_px, channels, values.size(), source);
-  if (bits != 8 && bits != 16) {
-    throw Error(fmt::format("{}: 8 or 16 bits are expected, found {}",
-                            source.empty() ? "image" : source, bits));
-  }
+  RequireBits(source.empty() ? "image" : source, bits);
   if (bits == 8) {
     const auto above =
         std::find_if(values.begin(), values.end(), [](std::uint16_t value) { return value > 255; });
@@ -111,6 +113,9 @@ Image Image::FromLight(int width_px, int height_px, ChannelOrder order, std::vec
   return image;
 }
 
+bool Image::is_empty() const {
+  return std::visit([](const auto& pixels) { return pixels.values.empty(); }, pixels_);
+}
 int Image::width_px() const {
   return std::visit([](const auto& pixels) { return pixels.width_px; }, pixels_);
 }
@@ -129,8 +134,9 @@ int Image::bits() const { return is_linear() ? 32 : encoded().bits; }
 const model::EncodedImage& Image::encoded() const {
   const auto* stored = std::get_if<model::EncodedImage>(&pixels_);
   if (stored == nullptr) {
-    throw Error(fmt::format("{}: encoded values are expected, found linear light",
-                            source_.empty() ? "image" : source_));
+    throw Error(fmt::format(
+        "{}: encoded values are expected, found linear light, which Image::Encoded converts",
+        source_.empty() ? "image" : source_));
   }
   return *stored;
 }
@@ -147,6 +153,23 @@ model::LinearImage Image::ToLight(const TransferCurve& transfer) const {
   return is_linear() ? light() : model::ToLinear(encoded(), transfer);
 }
 
+Image Image::Encoded(int bits) const {
+  const std::string where = source_.empty() ? "image" : source_;
+  RequireBits(where, bits);
+  if (is_empty()) throw Error(where + ": at least one pixel is expected, found an empty image");
+  if (!is_linear()) {
+    if (encoded().bits == bits) return *this;
+    throw Error(fmt::format("{}: its values are encoded in {} bits already, {} are requested",
+                            where, encoded().bits, bits));
+  }
+  Image stored;
+  stored.transfer_ = transfer_.value_or(TransferCurve::Srgb());
+  stored.source_ = source_;
+  stored.is_from_file_ = is_from_file_;
+  stored.pixels_ =
+      WithFileContext(where, [&] { return model::ToEncoded(light(), *stored.transfer_, bits); });
+  return stored;
+}
 Image Image::WithoutAlpha() const {
   if (channels() != 4) return *this;
   Image opaque = *this;
@@ -190,6 +213,7 @@ Image ReadImage(const std::string& path, std::optional<TransferCurve> transfer) 
 
 EncodedImageFile EncodeImage(const Image& image, const ImageFileOptions& options) {
   checks::RequireValid(options);
+  if (image.is_empty()) throw Error("image: at least one pixel is expected, found an empty image");
   EncodedImageFile file;
   if (image.is_linear()) {
     const TransferCurve transfer = image.transfer().value_or(TransferCurve::Srgb());
@@ -201,6 +225,9 @@ EncodedImageFile EncodeImage(const Image& image, const ImageFileOptions& options
     if (options.noise_levels != 0) {
       throw OptionError("noise_levels", "noise_levels: is for linear light only");
     }
+    if (options.bits > image.bits()) {  // 8 is the default
+      throw OptionError("bits", "bits: 16 is for linear light and for values of 16 bits only");
+    }
     file.png = io::EncodePng(image.encoded());
   }
   if (!options.description.empty()) file.png = io::WithDescription(file.png, options.description);
@@ -211,7 +238,7 @@ std::size_t WriteImage(const std::string& path, const Image& image,
                        const ImageFileOptions& options) {
   checks::RequireValid(options);
   OutputFile output(path);
-  const EncodedImageFile file = EncodeImage(image, options);
+  const EncodedImageFile file = WithFileContext(path, [&] { return EncodeImage(image, options); });
   output.Commit(file.png);
   return file.clipped_values;
 }

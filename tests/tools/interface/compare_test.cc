@@ -62,6 +62,18 @@ TEST(CompareInterfaceTest, TheBaselineFitsTheViewsAndIsNamed) {
   EXPECT_THAT(ErrorOf([&] { CompareImages(image, image, options); }), HasSubstr("baseline"));
 }
 
+TEST(CompareInterfaceTest, RenderedImagesAreComparedOnceEncoded) {
+  const LightField field = SteppedField(3, "");
+  const Image view = ViewOf(field, 1, 1);
+  const Image next = ViewOf(field, 2, 1);
+  const std::string refusal =
+      "view (1, 1): encoded values are expected, found linear light, which Image::Encoded converts";
+  EXPECT_EQ(ErrorOf([&] { CompareImages(view, next.Encoded(8)); }), refusal);
+  EXPECT_EQ(ErrorOf([&] { CompareImages(next.Encoded(8), view); }), refusal);
+  EXPECT_NEAR(CompareImages(view.Encoded(8), view.Encoded(8)).ssim, 1, 1e-12);
+  EXPECT_LT(CompareImages(view.Encoded(16), next.Encoded(16)).psnr_db, 50);
+}
+
 TEST(CompareInterfaceTest, BothLightFieldsMustBeValid) {
   LightField empty = SteppedField(3, "");
   empty.values.clear();

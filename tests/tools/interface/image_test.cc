@@ -2,9 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <opencv2/core.hpp>
+#include <string>
 #include <vector>
 
 #include "support/error_message.h"
@@ -66,6 +69,49 @@ TEST(ImageTest, TheBytesOfAFileAreThoseThatAreWritten) {
   EXPECT_EQ(testing::ContentOf(folder / "a.png"), file.png);
   EXPECT_EQ(ReadImage(folder / "a.png").encoded().values,
             (std::vector<std::uint16_t>{16384, 65535}));
+}
+
+TEST(ImageTest, LightIsEncodedByItsCurve) {
+  const Image light = Image::FromLight(3, 1, ChannelOrder::kGrey, {0.25F, 1.5F, -0.1F},
+                                       TransferCurve::Gamma(2), "rendered");
+  const Image stored = light.Encoded(8);
+  EXPECT_EQ(stored.bits(), 8);
+  EXPECT_EQ(stored.encoded().values, (std::vector<std::uint16_t>{128, 255, 0}));  // 127.5 is up
+  EXPECT_EQ(light.Encoded(16).encoded().values, (std::vector<std::uint16_t>{32768, 65535, 0}));
+  ASSERT_TRUE(stored.transfer());
+  EXPECT_EQ(*stored.transfer(), TransferCurve::Gamma(2));
+  EXPECT_EQ(stored.source(), "rendered");
+  EXPECT_EQ(stored.Encoded(8).encoded().values, stored.encoded().values);
+  EXPECT_EQ(ErrorOf([&] { stored.Encoded(16); }),
+            "rendered: its values are encoded in 8 bits already, 16 are requested");
+  EXPECT_EQ(ErrorOf([&] { light.Encoded(12); }), "rendered: 8 or 16 bits are expected, found 12");
+  EXPECT_EQ(ErrorOf([] { Image().Encoded(8); }),
+            "image: at least one pixel is expected, found an empty image");
+}
+
+TEST(ImageTest, AFileNeedsPixelsAndHasTheirBits) {
+  const testing::TemporaryFolder folder;
+  const std::string path = folder / "a.png";
+  EXPECT_TRUE(Image().is_empty());
+  EXPECT_EQ(ErrorOf([&] { WriteImage(path, Image()); }),
+            path + ": image: at least one pixel is expected, found an empty image");
+  ImageFileOptions options;
+  options.bits = 16;
+  const Image of_8 = Image::FromEncoded(1, 1, ChannelOrder::kGrey, 8, {7});
+  EXPECT_FALSE(of_8.is_empty());
+  try {
+    WriteImage(path, of_8, options);
+    ADD_FAILURE();
+  } catch (const OptionError& error) {
+    EXPECT_EQ(error.field(), "bits");
+  }
+  EXPECT_TRUE(folder.Entries().empty());
+  const Image of_16 = Image::FromEncoded(1, 1, ChannelOrder::kGrey, 16, {7});
+  for (const int bits : {8, 16}) {
+    options.bits = bits;
+    WriteImage(path, of_16, options);
+    EXPECT_EQ(ReadImage(path).bits(), 16);
+  }
 }
 
 TEST(ImageTest, RefusesWhatDoesNotFit) {

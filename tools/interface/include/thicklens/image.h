@@ -44,6 +44,8 @@ class THICKLENS_EXPORT Image {
   static Image FromLight(int width_px, int height_px, ChannelOrder order, std::vector<float> values,
                          TransferCurve transfer = TransferCurve::Srgb(), std::string source = "");
 
+  // Returns whether the image has no pixel, as a default-constructed one.
+  bool is_empty() const;
   // Width, px.
   int width_px() const;
   // Height, px.
@@ -69,6 +71,11 @@ class THICKLENS_EXPORT Image {
   // Returns the image in linear light. Encoded values are decoded by `transfer`; it has no effect
   // on an image that is linear already. Alpha is decoded like a colour, as model::ToLinear does.
   model::LinearImage ToLight(const TransferCurve& transfer) const;
+  // Returns the image with encoded values of 8 or 16 bits, which its transfer curve (sRGB if none
+  // is stated) gives, rounded to the nearest level and clipped to [0, 1]. CompareImages takes such
+  // images. An image that has encoded values of that many bits is returned as it is. Throws Error
+  // for other bits, for encoded values of other bits, and for an empty image.
+  Image Encoded(int bits) const;
   // Returns a copy without the alpha channel.
   Image WithoutAlpha() const;
   // Returns a rectangle of the image. Throws Error if it is empty or not inside.
@@ -92,7 +99,9 @@ THICKLENS_EXPORT Image ReadImage(const std::string& path,
 
 // The options of WriteImage and EncodeImage.
 struct ImageFileOptions {
-  int bits = 8;  // 8 or 16, of linear light; encoded values keep their own
+  // 8 or 16, of linear light. Encoded values keep their own bits; 16 is refused for values of 8
+  // bits.
+  int bits = 8;
   // Standard deviation of normal noise that is added to the encoded values before rounding, in
   // 1/255 of full scale, finite and >= 0; only for linear light.
   double noise_levels = 0;
