@@ -2,14 +2,19 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "thicklens/base/error.h"
 #include "thicklens/io/image_io.h"
+#include "tools/interface/validation.h"
 
 namespace thicklens {
 namespace {
@@ -51,6 +56,18 @@ cv::Mat MatOf(const std::vector<From>& values, int width_px, int height_px, int 
   return mat;
 }
 
+// The names of frames in messages.
+std::vector<std::string> FrameNames(const std::vector<model::SweepFrame>& frames) {
+  std::vector<std::string> names;
+  names.reserve(frames.size());
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const std::string number = fmt::format("frame {}", i);
+    names.push_back(frames[i].image.empty() ? number
+                                            : fmt::format("{} ({})", number, frames[i].image));
+  }
+  return names;
+}
+
 }  // namespace
 
 Image ImageFromMat(const cv::Mat& mat, ChannelOrder order, std::optional<TransferCurve> transfer,
@@ -77,6 +94,7 @@ Image ImageFromMat(const cv::Mat& mat, ChannelOrder order, std::optional<Transfe
 }
 
 cv::Mat MatFromImage(const Image& image, ChannelOrder order) {
+  if (image.is_empty()) throw Error("image: it is empty");
   if (image.channels() != CountOf(order)) {
     throw Error(fmt::format("image: the order {} has {} channel(s), the image {}",
                             ChannelOrderName(order), CountOf(order), image.channels()));
@@ -94,11 +112,62 @@ cv::Mat MatFromImage(const Image& image, ChannelOrder order) {
   return MatOf<std::uint16_t, std::uint16_t>(values, width_px, height_px, channels, CV_16U, swap);
 }
 
+DepthMap DepthMapFromMat(const cv::Mat& mat, const DepthMeaning& meaning,
+                         const std::string& source) {
+  checks::RequireValid(meaning);
+  const std::string where = source.empty() ? "depth" : source;
+  if (mat.empty()) throw Error(fmt::format("{}: the matrix is empty", where));
+  if (mat.dims != 2 || mat.channels() != 1) {
+    throw Error(
+        fmt::format("{}: a matrix of two dimensions and one channel is expected, found {} "
+                    "dimensions and {} channel(s)",
+                    where, mat.dims, mat.channels()));
+  }
+  DepthMap depth{mat.cols, mat.rows, {}, mat.depth() != CV_32F, meaning, source};
+  switch (mat.depth()) {
+    case CV_8U:
+      depth.values = ValuesOf<std::uint8_t, float>(mat);
+      break;
+    case CV_16U:
+      depth.values = ValuesOf<std::uint16_t, float>(mat);
+      break;
+    case CV_32F:
+      depth.values = ValuesOf<float, float>(mat);
+      break;
+    default:
+      throw Error(fmt::format("{}: a matrix of CV_8U, CV_16U or CV_32F is expected", where));
+  }
+  return depth;
+}
+
+cv::Mat MatFromDepthMap(const DepthMap& depth) {
+  checks::RequireValid(depth);
+  if (!depth.is_integer) {
+    return MatOf<float, float>(depth.values, depth.width_px, depth.height_px, 1, CV_32F, false);
+  }
+  constexpr float kMost = std::numeric_limits<std::uint16_t>::max();
+  const auto other = std::find_if(depth.values.begin(), depth.values.end(), [](float value) {
+    return !(value >= 0 && value <= kMost) || value != std::floor(value);
+  });
+  if (other != depth.values.end()) {
+    throw Error(
+        fmt::format("{}: whole numbers from 0 to {} are expected in a map of whole numbers, "
+                    "found {}",
+                    depth.source.empty() ? "depth" : depth.source, kMost, *other));
+  }
+  return MatOf<float, std::uint16_t>(depth.values, depth.width_px, depth.height_px, 1, CV_16U,
+                                     false);
+}
+
 calib::FocusSweep FocusSweepOf(const Sweep& sweep) {
   calib::FocusSweep focus_sweep = calib::MakeFocusSweep(sweep.description, sweep.camera);
   if (sweep.frames != nullptr) {
-    focus_sweep.read_frame = [frames = sweep.frames](std::size_t i) {
+    focus_sweep.read_frame = [frames = sweep.frames,
+                              names = FrameNames(sweep.description.frames)](std::size_t i) {
       const Image image = frames->Read(i);
+      if (image.is_empty()) {
+        throw Error(fmt::format("{}: FrameSource::Read returned an empty image", names.at(i)));
+      }
       return MatFromImage(image, image.order());
     };
   } else {

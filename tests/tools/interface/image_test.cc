@@ -114,6 +114,57 @@ TEST(ImageTest, AFileNeedsPixelsAndHasTheirBits) {
   }
 }
 
+TEST(ImageTest, DepthMapsBecomeMatricesAndBack) {
+  const DepthMeaning millimetres{DepthKind::kZ, LengthUnit::kMillimetre};
+  const cv::Mat of_8 = (cv::Mat_<std::uint8_t>(1, 3) << 0, 7, 255);
+  const DepthMap whole = DepthMapFromMat(of_8, millimetres, "map");
+  EXPECT_TRUE(whole.is_integer);
+  EXPECT_EQ(whole.width_px, 3);
+  EXPECT_EQ(whole.height_px, 1);
+  EXPECT_EQ(whole.values, (std::vector<float>{0, 7, 255}));
+  EXPECT_EQ(whole.meaning.unit, LengthUnit::kMillimetre);
+  EXPECT_EQ(whole.source, "map");
+  const cv::Mat of_16 = (cv::Mat_<std::uint16_t>(2, 2) << 1, 2, 3, 65535);
+  const cv::Mat again = MatFromDepthMap(DepthMapFromMat(of_16, millimetres));
+  ASSERT_EQ(again.type(), CV_16UC1);
+  EXPECT_EQ(cv::countNonZero(again != of_16), 0);
+  const cv::Mat floats = (cv::Mat_<float>(2, 1) << 0.5F, -3.25F);
+  const DepthMap map = DepthMapFromMat(floats, {DepthKind::kDisparity});
+  EXPECT_FALSE(map.is_integer);
+  const cv::Mat floats_again = MatFromDepthMap(map);
+  ASSERT_EQ(floats_again.type(), CV_32FC1);
+  EXPECT_EQ(cv::countNonZero(floats_again != floats), 0);
+}
+
+TEST(ImageTest, RefusesMatricesThatAreNoDepthMap) {
+  const DepthMeaning disparity{DepthKind::kDisparity};
+  EXPECT_THROW(DepthMapFromMat(cv::Mat(1, 1, CV_8UC1), DepthMeaning()), OptionError);
+  EXPECT_EQ(ErrorOf([&] { DepthMapFromMat(cv::Mat(), disparity, "map"); }),
+            "map: the matrix is empty");
+  EXPECT_THROW(DepthMapFromMat(cv::Mat(1, 1, CV_32FC3), disparity), Error);
+  EXPECT_THROW(DepthMapFromMat(cv::Mat(1, 1, CV_64FC1), disparity), Error);
+  EXPECT_THROW(MatFromDepthMap(DepthMap()), OptionError);
+  for (const float value : {0.5F, -1.0F, 65536.0F, std::numeric_limits<float>::quiet_NaN()}) {
+    EXPECT_THROW(MatFromDepthMap(DepthMap{1, 1, {value}, true, disparity, ""}), Error) << value;
+  }
+}
+
+TEST(ImageTest, AnEmptyFrameIsNamed) {
+  class EmptyFrames : public FrameSource {
+   public:
+    Image Read(std::size_t /*index*/) const override { return {}; }
+  };
+  Sweep sweep;
+  sweep.description.frames = {{"", 1}, {"frames/b.png", 2}};
+  sweep.frames = std::make_shared<EmptyFrames>();
+  const calib::FocusSweep measured = FocusSweepOf(sweep);
+  EXPECT_EQ(ErrorOf([&] { measured.read_frame(0); }),
+            "frame 0: FrameSource::Read returned an empty image");
+  EXPECT_EQ(ErrorOf([&] { measured.read_frame(1); }),
+            "frame 1 (frames/b.png): FrameSource::Read returned an empty image");
+  EXPECT_EQ(ErrorOf([] { MatFromImage(Image(), ChannelOrder::kGrey); }), "image: it is empty");
+}
+
 TEST(ImageTest, RefusesWhatDoesNotFit) {
   EXPECT_THROW(Image::FromEncoded(0, 1, ChannelOrder::kGrey, 8, {}), Error);
   EXPECT_THROW(Image::FromEncoded(1, 1, ChannelOrder::kGrey, 12, {1}), Error);

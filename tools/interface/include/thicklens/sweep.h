@@ -20,7 +20,8 @@ namespace thicklens {
 class THICKLENS_EXPORT FrameSource {
  public:
   virtual ~FrameSource();
-  // Returns the frame `index`, encoded, of the sensor's size. Throws Error that names the frame.
+  // Returns the frame `index`, encoded, of the sensor's size. Throws Error that names the frame. If
+  // it returns an empty image, the call that measures the frames throws such an Error.
   virtual Image Read(std::size_t index) const = 0;
 };
 
