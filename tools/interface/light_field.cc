@@ -9,6 +9,7 @@
 #include "thicklens/base/output_file.h"
 #include "thicklens/estimate.h"
 #include "thicklens/io/aperture_statement.h"
+#include "thicklens/io/confidence_files.h"
 #include "thicklens/io/light_field_io.h"
 #include "tools/interface/run_scope.h"
 #include "tools/interface/validation.h"
@@ -62,6 +63,12 @@ LightField ReadLightField(const std::string& folder, const LightFieldReadOptions
   checks::RequireValid(options);
   const RunScope scope(run);
   return io::ReadLightField(folder, ReadingOf(options));
+}
+
+std::vector<std::uint8_t> ReadConfidence(const std::string& folder, const RunControl& run) {
+  checks::RequireValid(run);
+  const RunScope scope(run);
+  return io::ReadConfidence(folder, run.threads);
 }
 
 ApertureViews ReadApertureViews(const std::string& folder, const LightFieldReadOptions& options,

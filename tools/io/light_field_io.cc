@@ -25,6 +25,7 @@
 #include "thicklens/io/image_io.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/light_field_file.h"
+#include "tools/io/confidence_file_name.h"
 #include "tools/io/float_tiff.h"
 #include "tools/io/image_file_kind.h"
 
@@ -39,7 +40,6 @@ namespace fs = std::filesystem;
 
 constexpr char kCameraFile[] = "camera.yaml";
 constexpr char kViewsFolder[] = "views";
-constexpr char kConfidenceFolder[] = "confidence";
 constexpr char kHciStem[] = "input_Cam";
 constexpr int kMaxHciNumber = 999999;
 constexpr char kHciSignature[] = "# Written by thicklens.\n";
@@ -110,10 +110,6 @@ std::string ViewFile(int k, int l, const std::string& format) {
   return fmt::format("{}/{}.{}", kViewsFolder, model::ViewFileStem(k, l), format);
 }
 
-std::string ConfidenceFile(int k, int l) {
-  return fmt::format("{}/{}.png", kConfidenceFolder, model::ViewFileStem(k, l));
-}
-
 // Includes the views that were not requested: the light field as a whole is the input.
 void ReportFilesOf(const std::string& folder, const model::LightFieldDescription& description) {
   const model::LightField& frame = description.light_field;
@@ -122,7 +118,7 @@ void ReportFilesOf(const std::string& folder, const model::LightFieldDescription
       if (!frame.IsPresent(k, l)) continue;
       ReportInput((fs::path(folder) / ViewFile(k, l, description.view_format)).string());
       if (!description.has_confidence) continue;
-      ReportInput((fs::path(folder) / ConfidenceFile(k, l)).string());
+      ReportInput((fs::path(folder) / ConfidenceFileName(k, l)).string());
     }
   }
 }
@@ -483,7 +479,7 @@ void LightFieldWriter::WriteView(int k, int l, const model::LinearImage& view) {
 void LightFieldWriter::WriteConfidence(int k, int l, const std::vector<std::uint8_t>& confidence,
                                        int width_px) {
   const auto start = Clock::now();
-  folder_->Write(ConfidenceFile(k, l), EncodeBytesPng(confidence, width_px));
+  folder_->Write(ConfidenceFileName(k, l), EncodeBytesPng(confidence, width_px));
   std::array<std::size_t, 256> counts{};
   for (const std::uint8_t value : confidence) ++counts[value];
   const std::lock_guard<std::mutex> lock(mutex_);

@@ -3,9 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <string>
+#include <vector>
 
 #include "support/error_message.h"
 #include "support/temporary_folder.h"
@@ -118,6 +121,56 @@ TEST(LightFieldInterfaceTest, NullIsAnError) {
       ErrorOf([] { SimulateSweep(SweepSimulation(), static_cast<OutputFolder*>(nullptr)); }),
       HasSubstr("found null"));
   EXPECT_THAT(ErrorOf([] { CalibrationRefused refused(nullptr); }), HasSubstr("found null"));
+}
+
+TEST(LightFieldInterfaceTest, TheConfidenceIsReadAsItWasWritten) {
+  const TemporaryFolder folder;
+  const LightFieldEstimate estimate = CountedEstimate();
+  WriteLightField(folder / "png", estimate);
+  EXPECT_EQ(ReadConfidence(folder / "png"), estimate.confidence);
+  RunControl run;
+  run.threads = 1;
+  WriteLightField(folder / "tiff", estimate, LightFieldFormat::kTiff);
+  EXPECT_EQ(ReadConfidence(folder / "tiff", run), estimate.confidence);
+  WriteLightField(folder / "hci", estimate, LightFieldFormat::kHci);
+  EXPECT_THAT(ReadConfidence(folder / "hci"), IsEmpty());
+  WriteLightField(folder / "without", estimate.light_field);
+  EXPECT_THAT(ReadConfidence(folder / "without"), IsEmpty());
+}
+
+TEST(LightFieldInterfaceTest, AMissingViewNeedsNoConfidence) {
+  const TemporaryFolder folder;
+  LightFieldEstimate estimate = CountedEstimate();
+  estimate.light_field.present = {true, true, true, true, false, true};
+  WriteLightField(folder / "lf", estimate);
+  EXPECT_EQ(ReadConfidence(folder / "lf"), estimate.confidence);
+  std::filesystem::remove(folder / "lf/confidence/view_01_01.png");
+  std::vector<std::uint8_t> expected = estimate.confidence;
+  std::fill_n(expected.begin() + 4 * 20, 20, std::uint8_t{0});
+  EXPECT_EQ(ReadConfidence(folder / "lf"), expected);
+}
+
+TEST(LightFieldInterfaceTest, AWrongFileOfConfidenceIsNamed) {
+  const TemporaryFolder folder;
+  WriteLightField(folder / "lf", CountedEstimate());
+  const std::string path = folder / "lf/confidence/view_01_02.png";
+  const auto refusal = [&] { return ErrorOf([&] { ReadConfidence(folder / "lf"); }); };
+  WriteImage(path,
+             Image::FromEncoded(5, 3, ChannelOrder::kGrey, 8, std::vector<std::uint16_t>(15)));
+  EXPECT_EQ(refusal(), path + ": it has 5x3 px, the views 5x4: they must be equal");
+  WriteImage(path,
+             Image::FromEncoded(5, 4, ChannelOrder::kGrey, 16, std::vector<std::uint16_t>(20)));
+  EXPECT_EQ(refusal(),
+            path + ": a grey image of 8 bits is expected, found 1 channel(s) of 16 bits");
+  WriteImage(path, Image::FromEncoded(5, 4, ChannelOrder::kRgb, 8, std::vector<std::uint16_t>(60)));
+  EXPECT_EQ(refusal(), path + ": a grey image of 8 bits is expected, found 3 channel(s) of 8 bits");
+  std::filesystem::remove(path);
+  EXPECT_THAT(refusal(), StartsWith(path + ": "));
+  EXPECT_THAT(ErrorOf([&] { ReadConfidence(folder / "none"); }),
+              StartsWith(folder / "none: does not exist"));
+  RunControl run;
+  run.threads = -1;
+  EXPECT_THAT(ErrorOf([&] { ReadConfidence(folder / "lf", run); }), StartsWith("threads: "));
 }
 
 }  // namespace

@@ -2,8 +2,10 @@
 #define THICKLENS_LIGHT_FIELD_H_
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "thicklens/base/export.h"
 #include "thicklens/base/output_file.h"
@@ -43,6 +45,15 @@ struct LightFieldReadOptions {
 THICKLENS_EXPORT LightField ReadLightField(const std::string& folder,
                                            const LightFieldReadOptions& options = {},
                                            const RunControl& run = {});
+
+// Reads the confidence that an estimate's folder has beside its views (docs/file-formats.md): one
+// byte per ray, view by view (index l * U + k), row by row, as LightFieldEstimate::confidence; all
+// V x U x T x S rays of the file, also those that options of ReadLightField would leave out. Rays
+// of a view that is missing have 0. Empty: the folder has none, as in the HCI layout. Throws
+// OptionError for `run`, Error that names the folder, or the file that is missing, has another size
+// than the views or is no grey image of 8 bits, and Interrupted.
+THICKLENS_EXPORT std::vector<std::uint8_t> ReadConfidence(const std::string& folder,
+                                                          const RunControl& run = {});
 
 // How the views are stored.
 enum class LightFieldFormat {
