@@ -33,7 +33,10 @@ void RequireValidEstimate(const DepthMap& depth, const std::optional<Camera>& ca
   std::string why;
   if (!depth.IsValid(&why))
     throw OptionError("depth." + why.substr(0, why.find(':')), "depth." + why);
-  if (camera) return;
+  if (camera) {
+    checks::RequireValidCamera(*camera);
+    return;
+  }
   if (options.sensor_origin) throw OptionError("sensor_origin", "sensor_origin: needs a camera");
   if (options.st_depth_mm) throw OptionError("st_depth_mm", "st_depth_mm: needs a camera");
   if (options.exif == ExifCheck::kIgnore) {

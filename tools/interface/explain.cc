@@ -89,6 +89,7 @@ CameraExplanation ExplainCamera(const Camera& camera, ExplainOptions options,
                                 const RunControl& control) {
   checks::RequireValid(control);
   checks::RequireValid(options);
+  checks::RequireValidCamera(camera);
   RunScope run(control);
   for (const std::string& notice : NoticesOf(camera)) run.Warn(notice);
   const ExplainedScene scene = SceneOf(&options, camera);

@@ -248,6 +248,21 @@ bool EstimateOptions::IsValid(std::string* why) const {
       !OneOf(why, "aperture.shape", model::ApertureShape::kDisc, *aperture.shape)) {
     return false;
   }
+  if (aperture.views_of != nullptr) {
+    const LightField& views_of = aperture.views_of->description;
+    if (views_of.u_count < 1 || views_of.v_count < 1) {
+      return Fail(why, "aperture.views_of",
+                  fmt::format("a light field with views is expected, found {} x {} views",
+                              views_of.u_count, views_of.v_count));
+    }
+    if (views_of.weights.cols() != views_of.u_count ||
+        views_of.weights.rows() != views_of.v_count) {
+      return Fail(why, "aperture.views_of",
+                  fmt::format("a weight for each of the {} x {} views is expected, found {} x {}",
+                              views_of.u_count, views_of.v_count, views_of.weights.cols(),
+                              views_of.weights.rows()));
+    }
+  }
   if (st_depth_mm && !AboveUpTo(why, "st_depth_mm", 0, kMaxLengthMm, *st_depth_mm)) return false;
   if (!Member(why, "effects", effects)) return false;
   if (effects.LeavesOut(Effect::kApertureShape) && (aperture.shape || aperture.views_of)) {

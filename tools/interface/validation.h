@@ -9,6 +9,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "thicklens/model/camera.h"
 #include "thicklens/run.h"
 
 // Checks of option structs. Every bound is written so that NaN fails. A failed check writes
@@ -96,6 +97,13 @@ template <typename Input>
 void RequireValidInput(const std::string& name, const Input& input) {
   std::string why;
   if (!input.IsValid(&why)) throw Error(fmt::format("{}: {}", name, why));
+}
+
+// Throws Error, which names the camera, unless it is valid.
+inline void RequireValidCamera(const model::Camera& camera) {
+  RequireValidInput(camera.source.empty() ? fmt::format("camera '{}' is not valid", camera.name)
+                                          : camera.source + ": the camera is not valid",
+                    camera);
 }
 
 }  // namespace thicklens::checks

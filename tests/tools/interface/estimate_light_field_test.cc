@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <limits>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -13,7 +14,9 @@
 #include <vector>
 
 #include "support/error_message.h"
+#include "thicklens/calibrate.h"
 #include "thicklens/estimate.h"
+#include "thicklens/explain.h"
 
 namespace thicklens {
 namespace {
@@ -142,6 +145,46 @@ TEST(EstimateLightField, RefusesANullSinkAndOneView) {
   options.views = ViewCounts{1, 1};
   EXPECT_THAT(ErrorOf([&] { EstimateLightField(Photo(), Disparity(), std::nullopt, options); }),
               StartsWith("views: 1x1 is not a light field"));
+}
+
+TEST(EstimateLightField, OptionsMayBeLeftOut) {
+  const LightFieldEstimate estimate = EstimateLightField(Photo(), Disparity(), std::nullopt);
+  EXPECT_EQ(estimate.light_field.u_count, 7);
+  EXPECT_EQ(estimate.light_field.v_count, 7);
+  KeepingSink sink;
+  EstimateLightFieldTo(&sink, Photo(), Disparity(), std::nullopt);
+  EXPECT_EQ(sink.views.size(), 49U);
+  EXPECT_THROW(Calibrate(Sweep()), Error);
+}
+
+TEST(EstimateLightField, StatesThatTheCameraIsNotValid) {
+  Camera camera;
+  camera.name = "empty";
+  EXPECT_THAT(ErrorOf([&] { EstimateLightField(Photo(), Disparity(), camera); }),
+              StartsWith("camera 'empty' is not valid: lens: front_focal_length_mm"));
+  camera.source = "empty.yaml";
+  EXPECT_THAT(ErrorOf([&] { PrepareProblem(Photo(), Disparity(), camera, {}, nullptr); }),
+              StartsWith("empty.yaml: the camera is not valid: lens: front_focal_length_mm"));
+  ExplainOptions options;
+  options.depth_range = DepthRange{500, 1000};
+  EXPECT_THAT(ErrorOf([&] { ExplainCamera(camera, options); }),
+              StartsWith("empty.yaml: the camera is not valid: lens: front_focal_length_mm"));
+}
+
+TEST(EstimateLightField, StatesThatALightFieldHasNoViews) {
+  EstimateOptions options = With(SceneSolver());
+  ApertureViews views;
+  options.aperture.views_of = std::make_shared<ApertureViews>(views);
+  const auto refusal = [&] {
+    return ErrorOf([&] { EstimateLightField(Photo(), Disparity(), std::nullopt, options); });
+  };
+  EXPECT_EQ(refusal(),
+            "aperture.views_of: a light field with views is expected, found 0 x 0 views");
+  options.views.reset();
+  EXPECT_THAT(refusal(), StartsWith("aperture.views_of: a light field with views"));
+  views.description.u_count = views.description.v_count = 3;
+  options.aperture.views_of = std::make_shared<ApertureViews>(views);
+  EXPECT_THAT(refusal(), StartsWith("aperture.views_of: a weight for each of the 3 x 3 views"));
 }
 
 }  // namespace

@@ -75,7 +75,7 @@ class THICKLENS_EXPORT CalibrationRefused : public Error {
 // kPartial and whose `summary.reason` says which are missing; nothing is thrown. Throws OptionError
 // for options that are not valid, CalibrationRefused as the options say, Error for frames that
 // cannot be read, and Interrupted.
-THICKLENS_EXPORT Calibration Calibrate(const Sweep& sweep, const CalibrateOptions& options,
+THICKLENS_EXPORT Calibration Calibrate(const Sweep& sweep, const CalibrateOptions& options = {},
                                        const RunControl& run = {});
 
 }  // namespace thicklens

@@ -252,7 +252,7 @@ class THICKLENS_EXPORT ViewSink {
 // Interrupted.
 THICKLENS_EXPORT LightFieldEstimate EstimateLightField(Image photo, DepthMap depth,
                                                        const std::optional<Camera>& camera,
-                                                       const EstimateOptions& options,
+                                                       const EstimateOptions& options = {},
                                                        const RunControl& run = {});
 
 // The same, with the views given to `sink`: the returned light field and confidence have no values.
@@ -261,7 +261,7 @@ THICKLENS_EXPORT LightFieldEstimate EstimateLightField(Image photo, DepthMap dep
 THICKLENS_EXPORT LightFieldEstimate EstimateLightFieldTo(ViewSink* sink, Image photo,
                                                          DepthMap depth,
                                                          const std::optional<Camera>& camera,
-                                                         const EstimateOptions& options,
+                                                         const EstimateOptions& options = {},
                                                          const RunControl& run = {});
 
 // The steps before the solver. `diagnostics` (may be null) gets what they found.
