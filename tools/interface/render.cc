@@ -149,6 +149,7 @@ Image RenderPhotograph(const LightField& light_field, const PhotographOptions& o
                        const RunControl& control, RenderSummary* summary) {
   checks::RequireValid(control);
   checks::RequireValid(options);
+  checks::RequireValidInput(LightFieldName(light_field), light_field);
   RunScope run(control);
   std::string notice;
   const auto backend = kernels::OpenBackend(kernels::ParseDeviceRequest(options.device), &notice,

@@ -119,6 +119,16 @@ TEST(RenderInterfaceTest, AFocusInMillimetresNeedsACamera) {
                     HasSubstr("give --disparity_px")));
 }
 
+TEST(RenderInterfaceTest, ALightFieldThatIsNotValidIsNamed) {
+  LightField field = UniformField({});
+  field.values.clear();
+  field.source = "fields/window";
+  FocusOptions focus;
+  focus.disparity_px = 1;
+  EXPECT_THAT(ErrorOf([&] { Refocus(field, focus); }), StartsWith("fields/window: values: 0 "));
+  EXPECT_THAT(ErrorOf([&] { RenderPhotograph(field); }), StartsWith("fields/window: values: 0 "));
+}
+
 TEST(RenderInterfaceTest, ImagesOfManyPixelsAreRefused) {
   const LightField field = UniformField({});
   EXPECT_EQ(RenderMosaic(field, 10).width_px(), 3 * kRenderWidthPx + 2 * 10);

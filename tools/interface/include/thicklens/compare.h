@@ -59,9 +59,8 @@ struct CompareOptions {
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 
-// Compares an image with the reference, both encoded (Image::Encoded converts what a renderer
-// returns). Throws Error for linear light, and if sizes or channels differ or the border leaves
-// nothing.
+// Compares an image with the reference, both encoded. Throws Error if sizes or channels differ or
+// the border leaves nothing.
 THICKLENS_EXPORT ImageScores CompareImages(const Image& reference, const Image& other,
                                            const CompareOptions& options = {});
 

@@ -49,8 +49,8 @@ struct CameraExplanation {
 };
 
 // Explains blur, depth of field and effects of a calibrated camera: `thicklens explain`. `options`
-// is a value so that a large map can be moved in. Throws OptionError, Error for a camera without
-// calibration or a map that does not fit it, and Interrupted.
+// is a value so that a large map can be moved in. Throws OptionError, Error for a camera that is
+// not valid or has no calibration, or a map that does not fit it, and Interrupted.
 THICKLENS_EXPORT CameraExplanation ExplainCamera(const Camera& camera, ExplainOptions options,
                                                  const RunControl& run = {});
 
