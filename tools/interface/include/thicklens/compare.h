@@ -59,8 +59,8 @@ struct CompareOptions {
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 
-// Compares an image with the reference, both encoded. Throws Error if sizes or channels differ or
-// the border leaves nothing.
+// Compares an image with the reference, both encoded. Throws Error if sizes or channels differ, if
+// the border leaves nothing, and for linear light, which Image::Encoded converts.
 THICKLENS_EXPORT ImageScores CompareImages(const Image& reference, const Image& other,
                                            const CompareOptions& options = {});
 
