@@ -273,8 +273,8 @@ THICKLENS_EXPORT Problem PrepareProblem(Image photo, DepthMap depth,
 
 // Writes the light field with its confidence as `thicklens estimate` does, completely or not at
 // all. The HCI layout has no place for a confidence, a camera or weights. Returns the number of
-// clipped values. Throws OptionError, and Error, also for a confidence that is neither empty nor has
-// one byte for each ray.
+// clipped values. Throws OptionError, and Error, also for a confidence that is neither empty nor
+// has one byte for each ray.
 THICKLENS_EXPORT std::size_t WriteLightField(const std::string& folder,
                                              const LightFieldEstimate& estimate,
                                              LightFieldFormat format = LightFieldFormat::kPng,
