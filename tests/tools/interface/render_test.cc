@@ -4,13 +4,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <functional>
 #include <limits>
 #include <optional>
 #include <string>
 
 #include "support/error_message.h"
 #include "support/test_cameras.h"
+#include "tools/support/option_error.h"
 
 namespace thicklens {
 namespace {
@@ -18,6 +18,7 @@ namespace {
 using ::testing::AllOf;
 using testing::CentredSensor;
 using testing::ErrorOf;
+using testing::FieldOfOptionError;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 using testing::TestCameraFocusedAt;
@@ -44,15 +45,6 @@ RenderSummary RenderSummaryOf(const LightField& field, const PhotographOptions& 
   RenderSummary summary;
   RenderPhotograph(field, options, {}, &summary);
   return summary;
-}
-
-std::string FieldOfOptionError(const std::function<void()>& work) {
-  try {
-    work();
-  } catch (const OptionError& error) {
-    return error.field();
-  }
-  return "";
 }
 
 TEST(RenderInterfaceTest, APhotographTakesTheEffectsThatMatter) {
