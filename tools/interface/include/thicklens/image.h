@@ -19,7 +19,13 @@ namespace thicklens {
 using TransferCurve = model::TransferCurve;
 
 // The order of the channels of one pixel. There is no default: a reader states it.
-enum class ChannelOrder { kGrey, kRgb, kRgba, kBgr, kBgra };
+enum class ChannelOrder {
+  kGrey,  // one channel
+  kRgb,   // red, green, blue
+  kRgba,  // red, green, blue, alpha
+  kBgr,   // blue, green, red, as OpenCV stores colours
+  kBgra,  // blue, green, red, alpha
+};
 THICKLENS_EXPORT std::string ChannelOrderName(ChannelOrder order);  // "grey", "rgb", ...
 
 // An image with everything that its values need to be understood: the order of its channels and

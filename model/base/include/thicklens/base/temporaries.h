@@ -13,7 +13,8 @@
 // computes, so that no destructor runs in time, removes them by AbandonOutputs.
 namespace thicklens {
 
-// Treatment of a folder by AbandonOutputs: remove it with its content, or only if it is empty.
+// Treatment of a folder by AbandonOutputs: remove it with its content (kWhole), or only if it is
+// empty (kIfEmpty).
 enum class Abandon { kWhole, kIfEmpty };
 
 // The entry of one file or folder in the list of this process. Functions may be called from any

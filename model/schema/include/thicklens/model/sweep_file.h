@@ -19,7 +19,12 @@ THICKLENS_EXPORT std::string BenchDirectionName(BenchDirection direction);
 THICKLENS_EXPORT double DirectionSign(BenchDirection direction);  // +1 away, -1 toward
 
 // Kind of the photographed target.
-enum class SweepTarget { kAuto, kTexture, kPrintedEdge, kKnifeEdge };
+enum class SweepTarget {
+  kAuto,         // not stated: the frames decide
+  kTexture,      // a flat pattern with detail everywhere
+  kPrintedEdge,  // one straight edge, which is blurred by its ink
+  kKnifeEdge,    // one straight edge that is sharp
+};
 // Name of the kind: "auto", "texture", "printed-edge" or "knife-edge".
 THICKLENS_EXPORT std::string SweepTargetName(SweepTarget target);
 
