@@ -18,7 +18,10 @@ namespace {
 std::string RefusalOf(const calib::Calibration& found, CalibrationMethod method) {
   if (method == CalibrationMethod::kPaper) {
     const calib::SourceRecipe& recipe = found.diagnostics.paper_recipe;
-    return recipe.done ? "" : recipe.message;
+    if (recipe.done) return "";
+    // A sweep can be refused before the recipe begins.
+    const bool was_run = recipe.message != calib::SourceRecipe().message;
+    return was_run ? recipe.message : found.summary.reason;
   }
   return found.summary.outcome == calib::Outcome::kRefused ? found.summary.reason : "";
 }

@@ -135,6 +135,16 @@ TEST_F(CalibrateInterfaceTest, OnlyTheChosenMethodCanRefuse) {
   EXPECT_NEAR(paper.camera.focus_depth_mm(), 298, 0.3);  // and an error of the reading
 }
 
+// A sweep of so few frames is refused before any method begins.
+TEST_F(CalibrateInterfaceTest, TooFewFramesAreTheReasonOfBothMethods) {
+  Sweep three = Determined();
+  three.description.frames.resize(3);
+  for (const auto method : {CalibrationMethod::kFit, CalibrationMethod::kPaper}) {
+    EXPECT_THAT(Calibrate(three, On(OnRefusal::kReturn, method)).refusal,
+                HasSubstr("at least 5 frames"));
+  }
+}
+
 // A refusal is a finding about the sweep. What was not measured has no finding.
 TEST_F(CalibrateInterfaceTest, OtherErrorsAreThrownByBothChoices) {
   for (const auto on_refusal : {OnRefusal::kThrow, OnRefusal::kReturn}) {
