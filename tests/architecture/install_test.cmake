@@ -81,7 +81,7 @@ foreach(document api.md equations.md file-formats.md examples/CMakeLists.txt)
   endif()
 endforeach()
 
-# The examples of the documentation, and the program of the README, as a user builds and runs them.
+# The examples of the documentation, and the program of docs/api.md, as a user builds and runs them.
 set(examples "${work_dir}/examples")
 run(${CMAKE_COMMAND} -S "${configs_dir}/../docs/examples" -B "${examples}" -G "${generator}"
     -D CMAKE_BUILD_TYPE=${config} -D CMAKE_CXX_COMPILER=${compiler} -D "CMAKE_PREFIX_PATH=${prefix}")
@@ -121,4 +121,9 @@ file(RENAME "${data_dir}/sweep/depth.pfm" "${data_dir}/sweep/depth.png")
 run_in("${data_dir}/sweep" "${work_dir}/consumer/first_program")
 if(NOT EXISTS "${data_dir}/sweep/light_field/lightfield.yaml")
   message(FATAL_ERROR "the first program wrote no light field")
+endif()
+# The same files, with the camera that the first program wrote.
+run_in("${data_dir}/sweep" "${work_dir}/consumer/api_program")
+if(NOT EXISTS "${data_dir}/sweep/light-field/lightfield.yaml")
+  message(FATAL_ERROR "the program of docs/api.md wrote no light field")
 endif()
