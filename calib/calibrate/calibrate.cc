@@ -215,7 +215,7 @@ class Calibrator {
     });
   }
 
-  // Determines the bench zero (given, or from the image scale), then every frame's depth.
+  // Determines the bench offset (given, or from the image scale), then every frame's depth.
   bool FindDepths() {
     std::optional<double> known_mm;
     if (sweep_.offset_mm) known_mm = sweep_.offset_mm->value;
@@ -300,7 +300,7 @@ class Calibrator {
                           "part of the target"));
   }
 
-  // Takes the given bench zero and the readings as they are.
+  // Takes the given bench offset and the readings as they are.
   bool UseGivenOffset() {
     TakeGivenOffset();
     return PlacedWithinReach();
@@ -418,10 +418,11 @@ class Calibrator {
   void WidenByContradictions(const BlurFitSetup& setup, const BlurFitResult& fit) {
     if (!sweep_.offset_mm && result_.diagnostics.scale.done) {
       const Eigen::Vector2d& offsets_mm = result_.diagnostics.scale.offset_of_pupil_laws_mm;
-      WidenByTrials("pupil law",
-                    "measure offset_mm: a bench zero from the image scale depends on how the light "
-                    "is distributed over the pupil",
-                    WithOffsets(setup, {offsets_mm.x(), offsets_mm.y()}), fit, &result_);
+      WidenByTrials(
+          "pupil law",
+          "measure offset_mm: a bench offset from the image scale depends on how the light "
+          "is distributed over the pupil",
+          WithOffsets(setup, {offsets_mm.x(), offsets_mm.y()}), fit, &result_);
     }
     if (conflicting_offset_mm_) {
       // If the other zero is assumed, its error must be assumed too.
@@ -467,7 +468,7 @@ class Calibrator {
     return true;
   }
 
-  // The bench zero of the image scale was found with a usual blur ratio. It is found once more if
+  // The bench offset of the image scale was found with a usual blur ratio. It is found once more if
   // the fitted ratio moves it by more than a part of its error.
   bool RefineOffsetWithFittedBlur(const Calibration& before) {
     if (sweep_.offset_mm || zero_is_settled_ || !result_.summary.blur_ratio) return false;

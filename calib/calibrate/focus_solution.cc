@@ -214,13 +214,13 @@ class Solution {
     const auto [nearest, farthest] = DepthRange();
     const double outside_mm = std::max({0.0, nearest - zf, zf - farthest});
     const char* side = zf < nearest ? "nearer" : "farther";
-    // These errors are from the blur alone, with the bench zero held.
+    // These errors are from the blur alone, with the bench offset held.
     const double own_kappa_sigma = std::sqrt(at_held_zero_.covariance(kBlurRatio, kBlurRatio));
     const double own_zf_sigma = result_.diagnostics.focus_reading_mm->sigma;
     if (!(kappa > 3 * own_kappa_sigma)) {
       result_.diagnostics.focus_reading_mm.reset();
       Refuse(fmt::format(
-          "the blur does not change over the sweep by more than its errors, for any bench zero "
+          "the blur does not change over the sweep by more than its errors, for any bench offset "
           "(kappa would be {:.2g} +- {:.2g}): move the target farther from focus on both sides",
           kappa, own_kappa_sigma));
       return false;
@@ -229,7 +229,7 @@ class Solution {
       result_.diagnostics.focus_reading_mm.reset();
       Refuse(
           fmt::format("the blur does not determine the depth of focus: {:.1f} +- {:.1f} mm in a "
-                      "sweep from {:.1f} to {:.1f} mm, with the bench zero held fixed",
+                      "sweep from {:.1f} to {:.1f} mm, with the bench offset held fixed",
                       zf, own_zf_sigma, nearest, farthest));
       return false;
     }
@@ -268,7 +268,7 @@ class Solution {
     return true;
   }
 
-  // The reason where the blur determines the reading at focus, but the bench zero does not
+  // The reason where the blur determines the reading at focus, but the bench offset does not
   // determine the depths of the sweep.
   std::string ReasonOfZero(double nearest_mm, double farthest_mm) const {
     const model::Estimate& zero_mm = evidence_.setup.offset_mm;
@@ -278,10 +278,10 @@ class Solution {
                           zero_mm.sigma)
             : fmt::format(
                   "the sweep is {:.3g} mm long at a depth of {:.4g} mm, too short for its image "
-                  "scale to determine the bench zero ({:.4g} +- {:.2g} mm)",
+                  "scale to determine the bench offset ({:.4g} +- {:.2g} mm)",
                   farthest_mm - nearest_mm, fit_.values[kFocusDepth], zero_mm.value, zero_mm.sigma);
     return fmt::format(
-        "the bench zero is not known well enough: {}, so that the depth of focus is {:.1f} +- "
+        "the bench offset is not known well enough: {}, so that the depth of focus is {:.1f} +- "
         "{:.1f} mm. The reading at focus is known: {:.6g} +- {:.2g} mm. State offset_mm{}",
         from, fit_.values[kFocusDepth], result_.summary.focus_depth_mm->sigma,
         result_.diagnostics.focus_reading_mm->value, result_.diagnostics.focus_reading_mm->sigma,
@@ -355,7 +355,7 @@ class Solution {
   const FocusSweep& sweep_;
   BlurEvidence& evidence_;
   BlurFitResult& fit_;
-  BlurFitResult at_held_zero_;  // the same fit; its errors exclude the bench zero's
+  BlurFitResult at_held_zero_;  // the same fit; its errors exclude the bench offset's
   Calibration& result_;
 };
 

@@ -193,7 +193,7 @@ class Verifier {
                     stored_.evidence.method, names));
   }
 
-  // An error of the bench zero moves all depths, including zf.
+  // An error of the bench offset moves all depths, including zf.
   void WarnOfBenchZero() {
     const ComparedParameter* focus = Find(kFocusDepth);
     if (focus == nullptr || sweep_.offset_mm || !found_.summary.bench_offset_mm) return;
@@ -204,10 +204,11 @@ class Verifier {
         found_.summary.image_distance_mm ? found_.summary.image_distance_mm->sigma : 0;
     if (!(offset_sigma > 0) || !(d1_sigma > 0)) return;
     result_.warnings.push_back(fmt::format(
-        "the bench zero is not stated, and the sweep determines it to +- {:.3g} mm only: the error "
-        "of zf is therefore +- {:.3g} mm (correlation of d1 and bench zero {:.2f}){}",
+        "the bench offset is not stated, and the sweep determines it to +- {:.3g} mm only: the "
+        "error "
+        "of zf is therefore +- {:.3g} mm (correlation of d1 and bench offset {:.2f}){}",
         offset_sigma, focus->found.sigma, covariance / (d1_sigma * offset_sigma),
-        options_.same_bench ? "; the stored bench zero is compared, too"
+        options_.same_bench ? "; the stored bench offset is compared, too"
                             : "; if the camera has not moved on the bench (same_bench), or if "
                               "offset_mm is measured, a smaller change can be detected"));
   }

@@ -304,9 +304,9 @@ BlurFitResult FitBlur(const BlurFitSetup& setup, const BlurFitResult* start) {
   BlurFitResult result = Fit(setup, information).Run(start, true);
   const double offset_sigma_mm = setup.offset_mm.sigma;
   if (!result.done || !(offset_sigma_mm > 0)) return result;
-  // The change of the results with the bench zero, by central differences over its own uncertainty.
-  // The depths move with the zero, and the focus with them. If it started at the old focus, a fit
-  // of a sweep that is short against that error would start outside the sweep.
+  // The change of the results with the bench offset, by central differences over its own
+  // uncertainty. The depths move with the zero, and the focus with them. If it started at the old
+  // focus, a fit of a sweep that is short against that error would start outside the sweep.
   const auto moved_by = [&](double move_mm) {
     BlurFitSetup moved = setup;
     moved.offset_mm.value += move_mm;
@@ -320,7 +320,7 @@ BlurFitResult FitBlur(const BlurFitSetup& setup, const BlurFitResult* start) {
   if (!above.done || !below.done) {
     result.done = false;
     result.message =
-        "the fit of the blur does not converge at the ends of the bench zero's uncertainty";
+        "the fit of the blur does not converge at the ends of the bench offset's uncertainty";
     return result;
   }
   const Eigen::Vector4d slope = (above.values - below.values) / (2 * offset_sigma_mm);

@@ -15,7 +15,7 @@ struct BlurPrediction {
   double by_depth = 0, by_depth_twice = 0;
 };
 
-// `global` is in the order of BlurParameter. `depth_mm` already includes its bench zero.
+// `global` is in the order of BlurParameter. `depth_mm` already includes its bench offset.
 BlurPrediction PredictBlur(const BlurFitSetup& setup, const Eigen::Vector4d& global,
                            double depth_mm, double scale);
 

@@ -116,8 +116,8 @@ std::string NonlinearityText(const ScaleNonlinearity& nonlinearity,
                 static_cast<char>(std::toupper(seen[0])), seen.substr(1));
   return fmt::format(
       "the readings bend against the image scale: in the middle of the sweep they deviate by "
-      "{:+.2f} +- {:.2f} mm from the straight line through its ends. {}. A bench zero from the "
-      "image scale is then less certain than its stated error: the bench zero from the farther "
+      "{:+.2f} +- {:.2f} mm from the straight line through its ends. {}. A bench offset from the "
+      "image scale is then less certain than its stated error: the bench offset from the farther "
       "half of the sweep differs by {:+.1f} mm from that of the nearer half",
       nonlinearity.bow_mm.value, nonlinearity.bow_mm.sigma, causes, nonlinearity.zero_spread_mm);
 }

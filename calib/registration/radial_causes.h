@@ -26,7 +26,7 @@ std::optional<std::string> CheckDistortion(Calibration* calibration);
 // The warning about readings that bend against the image scale. It names the structure found in
 // `calibration.structure`.
 std::string NonlinearityText(const ScaleNonlinearity& nonlinearity, const Calibration& calibration);
-// A remedy that makes the bend smaller, or its effect on the bench zero.
+// A remedy that makes the bend smaller, or its effect on the bench offset.
 std::string NonlinearityRemedy(const FrameStructureFinding& structure);
 
 }  // namespace thicklens::calib

@@ -20,7 +20,7 @@ constexpr std::array<ReadingUnit, 7> kUnits = {{{"inches", 25.4},
                                                 {"tenths of a millimetre", 0.1},
                                                 {"feet", 304.8}}};
 constexpr double kScaleBias = 3e-5;  // error of registrations, from frame to frame
-constexpr double kZeroBias = 0.01;   // error of a bench zero from the scale, relative to the depth
+constexpr double kZeroBias = 0.01;  // error of a bench offset from the scale, relative to the depth
 constexpr double kCauchyWidth = 3;
 constexpr int kRounds = 12;
 constexpr std::size_t kMaxForMedians = 300;
@@ -116,7 +116,7 @@ double ChiSquareOfConstant(const Points& points, double slope, double reading_si
   return sum;
 }
 
-// Cost of a bench zero for which the scale gives another value than the given one.
+// Cost of a bench offset for which the scale gives another value than the given one.
 double ChiSquareOfZero(const FocusSweep& sweep, double offset_mm, double sigma_mm,
                        double depth_mm) {
   if (!sweep.offset_mm) return 0;

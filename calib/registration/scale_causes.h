@@ -25,7 +25,7 @@ struct ReadingUnit {
 };
 
 // Comparison of the laws for the image scale, each on the same samples. chi^2 includes the scales,
-// the bench zero where it is given, and the blur ratio that the law requires.
+// the bench offset where it is given, and the blur ratio that the law requires.
 struct ScaleCauses {
   Diagnosis diagnosis;
   std::optional<BlurSlope> blur_slope;
@@ -65,7 +65,7 @@ std::string UnitAdvice(const FocusSweep& sweep, const std::vector<FrameMeasureme
 std::string UnitThatFits(const FocusSweep& sweep, const ScaleCauses& causes);
 
 // The warning where the scale is constant although it should change according to the given bench
-// zero.
+// offset.
 std::string ConstantScaleWarning(const FocusSweep& sweep, const std::vector<ScaleSample>& samples);
 
 }  // namespace thicklens::calib

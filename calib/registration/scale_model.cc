@@ -298,7 +298,7 @@ class ModelFinder {
     } else if (!is_close) {
       result->message = fmt::format(
           "readings and image scales scatter by {:.2g} mm about their law, {:.0f} % of the "
-          "readings' range: too much to determine the bench zero (the readings are worse than "
+          "readings' range: too much to determine the bench offset (the readings are worse than "
           "stated, or the texture is small or faint)",
           sigma_mm, 100 * sigma_mm / range_mm_);
     }

@@ -87,7 +87,7 @@ double NeighbourFactor(const Points& points, const Curve& curve) {
 // the scale gives.
 //   In the middle the curve lies -c2 off the chord through its ends.
 //   The chord through the middle and one end has the slope c1 -+ c2 and meets Z = 0, u = -m/h, at
-//   c0 - (c1 -+ c2) m/h, which is -sign times the bench zero: far minus near = 2 sign c2 m/h.
+//   c0 - (c1 -+ c2) m/h, which is -sign times the bench offset: far minus near = 2 sign c2 m/h.
 // Derived here [D63]; m and h are the middle and half the range of the depths, sign is that of the
 // direction.
 std::optional<ScaleNonlinearity> FindScaleNonlinearity(const std::vector<ScaleSample>& samples,

@@ -15,7 +15,7 @@ namespace thicklens::calib {
 struct ScaleNonlinearity {
   // Distance of the readings in the middle of the sweep from the straight line through its ends.
   model::Estimate bow_mm;
-  // Bench zero from the farther half of the sweep alone minus that from the nearer half.
+  // Bench offset from the farther half of the sweep alone minus that from the nearer half.
   double zero_spread_mm = 0;
 };
 

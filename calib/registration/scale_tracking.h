@@ -14,7 +14,7 @@ namespace thicklens::calib {
 // Registers the frames of a sweep to one reference, from the nearest readings outward. The law
 // found so far predicts the start of the next registration, so that a periodic target does not
 // cause an error of one period. Where that fails (a wrong reading), a ladder of scales is tried.
-// `known_offset_mm`, the bench zero if it is given, defines the first prediction. `read_grey`
+// `known_offset_mm`, the bench offset if it is given, defines the first prediction. `read_grey`
 // returns the linear grey light of a frame (CV_32F) and is called from several threads; `tick` is
 // called once for each frame except the reference, from several threads, too. The radial distortion
 // that the frames show together is removed from the scales, and its uncertainty is added to their

@@ -73,7 +73,7 @@ std::optional<std::string> FrameSelection::KeepPossibleDepths(double bench_offse
   return KeepOnly([&](const FrameMeasurement& frame) -> std::optional<std::string> {
     if (frame.depth_mm > front_focal_length_mm) return std::nullopt;
     return fmt::format(
-        "impossible depth: {:.3f} mm with the bench zero at {:.3f} mm is nearer than the front "
+        "impossible depth: {:.3f} mm with the bench offset at {:.3f} mm is nearer than the front "
         "focal point ({} mm): check offset_mm, direction and units",
         frame.depth_mm, bench_offset_mm, front_focal_length_mm);
   });

@@ -13,7 +13,7 @@
 namespace thicklens::calib {
 namespace {
 
-// A given bench zero that is off by more than this part of the depth is no error of measurement.
+// A given bench offset that is off by more than this part of the depth is no error of measurement.
 constexpr double kGrossOffset = 0.1;
 
 // m = f1 D/(f2 z) [D5] on the sensor over the target, so D = m z f2/f1.
@@ -51,8 +51,9 @@ OffsetCheck CheckGivenOffset(const FocusSweep& sweep, const std::string& unit_th
   const double sigma_mm = std::hypot(law.offset_mm.sigma, sweep.offset_mm->sigma);
   if (!(std::abs(apart_mm) > 3 * sigma_mm + 1e-3 * law.reference_depth_mm)) return check;
   const std::string found = fmt::format(
-      "the image scale puts the bench zero at {:.2f} +- {:.2f} mm, {:+.2f} mm from the given bench "
-      "zero",
+      "the image scale puts the bench offset at {:.2f} +- {:.2f} mm, {:+.2f} mm from the given "
+      "bench "
+      "offset",
       given_mm + apart_mm, law.offset_mm.sigma, apart_mm);
   if (std::abs(apart_mm) > kGrossOffset * law.reference_depth_mm &&
       std::abs(apart_mm) > 5 * sigma_mm) {

@@ -17,9 +17,9 @@ namespace thicklens::calib {
 // Checks that may contradict the results without forbidding them. Each adds its warning, if there
 // is one, to the calibration.
 
-// The given bench zero compared with that of the image scale: `conflicting_mm` is the latter where
-// the two contradict each other. `refusal` is set where they lie so far apart that one of them must
-// be wrong.
+// The given bench offset compared with that of the image scale: `conflicting_mm` is the latter
+// where the two contradict each other. `refusal` is set where they lie so far apart that one of
+// them must be wrong.
 struct OffsetCheck {
   std::optional<std::string> refusal;
   std::optional<model::Estimate> conflicting_mm;
@@ -36,9 +36,9 @@ std::optional<ScaleNonlinearity> CheckScaleNonlinearity(const FocusSweep& sweep,
 void WarnOfReadingStep(const ReadingStep& reading_step, Calibration* calibration);
 
 // The setups of fits with the alternatives that the checks leave possible. WithOffsets uses other
-// bench zeros, such as that of one half of the sweep. WithoutReadingStep moves the readings before
-// or after a jump; where no zero was given, it uses the zero that the scales of the moved readings
-// give.
+// bench offsets, such as that of one half of the sweep. WithoutReadingStep moves the readings
+// before or after a jump; where no zero was given, it uses the zero that the scales of the moved
+// readings give.
 std::vector<BlurFitSetup> WithOffsets(const BlurFitSetup& setup,
                                       const std::vector<double>& offsets_mm);
 std::vector<BlurFitSetup> WithoutReadingStep(const FocusSweep& sweep, const BlurFitSetup& setup,

@@ -51,7 +51,8 @@ void SortAndAdvise(Calibration* calibration) {
                     parts.front().remedy);
   } else if (zero_mm > noise_mm) {
     calibration->diagnostics.advice = fmt::format(
-        "the bench zero is {:.0f} % of the error of d1: measure offset_mm, or sweep over a longer "
+        "the bench offset is {:.0f} % of the error of d1: measure offset_mm, or sweep over a "
+        "longer "
         "range so that the image scale determines it better",
         share(zero_mm));
   } else {

@@ -14,8 +14,9 @@ namespace thicklens::calib {
 inline constexpr const char* kShapePart = "shape of the blur";
 
 // Sorts the parts, the largest first, and gives the advice: how to shrink the largest share of the
-// error of d1. The statistical part counts at its 95 %, without the share of the bench zero, which
-// counts separately (0 without a zero). A wrong shape of the blur has priority over all shares.
+// error of d1. The statistical part counts at its 95 %, without the share of the bench offset,
+// which counts separately (0 without a zero). A wrong shape of the blur has priority over all
+// shares.
 void SortAndAdvise(Calibration* calibration);
 
 // Adds a part that moves zf by up to `move_mm` in either direction to the table and to the
@@ -23,7 +24,7 @@ void SortAndAdvise(Calibration* calibration);
 void WidenFocus(const std::string& name, double move_mm, const std::string& remedy,
                 const model::ThickLens& lens, Calibration* calibration);
 
-// Adds a part to the table and to the intervals of zf, d1, kappa and the bench zero: the fit is
+// Adds a part to the table and to the intervals of zf, d1, kappa and the bench offset: the fit is
 // repeated with each of `setups` instead of the assumed one.
 void WidenByTrials(const std::string& name, const std::string& remedy,
                    const std::vector<BlurFitSetup>& setups, const BlurFitResult& fit,

@@ -98,7 +98,7 @@ struct FocusCase {
   }
 };
 
-// The covariance of (d1, kappa, floor in px, bench zero) by linear error propagation for exact
+// The covariance of (d1, kappa, floor in px, bench offset) by linear error propagation for exact
 // readings, from finite differences of the bench's own formulas. `softness_is_free`: all V have one
 // unknown constant in common. `floor_sigma_px`: sigma of a given floor, 0 for none.
 struct LinearReference {

@@ -48,7 +48,7 @@ inline model::SweepSimulationOptions SweepCase(const std::string& name, int size
 }
 
 // A simulated sweep in the form that a calibration gets, with the truth. The frames are rendered
-// once and kept. The camera has no calibration, the bench zero is given and the floor is not.
+// once and kept. The camera has no calibration, the bench offset is given and the floor is not.
 struct SimulatedSweep {
   calib::FocusSweep sweep;
   model::SweepTruth truth;

@@ -11,7 +11,7 @@ namespace thicklens::tools {
 
 // A simulated focus sweep in memory, as a calibration gets it, with its truth.
 struct BenchSweep {
-  calib::FocusSweep sweep;  // all frames; without calibration, with the bench zero
+  calib::FocusSweep sweep;  // all frames; without calibration, with the bench offset
   model::SweepTruth truth;
   double frames_phase = 0;  // 0 to 1: selects the frames if not all are used
 };

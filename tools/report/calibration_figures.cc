@@ -84,7 +84,7 @@ ReportFigure ScaleWithoutModel(const calib::ScaleModel& scale, ScalePoints point
   points.left_out.label.clear();
   Plot plot = ScalePlot();
   plot.series = {std::move(points.fitted), std::move(points.left_out)};
-  std::string caption = "The image scale does not determine the bench zero";
+  std::string caption = "The image scale does not determine the bench offset";
   if (scale.kind != calib::ScaleKind::kUnknown)
     caption += fmt::format("; its dependence on the reading: {}", ScaleKindWords(scale.kind));
   return FigureOf({plot}, caption + ". If it did, the points would lie on a straight line.");
@@ -207,7 +207,7 @@ ReportFigure ScaleFigure(const FocusSweep& sweep, const Calibration& calibration
                       {{range.first, law_at(range.first)}, {range.second, law_at(range.second)}}),
                 std::move(points.fitted), std::move(points.left_out)};
   law.lines = {Level(0)};
-  law.notes = {{TrueMinus(fmt::format("Ap at b = {} ± {} mm",
+  law.notes = {{TrueMinus(fmt::format("aperture at reading b = {} ± {} mm",
                                       RoundedTo(zero_reading_mm, scale.offset_mm.sigma),
                                       RoundedSigma(scale.offset_mm.sigma))),
                 zero_reading_mm, 0}};
@@ -225,7 +225,7 @@ ReportFigure ScaleFigure(const FocusSweep& sweep, const Calibration& calibration
   residuals.series = {std::move(points.fitted_residuals), std::move(points.left_out_residuals)};
   return FigureOf({law, residuals},
                   "All points should lie on one straight line, which reaches zero where the target "
-                  "would touch the aperture plane Ap; below, a single point off zero means a wrong "
+                  "would touch the aperture plane; below, a single point off zero means a wrong "
                   "reading, and a bow means that the scale does not follow 1/z.");
 }
 

@@ -72,7 +72,7 @@ Abscissa AbscissaOf(const Calibration& calibration) {
     ++depths;
   }
   if (depths >= 2 && hi > lo) return {true, "object depth z from Ap [mm]"};
-  return {false, "bench reading b [mm] (no depths: the bench zero is unknown)"};
+  return {false, "bench reading b [mm] (no depths: the bench offset is unknown)"};
 }
 
 std::string PointName(const FrameMeasurement& frame, const Abscissa& abscissa,

@@ -21,7 +21,7 @@ void AddPoint(PlotSeries* series, double x, double y, std::string name);
 // A horizontal line without a label, solid at 0.
 PlotLine Level(double position);
 
-// The abscissa of a frame in the figures. Without a bench zero there are no depths; the readings
+// The abscissa of a frame in the figures. Without a bench offset there are no depths; the readings
 // then still show the shape of a curve.
 struct Abscissa {
   bool is_depth = false;

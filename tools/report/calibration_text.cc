@@ -102,8 +102,8 @@ std::string ChannelLine(const std::vector<calib::ChannelFocus>& channels) {
   return fmt::format("{}", fmt::join(parts, ", "));
 }
 
-// The sides share no frame, so their errors are independent except for the bench zero, which shifts
-// both alike: the hypotenuse is the upper bound.
+// The sides share no frame, so their errors are independent except for the bench offset, which
+// shifts both alike: the hypotenuse is the upper bound.
 std::optional<Estimate> SidesApartMm(const calib::Calibration& calibration) {
   const calib::SideFit& nearer = calibration.diagnostics.nearer;
   const calib::SideFit& farther = calibration.diagnostics.farther;

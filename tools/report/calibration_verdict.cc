@@ -15,7 +15,7 @@ namespace {
 using calib::Calibration;
 using calib::FocusSweep;
 
-// The share of the sigma of the in-focus distance from which the bench zero counts as dominant.
+// The share of the sigma of the in-focus distance from which the bench offset counts as dominant.
 constexpr double kDominantShare = 0.7;
 
 std::string Paragraph(const std::string& text) {
@@ -55,7 +55,7 @@ std::string LimitInWords(const FocusSweep& sweep, const Calibration& calibration
   const std::string numbers = fmt::format(
       "{} an uncertainty of ±{} mm in the in-focus distance, the systematic interval one of up to "
       "{:.2g} mm.",
-      zero_dominates ? "the bench zero leaves" : "noise and readings leave",
+      zero_dominates ? "the bench offset leaves" : "noise and readings leave",
       RoundedSigma(focus.sigma), half_mm);
   std::string text, help;
   if (half_mm > 2 * focus.sigma) {
@@ -68,14 +68,14 @@ std::string LimitInWords(const FocusSweep& sweep, const Calibration& calibration
     help = zero_dominates ? " Measuring offset_mm, or a longer sweep, would help."
                           : " More frames, more light or better readings would help.";
   } else {
-    text = zero_dominates ? "Bench zero and systematic errors contribute alike: "
+    text = zero_dominates ? "Bench offset and systematic errors contribute alike: "
                           : "Noise and systematic errors contribute alike: ";
   }
   return text + numbers + (calibration.diagnostics.advice.empty() ? help : "");
 }
 
-// Describes what does not depend on the bench zero or the camera: most users want to know it first,
-// and it is the only result if everything else is refused.
+// Describes what does not depend on the bench offset or the camera: most users want to know it
+// first, and it is the only result if everything else is refused.
 std::string DeterminedInWords(const Calibration& calibration) {
   std::string html;
   const auto add = [&html](const std::string& about, const std::string& line) {

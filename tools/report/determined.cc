@@ -46,7 +46,7 @@ std::string SharpestLine(const calib::Calibration& calibration) {
 
 std::string FocusReadingLine(const calib::Calibration& calibration) {
   if (!calibration.diagnostics.focus_reading_mm) return "";
-  return fmt::format("reading {}, from the blur, without the error of the bench zero",
+  return fmt::format("reading {}, from the blur, without the error of the bench offset",
                      WithError(calibration.diagnostics.focus_reading_mm->value,
                                calibration.diagnostics.focus_reading_mm->sigma, "mm"));
 }

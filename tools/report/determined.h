@@ -15,7 +15,7 @@ namespace thicklens::tools {
 
 // "reading 110.03 +- 0.11 mm, by 5 frames; frame_015.png is the sharpest", or why there is none.
 std::string SharpestLine(const calib::Calibration& calibration);
-// "reading 109.9984 +- 0.0004 mm, by the blur; the bench zero is not in it"; otherwise empty.
+// "reading 109.9984 +- 0.0004 mm, by the blur; the bench offset is not in it"; otherwise empty.
 std::string FocusReadingLine(const calib::Calibration& calibration);
 // "1/scale changes by +10.1 +- 0.1 % over the sweep: the target looks smaller at larger readings";
 // empty if it was not measured.

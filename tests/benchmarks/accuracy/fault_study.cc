@@ -38,7 +38,7 @@ std::vector<Damage> Damages() {
       {"vignetting 48 %", {}, [](SimulatedSweep* s) { Vignette(s, 0.48); }},
       {"fixed glare", {}, [](SimulatedSweep* s) { AddGlare(s); }},
       {"readings 5 % long", {}, [](SimulatedSweep* s) { ScaleReadings(s, 1.05); }},
-      {"bench zero 2 mm off", {}, [](SimulatedSweep* s) { s->sweep.offset_mm->value += 2; }},
+      {"bench offset 2 mm off", {}, [](SimulatedSweep* s) { s->sweep.offset_mm->value += 2; }},
       {"readings reversed", {}, [](SimulatedSweep* s) { ReverseReadings(s); }},
   };
 }

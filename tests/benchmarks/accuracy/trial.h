@@ -23,7 +23,7 @@ struct TrialSettings {
   int size_px = 192;
   model::Psf psf = model::Psf::kGaussian;
   std::optional<model::PupilLaw> pupil_law;  // absent: the simulator's default
-  bool zero_is_known = true;                 // the calibration gets the bench zero
+  bool zero_is_known = true;                 // the calibration gets the bench offset
   std::uint64_t first_seed = 1;
   bool map_field = false;
   int calibration_threads = 1;

@@ -29,7 +29,7 @@ using thicklens::testing::SweepWithFloor;
 
 constexpr int kSizePx = 160;
 
-// Case iii on a small field with dead leaves. The floor and the bench zero are given.
+// Case iii on a small field with dead leaves. The floor and the bench offset are given.
 SimulatedSweep Good() {
   static const SimulatedSweep rendered = SweepWithFloor("iii", kSizePx, 1);
   return DeepCopy(rendered);
@@ -102,7 +102,7 @@ TEST(Calibrate, TheSourcesRecipeAndThePeakNeedNoFit) {
   EXPECT_EQ(alone.diagnostics.sharpness.focus_depth_mm, whole.diagnostics.sharpness.focus_depth_mm);
   EXPECT_FALSE(alone.summary.image_distance_mm || alone.summary.blur_ratio ||
                alone.diagnostics.blur.done || alone.diagnostics.field.done);
-  EXPECT_FALSE(alone.diagnostics.scale.done);  // the bench zero is given
+  EXPECT_FALSE(alone.diagnostics.scale.done);  // the bench offset is given
 }
 
 TEST(Calibrate, WithoutFitAnUnknownBenchZeroIsStillFound) {
@@ -170,7 +170,7 @@ TEST(Calibrate, AnUnknownBenchZeroIsFound) {
   ASSERT_TRUE(c.summary.focus_depth_mm);
   EXPECT_NEAR(c.summary.focus_depth_mm->value, s.truth.focus_depth_mm,
               3 * c.summary.focus_depth_mm->sigma);
-  // The error of the bench zero is contained in that of the focus.
+  // The error of the bench offset is contained in that of the focus.
   EXPECT_GE(c.summary.focus_depth_mm->sigma, 0.8 * c.summary.bench_offset_mm->sigma);
 }
 
@@ -178,7 +178,7 @@ TEST(Calibrate, OneImageRepeatedIsRefused) {
   SimulatedSweep s = Good();
   for (cv::Mat& frame : *s.stored) frame = s.frame(16).clone();
   {
-    SCOPED_TRACE("bench zero given");
+    SCOPED_TRACE("bench offset given");
     const Calibration c = Calibrated(s);
     EXPECT_EQ(c.summary.outcome, Outcome::kRefused) << c.summary.reason;
     EXPECT_FALSE(c.summary.blur_ratio);

@@ -23,7 +23,7 @@ using ::testing::ContainsRegex;
 
 constexpr int kSizePx = 192;
 
-// Dead leaves with the floor and the bench zero given, rendered once.
+// Dead leaves with the floor and the bench offset given, rendered once.
 const SimulatedSweep& Clean(const std::string& name) {
   static std::map<std::string, SimulatedSweep> rendered;
   const auto found = rendered.find(name);

@@ -120,12 +120,13 @@ TEST(SolveFocus, ABenchZeroThatIsNotKnownIsNotBlamedOnTheBlur) {
   bench.first_mm = 380;
   bench.last_mm = 425;
   const double half_mm = 0.5 * (bench.last_mm - bench.first_mm);
-  // Nearly the whole error of the bench zero enters zf.
+  // Nearly the whole error of the bench offset enters zf.
   const FocusCase trial = Solved(bench, 0.001, 10);
   const double per_zero = trial.calibration.summary.focus_depth_mm->sigma / 10;
   EXPECT_NEAR(per_zero, 1, 0.1);
   const FocusCase c = Solved(bench, 0.001, 1.1 * half_mm / per_zero);
-  ExpectRefused(c.calibration, "the bench zero is not known well enough: the sweep is 45 mm long");
+  ExpectRefused(c.calibration,
+                "the bench offset is not known well enough: the sweep is 45 mm long");
   EXPECT_THAT(c.calibration.summary.reason, HasSubstr("State offset_mm"));
   ASSERT_TRUE(c.calibration.diagnostics.focus_reading_mm) << "the reading of focus is determined";
   EXPECT_NEAR(c.calibration.diagnostics.focus_reading_mm->value, 400 - bench.offset_mm, 0.2);

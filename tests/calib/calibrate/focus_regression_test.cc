@@ -190,7 +190,7 @@ TEST(FocusRegression, SlowAPrintedEdgeOfUnknownFloorCoversTheTruth) {
   CheckPrinted("iv");
 }
 
-// A bench zero that is found from the image scale is accurate to a few tenths of a millimetre if
+// A bench offset that is found from the image scale is accurate to a few tenths of a millimetre if
 // the scale changes enough (i, iii, iv). Otherwise its stated error is large. Its error enters zf
 // one to one.
 void CheckUnknownOffset(const char* name, double within_mm) {

@@ -302,7 +302,7 @@ TEST(SolveFocus, EdgesOfATextureWithoutSoftnessAreNoBoundEither) {
   EXPECT_THAT(c.calibration.summary.warnings, ElementsAre(HasSubstr("are allowed for")));
 }
 
-// ---- the bench zero ----
+// ---- the bench offset ----
 
 TEST(SolveFocus, TheBenchZerosErrorIsInTheCovariance) {
   constexpr double kZeroSigmaMm = 0.6;

@@ -163,7 +163,7 @@ TEST(Reason, AnUnknownZeroOfAMacroSweepIsNamedAndTheFocusReported) {
     ASSERT_EQ(c.summary.outcome, Outcome::kRefused) << c.summary.reason;
     EXPECT_THAT(
         c.summary.reason,
-        AllOf(StartsWith("the bench zero is not known well enough"), HasSubstr("State offset_mm"),
+        AllOf(StartsWith("the bench offset is not known well enough"), HasSubstr("State offset_mm"),
               HasSubstr("reading at focus is known: 100"),
               Not(HasSubstr("that the readings are in mm")), Not(HasSubstr("blur does not"))))
         << c.summary.reason;

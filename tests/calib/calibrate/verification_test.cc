@@ -117,8 +117,8 @@ TEST(VerifyCalibration, UsesTheCorrelationOfBothMatrices) {
   EXPECT_EQ(other.verdict, Verdict::kDoesNotHold);
 }
 
-// An unknown bench zero leaves d1 undetermined. If the camera has not moved on the bench, the joint
-// information about both counts.
+// An unknown bench offset leaves d1 undetermined. If the camera has not moved on the bench, the
+// joint information about both counts.
 TEST(VerifyCalibration, TheBenchZeroIsComparedWhereTheCameraHasNotMoved) {
   model::Camera stored = StoredCamera(0.01, 0.001);
   stored.calibration->bench_offset_mm = model::Estimate{100, 1};
@@ -127,7 +127,7 @@ TEST(VerifyCalibration, TheBenchZeroIsComparedWhereTheCameraHasNotMoved) {
   Eigen::Matrix3d matrix = Eigen::Vector3d(1e-4, 1e-6, 1).asDiagonal();
   matrix(0, 2) = matrix(2, 0) = covariance;
   stored.calibration->covariance = matrix;
-  // Only d1 is off, by one sigma, and the bench zero is the same.
+  // Only d1 is off, by one sigma, and the bench offset is the same.
   Calibration found = FoundCalibration(kD1Mm + std::sqrt(2.0) * 0.01, 0.01, kRatio, 0.001);
   found.summary.bench_offset_mm = Result{100, 1, std::nullopt};
   found.diagnostics.covariance_order = stored.calibration->covariance_order;

@@ -26,7 +26,7 @@ using namespace thicklens::testing;
 constexpr double kRatio = 0.55;  // differs from the value with which a calibration starts
 
 // Case iii at f/1.4. The fall-off makes the blur of a Gaussian aperture 3.1 % narrower than the
-// aperture and moves the bench zero by 0.9 mm.
+// aperture and moves the bench offset by 0.9 mm.
 SimulatedSweep Wide(model::Psf psf, model::PupilLaw law, std::uint64_t seed) {
   model::SweepSimulationOptions options = SweepCase("iii", 160, seed);
   options.camera.psf = psf;
@@ -62,7 +62,7 @@ TEST(WideLens, KappaIsThatOfTheBlurUnderAnyPupilLaw) {
       EXPECT_LT(c.summary.blur_ratio->systematic->y() - c.summary.blur_ratio->systematic->x(),
                 (has_tails ? 0.08 : 0.015) * kRatio);
       EXPECT_THAT(c.summary.warnings, Not(Contains(HasSubstr("the blur is a"))));
-      EXPECT_THAT(c.summary.warnings, Not(Contains(HasSubstr("bench zero"))));
+      EXPECT_THAT(c.summary.warnings, Not(Contains(HasSubstr("bench offset"))));
       if (!has_tails) pulls += (c.summary.blur_ratio->value - kRatio) / kRatio;
     }
     // It would be 1 to 2.4 % if a law were part of the definition.
@@ -70,7 +70,7 @@ TEST(WideLens, KappaIsThatOfTheBlurUnderAnyPupilLaw) {
   }
 }
 
-// A bench zero from the image scale depends on the law, and its interval includes that.
+// A bench offset from the image scale depends on the law, and its interval includes that.
 TEST(WideLens, AnUnknownZeroHasThePupilLawInItsInterval) {
   for (const model::PupilLaw law : model::AllPupilLaws()) {
     SCOPED_TRACE(PupilLawName(law));

@@ -120,7 +120,7 @@ TEST(FitBlurCovariance, HoldsForTwoEstimators) {
       3, kRuns);
 }
 
-// Bench zeros are drawn from their distribution and used as exact. The results scatter by as much
+// Bench offsets are drawn from their distribution and used as exact. The results scatter by as much
 // as the covariance states for a zero with that sigma.
 TEST(FitBlurCovariance, CarriesTheBenchZerosError) {
   BlurBench bench;

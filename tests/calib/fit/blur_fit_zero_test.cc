@@ -1,4 +1,4 @@
-// The error of the bench zero in the results of a sweep that is short compared with it.
+// The error of the bench offset in the results of a sweep that is short compared with it.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -262,7 +262,7 @@ TEST(ReadingErrorProjection, GivesTheCovarianceOfTheWholeProblem) {
         ASSERT_EQ(residuals.rows(), values.size());
         EXPECT_LT((reduced.values - values).norm(), 1e-9 * values.norm());
 
-        // Fixed parameters have no column: the bench zero, and the floor, which one sweep cannot
+        // Fixed parameters have no column: the bench offset, and the floor, which one sweep cannot
         // distinguish from softness.
         std::vector<Eigen::Index> few = {kFocusDepth, kBlurRatio, 4, 5, 6, 7, 8};
         std::vector<Eigen::Index> all = few;

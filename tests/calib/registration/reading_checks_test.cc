@@ -212,7 +212,7 @@ TEST(ReasonAgainstScales, ReversedReadingsForbidAResult) {
   bench.law = {};
   bench.law.kind = ScaleKind::kReversed;
   bench.law.message = "direction must be 'toward'";
-  bench.sweep.offset_mm = model::Estimate{30, 0.1};  // even if the bench zero is known
+  bench.sweep.offset_mm = model::Estimate{30, 0.1};  // even if the bench offset is known
   EXPECT_EQ(bench.Reason(), "direction must be 'toward'");
 }
 

@@ -211,7 +211,7 @@ TEST(TrackScale, TheWrongDirectionIsReversed) {
 }
 
 // A lens that distorts by 1 % at the corner, in closed form. If the distortion were ignored, the
-// bench zero would be 2 mm off.
+// bench offset would be 2 mm off.
 TEST(TrackScale, DistortionIsFoundAndTakenOut) {
   constexpr int kSizePx = 192;
   FocusSweep sweep;

@@ -59,7 +59,7 @@ TEST(Contradiction, OfTheGivenOffsetWidensEverything) {
   EXPECT_GT(c.summary.focus_depth_mm->systematic->y() - c.summary.focus_depth_mm->systematic->x(),
             5);
   EXPECT_THAT(c.diagnostics.advice, HasSubstr("given offset_mm"));
-  EXPECT_THAT(c.summary.warnings, Contains(HasSubstr("from the given bench zero")));
+  EXPECT_THAT(c.summary.warnings, Contains(HasSubstr("from the given bench offset")));
 }
 
 TEST(Contradiction, OfTheGivenOffsetByTensOfMillimetresIsRefused) {

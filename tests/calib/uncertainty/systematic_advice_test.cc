@@ -95,7 +95,7 @@ SystematicPart PartOfImageDistance(const std::string& name, double low_mm, doubl
 TEST(WidenFocus, TheAdviceNamesTheLargestShare) {
   struct Case {
     double first_mm, second_mm;  // widths of two additional parts
-    double zero_mm;              // part of the bench zero in the total of 0.5 mm
+    double zero_mm;              // part of the bench offset in the total of 0.5 mm
     const char* advice;
   };
   // WidenFocus itself adds 2.131e-6 mm.
@@ -105,10 +105,10 @@ TEST(WidenFocus, TheAdviceNamesTheLargestShare) {
       {0.001, 0.001, 0.3, "noise and readings are 34 % of the error of d1: take more frames"},
       {0.0016, 0.001, 0.3, "noise and readings are 30 % of the error of d1"},
       {0.0017, 0.001, 0.3, "first is 30 % of the error of d1"},
-      {0.0014, 0.001, 0.4, "the bench zero is 31 % of the error of d1: measure offset_mm"},
+      {0.0014, 0.001, 0.4, "the bench offset is 31 % of the error of d1: measure offset_mm"},
       {0.0018, 0.001, 0.4, "first is 31 % of the error of d1"},
       // The share of the zero is not larger than the whole error of zf.
-      {0.001, 0.001, 7, "the bench zero is 51 % of the error of d1"},
+      {0.001, 0.001, 7, "the bench offset is 51 % of the error of d1"},
   };
   const model::ThickLens lens = BlurBench().lens;
   for (const Case& k : cases) {

@@ -87,7 +87,7 @@ TEST(FitSides, NearerIsNearer) {
   }
 }
 
-// An error of the bench zero moves both sides equally.
+// An error of the bench offset moves both sides equally.
 TEST(FitSides, TheBenchZerosErrorIsNoDifferenceOfTheSides) {
   Calibration found[2];
   for (const bool is_known : {false, true}) {

@@ -158,7 +158,7 @@ TEST_F(CameraVerifyTest, ACalibrationOfTheSameCameraHolds) {
     if (sigma > 0) {
       EXPECT_NEAR(parameter["difference_sigmas"].get<double>(),
                   parameter["difference"].get<double>() / sigma, 1e-9);
-    } else {  // a bench zero that is stated as exact
+    } else {  // a bench offset that is stated as exact
       EXPECT_TRUE(parameter["difference_sigmas"].is_null());
     }
     EXPECT_EQ(parameter["counted"].get<bool>(), parameter["why_not_counted"].is_null());
@@ -215,12 +215,13 @@ TEST_F(CameraVerifyTest, CasesWithoutAVerdictAreReported) {
   EXPECT_GT(json_["smallest_detectable_blur_px"].get<double>(), 0.0001);
 }
 
-// An unknown bench zero leaves zf undetermined. The message reports this and how to determine it.
+// An unknown bench offset leaves zf undetermined. The message reports this and how to determine it.
 TEST_F(CameraVerifyTest, AnUnknownBenchZeroIsReported) {
   offset_mm_ = "unknown";
   const ProgramResult result = Verify(*shared_ / "camera.yaml", Sweep(2));
   EXPECT_NE(result.exit_code, 2) << result.err;
-  EXPECT_THAT(result.out, AllOf(HasSubstr("bench zero is not stated"), HasSubstr("(same_bench)")));
+  EXPECT_THAT(result.out,
+              AllOf(HasSubstr("bench offset is not stated"), HasSubstr("(same_bench)")));
 }
 
 TEST_F(CameraVerifyTest, ACameraWithoutCalibrationIsRefused) {

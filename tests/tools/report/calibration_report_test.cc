@@ -543,7 +543,7 @@ TEST(CalibrationReport, NamesTheBenchZeroWhereItIsMostOfTheError) {
   made.calibration.summary.bench_offset_mm->sigma = 0.56;
   EXPECT_THAT(
       Page(made),
-      HasSubstr("Statistical errors dominate: the bench zero leaves an uncertainty of ±0.57"));
+      HasSubstr("Statistical errors dominate: the bench offset leaves an uncertainty of ±0.57"));
   EXPECT_THAT(Page(made), Not(HasSubstr("noise and readings leave")));
   made.calibration.summary.bench_offset_mm->sigma = 0.3;
   EXPECT_THAT(Page(made), HasSubstr("Statistical errors dominate: noise and readings leave"));

@@ -15,8 +15,8 @@ namespace thicklens::calib {
 // What Calibrate computes, and how it is run.
 struct CalibrationOptions {
   QualityCheckOptions checks;  // limits of the quality checks
-  // If false, only the paper's recipe and the sharpness peak are computed. Where the bench zero is
-  // given they need no image scale, and no frame is registered: a wrong reading is not noticed.
+  // If false, only the paper's recipe and the sharpness peak are computed. Where the bench offset
+  // is given they need no image scale, and no frame is registered: a wrong reading is not noticed.
   bool fit_blur = true;
   bool map_field = true;      // includes tiles and colour channels; needs the fit
   int threads = 0;            // 0: one per core

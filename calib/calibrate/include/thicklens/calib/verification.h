@@ -19,7 +19,7 @@ struct VerificationOptions {
   // The stored calibration does not hold if the joint chi-square exceeds the value that chance
   // exceeds in this share of the cases; 0.0027 is three sigma.
   double significance = 0.0027;
-  // True if the camera has not been moved on the bench: the bench zero is then compared too.
+  // True if the camera has not been moved on the bench: the bench offset is then compared too.
   bool same_bench = false;
   // The change of the blur that a sweep must be able to detect; otherwise its agreement proves
   // nothing. A change by d1 is in px of sigma, and a change of kappa is a share of kappa.
@@ -55,7 +55,7 @@ THICKLENS_EXPORT std::string VerdictName(Verdict verdict);
 struct Verification {
   Verdict verdict = Verdict::kUndetermined;   // whether the calibration holds
   std::string reason = "not run";             // one line: why this is the verdict
-  std::vector<ComparedParameter> parameters;  // present in both: d1, zf, kappa, floor, bench zero
+  std::vector<ComparedParameter> parameters;  // present in both: d1, zf, kappa, floor, bench offset
   int degrees_of_freedom = 0;                 // number of counted parameters
   double chi_square = 0;                      // joint chi^2 of the counted parameters
   double p_value = 1;                         // probability that chance alone exceeds it

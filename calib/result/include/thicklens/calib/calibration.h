@@ -95,7 +95,7 @@ enum class ScaleKind {
   kReversed,      // as 1/z with the opposite direction
 };
 
-// The bench zero from the image scale: 1/scale = (offset + direction * reading)/z_reference.
+// The bench offset from the image scale: 1/scale = (offset + direction * reading)/z_reference.
 struct ScaleModel {
   bool done = false;                     // true if the offset was found; for kInverseDepth alone
   std::string message = "not run";       // how it ended; without a result, the reason
@@ -106,7 +106,7 @@ struct ScaleModel {
   std::optional<model::Estimate> change_over_sweep;
   bool shows_no_scale = false;  // the target (spokes) looks the same at any scale: not sought
   int reference_frame = -1;     // index of the frame with scale 1; -1: none
-  Result offset_mm;             // the bench zero: position of the aperture
+  Result offset_mm;             // the bench offset: position of the aperture
   // Depth, from the aperture, at which the size on the sensor goes to infinity. It is not 0 because
   // the light of a point off the axis spreads unevenly over the pupil
   // (model::CentreOfPerspectiveMm, by the paper's law). It is part of offset_mm.
@@ -116,7 +116,7 @@ struct ScaleModel {
   // Depth of the reference frame from the centre of perspective:
   // 1/scale = (line_zero_mm + direction * reading)/reference_depth_mm.
   double reference_depth_mm = 0;
-  // The bench zero as measured from the centre of perspective, mm.
+  // The bench offset as measured from the centre of perspective, mm.
   double line_zero_mm() const { return offset_mm.value - centre_mm; }
   double reading_rms_mm = 0;  // scatter of the readings about the law
   int frames_used = 0;        // number of frames in the fit
@@ -191,7 +191,7 @@ struct ChannelFocus {
   model::Estimate focus_depth_mm;   // zf of this colour, from Ap
 };
 
-// The fit of sigma^2 = S0 + A (1/z - 1/zf)^2 by Ceres in (zf, kappa, floor). The bench zero is
+// The fit of sigma^2 = S0 + A (1/z - 1/zf)^2 by Ceres in (zf, kappa, floor). The bench offset is
 // held, and its error is propagated to the results.
 struct BlurFit {
   bool done = false;                      // true if the fit gave a result
@@ -250,10 +250,10 @@ struct CalibrationDiagnostics {
   Eigen::MatrixXd covariance;  // one row and column per name; empty: none
 
   // Results that are determined even where the rest is refused. They need neither camera nor bench
-  // zero.
+  // offset.
   SharpestReading sharpest;
   // Reading at the plane of focus by the blur fit: the position of focus in the sweep. Its error
-  // does not include that of the bench zero.
+  // does not include that of the bench offset.
   std::optional<model::Estimate> focus_reading_mm;
   // The symptoms whose causes were compared, with the causes that are named.
   std::vector<Diagnosis> diagnoses;
@@ -261,7 +261,7 @@ struct CalibrationDiagnostics {
 
   SourceRecipe paper_recipe;                        // the paper's method, for comparison
   SharpnessPeak sharpness;                          // depth of focus by sharpness alone
-  ScaleModel scale;                                 // the bench zero from the image scale
+  ScaleModel scale;                                 // the bench offset from the image scale
   BlurFit blur;                                     // the fit behind the results
   SideFit nearer, farther;                          // fits of the frames on each side of focus
   FieldMap field;                                   // focus over the field

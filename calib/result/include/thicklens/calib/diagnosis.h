@@ -41,7 +41,7 @@ struct Diagnosis {
 THICKLENS_EXPORT void SortCauses(Diagnosis* diagnosis);
 
 // The reading at which a sweep is sharpest: the peak of the normalised sharpness against the
-// reading. It needs no camera, no bench zero and no direction.
+// reading. It needs no camera, no bench offset and no direction.
 struct SharpestReading {
   bool done = false;                // true if a peak was found
   std::string message = "not run";  // how it ended; without a result, the reason
