@@ -228,7 +228,7 @@ class Solution {
     if (!(own_zf_sigma < 0.5 * (farthest - nearest))) {
       result_.diagnostics.focus_reading_mm.reset();
       Refuse(
-          fmt::format("the blur does not determine the depth of focus: {:.1f} +- {:.1f} mm in a "
+          fmt::format("the blur does not determine the in-focus distance: {:.1f} +- {:.1f} mm in a "
                       "sweep from {:.1f} to {:.1f} mm, with the bench offset held fixed",
                       zf, own_zf_sigma, nearest, farthest));
       return false;
@@ -281,7 +281,7 @@ class Solution {
                   "scale to determine the bench offset ({:.4g} +- {:.2g} mm)",
                   farthest_mm - nearest_mm, fit_.values[kFocusDepth], zero_mm.value, zero_mm.sigma);
     return fmt::format(
-        "the bench offset is not known well enough: {}, so that the depth of focus is {:.1f} +- "
+        "the bench offset is not known well enough: {}, so that the in-focus distance is {:.1f} +- "
         "{:.1f} mm. The reading at focus is known: {:.6g} +- {:.2g} mm. State offset_mm{}",
         from, fit_.values[kFocusDepth], result_.summary.focus_depth_mm->sigma,
         result_.diagnostics.focus_reading_mm->value, result_.diagnostics.focus_reading_mm->sigma,

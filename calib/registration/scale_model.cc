@@ -352,7 +352,7 @@ class ModelFinder {
       result->message =
           "the image scale does not change with the reading (a telecentric lens, a moving sensor, "
           "frames that were aligned, or one image repeated): it does not determine the bench "
-          "zero";
+          "offset";
     } else {
       result->message = fmt::format(
           "the readings span {:.3g} mm, too little to determine how the image scale changes with "

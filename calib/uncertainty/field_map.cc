@@ -47,7 +47,7 @@ class Field {
       return;
     }
     setup_.read_grey = [this](std::size_t frame) { return store_.Grey(frame); };
-    // Astigmatism comes first, because it may cause different depths of focus over the field.
+    // Astigmatism comes first, because it may cause different in-focus distances over the field.
     MeasureAstigmatism();
     const std::string astigmatism = AstigmatismInWords(result_);
     if (!astigmatism.empty()) result_.summary.warnings.push_back(astigmatism);

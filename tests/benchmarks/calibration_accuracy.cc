@@ -97,7 +97,7 @@ void AddOptions(CLI::App* app, Arguments* arguments) {
                 "instead: one sweep of each case, damaged in one way after the other");
   app->add_flag("--pupil-laws", arguments->pupil_laws,
                 "instead: sweeps under each law of the pupil, with a given and an unknown bench "
-                "zero: whether the intervals hold the truth");
+                "offset: whether the intervals hold the truth");
   app->add_option("--json", arguments->json_path, "write the tables to a file");
 }
 

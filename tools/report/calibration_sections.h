@@ -24,7 +24,7 @@ std::string ResultsSection(const std::vector<ResultRow>& rows, bool has_truth);
 // that are not stated. With a truth the camera's numbers are exact.
 std::string SystematicSection(const calib::FocusSweep& sweep, const calib::Calibration& calibration,
                               bool has_truth);
-// The depth of focus by every other method that measures it.
+// The in-focus distance by every other method that measures it.
 std::string OtherWaysSection(const calib::Calibration& calibration,
                              const std::vector<ResultRow>& rows);
 // Text on the field map and the colours, shown below the map.

@@ -206,7 +206,7 @@ std::string ResultsSection(const std::vector<ResultRow>& rows, bool has_truth) {
   html += kTableEnd;
   html +=
       "<p class=\"soft\">Statistical: one standard deviation from noise, readings and the bench "
-      "zero. Systematic: the interval that the causes in the table below allow together. The "
+      "offset. Systematic: the interval that the causes in the table below allow together. The "
       "paper's recipe has no error estimate.</p>\n";
   return html + (has_truth ? ErrorsTable(rows) : "");
 }

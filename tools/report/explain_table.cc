@@ -20,10 +20,10 @@ std::string HeadText(const model::Explanation& known) {
   };
   return fmt::format(
       "camera {}\n"
-      "image distance d1  {} mm\n"
-      "plane of focus zf  {} mm\n"
-      "blur ratio         {}\n"
-      "blur floor         {}\n\n",
+      "image distance d1     {} mm\n"
+      "in-focus distance zf  {} mm\n"
+      "blur ratio kappa      {}\n"
+      "blur floor            {}\n\n",
       PrintableUtf8(known.camera_name),
       with_sigma(known.image_distance_mm, known.image_distance_sigma_mm),
       DepthText(known.focus_depth_mm), with_sigma(known.blur_ratio, known.blur_ratio_sigma),

@@ -59,7 +59,8 @@ struct Verification {
   int degrees_of_freedom = 0;                 // number of counted parameters
   double chi_square = 0;                      // joint chi^2 of the counted parameters
   double p_value = 1;                         // probability that chance alone exceeds it
-  // The blur, px of sigma, that the smallest detectable change of d1 causes at the depth of focus.
+  // The blur, px of sigma, that the smallest detectable change of d1 causes at the in-focus
+  // distance.
   double detectable_blur_px = 0;
   std::vector<std::string> warnings;  // one line each
 };
@@ -68,7 +69,7 @@ struct Verification {
 // sweep was calibrated with. Both covariance matrices count. The file states no systematic interval
 // of the stored values. Therefore the systematic parts of the new sweep are counted once, with an
 // even distribution over their intervals, except those that the numbers of the camera file cause:
-// they move both calibrations alike. The depth of focus follows from d1: it is listed and not
+// they move both calibrations alike. The in-focus distance follows from d1: it is listed and not
 // counted. Throws Error if `stored` has no calibration or if the options are not valid.
 THICKLENS_EXPORT Verification VerifyCalibration(const model::Camera& stored,
                                                 const FocusSweep& sweep, const Calibration& found,

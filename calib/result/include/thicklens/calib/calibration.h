@@ -162,12 +162,12 @@ struct FieldTile {
   model::Estimate focus_depth_mm;   // zf of the tile, from Ap
   int cluster = 0;                  // index into FieldMap::clusters
 };
-// Tiles whose depths of focus agree: a part of the target at one depth.
+// Tiles whose in-focus distances agree: a part of the target at one depth.
 struct DepthCluster {
   model::Estimate focus_depth_mm;  // weighted mean of the tiles, from Ap
   int tiles = 0;                   // number of tiles
 };
-// Depth of focus over the field of view.
+// In-focus distance over the field of view.
 struct FieldMap {
   bool done = false;                // true if enough tiles were fitted
   std::string message = "not run";  // how it ended; without a result, the reason
@@ -260,7 +260,7 @@ struct CalibrationDiagnostics {
   FrameStructureFinding structure;  // vignetting, bands and dust of the frames
 
   SourceRecipe paper_recipe;                        // the paper's method, for comparison
-  SharpnessPeak sharpness;                          // depth of focus by sharpness alone
+  SharpnessPeak sharpness;                          // in-focus distance by sharpness alone
   ScaleModel scale;                                 // the bench offset from the image scale
   BlurFit blur;                                     // the fit behind the results
   SideFit nearer, farther;                          // fits of the frames on each side of focus
