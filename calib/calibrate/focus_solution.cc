@@ -347,8 +347,7 @@ class Solution {
     result_.summary.reason.clear();
     if (!result_.diagnostics.blur.undetermined.empty()) {
       result_.summary.outcome = Outcome::kPartial;
-      result_.summary.reason =
-          "the data do not determine blur_floor_px, which is therefore not written";
+      result_.summary.reason = "the blur floor is not determined";
     }
   }
 

@@ -113,7 +113,7 @@ class Fit {
                     setup_.reading_sigma_mm);
     const auto found =
         FromParabola(parabola, setup_, reference_mm, parameters_.global[kFloorVariance]);
-    if (!found) return Fail("the blur has no minimum in depth above the lens floor");
+    if (!found) return Fail("the blur has no minimum in depth above the blur floor");
     parameters_.global[kFocusDepth] = found->focus_depth_mm;
     parameters_.global[kBlurRatio] = found->blur_ratio;
     for (std::size_t m = 0; m < setup_.estimators.size(); ++m) {

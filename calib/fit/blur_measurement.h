@@ -46,7 +46,7 @@ struct BlurEvidence {
   std::vector<std::size_t> frames;  // indices into the sweep, for each of setup.frames
   int edges = -1, spectrum = -1;    // indices into setup.estimators; -1: absent
   // Edges of a target that is not stated to be an edge, where its texture is fitted. They give an
-  // upper limit of the lens floor.
+  // upper limit of the blur floor.
   std::optional<BlurSamples> unstated_edges;
   // The spectral estimator with other choices, for the systematic errors: see CompareChoices.
   std::optional<BlurSamples> other_psf, narrow_band;

@@ -20,10 +20,13 @@ std::string CalibrationSummary::BriefReport() const {
     return value ? fmt::format("{} {:.6g} +- {:.2g}{}", name, value->value, value->sigma, unit)
                  : fmt::format("{} not determined", name);
   };
-  std::string text = fmt::format(
-      "calibration {}: {}, {}, {}; {} frames used, {} rejected, {:.1f} s", OutcomeName(outcome),
-      number("d1", image_distance_mm, " mm"), number("zf", focus_depth_mm, " mm"),
-      number("kappa", blur_ratio, ""), frames_used, frames_rejected, seconds);
+  const char* found = outcome == Outcome::kOk        ? "calibrated"
+                      : outcome == Outcome::kPartial ? "partly calibrated"
+                                                     : "calibration refused";
+  std::string text =
+      fmt::format("{}: {}, {}, {}; {} frames used, {} rejected, {:.1f} s", found,
+                  number("d1", image_distance_mm, " mm"), number("zf", focus_depth_mm, " mm"),
+                  number("kappa", blur_ratio, ""), frames_used, frames_rejected, seconds);
   if (outcome != Outcome::kOk) text += "; " + reason;
   return text;
 }

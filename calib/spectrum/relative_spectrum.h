@@ -16,7 +16,7 @@ namespace thicklens::calib {
 //   G_i(nu) = g_i H_i(nu) exp(-2 pi i nu.t_i) T(nu).
 // T is the texture's own spectrum (free at every frequency: variable projection), g_i a gain near
 // 1, t_i a shift that the registration left over, and H_i the transfer function of the blur:
-//   Gaussian: exp(-2 pi^2 V_i |nu|^2);  disc: the lens floor's Gaussian times the disc's.
+//   Gaussian: exp(-2 pi^2 V_i |nu|^2);  disc: the blur floor's Gaussian times the disc's.
 // V_i, px^2 of the target, is the blur variance over scale^2, without the pixel box. T contains any
 // common blur, so that V is known only up to a constant. (The shape of a disc would determine the
 // constant, but the reference's V is held there, too.)
@@ -33,7 +33,7 @@ struct RelativeBlurOptions {
   // A mode is used in a frame where 2 pi^2 (V - Vmin) nu^2 is below this limit. It is 2 for a
   // Gaussian. A disc's first zero is at 1.84; its limit must be well below.
   double band = 2;
-  double floor_variance_px2 = 0.25;  // disc: sigma^2 of the lens floor, sensor px
+  double floor_variance_px2 = 0.25;  // disc: sigma^2 of the blur floor, sensor px
 };
 
 struct RelativeBlur {

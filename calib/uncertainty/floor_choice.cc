@@ -12,7 +12,7 @@
 namespace thicklens::calib {
 namespace {
 
-// Interval of a lens floor that was not measured, px: from a perfect lens to a soft one. If the
+// Interval of a blur floor that was not measured, px: from a perfect lens to a soft one. If the
 // target does not exclude it, the interval extends to the softest lens that gives a sharp image.
 constexpr double kUnknownFloorFromPx = 0;
 constexpr double kUnknownFloorToPx = 1.0;
@@ -75,7 +75,7 @@ Eigen::Vector2d UnknownFloor(const BlurEvidence& evidence, std::vector<std::stri
     }
   }
   warnings->push_back(
-      fmt::format("this target does not determine the lens floor; values from {} to {:.1f} px are "
+      fmt::format("this target does not determine the blur floor; values from {} to {:.1f} px are "
                   "allowed for, {}: measure the floor on a knife edge, or state blur_floor_px",
                   kUnknownFloorFromPx, to_px, why));
   return {kUnknownFloorFromPx * kUnknownFloorFromPx, to_px * to_px};

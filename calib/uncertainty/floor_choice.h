@@ -14,7 +14,7 @@ namespace thicklens::calib {
 struct FloorChoice {
   std::optional<model::Estimate> variance_px2;  // nothing: fitted freely
   FloorInterval interval_px2;                   // (lo, hi), where only these are known
-  bool is_measured = false;                     // the fit measures the lens floor itself
+  bool is_measured = false;                     // the fit measures the blur floor itself
 };
 
 // Chooses the floor's constraint. In one sweep only knowledge of the target separates the lens

@@ -74,7 +74,7 @@ class Parts {
   void AddFloor(const FloorInterval& floor) {
     if (!floor) return;
     SystematicPart part;
-    part.name = "lens floor";
+    part.name = "blur floor";
     part.remedy =
         "photograph a knife edge (target: knife-edge) with the same lens and state "
         "blur_floor_px: {from_calibration: ...}";
@@ -289,7 +289,7 @@ class Parts {
     const auto total = [&](Eigen::Vector2d SystematicPart::*of) {
       Eigen::Vector2d ends(0, 0), squares(0, 0);
       for (const SystematicPart& part : result_.diagnostics.systematic_parts) {
-        if (floor && part.name == "lens floor") {
+        if (floor && part.name == "blur floor") {
           ends += part.*of;
         } else {
           squares += (part.*of).cwiseAbs2();

@@ -43,7 +43,7 @@ const std::vector<EffectFacts>& AllEffects() {
        "the whole lens sees the same parts of a surface as its middle", EffectUnit::kPx, false},
       {Effect::kPixelBox, "pixel-box", "a pixel is the mean over its square",
        "a pixel samples the light at its centre", EffectUnit::kPx, false},
-      {Effect::kLensFloor, "lens-floor", "blur of the lens in its plane of focus",
+      {Effect::kLensFloor, "lens-floor", "blur floor: blur of the lens in its plane of focus",
        "a lens without aberrations", EffectUnit::kPx, false},
       {Effect::kDiffraction, "diffraction", "blur by the wave nature of light at the aperture",
        "rays", EffectUnit::kPx, false},

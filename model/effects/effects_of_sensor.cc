@@ -1,4 +1,4 @@
-// Effects behind the aperture: diffraction, lens floor, pixels, electronics.
+// Effects behind the aperture: diffraction, blur floor, pixels, electronics.
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -36,7 +36,7 @@ EffectImpact PixelBoxImpact(const EffectOptics& optics, const EffectSite& place,
           EncodedChange(optics, place, std::min(change, place.bright - place.dark))};
 }
 
-// Lens floor. Formula: a Gaussian of the measured sigma, in quadrature with defocus. Bound: the sum
+// Blur floor. Formula: a Gaussian of the measured sigma, in quadrature with defocus. Bound: the sum
 // of BlurChange and the bound of diffraction, which appears when the floor that contains it is
 // removed. Enters: the landing points of the rays.
 EffectImpact LensFloorImpact(const EffectOptics& optics, const EffectSite& place,
@@ -51,7 +51,7 @@ EffectImpact LensFloorImpact(const EffectOptics& optics, const EffectSite& place
   return {floor_px, EncodedChange(optics, place, change) + of_diffraction};
 }
 
-// Diffraction. Formula: airy.h. A measured lens floor already contains diffraction; it is then not
+// Diffraction. Formula: airy.h. A measured blur floor already contains diffraction; it is then not
 // added again, and its impact is 0. Bound: for the Gaussian, BlurChange; for the pattern of a disc,
 // which has no variance, the mean of min(R, |d| slope) + J min(1, sqrt(2) |d_n|/2) over its
 // displacements d. Without the box the second term is J/2. Enters: the landing points of the rays.

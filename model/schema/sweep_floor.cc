@@ -1,4 +1,4 @@
-// A lens floor of another calibration: it is copied to a sweep and compared with the sweep's
+// A blur floor of another calibration: it is copied to a sweep and compared with the sweep's
 // camera.
 #include <fmt/format.h>
 

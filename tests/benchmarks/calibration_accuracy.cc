@@ -75,7 +75,7 @@ void AddOptions(CLI::App* app, Arguments* arguments) {
       ->check(CLI::IsMember(TargetNames()));
   app->add_option(
          "--floor", arguments->floors,
-         "lens floor of textures: exact, drawn about the truth (both); an edge measures it")
+         "blur floor of textures: exact, drawn about the truth (both); an edge measures it")
       ->check(CLI::IsMember({"exact", "drawn"}));
   app->add_option("--sweeps", arguments->sweeps, "sweeps of each case and target (20)")
       ->check(CLI::Range(1, 20000));

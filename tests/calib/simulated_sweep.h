@@ -92,7 +92,7 @@ inline SimulatedSweep Simulate(const model::SweepSimulationOptions& options,
   return result;
 }
 
-// States the floor, as known to a user who has measured the lens floor on a knife edge before.
+// States the floor, as known to a user who has measured the blur floor on a knife edge before.
 inline void GiveFloor(SimulatedSweep* simulated) {
   simulated->sweep.floor.given_px = model::Estimate{simulated->truth.blur_floor_px, 0.01};
 }

@@ -24,7 +24,7 @@ model::SweepSimulationOptions BenchSweepOptions();
 // its sensor. Besides texture and noise the seed draws
 // - the position of the plane of focus between two frames: otherwise a method that names a frame
 //   would be always right or always wrong,
-// - the error of the stated lens floor (not for a knife edge, which shows the floor), because a
+// - the error of the stated blur floor (not for a knife edge, which shows the floor), because a
 //   floor that has an error but is stated without one makes the errors of the results look too
 //   large.
 BenchSweep MakeBenchSweep(const model::SweepSimulationOptions& description,

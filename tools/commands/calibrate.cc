@@ -141,7 +141,8 @@ CommandResult RunCalibration(const CalibrateOptions& options, const Sweep& sweep
   }
   // A refusal before any measurement is one line on stderr.
   if (calibration.refusal.empty() || calibration.diagnostics.paper_recipe.done)
-    PrintResult(options.common, CalibrationText(focus_sweep, calibration, TruthOf(sweep)));
+    PrintResult(options.common,
+                CalibrationText(focus_sweep, calibration, TruthOf(sweep), options.camera_output));
   CommandResult result;
   result.is_written = outputs.camera || outputs.report;
   result.summary =

@@ -147,7 +147,8 @@ std::string SecondaryLines(const calib::Calibration& calibration,
                                   blur.estimator.empty() ? "" : ", by " + blur.estimator)
                     : fmt::format("blur fit: none, {}\n", PrintableUtf8(blur.message));
   for (const std::string& name : blur.undetermined)
-    text += fmt::format("blur fit: the data do not determine {}\n", PrintableUtf8(name));
+    text += fmt::format("blur fit: the data do not determine {}\n",
+                        PrintableUtf8(WithNamesForKeys(name)));
   AddLine("blur fit", WorstKnownLine(blur), &text);
   AddLine("blur fit", OutsideLine(blur), &text);
   return text;
@@ -224,7 +225,7 @@ std::string FrameName(const std::string& image) {
 }
 
 std::string CalibrationText(const calib::FocusSweep& sweep, const calib::Calibration& calibration,
-                            const model::SweepTruth* truth) {
+                            const model::SweepTruth* truth, const std::string& camera_file) {
   const std::vector<ResultRow> rows = ResultRows(calibration, truth);
   const auto rejected =
       std::count_if(calibration.frames.begin(), calibration.frames.end(),
@@ -248,11 +249,8 @@ std::string CalibrationText(const calib::FocusSweep& sweep, const calib::Calibra
   text += SecondaryLines(calibration, rows) + DetailLines(sweep, calibration);
   for (const std::string& warning : calibration.summary.warnings)
     text += fmt::format("warning: {}\n", PrintableUtf8(warning));
-  text += calibration.summary.outcome == calib::Outcome::kOk
-              ? fmt::format("{}", calib::OutcomeName(calibration.summary.outcome))
-              : fmt::format("{}: {}", calib::OutcomeName(calibration.summary.outcome),
-                            PrintableUtf8(calibration.summary.reason));
-  text += fmt::format(" ({:.1f} s)\n", calibration.summary.seconds);
+  text += fmt::format("{} ({:.1f} s)\n", PrintableUtf8(OutcomeLine(calibration, camera_file)),
+                      calibration.summary.seconds);
   return text;
 }
 

@@ -29,10 +29,10 @@ std::vector<ResultRow> ResultRows(const calib::Calibration& calibration,
 // Returns the file name of a path in printable form.
 std::string FrameName(const std::string& image);
 
-// Returns the text that is printed after a calibration. `truth` may be null. It ends with a
-// newline.
+// Returns the text that is printed after a calibration. `truth` may be null, and `camera_file` is
+// empty if no camera file is written. It ends with a newline.
 std::string CalibrationText(const calib::FocusSweep& sweep, const calib::Calibration& calibration,
-                            const model::SweepTruth* truth);
+                            const model::SweepTruth* truth, const std::string& camera_file = "");
 
 }  // namespace thicklens::tools
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdlib>
+#include <utility>
 
 #include "tools/report/rounding.h"
 
@@ -165,6 +166,31 @@ std::string DistortionLine(const calib::ScaleModel& scale) {
                                          : "barrel");
 }
 
+std::string OutcomeLine(const calib::Calibration& calibration, const std::string& camera_file) {
+  const std::string& reason = calibration.summary.reason;
+  switch (calibration.summary.outcome) {
+    case calib::Outcome::kOk:
+      return "calibrated";
+    case calib::Outcome::kPartial:
+      return fmt::format("partly calibrated: {}; the other results are {}", reason,
+                         camera_file.empty() ? "determined" : "in " + camera_file);
+    default:
+      return "refused: " + reason;
+  }
+}
+
+std::string WithNamesForKeys(std::string text) {
+  for (const auto& [key, name] : {std::pair("image_distance_mm", "the image distance d1"),
+                                  std::pair("focus_depth_mm", "the in-focus distance zf"),
+                                  std::pair("blur_ratio", "the blur ratio kappa"),
+                                  std::pair("blur_floor_px", "the blur floor"),
+                                  std::pair("bench_offset_mm", "the bench offset")}) {
+    for (std::size_t at = text.find(key); at != std::string::npos; at = text.find(key, at))
+      text.replace(at, std::char_traits<char>::length(key), name);
+  }
+  return text;
+}
+
 std::string OutsideLine(const calib::BlurFit& blur) {
   if (!(blur.outside_mm > 0)) return "";
   return fmt::format("the focus lies {:.2g} mm outside the sweep and is extrapolated",
@@ -174,7 +200,7 @@ std::string OutsideLine(const calib::BlurFit& blur) {
 std::string WorstKnownLine(const calib::BlurFit& blur) {
   constexpr double kWorthReporting = 0.5;
   if (blur.weak_direction.empty() || std::abs(blur.weak_correlation) < kWorthReporting) return "";
-  return "least certain: " + blur.weak_direction;
+  return "least certain: " + WithNamesForKeys(blur.weak_direction);
 }
 
 std::string WidenedLine(const calib::BlurFit& blur) {

@@ -29,6 +29,11 @@ std::string ShapeLine(const calib::FocusSweep& sweep, const calib::BlurFit& blur
 std::string MagnificationLine(const calib::Calibration& calibration);
 std::string DistortionLine(const calib::ScaleModel& scale);
 std::string OutsideLine(const calib::BlurFit& blur);
+// An outcome in words, and its reason: "partly calibrated: the blur floor is not determined; the
+// other results are in camera.yaml". `camera_file` is empty if none was written.
+std::string OutcomeLine(const calib::Calibration& calibration, const std::string& camera_file);
+// A text in which the keys of the results in files are replaced by their names in the results.
+std::string WithNamesForKeys(std::string text);
 // The combination of parameters with the largest error; empty if they are hardly correlated.
 std::string WorstKnownLine(const calib::BlurFit& blur);
 // Reports that the frames deviate from the law by more than their errors, if they do.

@@ -92,14 +92,10 @@ std::string DeterminedInWords(const Calibration& calibration) {
   return html;
 }
 
-std::string Outcome(const Calibration& calibration, std::string* css_class) {
-  if (calibration.summary.outcome == calib::Outcome::kOk) {
-    *css_class = "ok";
-    return "Calibrated";
-  }
-  const bool partial = calibration.summary.outcome == calib::Outcome::kPartial;
-  *css_class = partial ? "partial" : "refused";
-  return (partial ? "Partly calibrated: " : "Refused: ") + calibration.summary.reason;
+std::string Outcome(const Calibration& calibration) {
+  std::string text = OutcomeLine(calibration, "");
+  text[0] = static_cast<char>(text[0] - 'a' + 'A');
+  return text;
 }
 
 }  // namespace
@@ -112,10 +108,9 @@ std::string AsSentence(std::string text) {
 }
 
 std::string VerdictSection(const FocusSweep& sweep, const Calibration& calibration) {
-  std::string css_class;
-  const std::string outcome = Outcome(calibration, &css_class);
   std::string html = fmt::format("<div class=\"verdict {}\">\n<p class=\"outcome\">{}</p>\n",
-                                 css_class, EscapeXml(Typeset(outcome)));
+                                 calib::OutcomeName(calibration.summary.outcome),
+                                 EscapeXml(Typeset(Outcome(calibration))));
   if (!calibration.diagnostics.advice.empty())
     html += fmt::format("<p><b>What to do next:</b> {}</p>\n",
                         EscapeXml(Typeset(AsSentence(calibration.diagnostics.advice))));
@@ -124,9 +119,6 @@ std::string VerdictSection(const FocusSweep& sweep, const Calibration& calibrati
   html += Paragraph(LimitInWords(sweep, calibration));
   const calib::BlurFit& blur = calibration.diagnostics.blur;
   html += Paragraph(AsSentence(OutsideLine(blur)));
-  if (!blur.undetermined.empty())
-    html +=
-        Paragraph(fmt::format("The data do not determine {}.", fmt::join(blur.undetermined, ", ")));
   html += Paragraph(AsSentence(WorstKnownLine(blur)));
   html += Paragraph(AsSentence(Typeset(ShapeLine(sweep, blur))));
   html += "</div>\n";

@@ -46,7 +46,7 @@ std::string TableText(const model::Explanation& known) {
                         row.sigma_px, row.magnification, row.thin_blur_radius_px);
   }
   return text +
-         "sigma: per axis, of defocus and lens floor together, without the box of the pixel\n\n";
+         "sigma: per axis, of defocus and blur floor together, without the box of the pixel\n\n";
 }
 
 std::string DepthOfFieldText(const model::Explanation& known) {

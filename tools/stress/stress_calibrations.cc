@@ -259,7 +259,7 @@ std::vector<StressCase> Optics() {
     simulation->camera.calibration->blur_floor_px = model::Estimate{3, 0};
   });
   cases.push_back(Sweep("floor-larger-than-blur",
-                        "a lens floor of 3 px, and 1 px of defocus at most",
+                        "a blur floor of 3 px, and 1 px of defocus at most",
                         "d1, zf and kappa within 4 standard errors of the truth, d1 within 200 um",
                         soft, Truth(200)));
   for (const double wrong_mm : {35.0, 70.0}) {

@@ -24,7 +24,7 @@ struct StressSweep {
   static model::SweepSimulationOptions UsualSimulation();
 };
 
-// Writes sweep/ with its frames and sweep.yaml; the lens floor and the bench offset are given.
+// Writes sweep/ with its frames and sweep.yaml; the blur floor and the bench offset are given.
 model::SweepTruth WriteSweep(const std::filesystem::path& folder, const StressSweep& sweep);
 
 // Returns the run of `calibrate` on this sweep, with the output camera.yaml.

@@ -11,7 +11,7 @@
 
 namespace thicklens::accuracy {
 
-// How the calibration gets the lens floor.
+// How the calibration gets the blur floor.
 enum class Floor {
   kExact,     // the true variance, with a stated error of 0.01 px^2 nevertheless
   kDrawn,     // a variance drawn about the truth with that error

@@ -90,7 +90,7 @@ TEST(SolveFocus, AFewEdgesBesideEnoughTextureDoNoHarm) {
 TEST(SolveFocus, AFloorAboveTheBlursCurvatureIsRefused) {
   FocusCase c = FocusCase().WithTexture(0.01).WithFloor(12, 0);  // A uf^2 = 116.6 px^2
   c.Solve();
-  ExpectRefused(c.calibration, "no minimum in depth above the lens floor");
+  ExpectRefused(c.calibration, "no minimum in depth above the blur floor");
   EXPECT_THAT(c.calibration.diagnostics.blur.message, HasSubstr("no minimum"));
   EXPECT_FALSE(c.calibration.diagnostics.blur.done);
 }

@@ -90,7 +90,7 @@ TEST(SolveFocus, AGivenFloorIsWrittenWithItsError) {
   LinearReference reference{kErrorPx2, true, 0.03};
   ExpectCovariance(c.calibration, reference.Covariance(c.bench), {0, 1, 2, 3});
   // The floor has no interval, and therefore no systematic part.
-  EXPECT_EQ(c.Part("lens floor"), nullptr);
+  EXPECT_EQ(c.Part("blur floor"), nullptr);
 }
 
 // The error of the floor enters zf: dzf = zf dS0/(A uf^2), where S0 is the floor squared.
@@ -142,7 +142,7 @@ TEST(SolveFocus, AKnifeEdgeMeasuresTheFloor) {
               ElementsAre("image_distance_mm", "blur_ratio", "blur_floor_px", "bench_offset_mm"));
   ExpectCovariance(c.calibration, reference, {0, 1, 2, 3});
   EXPECT_EQ(c.calibration.diagnostics.blur.estimator, "edges");
-  EXPECT_EQ(c.Part("lens floor"), nullptr);
+  EXPECT_EQ(c.Part("blur floor"), nullptr);
 }
 
 TEST(SolveFocus, AKnifeEdgeBesideATextureFixesTheTexturesFloorToo) {
@@ -220,7 +220,7 @@ TEST(SolveFocus, AnIntervalIsAnIntervalOfTheFocus) {
               1e-2);
   EXPECT_NEAR(c.calibration.summary.focus_depth_mm->systematic->y(), FocusWithFloor(c.bench, 0.64),
               1e-2);
-  ASSERT_NE(c.Part("lens floor"), nullptr);
+  ASSERT_NE(c.Part("blur floor"), nullptr);
   // The floor was stated, so there is no warning.
   EXPECT_THAT(c.calibration.summary.warnings, IsEmpty());
   // The remaining rows equal those of the reference with a fixed floor.
@@ -239,7 +239,7 @@ TEST(SolveFocus, AnUnknownFloorIsUpToASoftLens) {
   ExpectInterval(c, 0, 3, 1e-12);
   EXPECT_NEAR(c.calibration.summary.focus_depth_mm->value, FocusWithFloor(c.bench, 4.5), 1e-2);
   EXPECT_THAT(c.calibration.summary.warnings,
-              ElementsAre(AllOf(HasSubstr("this target does not determine the lens floor"),
+              ElementsAre(AllOf(HasSubstr("this target does not determine the blur floor"),
                                 HasSubstr("0 to 3.0 px"), HasSubstr("state blur_floor_px"))));
 }
 

@@ -152,7 +152,7 @@ TEST(VerifyCalibration, TheBenchZeroIsComparedWhereTheCameraHasNotMoved) {
 TEST(VerifyCalibration, SystematicPartsOfTheNewSweepWidenWhatTheCameraFileDoesNotCause) {
   Calibration found = FoundCalibration(kD1Mm + 0.01, 0.001, kRatio, 0.001);
   SystematicPart floor, focal;
-  floor.name = "lens floor";
+  floor.name = "blur floor";
   floor.image_distance_mm = {-0.01, 0.02};
   focal.name = "lens.front_focal_length_mm";
   focal.image_distance_mm = {-1, 1};

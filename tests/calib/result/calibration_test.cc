@@ -21,7 +21,7 @@ TEST(CalibrationSummary, IsOneLine) {
   summary.frames_rejected = 2;
   summary.seconds = 1.5;
   EXPECT_EQ(summary.BriefReport(),
-            "calibration ok: d1 57.25 +- 0.12 mm, zf 400 +- 0.5 mm, kappa 0.4375 +- 0.001; 19 "
+            "calibrated: d1 57.25 +- 0.12 mm, zf 400 +- 0.5 mm, kappa 0.4375 +- 0.001; 19 "
             "frames used, 2 rejected, 1.5 s");
 }
 

@@ -111,7 +111,7 @@ TEST(ChooseFloor, ASofterLensThanUsualIsAllowedForWhereTheTextureDoesNotExcludeI
         << floor_px;
     EXPECT_GE((*c.summary.blur_floor_px->systematic)[1], std::max(1.0, floor_px));
     EXPECT_THAT(c.summary.warnings,
-                Contains(HasSubstr("this target does not determine the lens floor")));
+                Contains(HasSubstr("this target does not determine the blur floor")));
   }
 }
 

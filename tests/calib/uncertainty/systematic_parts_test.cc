@@ -75,7 +75,7 @@ TEST(AddSystematicParts, TheFloorsEndsMoveTheResultsAsDerived) {
   Solved s = Texture(0);
   const Eigen::Vector2d floor(0.05, 0.65);
   s.Add(floor);
-  const SystematicPart* part = s.Part("lens floor");
+  const SystematicPart* part = s.Part("blur floor");
   ASSERT_TRUE(part);
   const double curvature = s.bench.Curvature(), zf = s.bench.focus_mm;
   const double f1 = s.bench.lens.front_focal_length_mm;
@@ -101,7 +101,7 @@ TEST(AddSystematicParts, TheFloorsEndsMoveTheResultsAsDerived) {
 TEST(AddSystematicParts, WithoutAnIntervalTheFloorIsNoPart) {
   Solved s = Texture(0);
   s.Add();
-  EXPECT_FALSE(s.Part("lens floor"));
+  EXPECT_FALSE(s.Part("blur floor"));
   // The limited accuracy of the blur estimator affects kappa only.
   ASSERT_TRUE(s.calibration.summary.focus_depth_mm->systematic);
   EXPECT_NEAR((*s.calibration.summary.focus_depth_mm->systematic)[0], s.bench.focus_mm, 1e-3);
@@ -185,7 +185,7 @@ TEST(AddSystematicParts, TheFloorAddsAndTheRestGoesInQuadrature) {
   s.sweep.camera.statements["lens.rear_focal_length_mm"] = {3e-4, false};
   s.sweep.camera.statements["lens.lens_thickness_mm"] = {4e-4, false};
   s.Add(Eigen::Vector2d(0.05, 0.65));
-  const double floor_mm = s.Part("lens floor")->image_distance_mm[1];
+  const double floor_mm = s.Part("blur floor")->image_distance_mm[1];
   ASSERT_GT(floor_mm, 3e-4);
   const Result& d1 = *s.calibration.summary.image_distance_mm;
   EXPECT_NEAR(d1.systematic.value()[1] - d1.value, floor_mm + std::hypot(3.097e-4, 4e-4), 1e-5);
@@ -284,9 +284,9 @@ TEST(AddSystematicParts, TheAdviceNamesTheLargestPartOfImageDistance) {
   Solved floor = Texture(0, 1e-3);
   floor.sweep.camera.statements["lens.rear_focal_length_mm"] = {1e-5, false};
   floor.Add(Eigen::Vector2d(0, 0.49));
-  EXPECT_EQ(floor.calibration.diagnostics.systematic_parts.front().name, "lens floor");
+  EXPECT_EQ(floor.calibration.diagnostics.systematic_parts.front().name, "blur floor");
   EXPECT_THAT(floor.calibration.diagnostics.advice,
-              AllOf(StartsWith("lens floor is "), HasSubstr("knife edge")));
+              AllOf(StartsWith("blur floor is "), HasSubstr("knife edge")));
 
   Solved tolerance = Texture(0, 1e-3);
   tolerance.sweep.camera.statements["lens.rear_focal_length_mm"] = {0.2, false};

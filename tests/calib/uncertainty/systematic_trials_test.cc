@@ -163,7 +163,7 @@ TEST(AddSystematicParts, OnEachEndTheFloorAddsToTheRest) {
   c.sweep.camera.statements["lens.rear_focal_length_mm"] = {3e-4, false};
   c.sweep.camera.statements["lens.lens_thickness_mm"] = {4e-4, false};
   c.Solve();
-  const SystematicPart* floor = c.Part("lens floor");
+  const SystematicPart* floor = c.Part("blur floor");
   ASSERT_NE(floor, nullptr);
   const double rest_mm = std::hypot(3e-4 * 400 / 387.5, 4e-4);
   const Result& d1 = *c.calibration.summary.image_distance_mm;

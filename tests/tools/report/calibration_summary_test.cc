@@ -64,7 +64,7 @@ TEST(CalibrationText, PutsBothMethodsBesideTheTruth) {
   EXPECT_THAT(LineWith(text, "blur ratio kappa"), HasSubstr("0.4512 +- 0.0021"));
   EXPECT_THAT(LineWith(text, "normalised sharpness"), HasSubstr("400.9 +- 1.3 mm"));
   EXPECT_THAT(LineWith(text, "image scale"), HasSubstr("12.29 +- 0.11 mm"));
-  EXPECT_THAT(text, HasSubstr("\nok (2.7 s)\n"));
+  EXPECT_THAT(text, HasSubstr("\ncalibrated (2.7 s)\n"));
 }
 
 TEST(CalibrationText, AnErrorThatTheIntervalAllowsForIsNotCountedInSigmas) {
@@ -107,7 +107,10 @@ TEST(CalibrationText, RejectedFramesHaveTheirReasons) {
   EXPECT_THAT(text, HasSubstr("  dark (2 frames):\n    frame_000.png: mean 0.001"));
   EXPECT_THAT(text, HasSubstr("  frame_009.png: blank\n"));
   EXPECT_THAT(text, HasSubstr("warning: focus extrapolated by 3 mm\n"));
-  EXPECT_THAT(text, HasSubstr("partial: floor unknown (2.7 s)\n"));
+  EXPECT_THAT(text, HasSubstr("\npartly calibrated: floor unknown; the other results are "
+                              "determined (2.7 s)\n"));
+  EXPECT_THAT(CalibrationText(made.sweep, made.calibration, nullptr, "out/camera.yaml"),
+              HasSubstr("; the other results are in out/camera.yaml (2.7 s)\n"));
 }
 
 TEST(CalibrationText, DetailsTakeFewLines) {
@@ -124,7 +127,7 @@ TEST(CalibrationText, DetailsTakeFewLines) {
   EXPECT_THAT(text, HasSubstr("field: tilt about the vertical axis +1.210 +- 0.090 deg"));
   EXPECT_THAT(text, HasSubstr("colours: red 400.61 +- 0.12 mm, green 400.02"));
   EXPECT_THAT(LineWith(text, "blur shape: "), HasSubstr("(chi2/dof 1.04 against 2.31)"));
-  EXPECT_THAT(LineWith(text, "systematic: lens floor"),
+  EXPECT_THAT(LineWith(text, "systematic: blur floor"),
               HasSubstr("zf -2.9 .. +3.6 mm, d1 -0.0015 .. +0.0012 mm, kappa -0.0070 .. +0.0080"));
   EXPECT_THAT(text, HasSubstr("advice: photograph a knife edge"));
   EXPECT_LE(std::count(text.begin(), text.end(), '\n'), 35);

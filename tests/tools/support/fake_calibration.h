@@ -110,7 +110,7 @@ inline void AddDetails(calib::Calibration* calibration) {
   }
   c.diagnostics.magnification = calib::MagnificationCheck{26.4812, 5, {16.1, 0.05}};
   c.diagnostics.systematic_parts = {
-      {"lens floor", {-2.9, 3.6}, {-0.0015, 0.0012}, {-0.007, 0.008}, "photograph a knife edge"},
+      {"blur floor", {-2.9, 3.6}, {-0.0015, 0.0012}, {-0.007, 0.008}, "photograph a knife edge"},
       {"lens.front_focal_length_mm",
        {0, 0},
        {-0.1, 0.1},

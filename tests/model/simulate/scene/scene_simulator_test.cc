@@ -449,7 +449,7 @@ TEST(SceneSimulatorTest, DiscAndMillimetresDescribeTheSamePart) {
 }
 
 // The photograph is the mean of the views over the aperture. This includes occlusions, a slant and
-// the lens floor.
+// the blur floor.
 TEST(SceneSimulatorTest, PhotographIsTheMeanOfItsViews) {
   SceneLayer back = Leaves(304, 2);
   back.plane.slope = {1, -2};

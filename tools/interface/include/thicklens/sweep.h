@@ -54,7 +54,7 @@ struct SweepOverrides {
   std::optional<double> offset_sigma_mm;  // finite, >= 0; needs an offset
   std::optional<model::BenchDirection> direction;  // sign of the reading in z
   std::optional<double> reading_sigma_mm;          // finite, >= 0
-  bool floor_unknown = false;                  // discards what the file states of the lens floor
+  bool floor_unknown = false;                  // discards what the file states of the blur floor
   std::optional<Measured> floor_px;            // value and sigma finite and >= 0
   std::string floor_from_calibration;          // a camera file; excludes floor_px and floor_unknown
   std::optional<model::SweepTarget> target;    // kind of the target

@@ -26,7 +26,7 @@ struct Result {
 // may differ from its value because of this source, with lowest <= 0 <= highest, in the result's
 // unit.
 struct SystematicPart {
-  std::string name;  // "lens floor", "side of focus", "lens.front_focal_length_mm"
+  std::string name;  // "blur floor", "side of focus", "lens.front_focal_length_mm"
   Eigen::Vector2d focus_depth_mm{0, 0};     // change of zf, mm
   Eigen::Vector2d image_distance_mm{0, 0};  // change of d1, mm
   Eigen::Vector2d blur_ratio{0, 0};         // change of kappa
@@ -231,7 +231,7 @@ struct CalibrationSummary {
   std::optional<Result> image_distance_mm;  // d1, from Ap to the sensor
   std::optional<Result> focus_depth_mm;     // zf, from Ap toward the scene [S13]
   std::optional<Result> blur_ratio;         // kappa, dimensionless
-  std::optional<Result> blur_floor_px;      // sigma of the lens floor
+  std::optional<Result> blur_floor_px;      // sigma of the blur floor
   std::optional<Result> bench_offset_mm;    // depth of reading 0 from Ap
   double chi2_per_dof = 0;                  // of the blur fit; 0: there is none
   // In the blur fit, or, before the fit, the frames that passed the quality checks.

@@ -28,7 +28,7 @@ struct FocusSweep {
   std::optional<model::Estimate> offset_mm;  // absent: found from the image scale
   model::BenchDirection direction = model::BenchDirection::kAway;  // sign of the reading in z
   model::SweepTarget target = model::SweepTarget::kAuto;  // kind of the target, if it is stated
-  model::FloorKnowledge floor;                            // what is known of the lens floor, px
+  model::FloorKnowledge floor;                            // what is known of the blur floor, px
   std::optional<double> target_period_mm;                 // period of a periodic target
   model::RegionOfInterest roi;                            // the part of the frames that is measured
 

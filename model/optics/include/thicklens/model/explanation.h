@@ -23,7 +23,7 @@ struct DepthRow {
   double blur_radius_px = 0;          // the same in px
   double defocus_sigma_px = 0;        // kappa r_defocus/p
   double defocus_sigma_error_px = 0;  // its standard deviation from those of kappa and d1
-  double sigma_px = 0;                // with the lens floor; without the pixel box
+  double sigma_px = 0;                // with the blur floor; without the pixel box
   double magnification = 0;           // of the chief ray, absolute value
   double thin_blur_radius_px = 0;     // of a thin lens at the same image distance
   double thin_magnification = 0;      // likewise
@@ -60,7 +60,7 @@ struct Explanation {
   double focus_depth_mm = 0;            // may be +inf
   double blur_ratio = 0;                // kappa, dimensionless
   double blur_ratio_sigma = 0;          // its standard deviation
-  std::optional<double> blur_floor_px;  // sigma of the lens floor, px; absent: not calibrated
+  std::optional<double> blur_floor_px;  // sigma of the blur floor, px; absent: not calibrated
   std::vector<DepthRow> rows;           // one per depth, from near to far
   std::vector<DepthOfFieldRow> depth_of_field;  // one per limit of the blur radius
   double hyperfocal_mm = 0;     // plane of focus whose blur radius at infinity is 1 px

@@ -28,7 +28,7 @@ enum class SweepTarget {
 // Name of the kind: "auto", "texture", "printed-edge" or "knife-edge".
 THICKLENS_EXPORT std::string SweepTargetName(SweepTarget target);
 
-// Prior knowledge of the lens floor, px: nothing, a value, or an interval.
+// Prior knowledge of the blur floor, px: nothing, a value, or an interval.
 struct FloorKnowledge {
   std::optional<Estimate> given_px;      // a value and its standard deviation, px
   std::optional<double> from_px, to_px;  // both or neither are present
@@ -64,7 +64,7 @@ struct SweepFile {
   std::optional<Estimate> offset_mm;  // absent: unknown
   BenchDirection direction = BenchDirection::kAway;  // whether readings grow away from the camera
   SweepTarget target = SweepTarget::kAuto;           // what was photographed
-  FloorKnowledge floor;                              // what is known of the lens floor
+  FloorKnowledge floor;                              // what is known of the blur floor
   std::optional<FloorOrigin> floor_origin;  // present if another calibration gave the floor
   std::optional<double> target_period_mm;   // period of a periodic target (docs/file-formats.md)
   RegionOfInterest roi;                     // the part that is measured
@@ -104,7 +104,7 @@ struct SweepTruth {
   double image_distance_mm = 0;  // d1 from Ap to the sensor, mm
   double focus_depth_mm = 0;     // zf from Ap, mm
   double blur_ratio = 0;         // kappa, dimensionless
-  double blur_floor_px = 0;      // sigma of the lens floor, px
+  double blur_floor_px = 0;      // sigma of the blur floor, px
   double bench_offset_mm = 0;    // depth from Ap of reading 0, mm
   double tilt_deg = 0;           // tilt of the target, as in TargetOptions
   std::string pupil_law;         // PupilLawName; empty: not stated

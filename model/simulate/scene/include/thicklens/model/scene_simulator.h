@@ -132,7 +132,7 @@ THICKLENS_EXPORT EffectSet ImageEffects();
 
 // What SceneSimulator simulates. The defaults are those of the file's schema.
 struct SceneSimulationOptions {
-  // Image size, pitch and lens. The calibration gives d1, kappa and the lens floor (0 if absent).
+  // Image size, pitch and lens. The calibration gives d1, kappa and the blur floor (0 if absent).
   Camera camera;
   std::vector<SceneLayer> layers;  // in any order: each ray shows the nearest layer
   EffectSelectionOptions effects;  // a choice of the effects ImageEffects()
@@ -165,7 +165,7 @@ struct SceneTruth {
   double image_distance_mm = 0;                        // d1 from Ap to the sensor, mm
   double focus_depth_mm = 0;                           // zf from Ap, mm
   double blur_ratio = 0;                               // kappa, dimensionless
-  double blur_floor_px = 0;                            // sigma of the lens floor, px
+  double blur_floor_px = 0;                            // sigma of the blur floor, px
   double nearest_depth_mm = 0, farthest_depth_mm = 0;  // minimum and maximum of the depth map
   double largest_blur_sigma_px = 0;       // maximum of defocus alone, over the depth map
   EffectSelectionRecord effects;          // which effects the photograph has
@@ -194,7 +194,7 @@ struct SceneRun {
 // depends on the blur and the surroundings of the pixel (sampling_plan.h); pixels with equal
 // numbers use the same set. The set spreads over the aperture by the camera's PSF (a Gaussian of
 // standard deviation kappa r, or a disc of radius 2 kappa r; the second moment of the set is
-// exactly (kappa r)^2) and over the pixel box widened by the lens floor. Each effect that is off
+// exactly (kappa r)^2) and over the pixel box widened by the blur floor. Each effect that is off
 // removes its part of the spread. With 600 rays the rms error of the transfer function is 0.01 at
 // the highest frequencies, and that of the share of a pixel that an edge occludes is 0.005.
 //
@@ -213,7 +213,7 @@ class THICKLENS_EXPORT SceneSimulator {
   SceneSimulator& operator=(const SceneSimulator&) = delete;
 
   const EffectSelection& effects() const;     // effects of the photograph
-  const EffectSet& effects_of_views() const;  // the chosen ones of pixel box, lens floor and
+  const EffectSet& effects_of_views() const;  // the chosen ones of pixel box, blur floor and
                                               // diffraction
   // Rms error of the encoded values of the photograph because of the finite number of rays, where
   // it is largest, in 1/255 of full scale.

@@ -92,7 +92,7 @@ THICKLENS_EXPORT EffectSet SweepEffects();
 THICKLENS_EXPORT SweepSimulationOptions ReadSweepSimulation(const std::string& path);
 
 // A bench sweep of a flat target, frame by frame, in grey. Each frame shows the target at its depth
-// through the exact transfer functions of defocus, lens floor and pixel box, at the image scale of
+// through the exact transfer functions of defocus, blur floor and pixel box, at the image scale of
 // its chief rays. Each effect can be left out. Textures are periodic and band-limited by
 // definition: beyond the tile a frame sees its repetition. Edges have a closed form. Each column of
 // a tilted target is at its own depth, within about 0.01 px of its blur and position.
