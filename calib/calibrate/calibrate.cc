@@ -419,7 +419,7 @@ class Calibrator {
     if (!sweep_.offset_mm && result_.diagnostics.scale.done) {
       const Eigen::Vector2d& offsets_mm = result_.diagnostics.scale.offset_of_pupil_laws_mm;
       WidenByTrials(
-          "pupil law",
+          "light distribution over the pupil",
           "measure offset_mm: a bench offset from the image scale depends on how the light "
           "is distributed over the pupil",
           WithOffsets(setup, {offsets_mm.x(), offsets_mm.y()}), fit, &result_);

@@ -10,6 +10,11 @@ namespace {
 
 double Width(const Eigen::Vector2d& interval) { return interval.y() - interval.x(); }
 
+// A part's name in a sentence: "the blur floor", but "lens.front_focal_length_mm".
+std::string WithArticle(const std::string& name) {
+  return name.find('.') == std::string::npos ? "the " + name : name;
+}
+
 // A clearly wrong shape changes kappa, whatever the shares of d1 are.
 std::optional<std::string> WrongShape(const Calibration& calibration) {
   for (const SystematicPart& part : calibration.diagnostics.systematic_parts) {
@@ -44,22 +49,20 @@ void SortAndAdvise(Calibration* calibration) {
     calibration->diagnostics.advice = *wrong;
     return;
   }
-  const auto share = [&](double part_mm) { return 100 * part_mm / all_mm; };
+  const auto due_to = [&](double part_mm, const std::string& cause) {
+    return fmt::format("{:.0f} % of the error of d1 is due to {}: ", 100 * part_mm / all_mm, cause);
+  };
   if (worst_mm > noise_mm && worst_mm > zero_mm) {
     calibration->diagnostics.advice =
-        fmt::format("{} is {:.0f} % of the error of d1: {}", parts.front().name, share(worst_mm),
-                    parts.front().remedy);
+        due_to(worst_mm, WithArticle(parts.front().name)) + parts.front().remedy;
   } else if (zero_mm > noise_mm) {
-    calibration->diagnostics.advice = fmt::format(
-        "the bench offset is {:.0f} % of the error of d1: measure offset_mm, or sweep over a "
-        "longer "
-        "range so that the image scale determines it better",
-        share(zero_mm));
+    calibration->diagnostics.advice =
+        due_to(zero_mm, "the bench offset") +
+        "measure offset_mm, or sweep over a longer range so that the image scale determines it "
+        "better";
   } else {
-    calibration->diagnostics.advice = fmt::format(
-        "noise and readings are {:.0f} % of the error of d1: take more frames, or use a finer "
-        "bench scale",
-        share(noise_mm));
+    calibration->diagnostics.advice =
+        due_to(noise_mm, "noise and readings") + "take more frames, or use a finer bench scale";
   }
 }
 

@@ -79,7 +79,7 @@ TEST(WideLens, AnUnknownZeroHasThePupilLawInItsInterval) {
     const Calibration c = CalibrateWithoutMap(s);
     ASSERT_EQ(c.summary.outcome, Outcome::kOk) << c.summary.reason;
     EXPECT_THAT(c.diagnostics.systematic_parts,
-                Contains(Field(&SystematicPart::name, "pupil law")));
+                Contains(Field(&SystematicPart::name, "light distribution over the pupil")));
     EXPECT_LT(Beyond(c.summary.bench_offset_mm, s.truth.bench_offset_mm), 2);
     EXPECT_LT(Beyond(c.summary.focus_depth_mm, s.truth.focus_depth_mm), 2);
     EXPECT_LT(Beyond(c.summary.image_distance_mm, s.truth.image_distance_mm), 2);
@@ -98,7 +98,7 @@ TEST(WideLens, AGivenZeroHasNone) {
   const Calibration c =
       CalibrateWithoutMap(Wide(model::Psf::kGaussian, model::PupilLaw::kUniform, 73));
   EXPECT_THAT(c.diagnostics.systematic_parts,
-              Not(Contains(Field(&SystematicPart::name, "pupil law"))));
+              Not(Contains(Field(&SystematicPart::name, "light distribution over the pupil"))));
 }
 
 TEST(WideLens, SlopesOfThePredictionAreThoseOfItsValues) {

@@ -100,15 +100,15 @@ TEST(WidenFocus, TheAdviceNamesTheLargestShare) {
   };
   // WidenFocus itself adds 2.131e-6 mm.
   const Case cases[] = {
-      {0.001, 0.004, 0.3, "second is 50 % of the error of d1: fix second"},
-      {0.004, 0.001, 0.3, "first is 50 % of the error of d1: fix first"},
-      {0.001, 0.001, 0.3, "noise and readings are 34 % of the error of d1: take more frames"},
-      {0.0016, 0.001, 0.3, "noise and readings are 30 % of the error of d1"},
-      {0.0017, 0.001, 0.3, "first is 30 % of the error of d1"},
-      {0.0014, 0.001, 0.4, "the bench offset is 31 % of the error of d1: measure offset_mm"},
-      {0.0018, 0.001, 0.4, "first is 31 % of the error of d1"},
+      {0.001, 0.004, 0.3, "50 % of the error of d1 is due to the second: fix second"},
+      {0.004, 0.001, 0.3, "50 % of the error of d1 is due to the first: fix first"},
+      {0.001, 0.001, 0.3, "34 % of the error of d1 is due to noise and readings: take more frames"},
+      {0.0016, 0.001, 0.3, "30 % of the error of d1 is due to noise and readings"},
+      {0.0017, 0.001, 0.3, "30 % of the error of d1 is due to the first"},
+      {0.0014, 0.001, 0.4, "31 % of the error of d1 is due to the bench offset: measure offset_mm"},
+      {0.0018, 0.001, 0.4, "31 % of the error of d1 is due to the first"},
       // The share of the zero is not larger than the whole error of zf.
-      {0.001, 0.001, 7, "the bench offset is 51 % of the error of d1"},
+      {0.001, 0.001, 7, "51 % of the error of d1 is due to the bench offset"},
   };
   const model::ThickLens lens = BlurBench().lens;
   for (const Case& k : cases) {

@@ -286,21 +286,22 @@ TEST(AddSystematicParts, TheAdviceNamesTheLargestPartOfImageDistance) {
   floor.Add(Eigen::Vector2d(0, 0.49));
   EXPECT_EQ(floor.calibration.diagnostics.systematic_parts.front().name, "blur floor");
   EXPECT_THAT(floor.calibration.diagnostics.advice,
-              AllOf(StartsWith("blur floor is "), HasSubstr("knife edge")));
+              AllOf(HasSubstr(" % of the error of d1 is due to the blur floor: "),
+                    HasSubstr("knife edge")));
 
   Solved tolerance = Texture(0, 1e-3);
   tolerance.sweep.camera.statements["lens.rear_focal_length_mm"] = {0.2, false};
   tolerance.Add(Eigen::Vector2d(0, 0.49));
   EXPECT_EQ(tolerance.calibration.diagnostics.systematic_parts.front().name,
             "lens.rear_focal_length_mm");
-  EXPECT_THAT(
-      tolerance.calibration.diagnostics.advice,
-      AllOf(StartsWith("lens.rear_focal_length_mm is 100 %"), HasSubstr("better than +- 0.2")));
+  EXPECT_THAT(tolerance.calibration.diagnostics.advice,
+              AllOf(StartsWith("100 % of the error of d1 is due to lens.rear_focal_length_mm: "),
+                    HasSubstr("better than +- 0.2")));
 
   Solved noise = Texture(0, 0.5);
   noise.sweep.camera.statements["lens.rear_focal_length_mm"] = {1e-5, false};
   noise.Add();
-  EXPECT_THAT(noise.calibration.diagnostics.advice, HasSubstr("noise and readings are"));
+  EXPECT_THAT(noise.calibration.diagnostics.advice, HasSubstr("is due to noise and readings"));
 
   for (const Solved* s : {&floor, &tolerance, &noise}) {
     ExpectOrdered(s->calibration);
