@@ -15,10 +15,14 @@ std::string WithArticle(const std::string& name) {
   return name.find('.') == std::string::npos ? "the " + name : name;
 }
 
+constexpr char kNoRemedy[] = "no remedy";  // begins the remedy of a part that has none
+
 // A clearly wrong shape changes kappa, whatever the shares of d1 are.
 std::optional<std::string> WrongShape(const Calibration& calibration) {
   for (const SystematicPart& part : calibration.diagnostics.systematic_parts) {
-    if (part.name == kShapePart && Width(part.blur_ratio) > 0) return part.remedy;
+    if (part.name == kShapePart && Width(part.blur_ratio) > 0 &&
+        part.remedy.rfind(kNoRemedy, 0) != 0)
+      return part.remedy;
   }
   return std::nullopt;
 }

@@ -178,6 +178,39 @@ class Parts {
     return other > kShapesDiffer * stated;
   }
 
+  // Whether the other family describes the frames better by more than chance does.
+  bool OtherShapeFitsMarkedly() const {
+    if (!evidence_.gaussian_misfit || !evidence_.disc_misfit) return false;
+    const bool is_gaussian = sweep_.camera.psf == model::Psf::kGaussian;
+    const double stated = is_gaussian ? *evidence_.gaussian_misfit : *evidence_.disc_misfit;
+    const double other = is_gaussian ? *evidence_.disc_misfit : *evidence_.gaussian_misfit;
+    if (evidence_.shape_dof > 0) return (stated / other - 1) * evidence_.shape_dof > kRuledOut;
+    return stated > kShapesDiffer * other;
+  }
+
+  bool NeitherShapeFits() const {
+    return evidence_.gaussian_misfit && evidence_.disc_misfit &&
+           std::min(*evidence_.gaussian_misfit, *evidence_.disc_misfit) >= kLargestMisfitOfShape;
+  }
+
+  // A better one of two bad descriptions is no reason to state another shape.
+  std::string RemedyOfShape(bool other_is_right) const {
+    if (NeitherShapeFits()) {
+      return fmt::format(
+          "neither blur shape fits the frames (chi2/dof {:.3g} for gaussian, {:.3g} for disc): "
+          "check sensor.transfer in the camera file, sharpening or denoising in the camera, and "
+          "aberrations of the lens, none of which these frames exclude",
+          *evidence_.gaussian_misfit, *evidence_.disc_misfit);
+    }
+    if (other_is_right || OtherShapeFitsMarkedly()) {
+      return fmt::format("state psf: {} in the camera file: this shape fits better",
+                         model::PsfName(OtherPsf(sweep_.camera.psf)));
+    }
+    return evidence_.better_psf == sweep_.camera.psf
+               ? "no remedy: the shape that the camera file states fits better"
+               : "no remedy: both shapes fit about equally well";
+  }
+
   // Adds the spread over the families that the frames do not rule out. The depth is compared in any
   // case.
   void AddShape() {
@@ -188,14 +221,11 @@ class Parts {
     part.name = kShapePart;
     const bool is_right = OtherShapeIsRight(*trial);
     const model::Psf other = OtherPsf(sweep_.camera.psf);
-    part.remedy = is_right || evidence_.better_psf != sweep_.camera.psf
-                      ? fmt::format("state psf: {} in the camera file: this shape fits better",
-                                    model::PsfName(other))
-                      : std::string("no remedy: the shape that the camera file states fits better");
+    part.remedy = RemedyOfShape(is_right);
     Include(*trial, &part);
     if (!is_right && OtherShapeIsRuledOut()) part.blur_ratio.setZero();
     result_.diagnostics.systematic_parts.push_back(part);
-    if (!is_right) return;
+    if (!is_right || NeitherShapeFits()) return;
     result_.summary.warnings.push_back(fmt::format(
         "the blur is a {}, not the {} that the camera file states: with it the frames "
         "follow the blur law (chi2/dof {:.3g} against {:.3g}) and the blur ratio is "

@@ -130,6 +130,13 @@ std::string SidesLine(const calib::Calibration& calibration) {
 std::string ShapeLine(const calib::FocusSweep& sweep, const calib::BlurFit& blur) {
   if (!blur.done || !blur.gaussian_misfit || !blur.disc_misfit) return "";
   const bool disc = blur.better_psf == model::Psf::kDisc;
+  const bool neither_fits =
+      std::min(*blur.gaussian_misfit, *blur.disc_misfit) >= calib::kLargestMisfitOfShape;
+  if (neither_fits) {
+    return fmt::format(
+        "neither a Gaussian nor a disc fits the frames (chi2/dof {:.3g} and {:.3g}, 1 is expected)",
+        *blur.gaussian_misfit, *blur.disc_misfit);
+  }
   std::string line =
       fmt::format("a {} describes the frames better than a {} (chi2/dof {:.3g} against {:.3g})",
                   disc ? "disc" : "Gaussian", disc ? "Gaussian" : "disc",

@@ -10,7 +10,9 @@
 namespace thicklens::calib {
 namespace {
 
+using ::testing::Contains;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using thicklens::testing::BlurBench;
 using thicklens::testing::ExactBench;
 using thicklens::testing::FocusCase;
@@ -192,12 +194,45 @@ TEST(AddSystematicParts, TheShapesRemedyIsToStateTheBetterOne) {
   for (const model::Psf better : {model::Psf::kGaussian, model::Psf::kDisc}) {
     FocusCase c = FocusCase().WithTexture(kErrorPx2).WithTrueFloor();
     c.evidence.better_psf = better;
+    c.evidence.gaussian_misfit = better == model::Psf::kGaussian ? 1.0 : 1.3;
+    c.evidence.disc_misfit = better == model::Psf::kGaussian ? 1.3 : 1.0;
     c.evidence.other_psf = c.evidence.setup.estimators[0];
     c.Solve();
     const SystematicPart* part = c.Part("shape of the blur");
     ASSERT_NE(part, nullptr);
     EXPECT_THAT(part->remedy, better == model::Psf::kGaussian ? HasSubstr("no remedy")
                                                               : HasSubstr("state psf: disc"));
+  }
+}
+
+TEST(AddSystematicParts, AShapeIsAdvisedOnlyWhereItFitsAndTheStatedOneFitsMarkedlyWorse) {
+  struct Case {
+    double gaussian, disc, dof;
+    const char* remedy;
+  };
+  const Case cases[] = {
+      {46, 45.8, 0, "neither blur shape fits the frames (chi2/dof 46 for gaussian, 45.8 for disc)"},
+      {46, 40, 1000, "neither blur shape fits"},  // better beyond doubt, and still bad
+      {1.3, 1.0, 1000, "state psf: disc"},
+      {1.02, 1.0, 1000, "state psf: disc"},  // 20 in chi^2
+      {1.01, 1.0, 1000, "both shapes fit about equally well"},
+      {1.05, 1.0, 0, "both shapes fit about equally well"},
+  };
+  for (const Case& k : cases) {
+    SCOPED_TRACE(k.remedy);
+    FocusCase c = FocusCase().WithTexture(kErrorPx2).WithTrueFloor();
+    c.evidence.gaussian_misfit = k.gaussian;
+    c.evidence.disc_misfit = k.disc;
+    c.evidence.shape_dof = k.dof;
+    c.evidence.better_psf = model::Psf::kDisc;
+    c.evidence.other_psf = c.evidence.setup.estimators[0];
+    c.Solve();
+    const SystematicPart* part = c.Part("shape of the blur");
+    ASSERT_NE(part, nullptr);
+    EXPECT_THAT(part->remedy, HasSubstr(k.remedy));
+    EXPECT_THAT(c.calibration.diagnostics.advice, Not(HasSubstr("no remedy")));
+    if (k.disc > 3)
+      EXPECT_THAT(c.calibration.summary.warnings, Not(Contains(HasSubstr("the blur is a"))));
   }
 }
 

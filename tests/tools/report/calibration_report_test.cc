@@ -253,6 +253,9 @@ TEST(CalibrationReport, SaysWhatTheFieldAndTheColoursDo) {
                               "405.00 ± 0.30 mm (1 tile)"));
   EXPECT_THAT(html, HasSubstr("A disc describes the frames better than a Gaussian"));
   EXPECT_THAT(html, HasSubstr("the camera file states gaussian"));
+  made.calibration.diagnostics.blur.gaussian_misfit = 46;
+  made.calibration.diagnostics.blur.disc_misfit = 45.8;
+  EXPECT_THAT(Page(made), HasSubstr("Neither a Gaussian nor a disc fits the frames"));
 }
 
 // The tiles have their positions in the image, and the colour is a function of their value.

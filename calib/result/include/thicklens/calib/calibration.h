@@ -191,6 +191,10 @@ struct ChannelFocus {
   model::Estimate focus_depth_mm;   // zf of this colour, from Ap
 };
 
+// The largest chi^2 per degree of freedom at which a shape of the blur counts as one that fits the
+// frames. Simulated sweeps have 0.7 to 1.5 with the true shape.
+inline constexpr double kLargestMisfitOfShape = 3;
+
 // The fit of sigma^2 = S0 + A (1/z - 1/zf)^2 by Ceres in (zf, kappa, floor). The bench offset is
 // held, and its error is propagated to the results.
 struct BlurFit {
