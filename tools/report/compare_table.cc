@@ -19,12 +19,12 @@ std::string PsnrText(double psnr_db) {
 }
 
 std::string HeadLine() {
-  return fmt::format("{:<14}{:>10}{:>9}{:>9}{:>17}\n", "", "PSNR dB", "SSIM", "M-dE94",
-                     "MACADE stand-in");
+  return fmt::format("{:<14}{:>10}{:>9}{:>9}{:>19}\n", "", "PSNR dB", "SSIM", "M-dE94",
+                     "edge orientation");
 }
 
 std::string Line(const std::string& name, const ImageScores& scores) {
-  return fmt::format("{:<14}{:>10}{:>9}{:>9}{:>17}\n", name, PsnrText(scores.psnr_db),
+  return fmt::format("{:<14}{:>10}{:>9}{:>9}{:>19}\n", name, PsnrText(scores.psnr_db),
                      NumberText(scores.ssim, 4), NumberText(scores.delta_e94_mean, 3),
                      scores.macade_standin ? NumberText(*scores.macade_standin, 4) : "-");
 }

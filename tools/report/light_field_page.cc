@@ -165,7 +165,7 @@ std::string ScoresTable(const ComparisonRecord& comparison) {
   std::string html =
       "<div class=\"wide\"><table>\n<thead><tr><th>views</th><th>by</th>"
       "<th class=\"number\">PSNR [dB]</th><th class=\"number\">SSIM</th>"
-      "<th class=\"number\">mean ΔE94</th><th class=\"number\">MACADE stand-in</th></tr></thead>\n"
+      "<th class=\"number\">mean ΔE94</th><th class=\"number\">edge orientation</th></tr></thead>\n"
       "<tbody>\n";
   struct Row {
     const char* views;
@@ -194,8 +194,9 @@ std::string ScoresTable(const ComparisonRecord& comparison) {
              "</tbody></table></div>\n<p class=\"soft\">Against the true views{}, on stored "
              "values. PSNR, ",
              area) +
-         "SSIM and the MACADE stand-in (edge-orientation similarity, an approximation of MACADE, "
-         "whose definition is not available): higher is better. ΔE94, the perceived colour "
+         "SSIM and edge orientation (the similarity of the directions of edges, an approximation "
+         "of "
+         "MACADE, whose definition is not available): higher is better. ΔE94, the perceived colour "
          "difference: lower is better. DIBR is the photograph warped to each view by its "
          "depth.</p>\n";
 }

@@ -231,8 +231,9 @@ TEST(AddSystematicParts, AShapeIsAdvisedOnlyWhereItFitsAndTheStatedOneFitsMarked
     ASSERT_NE(part, nullptr);
     EXPECT_THAT(part->remedy, HasSubstr(k.remedy));
     EXPECT_THAT(c.calibration.diagnostics.advice, Not(HasSubstr("no remedy")));
-    if (k.disc > 3)
+    if (k.disc > 3) {
       EXPECT_THAT(c.calibration.summary.warnings, Not(Contains(HasSubstr("the blur is a"))));
+    }
   }
 }
 
