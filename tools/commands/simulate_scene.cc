@@ -93,8 +93,8 @@ std::string SamplingText(const SceneSimulation& scene, double error) {
   const double asked = scene.sampling_error_grey_levels;
   return fmt::format("largest sampling error: about {:.2g} grey levels rms{}\n", error,
                      error > asked && asked > 0
-                         ? fmt::format(", above the requested {:.2g}: rays_per_pixel is {}", asked,
-                                       scene.rays_per_pixel)
+                         ? fmt::format(" with rays_per_pixel: {} ({:.2g} would need more rays)",
+                                       scene.rays_per_pixel, asked)
                          : "");
 }
 
