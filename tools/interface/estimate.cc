@@ -191,9 +191,9 @@ std::vector<std::string> WarningsOf(const DepthFile& depth, bool has_camera, con
   if (found.residual_rms && found.noise_sigma && !found.unexplained_share &&
       *found.residual_rms > kUnexplained * *found.noise_sigma) {
     warnings.push_back(fmt::format(
-        "the photograph has a residual of {:.1f} grey levels (noise: {:.1f}), and the whole "
-        "aperture sees hardly any part of it: the aperture is wide for an image of {} x {} px, or "
-        "the depth is rough; which of them is unknown",
+        "the photograph has a residual of {:.1f} grey levels (noise: {:.1f}), and nearly "
+        "everywhere it receives light from points that the centre view does not show: check the "
+        "depth, its unit and the aperture, which may also be too wide for an image of {} x {} px",
         kEightBitLevels * *found.residual_rms, noise_levels, summary.width_px, summary.height_px));
   }
   if (found.blur_check) {

@@ -131,14 +131,17 @@ nlohmann::json EffectsJson(const model::EffectSelection& decision) {
 }
 
 std::string EffectsText(const model::EffectSelection& decision) {
-  std::string left_out;
+  std::string ignored;
   for (const model::LargestEffectImpact& finding : decision.findings) {
     if (decision.on.Has(finding.effect)) continue;
-    left_out += fmt::format("{}{} ({})", left_out.empty() ? "" : ", ",
-                            model::EffectName(finding.effect), BoundText(finding));
+    ignored += fmt::format("{}{} {}", ignored.empty() ? "" : ", ",
+                           model::EffectName(finding.effect), BoundText(finding));
   }
-  return fmt::format("effects: {}; left out, with bounds in grey levels: {}\n",
-                     model::JoinedNames(decision.on), left_out.empty() ? "none" : left_out);
+  return fmt::format("effects: {}\n", model::JoinedNames(decision.on)) +
+         (ignored.empty() ? ""
+                          : fmt::format("effects ignored, with the largest change that each could "
+                                        "cause in grey levels of 255: {}\n",
+                                        ignored));
 }
 
 std::string EffectsTable(const model::EffectSelection& decision,

@@ -189,11 +189,13 @@ std::string ApertureBlurText(const EstimateDiagnostics& found) {
   const auto along = [&](int axis, const char* name) {
     const double sigma_mm = found.aperture_sigma_mm[axis];
     if (!(sigma_mm > 0)) return fmt::format("none along {} (one view)", name);
-    return fmt::format("{:.4g} mm along {} ({:+.2f} % in the corners)", sigma_mm, name,
+    return fmt::format("{:.4g} mm along {} ({:+.2f} % at the corners of the image)", sigma_mm, name,
                        100 * found.aperture_corner_change[axis]);
   };
-  return fmt::format("blur         aperture sigma {}, {}; calibrated {:.4g} mm\n", along(0, "u"),
-                     along(1, "v"), *found.aperture_calibrated_sigma_mm);
+  return fmt::format(
+      "blur         standard deviation of the light over the aperture {}, {}; calibrated {:.4g} "
+      "mm\n",
+      along(0, "u"), along(1, "v"), *found.aperture_calibrated_sigma_mm);
 }
 
 std::string ConfidenceText(const EstimateDiagnostics& found) {
@@ -319,7 +321,7 @@ std::string EstimateText(const EstimateOptions& options, const EstimateOutcome& 
   text += fmt::format("light field  {} x {} views of {} x {} px, {} channel(s)\n", summary.u_count,
                       summary.v_count, summary.width_px, summary.height_px, summary.channels);
   text += fmt::format("aperture     {}\n", PrintableUtf8(ApertureInWords(options, found)));
-  text += ApertureBlurText(found);
+  if (options.common.verbose) text += ApertureBlurText(found);
   text += SolverText(estimate);
   text += fmt::format("device       {}, {} thread(s)\n", summary.device, summary.threads);
   if (!found.effects.findings.empty()) text += EffectsText(found.effects);

@@ -144,7 +144,8 @@ std::string HowItWasMade(const LightFieldPageInput& input) {
   rows += OriginRow("noise of the photograph", GreyLevels(record.noise_sigma));
   rows += OriginRow("residual of the photograph (rms)", GreyLevels(record.residual_rms));
   rows += OriginRow("rays that the centre view does not show", Percent(record.occluded_fraction));
-  rows += OriginRow("pixels with a row of their own", Percent(record.row_share));
+  rows += OriginRow("pixels whose blur is computed one by one (occlusions, steep surfaces)",
+                    Percent(record.row_share));
   rows += OriginRow("iterations", IterationsInWords(record));
   rows += OriginRow("solver of a block", record.block_solver);
   rows += OriginRow("stencil of the smoothness", record.stencil);

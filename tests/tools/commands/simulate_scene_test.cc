@@ -130,7 +130,7 @@ TEST_F(SimulateSceneTest, EffectsAreChosenAndReported) {
   const ProgramResult given =
       Run({"image", config, "-o", folder_ / "given", "--effects", "defocus,falloff", "--without",
            "defocus", "--json", folder_ / "given.json"});
-  EXPECT_THAT(given.out, HasSubstr("effects: falloff; left out"));
+  EXPECT_THAT(given.out, HasSubstr("effects: falloff\neffects ignored, "));
   EXPECT_EQ(JsonOf("given.json")["bits"], 16);
   const YamlNode truth = YamlNode::LoadFile(folder_ / "given" + "/truth.yaml");
   ASSERT_EQ(truth.At("effects").Elements().size(), 1U);
