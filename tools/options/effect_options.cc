@@ -148,24 +148,31 @@ std::string EffectsTable(const model::EffectSelection& decision,
                          const std::vector<std::pair<model::Effect, double>>* cost_seconds) {
   std::string text =
       fmt::format("{:<15} {:>22} {:>13}{}  {:<4} {}\n", "effect", "largest impact", "grey levels",
-                  cost_seconds != nullptr ? fmt::format("{:>10}", "cost s") : "", "", "where");
+                  cost_seconds != nullptr ? fmt::format("{:>10}", "cost s") : "", "used", "where");
+  std::string without_impact;
   for (const model::LargestEffectImpact& finding : decision.findings) {
     const model::EffectFacts& facts = model::FactsOf(finding.effect);
     const std::string unit =
         facts.unit == model::EffectUnit::kGreyLevels ? "levels" : model::EffectUnitName(facts.unit);
-    const std::string on = decision.on.Has(finding.effect) ? "on" : "off";
+    if (finding.impact.amount == 0 && finding.impact.grey_levels == 0 && cost_seconds == nullptr) {
+      without_impact +=
+          fmt::format("{}{}", without_impact.empty() ? "" : ", ", std::string(facts.name));
+      continue;
+    }
+    const std::string used = decision.on.Has(finding.effect) ? "yes" : "no";
     const std::string cost = cost_seconds != nullptr
                                  ? fmt::format("{:>10}", CostText(finding.effect, *cost_seconds))
                                  : "";
     if (finding.impact.amount == 0 && finding.impact.grey_levels == 0) {
-      text += fmt::format("{:<15} {:>22} {:>13}{}  {}\n", facts.name, "none here", "0", cost, on);
+      text += fmt::format("{:<15} {:>22} {:>13}{}  {}\n", facts.name, "none here", "0", cost, used);
       continue;
     }
     text += fmt::format(
         "{:<15} {:>22} {:>13}{}  {:<4} {}\n", facts.name,
         fmt::format("{}{:.4g} {}", facts.random ? "sd " : "", finding.impact.amount, unit),
-        BoundText(finding), cost, on, EffectSiteText(finding.place));
+        BoundText(finding), cost, used, EffectSiteText(finding.place));
   }
+  if (!without_impact.empty()) text += fmt::format("no impact here: {}\n", without_impact);
   return text;
 }
 

@@ -33,10 +33,11 @@ EffectSelection EffectSelectionOf(const EffectOptions& options);
 std::string EffectSiteText(const model::EffectSite& place);
 // One entry for each effect: name, impact with its unit, bound in grey levels, on, where.
 nlohmann::json EffectsJson(const model::EffectSelection& decision);
-// One line on the effects that were on and those that were left out.
+// A line on the effects that were on, and one on those that were ignored, if there are any.
 std::string EffectsText(const model::EffectSelection& decision);
-// One line for each effect. `cost_seconds` may be null; otherwise it holds the costs of some
-// effects, shown in a column of their own.
+// One line for each effect that has an impact, and one that names the others. `cost_seconds` may be
+// null; otherwise it holds the costs of some effects, shown in a column of their own, and each
+// effect has its line.
 std::string EffectsTable(
     const model::EffectSelection& decision,
     const std::vector<std::pair<model::Effect, double>>* cost_seconds = nullptr);

@@ -14,6 +14,10 @@ std::string DepthText(double depth_mm) {
   return std::isfinite(depth_mm) ? fmt::format("{:.6g}", depth_mm) : "infinity";
 }
 
+std::string DepthWithUnit(double depth_mm) {
+  return DepthText(depth_mm) + (std::isfinite(depth_mm) ? " mm" : "");
+}
+
 std::string HeadText(const model::Explanation& known) {
   const auto with_sigma = [](double value, double sigma) {
     return sigma > 0 ? fmt::format("{:.6g} +- {:.2g}", value, sigma) : fmt::format("{:.6g}", value);
@@ -21,29 +25,34 @@ std::string HeadText(const model::Explanation& known) {
   return fmt::format(
       "camera {}\n"
       "image distance d1     {} mm\n"
-      "in-focus distance zf  {} mm\n"
+      "in-focus distance zf  {}\n"
       "blur ratio kappa      {}\n"
       "blur floor            {}\n\n",
       PrintableUtf8(known.camera_name),
       with_sigma(known.image_distance_mm, known.image_distance_sigma_mm),
-      DepthText(known.focus_depth_mm), with_sigma(known.blur_ratio, known.blur_ratio_sigma),
+      DepthWithUnit(known.focus_depth_mm), with_sigma(known.blur_ratio, known.blur_ratio_sigma),
       known.blur_floor_px ? fmt::format("{:.4g} px", *known.blur_floor_px)
                           : "unknown, assumed to be 0 below");
 }
 
+// The column of the thin lens is left out if the lens is thin: it would repeat the blur radius.
 std::string TableText(const model::Explanation& known) {
   const bool has_error = known.blur_ratio_sigma > 0;
+  const bool has_thin = !known.thin.same_lens;
   std::string text = fmt::format(
-      "{0:>10} {1:>12} {1:>12} {2:>20} {3:>10} {4:>14} {5:>13}\n{6:>10} {6:>12} {7:>12} {7:>20} "
-      "{7:>10} {8:>14} {7:>13}\n",
-      "depth", "blur radius", "defocus sigma", "sigma", "magnification", "thin: radius", "mm", "px",
-      "");
+      "{0:>10} {1:>12} {1:>12} {2:>20} {3:>10} {4:>14}{5}\n{6:>10} {6:>12} {7:>12} {7:>20} {7:>10}"
+      "{8}\n",
+      "depth", "blur radius", "defocus sigma", "sigma", "magnification",
+      has_thin ? fmt::format(" {:>13}", "thin: radius") : "", "mm", "px",
+      has_thin ? fmt::format("{:>29}", "px") : "");
   for (const model::DepthRow& row : known.rows) {
     std::string defocus = fmt::format("{:.4f}", row.defocus_sigma_px);
     if (has_error) defocus += fmt::format(" +- {:.4f}", row.defocus_sigma_error_px);
-    text += fmt::format("{:>10} {:>12.5f} {:>12.4f} {:>20} {:>10.4f} {:>14.6f} {:>13.4f}\n",
+    text += fmt::format("{:>10} {:>12.5f} {:>12.4f} {:>20} {:>10.4f} {:>14.6f}",
                         DepthText(row.depth_mm), row.blur_radius_mm, row.blur_radius_px, defocus,
-                        row.sigma_px, row.magnification, row.thin_blur_radius_px);
+                        row.sigma_px, row.magnification);
+    if (has_thin) text += fmt::format(" {:>13.4f}", row.thin_blur_radius_px);
+    text += '\n';
   }
   return text +
          "sigma: per axis, of defocus and blur floor together, without the box of the pixel\n\n";
@@ -52,8 +61,8 @@ std::string TableText(const model::Explanation& known) {
 std::string DepthOfFieldText(const model::Explanation& known) {
   std::string text;
   for (const model::DepthOfFieldRow& row : known.depth_of_field) {
-    text += fmt::format("blur radius up to {:.1f} px: from {} to {} mm\n", row.blur_radius_px,
-                        DepthText(row.near_mm), DepthText(row.far_mm));
+    text += fmt::format("depth of field (blur radius up to {:.1f} px): from {} to {}\n",
+                        row.blur_radius_px, DepthWithUnit(row.near_mm), DepthWithUnit(row.far_mm));
   }
   return text + fmt::format(
                     "hyperfocal distance: {:.6g} mm (infinity is blurred by a radius of 1 px)\n"
@@ -71,14 +80,13 @@ std::string ThinText(const model::Explanation& known) {
       "  same image distance: plane of focus {}; image scale {:+.4f} %, which is {:+.3f} px at "
       "the\n"
       "  farthest corner; its blur radius is in the last column\n"
-      "  with that image distance, the blur of thin is within {} px of that of thick up to {} "
-      "mm{}\n",
-      thin.focus_depth_mm ? "at " + DepthText(*thin.focus_depth_mm) + " mm"
+      "  with that image distance, the blur of thin is within {} px of that of thick up to {}{}\n",
+      thin.focus_depth_mm ? "at " + DepthWithUnit(*thin.focus_depth_mm)
                           : "nowhere (the sensor is nearer than the focal length)",
       100 * (thin.scale_ratio - 1), thin.corner_shift_px, model::kThinTolerancePx,
-      DepthText(thin.alike_up_to_mm),
+      DepthWithUnit(thin.alike_up_to_mm),
       thin.alike_up_to_mm < 1.1 * known.front_focal_length_mm
-          ? ",\n  just beyond the front focal length: nowhere, that is"
+          ? ",\n  which is just beyond the front focal length, so nowhere"
           : "");
 }
 

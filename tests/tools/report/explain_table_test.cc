@@ -43,6 +43,25 @@ TEST(ExplanationText, SaysUpToWhichDepthThinIsAsGoodAsThick) {
   EXPECT_THAT(ExplanationText(known), HasSubstr("within 0.1 px of that of thick up to 123.4 mm"));
 }
 
+TEST(ExplanationText, NamesTheDepthOfFieldAndTheInFocusDistance) {
+  const std::string near = ExplanationText(model::ExplainCamera(ExplainedCamera(), {500, 2000}, 2));
+  EXPECT_THAT(near, HasSubstr("in-focus distance zf  1000 mm\n"));
+  EXPECT_THAT(near, HasSubstr("depth of field (blur radius up to 1.0 px): from "));
+  model::Explanation known = model::ExplainCamera(ExplainedCamera(), {500, 2000}, 2);
+  known.depth_of_field = {{0.5, 299.1, kInfinity}};
+  EXPECT_THAT(ExplanationText(known),
+              HasSubstr("depth of field (blur radius up to 0.5 px): from 299.1 mm to infinity\n"));
+}
+
+TEST(ExplanationText, HasAColumnOfTheThinLensOnlyWhereTheLensIsThick) {
+  model::Camera camera = ExplainedCamera();
+  EXPECT_THAT(ExplanationText(model::ExplainCamera(camera, {500, 2000}, 2)),
+              HasSubstr("thin: radius"));
+  camera.lens = {50, 50, 0, 10};
+  EXPECT_THAT(ExplanationText(model::ExplainCamera(camera, {500, 2000}, 2)),
+              ::testing::Not(HasSubstr("thin: radius")));
+}
+
 TEST(ExplanationText, ShowsErrorsOnlyWhereThereAreSome) {
   model::Camera camera = ExplainedCamera();
   EXPECT_THAT(ExplanationText(model::ExplainCamera(camera, {500, 2000}, 3)),
