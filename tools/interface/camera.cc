@@ -20,8 +20,10 @@ std::vector<std::string> NoticesOf(const Camera& camera) {
   std::vector<std::string> notices = camera.notices;
   const std::vector<std::string> assumed = model::AssumedFields(camera);
   if (!assumed.empty()) {
-    notices.push_back(fmt::format("camera '{}': assumed, neither published nor measured: {}",
-                                  camera.name, fmt::join(assumed, ", ")));
+    notices.push_back(
+        fmt::format("camera '{}': assumed, neither published nor measured: {}; measure or look "
+                    "them up and edit the camera file, or ignore this for a first try",
+                    camera.name, fmt::join(assumed, ", ")));
   }
   return notices;
 }

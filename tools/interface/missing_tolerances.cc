@@ -22,7 +22,7 @@ std::string MissingTolerancesLine(const Camera& camera) {
                            : "kappa moves about 1 % for each 1 % of the pixel pitch";
   return fmt::format(
       "no tolerance is stated for the {}: the intervals take {} as exact, but {}; give {{value: "
-      ".., tolerance: ..}} in the camera file",
+      ".., tolerance: ..}} in the camera file, or ignore this for a first try",
       focal_length && pitch ? "focal lengths and the pixel pitch"
       : focal_length        ? "focal lengths"
                             : "pixel pitch",
