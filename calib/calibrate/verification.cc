@@ -60,7 +60,7 @@ class Verifier {
     TakeParameters();
     CountJointly();
     WarnOfExactValues();
-    WarnOfBenchZero();
+    WarnOfBenchOffset();
     Decide();
     return result_;
   }
@@ -194,7 +194,7 @@ class Verifier {
   }
 
   // An error of the bench offset moves all depths, including zf.
-  void WarnOfBenchZero() {
+  void WarnOfBenchOffset() {
     const ComparedParameter* focus = Find(kFocusDepth);
     if (focus == nullptr || sweep_.offset_mm || !found_.summary.bench_offset_mm) return;
     const double offset_sigma = found_.summary.bench_offset_mm->sigma;
@@ -205,8 +205,7 @@ class Verifier {
     if (!(offset_sigma > 0) || !(d1_sigma > 0)) return;
     result_.warnings.push_back(fmt::format(
         "the bench offset is not stated, and the sweep determines it to +- {:.3g} mm only: the "
-        "error "
-        "of zf is therefore +- {:.3g} mm (correlation of d1 and bench offset {:.2f}){}",
+        "error of zf is therefore +- {:.3g} mm (correlation of d1 and bench offset {:.2f}){}",
         offset_sigma, focus->found.sigma, covariance / (d1_sigma * offset_sigma),
         options_.same_bench ? "; the stored bench offset is compared, too"
                             : "; if the camera has not moved on the bench (same_bench), or if "

@@ -52,8 +52,7 @@ OffsetCheck CheckGivenOffset(const FocusSweep& sweep, const std::string& unit_th
   if (!(std::abs(apart_mm) > 3 * sigma_mm + 1e-3 * law.reference_depth_mm)) return check;
   const std::string found = fmt::format(
       "the image scale puts the bench offset at {:.2f} +- {:.2f} mm, {:+.2f} mm from the given "
-      "bench "
-      "offset",
+      "bench offset",
       given_mm + apart_mm, law.offset_mm.sigma, apart_mm);
   if (std::abs(apart_mm) > kGrossOffset * law.reference_depth_mm &&
       std::abs(apart_mm) > 5 * sigma_mm) {

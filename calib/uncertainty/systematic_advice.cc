@@ -60,10 +60,9 @@ void SortAndAdvise(Calibration* calibration) {
     calibration->diagnostics.advice =
         due_to(worst_mm, WithArticle(parts.front().name)) + parts.front().remedy;
   } else if (zero_mm > noise_mm) {
-    calibration->diagnostics.advice =
-        due_to(zero_mm, "the bench offset") +
-        "measure offset_mm, or sweep over a longer range so that the image scale determines it "
-        "better";
+    calibration->diagnostics.advice = due_to(zero_mm, "the bench offset") +
+                                      "measure offset_mm, or sweep over a longer range so that the "
+                                      "image scale determines it better";
   } else {
     calibration->diagnostics.advice =
         due_to(noise_mm, "noise and readings") + "take more frames, or use a finer bench scale";

@@ -1,4 +1,4 @@
-// thicklens doctor: lists what this machine computes with, and checks its results.
+// thicklens doctor: lists the devices and libraries of this machine, and checks their results.
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 

@@ -168,7 +168,7 @@ std::string SolverText(const LightFieldEstimate& estimate) {
   std::string text = fmt::format("solver       {}: {}\n", summary.solver, summary.message);
   if (found.noise_sigma && found.residual_rms) {
     text +=
-        fmt::format("image        noise {:.2f} grey levels, residual {:.2f} (rms)\n",
+        fmt::format("photograph   noise {:.2f} grey levels, residual {:.2f} (rms)\n",
                     kEightBitLevels * *found.noise_sigma, kEightBitLevels * *found.residual_rms);
   }
   return text;

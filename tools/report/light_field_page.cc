@@ -195,9 +195,8 @@ std::string ScoresTable(const ComparisonRecord& comparison) {
              "values. PSNR, ",
              area) +
          "SSIM and edge orientation (the similarity of the directions of edges, an approximation "
-         "of "
-         "MACADE, whose definition is not available): higher is better. ΔE94, the perceived colour "
-         "difference: lower is better. DIBR is the photograph warped to each view by its "
+         "of MACADE, whose definition is not available): higher is better. ΔE94, the perceived "
+         "colour difference: lower is better. DIBR is the photograph warped to each view by its "
          "depth.</p>\n";
 }
 
