@@ -45,7 +45,7 @@ struct BlurFitSetup {
   double pixel_pitch_mm = 0;
   BlurModel law = BlurModel::kPerspective;
   // The bench offset comes from elsewhere: it is held, and its error is propagated to the results.
-  // As a free parameter it would absorb the deviations of a real lens from the blur law.
+  // If it were a free parameter, it would absorb the deviations of a real lens from the blur law.
   model::Estimate offset_mm;
   model::BenchDirection direction = model::BenchDirection::kAway;
   double reading_sigma_mm = 0;

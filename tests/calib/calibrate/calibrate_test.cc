@@ -313,7 +313,7 @@ TEST(Calibrate, AnUnknownFloorLeavesItUnwrittenAndTheTruthInsideTheInterval) {
   s.sweep.floor = {};
   const Calibration c = Calibrated(s);
   EXPECT_EQ(c.summary.outcome, Outcome::kPartial);
-  EXPECT_THAT(c.summary.reason, HasSubstr("blur_floor_px"));
+  EXPECT_THAT(c.summary.reason, HasSubstr("the blur floor is not determined"));
   ASSERT_TRUE(c.summary.focus_depth_mm && c.summary.focus_depth_mm->systematic);
   const Eigen::Vector2d interval = *c.summary.focus_depth_mm->systematic;
   EXPECT_GT(s.truth.focus_depth_mm, interval.x() - 3 * c.summary.focus_depth_mm->sigma);

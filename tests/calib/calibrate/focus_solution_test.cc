@@ -184,7 +184,7 @@ TEST(SolveFocus, AFloorBelowItsOwnErrorIsLeftOpen) {
 void ExpectInterval(const FocusCase& c, double from_px, double to_px, double within_px) {
   const Calibration& found = c.calibration;
   EXPECT_EQ(found.summary.outcome, Outcome::kPartial);
-  EXPECT_THAT(found.summary.reason, HasSubstr("blur_floor_px"));
+  EXPECT_THAT(found.summary.reason, HasSubstr("the blur floor is not determined"));
   EXPECT_THAT(found.diagnostics.blur.undetermined, ElementsAre("blur_floor_px"));
   ASSERT_TRUE(found.summary.blur_floor_px && found.summary.blur_floor_px->systematic);
   EXPECT_TRUE(std::isnan(found.summary.blur_floor_px->value));
