@@ -42,7 +42,7 @@ struct CalibrateOptions {
   std::string camera_output;  // empty: no camera file
   std::string report_folder;  // empty: no report
   std::string method = "fit";
-  bool map_field = true;
+  bool no_field = false;
   bool dry_run = false;
 
   bool use_source_recipe() const { return method == "source"; }
@@ -87,7 +87,7 @@ Calibration Measure(const CalibrateOptions& options, const Sweep& sweep) {
   const CommandRun run(options.common, SweepOptionNames());
   thicklens::CalibrateOptions asked;
   asked.method = options.use_source_recipe() ? CalibrationMethod::kPaper : CalibrationMethod::kFit;
-  asked.map_field = options.map_field;
+  asked.map_field = !options.no_field;
   asked.on_refusal = OnRefusal::kReturn;
   return thicklens::Calibrate(sweep, asked, run.control());
 }
@@ -207,7 +207,7 @@ void AddCalibrateCommand(CLI::App* program, CommandAction* action) {
   command->add_option("--method", options->method, "fit, or source: the paper's baseline method")
       ->check(CLI::IsMember({"fit", "source"}))
       ->type_name("NAME");
-  command->add_flag("!--no-field", options->map_field,
+  command->add_flag("--no-field", options->no_field,
                     "Skip the maps over the field and the colours; faster");
   command->add_flag("--dry-run", options->dry_run,
                     "Report what the sweep file says, and measure nothing");

@@ -10,6 +10,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <exception>
+#include <memory>
 #include <new>
 #include <opencv2/core.hpp>
 #include <opencv2/core/utils/logger.hpp>
@@ -19,7 +20,9 @@
 #include "thicklens/base/error.h"
 #include "thicklens/estimator/blas.h"
 #include "tools/commands/commands.h"
+#include "tools/options/help_format.h"
 #include "tools/options/option_values.h"
+#include "tools/options/wrong_usage.h"
 #include "tools/system/build_info.h"
 #include "tools/system/interrupt.h"
 #include "tools/system/message_line.h"
@@ -31,6 +34,22 @@
 namespace {
 
 using namespace thicklens;
+
+constexpr char kExamples[] =
+    R"(Examples:
+  Calibrate a camera with a focus sweep, the photographs and readings.csv in the folder sweep:
+    thicklens camera init --focal-mm 50 --f-number 2.8 --pitch-um 4.5 --size 640x480 -o camera.yaml
+    thicklens calibrate sweep --readings sweep/readings.csv --camera camera.yaml -o calibrated.yaml --report report
+
+  A light field from a photograph with a map of z in mm, and a view of it:
+    thicklens estimate photo.png depth.png --camera calibrated.yaml --depth-kind z --depth-unit mm -o lf
+    thicklens render lf --view 0,3 -o left.png
+
+  A light field from a photograph with a map of disparities, without a camera:
+    thicklens estimate photo.png disparity.pfm --depth-kind disparity -o lf
+
+thicklens COMMAND --help lists the options of a command. Exit codes: 0 done (this help too),
+1 refused or failed, with a reason, 2 wrong usage.)";
 
 enum ExitCode { kDone = 0, kFailed = 1, kUsage = 2 };
 
@@ -65,16 +84,7 @@ void RequireNoEmptyValue(const CLI::App& command) {
   for (const CLI::App* inner : command.get_subcommands()) RequireNoEmptyValue(*inner);
 }
 
-int ParseAndRun(CLI::App* program, const tools::CommandAction* action, int argc, char** argv) {
-  try {
-    program->parse(argc, argv);
-  } catch (const CLI::Success& asked_for) {  // --help, --version
-    return program->exit(asked_for);
-  } catch (const CLI::ParseError& error) {
-    return Fail(fmt::format("{} (see --help)", error.what()), kUsage);
-  }
-  RequireNoEmptyValue(*program);
-  (*action)();
+int FinishOutput() {
   // It is a failure if results do not reach their file, but not if the reader of a pipe went away.
   errno = 0;
   if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
@@ -84,6 +94,23 @@ int ParseAndRun(CLI::App* program, const tools::CommandAction* action, int argc,
   }
   tools::BeginEnd(kDone);
   return kDone;
+}
+
+int ParseAndRun(CLI::App* program, const tools::CommandAction* action, int argc, char** argv) {
+  try {
+    program->parse(argc, argv);
+  } catch (const CLI::Success& asked_for) {  // --help, --version
+    return program->exit(asked_for);
+  } catch (const CLI::ParseError& error) {
+    if (!tools::EndsBeforeACommand(*program)) {
+      return Fail(fmt::format("{} (see --help)", tools::WrongUsageText(*program, error)), kUsage);
+    }
+    fmt::print("{}", program->help());
+    return FinishOutput();
+  }
+  RequireNoEmptyValue(*program);
+  (*action)();
+  return FinishOutput();
 }
 
 int Main(int argc, char** argv) {
@@ -102,18 +129,21 @@ int Main(int argc, char** argv) {
   program.set_version_flag("--version", tools::BuildInfo(),
                            "Print the version and the libraries it was built with");
   program.require_subcommand(1);
+  program.formatter(std::make_shared<tools::HelpFormat>());
   tools::CommandAction action;
-  tools::AddSimulateCommand(&program, &action);
+  // In the order of work, as --help lists them.
+  tools::AddTargetCommand(&program, &action);
+  tools::AddCameraCommand(&program, &action);
   tools::AddCalibrateCommand(&program, &action);
+  tools::AddExplainCommand(&program, &action);
   tools::AddEstimateCommand(&program, &action);
   tools::AddRenderCommand(&program, &action);
   tools::AddCompareCommand(&program, &action);
   tools::AddReportCommand(&program, &action);
-  tools::AddExplainCommand(&program, &action);
+  tools::AddSimulateCommand(&program, &action);
   tools::AddBenchCommand(&program, &action);
   tools::AddDoctorCommand(&program, &action);
-  tools::AddCameraCommand(&program, &action);
-  tools::AddTargetCommand(&program, &action);
+  program.footer(kExamples);  // after the commands, which would inherit it
   return ParseAndRun(&program, &action, argc, argv);
 }
 

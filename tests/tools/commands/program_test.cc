@@ -183,11 +183,70 @@ TEST_F(ProgramTest, EveryCommandHasHelp) {
   }
 }
 
+TEST_F(ProgramTest, WithoutACommandItPrintsTheHelp) {
+  for (const Arguments& arguments : {Arguments{}, Arguments{"camera"}, Arguments{"simulate"}}) {
+    Arguments asked_for = arguments;
+    asked_for.emplace_back("--help");
+    const ProgramResult result = Run(arguments);
+    EXPECT_EQ(result.exit_code, 0);
+    EXPECT_THAT(result.err, IsEmpty());
+    EXPECT_THAT(result.out, AllOf(HasSubstr("Usage: thicklens"), Not(HasSubstr("Excludes")),
+                                  Not(HasSubstr("{false}"))));
+    EXPECT_EQ(result.out, Run(asked_for).out);
+  }
+}
+
+TEST_F(ProgramTest, TheHelpListsTheCommandsInTheOrderOfWorkWithExamples) {
+  const std::string help = Run({"--help"}).out;
+  std::size_t at = help.find("Subcommands:");
+  for (const char* command : {"target", "camera", "calibrate", "explain", "estimate", "render",
+                              "compare", "report", "simulate", "bench", "doctor"}) {
+    at = help.find(std::string("\n  ") + command + " ", at);
+    ASSERT_NE(at, std::string::npos) << command;
+  }
+  EXPECT_NE(help.find("Examples:", at), std::string::npos);
+  EXPECT_THAT(Run({"estimate", "--help"}).out, Not(HasSubstr("Examples:")));
+}
+
+// Each command of the examples gets as far as its first file, which is missing here.
+TEST_F(ProgramTest, TheExamplesOfTheHelpAreRightUsage) {
+  std::istringstream help(Run({"--help"}).out);
+  const std::string begin = "    thicklens ";
+  int examples = 0;
+  for (std::string line; std::getline(help, line);) {
+    if (line.rfind(begin, 0) != 0) continue;
+    ++examples;
+    std::istringstream words(line.substr(begin.size()));
+    Arguments arguments;
+    for (std::string word; words >> word;) arguments.push_back(word);
+    if (arguments.front() == "camera") arguments.back() = folder_ / "missing/camera.yaml";
+    const ProgramResult result = Run(arguments);
+    // A folder of frames that does not exist is wrong usage of --readings.
+    if (arguments.front() == "calibrate") {
+      EXPECT_THAT(result.err, HasSubstr("sweep is not a folder"));
+    } else {
+      EXPECT_EQ(result.exit_code, 1) << line << "\n" << result.err;
+    }
+  }
+  EXPECT_EQ(examples, 5);
+}
+
+TEST_F(ProgramTest, UnknownNamesAreReportedWithTheNearestOnes) {
+  EXPECT_THAT(ErrorLine(Run({"calibrat", "x"})),
+              HasSubstr("unknown command 'calibrat'; did you mean calibrate?"));
+  EXPECT_THAT(ErrorLine(Run({"frobnicate"})),
+              AllOf(HasSubstr("unknown command 'frobnicate'"), HasSubstr("target, camera")));
+  for (const Arguments& arguments : {Arguments{"estimate", "--veiws", "5x5"},
+                                     Arguments{"estimate", "a", "b", "--veiws", "5x5"}}) {
+    EXPECT_THAT(ErrorLine(Run(arguments)),
+                HasSubstr("--veiws: unknown option of estimate; did you mean --views?"));
+  }
+}
+
 TEST_F(ProgramTest, WrongUsageIsExitCode2) {
   const std::string camera = *shared_ / "sweep/camera.yaml";
   const std::string sweep = *shared_ / "sweep/sweep.yaml";
   for (const Arguments& arguments : {
-           Arguments{},
            Arguments{"frobnicate"},
            Arguments{"simulate", "sweep"},
            Arguments{"calibrate", sweep, "--metod", "fit"},
