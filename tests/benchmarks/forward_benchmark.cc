@@ -4,7 +4,7 @@
 // Compare it with that of the triad, which is the bandwidth of this machine for two threads. Steps
 // and H on an OpenCL device are compared by time. If the device is the processor, column CPU (all
 // threads of the process) can be compared as well. FormNative measures H of a whole light field, as
-// `thicklens bench source --table 2` does; its minimum traffic is the light field, which it reads,
+// `thicklens bench paper --table 2` does; its minimum traffic is the light field, which it reads,
 // and the image, which it writes.
 #include <benchmark/benchmark.h>
 

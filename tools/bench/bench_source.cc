@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "thicklens/base/cancel.h"
+#include "thicklens/base/deprecation.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/parallel.h"
 #include "thicklens/base/stopwatch.h"
@@ -26,6 +27,7 @@
 #include "tools/bench/bench_source_rows.h"
 #include "tools/bench/bench_source_tables.h"
 #include "tools/options/bench_options.h"
+#include "tools/options/deprecated_names.h"
 #include "tools/options/estimate_call.h"
 #include "tools/options/light_field_options.h"
 #include "tools/options/option_values.h"
@@ -255,11 +257,15 @@ CommandResult BenchSource(const BenchSourceOptions& options) {
   return {std::move(summary), ""};
 }
 
-}  // namespace
+constexpr char kBench[] = "bench ";
+constexpr char kPaperCommand[] = "paper";
 
-void AddBenchSourceCommand(CLI::App* bench, CommandAction* action) {
+// `name` is the command's present or a former name.
+void AddPaperCommand(CLI::App* bench, const std::string& name, CommandAction* action) {
   CLI::App* command = bench->add_subcommand(
-      "source", "Measure the paper's tables 1 to 4 here, beside its published values");
+      name, "Measure the paper's tables 1 to 4 here, beside its published values");
+  const bool is_former = name != kPaperCommand;
+  if (is_former) command->group("");  // hidden in --help
   const auto options = std::make_shared<BenchSourceOptions>();
   command->add_option("--table", options->tables, "Tables to measure: 1 2 3 4 (default all)")
       ->check(CLI::Range(1, 4))
@@ -289,7 +295,11 @@ void AddBenchSourceCommand(CLI::App* bench, CommandAction* action) {
       ->type_name("N");
   AddDeviceOption(command, &options->device);
   AddCommonOptions(command, &options->common);
-  command->callback([options, action] {
+  command->callback([options, name, is_former, action] {
+    if (is_former) {
+      options->common.deprecated.push_back(
+          DeprecationText({kBench + name, kBench + std::string(kPaperCommand)}));
+    }
     *action = [options] {
       const EstimateOptions& given = options->given;
       RequireDistinctFiles({options->common.json_path},
@@ -297,6 +307,16 @@ void AddBenchSourceCommand(CLI::App* bench, CommandAction* action) {
       RunCommand(options->common, [&] { return BenchSource(*options); });
     };
   });
+}
+
+}  // namespace
+
+void AddBenchSourceCommand(CLI::App* bench, CommandAction* action) {
+  const std::string now = kPaperCommand;
+  AddPaperCommand(bench, now, action);
+  for (const std::string& former : FormerNames(NameKind::kCommand, kBench + now)) {
+    AddPaperCommand(bench, former.substr(std::string(kBench).size()), action);
+  }
 }
 
 }  // namespace thicklens::tools

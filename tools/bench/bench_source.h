@@ -7,7 +7,7 @@
 
 namespace thicklens::tools {
 
-// Adds `thicklens bench source`, which measures tables 1 to 4 of the paper on this machine and
+// Adds `thicklens bench paper`, which measures tables 1 to 4 of the paper on this machine and
 // shows the published values beside them.
 void AddBenchSourceCommand(CLI::App* bench, CommandAction* action);
 

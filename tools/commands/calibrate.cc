@@ -20,6 +20,7 @@
 #include "thicklens/sweep.h"
 #include "tools/commands/commands.h"
 #include "tools/options/command_frame.h"
+#include "tools/options/deprecated_names.h"
 #include "tools/options/interface_options.h"
 #include "tools/options/option_values.h"
 #include "tools/options/sweep_input.h"
@@ -45,7 +46,7 @@ struct CalibrateOptions {
   bool no_field = false;
   bool dry_run = false;
 
-  bool use_source_recipe() const { return method == "source"; }
+  bool by_paper() const { return method == "paper"; }
   std::string report_path() const {
     return report_folder.empty() ? "" : (fs::path(report_folder) / "report.html").string();
   }
@@ -86,7 +87,7 @@ const model::SweepTruth* TruthOf(const Sweep& sweep) {
 Calibration Measure(const CalibrateOptions& options, const Sweep& sweep) {
   const CommandRun run(options.common, SweepOptionNames());
   thicklens::CalibrateOptions asked;
-  asked.method = options.use_source_recipe() ? CalibrationMethod::kPaper : CalibrationMethod::kFit;
+  asked.method = options.by_paper() ? CalibrationMethod::kPaper : CalibrationMethod::kFit;
   asked.map_field = !options.no_field;
   asked.on_refusal = OnRefusal::kReturn;
   return thicklens::Calibrate(sweep, asked, run.control());
@@ -145,8 +146,7 @@ CommandResult RunCalibration(const CalibrateOptions& options, const Sweep& sweep
                 CalibrationText(focus_sweep, calibration, TruthOf(sweep), options.camera_output));
   CommandResult result;
   result.is_written = outputs.camera || outputs.report;
-  result.summary =
-      CalibrationJson(focus_sweep, calibration, TruthOf(sweep), options.use_source_recipe());
+  result.summary = CalibrationJson(focus_sweep, calibration, TruthOf(sweep), options.by_paper());
   if (!calibration.refusal.empty()) {
     result.refusal = PrintableUtf8(fmt::format("{}: {}", options.sweep.input, calibration.refusal));
   }
@@ -168,7 +168,8 @@ CommandResult RunDry(const CalibrateOptions& options, const Sweep& sweep) {
   { const Outputs could_be_written(options); }
   PrintResult(options.common,
               UnderstandingText(sweep, found, options.method, OutputsText(options)));
-  return {UnderstandingJson(sweep, found, options.method), ""};
+  // JSON has kept the former name of the paper's method.
+  return {UnderstandingJson(sweep, found, options.by_paper() ? "source" : options.method), ""};
 }
 
 CommandResult Calibrate(const CalibrateOptions& options) {
@@ -204,9 +205,11 @@ void AddCalibrateCommand(CLI::App* program, CommandAction* action) {
       ->add_option("--report", options->report_folder,
                    "Folder for report.html with its figures as SVG")
       ->type_name("DIR");
-  command->add_option("--method", options->method, "fit, or source: the paper's baseline method")
-      ->check(CLI::IsMember({"fit", "source"}))
-      ->type_name("NAME");
+  CLI::Option* method =
+      command->add_option("--method", options->method, "fit, or paper: the paper's method")
+          ->check(CLI::IsMember({"fit", "paper"}))
+          ->type_name("NAME");
+  AcceptDeprecatedValues(method, &options->common);
   command->add_flag("--no-field", options->no_field,
                     "Skip the maps over the field and the colours; faster");
   command->add_flag("--dry-run", options->dry_run,

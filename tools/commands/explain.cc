@@ -196,6 +196,7 @@ void AddExplainCommand(CLI::App* program, CommandAction* action) {
       ->capture_default_str()
       ->type_name("N");
   AddEffectOptions(command, &options->effects);
+  AddFormerEffectTolerance(command, &options->effects, &options->common);
   command->add_option("--bits", options->bits, "Bits per value of the encoded image")
       ->check(CLI::Range(1, 32))
       ->capture_default_str()

@@ -103,7 +103,7 @@ void CheckUsage(RenderOptions* options) {
                "--as-captured");
   RefuseUnless(options->as_captured, options->effects.without.has_value(), "--without",
                "--as-captured");
-  RefuseUnless(options->as_captured, options->effects.tolerance.has_value(), "--tolerance",
+  RefuseUnless(options->as_captured, options->effects.tolerance.has_value(), "--effect-tolerance",
                "--as-captured");
   const bool is_image = options->convert.empty();
   const char* const kImages = "an image as output, not --convert";
@@ -170,7 +170,7 @@ OptionNames RenderOptionNames() {
           {"aperture.radius", "--aperture"},
           {"effects", "--effects"},
           {"effects.without", "--without"},
-          {"effects.tolerance", "--tolerance"},
+          {"effects.tolerance", "--effect-tolerance"},
           {"depth_mm", "--focus"},
           {"disparity_px", "--focus-disparity"},
           {"device", "--device"},
@@ -451,6 +451,7 @@ void AddHowToRender(CLI::App* command, RenderOptions* options) {
       ->check(NonNegative())
       ->type_name("R");
   AddEffectOptions(command, &options->effects);
+  AddFormerEffectTolerance(command, &options->effects, &options->common);
   command
       ->add_option("--noise", options->noise_levels,
                    "Add normally distributed noise of N/255 to the encoded values")

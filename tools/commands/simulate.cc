@@ -34,7 +34,7 @@ struct SimulateOptions {
   std::optional<std::int64_t> seed;
   bool unknown_offset = false;
   bool ablate = false;
-  EffectOptions effects{{}, {}, {}, ""};  // auto has nothing to choose
+  EffectOptions effects{{}, {}, {}, false};  // auto has nothing to choose
 };
 
 nlohmann::json Summary(const SimulateOptions& options, const SweepSimulation& simulation,

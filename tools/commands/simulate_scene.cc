@@ -222,6 +222,7 @@ CLI::App* AddSceneCommand(CLI::App* simulate, const std::string& name, const std
       ->check(CLI::Range(std::int64_t{0}, std::numeric_limits<std::int64_t>::max()))
       ->type_name("N");
   AddEffectOptions(command, &options->effects);
+  AddFormerEffectTolerance(command, &options->effects, &options->common);
   AddCommonOptions(command, &options->common);
   return command;
 }

@@ -17,6 +17,7 @@
 #include "thicklens/model/target_texture.h"
 #include "tools/commands/commands.h"
 #include "tools/options/command_frame.h"
+#include "tools/options/deprecated_names.h"
 #include "tools/options/option_values.h"
 #include "tools/report/target_drawing.h"
 
@@ -44,7 +45,7 @@ constexpr std::array<NamedSheet, 3> kNamedSheets = {
 struct TargetOptions {
   CommonOptions common;
   std::string output_path;
-  std::string size = "a4";
+  std::string paper = "a4";
   std::string camera_path;
   double distance_mm = 0;
   double dots_per_inch = 600;
@@ -61,18 +62,25 @@ Format FormatOf(const std::string& path) {
   throw UsageError(fmt::format("{}: a name that ends in .pdf, .svg or .png is expected", path));
 }
 
+std::string LowerCase(std::string text) {
+  for (char& letter : text) {
+    if (letter >= 'A' && letter <= 'Z') letter = static_cast<char>(letter - 'A' + 'a');
+  }
+  return text;
+}
+
 model::SheetSize ParseSheet(const std::string& text) {
   for (const NamedSheet& sheet : kNamedSheets) {
-    if (text == sheet.name) return {sheet.width_mm, sheet.height_mm, true};
+    if (LowerCase(text) == sheet.name) return {sheet.width_mm, sheet.height_mm, true};
   }
   const std::string form =
       fmt::format("a4, a3, letter or WxH in mm from {:g} to {:g}", kShortestSideMm, kLongestSideMm);
-  const std::vector<double> sides_mm = SplitNumbers("--size", text, 'x', form);
+  const std::vector<double> sides_mm = SplitNumbers("--paper", text, 'x', form);
   const auto possible = [](double side_mm) {
     return side_mm >= kShortestSideMm && side_mm <= kLongestSideMm;
   };
   if (sides_mm.size() != 2 || !possible(sides_mm[0]) || !possible(sides_mm[1])) {
-    throw UsageError(fmt::format("--size: {} is expected, found '{}'", form, text));
+    throw UsageError(fmt::format("--paper: {} is expected, found '{}'", form, text));
   }
   return {sides_mm[0], sides_mm[1], false};
 }
@@ -150,19 +158,24 @@ void AddTargetOptions(CLI::App* command, TargetOptions* options) {
   command->add_option("-o,--output", options->output_path, "File to write: .pdf, .svg or .png")
       ->required()
       ->type_name("FILE");
-  command->add_option("--size", options->size, "Sheet: a4, a3, letter, or width x height in mm")
+  command->add_option("--paper", options->paper, "Sheet: a4, a3, letter, or width x height in mm")
       ->capture_default_str()
       ->type_name("WxH");
+  AddDeprecatedOptions(
+      command, "--paper", [options](const std::string& text) { options->paper = text; },
+      &options->common);
   CLI::Option* camera =
       command
-          ->add_option("--camera", options->camera_path, "Camera whose field the pattern must fill")
+          ->add_option("--camera", options->camera_path,
+                       "Camera whose field the pattern must fill, with --distance-mm")
           ->type_name("CAMERA.yaml");
-  CLI::Option* distance = command
-                              ->add_option("--distance-mm", options->distance_mm,
-                                           "Distance from its aperture to the target in focus")
-                              ->check(Between(0, kMaxDistanceMm, "mm from the aperture"))
-                              ->needs(camera)
-                              ->type_name("Z");
+  CLI::Option* distance =
+      command
+          ->add_option("--distance-mm", options->distance_mm,
+                       "Distance from the aperture of --camera to the target in focus")
+          ->check(Between(0, kMaxDistanceMm, "mm from the aperture"))
+          ->needs(camera)
+          ->type_name("Z");
   camera->needs(distance);
   command
       ->add_option("--feature-mm", options->feature_mm, "Smallest feature; by default it is chosen")
@@ -204,7 +217,7 @@ void AddTargetCommand(CLI::App* program, CommandAction* action) {
     *action = [options] {
       const Format format = FormatOf(options->output_path);
       model::TargetRequest request = options->request;
-      request.sheet = ParseSheet(options->size);
+      request.sheet = ParseSheet(options->paper);
       request.feature_mm = options->feature_mm;
       request.seed = static_cast<std::uint64_t>(options->seed);
       RequireDistinctFiles({options->output_path, options->common.json_path},

@@ -8,6 +8,7 @@
 
 #include "thicklens/base/deprecation.h"
 #include "thicklens/base/error.h"
+#include "tools/options/option_values.h"
 
 namespace thicklens::tools {
 namespace {
@@ -53,7 +54,13 @@ const std::vector<DeprecatedName>& DeprecatedNames() {
   using Kind = NameKind;
   static const std::vector<DeprecatedName> names = {
       {Kind::kCommand, "simulate picture", "simulate image", "command line"},
+      {Kind::kCommand, "bench source", "bench paper", "command line"},
       {Kind::kOption, "--attribute", "--ablate", "`simulate image`, `simulate sweep`"},
+      {Kind::kOption, "--tolerance", "--effect-tolerance",
+       "`render`, `explain`, `simulate image`, `simulate light-field`"},
+      {Kind::kOption, "--size", "--paper", "`target`"},
+      {Kind::kValue, "--method source", "--method paper", "`calibrate`"},
+      {Kind::kValue, "--stencil source", "--stencil paper", "`estimate`"},
       {Kind::kHardCase, "estimator/ridge-0-whole-picture", "estimator/ridge-0-whole-image",
        "`doctor --hard-cases --only`"},
       {Kind::kHardCase, "estimator/blur-beyond-the-picture", "estimator/blur-beyond-the-image",
@@ -71,7 +78,7 @@ const std::vector<DeprecatedName>& DeprecatedNames() {
        "`simulate --ablate --json`, `explain --costs --json`"},
       {Kind::kJson, "picture", "image", "`simulate --ablate --json`, of an effect",
        "image_seconds"},
-      {Kind::kJson, "picture", "image", "`bench source --json`, of a row", "implementation"},
+      {Kind::kJson, "picture", "image", "`bench paper --json`, of a row", "implementation"},
       {Kind::kJson, "attribution", "ablation", "`simulate --ablate --json`"},
       {Kind::kJson, "picture_files", "image_files", "`doctor --json`"},
       {Kind::kJson, "agreement", "self_test", "`doctor --json`"},
@@ -86,11 +93,11 @@ const std::vector<DeprecatedName>& DeprecatedNames() {
       {Kind::kJson, "psnr_picture_db", "psnr_image_db", "`bench --json`"},
       {Kind::kJson, "psnr_hidden_db", "psnr_occluded_db", "`bench --json`"},
       {Kind::kJson, "published_seconds_of_pictures", "published_seconds_of_images",
-       "`bench source --json`"},
+       "`bench paper --json`"},
       {Kind::kJson, "published_macade_of_pictures", "published_macade_of_images",
-       "`bench source --json`"},
+       "`bench paper --json`"},
       {Kind::kJson, "published_delta_e94_mean_of_pictures", "published_delta_e94_mean_of_images",
-       "`bench source --json`"},
+       "`bench paper --json`"},
       {Kind::kJson, "in_the_law", "in_the_model", "`bench accuracy --json`"},
       {Kind::kColumn, "picture_of", "image_of", "`attribution.csv`"},
       {Kind::kColumn, "picture_seconds", "image_seconds", "`attribution.csv`"},
@@ -121,6 +128,38 @@ void AddDeprecatedFlags(CLI::App* command, const std::string& now, bool* flag,
       common->deprecated.push_back(DeprecationText({former, now}));
     };
     command->add_flag_callback(former, set)->group("");
+  }
+}
+
+void AddDeprecatedOptions(CLI::App* command, const std::string& now,
+                          const std::function<void(const std::string&)>& take,
+                          CommonOptions* common) {
+  const CLI::Option* present = command->get_option(now);
+  for (const std::string& former : FormerNames(NameKind::kOption, now)) {
+    const std::function<void(const std::string&)> take_former = [=](const std::string& value) {
+      if (value.empty()) throw UsageError(former + ": a value is expected, found ''");
+      if (present->count() > 0) {
+        throw UsageError(fmt::format("{} and its former name {}: give {} alone", now, former, now));
+      }
+      take(value);
+      common->deprecated.push_back(DeprecationText({former, now}));
+    };
+    command->add_option_function(former, take_former)->group("");
+  }
+}
+
+void AcceptDeprecatedValues(CLI::Option* option, CommonOptions* common) {
+  const std::string begin = option->get_name() + " ";
+  for (const DeprecatedName& name : DeprecatedNames()) {
+    if (name.kind != NameKind::kValue || name.former.rfind(begin, 0) != 0) continue;
+    const auto rename = [name, begin, common](std::string& value) {
+      if (begin + value == name.former) {
+        value = name.now.substr(begin.size());
+        common->deprecated.push_back(DeprecationText({name.former, name.now}));
+      }
+      return std::string();
+    };
+    option->transform(CLI::Validator(rename, ""));
   }
 }
 

@@ -2,6 +2,7 @@
 #define THICKLENS_TOOLS_OPTIONS_DEPRECATED_NAMES_H_
 
 #include <CLI/CLI.hpp>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -10,7 +11,7 @@
 
 namespace thicklens::tools {
 
-enum class NameKind { kCommand, kOption, kHardCase, kYaml, kJson, kColumn };
+enum class NameKind { kCommand, kOption, kValue, kHardCase, kYaml, kJson, kColumn };
 
 // A name of the program's interface that was renamed. Its former name is accepted, or written
 // beside the present one, until version 1.0.
@@ -35,6 +36,16 @@ std::string PresentName(NameKind kind, const std::string& name);
 // in `common`.
 void AddDeprecatedFlags(CLI::App* command, const std::string& now, bool* flag,
                         CommonOptions* common);
+
+// Adds the former names of an option with one value, which `take` gets. --help does not show them,
+// and each use is noted in `common`. Throws UsageError while the command line is read if the option
+// is given by its present name too.
+void AddDeprecatedOptions(CLI::App* command, const std::string& now,
+                          const std::function<void(const std::string&)>& take,
+                          CommonOptions* common);
+
+// Lets an option accept the former names of its values. Each use is noted in `common`.
+void AcceptDeprecatedValues(CLI::Option* option, CommonOptions* common);
 
 // Adds the former names of all keys, with the same values, to what a command writes.
 void AddDeprecatedKeys(nlohmann::json* written);

@@ -6,10 +6,13 @@
 #include <utility>
 
 #include "thicklens/base/error.h"
+#include "tools/options/deprecated_names.h"
 #include "tools/options/option_values.h"
 
 namespace thicklens::tools {
 namespace {
+
+constexpr char kEffectTolerance[] = "--effect-tolerance";
 
 // Runs `parse`, and turns its error into a UsageError that begins with the option's name.
 template <typename Parse>
@@ -48,12 +51,18 @@ void AddEffectOptions(CLI::App* command, EffectOptions* options) {
       ->add_option("--without", options->without,
                    "Effects to leave out always, names separated by commas")
       ->type_name("NAMES");
-  if (options->tolerance_option.empty()) return;
+  if (!options->has_tolerance) return;
   command
       ->add_option(
-          options->tolerance_option, options->tolerance,
+          kEffectTolerance, options->tolerance,
           "Largest total effect that auto may leave out: 0.5gl (grey levels of 255) or 0.1px")
       ->type_name("AMOUNT");
+}
+
+void AddFormerEffectTolerance(CLI::App* command, EffectOptions* options, CommonOptions* common) {
+  AddDeprecatedOptions(
+      command, kEffectTolerance, [options](const std::string& text) { options->tolerance = text; },
+      common);
 }
 
 void CheckEffectNames(const EffectOptions& options, const model::EffectSet& of_model) {
@@ -85,7 +94,7 @@ void ApplyEffectOptions(const EffectOptions& options, model::EffectSelectionOpti
         Parsed("--without", [&] { return model::EffectSetFromNames(*options.without); });
   }
   if (options.tolerance) {
-    choice->tolerance = Parsed(options.tolerance_option,
+    choice->tolerance = Parsed(kEffectTolerance,
                                [&] { return model::EffectToleranceFromText(*options.tolerance); });
   }
 }

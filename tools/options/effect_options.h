@@ -10,16 +10,19 @@
 
 #include "thicklens/effects.h"
 #include "thicklens/model/effect_selection.h"
+#include "tools/options/command_frame.h"
 
 namespace thicklens::tools {
 
-// The options --effects, --without and --tolerance of commands with a forward model. An absent
+// The options --effects, --without and --effect-tolerance of commands with a forward model. An absent
 // value was not given.
 struct EffectOptions {
   std::optional<std::string> effects, without, tolerance;
-  std::string tolerance_option = "--tolerance";  // another name of the option; empty: there is none
+  bool has_tolerance = true;  // false: there is no --effect-tolerance
 };
 void AddEffectOptions(CLI::App* command, EffectOptions* options);
+// Also accepts the former name of --effect-tolerance, which is another option in `estimate`.
+void AddFormerEffectTolerance(CLI::App* command, EffectOptions* options, CommonOptions* common);
 // Throws UsageError for named effects that the forward model does not have.
 void CheckEffectNames(const EffectOptions& options, const model::EffectSet& of_model);
 // Overrides `choice` with the given options. Throws UsageError.

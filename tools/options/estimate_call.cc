@@ -53,7 +53,7 @@ BlockSolver::Linear LinearOf(const std::string& name) {
 BlockSolver BlockSolverOf(const EstimateOptions& options) {
   BlockSolver solver;
   if (options.block_solver) solver.linear = LinearOf(*options.block_solver);
-  if (options.stencil == "source") solver.stencil = BlockSolver::Stencil::kPaper;
+  if (options.stencil == "paper") solver.stencil = BlockSolver::Stencil::kPaper;
   if (options.splat == "nearest") solver.splat = BlockSolver::Splat::kNearest;
   if (options.gamma) solver.gamma = *options.gamma;
   solver.ridge = options.ridge;

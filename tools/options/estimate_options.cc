@@ -13,6 +13,7 @@
 #include "thicklens/estimator/block_solver.h"
 #include "thicklens/estimator/functional_solver.h"
 #include "thicklens/estimator/scene_solver.h"
+#include "tools/options/deprecated_names.h"
 #include "tools/options/option_values.h"
 #include "tools/options/quality_target_options.h"
 
@@ -219,12 +220,14 @@ void AddBlockOptions(CLI::App* command, EstimateOptions* options) {
           "Edge of a block (solver blocks); default 16, or the largest that --memory-limit allows")
       ->check(CLI::Range(1, 100000))
       ->type_name("PX");
-  command
-      ->add_option("--stencil", options->stencil,
-                   "Stencil of the smoothness (solver blocks): warp (default), or the paper's six "
-                   "differences")
-      ->check(CLI::IsMember({"warp", "source"}))
-      ->type_name("NAME");
+  CLI::Option* stencil =
+      command
+          ->add_option("--stencil", options->stencil,
+                       "Stencil of the smoothness (solver blocks): warp (default), or paper: the "
+                       "six differences of the paper's method")
+          ->check(CLI::IsMember({"warp", "paper"}))
+          ->type_name("NAME");
+  AcceptDeprecatedValues(stencil, &options->common);
   command
       ->add_option("--splat", options->splat,
                    "Of blocks: a ray reaches the two nearest pixels (bilinear, default), or the "

@@ -32,7 +32,7 @@ struct EstimateOptions {
   std::optional<double> memory_limit_mib;
   bool keep_depth_noise = false;
   std::string fill = "solver";  // or "telea"
-  EffectOptions effects{{}, {}, {}, "--effect-tolerance"};
+  EffectOptions effects;
   std::string device = "auto";
   std::string format = "png";
   // Options of some solvers, as the help says.

@@ -1,4 +1,4 @@
-// thicklens bench source, thicklens bench gamma.
+// thicklens bench paper, thicklens bench gamma.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -53,7 +53,7 @@ class BenchSourceTest : public ::testing::Test {
 };
 
 TEST_F(BenchSourceTest, MeasuresTheFourTables) {
-  const nlohmann::json rows = Rows({"source", "--size", "64x64", "--views", "2", "--threads", "2"});
+  const nlohmann::json rows = Rows({"paper", "--size", "64x64", "--views", "2", "--threads", "2"});
   std::map<int, std::set<std::string>> found;
   std::map<std::string, double> psnr_db;
   for (const auto& row : rows) {
@@ -91,7 +91,7 @@ TEST_F(BenchSourceTest, MeasuresTheFourTables) {
 
 TEST_F(BenchSourceTest, LargeImagesAreSampledAndSaySo) {
   const nlohmann::json rows =
-      Rows({"source", "--size", "160x160", "--views", "2", "--table", "1", "--device", "cpu"});
+      Rows({"paper", "--size", "160x160", "--views", "2", "--table", "1", "--device", "cpu"});
   ASSERT_GE(rows.size(), 2U);
   for (const auto& row : rows) {
     // Every row is scored on the same four areas. Extrapolated values have keys of their own.
@@ -125,8 +125,8 @@ TEST_F(BenchSourceTest, TakesAnImageOfOnesOwn) {
   const std::string image = folder_.Put("mine.png", io::EncodePng(stored));
   const std::string map = folder_.Put("depth.pfm", io::EncodePfm(depth));
   const std::string camera = folder_.Put("camera.yaml", model::CameraToYaml(camera_of_it));
-  const Arguments given = {"source", "--image",      image, "--depth",  map,    "--depth-kind",
-                           "z",      "--depth-unit", "mm",  "--camera", camera, "--views",
+  const Arguments given = {"paper", "--image",      image, "--depth",  map,    "--depth-kind",
+                           "z",     "--depth-unit", "mm",  "--camera", camera, "--views",
                            "2"};
   const nlohmann::json rows = Rows(given);
   std::set<int> tables;
@@ -140,7 +140,7 @@ TEST_F(BenchSourceTest, TakesAnImageOfOnesOwn) {
 
 TEST_F(BenchSourceTest, RefusesWhatCannotBeMeant) {
   const auto refusal = [&](const Arguments& arguments) {
-    Arguments all = {"bench", "source"};
+    Arguments all = {"bench", "paper"};
     all.insert(all.end(), arguments.begin(), arguments.end());
     const ProgramResult result = ChildProgram(all, folder_.path(), 0).Wait();
     EXPECT_EQ(result.exit_code, 2) << result.err;

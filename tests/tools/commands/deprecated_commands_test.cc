@@ -25,13 +25,14 @@ using thicklens::testing::ContentOf;
 using thicklens::testing::TemporaryFolder;
 using Arguments = std::vector<std::string>;
 
-// The former names.
-std::vector<std::string> NamesOfCommandLine() {
+// The former names of `simulate image` and its options.
+std::vector<std::string> NamesOfSimulateImage() {
   std::vector<std::string> names;
   for (const DeprecatedName& name : DeprecatedNames()) {
-    if (name.kind == NameKind::kCommand || name.kind == NameKind::kOption) {
-      names.push_back(name.former);
-    }
+    const bool is_command = name.kind == NameKind::kCommand && name.now == "simulate image";
+    const bool is_option =
+        name.kind == NameKind::kOption && name.where.find("`simulate image`") != std::string::npos;
+    if (is_command || is_option) names.push_back(name.former);
   }
   return names;
 }
@@ -55,6 +56,7 @@ class DeprecatedOnCommandLine : public ::testing::TestWithParam<std::string> {
   }
 
   static bool IsCommand() { return GetParam().front() != '-'; }
+  static bool IsFlag() { return GetParam() == "--attribute"; }
   static std::string Now() {
     return PresentName(IsCommand() ? NameKind::kCommand : NameKind::kOption, GetParam());
   }
@@ -66,6 +68,7 @@ class DeprecatedOnCommandLine : public ::testing::TestWithParam<std::string> {
     Arguments words = {"simulate", IsCommand() ? name.substr(name.find(' ') + 1) : "image",
                        folder_ / "scene.yaml", "--effects", "defocus,falloff"};
     if (!IsCommand()) words.push_back(name);
+    if (!IsCommand() && !IsFlag()) words.emplace_back("0.25gl");
     words.insert(words.end(), more.begin(), more.end());
     return words;
   }
@@ -105,7 +108,7 @@ TEST_P(DeprecatedOnCommandLine, DoesTheSameWithOneWarning) {
     return Steady(nlohmann::json::parse(ContentOf(folder_ / name)));
   };
   EXPECT_EQ(summary("former.json"), summary("now.json"));
-  EXPECT_EQ(summary("former.json").contains("ablation"), !IsCommand());
+  EXPECT_EQ(summary("former.json").contains("ablation"), IsFlag());
 }
 
 TEST_P(DeprecatedOnCommandLine, IsQuietIfAsked) {
@@ -126,7 +129,7 @@ TEST_P(DeprecatedOnCommandLine, IsNotInTheHelp) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(All, DeprecatedOnCommandLine, ::testing::ValuesIn(NamesOfCommandLine()),
+INSTANTIATE_TEST_SUITE_P(All, DeprecatedOnCommandLine, ::testing::ValuesIn(NamesOfSimulateImage()),
                          [](const auto& tested) {
                            std::string name;
                            for (const char letter : tested.param) {
@@ -149,6 +152,82 @@ TEST(DeprecatedOption, IsOneOfSimulateSweepToo) {
                        "\nthicklens: error: "),
             HasSubstr("none.yaml"), EndsWith("\n")));
   EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 2);
+}
+
+ProgramResult RunIn(const TemporaryFolder& scratch, const Arguments& arguments) {
+  return ChildProgram(arguments, scratch.path(), 0).Wait();
+}
+
+// One warning, and then the error of this place.
+void ExpectWarningThenError(const ProgramResult& result, const std::string& former,
+                            const std::string& now, const std::string& place) {
+  EXPECT_THAT(result.err, AllOf(StartsWith("thicklens: warning: " + DeprecationText({former, now}) +
+                                           "\nthicklens: error: "),
+                                HasSubstr(place), EndsWith("\n")));
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 2);
+}
+
+TEST(DeprecatedOption, OfTargetDrawsTheSame) {
+  const TemporaryFolder folder, scratch;
+  const Arguments begin = {"target", "--feature-mm", "1", "-o"};
+  const auto draw = [&](const std::string& file, const Arguments& more) {
+    Arguments all = begin;
+    all.push_back(folder / file);
+    all.insert(all.end(), more.begin(), more.end());
+    return RunIn(scratch, all);
+  };
+  const ProgramResult now = draw("now.svg", {"--paper", "100x80"});
+  const ProgramResult former = draw("former.svg", {"--size", "100x80"});
+  ASSERT_EQ(now.exit_code, 0) << now.err;
+  ASSERT_EQ(former.exit_code, 0) << former.err;
+  EXPECT_THAT(now.err, IsEmpty());
+  EXPECT_EQ(former.err, "thicklens: warning: " + DeprecationText({"--size", "--paper"}) + "\n");
+  EXPECT_EQ(ContentOf(folder / "former.svg"), ContentOf(folder / "now.svg"));
+  const ProgramResult both = draw("both.svg", {"--size", "a3", "--paper", "a4"});
+  EXPECT_EQ(both.exit_code, 2);
+  EXPECT_THAT(both.err, AllOf(HasSubstr("--paper"), HasSubstr("--size")));
+  EXPECT_EQ(draw("none.svg", {"--size="}).exit_code, 2);
+}
+
+TEST(DeprecatedOption, OfToleranceIsOneOfEachCommandWithEffects) {
+  const TemporaryFolder folder, scratch;
+  for (const Arguments& command :
+       {Arguments{"explain", folder / "none.yaml", "--depth-range", "100:200"},
+        Arguments{"render", folder / "none.yaml", "--as-captured", "-o", folder / "a.png"},
+        Arguments{"simulate", "light-field", folder / "none.yaml", "-o", folder / "lf"}}) {
+    Arguments all = command;
+    all.insert(all.end(), {"--tolerance", "1gl"});
+    const ProgramResult result = RunIn(scratch, all);
+    EXPECT_EQ(result.exit_code, 1);
+    ExpectWarningThenError(result, "--tolerance", "--effect-tolerance", "none.yaml");
+  }
+}
+
+TEST(DeprecatedValue, OfAnOptionIsAccepted) {
+  const TemporaryFolder folder, scratch;
+  const ProgramResult calibrate =
+      RunIn(scratch, {"calibrate", folder / "none.yaml", "--method", "source"});
+  EXPECT_EQ(calibrate.exit_code, 1);
+  ExpectWarningThenError(calibrate, "--method source", "--method paper", "none.yaml");
+  const ProgramResult estimate = RunIn(
+      scratch, {"estimate", folder / "none.png", folder / "none.pfm", "--depth-kind", "disparity",
+                "--solver", "blocks", "--stencil", "source", "-o", folder / "lf"});
+  EXPECT_EQ(estimate.exit_code, 1);
+  ExpectWarningThenError(estimate, "--stencil source", "--stencil paper", "none.png");
+  for (const char* value : {"paper", "fit"}) {
+    const ProgramResult result =
+        RunIn(scratch, {"calibrate", folder / "none.yaml", "--method", value});
+    EXPECT_THAT(result.err, AllOf(HasSubstr("none.yaml"), Not(HasSubstr("deprecated"))));
+  }
+}
+
+TEST(DeprecatedCommand, OfBenchIsAcceptedAndHidden) {
+  const TemporaryFolder scratch;
+  const ProgramResult result = RunIn(scratch, {"bench", "source", "--camera", "none.yaml"});
+  EXPECT_EQ(result.exit_code, 2);
+  ExpectWarningThenError(result, "bench source", "bench paper", "--camera requires --image");
+  EXPECT_THAT(RunIn(scratch, {"bench", "--help"}).out,
+              AllOf(HasSubstr("  paper "), Not(HasSubstr("  source "))));
 }
 
 // The warning of a file comes once for both words, and not with --quiet.

@@ -221,7 +221,7 @@ TEST_F(EstimateTest, OneViewAcrossIsReportedAndOneViewInAllIsRefused) {
 TEST_F(EstimateTest, BlocksLargerThanTheImageAndTheSourcesStencil) {
   const std::string json = folder_ / "estimate.json";
   const ProgramResult result =
-      Run(With(AsDisparity(Image(), Disparity()), {"--block-px", "500", "--stencil", "source",
+      Run(With(AsDisparity(Image(), Disparity()), {"--block-px", "500", "--stencil", "paper",
                                                    "--block-solver", "eigen", "--json", json}));
   EXPECT_EQ(result.exit_code, 0) << result.err;
   const nlohmann::json summary = nlohmann::json::parse(ContentOf(json));
@@ -280,7 +280,7 @@ TEST_F(EstimateTest, SettingsThatCannotBe) {
   EXPECT_THAT(Refusal(With(good, {"--block-solver", "superlu"}), 2), HasSubstr("superlu"));
   EXPECT_THAT(Refusal(With(good, {"--sensor-origin", "0,0"}), 2), HasSubstr("--camera"));
   if (estimator::IsBuiltIn(estimator::BlockSolver::kCholmod)) {
-    EXPECT_THAT(Refusal(With(good, {"--stencil", "source", "--block-solver", "cholmod"})),
+    EXPECT_THAT(Refusal(With(good, {"--stencil", "paper", "--block-solver", "cholmod"})),
                 HasSubstr("not symmetric"));
   } else {
     EXPECT_THAT(Refusal(With(good, {"--block-solver", "cholmod"})),

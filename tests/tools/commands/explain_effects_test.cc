@@ -114,9 +114,9 @@ TEST_F(ExplainEffectsTest, ToleranceAndSensorDecideWhatIsOn) {
   const double near_mm = 1 / (1 / 300.0 + 1 / 30000.0);
   ASSERT_NEAR(SigmaPx(near_mm), 1, 1e-9);
   const std::string range = std::to_string(near_mm) + ":300";
-  EXPECT_TRUE(EffectsOf({"--depth-range", range, "--tolerance", "0.9px"})["defocus"]["on"]);
-  EXPECT_FALSE(EffectsOf(
-      {"--depth-range", range, "--tolerance", "1.1px", "--without", "falloff"})["defocus"]["on"]);
+  EXPECT_TRUE(EffectsOf({"--depth-range", range, "--effect-tolerance", "0.9px"})["defocus"]["on"]);
+  EXPECT_FALSE(EffectsOf({"--depth-range", range, "--effect-tolerance", "1.1px", "--without",
+                          "falloff"})["defocus"]["on"]);
   const nlohmann::json noisy = EffectsOf(
       {"--depth-range", "290:310", "--full-well", "4000", "--read-noise", "20", "--bits", "4"});
   for (const char* name : {"shot-noise", "read-noise", "quantisation"}) {
@@ -146,7 +146,7 @@ TEST_F(ExplainEffectsTest, SaysWhatIsWrong) {
   EXPECT_THAT(Run({"--depth-range", "200:300", "--drift", "0.2"}).err,
               HasSubstr("require --as-sweep"));
   EXPECT_EQ(Run({"--depth-range", "200:300", "--effects", ""}).exit_code, 2);
-  EXPECT_EQ(Run({"--depth-range", "200:300", "--tolerance", "1"}).exit_code, 2);
+  EXPECT_EQ(Run({"--depth-range", "200:300", "--effect-tolerance", "1"}).exit_code, 2);
   model::RawDepthMap small{8, 8, std::vector<float>(64, 300), false};
   const ProgramResult wrong_size = Run({"--depth", folder_.Put("small.pfm", io::EncodePfm(small)),
                                         "--depth-kind", "z", "--depth-unit", "mm"});

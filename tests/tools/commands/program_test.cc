@@ -355,7 +355,7 @@ TEST_F(ProgramTest, CalibratesASweepAndWritesAllItsOutputs) {
 TEST_F(ProgramTest, TheSourcesRecipeIsMarkedAsSuch) {
   const std::string camera = folder_ / "camera.yaml";
   const ProgramResult result = Run(
-      {"calibrate", *shared_ / "sweep/sweep.yaml", "--method", "source", "-o", camera, "--quiet"});
+      {"calibrate", *shared_ / "sweep/sweep.yaml", "--method", "paper", "-o", camera, "--quiet"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, IsEmpty());
   EXPECT_EQ(model::ReadCamera(camera).calibration->evidence.method, "source-recipe");

@@ -141,7 +141,7 @@ TEST_F(SimulateSceneTest, EffectsAreChosenAndReported) {
   EXPECT_EQ(foreign.exit_code, 2);
   EXPECT_THAT(foreign.err, HasSubstr("--effects: effect tilt is not available here"));
   EXPECT_EQ(Run({"image", config, "-o", folder_ / "c", "--without", "bokeh"}).exit_code, 2);
-  EXPECT_EQ(Run({"image", config, "-o", folder_ / "c", "--tolerance", "1"}).exit_code, 2);
+  EXPECT_EQ(Run({"image", config, "-o", folder_ / "c", "--effect-tolerance", "1"}).exit_code, 2);
 }
 
 TEST_F(SimulateSceneTest, LightFieldFolderHoldsTheTrueViews) {

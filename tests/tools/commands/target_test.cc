@@ -380,7 +380,7 @@ class TargetProgram : public ::testing::Test {
 TEST_F(TargetProgram, WritesTheSameBytesEveryTimeAndOthersForAnotherSeed) {
   for (const std::string ending : {"pdf", "svg", "png"}) {
     const auto make = [&](const std::string& name, const std::string& seed) {
-      const ProgramResult result = Run({"-o", folder_ / name, "--size", "100x80", "--seed", seed,
+      const ProgramResult result = Run({"-o", folder_ / name, "--paper", "100x80", "--seed", seed,
                                         "--feature-mm", "1", "--dpi", "150"});
       EXPECT_EQ(result.exit_code, 0) << result.err;
       return ContentOf(folder_ / name);
@@ -415,7 +415,7 @@ TEST_F(TargetProgram, RefusesNonsense) {
   ExpectFailure({"-o", folder_ / "target"}, 2, ".pdf, .svg or .png is expected");
   for (const std::string size : {"10x10", "100", "100x", "ax100", "100x100x100", "-100x100",
                                  "nanx100", "1e9x100", "a5", ""}) {
-    ExpectFailure({"-o", pdf, "--size=" + size}, 2, "--size");
+    ExpectFailure({"-o", pdf, "--paper=" + size}, 2, "--paper");
   }
   ExpectFailure({"-o", pdf, "--feature-mm", "nan"}, 2, "--feature-mm");
   ExpectFailure({"-o", pdf, "--feature-mm", "0"}, 2, "--feature-mm");

@@ -59,6 +59,8 @@ std::string KindText(NameKind kind) {
       return "command";
     case NameKind::kOption:
       return "option";
+    case NameKind::kValue:
+      return "value";
     case NameKind::kHardCase:
       return "hard case";
     case NameKind::kYaml:

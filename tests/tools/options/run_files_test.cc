@@ -248,7 +248,7 @@ TEST_F(RunFilesTest, TheOtherCommandsKeepTheirInputs) {
   ExpectKept("case.yaml", {"bench", "calibration", "--sweep", (*this)("sw.yaml")}, {"--json"});
   ExpectKept("scene.yaml", {"bench", "accuracy", "--scene", (*this)("scene.yaml")}, {"--json"});
   ExpectKept("target.png",
-             {"bench", "source", "--image", image, "--depth", (*this)("map.pfm"), "--depth-kind",
+             {"bench", "paper", "--image", image, "--depth", (*this)("map.pfm"), "--depth-kind",
               "disparity"},
              {"--json"});
   // No frame that the page shows, but one of the sweep.
