@@ -135,7 +135,7 @@ CommandResult InitCamera(const CameraInitOptions& options) {
   const model::Camera camera = DescribedCamera(options.camera, photo, photo_size_px);
   const std::string yaml = model::CameraToYaml(camera);
   if (output) output->Commit(yaml);
-  if (!output) PrintResult(options.common, yaml);
+  PrintResult(options.common, output ? WrittenText({options.output}) : yaml);
   ReportAssumedFields(camera);
   CommandResult result;
   result.is_written = output.has_value();

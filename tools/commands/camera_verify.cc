@@ -95,6 +95,7 @@ CommandResult RunVerification(const CameraVerifyOptions& options) {
         "{}: {} by {}: {}", options.camera_path,
         is_other ? "the calibration does not hold" : "whether the calibration holds is undecided",
         options.sweep.input, verification.reason));
+    result.is_verdict = true;
   }
   return result;
 }

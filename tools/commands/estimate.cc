@@ -289,7 +289,7 @@ CommandResult RunEstimate(const EstimateOptions& options) {
   if (outputs.checkpoint && !outputs.checkpoint->Remove()) {
     spdlog::warn("{}: is no longer needed, but could not be removed", outputs.checkpoint->path());
   }
-  PrintResult(options.common, text);
+  PrintResult(options.common, text + WrittenText({options.output_folder, options.report_path()}));
   return result;
 }
 

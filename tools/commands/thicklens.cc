@@ -20,6 +20,7 @@
 #include "thicklens/base/error.h"
 #include "thicklens/estimator/blas.h"
 #include "tools/commands/commands.h"
+#include "tools/options/command_frame.h"
 #include "tools/options/help_format.h"
 #include "tools/options/option_values.h"
 #include "tools/options/wrong_usage.h"
@@ -84,7 +85,7 @@ void RequireNoEmptyValue(const CLI::App& command) {
   for (const CLI::App* inner : command.get_subcommands()) RequireNoEmptyValue(*inner);
 }
 
-int FinishOutput() {
+int FinishOutput(ExitCode code) {
   // It is a failure if results do not reach their file, but not if the reader of a pipe went away.
   errno = 0;
   if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
@@ -92,8 +93,8 @@ int FinishOutput() {
       throw Error(fmt::format("standard output cannot be written: {}", std::strerror(errno)));
     }
   }
-  tools::BeginEnd(kDone);
-  return kDone;
+  tools::BeginEnd(code);
+  return code;
 }
 
 int ParseAndRun(CLI::App* program, const tools::CommandAction* action, int argc, char** argv) {
@@ -106,11 +107,15 @@ int ParseAndRun(CLI::App* program, const tools::CommandAction* action, int argc,
       return Fail(fmt::format("{} (see --help)", tools::WrongUsageText(*program, error)), kUsage);
     }
     fmt::print("{}", program->help());
-    return FinishOutput();
+    return FinishOutput(kDone);
   }
   RequireNoEmptyValue(*program);
-  (*action)();
-  return FinishOutput();
+  try {
+    (*action)();
+  } catch (const tools::PrintedRefusal&) {
+    return FinishOutput(kFailed);
+  }
+  return FinishOutput(kDone);
 }
 
 int Main(int argc, char** argv) {

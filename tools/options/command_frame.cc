@@ -38,6 +38,10 @@ std::string JsonText(const nlohmann::json& summary) {
   return summary.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
+bool PrintsResults(const CommonOptions& options) {
+  return !options.quiet && options.json_path != kStandardOutput;
+}
+
 // Returns whether the reason of a refusal may be written to `path`. A user who has mixed up names
 // may have given one of the inputs, and a run that is refused early does not know all of them.
 bool MayReportRefusal(const std::string& path) {
@@ -118,12 +122,21 @@ void RunCommand(const CommonOptions& options, const std::function<CommandResult(
   }
   AddDeprecatedKeys(&result.summary);
   summary.Write(result.summary);
-  if (!result.refusal.empty()) throw Error(result.refusal);
+  if (result.refusal.empty()) return;
+  if (result.is_verdict && PrintsResults(options)) throw PrintedRefusal(result.refusal);
+  throw Error(result.refusal);
+}
+
+std::string WrittenText(const std::vector<std::string>& paths) {
+  std::string text;
+  for (const std::string& path : paths) {
+    if (!path.empty()) text += (text.empty() ? "wrote " : ", ") + PrintableUtf8(path);
+  }
+  return text.empty() ? text : text + "\n";
 }
 
 void PrintResult(const CommonOptions& options, const std::string& text) {
-  if (!options.quiet && options.json_path != kStandardOutput)
-    std::fwrite(text.data(), 1, text.size(), stdout);
+  if (PrintsResults(options)) std::fwrite(text.data(), 1, text.size(), stdout);
 }
 
 void ReportDeprecated(const CommonOptions& options, const std::vector<std::string>& notices) {

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/base/error.h"
 #include "thicklens/model/camera.h"
 #include "tools/options/run_files.h"
 
@@ -28,15 +29,26 @@ struct CommandResult {
   nlohmann::json summary;
   std::string refusal;      // one line; empty: none
   bool is_written = false;  // outputs are in place, so an interrupt comes too late
+  bool is_verdict = false;  // what was printed ends with the refusal, which is a result
+};
+
+// A refusal that was printed already: the program ends with exit code 1 and nothing more.
+class PrintedRefusal : public Error {
+ public:
+  using Error::Error;
 };
 
 // Runs a command. Its --json file is claimed before and written after the command. An Error is
 // written there as `status: refused` with its reason, unless this could destroy an input. Throws
-// what the command throws, and Error for a refusal.
+// what the command throws, Error for a refusal, and PrintedRefusal for a printed verdict.
 void RunCommand(const CommonOptions& options, const std::function<CommandResult()>& command);
 
 // Prints a result to stdout, unless --quiet is given or --json uses stdout.
 void PrintResult(const CommonOptions& options, const std::string& text);
+
+// Returns "wrote a.yaml, report/index.html", a line; empty paths are left out, and of none there is
+// no line.
+std::string WrittenText(const std::vector<std::string>& paths);
 
 // Reports former names on stderr, unless --quiet is given; `notices` has one line for each.
 void ReportDeprecated(const CommonOptions& options, const std::vector<std::string>& notices);

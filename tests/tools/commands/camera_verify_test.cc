@@ -28,6 +28,7 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using thicklens::testing::ContentOf;
 using thicklens::testing::TemporaryFolder;
 using Arguments = std::vector<std::string>;
@@ -179,8 +180,9 @@ TEST_F(CameraVerifyTest, ACameraThatWasRefocusedIsFound) {
   const ProgramResult result = Verify(other, Sweep(2));
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_EQ(json_["status"], "does-not-hold");
-  EXPECT_THAT(result.err, AllOf(HasSubstr("other.yaml: the calibration does not hold"),
+  EXPECT_THAT(result.out, AllOf(HasSubstr("\nthe calibration does not hold: "),
                                 HasSubstr("image_distance_mm"), HasSubstr("sigma")));
+  EXPECT_THAT(result.err, Not(HasSubstr("error")));
   EXPECT_LT(json_["p_value"].get<double>(), 0.0027);
 }
 
@@ -189,6 +191,13 @@ TEST_F(CameraVerifyTest, CasesWithoutAVerdictAreReported) {
   ProgramResult result = Verify(*shared_ / "camera.yaml", Sweep(1));
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_EQ(json_["status"], "cannot-tell");
+  // The verdict is a result, which comes once; with --quiet it is the only line.
+  EXPECT_THAT(result.out, AllOf(HasSubstr("whether the calibration holds is undecided: "),
+                                HasSubstr("take a new one")));
+  EXPECT_THAT(result.err, Not(HasSubstr("error")));
+  result = Verify(*shared_ / "camera.yaml", Sweep(1), {"--quiet"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_EQ(result.out, "");
   EXPECT_THAT(result.err, HasSubstr("take a new one"));
   // Three frames give no calibration.
   fs::create_directories(folder_ / "few");
@@ -207,7 +216,7 @@ TEST_F(CameraVerifyTest, CasesWithoutAVerdictAreReported) {
                   {"--readings", folder_.Put("few.csv", rows)});
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_EQ(json_["status"], "cannot-tell");
-  EXPECT_THAT(result.err, HasSubstr("frames"));
+  EXPECT_THAT(result.out, HasSubstr("frames"));
   // This sweep is too coarse for the requested accuracy.
   result = Verify(*shared_ / "camera.yaml", Sweep(2), {"--needed-blur-px", "0.0001"});
   EXPECT_EQ(result.exit_code, 1);

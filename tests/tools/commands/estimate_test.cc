@@ -128,7 +128,8 @@ TEST_F(EstimateTest, WritesALightFieldThatSaysHowItWasMade) {
   const ProgramResult result =
       Run(With(AsDisparity(Image(), Disparity()), {"--json", json, "--threads", "2"}));
   ASSERT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(result.out, AllOf(HasSubstr("3 x 3 views of 36 x 28 px"), HasSubstr("6 blocks")));
+  EXPECT_THAT(result.out, AllOf(HasSubstr("3 x 3 views of 36 x 28 px"), HasSubstr("6 blocks"),
+                                ::testing::EndsWith("\nwrote " + Output() + "\n")));
 
   const nlohmann::json summary = nlohmann::json::parse(ContentOf(json));
   EXPECT_EQ(summary["status"], "ok");
