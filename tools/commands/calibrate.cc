@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "thicklens/base/cancel.h"
@@ -48,7 +49,7 @@ struct CalibrateOptions {
 
   bool by_paper() const { return method == "paper"; }
   std::string report_path() const {
-    return report_folder.empty() ? "" : (fs::path(report_folder) / "report.html").string();
+    return report_folder.empty() ? "" : (fs::path(report_folder) / "index.html").string();
   }
   std::string figures_path() const {
     return report_folder.empty() ? "" : (fs::path(report_folder) / "figures").string();
@@ -57,6 +58,8 @@ struct CalibrateOptions {
 
 // A folder with this file was written by this program.
 constexpr char kCaptions[] = "captions.txt";
+// The former name of the page. Such a file is not removed: it may be anyone's.
+constexpr char kFormerReport[] = "report.html";
 
 std::vector<std::string> OwnFigureFiles() {
   std::vector<std::string> names = ReportFigureNames();
@@ -124,6 +127,12 @@ void WriteOutputs(const CalibrateOptions& options, const Sweep& sweep,
     outputs->report->Commit(report.html);
     outputs->figures->Commit();
     spdlog::debug("{} written", options.report_path());
+    const fs::path older = fs::path(options.report_folder) / kFormerReport;
+    std::error_code ignored;
+    if (fs::exists(older, ignored) && !options.common.quiet) {
+      spdlog::warn("{}: this page of an older version stays; the present one is {}",
+                   PrintableUtf8(older.string()), PrintableUtf8(options.report_path()));
+    }
   }
   if (!camera.empty()) {
     outputs->camera->Commit(camera);
@@ -144,6 +153,8 @@ CommandResult RunCalibration(const CalibrateOptions& options, const Sweep& sweep
   if (calibration.refusal.empty() || calibration.diagnostics.paper_recipe.done)
     PrintResult(options.common,
                 CalibrationText(focus_sweep, calibration, TruthOf(sweep), options.camera_output));
+  PrintResult(options.common, WrittenText({calibration.refusal.empty() ? options.camera_output : "",
+                                           options.report_path()}));
   CommandResult result;
   result.is_written = outputs.camera || outputs.report;
   result.summary = CalibrationJson(focus_sweep, calibration, TruthOf(sweep), options.by_paper());
@@ -203,7 +214,7 @@ void AddCalibrateCommand(CLI::App* program, CommandAction* action) {
       ->type_name("CAMERA.yaml");
   command
       ->add_option("--report", options->report_folder,
-                   "Folder for report.html with its figures as SVG")
+                   "Folder for index.html, a page with the results, and its figures as SVG")
       ->type_name("DIR");
   CLI::Option* method =
       command->add_option("--method", options->method, "fit, or paper: the paper's method")

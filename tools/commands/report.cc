@@ -366,9 +366,11 @@ void AddFileOptions(CLI::App* command, ReportOptions* options) {
                    "Focus sweep that the camera was calibrated with")
       ->type_name("SWEEP");
   command
-      ->add_option("--calibration", options->calibration_path,
-                   "Page of thicklens calibrate --report")
-      ->type_name("REPORT.html");
+      ->add_option(
+          "--calibration", options->calibration_path,
+          "Page that thicklens calibrate --report has written: index.html in its folder, or "
+          "report.html of an older version")
+      ->type_name("PAGE.html");
   command
       ->add_option("--estimate", options->estimate_path, "JSON file of thicklens estimate --json")
       ->type_name("ESTIMATE.json");

@@ -69,11 +69,13 @@ TEST_F(CalibrateOutputs, FiguresLieBesideThePageAndAreReplaced) {
   folder_.Put("out/report/mine.txt", "mine");
   folder_.Put("out/report/figures/captions.txt", "of an older run");
   folder_.Put("out/report/figures/field.svg", "of an older run");
+  folder_.Put("out/report/report.html", "of an older version");
   const ProgramResult result = Calibrate({"--no-field", "--json", folder_ / "result.json"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(Names("out/report"),
-              ::testing::UnorderedElementsAre("figures", "mine.txt", "report.html"));
+              ::testing::UnorderedElementsAre("figures", "index.html", "mine.txt", "report.html"));
   EXPECT_EQ(ContentOf(folder_ / "out/report/mine.txt"), "mine");
+  EXPECT_THAT(result.err, HasSubstr("report.html: this page of an older version stays"));
   const std::vector<std::string> figures = Names("out/report/figures");
   EXPECT_THAT(figures, Contains("sharpness.svg"));
   EXPECT_THAT(figures, Contains("blur.svg"));

@@ -344,7 +344,9 @@ TEST_F(ProgramTest, CalibratesASweepAndWritesAllItsOutputs) {
   EXPECT_EQ(evidence.data_sha256.size(), 64U);
   EXPECT_THAT(evidence.version, StartsWith("0."));
   EXPECT_THAT(evidence.date, AllOf(StartsWith("20"), EndsWith("Z")));
-  EXPECT_THAT(ContentOf(folder_ / "report/report.html"), HasSubstr("</html>"));
+  EXPECT_THAT(result.out,
+              EndsWith("\nwrote " + camera + ", " + (folder_ / "report") + "/index.html\n"));
+  EXPECT_THAT(ContentOf(folder_ / "report/index.html"), HasSubstr("</html>"));
   EXPECT_THAT(folder_.Entries(), ElementsAre("camera.yaml", "report", "result.json"));
 
   const ProgramResult explained = Run({"explain", camera, "--depth-range", "250:inf"});
@@ -458,14 +460,19 @@ TEST_F(ProgramTest, RefusesABlankTarget) {
   const std::string sweep = CopySweep();
   for (const auto& frame : fs::directory_iterator(sweep + "/frames"))
     folder_.Put("sweep/frames/" + frame.path().filename().string(), GreyPng(160, 160));
-  const std::string message = CalibrationFailure(
-      {sweep + "/sweep.yaml", "--json", folder_ / "result.json", "--report", folder_ / "report"});
-  EXPECT_THAT(message, HasSubstr("sweep.yaml: "));
+  const std::string camera = folder_ / "camera.yaml";
+  const ProgramResult result =
+      Run({"calibrate", sweep + "/sweep.yaml", "--json", folder_ / "result.json", "-o", camera,
+           "--report", folder_ / "report"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("sweep.yaml: "));
+  EXPECT_THAT(result.out, EndsWith("wrote " + (folder_ / "report") + "/index.html\n"));
+  EXPECT_FALSE(fs::exists(camera));
   const auto json = nlohmann::json::parse(ContentOf(folder_ / "result.json"));
   EXPECT_EQ(json["status"], "refused");
   EXPECT_FALSE(json["reason"].get<std::string>().empty());
   EXPECT_EQ(json["frames"].size(), static_cast<std::size_t>(kFrames));
-  EXPECT_THAT(ContentOf(folder_ / "report/report.html"), HasSubstr("</html>"));
+  EXPECT_THAT(ContentOf(folder_ / "report/index.html"), HasSubstr("</html>"));
 }
 
 TEST_F(ProgramTest, AnErrorIsWrittenToTheSummaryToo) {
@@ -515,7 +522,9 @@ TEST_F(ProgramTest, MakesACameraFileThatTheOtherCommandsRead) {
                              "--size",     "640x480", "--thickness-mm", "-1.5"};
   Arguments to_file = numbers;
   to_file.insert(to_file.end(), {"-o", camera});
-  ASSERT_EQ(Run(to_file).exit_code, 0);
+  const ProgramResult written = Run(to_file);
+  ASSERT_EQ(written.exit_code, 0);
+  EXPECT_EQ(written.out, "wrote " + camera + "\n");
   EXPECT_EQ(model::ReadCamera(camera).lens.lens_thickness_mm, -1.5);
   const ProgramResult shown = Run(numbers);
   EXPECT_EQ(shown.out, ContentOf(camera));
