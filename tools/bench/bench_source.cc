@@ -288,7 +288,7 @@ void AddPaperCommand(CLI::App* bench, const std::string& name, CommandAction* ac
       ->type_name("FILE");
   command->add_option("--camera", options->given.camera_path, "Camera file of --image")
       ->type_name("FILE");
-  AddDepthOptions(command, &options->given.depth);
+  AddDepthOptions(command, "Required with --depth", &options->given.depth);
   AddRepeatOption(command, &options->repeat);
   command->add_flag("--full", options->full, "Solve all blocks of the images, not a sample");
   command->add_option("--seed", options->seed, "Seed of texture and noise (default 1)")

@@ -153,7 +153,7 @@ void AddDibrOptions(CLI::App* command, CompareOptions* options) {
                                        "warped to each view by its depth map")
                           ->expected(2)
                           ->type_name("PHOTO DEPTH");
-  AddDepthOptions(command, &options->depth);
+  AddDepthOptions(command, "Required with --dibr", &options->depth);
   command
       ->add_option("--without", options->without,
                    "Effects that the photograph of --dibr lacks: falloff")

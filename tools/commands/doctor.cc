@@ -261,7 +261,9 @@ void AddDoctorCommand(CLI::App* program, CommandAction* action) {
   CLI::Option* hard = command->add_flag(
       "--hard-cases", options->hard_cases,
       "Run the stress tests: each difficult input must be solved to a stated accuracy or rejected "
-      "with a reason, by every available solver, precision and device; takes minutes");
+      "with a reason, by every available solver, precision and device (therefore without "
+      "--device); takes "
+      "minutes");
   command->get_option("--device")->excludes(hard);
   command
       ->add_option(

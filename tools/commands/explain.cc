@@ -188,7 +188,7 @@ void AddExplainCommand(CLI::App* program, CommandAction* action) {
       ->add_option("--depth", options->depth_path,
                    "Depth map of the scene, instead of --depth-range")
       ->type_name("MAP");
-  AddDepthOptions(command, &options->depth);
+  AddDepthOptions(command, "Required with --depth", &options->depth);
   command
       ->add_option("--steps", options->steps,
                    "Number of depths in the table, equally spaced in 1/depth")

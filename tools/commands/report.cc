@@ -356,7 +356,7 @@ void AddFileOptions(CLI::App* command, ReportOptions* options) {
       ->type_name("IMAGE");
   command->add_option("--depth", options->depth_path, "Depth map of the photograph")
       ->type_name("DEPTH");
-  AddDepthOptions(command, &options->depth);
+  AddDepthOptions(command, "Required with --depth", &options->depth);
   command
       ->add_option("--truth", options->truth_path,
                    "True light field; if it has more views, the inner ones are used")

@@ -14,6 +14,7 @@
 #include "thicklens/estimator/functional_solver.h"
 #include "thicklens/estimator/scene_solver.h"
 #include "tools/options/deprecated_names.h"
+#include "tools/options/help_format.h"
 #include "tools/options/option_values.h"
 #include "tools/options/quality_target_options.h"
 
@@ -23,6 +24,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr char kReportName[] = "index.html";
+constexpr char kRunGroup[] = "Run";
 constexpr int kMaxIterations = 1000000;
 
 std::optional<double> PositiveNumber(const std::string& text) {
@@ -58,10 +60,18 @@ void AddInputOptions(CLI::App* command, EstimateOptions* options) {
   command->add_option("depth", options->depth_path, "Its depth map, of the same size")
       ->required()
       ->type_name("DEPTH");
+  AddDepthOptions(command, "Required", &options->depth);
   command
       ->add_option("--camera", options->camera_path,
                    "The calibrated camera; optional if the depth map holds disparities")
       ->type_name("CAMERA.yaml");
+  command
+      ->add_option("--transfer", options->transfer,
+                   "How light became encoded values: linear, srgb or gamma-2.2; default: as the "
+                   "camera file states, or srgb without a camera")
+      ->check(CLI::IsMember({"linear", "srgb", "gamma-2.2"}))
+      ->type_name("NAME");
+  AddCropOption(command, &options->crop);
   command
       ->add_option("--sensor-origin", options->sensor_origin,
                    "Position on the camera's sensor of an image that is a part of it, px")
@@ -69,26 +79,6 @@ void AddInputOptions(CLI::App* command, EstimateOptions* options) {
   command->add_flag("--ignore-exif", options->ignore_exif,
                     "Continue even if the EXIF of the photograph states another lens, setting or "
                     "sensor than the camera file");
-  command->add_option("-o,--output", options->output_folder, "Folder for the light field")
-      ->required()
-      ->type_name("LF");
-  command
-      ->add_option("--report", options->report_folder,
-                   "Folder for index.html, a page that shows the estimate and what it knows of "
-                   "itself")
-      ->type_name("DIR");
-  AddDepthOptions(command, &options->depth);
-  AddCropOption(command, &options->crop);
-  command
-      ->add_option("--transfer", options->transfer,
-                   "How light became encoded values: linear, srgb or gamma-2.2; default: as the "
-                   "camera file states, or srgb without a camera")
-      ->check(CLI::IsMember({"linear", "srgb", "gamma-2.2"}))
-      ->type_name("NAME");
-}
-
-void AddLightFieldOptions(CLI::App* command, EstimateOptions* options) {
-  AddViewsOption(command, &options->views, "Number of views across and down; default 7x7");
   AddApertureShapeOption(command, &options->aperture_shape);
   command
       ->add_option(
@@ -101,49 +91,15 @@ void AddLightFieldOptions(CLI::App* command, EstimateOptions* options) {
       ->check(CLI::Range(1, 1000))
       ->type_name("N");
   command->add_flag("--sparse", options->sparse, "For --aperture-of: accept missing views");
-  command
-      ->add_option("--st-depth-mm", options->st_depth_mm,
-                   "Depth of the ST plane (UV is the aperture); default: the plane of focus")
-      ->check(Between(0, 1e9, "millimetres"))
-      ->type_name("MM");
-  command->add_flag("--keep-depth-noise", options->keep_depth_noise,
-                    "Disable depth denoising, which smooths the depth along surfaces");
-  command
-      ->add_option("--fill", options->fill,
-                   "Fill of areas that the centre view does not show: by the solver, or by the "
-                   "paper's inpainting (telea) view by view, for comparison")
-      ->check(CLI::IsMember({"solver", "telea"}))
-      ->capture_default_str()
-      ->type_name("NAME");
-  AddEffectOptions(command, &options->effects);
-  command
-      ->add_option(
-          "--format", options->format,
-          "Format of the views: png (16 bit, encoded values) or tiff (float, linear light)")
-      ->check(CLI::IsMember({"png", "tiff"}))
-      ->capture_default_str()
-      ->type_name("NAME");
 }
 
-void AddSolverOptions(CLI::App* command, EstimateOptions* options) {
+void AddQualityOptions(CLI::App* command, EstimateOptions* options) {
+  AddQualityTargetOptions(command, &options->quality_target);
   command
-      ->add_option("--solver", options->solver,
-                   "scene: solves for the whole image at once. For comparison: blocks, the "
-                   "paper's method, block by block; functional and grid, the paper's functional "
-                   "for the whole image, on the rays of scene points or of the views")
-      ->check(CLI::IsMember({"scene", "blocks", "functional", "grid"}))
-      ->capture_default_str()
-      ->type_name("NAME");
-  command
-      ->add_option("--memory-limit", options->memory_limit_mib,
-                   "Memory limit of the whole program; the solver scene then works in bands. "
-                   "Default of scene: four fifths of the available memory")
-      ->check(Between(0, 1e9, "MiB"))
-      ->type_name("MIB");
-  AddDeviceOption(command, &options->device);
-}
-
-void AddSceneOptions(CLI::App* command, EstimateOptions* options) {
+      ->add_option("--profile", options->profile_path,
+                   "Profile for --quality, --within and --psnr-loss, as bench accuracy "
+                   "--save-profile writes it; default: your own, or the one that ships")
+      ->type_name("FILE");
   command
       ->add_option("--prior", options->prior,
                    "Regularisation prior of the radiance (solver scene): ridge, gradient, tv "
@@ -162,6 +118,51 @@ void AddSceneOptions(CLI::App* command, EstimateOptions* options) {
                     "Check whether a narrower blur or another plane of focus fits the photograph "
                     "better than camera and depth, and propose it (solver scene); costs one more "
                     "solve at half the size, and seven to seventeen if something may be wrong");
+  command->add_flag("--keep-depth-noise", options->keep_depth_noise,
+                    "Disable depth denoising, which smooths the depth along surfaces");
+  AddEffectOptions(command, &options->effects);
+}
+
+void AddOutputOptions(CLI::App* command, EstimateOptions* options) {
+  command->add_option("-o,--output", options->output_folder, "Folder for the light field")
+      ->required()
+      ->type_name("LF");
+  AddViewsOption(command, &options->views, "Number of views across and down; default 7x7");
+  command
+      ->add_option(
+          "--format", options->format,
+          "Format of the views: png (16 bit, encoded values) or tiff (float, linear light)")
+      ->check(CLI::IsMember({"png", "tiff"}))
+      ->capture_default_str()
+      ->type_name("NAME");
+  command
+      ->add_option("--st-depth-mm", options->st_depth_mm,
+                   "Depth of the ST plane (UV is the aperture); default: the plane of focus")
+      ->check(Between(0, 1e9, "millimetres"))
+      ->type_name("MM");
+  command
+      ->add_option("--report", options->report_folder,
+                   "Folder for index.html, a page that shows the estimate and what it knows of "
+                   "itself")
+      ->type_name("DIR");
+}
+
+void AddSolverOptions(CLI::App* command, EstimateOptions* options) {
+  command
+      ->add_option("--solver", options->solver,
+                   "scene: solves for the whole image at once. For comparison: blocks, the "
+                   "paper's method, block by block; functional and grid, the paper's functional "
+                   "for the whole image, on the rays of scene points or of the views")
+      ->check(CLI::IsMember({"scene", "blocks", "functional", "grid"}))
+      ->capture_default_str()
+      ->type_name("NAME");
+  command
+      ->add_option("--fill", options->fill,
+                   "Fill of areas that the centre view does not show: by the solver, or by the "
+                   "paper's inpainting (telea) view by view, for comparison")
+      ->check(CLI::IsMember({"solver", "telea"}))
+      ->capture_default_str()
+      ->type_name("NAME");
 }
 
 void AddFunctionalOptions(CLI::App* command, EstimateOptions* options) {
@@ -234,6 +235,16 @@ void AddBlockOptions(CLI::App* command, EstimateOptions* options) {
                    "nearest")
       ->check(CLI::IsMember({"nearest", "bilinear"}))
       ->type_name("NAME");
+}
+
+void AddRunOptions(CLI::App* command, EstimateOptions* options) {
+  AddDeviceOption(command, &options->device);
+  command
+      ->add_option("--memory-limit", options->memory_limit_mib,
+                   "Memory limit of the whole program; the solver scene then works in bands. "
+                   "Default of scene: four fifths of the available memory")
+      ->check(Between(0, 1e9, "MiB"))
+      ->type_name("MIB");
   command
       ->add_option("--checkpoint", options->checkpoint_path,
                    "Keep each solved block in this file (solver blocks), so that the same command "
@@ -307,20 +318,23 @@ std::string EstimateOptions::report_path() const {
 }
 
 void AddEstimateOptions(CLI::App* command, EstimateOptions* options) {
+  const auto begin_group = [command](const char* name) { command->option_defaults()->group(name); };
+  begin_group("Input");
   AddInputOptions(command, options);
-  AddLightFieldOptions(command, options);
+  begin_group("Quality");
+  AddQualityOptions(command, options);
+  begin_group("Output");
+  AddOutputOptions(command, options);
+  begin_group("Solver (for comparison)");
   AddSolverOptions(command, options);
-  AddSceneOptions(command, options);
   AddIterationOptions(command, options);
   AddFunctionalOptions(command, options);
   AddBlockOptions(command, options);
-  AddQualityTargetOptions(command, &options->quality_target);
-  command
-      ->add_option("--profile", options->profile_path,
-                   "Profile for --quality, --within and --psnr-loss, as bench accuracy "
-                   "--save-profile writes it; default: your own, or the one that ships")
-      ->type_name("FILE");
+  begin_group(kRunGroup);
+  AddRunOptions(command, options);
   AddCommonOptions(command, &options->common);
+  MoveHelpFlagTo(kRunGroup, command);
+  ExcludeSolverOptions(command);
 }
 
 void CheckSolverUsage(const EstimateOptions& options) {

@@ -80,12 +80,13 @@ LightFieldReadOptions LightFieldReadOptionsOf(const ReadingOptions& options) {
   return reading;
 }
 
-void AddDepthOptions(CLI::App* command, DepthOptions* options) {
+void AddDepthOptions(CLI::App* command, const std::string& required, DepthOptions* options) {
   command
       ->add_option(
           "--depth-kind", options->kind,
-          "Required. Meaning of the depth map: z (along the axis), range (along the pixel's ray) "
-          "or disparity (px per view step, near positive, 0 in the plane of focus)")
+          required +
+              ". Meaning of the depth map: z (along the axis), range (along the pixel's ray) "
+              "or disparity (px per view step, near positive, 0 in the plane of focus)")
       ->check(CLI::IsMember({"z", "range", "disparity"}))
       ->type_name("KIND");
   command

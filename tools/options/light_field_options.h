@@ -48,7 +48,8 @@ struct DepthOptions {
   double disparity_scale = 1;
   double disparity_offset_px = 0;
 };
-void AddDepthOptions(CLI::App* command, DepthOptions* options);
+// `required` begins the description of --depth-kind: when the kind must be given.
+void AddDepthOptions(CLI::App* command, const std::string& required, DepthOptions* options);
 // Throws UsageError if the kind is not given, z or range have no unit, or disparity has one.
 model::DepthConvention ConventionOf(const DepthOptions& options);
 

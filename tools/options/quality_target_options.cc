@@ -51,9 +51,12 @@ std::string QualityTargetText(const estimator::QualityTarget& target) {
 void AddQualityTargetOptions(CLI::App* command, estimator::QualityTarget* target) {
   CLI::Option* quality =
       command
-          ->add_option("--quality", target->quality,
-                       "Choose the solver by quality. draft: the fastest plan with half of the "
-                       "gain of the best plan over warping; standard: nine tenths; best")
+          ->add_option(
+              "--quality", target->quality,
+              "Choose the solver by quality. draft: the fastest plan with half of the "
+              "gain of the best plan over warping; standard: nine tenths; best. This option, "
+              "--within and --psnr-loss replace the options of the solver, --prior, "
+              "--strength, --check-blur and --device")
           ->check(CLI::IsMember({"draft", "standard", "best"}))
           ->type_name("NAME");
   CLI::Option* within = AddNumberWithUnit(command, "--within", "s", "2s",
@@ -66,10 +69,15 @@ void AddQualityTargetOptions(CLI::App* command, estimator::QualityTarget* target
                         "against the best one; can be combined with --within",
                         &target->psnr_loss_db);
   quality->excludes(within)->excludes(loss);
+}
+
+void ExcludeSolverOptions(CLI::App* command) {
   for (const char* chosen : {"--solver", "--prior", "--strength", "--check-blur", "--tolerance",
                              "--max-iterations", "--double", "--gamma", "--ridge", "--block-solver",
                              "--block-px", "--stencil", "--splat", "--checkpoint", "--device"}) {
-    for (CLI::Option* option : {quality, within, loss}) option->excludes(chosen);
+    for (const char* target : {"--quality", "--within", "--psnr-loss"}) {
+      command->get_option(target)->excludes(command->get_option(chosen));
+    }
   }
 }
 

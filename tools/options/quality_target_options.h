@@ -11,9 +11,10 @@ namespace thicklens::tools {
 // Returns the target as on the command line: "--within 2s --psnr-loss 0.1dB".
 std::string QualityTargetText(const estimator::QualityTarget& target);
 
-// Adds --quality, --within and --psnr-loss. Call it after the options of the solver, which they
-// exclude.
+// Adds --quality, --within and --psnr-loss.
 void AddQualityTargetOptions(CLI::App* command, estimator::QualityTarget* target);
+// Makes them exclude the options of the solver, once all have been added.
+void ExcludeSolverOptions(CLI::App* command);
 
 }  // namespace thicklens::tools
 

@@ -208,6 +208,21 @@ TEST_F(ProgramTest, TheHelpListsTheCommandsInTheOrderOfWorkWithExamples) {
   EXPECT_THAT(Run({"estimate", "--help"}).out, Not(HasSubstr("Examples:")));
 }
 
+TEST_F(ProgramTest, TheHelpOfEstimateHasItsOptionsInGroups) {
+  const std::string help = Run({"estimate", "--help"}).out;
+  EXPECT_THAT(help, Not(HasSubstr("\nOptions:")));
+  std::size_t at = 0;
+  for (const char* part :
+       {"\nInput:", "--depth-kind", "\nQuality:", "--within", "\nOutput:", "--views",
+        "\nSolver (for comparison):", "--solver", "\nRun:", "--threads", "--help"}) {
+    at = help.find(part, at);
+    ASSERT_NE(at, std::string::npos) << part;
+  }
+  EXPECT_THAT(help, HasSubstr("Required. Meaning of the depth map"));
+  EXPECT_THAT(Run({"explain", "--help"}).out, HasSubstr("Required with --depth. Meaning"));
+  EXPECT_THAT(Run({"compare", "--help"}).out, HasSubstr("Required with --dibr. Meaning"));
+}
+
 // Each command of the examples gets as far as its first file, which is missing here.
 TEST_F(ProgramTest, TheExamplesOfTheHelpAreRightUsage) {
   std::istringstream help(Run({"--help"}).out);
