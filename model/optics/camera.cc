@@ -8,6 +8,21 @@
 #include "thicklens/base/validity.h"
 
 namespace thicklens::model {
+namespace {
+
+// Reports everything that is missing at once, whichever a computation needs first.
+[[noreturn]] void ThrowNotCalibrated(const Camera& camera) {
+  const bool has_distance = camera.calibration && camera.calibration->image_distance_mm;
+  const bool has_ratio = camera.calibration && camera.calibration->blur_ratio;
+  const char* const missing = !has_distance && !has_ratio ? "image_distance_mm and blur_ratio are"
+                              : has_ratio                 ? "image_distance_mm is"
+                                                          : "blur_ratio is";
+  throw Error(fmt::format(
+      "{} is not calibrated yet: {} missing; run thicklens calibrate",
+      camera.source.empty() ? fmt::format("camera '{}'", camera.name) : camera.source, missing));
+}
+
+}  // namespace
 
 std::string PsfName(Psf psf) { return psf == Psf::kGaussian ? "gaussian" : "disc"; }
 
@@ -65,10 +80,7 @@ bool Camera::IsValid(std::string* why) const {
 
 double Camera::image_distance_mm() const {
   if (!calibration || !calibration->image_distance_mm) {
-    throw Error(fmt::format(
-        "camera '{}': calibration.image_distance_mm is missing; run thicklens calibrate "
-        "or write an assumed value",
-        name));
+    ThrowNotCalibrated(*this);
   }
   return calibration->image_distance_mm->value;
 }
@@ -77,10 +89,7 @@ double Camera::focus_depth_mm() const { return FocusDepthMm(lens, image_distance
 
 double Camera::blur_ratio() const {
   if (!calibration || !calibration->blur_ratio) {
-    throw Error(
-        fmt::format("camera '{}': calibration.blur_ratio is missing; run thicklens calibrate or "
-                    "write an assumed value",
-                    name));
+    ThrowNotCalibrated(*this);
   }
   return calibration->blur_ratio->value;
 }

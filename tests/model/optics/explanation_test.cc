@@ -165,7 +165,19 @@ TEST(ExplainCamera, NamesWhatIsMissing) {
     ExplainCamera(camera, {500, 2000}, 2);
     FAIL();
   } catch (const Error& error) {
-    EXPECT_THAT(error.what(), HasSubstr("calibration.blur_ratio is missing"));
+    EXPECT_THAT(error.what(), HasSubstr("is not calibrated yet: blur_ratio is missing"));
+  }
+  camera.calibration.reset();
+  camera.source = "c.yaml";
+  for (const bool asks_for_ratio : {false, true}) {
+    try {
+      asks_for_ratio ? camera.blur_ratio() : camera.image_distance_mm();
+      FAIL();
+    } catch (const Error& error) {
+      EXPECT_STREQ(error.what(),
+                   "c.yaml is not calibrated yet: image_distance_mm and blur_ratio are missing; "
+                   "run thicklens calibrate");
+    }
   }
 }
 

@@ -527,7 +527,8 @@ TEST_F(ProgramTest, NamesWhatIsWrongInACameraFileWithItsPlace) {
 
 TEST_F(ProgramTest, ExplainNamesTheMissingCalibration) {
   EXPECT_THAT(Failure({"explain", *shared_ / "sweep/camera.yaml", "--depth-range", "250:350"}),
-              HasSubstr("calibration.image_distance_mm is missing"));
+              HasSubstr("camera.yaml is not calibrated yet: image_distance_mm and blur_ratio are "
+                        "missing; run thicklens calibrate"));
 }
 
 TEST_F(ProgramTest, MakesACameraFileThatTheOtherCommandsRead) {
