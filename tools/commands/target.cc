@@ -11,7 +11,9 @@
 #include <vector>
 
 #include "thicklens/base/cancel.h"
+#include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
+#include "thicklens/base/printable_text.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/target_page.h"
 #include "thicklens/model/target_texture.h"
@@ -122,6 +124,13 @@ CommandResult MakeTarget(const TargetOptions& options, Format format,
   if (!options.camera_path.empty()) {
     const model::Camera camera = model::ReadCamera(options.camera_path);
     ReportAssumedFields(camera);
+    const double focal_length_mm = camera.lens.front_focal_length_mm;
+    if (!(options.distance_mm > focal_length_mm)) {
+      throw Error(fmt::format(
+          "--distance-mm {:g}: it must be above the front focal length {:g} mm of {}, because a "
+          "nearer object has no real image",
+          options.distance_mm, focal_length_mm, PrintableUtf8(options.camera_path)));
+    }
     request.view = model::ViewOfTarget(camera, options.distance_mm);
   }
   const model::TargetPage page = model::LayOutTarget(request);

@@ -73,8 +73,9 @@ PreparedDepth PrepareDepth(const DepthMap& map, const model::LinearImage& image,
   if (camera != nullptr) return PrepareByCamera(map, image, *camera, *grid);
   if (map.meaning.kind != DepthKind::kDisparity) {
     throw OptionError("depth.meaning.kind",
-                      "depth.meaning.kind: millimetres need a camera file, and without one the "
-                      "map must be a disparity");
+                      fmt::format("depth.meaning.kind: {} needs a camera; without a camera only a "
+                                  "disparity map can be used",
+                                  map.meaning.kind == DepthKind::kRange ? "range" : "z"));
   }
   PreparedDepth prepared;
   prepared.disparity = WithFileContext(NameOf(map), [&] {

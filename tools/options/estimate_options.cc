@@ -375,6 +375,10 @@ void CheckEstimateUsage(const EstimateOptions& options) {
   };
   const bool camera = !options.camera_path.empty();
   const bool aperture_of = !options.aperture_of.empty();
+  needs(!options.depth.kind.empty() && options.depth.kind != "disparity", camera,
+        fmt::format("--depth-kind {} needs --camera; without a camera only a disparity map can be "
+                    "used",
+                    options.depth.kind));
   needs(!options.sensor_origin.empty(), camera, "--sensor-origin needs a --camera");
   needs(options.ignore_exif, camera, "--ignore-exif needs a --camera, with which EXIF is compared");
   needs(options.st_depth_mm.has_value(), camera, "--st-depth-mm needs a --camera");

@@ -250,7 +250,8 @@ TEST_F(EstimateTest, DepthThatCannotBe) {
   EXPECT_THAT(Refusal(AsDisparity(image, folder_.Put("small.pfm", io::EncodePfm(small)))),
               AllOf(HasSubstr("small.pfm"), HasSubstr("8x8"), HasSubstr("36x28")));
   EXPECT_THAT(Refusal({image, Disparity(), "--depth-kind", "z", "--depth-unit", "mm"}, 2),
-              HasSubstr("camera"));
+              HasSubstr("--depth-kind z needs --camera; without a camera only a disparity map can "
+                        "be used"));
   EXPECT_THAT(Refusal({image, Disparity()}, 2), HasSubstr("--depth-kind"));
 }
 

@@ -428,6 +428,11 @@ TEST_F(TargetProgram, RefusesNonsense) {
   ExpectFailure({"-o", pdf, "--camera", "camera.yaml"}, 2, "--distance-mm");
   ExpectFailure({"-o", pdf, "--camera", folder_ / "none.yaml", "--distance-mm", "500"}, 1,
                 "none.yaml");
+  const std::string camera = std::string(THICKLENS_SOURCE_DIR) + "/configs/cameras/case-iii.yaml";
+  const ProgramResult near = Run({"-o", pdf, "--camera", camera, "--distance-mm", "8"});
+  EXPECT_EQ(near.exit_code, 1);
+  EXPECT_THAT(near.err, AllOf(HasSubstr("--distance-mm 8: it must be above the front focal length"),
+                              HasSubstr("case-iii.yaml")));
   ExpectFailure({"-o", folder_ / "target.png", "--dpi", "4800"}, 1, "smaller --dpi");
   ExpectFailure({"-o", folder_ / "none/target.pdf"}, 1, "none does not exist");
 }

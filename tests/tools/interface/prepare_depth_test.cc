@@ -73,7 +73,7 @@ TEST(PrepareDepth, WithoutACameraMillimetresMeanNothing) {
                 Prepared(MapOf(std::vector<float>(6, 500)), "d.pfm", KindAndUnit("z", "mm"),
                          GreyImage(), nullptr, nullptr);
               }),
-              AllOf(StartsWith("depth.meaning.kind: "), HasSubstr("need a camera"),
+              AllOf(StartsWith("depth.meaning.kind: "), HasSubstr("z needs a camera"),
                     HasSubstr("disparity")));
 }
 
