@@ -59,7 +59,8 @@ Offer Choose(const EstimateProfile& profile, const QualityTarget& target,
   if (soon.empty()) {
     const Offer fastest = *std::min_element(offers.begin(), offers.end(), IsFaster);
     Refuse(target_text, profile,
-           fmt::format("the fastest plan is {}; fewer views or a smaller image take less time",
+           fmt::format("the fastest plan is {}; reading and writing files counts; fewer views or a "
+                       "smaller image take less time",
                        OfferText(fastest)));
   }
   const Offer best = *std::min_element(soon.begin(), soon.end(), IsBetter);

@@ -127,7 +127,7 @@ std::vector<SweepFrame> JoinRowsAndFiles(const std::vector<ReadingRow>& rows,
   if (!without_row.empty()) {
     throw Error(fmt::format(
         "{}: has no row in {} ({} such file{}): add its reading, move it elsewhere, or "
-        "choose the files by frames_glob",
+        "choose the files by frames_glob in a sweep file",
         without_row.front(), table, without_row.size(), without_row.size() == 1 ? "" : "s"));
   }
   return frames;

@@ -168,8 +168,11 @@ std::string FindingsText(const Findings& findings) {
   text += fmt::format("images         {}\n", findings.image_files);
   text += SurveyText(findings);
   if (!findings.used.empty()) {
-    text += fmt::format("used           {}: {}\n               {}\n", findings.used,
-                        PrintableUtf8(findings.used_description), PrintableUtf8(findings.used_why));
+    text += fmt::format(
+        "used           {}: {}\n               {}\n"
+        "               by --solver blocks and render; the default solver of estimate computes on "
+        "the CPU\n",
+        findings.used, PrintableUtf8(findings.used_description), PrintableUtf8(findings.used_why));
   }
   if (findings.self_test) text += SelfTestText(*findings.self_test);
   return text;

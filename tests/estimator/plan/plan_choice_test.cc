@@ -69,7 +69,8 @@ TEST(ChoosePlan, RefusesWithTheNearest) {
     return std::string("no refusal");
   };
   EXPECT_THAT(refusal(Within(0.5)),
-              AllOf(StartsWith("the target cannot be met"), HasSubstr("scene ridge (1 s")));
+              AllOf(StartsWith("the target cannot be met"), HasSubstr("scene ridge (1 s"),
+                    HasSubstr("reading and writing files counts")));
   EXPECT_THAT(refusal({"", 3.0, 1.0}),
               AllOf(HasSubstr("scene gradient (2 s, 4.50"), HasSubstr("scene tv (4 s, 0.80")));
 }

@@ -138,6 +138,7 @@ TEST_F(DoctorTest, PrintsWhatItFound) {
   EXPECT_THAT(result.out, AllOf(StartsWith("thicklens "), HasSubstr(" core(s), 1 thread(s)"),
                                 HasSubstr("\nblas  "), HasSubstr("\nblock solvers  "),
                                 HasSubstr("\nopencl:0:0 "), HasSubstr("\nused           opencl:"),
+                                HasSubstr("the default solver of estimate computes on the CPU"),
                                 HasSubstr("\nself-test      yes: ")));
   EXPECT_THAT(Run({"--quiet"}).out, IsEmpty());
 }
