@@ -20,7 +20,7 @@ using ::testing::Not;
 TEST(NearestNameTest, DiffersByFewLetters) {
   const std::vector<std::string> names = {"calibrate", "camera", "compare", "estimate"};
   EXPECT_EQ(NearestName("calibrat", names), "calibrate");
-  EXPECT_EQ(NearestName("esitmate", names), "estimate");
+  EXPECT_EQ(NearestName("etsimate", names), "estimate");
   EXPECT_EQ(NearestName("est", names), "estimate");
   EXPECT_EQ(NearestName("canera", names), "camera");
   EXPECT_EQ(NearestName("frobnicate", names), "");
@@ -48,7 +48,7 @@ class WrongUsageTest : public ::testing::Test {
     camera->add_subcommand("init", "A new one");
   }
 
-  // What is wrong with this command line; "help" if the help is the answer.
+  // Returns what is wrong with this command line, or "help" if the help is the answer.
   std::string Wrong(std::vector<std::string> words) {
     std::reverse(words.begin(), words.end());
     try {
@@ -65,7 +65,7 @@ class WrongUsageTest : public ::testing::Test {
 };
 
 TEST_F(WrongUsageTest, AnUnknownCommandIsNamedWithTheNearestOne) {
-  EXPECT_EQ(Wrong({"mkae", "x"}), "unknown command 'mkae'; did you mean make?");
+  EXPECT_EQ(Wrong({"amke", "x"}), "unknown command 'amke'; did you mean make?");
   EXPECT_EQ(Wrong({"frobnicate", "--quiet"}),
             "unknown command 'frobnicate'; the commands are: make, camera");
   EXPECT_EQ(Wrong({"camera", "inti"}), "unknown command 'inti' of camera; did you mean init?");
