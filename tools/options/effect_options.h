@@ -14,8 +14,8 @@
 
 namespace thicklens::tools {
 
-// The options --effects, --without and --effect-tolerance of commands with a forward model. An absent
-// value was not given.
+// The options --effects, --without and --effect-tolerance of commands with a forward model. An
+// absent value was not given.
 struct EffectOptions {
   std::optional<std::string> effects, without, tolerance;
   bool has_tolerance = true;  // false: there is no --effect-tolerance

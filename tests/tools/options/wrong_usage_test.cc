@@ -65,7 +65,7 @@ class WrongUsageTest : public ::testing::Test {
 };
 
 TEST_F(WrongUsageTest, AnUnknownCommandIsNamedWithTheNearestOne) {
-  EXPECT_EQ(Wrong({"amke", "x"}), "unknown command 'amke'; did you mean make?");
+  EXPECT_EQ(Wrong({"maek", "x"}), "unknown command 'maek'; did you mean make?");
   EXPECT_EQ(Wrong({"frobnicate", "--quiet"}),
             "unknown command 'frobnicate'; the commands are: make, camera");
   EXPECT_EQ(Wrong({"camera", "inti"}), "unknown command 'inti' of camera; did you mean init?");
