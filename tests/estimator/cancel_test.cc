@@ -19,6 +19,7 @@
 #include "thicklens/estimator/grid_solver.h"
 #include "thicklens/estimator/inpaint.h"
 #include "thicklens/estimator/scene_solver.h"
+#include "thicklens/estimator/solve.h"
 #include "thicklens/kernels/device.h"
 
 namespace thicklens::estimator {
@@ -141,13 +142,14 @@ TEST(CancelledEstimate, TheBlockSolverStops) {
 
 TEST(CancelledEstimate, TheFunctionalAndTheGridSolverStop) {
   const EstimateInput input = RandomInput(40, 36, 0.5F, 1.5F);
-  for (const auto& solve : {EstimateFunctional, EstimateOnGrid}) {
+  for (const SolverOptions& solver :
+       {SolverOptions(FunctionalOptions()), SolverOptions(GridOptions())}) {
+    SCOPED_TRACE(SolverName(solver));
     ExpectCancelledAtEachStep([&](const std::function<void(int, int)>& progress) {
       SolverRun run;
       run.threads = 1;
       run.progress = progress;
-      FunctionalSummary summary;
-      solve(input, {}, run, &summary);
+      Solve(input, solver, run, nullptr);
     });
   }
 }

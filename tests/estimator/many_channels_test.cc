@@ -14,6 +14,7 @@
 #include "thicklens/estimator/functional_solver.h"
 #include "thicklens/estimator/grid_solver.h"
 #include "thicklens/estimator/scene_solver.h"
+#include "thicklens/estimator/solve.h"
 #include "thicklens/kernels/device.h"
 #include "thicklens/model/light_field_grid.h"
 
@@ -70,13 +71,11 @@ TEST(ManyChannels, TheBlockSolverTakesEachBandAlone) {
 }
 
 TEST(ManyChannels, TheFunctionalTakesEachBandAlone) {
-  for (const auto estimate : {EstimateFunctional, EstimateOnGrid}) {
-    ExpectBandByBand(
-        [&](const EstimateInput& input) {
-          FunctionalSummary summary;
-          return estimate(input, {}, {}, &summary);
-        },
-        0);
+  for (const SolverOptions& solver :
+       {SolverOptions(FunctionalOptions()), SolverOptions(GridOptions())}) {
+    SCOPED_TRACE(SolverName(solver));
+    ExpectBandByBand([&](const EstimateInput& input) { return Solve(input, solver, {}, nullptr); },
+                     0);
   }
 }
 
