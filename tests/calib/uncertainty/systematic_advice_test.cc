@@ -13,6 +13,7 @@
 namespace thicklens::calib {
 namespace {
 
+using ::testing::HasSubstr;
 using ::testing::StartsWith;
 using thicklens::testing::BlurBench;
 
@@ -32,7 +33,7 @@ Calibration Plain(double zf_mm, double zf_sigma_mm, double zero_sigma_mm,
 TEST(WidenFocus, AddsToBothIntervals) {
   const model::ThickLens lens = BlurBench().lens;
   Calibration c = Plain(400, 0.1, 0, lens);
-  WidenFocus("a jump", 5, "fix it", lens, &c);
+  WidenFocus("jump of the readings", 5, "fix it", lens, &c);
   EXPECT_NEAR(c.summary.focus_depth_mm->systematic->x(), 400 - 1 - 5, 1e-9);
   EXPECT_NEAR(c.summary.focus_depth_mm->systematic->y(), 400 + 2 + 5, 1e-9);
   const double d1_mm = c.summary.image_distance_mm->value;
@@ -42,12 +43,12 @@ TEST(WidenFocus, AddsToBothIntervals) {
   EXPECT_NEAR(c.summary.image_distance_mm->systematic->y(), d1_mm + 0.001 + (high_mm - d1_mm),
               1e-9);
   ASSERT_EQ(c.diagnostics.systematic_parts.size(), 1U);
-  EXPECT_EQ(c.diagnostics.systematic_parts[0].name, "a jump");
+  EXPECT_EQ(c.diagnostics.systematic_parts[0].name, "jump of the readings");
   EXPECT_EQ(c.diagnostics.systematic_parts[0].remedy, "fix it");
   EXPECT_NEAR(c.diagnostics.systematic_parts[0].focus_depth_mm.x(), -5, 1e-12);
   EXPECT_NEAR(c.diagnostics.systematic_parts[0].focus_depth_mm.y(), 5, 1e-12);
   EXPECT_EQ(c.diagnostics.systematic_parts[0].blur_ratio.norm(), 0);
-  EXPECT_THAT(c.diagnostics.advice, StartsWith("a jump is "));
+  EXPECT_THAT(c.diagnostics.advice, HasSubstr(" is due to the jump of the readings: fix it"));
 }
 
 // Nearer than the focal point there is no image. One hundredth beyond it, d1 is rho + 101 f2.
@@ -55,7 +56,7 @@ TEST(WidenFocus, StopsShortOfTheFocalPoint) {
   const model::ThickLens lens = BlurBench().lens;
   for (const double move_mm : {387.4, 390.0, 5000.0}) {
     Calibration c = Plain(400, 0.1, 0, lens);
-    WidenFocus("a jump", move_mm, "fix it", lens, &c);
+    WidenFocus("jump of the readings", move_mm, "fix it", lens, &c);
     EXPECT_NEAR(c.diagnostics.systematic_parts[0].image_distance_mm.y(),
                 3 + 101 * 12.8 - c.summary.image_distance_mm->value, 1e-6);
     EXPECT_NEAR(c.summary.focus_depth_mm->systematic->x(), 399 - (400 - 12.625), 1e-9);
@@ -63,7 +64,7 @@ TEST(WidenFocus, StopsShortOfTheFocalPoint) {
                 move_mm + 2, 1e-9);
   }
   Calibration c = Plain(400, 0.1, 0, lens);
-  WidenFocus("a jump", 387, "fix it", lens, &c);
+  WidenFocus("jump of the readings", 387, "fix it", lens, &c);
   EXPECT_NEAR(c.diagnostics.systematic_parts[0].image_distance_mm.y(),
               3 + 12.8 * 13 / 0.5 - c.summary.image_distance_mm->value, 1e-6);
 }
@@ -73,7 +74,7 @@ TEST(WidenFocus, MakesNoIntervalWhereThereIsNone) {
   Calibration c = Plain(400, 0.1, 0, lens);
   c.summary.focus_depth_mm->systematic.reset();
   c.summary.image_distance_mm->systematic.reset();
-  WidenFocus("a jump", 5, "fix it", lens, &c);
+  WidenFocus("jump of the readings", 5, "fix it", lens, &c);
   EXPECT_FALSE(c.summary.focus_depth_mm->systematic);
   EXPECT_FALSE(c.summary.image_distance_mm->systematic);
   EXPECT_EQ(c.diagnostics.systematic_parts.size(), 1U);
@@ -137,7 +138,8 @@ TEST(WidenFocus, WithoutAZeroItHasNoShare) {
   Calibration without = c;
   without.summary.bench_offset_mm.reset();
   for (Calibration* each : {&c, &without}) WidenFocus("a hair", 0.001, "nothing", lens, each);
-  EXPECT_THAT(without.diagnostics.advice, StartsWith("noise and readings are 100 %"));
+  EXPECT_THAT(without.diagnostics.advice,
+              StartsWith("100 % of the error of d1 is due to noise and readings"));
   EXPECT_EQ(without.diagnostics.advice, c.diagnostics.advice);
 }
 

@@ -225,10 +225,13 @@ TEST(AddSystematicParts, AShapeIsAdvisedOnlyWhereItFitsAndTheStatedOneFitsMarked
     c.evidence.disc_misfit = k.disc;
     c.evidence.shape_dof = k.dof;
     c.evidence.better_psf = model::Psf::kDisc;
-    c.evidence.other_psf = c.evidence.setup.estimators[0];
+    BlurBench other = c.bench;
+    other.ratio *= 1.05;  // the other shape finds another kappa, or no advice would follow from it
+    c.evidence.other_psf = other.Relative(kErrorPx2, thicklens::testing::kReferencePx2, &c.random);
     c.Solve();
     const SystematicPart* part = c.Part("shape of the blur");
     ASSERT_NE(part, nullptr);
+    EXPECT_GT(part->blur_ratio.norm(), 0);
     EXPECT_THAT(part->remedy, HasSubstr(k.remedy));
     EXPECT_THAT(c.calibration.diagnostics.advice, Not(HasSubstr("no remedy")));
     if (k.disc > 3) {

@@ -313,8 +313,10 @@ TEST(CameraToYaml, AnyNameComesBack) {
 TEST(Camera, MissingCalibrationIsNamed) {
   const Camera camera = ParseCamera(Text(""), "c.yaml");
   EXPECT_THAT(ErrorOf([&] { camera.image_distance_mm(); }),
-              AllOf(HasSubstr("'bench'"), HasSubstr("calibration.image_distance_mm")));
-  EXPECT_THAT(ErrorOf([&] { camera.blur_ratio(); }), HasSubstr("calibration.blur_ratio"));
+              AllOf(HasSubstr("'bench' is not calibrated yet"),
+                    HasSubstr("image_distance_mm and blur_ratio are missing")));
+  EXPECT_THAT(ErrorOf([&] { camera.blur_ratio(); }),
+              HasSubstr("image_distance_mm and blur_ratio are missing"));
 }
 
 TEST(Camera, IsValidNamesTheField) {
