@@ -246,7 +246,6 @@ model::Camera DescribedCamera(const CameraDescription& description,
 void AddCameraCommand(CLI::App* program, CommandAction* action) {
   CLI::App* camera = program->add_subcommand("camera", "Camera files");
   camera->require_subcommand(1);
-  AddCameraVerifyCommand(camera, action);
   CLI::App* command = camera->add_subcommand(
       "init", "A camera file from data-sheet values or from a photograph's EXIF");
   const auto options = std::make_shared<CameraInitOptions>();
@@ -274,6 +273,7 @@ void AddCameraCommand(CLI::App* program, CommandAction* action) {
       RunCommand(options->common, [&] { return InitCamera(*options); });
     };
   });
+  AddCameraVerifyCommand(camera, action);  // in the order of work
 }
 
 }  // namespace thicklens::tools

@@ -103,7 +103,7 @@ int ParseAndRun(CLI::App* program, const tools::CommandAction* action, int argc,
   } catch (const CLI::Success& asked_for) {  // --help, --version
     return program->exit(asked_for);
   } catch (const CLI::ParseError& error) {
-    if (!tools::EndsBeforeACommand(*program)) {
+    if (!tools::EndsBeforeACommand(*program, error)) {
       return Fail(fmt::format("{} (see --help)", tools::WrongUsageText(*program, error)), kUsage);
     }
     fmt::print("{}", program->help());

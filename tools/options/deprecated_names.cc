@@ -127,7 +127,7 @@ void AddDeprecatedFlags(CLI::App* command, const std::string& now, bool* flag,
       *flag = true;
       common->deprecated.push_back(DeprecationText({former, now}));
     };
-    command->add_flag_callback(former, set)->group("");
+    command->add_flag_callback(former, set)->group(kFormerNamesGroup);
   }
 }
 
@@ -144,7 +144,7 @@ void AddDeprecatedOptions(CLI::App* command, const std::string& now,
       take(value);
       common->deprecated.push_back(DeprecationText({former, now}));
     };
-    command->add_option_function(former, take_former)->group("");
+    command->add_option_function(former, take_former)->group(kFormerNamesGroup);
   }
 }
 

@@ -13,6 +13,10 @@ namespace thicklens::tools {
 
 enum class NameKind { kCommand, kOption, kValue, kHardCase, kYaml, kJson, kColumn };
 
+// The group of former options, which the help does not show. An option of no group would have no
+// name in the errors of CLI11.
+inline constexpr char kFormerNamesGroup[] = "Former names";
+
 // A name of the program's interface that was renamed. Its former name is accepted, or written
 // beside the present one, until version 1.0.
 struct DeprecatedName {

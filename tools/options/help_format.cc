@@ -2,6 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
+#include "tools/options/deprecated_names.h"
+
 namespace thicklens::tools {
 
 std::string HelpFormat::make_option_opts(const CLI::Option* option) const {
@@ -17,6 +21,12 @@ std::string HelpFormat::make_option_opts(const CLI::Option* option) const {
   }
   if (option->get_required()) text += " " + get_label("REQUIRED");
   return text;
+}
+
+std::string HelpFormat::make_group(std::string group, bool is_positional,
+                                   std::vector<const CLI::Option*> options) const {
+  if (group == kFormerNamesGroup) return "";
+  return CLI::Formatter::make_group(std::move(group), is_positional, std::move(options));
 }
 
 void MoveHelpFlagTo(const std::string& group, CLI::App* command) {

@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <string>
+#include <vector>
 
 namespace thicklens::tools {
 
@@ -11,6 +12,9 @@ namespace thicklens::tools {
 class HelpFormat final : public CLI::Formatter {
  public:
   std::string make_option_opts(const CLI::Option* option) const override;
+  // Former names of options are not shown.
+  std::string make_group(std::string group, bool is_positional,
+                         std::vector<const CLI::Option*> options) const override;
 };
 
 // Makes -h the last option of the command, in this group of the help.

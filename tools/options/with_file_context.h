@@ -1,10 +1,12 @@
 #ifndef THICKLENS_TOOLS_OPTIONS_WITH_FILE_CONTEXT_H_
 #define THICKLENS_TOOLS_OPTIONS_WITH_FILE_CONTEXT_H_
 
+#include <fmt/format.h>
+
 #include <string>
 
+#include "thicklens/base/error.h"
 #include "thicklens/base/printable_text.h"
-#include "tools/interface/with_file_context.h"
 #include "tools/options/option_values.h"
 
 namespace thicklens::tools {
@@ -13,7 +15,15 @@ namespace thicklens::tools {
 // the file's name.
 template <typename Work>
 auto WithFileContext(const std::string& path, const Work& work) {
-  return thicklens::WithFileContext<UsageError>(PrintableUtf8(path), work);
+  try {
+    return work();
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const UsageError&) {
+    throw;
+  } catch (const Error& error) {
+    throw Error(fmt::format("{}: {}", PrintableUtf8(path), error.what()));
+  }
 }
 
 }  // namespace thicklens::tools

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cstddef>
 
+#include "tools/options/deprecated_names.h"
+
 namespace thicklens::tools {
 namespace {
 
@@ -48,7 +50,8 @@ std::vector<std::string> CommandsOf(const CLI::App& app) {
 std::vector<std::string> OptionsOf(const CLI::App& command) {
   std::vector<std::string> names;
   for (const CLI::Option* option : command.get_options()) {
-    if (option->get_group().empty()) continue;
+    const std::string& group = option->get_group();
+    if (group.empty() || group == kFormerNamesGroup) continue;
     for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
   }
   return names;
@@ -88,9 +91,16 @@ std::string UnknownOption(const std::string& word, const CLI::App& command,
                      near.empty() ? "" : fmt::format("; did you mean {}?", near));
 }
 
+// Returns what the command did not take, without the mark "--" behind which no word is an option.
+std::vector<std::string> NotTaken(const CLI::App& command, bool with_inner) {
+  std::vector<std::string> words = command.remaining(with_inner);
+  words.erase(std::remove(words.begin(), words.end(), "--"), words.end());
+  return words;
+}
+
 // Returns what is unknown behind the name of this command, or an empty text.
 std::string UnknownIn(const CLI::App& command, const CLI::App& innermost) {
-  const std::vector<std::string> unknown = command.remaining();
+  const std::vector<std::string> unknown = NotTaken(command, false);
   const auto option = std::find_if(unknown.begin(), unknown.end(), LooksLikeAnOption);
   const auto word = std::find_if(unknown.begin(), unknown.end(),
                                  [](const std::string& one) { return !LooksLikeAnOption(one); });
@@ -122,8 +132,9 @@ std::string NearestName(const std::string& typed, const std::vector<std::string>
   return nearest;
 }
 
-bool EndsBeforeACommand(const CLI::App& program) {
-  return program.remaining(true).empty() &&
+bool EndsBeforeACommand(const CLI::App& program, const CLI::ParseError& error) {
+  return dynamic_cast<const CLI::RequiredError*>(&error) != nullptr &&
+         NotTaken(program, true).empty() &&
          InnermostCommand(program).get_require_subcommand_min() > 0;
 }
 

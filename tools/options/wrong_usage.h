@@ -11,9 +11,9 @@ namespace thicklens::tools {
 // begins with it. Empty: none.
 std::string NearestName(const std::string& typed, const std::vector<std::string>& names);
 
-// Returns whether a command line that `program` could not parse ends where a command is expected,
-// and has nothing that is unknown: `thicklens`, `thicklens camera`.
-bool EndsBeforeACommand(const CLI::App& program);
+// Returns whether a command line that `program` could not parse by `error` ends where a command is
+// expected, and has nothing that is wrong before: `thicklens`, `thicklens camera`.
+bool EndsBeforeACommand(const CLI::App& program, const CLI::ParseError& error);
 
 // Returns in one line what is wrong with a command line that `program` could not parse: the first
 // unknown command or option, with the nearest known one, otherwise what the error says.

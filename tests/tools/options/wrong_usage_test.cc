@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "tools/options/deprecated_names.h"
 #include "tools/options/help_format.h"
 
 namespace thicklens::tools {
@@ -42,7 +43,7 @@ class WrongUsageTest : public ::testing::Test {
     make->add_option("--views", views_, "Its views");
     CLI::Option* quiet = make->add_flag("--quiet", quiet_, "Say nothing");
     make->add_flag("--verbose", verbose_, "Say all")->excludes(quiet);
-    make->add_flag("--veiw", verbose_, "A former name")->group("");
+    make->add_flag("--veiw", verbose_, "A former name")->group(kFormerNamesGroup);
     CLI::App* camera = program_.add_subcommand("camera", "Cameras");
     camera->require_subcommand(1);
     camera->add_subcommand("init", "A new one");
@@ -54,7 +55,7 @@ class WrongUsageTest : public ::testing::Test {
     try {
       program_.parse(words);
     } catch (const CLI::ParseError& error) {
-      return EndsBeforeACommand(program_) ? "help" : WrongUsageText(program_, error);
+      return EndsBeforeACommand(program_, error) ? "help" : WrongUsageText(program_, error);
     }
     return "";
   }
@@ -97,8 +98,17 @@ TEST_F(WrongUsageTest, WithoutACommandTheHelpIsTheAnswer) {
 
 TEST_F(WrongUsageTest, TheHelpHasNoListsOfOtherOptions) {
   EXPECT_EQ(Wrong({"make", "a"}), "");
-  EXPECT_THAT(program_.help(),
-              AllOf(HasSubstr("--verbose"), Not(HasSubstr("Excludes")), Not(HasSubstr("{"))));
+  EXPECT_THAT(program_.help(), AllOf(HasSubstr("--verbose"), Not(HasSubstr("Excludes")),
+                                     Not(HasSubstr("{")), Not(HasSubstr("ormer name"))));
+}
+
+TEST_F(WrongUsageTest, TheMarkBehindWhichNoOptionFollowsIsNotUnknown) {
+  EXPECT_EQ(Wrong({"make", "--", "a", "b"}), "make does not take: b");
+  EXPECT_EQ(Wrong({"--"}), "help");
+}
+
+TEST_F(WrongUsageTest, AWrongValueBeforeACommandIsNoQuestionForHelp) {
+  EXPECT_NE(Wrong({"--help=foo"}), "help");
 }
 
 }  // namespace
