@@ -143,7 +143,7 @@ Plot CalibrationCostFigure(const std::vector<CalibrationRow>& rows) {
 
 std::string CalibrationCostPage(const std::vector<CalibrationRow>& rows, const std::string& about) {
   constexpr char kTitle[] = "Accuracy and run time of calibrations";
-  std::string html = PageHead(kTitle, SvgPlotStyle() + LightFieldFigureStyle());
+  std::string html = PageHead("benchmark", kTitle, SvgPlotStyle() + LightFieldFigureStyle());
   html += fmt::format("<h1>{}</h1>\n<p class=\"under-title\">{}</p>\n", kTitle,
                       EscapeXml(PrintableUtf8(about)));
   html += Figure(SvgPlot(CalibrationCostFigure(rows)), "Each method, by frames and field",

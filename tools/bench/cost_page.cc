@@ -162,7 +162,7 @@ Plot CostFigure(const std::vector<CostRow>& rows, const std::string& id) {
 
 std::string CostPage(const std::vector<CostRow>& rows, const std::string& about) {
   constexpr char kTitle[] = "Accuracy and run time";
-  std::string html = PageHead(kTitle, SvgPlotStyle() + LightFieldFigureStyle());
+  std::string html = PageHead("benchmark", kTitle, SvgPlotStyle() + LightFieldFigureStyle());
   html += fmt::format("<h1>{}</h1>\n<p class=\"under-title\">{}</p>\n", kTitle, EscapeXml(about));
   int number = 0;
   for (const std::vector<CostRow>& group : CostGroups(rows)) {

@@ -30,6 +30,7 @@
 #include "tools/report/calibration_report.h"
 #include "tools/report/calibration_summary.h"
 #include "tools/report/input_summary.h"
+#include "tools/report/page_style.h"
 #include "tools/report/report_folder.h"
 #include "tools/system/build_info.h"
 
@@ -72,6 +73,7 @@ struct Outputs {
   explicit Outputs(const CalibrateOptions& options) : folder(options.report_folder) {
     if (!options.camera_output.empty()) camera.emplace(options.camera_output);
     if (options.report_folder.empty()) return;
+    RequireOwnPage(options.report_path(), kCalibrationPage);
     report.emplace(options.report_path());
     figures.emplace(options.figures_path(), kCaptions, OwnFigureFiles());
   }
@@ -151,8 +153,13 @@ CommandResult RunCalibration(const CalibrateOptions& options, const Sweep& sweep
   }
   // A refusal before any measurement is one line on stderr.
   if (calibration.refusal.empty() || calibration.diagnostics.paper_recipe.done)
+    PrintResult(options.common, CalibrationText(focus_sweep, calibration, TruthOf(sweep),
+                                                options.by_paper() ? "" : options.camera_output));
+  if (options.by_paper() && outputs.camera && calibration.refusal.empty()) {
     PrintResult(options.common,
-                CalibrationText(focus_sweep, calibration, TruthOf(sweep), options.camera_output));
+                fmt::format("{} has the results of the paper's method, not of the fit\n",
+                            PrintableUtf8(options.camera_output)));
+  }
   PrintResult(options.common, WrittenText({calibration.refusal.empty() ? options.camera_output : "",
                                            options.report_path()}));
   CommandResult result;

@@ -38,6 +38,7 @@
 #include "tools/report/estimate_records.h"
 #include "tools/report/estimate_summary.h"
 #include "tools/report/light_field_page.h"
+#include "tools/report/page_style.h"
 #include "tools/report/report_folder.h"
 #include "tools/system/build_info.h"
 #include "tools/system/interrupt.h"
@@ -50,7 +51,10 @@ struct Outputs {
   explicit Outputs(const EstimateOptions& options)
       : light_field(options.output_folder, io::kLightFieldMarker, io::LightFieldEntries()),
         report_folder(options.report_folder) {
-    if (!options.report_folder.empty()) report.emplace(options.report_path());
+    if (!options.report_folder.empty()) {
+      RequireOwnPage(options.report_path(), kLightFieldPage);
+      report.emplace(options.report_path());
+    }
     if (!options.checkpoint_path.empty()) {
       checkpoint = std::make_shared<io::BlockCheckpoint>(
           options.checkpoint_path, BuildInfo(),

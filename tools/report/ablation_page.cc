@@ -167,7 +167,7 @@ std::string Section(const std::string& id, const std::string& heading, const std
 std::string AblationPage(const Ablation& ablation, const std::string& name,
                          const std::string& version, const std::string& date) {
   constexpr char kTitle[] = "What each effect changes";
-  std::string html = PageHead(kTitle, SvgPlotStyle() + LightFieldFigureStyle());
+  std::string html = PageHead("ablation", kTitle, SvgPlotStyle() + LightFieldFigureStyle());
   html += fmt::format(
       "<h1>{}</h1>\n<p class=\"under-title\">{}</p>\n", kTitle,
       EscapeXml(fmt::format("{} · thicklens {} · {}", PrintableUtf8(name), version, date)));

@@ -163,7 +163,7 @@ CalibrationReport MakeCalibrationReport(const FocusSweep& sweep, const Calibrati
                                         sweep.frames.size(), origin.date);
   Figures figures;
   CalibrationReport report;
-  report.html = PageHead(title, SvgPlotStyle());
+  report.html = PageHead(kCalibrationPage, title, SvgPlotStyle());
   report.html += fmt::format("<h1>{}</h1>\n<p class=\"under-title\">{}</p>\n", EscapeXml(title),
                              EscapeXml(about));
   report.html += VerdictSection(sweep, calibration);

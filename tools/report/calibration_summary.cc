@@ -142,10 +142,11 @@ std::string SecondaryLines(const calib::Calibration& calibration,
   const calib::BlurFit& blur = calibration.diagnostics.blur;
   AddLine("image scale", DistortionLine(scale), &text);
   AddLine("magnification", MagnificationLine(calibration), &text);
-  text += blur.done ? fmt::format("blur fit: chi2/dof {:.2f}, {} frames{}\n", blur.chi2_per_dof,
-                                  blur.frames_used,
-                                  blur.estimator.empty() ? "" : ", by " + blur.estimator)
-                    : fmt::format("blur fit: none, {}\n", PrintableUtf8(blur.message));
+  text +=
+      blur.done
+          ? fmt::format("blur fit: chi2/dof {:.2f}, {} frames{}\n", blur.chi2_per_dof,
+                        blur.frames_used, blur.estimator.empty() ? "" : ", by " + blur.estimator)
+          : fmt::format("blur fit: none, {}\n", PrintableUtf8(WithNamesForKeys(blur.message)));
   for (const std::string& name : blur.undetermined)
     text += fmt::format("blur fit: the data do not determine {}\n",
                         PrintableUtf8(WithNamesForKeys(name)));

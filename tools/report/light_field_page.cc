@@ -270,7 +270,8 @@ LightFieldPage MakeLightFieldPage(const LightFieldPageInput& input) {
   const std::string title =
       IsEstimated(input) ? "A light field from one photograph" : "A light field";
   LightFieldPage page;
-  page.html = PageHead(title, SvgPlotStyle() + LightFieldFigureStyle() + EstimateFigureStyle());
+  page.html = PageHead(kLightFieldPage, title,
+                       SvgPlotStyle() + LightFieldFigureStyle() + EstimateFigureStyle());
   page.html +=
       fmt::format("<h1>{}</h1>\n<p class=\"under-title\">{}</p>\n", title,
                   EscapeXml(fmt::format(

@@ -62,12 +62,16 @@ details { margin-top: 12px; } summary { cursor: pointer; color: var(--soft); }
 )";
 }
 
-std::string PageHead(const std::string& title, const std::string& style) {
+std::string GeneratorTag(const std::string& kind) {
+  return fmt::format("<meta name=\"generator\" content=\"thicklens, {}\"/>", kind);
+}
+
+std::string PageHead(const std::string& kind, const std::string& title, const std::string& style) {
   return fmt::format(
       "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n"
-      "<title>{}</title>\n<style>{}{}</style>\n</head>\n<body>\n<main>\n",
-      EscapeXml(title), PageStyle(), style);
+      "{}\n<title>{}</title>\n<style>{}{}</style>\n</head>\n<body>\n<main>\n",
+      GeneratorTag(kind), EscapeXml(title), PageStyle(), style);
 }
 
 std::string TrueMinus(const std::string& text) {

@@ -8,9 +8,16 @@ namespace thicklens::tools {
 // The style rules that the program's HTML pages share: light, dark and for print.
 std::string PageStyle();
 
+// Kinds of pages that replace only pages of their kind.
+inline constexpr char kCalibrationPage[] = "calibration";
+inline constexpr char kLightFieldPage[] = "light field";
+
+// The tag in the head of a page by which the program recognises its own page of this kind.
+std::string GeneratorTag(const std::string& kind);
+
 // Returns a page's text up to its <main>; close it with "</main>\n</body>\n</html>\n". `style`
 // follows the rules of PageStyle.
-std::string PageHead(const std::string& title, const std::string& style);
+std::string PageHead(const std::string& kind, const std::string& title, const std::string& style);
 
 // Replaces hyphens of negative numbers by minus signs; those of exponents stay.
 std::string TrueMinus(const std::string& text);

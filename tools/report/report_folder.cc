@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <fstream>
 #include <system_error>
 
 #include "thicklens/base/error.h"
+#include "tools/report/page_style.h"
 
 namespace thicklens::tools {
 
@@ -24,6 +26,26 @@ ReportFolder::ReportFolder(const std::string& path) : path_(path) {
       },
       Abandon::kIfEmpty);
   if (!is_new) made_ = {};
+}
+
+void RequireOwnPage(const std::string& path, const std::string& kind) {
+  std::error_code ignored;
+  if (!fs::is_regular_file(path, ignored))
+    return;  // what else it may be is checked where it is claimed
+  constexpr std::streamsize kBytesOfHead = 1024;
+  std::string head(kBytesOfHead, ' ');
+  std::ifstream file(path, std::ios::binary);
+  file.read(head.data(), kBytesOfHead);
+  if (head.find(GeneratorTag(kind)) != std::string::npos) return;
+  // Pages of earlier versions have no such tag. Their style sheet begins so.
+  const bool has_tag = head.find("name=\"generator\"") != std::string::npos;
+  if (!has_tag &&
+      head.find(":root { color-scheme: light dark; --paper: #ffffff;") != std::string::npos)
+    return;
+  throw Error(
+      fmt::format("{}: this file is not the page of a {} by thicklens, and would be replaced: "
+                  "name another folder, or remove it",
+                  path, kind));
 }
 
 ReportFolder::~ReportFolder() {

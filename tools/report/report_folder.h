@@ -22,6 +22,10 @@ class ReportFolder {
   Temporary made_;  // the folder, if this run created it
 };
 
+// Throws Error if there is a file at `path` that is no page of this kind by this program, because
+// it would be replaced. `kind` is one of page_style.h.
+void RequireOwnPage(const std::string& path, const std::string& kind);
+
 }  // namespace thicklens::tools
 
 #endif  // THICKLENS_TOOLS_REPORT_REPORT_FOLDER_H_

@@ -119,6 +119,25 @@ TEST_F(CalibrateOutputs, FilesOfOthersAmongTheFiguresStopTheRunAtOnce) {
   EXPECT_THAT(Names("out/report"), ::testing::ElementsAre("figures"));
 }
 
+TEST_F(CalibrateOutputs, AnotherPageIsNotReplaced) {
+  const std::string tag = R"(<meta name="generator" content="thicklens, light field"/>)";
+  for (const std::string& page : {std::string("<html>mine</html>"), tag}) {
+    folder_.Put("out/report/index.html", page);
+    const ProgramResult result = Calibrate({});
+    EXPECT_EQ(result.exit_code, 1);
+    EXPECT_THAT(result.err, HasSubstr("this file is not the page of a calibration by thicklens"));
+    EXPECT_EQ(ContentOf(folder_ / "out/report/index.html"), page);
+    EXPECT_THAT(Names("out/report"), ::testing::ElementsAre("index.html"));
+  }
+  // Its own page, also that of an older version, is.
+  for (const char* page : {R"(<meta name="generator" content="thicklens, calibration"/>)",
+                           "<style>\n:root { color-scheme: light dark; --paper: #ffffff;"}) {
+    folder_.Put("out/report/index.html", page);
+    EXPECT_EQ(Calibrate({}).exit_code, 0);
+    EXPECT_THAT(ContentOf(folder_ / "out/report/index.html"), HasSubstr("thicklens, calibration"));
+  }
+}
+
 TEST_F(CalibrateOutputs, ADryRunLeavesNoFolder) {
   const ProgramResult result = Calibrate({"--dry-run"});
   EXPECT_EQ(result.exit_code, 1) << "the folder of the report's folder is missing";

@@ -496,7 +496,7 @@ TEST_F(EstimateSceneTest, TheReportOfBlocksHasNoMaps) {
 
 TEST_F(EstimateSceneTest, OtherFilesBesideTheReportStay) {
   folder_.Put("page/mine.txt", "mine");
-  folder_.Put("page/index.html", "older");
+  folder_.Put("page/index.html", R"(<meta name="generator" content="thicklens, light field"/>)");
   Summary(With(Usual(), {"--report", Report()}));
   EXPECT_EQ(ContentOf(Report() + "/mine.txt"), "mine");
   EXPECT_THAT(ContentOf(Report() + "/index.html"), HasSubstr("<!DOCTYPE html>"));
