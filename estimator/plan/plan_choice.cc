@@ -58,10 +58,11 @@ Offer Choose(const EstimateProfile& profile, const QualityTarget& target,
                [&](const Offer& offer) { return offer.seconds <= *target.within_s; });
   if (soon.empty()) {
     const Offer fastest = *std::min_element(offers.begin(), offers.end(), IsFaster);
-    Refuse(target_text, profile,
-           fmt::format("the fastest plan is {}; reading and writing files counts; fewer views or a "
-                       "smaller image take less time",
-                       OfferText(fastest)));
+    Refuse(
+        target_text, profile,
+        fmt::format("the fastest plan is {}; reading and writing files counts, and other programs "
+                    "that compute; fewer views or a smaller image take less time",
+                    OfferText(fastest)));
   }
   const Offer best = *std::min_element(soon.begin(), soon.end(), IsBetter);
   if (!target.psnr_loss_db) return best;

@@ -180,7 +180,7 @@ void AddCameraVerifyCommand(CLI::App* camera, CommandAction* action) {
       ->type_name("CSV");
   AddSweepStatements(command, &options->sweep);
   command->add_flag("--same-bench", options->verification.same_bench,
-                    "The camera is mounted on the bench as before: compare the bench zero too");
+                    "The camera is mounted on the bench as before: compare the bench offset too");
   command
       ->add_option("--significance", options->verification.significance,
                    "Probability that chance rejects a calibration that holds")

@@ -170,8 +170,9 @@ std::string FindingsText(const Findings& findings) {
   if (!findings.used.empty()) {
     text += fmt::format(
         "used           {}: {}\n               {}\n"
-        "               by --solver blocks and render; the default solver of estimate computes on "
-        "the CPU\n",
+        "               by --solver blocks and render; the default solver of estimate uses it only "
+        "with "
+        "--device opencl\n",
         findings.used, PrintableUtf8(findings.used_description), PrintableUtf8(findings.used_why));
   }
   if (findings.self_test) text += SelfTestText(*findings.self_test);

@@ -70,7 +70,7 @@ OptionNames ExplainOptionNames() {
           {"depth_count", "--steps"},
           {"effects", "--effects"},
           {"effects.without", "--without"},
-          {"effects.tolerance", "--tolerance"},
+          {"effects.tolerance", "--effect-tolerance"},
           {"bits", "--bits"},
           {"full_well_electrons", "--full-well"},
           {"read_noise_electrons", "--read-noise"},

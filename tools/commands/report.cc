@@ -176,7 +176,7 @@ double RelativeDepthMm(const model::SweepFile& sweep, const model::SweepFrame& f
 }
 
 // Returns which of the frames, ordered from near to far, is nearest to the camera's plane of focus.
-// Returns none if the bench zero is unknown, or if that plane lies more than a step outside the
+// Returns none if the bench offset is unknown, or if that plane lies more than a step outside the
 // sweep.
 std::optional<std::size_t> FrameInFocus(const model::SweepFile& sweep,
                                         const std::optional<model::Camera>& camera) {

@@ -171,7 +171,8 @@ bool EffectSelection::IsValid(std::string* why) const {
     return Fail(why, "given", "effects are given, but the base is not kGiven");
   }
   if (tolerance && base != Base::kAuto) {
-    return Fail(why, "tolerance", "is for the base kAuto only");
+    return Fail(why, "tolerance",
+                "is for automatic effects only: a list of effects, all and none have no tolerance");
   }
   std::string reason;
   if (tolerance && !tolerance->IsValid(&reason)) return Fail(why, "tolerance", reason);

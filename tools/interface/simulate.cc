@@ -15,7 +15,6 @@
 #include "thicklens/io/simulated_sweep.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/version.h"
-#include "tools/interface/ablation_files.h"
 #include "tools/interface/run_scope.h"
 #include "tools/interface/validation.h"
 

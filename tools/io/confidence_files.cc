@@ -36,6 +36,15 @@ cv::Mat ReadConfidenceOfView(const std::string& path, const model::LightField& f
   return image;
 }
 
+bool HasHciViews(const std::string& folder) {
+  std::error_code failure;
+  for (fs::directory_iterator entry(folder, failure), end; !failure && entry != end;
+       entry.increment(failure)) {
+    if (entry->path().filename().string().rfind("input_Cam", 0) == 0) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 void WriteConfidence(const std::vector<estimator::Confidence>& of_rays, int u_count, int width_px,
@@ -56,7 +65,13 @@ std::vector<estimator::Confidence> ReadConfidence(const std::string& folder, int
                             fs::exists(folder, ignored) ? "is a file" : "does not exist"));
   }
   const fs::path description_path = fs::path(folder) / kLightFieldMarker;
-  if (!fs::exists(description_path, ignored)) return {};  // the HCI layout has none
+  if (!fs::exists(description_path, ignored)) {
+    if (HasHciViews(folder)) return {};  // this layout has none
+    throw Error(
+        fmt::format("{}: the folder of a light field is expected, with {} or views of the HCI "
+                    "layout",
+                    folder, kLightFieldMarker));
+  }
   const model::LightFieldDescription description =
       model::ReadLightFieldDescription(description_path.string());
   if (!description.has_confidence) return {};

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "thicklens/base/output_file.h"
-#include "tools/interface/ablation_files.h"
+#include "thicklens/simulate.h"
 #include "tools/report/ablation_table.h"
 
 namespace thicklens::tools {

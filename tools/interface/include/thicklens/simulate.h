@@ -43,6 +43,11 @@ struct SimulatedSweep {
   model::EffectSelection effects;  // the effects that the frames have
   int bits = 0;                    // of the frames' values
 };
+// The files that `thicklens simulate --ablate` adds to a simulated folder: a page and a table. A
+// run without an ablation replaces them too.
+inline constexpr char kAblationPage[] = "attribution.html";
+// The table of an ablation.
+inline constexpr char kAblationTable[] = "attribution.csv";
 // The first step of SimulateSweep, for a folder that is claimed before a long computation or that
 // gets other files too. The frames are then written below it as they are rendered and the
 // descriptions after them, and Commit of the folder (thicklens/base/output_file.h) puts it in

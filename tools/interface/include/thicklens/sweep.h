@@ -49,7 +49,7 @@ struct Sweep {
 struct SweepOverrides {
   std::string camera_path;                // another camera file
   std::string truth_path;                 // the truth of a simulated sweep
-  bool offset_unknown = false;            // the bench zero is to be found from the image scale
+  bool offset_unknown = false;            // the bench offset is to be found from the image scale
   std::optional<double> offset_mm;        // finite
   std::optional<double> offset_sigma_mm;  // finite, >= 0; needs an offset
   std::optional<model::BenchDirection> direction;  // sign of the reading in z
