@@ -34,6 +34,7 @@ void RequireOwnPage(const std::string& path, const std::string& kind) {
     return;  // what else it may be is checked where it is claimed
   constexpr std::streamsize kBytesOfHead = 1024;
   std::string head(kBytesOfHead, ' ');
+  // ReadWholeFile would report the page as an input, which no output may replace.
   std::ifstream file(path, std::ios::binary);
   file.read(head.data(), kBytesOfHead);
   if (head.find(GeneratorTag(kind)) != std::string::npos) return;
