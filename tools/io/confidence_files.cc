@@ -15,6 +15,7 @@
 #include "thicklens/io/image_io.h"
 #include "thicklens/model/light_field_file.h"
 #include "tools/io/confidence_file_name.h"
+#include "tools/io/hci_views.h"
 
 namespace thicklens::io {
 namespace {
@@ -34,15 +35,6 @@ cv::Mat ReadConfidenceOfView(const std::string& path, const model::LightField& f
                             image.cols, image.rows, frame.s_count, frame.t_count));
   }
   return image;
-}
-
-bool HasHciViews(const std::string& folder) {
-  std::error_code failure;
-  for (fs::directory_iterator entry(folder, failure), end; !failure && entry != end;
-       entry.increment(failure)) {
-    if (entry->path().filename().string().rfind("input_Cam", 0) == 0) return true;
-  }
-  return false;
 }
 
 }  // namespace
@@ -66,7 +58,7 @@ std::vector<estimator::Confidence> ReadConfidence(const std::string& folder, int
   }
   const fs::path description_path = fs::path(folder) / kLightFieldMarker;
   if (!fs::exists(description_path, ignored)) {
-    if (HasHciViews(folder)) return {};  // this layout has none
+    if (!HciNumbers(folder).empty()) return {};  // this layout has none
     throw Error(
         fmt::format("{}: the folder of a light field is expected, with {} or views of the HCI "
                     "layout",

@@ -27,6 +27,7 @@
 #include "thicklens/model/light_field_file.h"
 #include "tools/io/confidence_file_name.h"
 #include "tools/io/float_tiff.h"
+#include "tools/io/hci_views.h"
 #include "tools/io/image_file_kind.h"
 
 namespace thicklens::io {
@@ -164,7 +165,8 @@ ViewSource OpenOwn(const std::string& folder, bool sparse) {
 
 std::string HciFile(int number) { return fmt::format("{}{:03}.png", kHciStem, number); }
 
-// Returns the numbers of the views that are in the folder.
+}  // namespace
+
 std::vector<int> HciNumbers(const std::string& folder) {
   std::vector<int> numbers;
   std::error_code failure;
@@ -179,6 +181,8 @@ std::vector<int> HciNumbers(const std::string& folder) {
   std::sort(numbers.begin(), numbers.end());
   return numbers;
 }
+
+namespace {
 
 std::string Trimmed(const std::string& text) {
   const auto begin = text.find_first_not_of(" \t\r");

@@ -120,6 +120,13 @@ void AddQualityOptions(CLI::App* command, EstimateOptions* options) {
                     "solve at half the size, and seven to seventeen if something may be wrong");
   command->add_flag("--keep-depth-noise", options->keep_depth_noise,
                     "Disable depth denoising, which smooths the depth along surfaces");
+  command
+      ->add_option("--fill", options->fill,
+                   "Fill of areas that the centre view does not show: by the solver, or by the "
+                   "paper's inpainting (telea) view by view, for comparison")
+      ->check(CLI::IsMember({"solver", "telea"}))
+      ->capture_default_str()
+      ->type_name("NAME");
   AddEffectOptions(command, &options->effects);
 }
 
@@ -154,13 +161,6 @@ void AddSolverOptions(CLI::App* command, EstimateOptions* options) {
                    "paper's method, block by block; functional and grid, the paper's functional "
                    "for the whole image, on the rays of scene points or of the views")
       ->check(CLI::IsMember({"scene", "blocks", "functional", "grid"}))
-      ->capture_default_str()
-      ->type_name("NAME");
-  command
-      ->add_option("--fill", options->fill,
-                   "Fill of areas that the centre view does not show: by the solver, or by the "
-                   "paper's inpainting (telea) view by view, for comparison")
-      ->check(CLI::IsMember({"solver", "telea"}))
       ->capture_default_str()
       ->type_name("NAME");
 }

@@ -38,9 +38,10 @@ void RequireOwnPage(const std::string& path, const std::string& kind) {
   std::ifstream file(path, std::ios::binary);
   file.read(head.data(), kBytesOfHead);
   if (head.find(GeneratorTag(kind)) != std::string::npos) return;
-  // Pages of earlier versions have no such tag. Their style sheet begins so.
+  // An estimate's page of an earlier version has no such tag; its style sheet begins so. That of a
+  // calibration had another name.
   const bool has_tag = head.find("name=\"generator\"") != std::string::npos;
-  if (!has_tag &&
+  if (kind == kLightFieldPage && !has_tag &&
       head.find(":root { color-scheme: light dark; --paper: #ffffff;") != std::string::npos)
     return;
   throw Error(

@@ -500,6 +500,18 @@ TEST_F(EstimateSceneTest, OtherFilesBesideTheReportStay) {
   Summary(With(Usual(), {"--report", Report()}));
   EXPECT_EQ(ContentOf(Report() + "/mine.txt"), "mine");
   EXPECT_THAT(ContentOf(Report() + "/index.html"), HasSubstr("<!DOCTYPE html>"));
+
+  // A page of an earlier version has no tag.
+  folder_.Put("page/index.html", "<style>\n:root { color-scheme: light dark; --paper: #ffffff;");
+  Summary(With(Usual(), {"--report", Report()}));
+  EXPECT_THAT(ContentOf(Report() + "/index.html"), HasSubstr("<!DOCTYPE html>"));
+}
+
+TEST_F(EstimateSceneTest, TheFileOfSomebodyElseIsNoReport) {
+  folder_.Put("page/index.html", "<html>mine</html>");
+  EXPECT_THAT(EstimateCommand::Refusal(With(Usual(), {"--report", Report()}), 1),
+              HasSubstr("this file is not the page of a light field by thicklens"));
+  EXPECT_EQ(ContentOf(Report() + "/index.html"), "<html>mine</html>");
 }
 
 TEST_F(EstimateSceneTest, AnInterruptLeavesNothing) {

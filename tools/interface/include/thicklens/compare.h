@@ -68,9 +68,9 @@ THICKLENS_EXPORT ImageScores CompareImages(const Image& reference, const Image& 
 // light fields with different counts the inner views of the larger one are taken, which a notice
 // reports, and so is a difference of the apertures that their files state. The distances between
 // neighbouring views must be equal within 5 %; 7 x 7 views and 5 x 5 views of the same aperture are
-// at other places, and are refused. The arguments are values
-// so that large ones can be moved in: they are freed as soon as they are no longer needed. Throws
-// OptionError, and Error if they do not fit.
+// at other places, and are refused. The arguments are values so that large ones can be moved in:
+// they are freed as soon as they are no longer needed. Throws OptionError, and Error if they do not
+// fit.
 THICKLENS_EXPORT LightFieldScores CompareLightFields(LightField reference, LightField other,
                                                      CompareOptions options = {},
                                                      const RunControl& run = {});

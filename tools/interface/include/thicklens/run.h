@@ -59,8 +59,8 @@ struct RunControl {
   // (thicklens/base/cancel.h). Null: the token of the calling thread's CancelScope, if it has one.
   // Not owned.
   const CancelToken* cancel = nullptr;
-  // Called for each step, from any thread, never by two threads at once. A stage that has
-  // to do a step again reports it again. An exception that the function throws ends the call and is
+  // Called for each step, from any thread, never by two threads at once. A stage that has to
+  // do a step again reports it again. An exception that the function throws ends the call and is
   // thrown by the call. Empty: none.
   std::function<void(const Progress&)> progress;
   // Called with each notice when it arises, on the calling thread. EstimateDiagnostics,
