@@ -2,9 +2,16 @@
 
 # Compiler settings that every target of the project shares.
 function(thicklens_compile_settings target)
+  # GCC collects garbage only above 512 MiB, which takes a tenth less time and a tenth more memory.
+  # clang-tidy does not know the option.
+  set(saves_time OFF)
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND NOT CMAKE_CXX_CLANG_TIDY)
+    set(saves_time ON)
+  endif()
   target_compile_options(
     ${target} PRIVATE -Wall -Wextra -Wconversion -Wshadow
-                      $<$<BOOL:${THICKLENS_WARNINGS_AS_ERRORS}>:-Werror>)
+                      $<$<BOOL:${THICKLENS_WARNINGS_AS_ERRORS}>:-Werror>
+                      $<$<BOOL:${saves_time}>:--param=ggc-min-heapsize=524288>)
   if(THICKLENS_SANITIZE)
     # The checks of each pointer, which take a quarter of the compile time, are off: the address
     # sanitizer detects null pointers and wrong sizes, and aligned instructions wrong alignment.
