@@ -15,14 +15,6 @@ namespace {
 
 constexpr char kSchema[] = "thicklens/sweep/1";
 
-double MillimetresPer(const std::string& unit) {
-  if (unit == "um") return 1e-3;
-  if (unit == "cm") return 10;
-  if (unit == "m") return 1000;
-  if (unit == "in") return 25.4;
-  return 1;
-}
-
 bool IsUnknown(const YamlNode& node) { return node.IsScalar() && node.Text() == "unknown"; }
 
 void ReadOffset(const YamlNode& root, SweepFile* sweep) {
@@ -104,22 +96,37 @@ std::string SweepTargetName(SweepTarget target) {
 }
 
 SweepFile ReadSweep(const std::string& path, std::vector<std::string>* notices) {
+  return ReadSweep(path, SweepReading{}, notices);
+}
+
+SweepFile ReadSweep(const std::string& path, const SweepReading& reading,
+                    std::vector<std::string>* notices) {
   const YamlNode root = YamlNode::LoadFile(path);
   root.RequireSchema(kSchema);
-  root.RequireKeys({"schema", "camera", "readings_unit", "reading_sigma_mm", "offset_mm",
-                    "direction", "target", "target_period_mm", "blur_floor_px", "roi_px", "frames",
-                    "frames_csv", "frames_dir", "frames_glob"});
+  root.RequireKeys({"schema",
+                    "camera",
+                    "readings_unit",
+                    "reading_sigma_mm",
+                    "offset_mm",
+                    "direction",
+                    "target",
+                    "target_period_mm",
+                    "blur_floor_px",
+                    "roi_px",
+                    "frames",
+                    "frames_csv",
+                    "frames_dir",
+                    "frames_glob",
+                    "readings_column",
+                    "readings_file_column",
+                    "readings_scale_mm",
+                    "readings_decimal",
+                    "readings_from",
+                    "readings_from_name"});
   SweepFile sweep;
   sweep.source = path;
   const YamlNode camera = root.At("camera");
   sweep.camera_path = camera.ResolvePath(camera.Text());
-  double mm_per_unit = 1;
-  if (const auto unit = root.Find("readings_unit")) {
-    mm_per_unit = MillimetresPer(unit->OneOf({"mm", "um", "cm", "m", "in"}));
-    if (mm_per_unit != 1 && root.Has("frames")) {
-      throw unit->ErrorHere("'frames' states reading_mm; only 'frames_csv' may use another unit");
-    }
-  }
   if (const auto sigma = root.Find("reading_sigma_mm")) {
     sweep.reading_sigma_mm = sigma->NonNegativeNumber();
     sweep.reading_sigma_stated = true;
@@ -145,17 +152,23 @@ SweepFile ReadSweep(const std::string& path, std::vector<std::string>* notices) 
     sweep.roi = {numbers[0].Integer(0, kMax), numbers[1].Integer(0, kMax),
                  numbers[2].Integer(1, kMax), numbers[3].Integer(1, kMax)};
   }
-  sweep.frames = ReadSweepFrames(root, mm_per_unit);
+  ReadSweepFrames(root, reading, &sweep, notices);
   NoteOrderAndRepeats(sweep, notices);
   return sweep;
 }
 
 SweepFile SweepFromFolder(const std::string& folder, const std::string& readings_csv,
                           const std::string& camera_path, std::vector<std::string>* notices) {
+  return SweepFromFolder(folder, readings_csv, camera_path, SweepReading{}, notices);
+}
+
+SweepFile SweepFromFolder(const std::string& folder, const std::string& table,
+                          const std::string& camera_path, const SweepReading& reading,
+                          std::vector<std::string>* notices) {
   SweepFile sweep;
   sweep.source = folder;
   sweep.camera_path = camera_path;
-  sweep.frames = FramesOfFolder(folder, readings_csv);
+  ReadFramesOfFolder(folder, table, reading, &sweep, notices);
   NoteOrderAndRepeats(sweep, notices);
   return sweep;
 }

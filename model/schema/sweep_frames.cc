@@ -4,14 +4,16 @@
 #include <glob.h>
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <filesystem>
 #include <set>
 #include <system_error>
 
-#include "model/schema/readings_table.h"
+#include "model/schema/frame_pairing.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/input_file.h"
+#include "thicklens/model/readings.h"
 
 namespace thicklens::model {
 namespace {
@@ -40,9 +42,8 @@ std::string EscapedForGlob(const std::string& folder) {
   return escaped;
 }
 
-std::vector<std::string> FilesMatching(const YamlNode& node) {
-  const std::string folder = EscapedForGlob(fs::path(node.source()).parent_path().string());
-  const std::string pattern = (fs::path(folder) / node.Text()).string();
+std::vector<std::string> FilesMatching(const std::string& folder, const std::string& text) {
+  const std::string pattern = (fs::path(EscapedForGlob(folder)) / text).string();
   glob_t found{};
   std::vector<std::string> files;
   if (::glob(pattern.c_str(), 0, nullptr, &found) == 0) {
@@ -76,90 +77,92 @@ std::vector<std::string> ImagesIn(const std::string& folder) {
   return files;
 }
 
-// Checks a frame early, because frames are read long after their names are known.
-void RequireFrame(const std::string& path, const std::string& place) {
-  ReportInput(path);
-  try {
-    RequireRegularFile(path);
-  } catch (const Error& error) {
-    throw Error(place + error.what());
+// The files of `frames_glob`, which is relative to `folder`. Older sweeps wrote it relative to the
+// sweep's file.
+std::vector<std::string> FilesOfGlob(const YamlNode& pattern, const std::string& folder,
+                                     std::vector<std::string>* notices) {
+  std::vector<std::string> files = FilesMatching(folder, pattern.Text());
+  const std::string home = fs::path(pattern.source()).parent_path().string();
+  if (files.empty() && home != folder) {
+    files = FilesMatching(home, pattern.Text());
+    if (!files.empty() && notices != nullptr) {
+      notices->push_back(fmt::format(
+          "frames_glob: nothing in {} matches '{}'; the files beside the sweep file that match are "
+          "used",
+          folder.empty() ? "." : folder, pattern.Text()));
+    }
+  }
+  if (files.empty()) throw pattern.ErrorHere(fmt::format("no file matches '{}'", pattern.Text()));
+  return files;
+}
+
+// A value of the command line replaces that of the file.
+void Replace(const std::string& stated, std::string* value) {
+  if (!stated.empty()) *value = stated;
+}
+
+constexpr std::array<const char*, 7> kReadingKeys = {
+    "readings_unit",    "readings_column", "readings_file_column", "readings_scale_mm",
+    "readings_decimal", "readings_from",   "readings_from_name"};
+
+ReadingOptions OptionsOf(const YamlNode& root, const ReadingOptions& replacements) {
+  ReadingOptions options;
+  if (const auto unit = root.Find("readings_unit"))
+    options.unit = unit->OneOf({"mm", "um", "nm", "cm", "m", "in", "dpt", "steps", "counts"});
+  if (const auto column = root.Find("readings_column")) options.column = column->Text();
+  if (const auto column = root.Find("readings_file_column")) options.file_column = column->Text();
+  if (const auto scale = root.Find("readings_scale_mm")) options.scale_mm = scale->Number();
+  if (const auto decimal = root.Find("readings_decimal"))
+    options.decimal = decimal->OneOf({"comma", "point"});
+  if (const auto source = root.Find("readings_from"))
+    options.source = source->OneOf({"exif", "sidecar", "ome"});
+  if (const auto pattern = root.Find("readings_from_name")) options.name_pattern = pattern->Text();
+  std::string why;
+  if (!options.IsValid(&why)) throw root.ErrorHere("readings: " + why);
+  if (replacements.IsWithoutTable()) {
+    options.source = replacements.source;
+    options.name_pattern = replacements.name_pattern;
+  }
+  if (!replacements.unit.empty()) options.scale_mm.reset();
+  Replace(replacements.unit, &options.unit);
+  Replace(replacements.column, &options.column);
+  Replace(replacements.file_column, &options.file_column);
+  Replace(replacements.decimal, &options.decimal);
+  if (replacements.scale_mm) options.scale_mm = replacements.scale_mm;
+  return options;
+}
+
+void TakeReadings(const SweepReading& reading, const std::string& table,
+                  const ReadingOptions& options, const std::vector<std::string>& files,
+                  const std::string& folder, SweepFile* sweep, std::vector<std::string>* notices) {
+  const ReadingReader reader = reading.reader ? reading.reader : ReadTextReadings;
+  const ReadingSet readings = reader(table, files, options);
+  if (notices != nullptr)
+    notices->insert(notices->end(), readings.notices.begin(), readings.notices.end());
+  sweep->readings = readings.description;
+  sweep->frames = PairFrames(readings, files, folder, notices);
+}
+
+// The readings are in the list itself: nothing that says how to read them applies.
+void RequireNoOptions(const YamlNode& root, const ReadingOptions& replacements) {
+  for (const char* key : kReadingKeys) {
+    const auto node = root.Find(key);
+    if (!node || (std::string(key) == "readings_unit" && node->Text() == "mm")) continue;
+    throw node->ErrorHere(
+        "'frames' states reading_mm; this key applies only to 'frames_csv' and to "
+        "readings of the files");
+  }
+  const bool is_any = replacements.IsWithoutTable() || !replacements.column.empty() ||
+                      !replacements.file_column.empty() || !replacements.unit.empty() ||
+                      replacements.scale_mm || !replacements.decimal.empty();
+  if (is_any) {
+    throw root.At("frames").ErrorHere(
+        "the list states reading_mm for each image; --column, --file-column, --unit, "
+        "--reading-scale, --decimal, --reading-from and --reading-from-name do not apply");
   }
 }
 
-// Pairs table rows and image files by name; each must have its partner.
-std::vector<SweepFrame> JoinRowsAndFiles(const std::vector<ReadingRow>& rows,
-                                         const std::string& table,
-                                         const std::vector<std::string>& files,
-                                         const std::string& folder, double mm_per_unit) {
-  std::vector<SweepFrame> frames;
-  std::set<std::string> used;
-  for (const ReadingRow& row : rows) {
-    std::string path = (fs::path(folder) / row.file).lexically_normal().string();
-    std::error_code failure;
-    if (!fs::exists(path, failure)) {
-      const auto same_name = [&](const std::string& file) {
-        return fs::path(file).filename() == row.file;
-      };
-      const auto match = std::find_if(files.begin(), files.end(), same_name);
-      if (match == files.end()) {
-        throw Error(fmt::format("{}:{}: the file '{}' is not in {}", table, row.line, row.file,
-                                folder.empty() ? "." : folder));
-      }
-      const auto other = std::find_if(match + 1, files.end(), same_name);
-      if (other != files.end()) {
-        throw Error(fmt::format("{}:{}: '{}' may be {} or {}; write the name of its folder, too",
-                                table, row.line, row.file, *match, *other));
-      }
-      path = fs::path(*match).lexically_normal().string();
-    }
-    RequireFrame(path, fmt::format("{}:{}: ", table, row.line));
-    if (!used.insert(path).second) {
-      throw Error(
-          fmt::format("{}:{}: the file '{}' already has a reading", table, row.line, row.file));
-    }
-    frames.push_back({path, row.reading * mm_per_unit});
-  }
-  std::vector<std::string> without_row;
-  for (const std::string& file : files) {
-    if (used.count(fs::path(file).lexically_normal().string()) == 0) without_row.push_back(file);
-  }
-  // An image that was left out by mistake costs more than one that has to be moved away.
-  if (!without_row.empty()) {
-    throw Error(fmt::format(
-        "{}: has no row in {} ({} such file{}): add its reading, move it elsewhere, or "
-        "choose the files by frames_glob in a sweep file",
-        without_row.front(), table, without_row.size(), without_row.size() == 1 ? "" : "s"));
-  }
-  return frames;
-}
-
-}  // namespace
-
-std::vector<SweepFrame> ReadSweepFrames(const YamlNode& root, double mm_per_unit) {
-  if (root.Has("frames") == root.Has("frames_csv")) {
-    throw root.ErrorHere(
-        "either 'frames' (a list of image and reading_mm) or 'frames_csv' (a table) is expected");
-  }
-  if (const auto table = root.Find("frames_csv")) {
-    const std::string csv = table->ResolvePath(table->Text());
-    std::string folder = fs::path(csv).parent_path().string();
-    if (const auto dir = root.Find("frames_dir")) folder = dir->ResolvePath(dir->Text());
-    std::vector<std::string> files;
-    if (const auto pattern = root.Find("frames_glob")) {
-      files = FilesMatching(*pattern);
-      if (files.empty())
-        throw pattern->ErrorHere(fmt::format("no file matches '{}'", pattern->Text()));
-    } else {
-      files = ImagesIn(folder.empty() ? "." : folder);
-    }
-    return JoinRowsAndFiles(ReadReadingsTable(csv), csv, files, folder, mm_per_unit);
-  }
-  for (const char* key : {"frames_dir", "frames_glob"}) {
-    if (const auto extra = root.Find(key))
-      throw extra->ErrorHere(
-          "this key applies only to 'frames_csv'; the paths in 'frames' are complete");
-  }
-  std::vector<SweepFrame> frames;
+void ReadListedFrames(const YamlNode& root, SweepFile* sweep) {
   std::set<std::string> images;
   for (const YamlNode& node : root.At("frames").Elements()) {
     node.RequireKeys({"image", "reading_mm"});
@@ -175,15 +178,52 @@ std::vector<SweepFrame> ReadSweepFrames(const YamlNode& root, double mm_per_unit
     }
     if (!images.insert(path).second)
       throw image.ErrorHere(fmt::format("'{}' is listed twice", image.Text()));
-    frames.push_back({path, node.At("reading_mm").Number()});
+    sweep->frames.push_back({path, node.At("reading_mm").Number()});
   }
-  if (frames.empty()) throw root.At("frames").ErrorHere("at least one frame is expected");
-  return frames;
+  if (sweep->frames.empty()) throw root.At("frames").ErrorHere("at least one frame is expected");
 }
 
-std::vector<SweepFrame> FramesOfFolder(const std::string& folder, const std::string& readings_csv) {
-  return JoinRowsAndFiles(ReadReadingsTable(readings_csv), readings_csv, ImagesIn(folder), folder,
-                          1);
+}  // namespace
+
+void ReadSweepFrames(const YamlNode& root, const SweepReading& reading, SweepFile* sweep,
+                     std::vector<std::string>* notices) {
+  const bool is_from_files = root.Has("readings_from") || root.Has("readings_from_name");
+  if (root.Has("frames") + (root.Has("frames_csv") || is_from_files) != 1 ||
+      (root.Has("frames_csv") && is_from_files)) {
+    throw root.ErrorHere(
+        "either 'frames' (a list of image and reading_mm), 'frames_csv' (a table) or "
+        "'readings_from' or 'readings_from_name' (the files themselves) is expected");
+  }
+  if (root.Has("frames")) {
+    for (const char* key : {"frames_dir", "frames_glob"}) {
+      if (const auto extra = root.Find(key))
+        throw extra->ErrorHere(
+            "this key applies only to 'frames_csv'; the paths in 'frames' are complete");
+    }
+    RequireNoOptions(root, reading.readings);
+    ReadListedFrames(root, sweep);
+    return;
+  }
+  const ReadingOptions options = OptionsOf(root, reading.readings);
+  std::string table;
+  std::string folder = fs::path(root.source()).parent_path().string();
+  if (const auto csv = root.Find("frames_csv"); csv && !options.IsWithoutTable()) {
+    table = csv->ResolvePath(csv->Text());
+    folder = fs::path(table).parent_path().string();
+  }
+  if (const auto dir = root.Find("frames_dir")) folder = dir->ResolvePath(dir->Text());
+  const auto pattern = root.Find("frames_glob");
+  const std::vector<std::string> files =
+      pattern ? FilesOfGlob(*pattern, folder, notices) : ImagesIn(folder.empty() ? "." : folder);
+  TakeReadings(reading, table, options, files, folder, sweep, notices);
 }
+
+void ReadFramesOfFolder(const std::string& folder, const std::string& table,
+                        const SweepReading& reading, SweepFile* sweep,
+                        std::vector<std::string>* notices) {
+  TakeReadings(reading, table, reading.readings, ImagesIn(folder), folder, sweep, notices);
+}
+
+std::vector<std::string> ImagesOfFolder(const std::string& folder) { return ImagesIn(folder); }
 
 }  // namespace thicklens::model

@@ -9,16 +9,19 @@
 
 namespace thicklens::model {
 
-// The images of a sweep, each with its reading. Every row must have its image and every image its
-// row; a row or an image without a partner throws Error with its place.
+// The images of a sweep, each with its reading. Every reading must have its image and every image
+// its reading; one without a partner throws Error with its place.
 
-// Reads the frames from the key `frames` of the file, or from `frames_csv` with `frames_dir` or
-// `frames_glob`. `mm_per_unit` converts the readings of the table to mm; the readings of `frames`
-// are always in mm.
-std::vector<SweepFrame> ReadSweepFrames(const YamlNode& root, double mm_per_unit);
+// Reads the frames from the key `frames` of the file, or from `frames_csv` or `readings_from` with
+// `frames_dir` or `frames_glob`, into `sweep`. `notices` may be null.
+void ReadSweepFrames(const YamlNode& root, const SweepReading& reading, SweepFile* sweep,
+                     std::vector<std::string>* notices);
 
-// Reads the frames from a folder of images and a table in mm.
-std::vector<SweepFrame> FramesOfFolder(const std::string& folder, const std::string& readings_csv);
+// Reads the frames from a folder of images and a table, or without a table (empty) from what
+// `reading` states.
+void ReadFramesOfFolder(const std::string& folder, const std::string& table,
+                        const SweepReading& reading, SweepFile* sweep,
+                        std::vector<std::string>* notices);
 
 }  // namespace thicklens::model
 

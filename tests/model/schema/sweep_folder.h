@@ -33,8 +33,8 @@ class SweepFolder : public ::testing::Test {
     folder_.Put("r.csv", table);
     return Read("frames_csv: r.csv\n" + rest);
   }
-  std::string ErrorOfTable(const std::string& table) {
-    return ErrorOf([&] { ReadTable(table); });
+  std::string ErrorOfTable(const std::string& table, const std::string& rest = "") {
+    return ErrorOf([&] { ReadTable(table, rest); });
   }
   void ExpectThreeFrames(const std::string& table) {
     SCOPED_TRACE(table);

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <string>
 #include <utility>
 #include <vector>
@@ -10,6 +11,8 @@
 
 namespace thicklens::model {
 namespace {
+
+namespace fs = std::filesystem;
 
 using ::testing::AllOf;
 using ::testing::ElementsAre;
@@ -27,6 +30,7 @@ TEST_F(SweepFolder, TablesOfEveryMake) {
   ExpectThreeFrames("a.png,400\nb.png,401.5\nc.png,-3");
   ExpectThreeFrames("file;reading\na.png;400\nb.png;401.5\nc.png;-3\n");
   ExpectThreeFrames("file\treading\na.png\t400\nb.png\t401.5\nc.png\t-3\n");
+  ExpectThreeFrames("Datei;Position\na.png;400\nb.png;401,5\nc.png;-3\n");
   ExpectThreeFrames("file,reading\r\na.png,400\r\nb.png,401.5\r\nc.png,-3\r\n");
   ExpectThreeFrames(
       "\xEF\xBB\xBF"
@@ -49,7 +53,8 @@ TEST_F(SweepFolder, TableErrorsNameTheLine) {
   EXPECT_THAT(ErrorOfTable("file,reading\r\na.png,1\r\nb.png,two"), StartsWith(csv + ":3: "));
   EXPECT_THAT(ErrorOfTable("a.png,1\n\n\nb.png,4 mm\n"),
               AllOf(StartsWith(csv + ":4: "), HasSubstr("'4 mm'")));
-  EXPECT_THAT(ErrorOfTable("a.png;1\nb.png;401,5\n"), HasSubstr("'401,5'"));
+  EXPECT_THAT(ErrorOfTable("a.png,1\nb.png,401,5\n"),
+              AllOf(StartsWith(csv + ":2: "), HasSubstr("401,5 with a decimal comma")));
   EXPECT_THAT(ErrorOfTable("a.png,1\nb.png,nan\n"), StartsWith(csv + ":2: "));
   EXPECT_THAT(ErrorOfTable("a.png,1\nb.png,+-2\n"), StartsWith(csv + ":2: "));
   EXPECT_THAT(ErrorOfTable("a.png,1\nb.png\n"),
@@ -130,6 +135,100 @@ TEST_F(SweepFolder, GlobChoosesTheFiles) {
   folder_.Put("r.csv", "a.png,1\n");
   EXPECT_THAT(ErrorWith("frames_csv: r.csv\nframes_glob: '*.webp'\n"),
               AllOf(HasSubstr("s.yaml:4:14: frames_glob"), HasSubstr("no file matches '*.webp'")));
+}
+
+TEST_F(SweepFolder, GlobIsRelativeToFramesDir) {
+  folder_.Put("raw/x1.png");
+  folder_.Put("raw/x2.png");
+  folder_.Put("raw/dark.png");
+  folder_.Put("r.csv", "x1.png,1\nx2.png,2\n");
+  const SweepFile sweep =
+      Read("frames_csv: r.csv\nframes_dir: raw\nframes_glob: x*.png\nreading_sigma_mm: 0\n");
+  ASSERT_THAT(sweep.frames, SizeIs(2));
+  EXPECT_EQ(sweep.frames[1].image, folder_ / "raw/x2.png");
+  EXPECT_THAT(notices_, IsEmpty());
+  // Relative to the sweep's file, as before, if nothing in frames_dir matches.
+  Read("frames_csv: r.csv\nframes_dir: raw\nframes_glob: raw/x*.png\nreading_sigma_mm: 0\n");
+  EXPECT_THAT(notices_, ElementsAre(HasSubstr("frames_glob")));
+}
+
+TEST_F(SweepFolder, PathsOfATable) {
+  const std::string sigma = "reading_sigma_mm: 0\n";
+  // Absolute paths that name the files of the folder, also through a link.
+  const auto rows = [](const std::string& before) {
+    return before + "a.png,400\n" + before + "b.png,401.5\n" + before + "c.png,-3\n";
+  };
+  ExpectThreeFrames(rows(folder_.path() + "/"));
+  fs::create_directory_symlink(folder_.path(), folder_ / "link");
+  ExpectThreeFrames(rows(folder_ / "link/"));
+  ExpectThreeFrames(rows("./"));
+  ExpectThreeFrames(rows("../" + fs::path(folder_.path()).filename().string() + "/"));
+  const auto in_order = [](const std::string& before) {
+    return before + "a.png,1\n" + before + "b.png,2\n" + before + "c.png,3\n";
+  };
+  ReadTable(in_order(folder_.path() + "/"), sigma);
+  EXPECT_THAT(notices_, IsEmpty());
+  // Names without their ending, and paths of another computer, which are reported.
+  ReadTable("a,1\nb,2\nc,3\n", sigma);
+  EXPECT_THAT(notices_, IsEmpty());
+  for (const char* other : {"C:\\sweep\\", "/nowhere/sweep/", "raw/"}) {
+    ExpectThreeFrames(rows(other));
+    ReadTable(in_order(other), sigma);
+    EXPECT_THAT(notices_, ElementsAre(AllOf(HasSubstr("r.csv:1: "), HasSubstr("2 more rows"))));
+  }
+  // The table's folder comes before frames_dir.
+  folder_.Put("bench/frames/x.png");
+  folder_.Put("bench/r.csv", "frames/x.png,2\n");
+  EXPECT_EQ(Read("frames_csv: bench/r.csv\nframes_dir: bench/frames\n").frames.at(0).image,
+            folder_ / "bench/frames/x.png");
+  EXPECT_THAT(
+      ErrorOfTable(rows(folder_.path() + "/") + "link/a.png,5\n"),
+      AllOf(HasSubstr("r.csv:4: "), HasSubstr("already has a reading"), HasSubstr("r.csv:1")));
+}
+
+TEST_F(SweepFolder, FieldsThatSelectTheColumns) {
+  const std::string table = "file,where,elsewhere\na.png,1,400000\nb.png,2,401500\nc.png,3,-3000\n";
+  EXPECT_THAT(ErrorOfTable(table),
+              AllOf(HasSubstr("r.csv:1: "), HasSubstr("column 2 'where', column 3 'elsewhere'"),
+                    HasSubstr("--column")));
+  const SweepFile sweep = ReadTable(table, "readings_column: elsewhere\nreadings_unit: um\n");
+  EXPECT_EQ(sweep.frames.at(1).reading_mm, 401.5);
+  EXPECT_EQ(sweep.readings,
+            "column 3 'elsewhere' of r.csv, um, 3 rows; files from column 1 'file'");
+  EXPECT_EQ(ReadTable(table,
+                      "readings_column: 2\nreadings_file_column: file\n"
+                      "readings_unit: steps\nreadings_scale_mm: 0.25\n")
+                .frames.at(1)
+                .reading_mm,
+            0.5);
+  // The options of a caller replace the fields.
+  SweepReading reading;
+  reading.readings.column = "where";
+  reading.readings.unit = "mm";
+  EXPECT_EQ(ReadSweep(folder_ / "s.yaml", reading, nullptr).frames.at(1).reading_mm, 2);
+  EXPECT_THAT(ErrorOfTable(table, "readings_scale_mm: 0\nreadings_column: 2\n"),
+              HasSubstr("other than 0"));
+  EXPECT_THAT(ErrorWith(frames_ + "readings_column: z\n"),
+              AllOf(HasSubstr("s.yaml:4:"), HasSubstr("applies only to 'frames_csv'")));
+  Read(frames_);
+  EXPECT_THAT(ErrorOf([&] { ReadSweep(folder_ / "s.yaml", reading, nullptr); }),
+              AllOf(HasSubstr("s.yaml:3:"), HasSubstr("--column")));
+}
+
+TEST_F(SweepFolder, ReadingsFromTheNames) {
+  folder_.Put("n/z-10um.png");
+  folder_.Put("n/z0um.png");
+  folder_.Put("n/z2.5um.png");
+  const SweepFile sweep = Read("frames_dir: n\nreadings_from_name: 'z{reading}um'\n");
+  ASSERT_THAT(sweep.frames, SizeIs(3));
+  EXPECT_EQ(sweep.frames[0].reading_mm, -0.01);
+  EXPECT_EQ(sweep.frames[2].reading_mm, 0.0025);
+  EXPECT_THAT(sweep.readings, HasSubstr("um"));
+  EXPECT_THAT(ErrorWith("frames_dir: n\nreadings_from_name: 'z{reading}mm'\n"),
+              AllOf(HasSubstr("n/z-10um.png"), HasSubstr("does not contain")));
+  EXPECT_THAT(ErrorWith("frames_dir: n\nreadings_from_name: z\n"), HasSubstr("{reading}"));
+  EXPECT_THAT(ErrorWith("frames_dir: n\nreadings_from: exif\n"), HasSubstr("thicklens::io"));
+  EXPECT_THAT(ErrorWith("frames_csv: r.csv\nreadings_from: exif\n"), HasSubstr("either 'frames'"));
 }
 
 TEST_F(SweepFolder, ListOfFrames) {

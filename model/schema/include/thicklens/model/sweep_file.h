@@ -8,6 +8,7 @@
 #include "thicklens/base/export.h"
 #include "thicklens/model/camera.h"
 #include "thicklens/model/effect_selection.h"
+#include "thicklens/model/readings.h"
 
 namespace thicklens::model {
 
@@ -68,7 +69,16 @@ struct SweepFile {
   std::optional<FloorOrigin> floor_origin;  // present if another calibration gave the floor
   std::optional<double> target_period_mm;   // period of a periodic target (docs/file-formats.md)
   RegionOfInterest roi;                     // the part that is measured
-  std::vector<SweepFrame> frames;           // in the order of the file
+  // Describes in one line which readings were read, and in which unit; empty: the file lists them.
+  std::string readings;
+  std::vector<SweepFrame> frames;  // in the order of the file
+};
+
+// How the readings of a sweep are read.
+struct SweepReading {
+  ReadingOptions readings;  // each value that is given replaces that of the sweep's file
+  // Reads the readings; empty: ReadTextReadings, which reads tables of text and names of files.
+  ReadingReader reader;
 };
 
 // Reads the YAML file and, with `frames_csv`, the table. Throws Error with file:line:column for
@@ -76,6 +86,8 @@ struct SweepFile {
 // without a row, duplicate rows and readings that are no numbers. Assumptions about missing or
 // unusual content are added to `notices`, which may be null.
 THICKLENS_EXPORT SweepFile ReadSweep(const std::string& path, std::vector<std::string>* notices);
+THICKLENS_EXPORT SweepFile ReadSweep(const std::string& path, const SweepReading& reading,
+                                     std::vector<std::string>* notices);
 
 // Copies value and sigma of calibration.blur_floor_px of a camera file to the floor of `sweep`.
 // Throws Error if the file contains no measured floor. The message begins with `place`, the place
@@ -87,13 +99,21 @@ THICKLENS_EXPORT void TakeFloorOfCalibration(const std::string& camera_path,
 // `camera` has.
 THICKLENS_EXPORT void RequireFloorOfCamera(const SweepFile& sweep, const Camera& camera);
 
-// A sweep of a folder of images and a table of readings in mm; all other fields have their
-// defaults. The command `thicklens calibrate DIR --readings` uses it. Throws Error as ReadSweep
-// does for rows and images without partner; `notices` may be null.
+// A sweep of a folder of images and a table of readings; all other fields have their defaults. The
+// command `thicklens calibrate DIR --readings` uses it. Throws Error as ReadSweep does for rows and
+// images without partner; `notices` may be null.
 THICKLENS_EXPORT SweepFile SweepFromFolder(const std::string& folder,
                                            const std::string& readings_csv,
                                            const std::string& camera_path,
                                            std::vector<std::string>* notices);
+// Likewise with options. `table` is empty if the readings come from the files themselves.
+THICKLENS_EXPORT SweepFile SweepFromFolder(const std::string& folder, const std::string& table,
+                                           const std::string& camera_path,
+                                           const SweepReading& reading,
+                                           std::vector<std::string>* notices);
+// The images that a sweep from a folder has: those in the folder or, if it contains none, in its
+// direct sub-folders. Throws Error if the folder cannot be read.
+THICKLENS_EXPORT std::vector<std::string> ImagesOfFolder(const std::string& folder);
 
 // The YAML text of a sweep. Paths in `sweep` are written unchanged; they should therefore be
 // relative to the folder of the written file.

@@ -1,0 +1,166 @@
+#include "model/schema/frame_pairing.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <system_error>
+
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/input_file.h"
+
+namespace thicklens::model {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string Shortened(const std::string& text) {
+  constexpr std::size_t kMost = 200;
+  return text.size() <= kMost ? text : text.substr(0, kMost) + "...";
+}
+
+// The last part of a path of any system.
+std::string NameIn(const std::string& path) {
+  const std::size_t slash = path.find_last_of("/\\");
+  return slash == std::string::npos ? path : path.substr(slash + 1);
+}
+
+class Images {
+ public:
+  Images(const std::vector<std::string>& files, const std::string& folder)
+      : files_(files), folder_(folder), here_(fs::current_path()) {
+    for (std::size_t i = 0; i < files.size(); ++i) {
+      by_path_.emplace(Key(files[i]), i);
+      const fs::path name = fs::path(files[i]).filename();
+      by_name_[name.string()].push_back(i);
+      by_stem_[name.stem().string()].push_back(i);
+    }
+  }
+
+  // Returns the image of the row. `is_by_name` is set if the row has a path that leads nowhere, and
+  // only its last part names an image.
+  std::string Find(const FileReading& row, const std::string& table_folder, bool* is_by_name) {
+    std::vector<std::string> paths = {(fs::path(table_folder) / row.file).string()};
+    if (table_folder != folder_) paths.push_back((fs::path(folder_) / row.file).string());
+    for (const std::string& path : paths) {
+      const auto found = by_path_.find(Key(path));
+      if (found != by_path_.end()) return Normal(files_[found->second]);
+    }
+    for (const std::string& path : paths) {
+      std::error_code failure;
+      if (!fs::exists(path, failure)) continue;
+      const auto same = SameFile(path);
+      return Normal(same ? files_[*same] : path);
+    }
+    return FindByName(row, is_by_name);
+  }
+
+ private:
+  static std::string Normal(const std::string& path) {
+    return fs::path(path).lexically_normal().string();
+  }
+  std::string Key(const std::string& path) const {
+    return (here_ / path).lexically_normal().string();
+  }
+
+  // The image that the path leads to by links.
+  std::optional<std::size_t> SameFile(const std::string& path) {
+    std::error_code failure;
+    if (canonical_.empty()) {
+      for (std::size_t i = 0; i < files_.size(); ++i)
+        canonical_.emplace(fs::canonical(files_[i], failure).string(), i);
+    }
+    const auto found = canonical_.find(fs::canonical(path, failure).string());
+    if (failure || found == canonical_.end()) return std::nullopt;
+    return found->second;
+  }
+
+  std::string FindByName(const FileReading& row, bool* is_by_name) const {
+    const std::string name = NameIn(row.file);
+    const std::vector<std::size_t>* found = nullptr;
+    if (const auto same = by_name_.find(name); same != by_name_.end()) {
+      found = &same->second;
+    } else if (const auto stem = by_stem_.find(name); stem != by_stem_.end()) {
+      found = &stem->second;  // the table leaves out the ending
+    }
+    if (found == nullptr) {
+      throw Error(fmt::format("{}the file '{}' is not in {}", row.place, Shortened(row.file),
+                              folder_.empty() ? "." : folder_));
+    }
+    if (found->size() > 1) {
+      throw Error(fmt::format("{}'{}' may be {} or {}; write the name of its folder, too",
+                              row.place, Shortened(row.file), files_[(*found)[0]],
+                              files_[(*found)[1]]));
+    }
+    *is_by_name = name != row.file;
+    return Normal(files_[found->front()]);
+  }
+
+  const std::vector<std::string>& files_;
+  const std::string& folder_;
+  fs::path here_;
+  std::map<std::string, std::size_t> by_path_, canonical_;
+  std::map<std::string, std::vector<std::size_t>> by_name_, by_stem_;
+};
+
+// Checks a frame early, because frames are read long after their names are known.
+void RequireFrame(const std::string& path, const std::string& place) {
+  ReportInput(path);
+  try {
+    RequireRegularFile(path);
+  } catch (const Error& error) {
+    throw Error(place + error.what());
+  }
+}
+
+}  // namespace
+
+std::vector<SweepFrame> PairFrames(const ReadingSet& readings,
+                                   const std::vector<std::string>& files, const std::string& folder,
+                                   std::vector<std::string>* notices) {
+  Images images(files, folder);
+  std::vector<SweepFrame> frames;
+  std::map<std::string, const FileReading*> row_of;
+  std::size_t by_name = 0;
+  const FileReading* first_by_name = nullptr;
+  for (const FileReading& row : readings.rows) {
+    if (frames.size() % 4096 == 0) ThrowIfCancelled();
+    bool is_by_name = false;
+    const std::string path = images.Find(row, readings.folder, &is_by_name);
+    RequireFrame(path, row.place);
+    const auto [known, added] = row_of.emplace(path, &row);
+    if (!added) {
+      throw Error(fmt::format("{}the file '{}' already has a reading, at {}", row.place,
+                              Shortened(row.file),
+                              known->second->place.substr(0, known->second->place.size() - 2)));
+    }
+    if (is_by_name && by_name++ == 0) first_by_name = &row;
+    frames.push_back({path, row.reading_mm});
+  }
+  std::vector<std::string> without_row;
+  for (const std::string& file : files) {
+    if (row_of.count(fs::path(file).lexically_normal().string()) == 0) without_row.push_back(file);
+  }
+  // An image that was left out by mistake costs more than one that has to be moved away.
+  if (!without_row.empty()) {
+    throw Error(
+        fmt::format("{}: has no row in {} ({} such file{}): add its reading, move it elsewhere, or "
+                    "choose the files by frames_glob",
+                    without_row.front(), readings.source, without_row.size(),
+                    without_row.size() == 1 ? "" : "s"));
+  }
+  if (by_name > 0 && notices != nullptr) {
+    notices->push_back(fmt::format(
+        "{}'{}' does not exist{}; the image of the same name in {} is used", first_by_name->place,
+        Shortened(first_by_name->file),
+        by_name > 1 ? fmt::format(", nor do the paths of {} more rows", by_name - 1) : "",
+        folder.empty() ? "." : folder));
+  }
+  return frames;
+}
+
+}  // namespace thicklens::model

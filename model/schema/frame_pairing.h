@@ -1,0 +1,21 @@
+#ifndef THICKLENS_MODEL_SCHEMA_FRAME_PAIRING_H_
+#define THICKLENS_MODEL_SCHEMA_FRAME_PAIRING_H_
+
+#include <string>
+#include <vector>
+
+#include "thicklens/model/readings.h"
+#include "thicklens/model/sweep_file.h"
+
+namespace thicklens::model {
+
+// Pairs the rows of `readings` with the images `files` of the folder. A row names its image by an
+// absolute path, by a path relative to the table's folder or to `folder`, or by its name alone if
+// only one image has it. Throws Error with the place for a row or an image without its partner.
+std::vector<SweepFrame> PairFrames(const ReadingSet& readings,
+                                   const std::vector<std::string>& files, const std::string& folder,
+                                   std::vector<std::string>* notices);
+
+}  // namespace thicklens::model
+
+#endif  // THICKLENS_MODEL_SCHEMA_FRAME_PAIRING_H_

@@ -1,0 +1,429 @@
+#include "model/tables/reading_columns.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <optional>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "model/tables/reading_number.h"
+#include "model/tables/reading_unit.h"
+#include "model/tables/table_text.h"
+#include "thicklens/base/error.h"
+
+namespace thicklens::model {
+namespace {
+
+using Words = std::set<std::string>;
+
+// Names of the readings in English, German, French, Spanish, Portuguese, Italian, Dutch, Swedish,
+// Danish, Polish, Czech, Russian, Chinese, Japanese and Korean.
+const Words& ReadingWords() {
+  static const Words words = {
+      "position", "positions",     "pos",        "z",       "zpos",      "zposition", "focus",
+      "focuspos", "focusposition", "foc",        "reading", "readings",  "distance",  "dist",
+      "depth",    "dial",          "scale",      "travel",  "stage",     "rail",      "slider",
+      "encoder",  "lensposition",  "defocus",    "fokus",   "messwert",  "ablesung",  "abstand",
+      "stellung", "weg",           "entfernung", "lecture", "distancia", "mise",      "foyer",
+      "posición", "posicion",      "lectura",    "enfoque", "foco",      "posição",   "posicao",
+      "leitura",  "distância",     "posizione",  "lettura", "fuoco",     "distanza",  "positie",
+      "stand",    "afstand",       "läge",       "avstånd", "stilling",  "pozycja",   "położenie",
+      "odczyt",   "poloha",        "pozice",     "čtení",   "позиция",   "положение", "фокус",
+      "отсчёт",   "отсчет",        "位置",       "焦点",    "焦距位置",  "读数",      "距离",
+      "距離",     "ピント",        "위치",       "초점"};
+  return words;
+}
+
+const Words& FileWords() {
+  static const Words words = {
+      "file",     "files",      "filename",   "filepath", "fname",     "image",        "images",
+      "img",      "imagename",  "imagefile",  "frame",    "framename", "name",         "path",
+      "photo",    "photograph", "pic",        "datei",    "dateiname", "bild",         "bildname",
+      "aufnahme", "fichier",    "nom",        "cliché",   "archivo",   "imagen",       "nombre",
+      "arquivo",  "imagem",     "nome",       "immagine", "bestand",   "bestandsnaam", "afbeelding",
+      "fil",      "filnamn",    "filnavn",    "plik",     "obraz",     "zdjęcie",      "soubor",
+      "snímek",   "файл",       "имя",        "кадр",     "文件",      "文件名",       "图像",
+      "图片",     "ファイル",   "ファイル名", "画像",     "파일",      "파일명"};
+  return words;
+}
+
+// Words of columns that are no reading although another word of their names says so, such as
+// "focus_score" and "position_index".
+const Words& OtherWords() {
+  static const Words words = {
+      "score",   "measure",    "metric",   "sharpness",    "fom",      "time",  "timestamp",
+      "date",    "mjd",        "mjdate",   "jd",           "index",    "idx",   "no",
+      "nr",      "number",     "num",      "id",           "exposure", "gain",  "temperature",
+      "temp",    "sigma",      "std",      "stddev",       "error",    "err",   "uncertainty",
+      "rms",     "fwhm",       "contrast", "mean",         "variance", "x",     "y",
+      "r",       "theta",      "angle",    "tilt",         "roll",     "lux",   "iso",
+      "zeit",    "datum",      "fehler",   "unsicherheit", "heure",    "temps", "fecha",
+      "hora",    "tempo",      "width",    "height",       "size",     "mode",  "state",
+      "quality", "confidence", "weight",   "elapsed",      "epoch"};
+  return words;
+}
+
+// Lower case of Latin and Cyrillic letters in UTF-8; other bytes as they are.
+std::string LowerCase(const std::string& text) {
+  std::string lower;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const auto byte = static_cast<unsigned char>(text[i]);
+    const auto next = i + 1 < text.size() ? static_cast<unsigned char>(text[i + 1]) : 0U;
+    if (byte < 0x80) {
+      lower += static_cast<char>(std::tolower(byte));
+    } else if (byte == 0xC3 && next >= 0x80 && next <= 0x9E && next != 0x97) {  // U+00C0 to U+00DE
+      lower += text[i];
+      lower += static_cast<char>(next + 0x20);
+      ++i;
+    } else if (byte == 0xD0 && next >= 0x90 && next <= 0x9F) {  // U+0410 to U+041F
+      lower += text[i];
+      lower += static_cast<char>(next + 0x20);
+      ++i;
+    } else if (byte == 0xD0 && next >= 0xA0 && next <= 0xAF) {  // U+0420 to U+042F
+      lower += '\xD1';
+      lower += static_cast<char>(next - 0x20);
+      ++i;
+    } else {
+      lower += text[i];
+    }
+  }
+  return lower;
+}
+
+bool IsUpper(char c) { return std::isupper(static_cast<unsigned char>(c)) != 0; }
+bool IsLower(char c) { return std::islower(static_cast<unsigned char>(c)) != 0; }
+
+// The words of a name: "ZPositionUm" and "Z_position um" are z, position, um.
+std::vector<std::string> WordsOf(const std::string& name) {
+  std::vector<std::string> words(1);
+  for (std::size_t i = 0; i < name.size(); ++i) {
+    const char c = name[i];
+    const bool is_letter = static_cast<unsigned char>(c) >= 0x80 ||
+                           std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '"' || c == '%';
+    const bool begins_word =
+        i > 0 && IsUpper(c) &&
+        (IsLower(name[i - 1]) ||
+         (IsUpper(name[i - 1]) && i + 1 < name.size() && IsLower(name[i + 1])));
+    if ((!is_letter || begins_word) && !words.back().empty()) words.emplace_back();
+    if (is_letter) words.back() += c;
+  }
+  if (words.back().empty()) words.pop_back();
+  for (std::string& word : words) word = LowerCase(word);
+  return words;
+}
+
+bool HasWord(const std::vector<std::string>& words, const Words& known) {
+  return std::any_of(words.begin(), words.end(),
+                     [&](const std::string& word) { return known.count(word) > 0; });
+}
+
+// What the name of a column says.
+struct ColumnName {
+  std::vector<std::string> words;    // without the unit
+  std::string unit;                  // its text; empty: none
+  std::optional<ReadingUnit> known;  // the unit, if it is known
+};
+
+// "Position [µm]", "z (mm)", "z / mm", "z_um".
+ColumnName NameOf(const std::string& cell) {
+  constexpr std::size_t kLongest = 200;
+  std::string text = cell.substr(0, kLongest);
+  ColumnName name;
+  const std::size_t close = text.find_last_of("])}");
+  const std::size_t open = close == std::string::npos ? close : text.find_last_of("[({", close);
+  if (open != std::string::npos) {
+    const std::string inside = text.substr(open + 1, close - open - 1);
+    const bool is_word =
+        inside.size() >= 3 && std::all_of(inside.begin(), inside.end(), [](char c) {
+          return std::isalpha(static_cast<unsigned char>(c)) != 0 || c == ' ';
+        });
+    name.known = FindUnit(inside);
+    if (name.known || !is_word) name.unit = inside;  // "(abs)" and "(stage)" are no unit
+    text.replace(open, close - open + 1, name.unit.empty() ? " " + inside + " " : " ");
+  }
+  name.words = WordsOf(text);
+  if (name.unit.empty() && !name.words.empty()) {
+    // A name of one word is a unit only if it is no name: "m" and "in" alone say nothing.
+    const std::string& last = name.words.back();
+    const auto unit = FindUnit(last);
+    const bool may_be_unit =
+        unit && (name.words.size() > 1 ||
+                 (unit->kind == ReadingUnit::Kind::kLength && last != "m" && last != "in") ||
+                 unit->kind == ReadingUnit::Kind::kOther);
+    if (may_be_unit) {
+      name.unit = last;
+      name.known = unit;
+      name.words.pop_back();
+    }
+  }
+  if (name.unit.empty() && name.words.size() > 1 && name.words.front() == "t") {
+    name.words.front() = "time";
+  }
+  return name;
+}
+
+std::string Quoted(const std::string& text) { return "'" + Shown(text) + "'"; }
+
+std::string Trimmed(const std::string& text) {
+  const std::size_t begin = text.find_first_not_of(" \t\n");
+  if (begin == std::string::npos) return "";
+  return text.substr(begin, text.find_last_not_of(" \t\n") - begin + 1);
+}
+
+class Finder {
+ public:
+  Finder(const TableCells& table, const std::string& path, const ReadingOptions& options)
+      : table_(table), path_(path), options_(options) {}
+
+  ReadingColumns Find() {
+    FindHeader();
+    CountCells();
+    found_.file = FindFile();
+    found_.reading = FindReading();
+    if (!found_.header.cells.empty()) found_.unit = NameOf(CellOf(found_.reading)).unit;
+    return found_;
+  }
+
+ private:
+  bool HasHeader() const { return !found_.header.cells.empty(); }
+  const std::string& CellOf(std::size_t column) const {
+    static const std::string none;
+    return column < found_.header.cells.size() ? found_.header.cells[column] : none;
+  }
+  std::string Place() const {
+    const std::size_t line = HasHeader() ? found_.header.line : table_.rows.front().line;
+    return fmt::format("{}:{}: ", path_, line);
+  }
+
+  // The first row is a header if it has neither a number nor the name of a file.
+  void FindHeader() {
+    const TableRow& first = table_.rows.front();
+    const bool is_asked_for =
+        NamesCell(first, options_.column) || NamesCell(first, options_.file_column);
+    const bool has_data = std::any_of(first.cells.begin(), first.cells.end(), [](const auto& cell) {
+      return LooksLikeNumber(cell) || LooksLikeFile(cell);
+    });
+    const auto& comment = table_.comment.cells;
+    if (is_asked_for || !has_data) {
+      found_.header = first;
+      found_.first_row = 1;
+    } else if (comment.size() == first.cells.size() &&
+               std::none_of(comment.begin(), comment.end(), LooksLikeNumber)) {
+      found_.header = table_.comment;
+    }
+    found_.width = HasHeader() ? found_.header.cells.size() : first.cells.size();
+  }
+
+  static bool NamesCell(const TableRow& row, const std::string& name) {
+    return !name.empty() && std::find(row.cells.begin(), row.cells.end(), name) != row.cells.end();
+  }
+
+  void CountCells() {
+    numbers_.assign(found_.width, 0);
+    files_ = texts_ = numbers_;
+    for (std::size_t i = found_.first_row; i < table_.rows.size(); ++i) {
+      const auto& cells = table_.rows[i].cells;
+      for (std::size_t k = 0; k < std::min(cells.size(), found_.width); ++k) {
+        if (LooksLikeNumber(cells[k])) {
+          ++numbers_[k];
+        } else if (!cells[k].empty()) {
+          ++texts_[k];
+          files_[k] += LooksLikeFile(cells[k]);
+        }
+      }
+    }
+  }
+
+  // A few wrong cells do not change what a column is.
+  bool IsMost(std::size_t count) const {
+    return count > 0 && 2 * count >= table_.rows.size() - found_.first_row;
+  }
+
+  std::vector<std::size_t> Select(const std::vector<std::size_t>& among,
+                                  const std::function<bool(std::size_t)>& is_meant) const {
+    std::vector<std::size_t> selected;
+    std::copy_if(among.begin(), among.end(), std::back_inserter(selected), is_meant);
+    return selected;
+  }
+  std::vector<std::size_t> All() const {
+    std::vector<std::size_t> all(found_.width);
+    for (std::size_t i = 0; i < all.size(); ++i) all[i] = i;
+    return all;
+  }
+
+  std::string List(const std::vector<std::size_t>& columns) const {
+    constexpr std::size_t kMost = 6;
+    std::string text;
+    for (std::size_t i = 0; i < std::min(columns.size(), kMost); ++i) {
+      text += (i == 0 ? "" : ", ") + ColumnText(found_, columns[i]);
+    }
+    if (columns.size() > kMost) text += fmt::format(" and {} more", columns.size() - kMost);
+    return text;
+  }
+
+  // The column that an option names.
+  std::size_t Named(const std::string& name, const char* option) const {
+    const auto matches = [&](const std::function<bool(const std::string&)>& is_same) {
+      return Select(All(), [&](std::size_t column) { return is_same(CellOf(column)); });
+    };
+    std::vector<std::size_t> found;
+    if (HasHeader()) {
+      found = matches([&](const std::string& cell) { return cell == name; });
+      if (found.empty()) {
+        found = matches([&](const std::string& cell) {
+          return LowerCase(Trimmed(cell)) == LowerCase(Trimmed(name));
+        });
+      }
+      if (found.empty()) {
+        const auto words = WordsOf(name);
+        found = matches(
+            [&](const std::string& cell) { return !words.empty() && NameOf(cell).words == words; });
+      }
+    }
+    if (found.empty()) {
+      std::size_t number = 0;
+      const auto [rest, status] = std::from_chars(name.data(), name.data() + name.size(), number);
+      const bool is_number = status == std::errc() && rest == name.data() + name.size();
+      if (is_number && number >= 1 && number <= found_.width) return number - 1;
+      throw Error(fmt::format("{}{}: the table has no column {}; it has {}", Place(), option,
+                              Quoted(name), List(All())));
+    }
+    if (found.size() > 1) {
+      throw Error(fmt::format("{}{}: {} may be {}; give its number", Place(), option, Quoted(name),
+                              List(found)));
+    }
+    return found.front();
+  }
+
+  std::size_t FindFile() const {
+    if (!options_.file_column.empty()) return Named(options_.file_column, "--file-column");
+    const auto has_file_name = [&](std::size_t column) {
+      return HasWord(NameOf(CellOf(column)).words, FileWords());
+    };
+    const auto files = Select(All(), [&](std::size_t column) { return IsMost(files_[column]); });
+    if (files.size() == 1) return files.front();
+    if (files.size() > 1) {
+      const auto named = Select(files, has_file_name);
+      if (named.size() == 1) return named.front();
+      throw Error(fmt::format("{}several columns name files: {}; --file-column selects one",
+                              Place(), List(named.empty() ? files : named)));
+    }
+    const auto texts = Select(All(), [&](std::size_t column) { return IsMost(texts_[column]); });
+    auto named = Select(texts, has_file_name);
+    if (named.size() == 1) return named.front();
+    if (texts.size() == 1 && named.empty()) return texts.front();
+    // Names without an ending may be numbers.
+    named = Select(All(), has_file_name);
+    if (named.size() == 1) return named.front();
+    if (found_.width <= 2) return 0;
+    throw Error(
+        fmt::format("{}no column names the files of the images; --file-column selects one of "
+                    "{}",
+                    Place(), List(All())));
+  }
+
+  // How likely the column is the reading: 0 the least likely.
+  int RankOf(std::size_t column) const {
+    const ColumnName name = NameOf(CellOf(column));
+    if (name.known && name.known->kind == ReadingUnit::Kind::kOther) return 0;
+    if (HasWord(name.words, OtherWords())) {
+      // "x, y, z" in one name, as in "stage_z_x", is not meant by any known program.
+      return 0;
+    }
+    if (HasWord(name.words, ReadingWords())) return 3;
+    return name.known ? 2 : 1;
+  }
+
+  std::size_t FindReading() const {
+    if (!options_.column.empty()) return RequireOther(Named(options_.column, "--column"));
+    const auto others = Select(All(), [&](std::size_t column) { return column != found_.file; });
+    const auto numbers =
+        Select(others, [&](std::size_t column) { return IsMost(numbers_[column]); });
+    std::vector<std::size_t> candidates;
+    int best = 0;
+    for (const std::size_t column : numbers) {
+      const int rank = HasHeader() ? RankOf(column) : 1;
+      if (rank > best) candidates.clear();
+      if (rank > 0 && rank >= best) candidates.push_back(column);
+      best = std::max(best, rank);
+    }
+    if (candidates.size() == 1) return candidates.front();
+    if (candidates.size() > 1) RefuseSeveral(candidates);
+    if (!numbers.empty()) {
+      throw Error(fmt::format(
+          "{}no column is named as a position or has a unit of length; the numbers are in {}; "
+          "--column selects one, and --unit states its unit",
+          Place(), List(numbers)));
+    }
+    // No column of numbers: the message about the first wrong cell says more.
+    const auto named = Select(others, [&](std::size_t column) { return RankOf(column) == 3; });
+    if (named.size() == 1) return named.front();
+    if (found_.width <= 2) return others.empty() ? 1 : others.front();
+    throw Error(fmt::format("{}no column has numbers in most rows; the table has {}", Place(),
+                            List(All())));
+  }
+
+  std::size_t RequireOther(std::size_t column) const {
+    if (column == found_.file && found_.width > 1) {
+      throw Error(fmt::format("{}--column: {} has the files; name the column of the readings",
+                              Place(), ColumnText(found_, column)));
+    }
+    return column;
+  }
+
+  [[noreturn]] void RefuseSeveral(const std::vector<std::size_t>& candidates) const {
+    std::string comma;
+    const bool may_be_comma = table_.separator == ',' && candidates.size() == 2 &&
+                              candidates[1] == candidates[0] + 1 && AreDigits(candidates[1]);
+    if (may_be_comma && !HasHeader()) {
+      comma = fmt::format(
+          " (or one number with a decimal comma, which a table with commas must have in quotation "
+          "marks)");
+    }
+    throw Error(fmt::format("{}which column is the reading, {}{}? --column selects it by its {}",
+                            Place(), List(candidates), comma,
+                            HasHeader() ? "name or number" : "number"));
+  }
+
+  bool AreDigits(std::size_t column) const {
+    return std::all_of(table_.rows.begin() + static_cast<std::ptrdiff_t>(found_.first_row),
+                       table_.rows.end(), [&](const TableRow& row) {
+                         if (column >= row.cells.size()) return true;
+                         const std::string& cell = row.cells[column];
+                         return std::all_of(cell.begin(), cell.end(), [](char c) {
+                           return std::isdigit(static_cast<unsigned char>(c)) != 0;
+                         });
+                       });
+  }
+
+  const TableCells& table_;
+  const std::string& path_;
+  const ReadingOptions& options_;
+  ReadingColumns found_;
+  std::vector<std::size_t> numbers_, files_, texts_;  // how many cells of each column are such
+};
+
+}  // namespace
+
+bool IsReadingName(const std::string& name) {
+  const ColumnName column = NameOf(name);
+  const bool is_other = column.known && column.known->kind == ReadingUnit::Kind::kOther;
+  return !is_other && !HasWord(column.words, OtherWords()) && HasWord(column.words, ReadingWords());
+}
+
+std::string ColumnText(const ReadingColumns& columns, std::size_t column) {
+  const std::string number = fmt::format("column {}", column + 1);
+  if (column >= columns.header.cells.size() || columns.header.cells[column].empty()) return number;
+  return number + " " + Quoted(columns.header.cells[column]);
+}
+
+ReadingColumns FindColumns(const TableCells& table, const std::string& path,
+                           const ReadingOptions& options) {
+  return Finder(table, path, options).Find();
+}
+
+}  // namespace thicklens::model

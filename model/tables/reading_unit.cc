@@ -1,0 +1,165 @@
+#include "model/tables/reading_unit.h"
+
+#include <fmt/format.h>
+
+#include <cctype>
+#include <cmath>
+#include <cstddef>
+#include <map>
+
+#include "model/tables/table_text.h"
+#include "thicklens/base/error.h"
+#include "thicklens/model/readings.h"
+
+namespace thicklens::model {
+namespace {
+
+using Kind = ReadingUnit::Kind;
+
+struct Spellings {
+  ReadingUnit unit;
+  const char* words;  // separated by spaces
+};
+
+// The first word is the name. Case does not matter, and both micro signs are written as u.
+const Spellings kUnits[] = {
+    {{"mm", Kind::kLength, 1},
+     "mm millimeter millimeters millimetre millimetres millimètre millimètres milimetro milimetros "
+     "мм 毫米"},
+    {{"um", Kind::kLength, 1e-3},
+     "um micron microns micrometer micrometers micrometre micrometres mikrometer micromètre "
+     "micromètres мкм 微米"},
+    {{"nm", Kind::kLength, 1e-6}, "nm nanometer nanometers nanometre nanometres нм 纳米"},
+    {{"cm", Kind::kLength, 10}, "cm centimeter centimeters centimetre centimetres см 厘米"},
+    {{"m", Kind::kLength, 1000}, "m meter meters metre metres"},
+    {{"in", Kind::kLength, 25.4}, "in inch inches zoll pouce pouces pulgada pulgadas \""},
+    {{"dpt", Kind::kDioptre, 0},
+     "dpt diopter diopters dioptre dioptres dioptrie dioptrien dioptrías 1/m m^-1 m-1"},
+    {{"steps", Kind::kScaled, 0},
+     "steps step stp microsteps microstep usteps ustep schritte schritt pasos passi"},
+    {{"counts", Kind::kScaled, 0},
+     "counts count cts ticks tick pulses pulse impulse impulses enc adu lsb"},
+    {{"s", Kind::kOther, 0}, "s sec secs second seconds sekunde sekunden ms us ns min h hr hours"},
+    {{"deg", Kind::kOther, 0}, "deg degs degree degrees ° rad mrad urad arcsec arcmin grad"},
+    {{"C", Kind::kOther, 0}, "c degc °c k °f celsius kelvin"},
+    {{"V", Kind::kOther, 0}, "v mv uv volt volts a ma"},
+    {{"px", Kind::kOther, 0}, "px pix pixel pixels"},
+    {{"%", Kind::kOther, 0}, "% percent hz khz lux"},
+};
+
+std::string Normalised(const std::string& text) {
+  std::string normal;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const bool is_micro =
+        text.compare(i, 2, "\xC2\xB5") == 0 || text.compare(i, 2, "\xCE\xBC") == 0;
+    if (is_micro) {
+      normal += 'u';
+      ++i;
+    } else if (text[i] != ' ' && text[i] != '\t') {
+      normal += static_cast<char>(std::tolower(static_cast<unsigned char>(text[i])));
+    }
+  }
+  if (!normal.empty() && normal.back() == '.') normal.pop_back();  // "mm."
+  return normal;
+}
+
+std::map<std::string, ReadingUnit> UnitsByWord() {
+  std::map<std::string, ReadingUnit> units;
+  for (const Spellings& spellings : kUnits) {
+    std::string words = spellings.words;
+    words += ' ';
+    for (std::size_t begin = 0; begin < words.size();) {
+      const std::size_t end = words.find(' ', begin);
+      units.emplace(words.substr(begin, end - begin), spellings.unit);
+      begin = end + 1;
+    }
+  }
+  return units;
+}
+
+}  // namespace
+
+const char kUnitNames[] = "mm, um, nm, cm, m, in, dpt, steps or counts";
+
+std::optional<ReadingUnit> FindUnit(const std::string& text) {
+  static const std::map<std::string, ReadingUnit> units = UnitsByWord();
+  constexpr std::size_t kLongest = 32;
+  if (text.size() > kLongest) return std::nullopt;
+  const auto found = units.find(Normalised(text));
+  if (found == units.end()) return std::nullopt;
+  return found->second;
+}
+
+std::string ReadingUnitName(const std::string& stated, const ReadingOptions& options) {
+  const std::string& name = options.unit.empty() ? stated : options.unit;
+  if (name.empty()) return options.scale_mm ? "steps" : "mm";
+  const auto unit = FindUnit(name);
+  return unit ? unit->name : name;
+}
+
+double ReadingInMm(double value, const std::string& stated, const ReadingOptions& options,
+                   const std::string& place) {
+  const std::string name = ReadingUnitName(stated, options);
+  const auto unit = FindUnit(name);
+  if (!unit || unit->kind == Kind::kOther) {
+    if (unit && options.scale_mm) return value * *options.scale_mm;  // the output of a sensor
+    throw Error(fmt::format(
+        "{}the unit '{}' is no unit of length; state the unit by --unit ({}), or the length of one "
+        "of it by --reading-scale",
+        place, Shown(name), kUnitNames));
+  }
+  if (unit->kind == Kind::kScaled) {
+    if (!options.scale_mm) {
+      throw Error(
+          fmt::format("{}the readings are in {}; state their length in mm by "
+                      "--reading-scale, or another unit by --unit",
+                      place, unit->name));
+    }
+    return value * *options.scale_mm;
+  }
+  if (options.scale_mm) {
+    throw Error(fmt::format(
+        "{}the readings are in {}, which has a length; --reading-scale is for steps and counts "
+        "(--unit steps, if the readings are that)",
+        place, unit->name));
+  }
+  if (unit->kind == Kind::kLength) return value * unit->mm_per_unit;
+  constexpr double kMmPerMetre = 1000;
+  if (!(value > 0)) {
+    throw Error(fmt::format("{}{} dpt: a reading in dioptres must be above 0 (0 is infinity)",
+                            place, value));
+  }
+  return kMmPerMetre / value;
+}
+
+bool ReadingOptions::IsValid(std::string* why) const {
+  const auto fail = [why](const std::string& text) {
+    if (why != nullptr) *why = text;
+    return false;
+  };
+  if (!unit.empty()) {
+    const auto found = FindUnit(unit);
+    if (!found || (found->kind == Kind::kOther && !scale_mm))
+      return fail(fmt::format("unit: {} is expected, found '{}'", kUnitNames, Shown(unit)));
+  }
+  if (scale_mm && !(std::isfinite(*scale_mm) && *scale_mm != 0))
+    return fail(
+        fmt::format("scale_mm: a finite number other than 0 is expected, found {}", *scale_mm));
+  if (!decimal.empty() && decimal != "comma" && decimal != "point")
+    return fail(fmt::format("decimal: comma or point is expected, found '{}'", Shown(decimal)));
+  if (!source.empty() && source != "exif" && source != "sidecar" && source != "ome")
+    return fail(fmt::format("source: exif, sidecar or ome is expected, found '{}'", Shown(source)));
+  if (!source.empty() && !name_pattern.empty())
+    return fail("name_pattern: excludes source, which takes the readings from inside the files");
+  if (!name_pattern.empty()) {
+    const std::size_t at = name_pattern.find("{reading}");
+    if (at == std::string::npos || name_pattern.find("{reading}", at + 1) != std::string::npos) {
+      return fail(
+          fmt::format("name_pattern: a text that contains {{reading}} once is expected, found '{}'",
+                      Shown(name_pattern)));
+    }
+  }
+  return true;
+}
+
+}  // namespace thicklens::model

@@ -1,0 +1,30 @@
+#ifndef THICKLENS_MODEL_TABLES_READING_UNIT_H_
+#define THICKLENS_MODEL_TABLES_READING_UNIT_H_
+
+#include <optional>
+#include <string>
+
+namespace thicklens::model {
+
+// A unit that a table of readings may state.
+struct ReadingUnit {
+  enum class Kind {
+    kLength,   // mm_per_unit is set
+    kDioptre,  // 1/m
+    kScaled,   // steps or counts of a drive, whose length the user states
+    kOther     // seconds, degrees, volts ...: no reading of a bench
+  };
+  std::string name;  // as ReadingOptions::unit has it
+  Kind kind = Kind::kOther;
+  double mm_per_unit = 0;
+};
+
+// The unit with this name or a usual spelling of it ("µm", "Microns", "inch"), or nothing.
+std::optional<ReadingUnit> FindUnit(const std::string& text);
+
+// The units that ReadingOptions::unit may name, for messages.
+extern const char kUnitNames[];
+
+}  // namespace thicklens::model
+
+#endif  // THICKLENS_MODEL_TABLES_READING_UNIT_H_
