@@ -149,7 +149,7 @@ std::vector<SweepFrame> PairFrames(const ReadingSet& readings,
   if (!without_row.empty()) {
     throw Error(
         fmt::format("{}: has no row in {} ({} such file{}): add its reading, move it elsewhere, or "
-                    "choose the files by frames_glob",
+                    "choose the files by frames_glob in a sweep file",
                     without_row.front(), readings.source, without_row.size(),
                     without_row.size() == 1 ? "" : "s"));
   }

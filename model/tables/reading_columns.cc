@@ -409,11 +409,15 @@ class Finder {
 
 }  // namespace
 
-bool IsReadingName(const std::string& name) {
+std::optional<std::string> UnitOfReadingName(const std::string& name) {
   const ColumnName column = NameOf(name);
   const bool is_other = column.known && column.known->kind == ReadingUnit::Kind::kOther;
-  return !is_other && !HasWord(column.words, OtherWords()) && HasWord(column.words, ReadingWords());
+  if (is_other || HasWord(column.words, OtherWords()) || !HasWord(column.words, ReadingWords()))
+    return std::nullopt;
+  return column.unit;
 }
+
+bool IsNameOfFiles(const std::string& name) { return HasWord(NameOf(name).words, FileWords()); }
 
 std::string ColumnText(const ReadingColumns& columns, std::size_t column) {
   const std::string number = fmt::format("column {}", column + 1);

@@ -18,9 +18,6 @@ struct ReadingColumns {
   std::string unit;           // that the header states; empty: none
 };
 
-// Whether a name of a value means the position of a bench or of a focus drive, in a usual language.
-bool IsReadingName(const std::string& name);
-
 // Finds the columns of the file and of the reading by the options, by the names in the header, and
 // by the content of the cells. Throws Error, which lists the candidates and the options that
 // decide, if several columns may be meant or none.

@@ -153,8 +153,9 @@ CommandResult RunCalibration(const CalibrateOptions& options, const Sweep& sweep
   }
   // A refusal before any measurement is one line on stderr.
   if (calibration.refusal.empty() || calibration.diagnostics.paper_recipe.done)
-    PrintResult(options.common, CalibrationText(focus_sweep, calibration, TruthOf(sweep),
-                                                options.by_paper() ? "" : options.camera_output));
+    PrintResult(options.common, ReadingsLine(sweep) +
+                                    CalibrationText(focus_sweep, calibration, TruthOf(sweep),
+                                                    options.by_paper() ? "" : options.camera_output));
   if (options.by_paper() && outputs.camera && calibration.refusal.empty()) {
     PrintResult(options.common,
                 fmt::format("{} has the results of the paper's method, not of the fit\n",
@@ -165,6 +166,7 @@ CommandResult RunCalibration(const CalibrateOptions& options, const Sweep& sweep
   CommandResult result;
   result.is_written = outputs.camera || outputs.report;
   result.summary = CalibrationJson(focus_sweep, calibration, TruthOf(sweep), options.by_paper());
+  result.summary["readings"] = PrintableUtf8(sweep.description.readings);
   if (!calibration.refusal.empty()) {
     result.refusal = PrintableUtf8(fmt::format("{}: {}", options.sweep.input, calibration.refusal));
   }
@@ -201,8 +203,7 @@ void AddSweepOptions(CLI::App* command, SweepArguments* sweep) {
                    "Sweep description, or a folder of frames with --readings and --camera")
       ->required()
       ->type_name("SWEEP.yaml|DIR");
-  command->add_option("--readings", sweep->readings_csv, "Table for a folder: file, reading in mm")
-      ->type_name("CSV");
+  AddReadingOptions(command, sweep);
   command->add_option("--camera", sweep->camera_path, "Camera file, instead of the sweep's own")
       ->type_name("CAMERA.yaml");
   command->add_option("--truth", sweep->truth_path, "True values to compare with (of a simulation)")

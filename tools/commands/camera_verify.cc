@@ -16,6 +16,7 @@
 #include "tools/options/option_values.h"
 #include "tools/options/sweep_input.h"
 #include "tools/options/sweep_options.h"
+#include "tools/report/input_summary.h"
 
 namespace thicklens::tools {
 namespace {
@@ -63,20 +64,22 @@ std::string ParameterLine(const calib::ComparedParameter& parameter) {
 }
 
 // Its progress line ends with it.
-CameraVerification Verify(const CameraVerifyOptions& options) {
+CameraVerification Verify(const CameraVerifyOptions& options, std::string* readings_line) {
   const CommandRun run(options.common, SweepOptionNames());
   const model::Camera stored = ReadCamera(options.camera_path);
   const Sweep sweep = ReadSweepInput(options.sweep, run.control());
+  *readings_line = ReadingsLine(sweep);
   return VerifyCamera(stored, sweep, options.verification, run.control());
 }
 
 CommandResult RunVerification(const CameraVerifyOptions& options) {
-  const CameraVerification verification = Verify(options);
+  std::string readings_line;
+  const CameraVerification verification = Verify(options, &readings_line);
   const CalibrationSummary& found = verification.calibration.summary;
   const calib::BlurFit& blur = verification.calibration.diagnostics.blur;
   for (const std::string& warning : found.warnings) spdlog::debug("{}", PrintableUtf8(warning));
 
-  PrintResult(options.common, VerificationText(verification));
+  PrintResult(options.common, readings_line + VerificationText(verification));
   CommandResult result;
   result.summary = VerificationJson(verification);
   result.summary.update(
@@ -174,10 +177,7 @@ void AddCameraVerifyCommand(CLI::App* camera, CommandAction* action) {
                    "Description of the new sweep, or a folder of frames with --readings")
       ->required()
       ->type_name("SWEEP.yaml|DIR");
-  command
-      ->add_option("--readings", options->sweep.readings_csv,
-                   "Table for a folder: file, reading in mm")
-      ->type_name("CSV");
+  AddReadingOptions(command, &options->sweep);
   AddSweepStatements(command, &options->sweep);
   command->add_flag("--same-bench", options->verification.same_bench,
                     "The camera is mounted on the bench as before: compare the bench offset too");

@@ -12,6 +12,7 @@
 #include "thicklens/base/error.h"
 #include "thicklens/base/input_file.h"
 #include "thicklens/calib/focus_sweep.h"
+#include "thicklens/io/readings.h"
 #include "thicklens/model/camera_file.h"
 #include "tools/interface/missing_tolerances.h"
 #include "tools/interface/run_scope.h"
@@ -92,6 +93,10 @@ std::optional<model::SweepTruth> ReadTruth(const std::string& truth_path,
   }
 }
 
+model::SweepReading ReadingOf(const SweepOverrides& overrides) {
+  return {overrides.readings, io::ReadReadings};
+}
+
 Sweep Finish(model::SweepFile file, const std::string& sweep_yaml, const SweepOverrides& overrides,
              const RunScope& run, Sweep sweep) {
   ApplyOverrides(overrides, run, &file);
@@ -153,7 +158,7 @@ Sweep ReadSweep(const std::string& path, const SweepOverrides& overrides,
     yaml = inside.string();
   }
   Sweep sweep;
-  model::SweepFile file = model::ReadSweep(yaml, &sweep.notices);
+  model::SweepFile file = model::ReadSweep(yaml, ReadingOf(overrides), &sweep.notices);
   if (!overrides.camera_path.empty()) file.camera_path = overrides.camera_path;
   return Finish(std::move(file), yaml, overrides, run, std::move(sweep));
 }
@@ -170,9 +175,19 @@ Sweep ReadSweepFolder(const std::string& folder, const std::string& readings_csv
                     "needs a camera file (thicklens camera init makes one)",
                     folder));
   }
+  if (readings_csv.empty() != overrides.readings.IsWithoutTable()) {
+    throw OptionError(
+        "readings",
+        readings_csv.empty()
+            ? fmt::format("readings: {} has no table of readings, and neither name_pattern nor "
+                          "source says where the readings are",
+                          folder)
+            : fmt::format("readings: either the table {} or the files themselves have the readings",
+                          readings_csv));
+  }
   Sweep sweep;
-  model::SweepFile file =
-      model::SweepFromFolder(folder, readings_csv, overrides.camera_path, &sweep.notices);
+  model::SweepFile file = model::SweepFromFolder(folder, readings_csv, overrides.camera_path,
+                                                 ReadingOf(overrides), &sweep.notices);
   return Finish(std::move(file), "", overrides, run, std::move(sweep));
 }
 

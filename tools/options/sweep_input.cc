@@ -54,20 +54,36 @@ void TakeRoi(const std::string& text, SweepOverrides* overrides) {
   overrides->roi = model::RegionOfInterest{px[0], px[1], px[2], px[3]};
 }
 
+bool HasSweepFile(const SweepArguments& arguments) {
+  std::error_code failure;
+  return fs::exists(fs::path(arguments.input) / kSweepName, failure);
+}
+
 // Throws UsageError unless the input is a sweep's file, a folder with one, or a folder with a table
 // of readings.
 void CheckInput(const SweepArguments& arguments) {
   std::error_code failure;
   const bool is_folder = fs::is_directory(arguments.input, failure);
   if (!arguments.readings_csv.empty()) {
+    if (arguments.readings.IsWithoutTable()) {
+      throw UsageError(
+          "--readings (a table) and --reading-from or --reading-from-name (the files themselves) "
+          "exclude each other");
+    }
     if (is_folder) return;
     throw UsageError(
         fmt::format("--readings requires a folder of frames; {} is not a folder", arguments.input));
   }
-  if (!is_folder || fs::exists(fs::path(arguments.input) / kSweepName, failure)) return;
+  if (!is_folder || HasSweepFile(arguments)) return;
+  if (arguments.readings.IsWithoutTable()) return;
+  const auto pattern = model::ProposedNamePattern(model::ImagesOfFolder(arguments.input));
   throw UsageError(fmt::format(
-      "{}: a folder without {} needs --readings (a table of file and reading) and --camera",
-      arguments.input, kSweepName));
+      "{}: a folder without {} needs --readings (a table of file and reading) and --camera{}",
+      arguments.input, kSweepName,
+      pattern ? fmt::format("; if the one number that changes in the names is the reading: "
+                            "--reading-from-name '{}' (--unit states its unit)",
+                            *pattern)
+              : ""));
 }
 
 }  // namespace
@@ -85,6 +101,7 @@ SweepOverrides SweepOverridesOf(const SweepArguments& arguments) {
   TakeFloor(arguments, &overrides);
   TakeRoi(arguments.roi, &overrides);
   overrides.reading_sigma_mm = arguments.reading_sigma_mm;
+  overrides.readings = arguments.readings;
   for (const auto direction : {model::BenchDirection::kAway, model::BenchDirection::kToward}) {
     if (arguments.direction == model::BenchDirectionName(direction)) {
       overrides.direction = direction;
@@ -98,11 +115,24 @@ SweepOverrides SweepOverridesOf(const SweepArguments& arguments) {
 }
 
 OptionNames SweepOptionNames() {
-  return {{"camera_path", "--camera"},  {"truth_path", "--truth"},
-          {"offset_mm", "--offset-mm"}, {"offset_sigma_mm", "--offset-sigma-mm"},
-          {"direction", "--direction"}, {"reading_sigma_mm", "--reading-sigma-mm"},
-          {"floor_px", "--floor-px"},   {"floor_from_calibration", "--floor-from"},
-          {"target", "--target"},       {"roi", "--roi"}};
+  return {{"camera_path", "--camera"},
+          {"truth_path", "--truth"},
+          {"offset_mm", "--offset-mm"},
+          {"offset_sigma_mm", "--offset-sigma-mm"},
+          {"direction", "--direction"},
+          {"reading_sigma_mm", "--reading-sigma-mm"},
+          {"floor_px", "--floor-px"},
+          {"floor_from_calibration", "--floor-from"},
+          {"target", "--target"},
+          {"roi", "--roi"},
+          {"readings", "--readings"},
+          {"readings.column", "--column"},
+          {"readings.file_column", "--file-column"},
+          {"readings.unit", "--unit"},
+          {"readings.scale_mm", "--reading-scale"},
+          {"readings.decimal", "--decimal"},
+          {"readings.source", "--reading-from"},
+          {"readings.name_pattern", "--reading-from-name"}};
 }
 
 Sweep ReadSweepInput(const SweepArguments& arguments, const RunControl& run) {
@@ -112,9 +142,13 @@ Sweep ReadSweepInput(const SweepArguments& arguments, const RunControl& run) {
   RunControl named = run;
   if (!named.option_name) named.option_name = names;
   return WithOptionNames(names, [&] {
-    return arguments.readings_csv.empty()
-               ? ReadSweep(arguments.input, overrides, named)
-               : ReadSweepFolder(arguments.input, arguments.readings_csv, overrides, named);
+    std::error_code failure;
+    const bool is_plain_folder =
+        !arguments.readings_csv.empty() ||
+        (fs::is_directory(arguments.input, failure) && !HasSweepFile(arguments));
+    return is_plain_folder
+               ? ReadSweepFolder(arguments.input, arguments.readings_csv, overrides, named)
+               : ReadSweep(arguments.input, overrides, named);
   });
 }
 

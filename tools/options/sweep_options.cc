@@ -6,6 +6,46 @@
 
 namespace thicklens::tools {
 
+void AddReadingOptions(CLI::App* command, SweepArguments* sweep) {
+  model::ReadingOptions* readings = &sweep->readings;
+  command
+      ->add_option("--readings", sweep->readings_csv,
+                   "Table for a folder: text with columns of files and readings (found by their "
+                   "names), JSON of Micro-Manager or pymmcore-plus, or an OME companion file")
+      ->type_name("TABLE");
+  command
+      ->add_option(
+          "--column", readings->column,
+          "Column of the readings: its name, or its number from 1; the key of JSON or EXIF")
+      ->type_name("NAME");
+  command->add_option("--file-column", readings->file_column, "Column of the files, likewise")
+      ->type_name("NAME");
+  command
+      ->add_option(
+          "--unit", readings->unit,
+          "Unit of the readings: mm, um, nm, cm, m, in, dpt, steps or counts; replaces the "
+          "one in the table")
+      ->type_name("UNIT");
+  command->add_option("--reading-scale", readings->scale_mm, "Length of one step or count, in mm")
+      ->type_name("MM");
+  command
+      ->add_option("--decimal", readings->decimal,
+                   "Decimal mark of the readings: comma or point, if the table does not show it")
+      ->check(CLI::IsMember({"comma", "point"}))
+      ->type_name("MARK");
+  command
+      ->add_option("--reading-from", readings->source,
+                   "Readings from the images instead of a table: exif (EXIF and XMP), sidecar (a "
+                   "JSON file beside each) or ome (OME-XML)")
+      ->check(CLI::IsMember({"exif", "sidecar", "ome"}))
+      ->type_name("SOURCE");
+  command
+      ->add_option("--reading-from-name", readings->name_pattern,
+                   "Readings from the names of the images: their text around the number, such as "
+                   "'z{reading}um'")
+      ->type_name("PATTERN");
+}
+
 void AddSweepStatements(CLI::App* command, SweepArguments* sweep) {
   const std::string instead = "; overrides the sweep file";
   command->add_option("--offset-mm", sweep->offset_mm, "Depth of reading 0, or unknown" + instead)

@@ -11,6 +11,10 @@ namespace thicklens::tools {
 // --direction, --reading-sigma-mm, --floor-px, --floor-from, --target, --roi.
 void AddSweepStatements(CLI::App* command, SweepArguments* sweep);
 
+// Adds the options that say where the readings are: --readings, --column, --file-column, --unit,
+// --reading-scale, --decimal, --reading-from, --reading-from-name.
+void AddReadingOptions(CLI::App* command, SweepArguments* sweep);
+
 }  // namespace thicklens::tools
 
 #endif  // THICKLENS_TOOLS_OPTIONS_SWEEP_OPTIONS_H_

@@ -84,11 +84,16 @@ Understanding Understand(const Sweep& sweep) {
       readings.size()};
 }
 
+std::string ReadingsLine(const Sweep& sweep) {
+  const std::string& readings = sweep.description.readings;
+  return readings.empty() ? "" : fmt::format("read from  {}\n", PrintableUtf8(readings));
+}
+
 std::string UnderstandingText(const Sweep& sweep, const Understanding& found,
                               const std::string& method, const std::string& outputs) {
   const model::RegionOfInterest& roi = sweep.description.roi;
   return fmt::format(
-      "frames     {}, the first {} x {} px, {} bit, {} channel{}\n{}{}"
+      "frames     {}, the first {} x {} px, {} bit, {} channel{}\n{}{}{}"
       "region     {}\n"
       "target     {}, blur floor {}\n"
       "method     {}\n"
@@ -96,7 +101,7 @@ std::string UnderstandingText(const Sweep& sweep, const Understanding& found,
       "dry run: nothing was measured\n",
       sweep.description.frames.size(), found.frame_size_px.width, found.frame_size_px.height,
       found.frame_bits, found.frame_channels, found.frame_channels == 1 ? "" : "s",
-      BenchText(sweep, found), CameraText(sweep.camera),
+      ReadingsLine(sweep), BenchText(sweep, found), CameraText(sweep.camera),
       roi.width > 0 ? fmt::format("{} x {} px from ({}, {})", roi.width, roi.height, roi.x, roi.y)
                     : "the whole field",
       model::SweepTargetName(sweep.description.target), FloorText(sweep.description.floor), method,
@@ -111,6 +116,7 @@ nlohmann::json UnderstandingJson(const Sweep& sweep, const Understanding& found,
                          {"method", method},
                          {"camera", sweep.camera.name},
                          {"frames", sweep.description.frames.size()},
+                         {"readings", PrintableUtf8(sweep.description.readings)},
                          {"width_px", found.frame_size_px.width},
                          {"height_px", found.frame_size_px.height},
                          {"bits", found.frame_bits},

@@ -22,6 +22,10 @@ struct Understanding {
 // that would stop the calibration.
 Understanding Understand(const Sweep& sweep);
 
+// Returns the line that says which readings were read, and in which unit; empty for a sweep whose
+// file lists them.
+std::string ReadingsLine(const Sweep& sweep);
+
 // Returns the text of a dry run. `outputs` names the files that a run would write.
 std::string UnderstandingText(const Sweep& sweep, const Understanding& found,
                               const std::string& method, const std::string& outputs);

@@ -59,6 +59,8 @@ struct SweepOverrides {
   std::string floor_from_calibration;          // a camera file; excludes floor_px and floor_unknown
   std::optional<model::SweepTarget> target;    // kind of the target
   std::optional<model::RegionOfInterest> roi;  // px, inside the sensor
+  // Which readings are read, and in which unit (thicklens/model/readings.h).
+  model::ReadingOptions readings;
 
   // Returns whether all statements are in their range and do not contradict each other. Otherwise
   // `why`, if not null, gets the field, the value and the constraint.
@@ -70,8 +72,9 @@ struct SweepOverrides {
 // file:line:column.
 THICKLENS_EXPORT Sweep ReadSweep(const std::string& path, const SweepOverrides& overrides = {},
                                  const RunControl& run = {});
-// Reads a folder of frames with a table of readings in mm (columns file, reading).
-// `overrides.camera_path` is required.
+// Reads a folder of frames with a table of their readings (docs/file-formats.md). `readings_csv` is
+// empty if `overrides.readings` states that the readings are in the names or in the metadata of the
+// frames. `overrides.camera_path` is required.
 THICKLENS_EXPORT Sweep ReadSweepFolder(const std::string& folder, const std::string& readings_csv,
                                        const SweepOverrides& overrides, const RunControl& run = {});
 

@@ -76,6 +76,13 @@ THICKLENS_EXPORT ReadingSet ReadingsOfNames(const std::vector<std::string>& file
 THICKLENS_EXPORT std::optional<std::string> ProposedNamePattern(
     const std::vector<std::string>& files);
 
+// The unit in the name of a value that means the position of a bench or of a focus drive, in a
+// usual language: "um" for "z_um", empty for "Position". Nothing for a name that means something
+// else.
+THICKLENS_EXPORT std::optional<std::string> UnitOfReadingName(const std::string& name);
+// Whether the name of a value means a file: "file", "Bildname".
+THICKLENS_EXPORT bool IsNameOfFiles(const std::string& name);
+
 // Converts a number with the unit of `options` or, if it has none, with `stated` (a name of a unit;
 // empty: mm). Throws Error that begins with `place`.
 THICKLENS_EXPORT double ReadingInMm(double value, const std::string& stated,

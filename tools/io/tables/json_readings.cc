@@ -1,0 +1,316 @@
+// JSON with the readings of a sweep: one file for all images, or one beside each.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cstddef>
+#include <filesystem>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <system_error>
+#include <utility>
+
+#include "thicklens/base/error.h"
+#include "thicklens/base/input_file.h"
+#include "tools/io/tables/reading_sources.h"
+
+namespace thicklens::io {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+std::string Shown(const std::string& text) {
+  constexpr std::size_t kMost = 80;
+  return text.size() <= kMost ? text : text.substr(0, kMost) + "...";
+}
+
+// A number in the metadata of a frame.
+struct Field {
+  std::string name;  // with the names of the objects around it: "position.z"
+  double value = 0;
+};
+
+// Names that are known to mean a position, in the order in which they are taken, with their unit.
+struct KnownField {
+  const char* name;
+  const char* unit;
+  bool is_focus_distance;
+};
+constexpr KnownField kKnownFields[] = {
+    {"ZPositionUm", "um", false},      // Micro-Manager: where the drive was
+    {"SlicePosition", "um", false},    // Micro-Manager 1.4: where it was sent
+    {"position.z", "um", false},       // pymmcore-plus, "format": "frame-dict"
+    {"mda_event.z_pos", "um", false},  // useq-schema
+    {"LensPosition", "dpt", true},     // libcamera: rpicam-still --metadata, picamera2
+};
+
+// Collects the numbers of an object and of the objects in it. Micro-Manager writes some numbers as
+// text.
+void Collect(const json& object, const std::string& before, int depth, std::vector<Field>* fields) {
+  constexpr int kMaxDepth = 4;
+  constexpr std::size_t kMaxFields = 5000;
+  if (depth > kMaxDepth || !object.is_object()) return;
+  for (const auto& [key, value] : object.items()) {
+    if (fields->size() >= kMaxFields) return;
+    const std::string name = before + key;
+    if (value.is_number()) {
+      fields->push_back({name, value.get<double>()});
+    } else if (value.is_object()) {
+      Collect(value, name + ".", depth + 1, fields);
+    }
+  }
+}
+
+std::string LastPart(const std::string& name) {
+  const std::size_t dot = name.rfind('.');
+  return dot == std::string::npos ? name : name.substr(dot + 1);
+}
+
+// Which field is the reading: decided by the first frame, and the same for all.
+struct Choice {
+  std::string name;
+  std::string unit;
+  bool is_focus_distance = false;
+};
+
+std::string List(const std::vector<Field>& fields) {
+  constexpr std::size_t kMost = 6;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(fields.size(), kMost); ++i)
+    text += (i == 0 ? "'" : ", '") + Shown(fields[i].name) + "'";
+  if (fields.size() > kMost) text += fmt::format(" and {} more", fields.size() - kMost);
+  return text;
+}
+
+bool IsFrameOfPymmcore(const json& frame) {
+  const auto format = frame.find("format");
+  return format != frame.end() && format->is_string() &&
+         format->get_ref<const std::string&>() == "frame-dict";
+}
+
+Choice Choose(const json& frame, const std::string& place, const model::ReadingOptions& options) {
+  std::vector<Field> fields;
+  Collect(frame, "", 0, &fields);
+  const auto find = [&](const std::string& name) {
+    return std::find_if(fields.begin(), fields.end(),
+                        [&](const Field& field) { return field.name == name; });
+  };
+  if (!options.column.empty()) {
+    if (find(options.column) == fields.end()) {
+      throw Error(fmt::format("{}--column: there is no number '{}'; there are {}", place,
+                              Shown(options.column), fields.empty() ? "none" : List(fields)));
+    }
+    for (const KnownField& known : kKnownFields) {
+      if (options.column == known.name) return {known.name, known.unit, known.is_focus_distance};
+    }
+    return {options.column, model::UnitOfReadingName(LastPart(options.column)).value_or(""), false};
+  }
+  for (const KnownField& known : kKnownFields) {
+    const bool is_meant = std::string(known.name) != "position.z" || IsFrameOfPymmcore(frame);
+    if (is_meant && find(known.name) != fields.end())
+      return {known.name, known.unit, known.is_focus_distance};
+  }
+  std::vector<Field> readings;
+  for (const Field& field : fields) {
+    if (model::UnitOfReadingName(LastPart(field.name))) readings.push_back(field);
+  }
+  if (readings.size() == 1) {
+    return {readings.front().name, *model::UnitOfReadingName(LastPart(readings.front().name)),
+            false};
+  }
+  if (readings.size() > 1) {
+    throw Error(
+        fmt::format("{}which is the reading, {}? --column selects it", place, List(readings)));
+  }
+  throw Error(fmt::format(
+      "{}no number is named as a position (ZPositionUm, LensPosition, z, position, focus ...); "
+      "--column selects one of {}",
+      place, fields.empty() ? "none" : List(fields)));
+}
+
+double ReadingOf(const json& frame, const Choice& choice, const std::string& place,
+                 const model::ReadingOptions& options) {
+  std::vector<Field> fields;
+  Collect(frame, "", 0, &fields);
+  const auto found = std::find_if(fields.begin(), fields.end(),
+                                  [&](const Field& field) { return field.name == choice.name; });
+  if (found == fields.end())
+    throw Error(fmt::format("{}the number '{}' is missing", place, Shown(choice.name)));
+  constexpr double kMaxMagnitude = 1e30;
+  if (!(found->value >= -kMaxMagnitude && found->value <= kMaxMagnitude)) {
+    throw Error(fmt::format("{}'{}' must be a number of at most 1e30, found {}", place,
+                            Shown(choice.name), found->value));
+  }
+  return model::ReadingInMm(found->value, choice.unit, options, place);
+}
+
+// One image and what the JSON says about it.
+struct Frame {
+  std::string file;
+  std::string name;  // where it is in the JSON, for messages
+  const json* metadata = nullptr;
+};
+
+bool StartsWith(const std::string& text, const std::string& beginning) {
+  return text.compare(0, beginning.size(), beginning) == 0;
+}
+
+// Micro-Manager 1.4 has "FrameKey-TIME-CHANNEL-SLICE" with the name of the file inside, 2.0 has
+// "Metadata-PATH"; pymmcore-plus has the name itself.
+std::vector<Frame> FramesOfObject(const json& object, const std::string& path) {
+  std::vector<Frame> frames;
+  for (const auto& [key, value] : object.items()) {
+    if (!value.is_object()) continue;
+    const std::string name = "'" + Shown(key) + "'";
+    if (StartsWith(key, "Metadata-")) {
+      frames.push_back({key.substr(9), name, &value});
+    } else if (StartsWith(key, "FrameKey-")) {
+      const auto file = value.find("FileName");
+      if (file == value.end() || !file->is_string())
+        throw Error(fmt::format("{}: {}: the text 'FileName' is missing", path, name));
+      frames.push_back({file->get<std::string>(), name, &value});
+    }
+  }
+  if (!frames.empty()) return frames;
+  for (const auto& [key, value] : object.items()) {
+    const std::string ending = fs::path(key).extension().string();
+    if (value.is_object() && ending.size() > 1)
+      frames.push_back({key, "'" + Shown(key) + "'", &value});
+  }
+  return frames;
+}
+
+std::vector<Frame> FramesOfList(const json& list, const std::string& path,
+                                const model::ReadingOptions& options) {
+  std::vector<Frame> frames;
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    const std::string name = fmt::format("element {}", i + 1);
+    const json& frame = list[i];
+    if (!frame.is_object())
+      throw Error(
+          fmt::format("{}: {}: an object with a file and a reading is expected", path, name));
+    for (const auto& [key, value] : frame.items()) {
+      const bool is_file =
+          options.file_column.empty() ? model::IsNameOfFiles(key) : key == options.file_column;
+      if (!is_file || !value.is_string()) continue;
+      if (frames.size() > i) {
+        throw Error(fmt::format("{}: {}: several texts name a file; --file-column selects one",
+                                path, name));
+      }
+      frames.push_back({value.get<std::string>(), name, &frame});
+    }
+    if (frames.size() <= i) {
+      const bool is_plan = frame.contains("z_pos") || frame.contains("index");
+      throw Error(fmt::format("{}: {}: no text names the file of the image ({}); {}", path, name,
+                              options.file_column.empty() ? "'file'" : options.file_column,
+                              is_plan ? "a list of MDA events is a plan: the file "
+                                        "_frame_metadata.json has what was recorded"
+                                      : "--file-column selects it"));
+    }
+  }
+  return frames;
+}
+
+// An acquisition that was aborted leaves out the last brace of metadata.txt.
+json Parsed(const std::string& text, const std::string& path, model::ReadingSet* set) {
+  json parsed;
+  std::string why;
+  std::size_t byte = 0;
+  try {
+    return json::parse(text);
+  } catch (const json::parse_error& error) {
+    byte = std::min(error.byte, text.size());
+    const std::string what = error.what();
+    why = what.substr(what.find(": ") == std::string::npos ? 0 : what.find(": ") + 2);
+  }
+  parsed = json::parse(text + "}", nullptr, false);
+  if (!parsed.is_discarded()) {
+    set->notices.push_back(path + ": the last brace is missing (the recording was aborted?)");
+    return parsed;
+  }
+  const auto line =
+      1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(byte), '\n');
+  throw Error(fmt::format("{}:{}: not valid JSON: {}", path, line, Shown(why)));
+}
+
+}  // namespace
+
+model::ReadingSet ReadingsOfJson(const std::string& text, const std::string& path,
+                                 const model::ReadingOptions& options) {
+  model::ReadingSet set;
+  set.source = path;
+  set.folder = fs::path(path).parent_path().string();
+  const json parsed = Parsed(text, path, &set);
+  const std::vector<Frame> frames =
+      parsed.is_array() ? FramesOfList(parsed, path, options) : FramesOfObject(parsed, path);
+  if (frames.empty()) {
+    const bool is_plan = parsed.is_object() && parsed.contains("z_plan");
+    throw Error(fmt::format(
+        "{}: no frame with a file and a reading; {}", path,
+        is_plan ? "this is the plan of an acquisition (MDASequence): the file _frame_metadata.json "
+                  "has what was recorded"
+                : "keys FrameKey-... or Metadata-... (Micro-Manager), names of files, or a list of "
+                  "objects with 'file' are expected"));
+  }
+  std::optional<Choice> choice;
+  std::map<std::string, std::string> known;
+  for (const Frame& frame : frames) {
+    const std::string place = fmt::format("{}: {}: ", path, frame.name);
+    if (!choice) choice = Choose(*frame.metadata, place, options);
+    const auto [other, added] = known.emplace(frame.file, frame.name);
+    if (!added) {
+      throw Error(fmt::format(
+          "{}the file '{}' already has a reading, at {}; frames in one file are its pages, which "
+          "this table cannot name",
+          place, Shown(frame.file), other->second));
+    }
+    set.rows.push_back({frame.file, ReadingOf(*frame.metadata, *choice, place, options), place});
+  }
+  FinishMetadata(fmt::format("'{}' of {}", choice->name, fs::path(path).filename().string()),
+                 choice->unit, choice->is_focus_distance, options, &set);
+  return set;
+}
+
+namespace {
+
+// rpicam-still and picamera2 leave the name to the user; these are usual.
+std::string SidecarOf(const std::string& file) {
+  const fs::path path(file);
+  const std::string stem = (path.parent_path() / path.stem()).string();
+  const std::vector<std::string> names = {file + ".json",          stem + ".json",
+                                          stem + "_metadata.json", stem + ".metadata.json",
+                                          stem + "_meta.json",     stem + "-metadata.json"};
+  for (const std::string& name : names) {
+    std::error_code failure;
+    if (fs::exists(name, failure)) return name;
+  }
+  throw Error(fmt::format("{}: no JSON file is beside it; {} or {} is expected", file, names[1],
+                          fs::path(names[0]).filename().string()));
+}
+
+}  // namespace
+
+model::ReadingSet ReadingsOfSidecars(const std::vector<std::string>& files,
+                                     const model::ReadingOptions& options) {
+  model::ReadingSet set;
+  set.source = "the JSON files beside the images";
+  std::optional<Choice> choice;
+  for (const std::string& file : files) {
+    const std::string sidecar = SidecarOf(file);
+    json parsed = Parsed(ReadTextFile(sidecar), sidecar, &set);
+    if (parsed.is_array() && parsed.size() == 1) parsed = json(parsed[0]);  // of one frame
+    const std::string place = sidecar + ": ";
+    if (!parsed.is_object())
+      throw Error(place + "an object with the metadata of one frame is expected");
+    if (!choice) choice = Choose(parsed, place, options);
+    set.rows.push_back({file, ReadingOf(parsed, *choice, place, options), place});
+  }
+  if (set.rows.empty()) throw Error("no image, and therefore no JSON file beside one, is there");
+  FinishMetadata(fmt::format("'{}' of the JSON files beside the images", choice->name),
+                 choice->unit, choice->is_focus_distance, options, &set);
+  return set;
+}
+
+}  // namespace thicklens::io
