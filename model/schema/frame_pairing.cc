@@ -9,6 +9,7 @@
 #include <optional>
 #include <system_error>
 
+#include "model/tables/table_text.h"
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/input_file.h"
@@ -56,7 +57,17 @@ class Images {
       const auto same = SameFile(path);
       return Normal(same ? files_[*same] : path);
     }
-    return FindByName(row, is_by_name);
+    try {
+      return FindByName(row, is_by_name);
+    } catch (const Error&) {
+      // The names on the disk may have the bytes of the table, which was converted from Latin-1.
+      FileReading other = row;
+      const auto bytes = InLatin1(row.file);
+      if (!bytes || *bytes == row.file) throw;
+      other.file = *bytes;
+      if (by_name_.count(NameIn(*bytes)) == 0) throw;
+      return FindByName(other, is_by_name);
+    }
   }
 
  private:

@@ -121,7 +121,7 @@ bool HasWord(const std::vector<std::string>& words, const Words& known) {
                      [&](const std::string& word) { return known.count(word) > 0; });
 }
 
-// What the name of a column says.
+// The statements in the name of a column.
 struct ColumnName {
   std::vector<std::string> words;    // without the unit
   std::string unit;                  // its text; empty: none

@@ -19,9 +19,10 @@ bool StartsWith(const std::string& text, const std::string& beginning) {
   return text.compare(0, beginning.size(), beginning) == 0;
 }
 
-// Converts to UTF-8, or returns nothing if the bytes are not in the encoding.
-std::optional<std::string> Converted(const std::string& bytes, const char* encoding) {
-  const iconv_t converter = ::iconv_open("UTF-8", encoding);
+// Converts to another encoding, or returns nothing if the bytes are not in theirs.
+std::optional<std::string> Converted(const std::string& bytes, const char* to,
+                                     const char* encoding) {
+  const iconv_t converter = ::iconv_open(to, encoding);
   // NOLINTNEXTLINE: the value that iconv_open defines for failure
   if (converter == reinterpret_cast<iconv_t>(-1)) return std::nullopt;
   const std::unique_ptr<void, int (*)(iconv_t)> closer(converter, ::iconv_close);
@@ -51,9 +52,9 @@ const char* Utf16WithoutMark(const std::string& bytes) {
     odd += bytes[i + 1] == '\0';
   }
   const std::size_t pairs = bytes.size() / 2;
-  constexpr std::size_t kPercent = 100, kMostly = 70, kHardly = 2;
-  if (odd * kPercent >= kMostly * pairs && even * kPercent <= kHardly * pairs) return "UTF-16LE";
-  if (even * kPercent >= kMostly * pairs && odd * kPercent <= kHardly * pairs) return "UTF-16BE";
+  constexpr std::size_t kPercent = 100, kHigh = 70, kLow = 2;
+  if (odd * kPercent >= kHigh * pairs && even * kPercent <= kLow * pairs) return "UTF-16LE";
+  if (even * kPercent >= kHigh * pairs && odd * kPercent <= kLow * pairs) return "UTF-16BE";
   return nullptr;
 }
 
@@ -78,22 +79,26 @@ std::size_t LineAt(const std::string& text, std::size_t at) {
                  std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n'));
 }
 
-// Control characters other than white space and the end-of-file mark of DOS are no text.
-void RefuseControlCharacters(const std::string& text, const std::string& path) {
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const auto byte = static_cast<unsigned char>(text[i]);
-    if (byte == 0) {
-      throw Error(fmt::format(
-          "{}:{}: a NUL byte, which no text file contains; a table in UTF-8 or UTF-16 is expected",
-          path, LineAt(text, i)));
-    }
+void RefuseNul(const std::string& text, const std::string& path) {
+  const std::size_t nul = text.find('\0');
+  if (nul == std::string::npos) return;
+  throw Error(fmt::format(
+      "{}:{}: a NUL byte, which no text file contains; a table in UTF-8 or UTF-16 is expected",
+      path, LineAt(text, nul)));
+}
+
+// Names of files may contain control characters, but bytes that are neither UTF-8 nor free of them
+// are no text of any encoding.
+void RefuseBinary(const std::string& bytes, const std::string& path) {
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    const auto byte = static_cast<unsigned char>(bytes[i]);
     const bool is_space = byte == '\t' || byte == '\n' || byte == '\r' || byte == '\f';
-    if (byte < ' ' && !is_space && byte != 0x1A) {
-      throw Error(
-          fmt::format("{}:{}: the control character {:#04x}: no text; a table of readings "
-                      "is expected",
-                      path, LineAt(text, i), byte));
-    }
+    if (byte >= ' ' || is_space || byte == 0x1A) continue;
+    throw Error(
+        fmt::format("{}:{}: no text: the bytes are no UTF-8, and among them is the control "
+                    "character {:#04x}; a "
+                    "table of readings is expected",
+                    path, LineAt(bytes, i), byte));
   }
 }
 
@@ -118,6 +123,11 @@ std::string Shown(const std::string& text) {
   return text.size() <= kMost ? text : text.substr(0, kMost) + "...";
 }
 
+std::optional<std::string> InLatin1(const std::string& text) {
+  if (auto bytes = Converted(text, "WINDOWS-1252", "UTF-8")) return bytes;
+  return Converted(text, "ISO-8859-1", "UTF-8");
+}
+
 TableText DecodeTableText(const std::string& bytes, const std::string& path) {
   RefuseOtherKinds(bytes, path);
   const std::string mark_of_utf32("\xFF\xFE\0\0", 4);
@@ -129,7 +139,7 @@ TableText DecodeTableText(const std::string& bytes, const std::string& path) {
   if (StartsWith(bytes, "\xFF\xFE")) wide = "UTF-16LE", mark = 2;
   if (StartsWith(bytes, "\xFE\xFF")) wide = "UTF-16BE", mark = 2;
   if (wide != nullptr) {
-    const auto text = Converted(bytes.substr(mark), wide);
+    const auto text = Converted(bytes.substr(mark), "UTF-8", wide);
     if (!text) {
       throw Error(fmt::format(
           "{}: the text is {}, but is cut off or contains half a character; save it as UTF-8", path,
@@ -139,11 +149,12 @@ TableText DecodeTableText(const std::string& bytes, const std::string& path) {
   } else if (StartsWith(bytes, "\xEF\xBB\xBF")) {
     decoded.text = bytes.substr(3);
   }
-  RefuseControlCharacters(decoded.text, path);
-  if (wide == nullptr && !Converted(decoded.text, "UTF-8")) {
+  RefuseNul(decoded.text, path);
+  if (wide == nullptr && !Converted(decoded.text, "UTF-8", "UTF-8")) {
+    RefuseBinary(decoded.text, path);
     // Windows-1252 leaves five bytes undefined; they are control characters in Latin-1.
-    auto text = Converted(decoded.text, "WINDOWS-1252");
-    if (!text) text = Converted(decoded.text, "ISO-8859-1");
+    auto text = Converted(decoded.text, "UTF-8", "WINDOWS-1252");
+    if (!text) text = Converted(decoded.text, "UTF-8", "ISO-8859-1");
     if (!text) throw Error(path + ": the text is in an unknown encoding; save it as UTF-8");
     decoded = {*text, "Latin-1"};
   }

@@ -1,7 +1,7 @@
 #ifndef THICKLENS_MODEL_TABLES_TABLE_TEXT_H_
 #define THICKLENS_MODEL_TABLES_TABLE_TEXT_H_
 
-#include <cstddef>
+#include <optional>
 #include <string>
 
 namespace thicklens::model {
@@ -16,6 +16,10 @@ struct TableText {
 // are no UTF-8, Latin-1 as Windows extends it. Throws Error, which names `path`, the line and the
 // byte, for what is no text.
 TableText DecodeTableText(const std::string& bytes, const std::string& path);
+
+// The bytes that DecodeTableText reads as this text in UTF-8 if they are Latin-1; nothing if there
+// are none.
+std::optional<std::string> InLatin1(const std::string& text);
 
 // A text for messages: its beginning if it is long.
 std::string Shown(const std::string& text);

@@ -11,8 +11,10 @@
 #include "thicklens/io/image_io.h"
 #include "thicklens/io/journal_file.h"
 #include "thicklens/io/light_field_io.h"
+#include "thicklens/io/readings.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/light_field_file.h"
+#include "thicklens/model/readings.h"
 #include "thicklens/model/scene_simulator.h"
 #include "thicklens/model/sweep_file.h"
 #include "thicklens/model/sweep_simulator.h"
@@ -88,6 +90,22 @@ const std::vector<FuzzedReader>& FuzzedReaders() {
                std::vector<std::string> notices;
                model::SweepFromFolder(fs::path(path).parent_path().string(), path, "", &notices);
              }),
+      {"readings-text",
+       [](const std::string& bytes, const TemporaryFolder&) {
+         model::ReadingOptions options;
+         options.scale_mm = 0.01;  // for steps and counts
+         try {
+           model::ReadingsOfTable(bytes, "table.csv", options);
+         } catch (const Error&) {
+           model::ReadingsOfTable(bytes, "table.csv", {});
+         }
+       }},
+      OfFile("readings-json", "frames/metadata.txt",
+             [](const std::string& path) { io::ReadReadings(path, {}, {}); }),
+      {"readings-ome",
+       [](const std::string& bytes, const TemporaryFolder&) {
+         io::ReadingsOfOmeXml(bytes, "stack.ome.tif", {});
+       }},
       OfFile("sweep-truth-yaml", "truth.yaml",
              [](const std::string& path) { model::ReadSweepTruth(path); }),
       OfFile("sweep-simulation-yaml", "simulation.yaml",

@@ -176,6 +176,13 @@ TEST_F(SweepFolder, PathsOfATable) {
     ReadTable(in_order(other), sigma);
     EXPECT_THAT(notices_, ElementsAre(AllOf(HasSubstr("r.csv:1: "), HasSubstr("2 more rows"))));
   }
+  // Names on the disk in the encoding of the table, and in UTF-8.
+  folder_.Put("latin/m\xFCnze.png");
+  folder_.Put("latin/caf\xC3\xA9.png");
+  folder_.Put("latin/r.csv", "m\xFCnze.png,1\ncaf\xE9.png,2\n");
+  EXPECT_EQ(Read("frames_csv: latin/r.csv\n").frames.at(0).image, folder_ / "latin/m\xFCnze.png");
+  EXPECT_EQ(Read("frames_csv: latin/r.csv\n").frames.at(1).image,
+            folder_ / "latin/caf\xC3\xA9.png");
   // The table's folder comes before frames_dir.
   folder_.Put("bench/frames/x.png");
   folder_.Put("bench/r.csv", "frames/x.png,2\n");

@@ -69,7 +69,7 @@ TEST(NameReadings, APatternIsProposedForOneChangingNumber) {
   EXPECT_EQ(ProposedNamePattern({"a.png", "b.png"}), std::nullopt);
   EXPECT_EQ(ProposedNamePattern({"a1.png"}), std::nullopt);
   EXPECT_EQ(ProposedNamePattern({}), std::nullopt);
-  // What is proposed reads the names.
+  // The proposed pattern reads the names.
   const std::vector<std::string> names = {"z-1_x0.png", "z0_x0.png", "z1_x0.png"};
   EXPECT_EQ(ReadingsOfNames(names, Named(*ProposedNamePattern(names))).rows.at(0).reading_mm, -1);
 }

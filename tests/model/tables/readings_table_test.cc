@@ -296,7 +296,8 @@ TEST(ReadingsTable, BytesThatAreNoText) {
   EXPECT_THAT(Refusal(std::string("file,z\na.png,\0\n", 15)),
               AllOf(StartsWith("bench/t.csv:2: "), HasSubstr("NUL")));
   EXPECT_THAT(Refusal(std::string(4096, '\0')), HasSubstr("NUL"));
-  EXPECT_THAT(Refusal("file,z\n\x01.png,1\n"), AllOf(HasSubstr("t.csv:2"), HasSubstr("0x01")));
+  EXPECT_THAT(Refusal("file,z\n\x01\xFF.png,1\n"), AllOf(HasSubstr("t.csv:2"), HasSubstr("0x01")));
+  EXPECT_EQ(Read("file,z\n\x01.png,1\n").rows.at(0).file, "\x01.png");
   EXPECT_THAT(Refusal("PK\x03\x04\x14"), HasSubstr("workbook"));
   EXPECT_THAT(Refusal("\x89PNG\r\n\x1A\n"), HasSubstr("a PNG image"));
   EXPECT_THAT(Refusal(std::string("\xFF\xFE\0\0f\0\0\0", 8)), HasSubstr("UTF-32"));
@@ -370,7 +371,7 @@ TEST(ReadingsTable, EveryDialectIsReadBack) {
       if (has_comma) number.replace(number.find('.'), 1, ",");
       std::vector<std::string> cells = {"frame " + std::to_string(i) + ".png", number};
       if (extra > 0) cells.insert(cells.begin(), std::to_string(i));
-      if (extra > 1) cells.push_back(std::to_string(i) + (has_comma ? ",25" : ".25"));
+      if (extra > 1) cells.push_back(std::to_string(i) + (has_comma ? "," : ".") + "25");
       text += join(cells);
     }
     const int encoding = draw(4);

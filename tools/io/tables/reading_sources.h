@@ -25,9 +25,9 @@ model::ReadingSet ReadingsOfOmeFiles(const std::vector<std::string>& files,
 model::ReadingSet ReadingsOfOmeCompanion(const std::string& xml, const std::string& path,
                                          const model::ReadingOptions& options);
 
-// What all images have in common: the name of the value, its unit and the number of images. A value
-// that is the same in all images is no reading of a sweep, and a focus distance is not the position
-// of a bench, which a notice says.
+// Describes the rows: the name of the value, its unit and the number of images. Throws Error if the
+// value is the same in all images, which no reading of a sweep is. A notice says that a focus distance
+// is not the position of a bench.
 void FinishMetadata(const std::string& what, const std::string& stated_unit, bool is_focus_distance,
                     const model::ReadingOptions& options, model::ReadingSet* set);
 

@@ -69,9 +69,9 @@ struct SweepFile {
   std::optional<FloorOrigin> floor_origin;  // present if another calibration gave the floor
   std::optional<double> target_period_mm;   // period of a periodic target (docs/file-formats.md)
   RegionOfInterest roi;                     // the part that is measured
+  std::vector<SweepFrame> frames;           // in the order of the file
   // Describes in one line which readings were read, and in which unit; empty: the file lists them.
   std::string readings;
-  std::vector<SweepFrame> frames;  // in the order of the file
 };
 
 // How the readings of a sweep are read.
