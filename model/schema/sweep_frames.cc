@@ -141,6 +141,11 @@ void TakeReadings(const SweepReading& reading, const std::string& table,
     notices->insert(notices->end(), readings.notices.begin(), readings.notices.end());
   sweep->readings = readings.description;
   sweep->frames = PairFrames(readings, files, folder, notices);
+  if (!table.empty()) return;
+  // The order of names ("z10", "z9") means nothing.
+  std::stable_sort(
+      sweep->frames.begin(), sweep->frames.end(),
+      [](const SweepFrame& a, const SweepFrame& b) { return a.reading_mm < b.reading_mm; });
 }
 
 // The readings are in the list itself: nothing that says how to read them applies.

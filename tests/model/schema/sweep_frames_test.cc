@@ -224,12 +224,14 @@ TEST_F(SweepFolder, FieldsThatSelectTheColumns) {
 
 TEST_F(SweepFolder, ReadingsFromTheNames) {
   folder_.Put("n/z-10um.png");
+  folder_.Put("n/z10um.png");
   folder_.Put("n/z0um.png");
   folder_.Put("n/z2.5um.png");
   const SweepFile sweep = Read("frames_dir: n\nreadings_from_name: 'z{reading}um'\n");
-  ASSERT_THAT(sweep.frames, SizeIs(3));
+  ASSERT_THAT(sweep.frames, SizeIs(4));
   EXPECT_EQ(sweep.frames[0].reading_mm, -0.01);
   EXPECT_EQ(sweep.frames[2].reading_mm, 0.0025);
+  EXPECT_EQ(sweep.frames[3].image, folder_ / "n/z10um.png");  // in the order of the readings
   EXPECT_THAT(sweep.readings, HasSubstr("um"));
   EXPECT_THAT(ErrorWith("frames_dir: n\nreadings_from_name: 'z{reading}mm'\n"),
               AllOf(HasSubstr("n/z-10um.png"), HasSubstr("does not contain")));

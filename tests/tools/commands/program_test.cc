@@ -378,6 +378,18 @@ TEST_F(ProgramTest, TheSourcesRecipeIsMarkedAsSuch) {
   EXPECT_EQ(model::ReadCamera(camera).calibration->evidence.method, "source-recipe");
 }
 
+TEST_F(ProgramTest, TheSummaryStatesWhichReadingsWereRead) {
+  const std::string table = CopyAsFolderWithTable();
+  const std::string sweep = folder_ / "sweep";
+  const ProgramResult result =
+      Run({"calibrate", sweep, "--readings", table, "--camera", sweep + "/camera.yaml", "--dry-run",
+           "--json", folder_ / "dry.json"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  const std::string readings = "column 2 'reading' of positions.csv, mm (no unit is stated)";
+  EXPECT_THAT(result.out, HasSubstr("read from  " + readings));
+  EXPECT_THAT(ContentOf(folder_ / "dry.json"), HasSubstr("\"readings\": \"" + readings));
+}
+
 TEST_F(ProgramTest, AFolderWithATableCalibratesLikeItsSweepFile) {
   const std::string table = CopyAsFolderWithTable();
   const std::string sweep = folder_ / "sweep";

@@ -143,6 +143,52 @@ TEST_F(SweepInputTest, AFolderNeedsReadingsAndACamera) {
   EXPECT_THAT(ErrorOf([&] { ReadSweepInput(arguments_); }), HasSubstr("is not a folder"));
 }
 
+TEST_F(SweepInputTest, ReadingsInTheNamesAreProposedAndRead) {
+  arguments_.input = folder_ / "frames";
+  arguments_.camera_path = folder_ / "camera.yaml";
+  folder_.Put("frames/z10um.png");
+  folder_.Put("frames/z9.5um.png");
+  EXPECT_THAT(ErrorOf([&] { ReadSweepInput(arguments_); }),
+              HasSubstr("--reading-from-name 'z{reading}um.png'"));
+  arguments_.readings.name_pattern = "z{reading}um.png";
+  const model::SweepFile sweep = ReadSweepInput(arguments_).description;
+  EXPECT_EQ(sweep.frames.at(0).reading_mm, 0.0095);
+  EXPECT_EQ(sweep.readings, "'z{reading}um.png' in the names of 2 files, um");
+  arguments_.readings_csv = folder_.Put("readings.csv", "file,z\nz10um.png,1\nz9.5um.png,2\n");
+  EXPECT_THAT(ErrorOf([&] { ReadSweepInput(arguments_); }), HasSubstr("exclude each other"));
+  arguments_.readings.name_pattern.clear();
+  arguments_.readings.unit = "feet";
+  EXPECT_THAT(ErrorOf([&] { ReadSweepInput(arguments_); }), StartsWith("--unit: "));
+  arguments_.readings.unit = "counts";
+  arguments_.readings.scale_mm = 0.5;
+  EXPECT_EQ(ReadSweepInput(arguments_).description.frames.at(1).reading_mm, 1);
+  arguments_.readings.scale_mm = 0;
+  EXPECT_THAT(ErrorOf([&] { ReadSweepInput(arguments_); }), StartsWith("--reading-scale: "));
+}
+
+// JSON and EXIF come through the interface as well, and a table through a sweep's file.
+TEST_F(SweepInputTest, ReadingsOfOtherSourcesComeThrough) {
+  arguments_.input = folder_ / "frames";
+  arguments_.camera_path = folder_ / "camera.yaml";
+  folder_.Put("frames/a.png");
+  folder_.Put("frames/b.png");
+  folder_.Put("frames/a.json", R"({"LensPosition": 4})");
+  folder_.Put("frames/b.json", R"({"LensPosition": 5})");
+  arguments_.readings.source = "sidecar";
+  EXPECT_EQ(ReadSweepInput(arguments_).description.frames.at(1).reading_mm, 250);
+  arguments_.readings.source.clear();
+  arguments_.readings_csv =
+      folder_.Put("metadata.txt", R"({"FrameKey-0-0-0": {"FileName": "a.png", "ZPositionUm": 10},
+                                      "FrameKey-0-0-1": {"FileName": "b.png", "ZPositionUm": 20}})");
+  EXPECT_EQ(ReadSweepInput(arguments_).description.frames.at(1).reading_mm, 0.02);
+  // Without a notice that the sigma is not stated, if an option states it.
+  arguments_.reading_sigma_mm = 0.05;
+  const thicklens::Sweep sweep = ReadSweepInput(arguments_);
+  EXPECT_TRUE(std::none_of(sweep.notices.begin(), sweep.notices.end(), [](const auto& notice) {
+    return notice.find("reading_sigma_mm") != std::string::npos;
+  }));
+}
+
 TEST_F(SweepInputTest, ThePeriodOfTheTargetComesThrough) {
   Sweep("target_period_mm: 5\n");
   EXPECT_EQ(ReadSweepInput(arguments_).description.target_period_mm.value(), 5);

@@ -213,26 +213,33 @@ std::vector<Frame> FramesOfList(const json& list, const std::string& path,
   return frames;
 }
 
+[[noreturn]] void RefuseJson(const std::string& text, std::size_t at, const std::string& path,
+                             const json::exception& error) {
+  // "[json.exception.parse_error.101] parse error at line 1, column 2: WHY"
+  const std::string what = error.what();
+  const std::size_t begin =
+      what.find(": ") == std::string::npos ? what.find("] ") : what.find(": ");
+  const auto end = text.begin() + static_cast<std::ptrdiff_t>(std::min(at, text.size()));
+  throw Error(fmt::format("{}:{}: not valid JSON: {}", path,
+                          1 + std::count(text.begin(), end, '\n'),
+                          Shown(begin == std::string::npos ? what : what.substr(begin + 2))));
+}
+
 // An acquisition that was aborted leaves out the last brace of metadata.txt.
 json Parsed(const std::string& text, const std::string& path, model::ReadingSet* set) {
-  json parsed;
-  std::string why;
-  std::size_t byte = 0;
   try {
     return json::parse(text);
   } catch (const json::parse_error& error) {
-    byte = std::min(error.byte, text.size());
-    const std::string what = error.what();
-    why = what.substr(what.find(": ") == std::string::npos ? 0 : what.find(": ") + 2);
-  }
-  parsed = json::parse(text + "}", nullptr, false);
-  if (!parsed.is_discarded()) {
+    const json completed = json::parse(text + "}", nullptr, false);
+    if (completed.is_discarded()) RefuseJson(text, error.byte, path, error);
     set->notices.push_back(path + ": the last brace is missing (the recording was aborted?)");
-    return parsed;
+    return completed;
+  } catch (const json::out_of_range& error) {  // a number, which the message quotes
+    const std::string what = error.what();
+    const std::size_t first = what.find('\''), last = what.rfind('\'');
+    const std::size_t at = first < last ? text.find(what.substr(first + 1, last - first - 1)) : 0;
+    RefuseJson(text, at == std::string::npos ? 0 : at, path, error);
   }
-  const auto line =
-      1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(byte), '\n');
-  throw Error(fmt::format("{}:{}: not valid JSON: {}", path, line, Shown(why)));
 }
 
 }  // namespace

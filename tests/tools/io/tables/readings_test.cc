@@ -94,6 +94,8 @@ TEST_F(Readings, OfMicroManagerThatAreBroken) {
               HasSubstr("at most 1e30"));
   EXPECT_THAT(Refusal("m.txt", R"({"FrameKey-0-0-0": {"FileName": "a.tif", "ZPositionUm": NaN}})"),
               HasSubstr("not valid JSON"));
+  EXPECT_THAT(Refusal("m.txt", "{\n\"z\": 21e308}"),
+              AllOf(HasSubstr("m.txt:2: not valid JSON"), HasSubstr("21e308")));
   EXPECT_THAT(Refusal("m.txt", std::string(100000, '[')), HasSubstr("not valid JSON"));
   EXPECT_THAT(Refusal("m.txt", std::string("{\0}", 3)), HasSubstr("not valid JSON"));
 }
