@@ -199,18 +199,46 @@ class Finder {
     return fmt::format("{}:{}: ", path_, line);
   }
 
+  static bool HasFile(const TableRow& row) {
+    return std::any_of(row.cells.begin(), row.cells.end(), LooksLikeFile);
+  }
+  static bool HasNumber(const TableRow& row) {
+    return std::any_of(row.cells.begin(), row.cells.end(), LooksLikeNumber);
+  }
+
+  // Index of the header or, without one, of the first row with data. Programs of instruments write
+  // lines about the recording before it. They name no file, and the table itself begins with the
+  // row before the first one that has a file and a number.
+  std::size_t FindBeginning() const {
+    constexpr std::size_t kMaxPreamble = 200;
+    for (std::size_t i = 0; i < std::min(table_.rows.size(), kMaxPreamble); ++i) {
+      if (!HasFile(table_.rows[i])) continue;
+      if (i == 0 || !HasNumber(table_.rows[i])) return 0;
+      const TableRow& before = table_.rows[i - 1];
+      // Rows with more cells than the only row before them are reported one by one.
+      const bool is_as_wide =
+          i == 1 ? before.cells.size() > 1 : before.cells.size() == table_.rows[i].cells.size();
+      const bool is_header = is_as_wide && !HasNumber(before);
+      return is_header ? i - 1 : i;
+    }
+    return 0;
+  }
+
   // The first row is a header if it has neither a number nor the name of a file.
   void FindHeader() {
-    const TableRow& first = table_.rows.front();
+    const bool is_first = NamesCell(table_.rows.front(), options_.column) ||
+                          NamesCell(table_.rows.front(), options_.file_column);
+    const std::size_t beginning = is_first ? 0 : FindBeginning();
+    found_.first_row = beginning;
+    if (beginning > 0) found_.last_skipped_line = table_.rows[beginning - 1].line;
+    const TableRow& first = table_.rows[beginning];
     const bool is_asked_for =
         NamesCell(first, options_.column) || NamesCell(first, options_.file_column);
-    const bool has_data = std::any_of(first.cells.begin(), first.cells.end(), [](const auto& cell) {
-      return LooksLikeNumber(cell) || LooksLikeFile(cell);
-    });
+    const bool has_data = HasNumber(first) || HasFile(first);
     const auto& comment = table_.comment.cells;
     if (is_asked_for || !has_data) {
       found_.header = first;
-      found_.first_row = 1;
+      found_.first_row = beginning + 1;
     } else if (comment.size() == first.cells.size() &&
                std::none_of(comment.begin(), comment.end(), LooksLikeNumber)) {
       found_.header = table_.comment;

@@ -227,6 +227,10 @@ class Reader {
     if (table_.separator != ',') set->description += "; " + SeparatorName(table_.separator);
     if (is_comma_seen_) set->description += "; decimal comma";
     if (encoding != "UTF-8") set->description += "; " + encoding;
+    if (columns_.last_skipped_line > 0) {
+      set->notices.push_back(fmt::format("{}: the lines up to {}, before the table, are not read",
+                                         path_, columns_.last_skipped_line));
+    }
     if (!columns_.unit.empty() && !options_.unit.empty() &&
         NameOf(columns_.unit) != NameOf(options_.unit)) {
       set->notices.push_back(

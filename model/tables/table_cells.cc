@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "model/tables/reading_number.h"
+#include "model/tables/reading_unit.h"
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 
@@ -189,7 +190,9 @@ bool LooksLikeFile(const std::string& cell) {
   if (dot == std::string::npos || dot == 0 || dot + 1 == cell.size()) return false;
   if (cell.size() - dot - 1 > kLongest) return false;
   if (std::isalpha(static_cast<unsigned char>(cell[dot + 1])) == 0) return false;
-  return std::all_of(cell.begin() + static_cast<std::ptrdiff_t>(dot) + 1, cell.end(),
+  const std::string ending = cell.substr(dot + 1);
+  if (ending == "name" || FindUnit(ending)) return false;  // R's "file.name" and "z.um"
+  return std::all_of(ending.begin(), ending.end(),
                      [](char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0; });
 }
 

@@ -25,7 +25,7 @@ struct TableCells {
 std::string SeparatorName(char separator);
 
 // Whether the cell ends in a dot and the ending of a file: letters and digits that begin with a
-// letter.
+// letter, but not the end of a name such as "z.um" or "file.name".
 bool LooksLikeFile(const std::string& cell);
 
 // Splits the text of a table. The separator is the one with which most rows have a file and a

@@ -125,6 +125,24 @@ TEST(ReadingsTable, NumpyTextWithCommentedHeader) {
       ElementsAre(1, 2));
 }
 
+// Programs of instruments write lines about the recording before the table.
+TEST(ReadingsTable, LinesBeforeTheTableAreReported) {
+  const ReadingSet set = Read(
+      "Focus sweep\nOperator,me\nDate,2024-05-01,10:00\n\nfile,t_s,z_um\n"
+      "a.png,1,5\nb.png,2,6\n");
+  EXPECT_THAT(Values(set), ElementsAre(0.005, 0.006));
+  EXPECT_THAT(set.notices, ElementsAre(HasSubstr("the lines up to 3")));
+  EXPECT_THAT(ValuesOf("Focus sweep\na.png;1\nb.png;2\n"), ElementsAre(1, 2));
+  // A row with a file is never left out.
+  EXPECT_THAT(Refusal("file,z\na.png,two\nb.png,2\n"),
+              AllOf(StartsWith("bench/t.csv:2: "), HasSubstr("'two'")));
+}
+
+// R writes names with points.
+TEST(ReadingsTable, NamesWithPoints) {
+  EXPECT_THAT(ValuesOf("\"file.name\",\"z.um\"\n\"a.png\",5\n"), ElementsAre(0.005));
+}
+
 TEST(ReadingsTable, ExcelStatesTheSeparator) {
   EXPECT_THAT(ValuesOf("sep=|\nfile|z\na.png|1\nb.png|2\n"), ElementsAre(1, 2));
   EXPECT_THAT(ValuesOf("sep=;\r\nfile;z\r\na.png;1,5\r\n"), ElementsAre(1.5));
