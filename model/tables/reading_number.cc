@@ -27,6 +27,8 @@ std::string WithAsciiMarks(const std::string& text) {
       {"\xE2\x80\xAF", " "},   // narrow no-break space
       {"\xE2\x80\x89", " "},   // thin space
       {"\xE2\x80\x99", "'"}};  // right quotation mark, which groups digits in Switzerland
+  const auto is_ascii = [](char c) { return static_cast<unsigned char>(c) < 0x80; };
+  if (std::all_of(text.begin(), text.end(), is_ascii)) return text;
   std::string ascii = text;
   for (const auto& [mark, replacement] : kMarks) {
     for (std::size_t at = 0; (at = ascii.find(mark, at)) != std::string::npos; ++at)
@@ -125,7 +127,7 @@ std::optional<NumberText> SplitNumber(const std::string& cell) {
 
 bool LooksLikeNumber(const std::string& cell) {
   constexpr std::size_t kLongest = 100;  // of a cell that is worth a look
-  if (cell.size() > kLongest) return false;
+  if (cell.size() > kLongest || std::none_of(cell.begin(), cell.end(), IsDigit)) return false;
   const auto parts = SplitNumber(cell);
   if (!parts) return false;
   if (!parts->unit.empty() && !FindUnit(parts->unit)) return false;

@@ -17,7 +17,7 @@ namespace thicklens::model {
 namespace {
 
 // More cells would take gigabytes of memory.
-constexpr std::size_t kMaxCells = 8'000'000;
+constexpr std::size_t kMaxCells = 4'000'000;
 // Rows by which the separator is recognised.
 constexpr std::size_t kSampleRows = 100;
 
@@ -128,8 +128,8 @@ std::size_t ParseWith(char separator, const std::string& text, std::size_t begin
     }
     if (!parser.TakeLine(line, number)) return number;
     if (parser.is_too_large()) {
-      throw Error(fmt::format("line {}: more than {} cells, which no table of readings has", number,
-                              kMaxCells));
+      throw Error(
+          fmt::format("{}: more than {} cells, which no table of readings has", number, kMaxCells));
     }
   }
   if (is_whole && !parser.Finish()) return number;
@@ -159,12 +159,26 @@ std::optional<char> StatedSeparator(const std::string& text) {
   return text[4];
 }
 
-// Whether the text ends within the row that begins the error: the quotation mark has no partner.
-std::string QuotationText(const std::string& path, std::size_t line) {
+std::string QuotationText(std::size_t line) {
   return fmt::format(
-      "{}:{}: not a valid CSV row: a quotation mark is inside a cell or has no partner; write \"\" "
+      "{}: not a valid CSV row: a quotation mark is inside a cell or has no partner; write \"\" "
       "for one inside of a quoted cell",
-      path, line);
+      line);
+}
+
+char BestSeparator(const std::string& text) {
+  char best = ',';
+  std::size_t best_score = 0;
+  for (const char separator : {'\t', ';', ',', ' '}) {
+    TableCells sample;
+    ParseWith(separator, text, 0, 0, kSampleRows, &sample);
+    const std::size_t score = ScoreOf(sample);
+    if (score > best_score) {
+      best = separator;
+      best_score = score;
+    }
+  }
+  return best;
 }
 
 }  // namespace
@@ -201,29 +215,18 @@ TableCells SplitTable(const std::string& text, const std::string& path) {
   const std::size_t begin = stated ? 6 : 0;
   const std::size_t lines_before = stated ? 1 : 0;
   char best = stated.value_or(',');
-  if (!stated) {
-    std::size_t best_score = 0;
-    for (const char separator : {'\t', ';', ',', ' '}) {
-      TableCells sample;
-      ParseWith(separator, text, begin, lines_before, kSampleRows, &sample);
-      const std::size_t score = ScoreOf(sample);
-      if (score > best_score) {
-        best = separator;
-        best_score = score;
-      }
-    }
-  }
-  TableCells table;
-  std::size_t wrong_line = 0;
   try {
-    wrong_line = ParseWith(best, text, begin, lines_before, text.size() + 1, &table);
+    if (!stated) best = BestSeparator(text);
+    TableCells table;
+    const std::size_t wrong_line =
+        ParseWith(best, text, begin, lines_before, text.size() + 1, &table);
+    if (wrong_line == 0) return table;
+    throw Error(QuotationText(wrong_line));
   } catch (const Interrupted&) {
     throw;
   } catch (const Error& error) {
-    throw Error(fmt::format("{}: {}", path, error.what()));
+    throw Error(fmt::format("{}:{}", path, error.what()));
   }
-  if (wrong_line > 0) throw Error(QuotationText(path, wrong_line));
-  return table;
 }
 
 }  // namespace thicklens::model

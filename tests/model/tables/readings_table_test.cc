@@ -330,7 +330,8 @@ TEST(ReadingsTable, AMillionColumns) {
   const std::string message = Refusal(row + "\n");
   EXPECT_THAT(message, AllOf(HasSubstr("999994 more"), HasSubstr("--column")));
   EXPECT_LT(message.size(), 400U);
-  EXPECT_THAT(Refusal(std::string(20'000'000, ',')), HasSubstr("more than 8000000 cells"));
+  EXPECT_THAT(Refusal(std::string(20'000'000, ',')),
+              StartsWith("bench/t.csv:1: more than 4000000 cells"));
 }
 
 TEST(ReadingsTable, LongCellsAreShortened) {
