@@ -26,8 +26,8 @@ bool IsSystemHeader(const std::string& header) {
       "ctime", "cuchar", "cwchar", "cwctype", "assert.h", "ctype.h", "errno.h", "fenv.h", "float.h",
       "inttypes.h", "limits.h", "locale.h", "math.h", "setjmp.h", "signal.h", "stdarg.h",
       "stddef.h", "stdint.h", "stdio.h", "stdlib.h", "string.h", "time.h", "dirent.h", "dlfcn.h",
-      "fcntl.h", "fnmatch.h", "glob.h", "iconv.h", "libgen.h", "poll.h", "pthread.h", "pwd.h", "sched.h",
-      "semaphore.h", "spawn.h", "strings.h", "termios.h", "unistd.h",
+      "fcntl.h", "fnmatch.h", "glob.h", "iconv.h", "libgen.h", "poll.h", "pthread.h", "pwd.h",
+      "sched.h", "semaphore.h", "spawn.h", "strings.h", "termios.h", "unistd.h",
       // Vector instructions of the compiler, for the hot files with run-time dispatch.
       "immintrin.h",
       // The settings of the GNU C library's allocator.

@@ -26,8 +26,8 @@ model::ReadingSet ReadingsOfOmeCompanion(const std::string& xml, const std::stri
                                          const model::ReadingOptions& options);
 
 // Describes the rows: the name of the value, its unit and the number of images. Throws Error if the
-// value is the same in all images, which no reading of a sweep is. A notice says that a focus distance
-// is not the position of a bench.
+// value is the same in all images, which no reading of a sweep is. A notice says that a focus
+// distance is not the position of a bench.
 void FinishMetadata(const std::string& what, const std::string& stated_unit, bool is_focus_distance,
                     const model::ReadingOptions& options, model::ReadingSet* set);
 

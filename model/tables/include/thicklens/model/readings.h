@@ -76,7 +76,7 @@ THICKLENS_EXPORT ReadingSet ReadingsOfNames(const std::vector<std::string>& file
 THICKLENS_EXPORT std::optional<std::string> ProposedNamePattern(
     const std::vector<std::string>& files);
 
-// The unit in the name of a value that means the position of a bench or of a focus drive, in a usual
+// The unit in the name of a value that means the position of a bench or focus drive, in a usual
 // language: "um" for "z_um", empty for "Position". Nothing for any other name.
 THICKLENS_EXPORT std::optional<std::string> UnitOfReadingName(const std::string& name);
 // Whether the name of a value means a file: "file", "Bildname".
