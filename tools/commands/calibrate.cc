@@ -153,9 +153,10 @@ CommandResult RunCalibration(const CalibrateOptions& options, const Sweep& sweep
   }
   // A refusal before any measurement is one line on stderr.
   if (calibration.refusal.empty() || calibration.diagnostics.paper_recipe.done)
-    PrintResult(options.common, ReadingsLine(sweep) +
-                                    CalibrationText(focus_sweep, calibration, TruthOf(sweep),
-                                                    options.by_paper() ? "" : options.camera_output));
+    PrintResult(
+        options.common,
+        ReadingsLine(sweep) + CalibrationText(focus_sweep, calibration, TruthOf(sweep),
+                                              options.by_paper() ? "" : options.camera_output));
   if (options.by_paper() && outputs.camera && calibration.refusal.empty()) {
     PrintResult(options.common,
                 fmt::format("{} has the results of the paper's method, not of the fit\n",
