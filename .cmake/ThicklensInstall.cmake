@@ -41,7 +41,10 @@ if(THICKLENS_BUILDS_SHARED AND NOT THICKLENS_SHARED_LIBS)
     install(FILES "${PROJECT_BINARY_DIR}/shared/thicklensConfig.cmake"
                   "${PROJECT_BINARY_DIR}/thicklensConfigVersion.cmake" DESTINATION ${package_dir}
             ${component})
-    install(TARGETS thicklens_opencv_codecs LIBRARY DESTINATION ${THICKLENS_LIBRARY_DIR} ${component})
+    if(TARGET thicklens_image_library)
+      install(TARGETS thicklens_image_library LIBRARY DESTINATION ${THICKLENS_LIBRARY_DIR}
+                                                      ${component})
+    endif()
   endfunction()
   thicklens_install_shared_component()
 endif()

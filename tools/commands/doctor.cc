@@ -104,9 +104,9 @@ void ExamineDevice(const DoctorOptions& options, Findings* findings) {
 void ExamineImageFiles(Findings* findings) {
   try {
     io::RequireImageCodecs();
-    findings->image_files = "PNG; JPEG, TIFF, EXR, BMP and PNM by OpenCV";
+    findings->image_files = io::ReadableImageKinds();
   } catch (const Error& error) {
-    findings->image_files = "PNG only";
+    findings->image_files = "PNG, TIFF, PNM and PFM only";
     if (findings->refusal.empty()) findings->refusal = error.what();
   }
 }

@@ -341,8 +341,45 @@ std::string Description(const RenderOptions& options, const Rendering& rendering
                          : fmt::format("{}", fmt::join(rendering.effects_on, ", ")));
 }
 
+constexpr int kFloatBits = 32;
+
+bool HoldsLight(ImageFileFormat format) {
+  return format == ImageFileFormat::kExr || format == ImageFileFormat::kPfm;
+}
+
+std::string BitsText(const ImageFileOptions& file) {
+  if (HoldsLight(file.format)) return "linear light as floats";
+  return fmt::format("{} bit", file.bits);
+}
+
+// Refuses before anything is computed what the kind of file cannot hold.
+void RequireHeld(const RenderOptions& options, const ImageFileOptions& file) {
+  const bool has_8_bits = file.format == ImageFileFormat::kJpeg ||
+                          file.format == ImageFileFormat::kWebp ||
+                          file.format == ImageFileFormat::kBmp;
+  if (has_8_bits && file.bits != 8) {
+    throw UsageError(
+        fmt::format("--bits: {} has 8 bits per value, found {}; .png, .tif and .ppm hold 16",
+                    options.output, file.bits));
+  }
+  if (HoldsLight(file.format) && options.bits) {
+    throw UsageError(fmt::format("--bits: {} holds floats; leave the option out", options.output));
+  }
+  if (HoldsLight(file.format) && options.noise_levels) {
+    throw UsageError(fmt::format(
+        "--noise: {} holds floats, to which no noise of rounding is added; leave the option out",
+        options.output));
+  }
+}
+
 CommandResult RenderImage(const RenderOptions& options) {
   const auto start = Clock::now();
+  ImageFileOptions file;
+  file.format = ImageFormatOfName(options.output);
+  file.bits = options.bits.value_or(kDefaultBits);
+  file.noise_levels = options.noise_levels.value_or(0);
+  file.seed = static_cast<std::uint64_t>(options.seed.value_or(0));
+  RequireHeld(options, file);
   OutputFile output(options.output);
   const CommandRun run(options.common, RenderOptionNames());
   const LightField light_field =
@@ -352,15 +389,11 @@ CommandResult RenderImage(const RenderOptions& options) {
       WithOptionNames(run.names(), [&] { return RenderAny(options, light_field, run.control()); });
   ThrowIfCancelled();
 
-  ImageFileOptions file;
-  file.bits = options.bits.value_or(kDefaultBits);
-  file.noise_levels = options.noise_levels.value_or(0);
-  file.seed = static_cast<std::uint64_t>(options.seed.value_or(0));
   file.description = Description(options, rendering);
   const Image& image = rendering.image;
   const EncodedImageFile encoded =
       WithOptionNames(run.names(), [&] { return EncodeImage(image, file); });
-  output.Commit(encoded.png);
+  output.Commit(encoded.bytes);
 
   const double fraction = static_cast<double>(encoded.clipped_values) /
                           static_cast<double>(image.light().values.size());
@@ -369,19 +402,19 @@ CommandResult RenderImage(const RenderOptions& options) {
   result.summary = std::move(rendering.details);
   result.summary.update({{"width_px", image.width_px()},
                          {"height_px", image.height_px()},
-                         {"bits", file.bits},
+                         {"bits", HoldsLight(file.format) ? kFloatBits : file.bits},
                          {"noise_levels", file.noise_levels},
                          {"seed", file.seed}});
   AddToSummary(options, light_field, fraction, SecondsSince(start), &result.summary);
   const std::string noise = file.noise_levels > 0 ? fmt::format(", noise {:g}/255 (seed {})",
                                                                 file.noise_levels, file.seed)
                                                   : "";
-  PrintResult(options.common,
-              fmt::format("{}\n{} x {} views -> {} x {} px, {} channel(s), {} bit{}: {}\n{}",
-                          rendering.what, light_field.u_count, light_field.v_count,
-                          image.width_px(), image.height_px(), image.channels(), file.bits, noise,
-                          options.output, ClippedText(fraction)) +
-                  rendering.effects);
+  PrintResult(
+      options.common,
+      fmt::format("{}\n{} x {} views -> {} x {} px, {} channel(s), {}{}: {}\n{}", rendering.what,
+                  light_field.u_count, light_field.v_count, image.width_px(), image.height_px(),
+                  image.channels(), BitsText(file), noise, options.output, ClippedText(fraction)) +
+          rendering.effects);
   return result;
 }
 
@@ -477,7 +510,11 @@ void AddRenderCommand(CLI::App* program, CommandAction* action) {
                    "Folder of a light field, in the layout of thicklens or HCI")
       ->required()
       ->type_name("LF");
-  command->add_option("-o,--output", options->output, "PNG file to write; with --convert a folder")
+  command
+      ->add_option("-o,--output", options->output,
+                   "Image file to write, of the kind that its ending names (.png .jpg .tif .exr "
+                   ".webp .bmp .ppm .pfm); "
+                   "with --convert a folder")
       ->required()
       ->type_name("OUT");
   AddWhatToRender(command, options.get());

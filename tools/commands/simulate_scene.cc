@@ -135,7 +135,7 @@ CommandResult SimulateImage(const SceneOptions& options) {
   ImageFileOptions file;
   file.description =
       fmt::format("simulated; effects: {}", model::JoinedNames(simulated.effects.on));
-  folder.Write("picture.png", EncodeImage(simulated.photo, file).png);
+  folder.Write("picture.png", EncodeImage(simulated.photo, file).bytes);
   folder.Write("depth.pfm", EncodeDepth(simulated.depth));
   folder.Write("camera.yaml", model::CameraToYaml(simulated.camera));
   folder.Write(kImageMarker, model::SceneTruthToYaml(simulated.truth));

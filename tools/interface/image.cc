@@ -3,14 +3,17 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <opencv2/core/mat.hpp>
 #include <utility>
 
 #include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/io/image_description.h"
+#include "thicklens/io/image_file.h"
 #include "thicklens/io/image_io.h"
 #include "thicklens/io/light_field_io.h"
 #include "tools/interface/validation.h"
@@ -20,6 +23,43 @@ namespace thicklens {
 namespace {
 
 constexpr double kEncodedLevels = 255;
+
+constexpr std::array<std::pair<ImageFileFormat, io::ImageFormat>, 8> kFormats = {
+    {{ImageFileFormat::kPng, io::ImageFormat::kPng},
+     {ImageFileFormat::kJpeg, io::ImageFormat::kJpeg},
+     {ImageFileFormat::kTiff, io::ImageFormat::kTiff},
+     {ImageFileFormat::kExr, io::ImageFormat::kExr},
+     {ImageFileFormat::kWebp, io::ImageFormat::kWebp},
+     {ImageFileFormat::kBmp, io::ImageFormat::kBmp},
+     {ImageFileFormat::kPnm, io::ImageFormat::kPnm},
+     {ImageFileFormat::kPfm, io::ImageFormat::kPfm}}};
+
+ImageFileFormat PublicFormat(io::ImageFormat format) {
+  for (const auto& [shown, inner] : kFormats) {
+    if (inner == format) return shown;
+  }
+  return ImageFileFormat::kPng;
+}
+
+io::ImageFormat InnerFormat(ImageFileFormat format) {
+  for (const auto& [shown, inner] : kFormats) {
+    if (shown == format) return inner;
+  }
+  throw OptionError("format", fmt::format("format: {} is unknown", static_cast<int>(format)));
+}
+
+std::string Encoded(const model::EncodedImage& image, io::ImageFormat format,
+                    const io::ImageWriting& writing) {
+  if (format == io::ImageFormat::kPng) {
+    const std::string png = io::EncodePng(image);
+    return writing.description.empty() ? png : io::WithDescription(png, writing.description);
+  }
+  const cv::Mat wide(image.height_px, image.width_px, CV_16UC(image.channels),
+                     const_cast<std::uint16_t*>(image.values.data()));  // NOLINT: only read
+  cv::Mat values = wide;
+  if (image.bits == 8) wide.convertTo(values, CV_8U);
+  return io::EncodeImageFile(values, format, writing);
+}
 
 int ChannelsOf(ChannelOrder order) {
   switch (order) {
@@ -204,42 +244,71 @@ Image Image::Cropped(const model::PixelRect& rect) const {
 
 Image ReadImage(const std::string& path, std::optional<TransferCurve> transfer) {
   Image image;
-  image.pixels_ = io::ToEncodedImage(io::ReadImageFile(path));
+  io::ImageFacts facts;
+  image.pixels_ = io::ToEncodedImage(io::ReadImageFile(path, &facts));
   image.transfer_ = transfer;
+  if (!transfer && facts.raw) image.transfer_ = TransferCurve::Linear();
   image.source_ = path;
   image.is_from_file_ = true;
   return image;
 }
 
+ImageFileFormat ImageFormatOfName(const std::string& path) {
+  return PublicFormat(io::FormatOfName(path));
+}
+
 EncodedImageFile EncodeImage(const Image& image, const ImageFileOptions& options) {
   checks::RequireValid(options);
   if (image.is_empty()) throw Error("image: at least one pixel is expected, found an empty image");
+  const io::ImageFormat format = InnerFormat(options.format);
+  io::ImageWriting writing;
+  writing.description = options.description;
   EncodedImageFile file;
+  if (!image.is_linear() && options.noise_levels != 0)
+    throw OptionError("noise_levels", "noise_levels: is for linear light only");
+  const int bits = image.is_linear() ? options.bits : image.encoded().bits;
+  if (!io::HoldsBits(format, bits) && !io::HoldsBits(format, 8)) {  // EXR and PFM
+    if (options.noise_levels != 0) {
+      throw OptionError(
+          "noise_levels",
+          fmt::format("noise_levels: is for files of integers, not {}", io::NameOf(format)));
+    }
+    const model::LinearImage light =
+        image.ToLight(image.transfer().value_or(TransferCurve::Srgb()));
+    const cv::Mat values(light.height_px, light.width_px, CV_32FC(light.channels),
+                         const_cast<float*>(light.values.data()));  // NOLINT: only read
+    writing.is_linear = true;
+    file.bytes = io::EncodeImageFile(values, format, writing);
+    return file;
+  }
+  if (!io::HoldsBits(format, bits)) {
+    throw OptionError(
+        "bits", fmt::format("bits: a {} file has 8 bits, found {}", io::NameOf(format), bits));
+  }
   if (image.is_linear()) {
     const TransferCurve transfer = image.transfer().value_or(TransferCurve::Srgb());
     file.clipped_values = io::CountClipped(image.light(), transfer, options.bits);
-    file.png = io::EncodePng(model::ToEncodedWithNoise(image.light(), transfer, options.bits,
-                                                       options.noise_levels / kEncodedLevels,
-                                                       options.seed));
+    file.bytes =
+        Encoded(model::ToEncodedWithNoise(image.light(), transfer, options.bits,
+                                          options.noise_levels / kEncodedLevels, options.seed),
+                format, writing);
   } else {
-    if (options.noise_levels != 0) {
-      throw OptionError("noise_levels", "noise_levels: is for linear light only");
-    }
     if (options.bits > image.bits()) {  // 8 is the default
       throw OptionError("bits", "bits: 16 is for linear light and for values of 16 bits only");
     }
-    file.png = io::EncodePng(image.encoded());
+    file.bytes = Encoded(image.encoded(), format, writing);
   }
-  if (!options.description.empty()) file.png = io::WithDescription(file.png, options.description);
   return file;
 }
 
 std::size_t WriteImage(const std::string& path, const Image& image,
                        const ImageFileOptions& options) {
-  checks::RequireValid(options);
+  ImageFileOptions by_name = options;
+  by_name.format = ImageFormatOfName(path);
+  checks::RequireValid(by_name);
   OutputFile output(path);
-  const EncodedImageFile file = WithFileContext(path, [&] { return EncodeImage(image, options); });
-  output.Commit(file.png);
+  const EncodedImageFile file = WithFileContext(path, [&] { return EncodeImage(image, by_name); });
+  output.Commit(file.bytes);
   return file.clipped_values;
 }
 

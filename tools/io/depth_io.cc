@@ -1,14 +1,16 @@
 #include "thicklens/io/depth_io.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
-#include <opencv2/core/mat.hpp>
+#include <opencv2/core.hpp>
 #include <optional>
 #include <vector>
 
@@ -16,6 +18,7 @@
 #include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/base/printable_text.h"
+#include "thicklens/io/image_file.h"
 #include "tools/io/image_file_kind.h"
 #include "tools/io/png_check.h"
 
@@ -104,28 +107,27 @@ std::string TypeName(const cv::Mat& image) {
   return fmt::format("{} values in {} channel(s)", kNames[image.depth()], image.channels());
 }
 
-const std::vector<ImageFileKind> kDepthKinds = {ImageFileKind::kPng, ImageFileKind::kTiff,
-                                                ImageFileKind::kExr};
-
-// A PNG of fewer bits would be spread over 8 when decoded.
-bool IsAsExpected(const cv::Mat& image, ImageFileKind kind, const std::string& bytes) {
-  if (kind == ImageFileKind::kPng)
-    return PngBits(bytes) >= 8 && (image.type() == CV_8UC1 || image.type() == CV_16UC1);
-  return image.type() == CV_32FC1 || (kind == ImageFileKind::kTiff && image.type() == CV_16UC1);
-}
+constexpr std::array<ImageFileKind, 4> kDepthKinds = {ImageFileKind::kPng, ImageFileKind::kTiff,
+                                                      ImageFileKind::kExr, ImageFileKind::kPnm};
 
 std::string ExpectedOf(ImageFileKind kind) {
   if (kind == ImageFileKind::kPng) return "a PNG depth map has 8- or 16-bit values";
-  if (kind == ImageFileKind::kTiff) return "a TIFF depth map has 16-bit or 32-bit float values";
+  if (kind == ImageFileKind::kTiff) return "a TIFF depth map has integer or float values";
+  if (kind == ImageFileKind::kPnm) return "a PGM depth map has 8- or 16-bit values";
   return "an EXR depth map has float values";
 }
 
-cv::Mat Decode(const std::string& bytes, const std::string& name) {
-  std::string why;
-  cv::Mat image = DecodeUnchanged(bytes, name, kDepthKinds, &why);
-  if (!image.empty()) return image;
-  throw Error(fmt::format("{}: cannot be decoded as a depth map ({} bytes){}", name, bytes.size(),
-                          why.empty() ? "" : ": " + why));
+// Returns the place of the channel that is the depth: the only one, or the one named Z.
+std::optional<int> DepthChannel(const std::vector<std::string>& names) {
+  if (names.size() == 1) return 0;
+  std::optional<int> found;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const std::string last = names[i].substr(names[i].rfind('.') + 1);
+    if (last != "Z" && last != "z") continue;
+    if (found) return std::nullopt;  // of several layers
+    found = static_cast<int>(i);
+  }
+  return found;
 }
 
 }  // namespace
@@ -138,17 +140,29 @@ model::RawDepthMap ReadDepthMap(const std::string& path) {
   if (StartsWith(bytes, "Pf")) return DecodePfm(bytes, path);
   const std::optional<ImageFileKind> kind = KindOfImage(bytes);
   if (!kind || std::find(kDepthKinds.begin(), kDepthKinds.end(), *kind) == kDepthKinds.end()) {
-    throw Error(fmt::format("{}: not a depth map: a PFM, PNG, TIFF or EXR file is expected", path));
+    throw Error(
+        fmt::format("{}: not a depth map: a PFM, PNG, PGM, TIFF or EXR file is expected", path));
   }
-  const cv::Mat image = Decode(bytes, path);
-  if (!IsAsExpected(image, *kind, bytes)) {
+  ImageReading reading;
+  reading.spread_bits = false;
+  const DecodedImage decoded = DecodeImageFile(bytes, path, reading);
+  const std::optional<int> channel = DepthChannel(decoded.facts.channels);
+  // A PNG of fewer bits is more likely a picture.
+  const bool has_few_bits = *kind == ImageFileKind::kPng && PngBits(bytes) < 8;
+  if (!channel || has_few_bits) {
     throw Error(fmt::format(
-        "{}: {} in one channel, found {}{}", path, ExpectedOf(*kind), TypeName(image),
-        *kind == ImageFileKind::kPng ? fmt::format(" ({} bits in the file)", PngBits(bytes)) : ""));
+        "{}: {} in one channel, found {}{}", path, ExpectedOf(*kind), TypeName(decoded.pixels),
+        *kind == ImageFileKind::kPng
+            ? fmt::format(" ({} bits in the file)", PngBits(bytes))
+            : fmt::format(" ({})", PrintableUtf8(fmt::format(
+                                       "{}", fmt::join(decoded.facts.channels, ", "))))));
   }
-  model::RawDepthMap map{image.cols, image.rows, {}, image.depth() != CV_32F};
+  cv::Mat image;
+  cv::extractChannel(decoded.pixels, image, *channel);
+  const bool is_integer = decoded.facts.sample_type.find("float") == std::string::npos;
+  model::RawDepthMap map{image.cols, image.rows, {}, is_integer};
   cv::Mat values;
-  image.convertTo(values, CV_32F);  // exact: float holds every 16-bit number
+  image.convertTo(values, CV_32F);  // exact for 16 bits
   map.values.reserve(values.total());
   for (int y = 0; y < values.rows; ++y) {
     ThrowIfCancelled();

@@ -7,19 +7,18 @@
 #include <array>
 #include <cctype>
 #include <cmath>
-#include <cstdarg>
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <cstring>
-#include <memory>
+#include <utility>
+#include <vector>
 
+#include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/memory_available.h"
 #include "thicklens/base/printable_text.h"
-#include "tools/io/opencv_codecs.h"
-#include "tools/io/png_check.h"
-#include "tools/io/png_pixels.h"
+#include "tools/io/image_library.h"
+#include "tools/io/tiff_pixels.h"
 
 namespace thicklens::io {
 namespace {
@@ -32,8 +31,12 @@ struct StatedSize {
   double most_of_a_byte = 1;  // at most so many decoded bytes per byte of the file
 };
 
+bool HasAt(const std::string& bytes, std::size_t at, const std::string& text) {
+  return bytes.size() >= at && bytes.compare(at, text.size(), text) == 0;
+}
+
 bool StartsWith(const std::string& bytes, const std::string& start) {
-  return bytes.compare(0, start.size(), start) == 0;
+  return HasAt(bytes, 0, start);
 }
 
 // Reads zeros beyond the end.
@@ -86,39 +89,6 @@ std::optional<StatedSize> SizeOfJpeg(const std::string& bytes) {
   return std::nullopt;
 }
 
-// The bytes of a file that libtiff reads from memory.
-struct BytesInMemory {
-  const std::string* bytes = nullptr;
-  std::size_t at = 0;
-
-  static tmsize_t Read(thandle_t handle, void* to, tmsize_t size) {
-    auto* file = static_cast<BytesInMemory*>(handle);
-    const std::size_t left = file->bytes->size() - std::min(file->at, file->bytes->size());
-    const std::size_t count = std::min(left, static_cast<std::size_t>(std::max<tmsize_t>(size, 0)));
-    if (count > 0) std::memcpy(to, file->bytes->data() + file->at, count);
-    file->at += count;
-    return static_cast<tmsize_t>(count);
-  }
-  static tmsize_t Write(thandle_t, void*, tmsize_t) { return 0; }
-  static toff_t Seek(thandle_t handle, toff_t offset, int whence) {
-    auto* file = static_cast<BytesInMemory*>(handle);
-    if (whence == SEEK_CUR) offset += file->at;
-    if (whence == SEEK_END) offset += file->bytes->size();
-    file->at = static_cast<std::size_t>(offset);
-    return offset;
-  }
-  static int Close(thandle_t) { return 0; }
-  static toff_t Size(thandle_t handle) {
-    return static_cast<BytesInMemory*>(handle)->bytes->size();
-  }
-};
-
-int KeepStill(TIFF*, void*, const char*, const char*, std::va_list) { return 1; }
-
-struct CloseTiff {
-  void operator()(TIFF* tiff) const { TIFFClose(tiff); }
-};
-
 // Returns the maximum expansion of a compression in decoded bytes per byte; for rarely used ones
 // the value is a generous bound.
 double MostOfAByte(int compression) {
@@ -136,28 +106,26 @@ double MostOfAByte(int compression) {
   }
 }
 
+// The largest of its pages.
 std::optional<StatedSize> SizeOfTiff(const std::string& bytes) {
-  BytesInMemory file{&bytes, 0};
-  TIFFOpenOptions* options = TIFFOpenOptionsAlloc();
-  TIFFOpenOptionsSetErrorHandlerExtR(options, KeepStill, nullptr);
-  TIFFOpenOptionsSetWarningHandlerExtR(options, KeepStill, nullptr);
-  const std::unique_ptr<TIFF, CloseTiff> tiff(TIFFClientOpenExt(
-      "", "rm", &file, BytesInMemory::Read, BytesInMemory::Write, BytesInMemory::Seek,
-      BytesInMemory::Close, BytesInMemory::Size, nullptr, nullptr, options));
-  TIFFOpenOptionsFree(options);
-  if (!tiff) return std::nullopt;
-  std::uint32_t width = 0, height = 0;
-  std::uint16_t bits = 1, channels = 1, compression = COMPRESSION_NONE;
-  std::uint16_t photometric = PHOTOMETRIC_MINISBLACK;
-  TIFFGetField(tiff.get(), TIFFTAG_IMAGEWIDTH, &width);
-  TIFFGetField(tiff.get(), TIFFTAG_IMAGELENGTH, &height);
-  TIFFGetFieldDefaulted(tiff.get(), TIFFTAG_BITSPERSAMPLE, &bits);
-  TIFFGetFieldDefaulted(tiff.get(), TIFFTAG_SAMPLESPERPIXEL, &channels);
-  TIFFGetFieldDefaulted(tiff.get(), TIFFTAG_COMPRESSION, &compression);
-  TIFFGetField(tiff.get(), TIFFTAG_PHOTOMETRIC, &photometric);
-  if (photometric == PHOTOMETRIC_YCBCR) channels = 1;  // the other channels have fewer pixels
-  return StatedSize{static_cast<double>(width), static_cast<double>(height), bits / 8.0 * channels,
-                    MostOfAByte(compression)};
+  std::optional<StatedSize> largest;
+  std::vector<TiffPage> pages;
+  try {
+    pages = TiffPages(bytes);
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const Error&) {
+    return std::nullopt;
+  }
+  for (const TiffPage& page : pages) {
+    const StatedSize size{static_cast<double>(page.width_px), static_cast<double>(page.height_px),
+                          page.bits_per_px / 8, MostOfAByte(page.compression)};
+    if (!largest || size.width_px * size.height_px * size.bytes_per_px >
+                        largest->width_px * largest->height_px * largest->bytes_per_px) {
+      largest = size;
+    }
+  }
+  return largest;
 }
 
 struct ExrAttribute {
@@ -254,8 +222,9 @@ std::optional<StatedSize> SizeOfPnm(const std::string& bytes) {
     for (; at < bytes.size() && is_digit(); ++at) {
       side = std::min(10 * side + (bytes[at] - '0'), kMuch);
     }
-    ++at;  // OpenCV consumes one more byte with the number, even where it begins a comment
   }
+  constexpr char kPam = '7';  // its size is in words; its decoder checks it
+  if (bytes[1] == kPam) return std::nullopt;
   const bool is_bitmap = bytes[1] == '4';
   return StatedSize{sides[0], sides[1], is_bitmap ? 1.0 / 8 : 1, 1};
 }
@@ -273,42 +242,144 @@ std::optional<StatedSize> SizeOf(const std::string& bytes, ImageFileKind kind) {
     case ImageFileKind::kBmp:
       return SizeOfBmp(bytes);
     case ImageFileKind::kPnm:
-      break;
+      return SizeOfPnm(bytes);
+    default:
+      return std::nullopt;  // its decoder checks the size before it allocates
   }
-  return SizeOfPnm(bytes);
 }
+
+bool IsIsoMedia(const std::string& bytes, const std::vector<std::string>& brands) {
+  constexpr std::size_t kTypeAt = 4, kBrandAt = 8, kBrandBytes = 4, kMaxBytes = 256;
+  if (!HasAt(bytes, kTypeAt, "ftyp")) return false;
+  const std::size_t end =
+      std::min({static_cast<std::size_t>(BigEndian(bytes, 0, 4)), bytes.size(), kMaxBytes});
+  for (std::size_t at = kBrandAt; at + kBrandBytes <= end; at += kBrandBytes) {
+    constexpr std::size_t kMinorVersionAt = 12;
+    if (at == kMinorVersionAt) continue;
+    if (std::find(brands.begin(), brands.end(), bytes.substr(at, kBrandBytes)) != brands.end())
+      return true;
+  }
+  return false;
+}
+
+// Raw files that are no TIFF files.
+bool IsOtherRaw(const std::string& bytes) {
+  for (const std::string& start : {"IIRO"s, "IIRS"s, "MMOR"s, "IIU\0"s, "FUJIFILMCCD-RAW"s, "FOVb"s,
+                                   "\0MRM"s, "II\x1A\0\0\0HEAPCCDR"s}) {
+    if (StartsWith(bytes, start)) return true;
+  }
+  return IsIsoMedia(bytes, {"crx "});
+}
+
+}  // namespace
 
 // A small file may need more memory than there is when decoded; this is reported beforehand, with
 // the file's name. A decoded image has at least one byte per value, and is then copied to wider
 // numbers.
-void RequireMemory(const StatedSize& size, const std::string& name) {
+void RequireMemory(double width_px, double height_px, double bytes_per_px,
+                   const std::string& name) {
   constexpr double kCopies = 3, kLittleMib = 64;
   const double needed_mib =
-      kCopies * size.width_px * size.height_px * std::max(1.0, size.bytes_per_px) / (1 << 20);
+      kCopies * width_px * height_px * std::max(1.0, bytes_per_px) / (1 << 20);
   if (needed_mib <= kLittleMib) return;
   const std::optional<double> left_mib = MemoryLeftMib();
   if (!left_mib || needed_mib <= *left_mib) return;
   throw Error(
       fmt::format("{}: {:.0f}x{:.0f} px need at least {:.0f} MiB of memory, {:.0f} MiB are left",
-                  name, size.width_px, size.height_px, needed_mib, *left_mib));
+                  name, width_px, height_px, needed_mib, *left_mib));
 }
-
-}  // namespace
 
 std::optional<ImageFileKind> KindOfImage(const std::string& bytes) {
   if (StartsWith(bytes, "\x89PNG\r\n\x1A\n")) return ImageFileKind::kPng;
   if (StartsWith(bytes, "\xFF\xD8\xFF")) return ImageFileKind::kJpeg;
   for (const std::string& start : {"II*\0"s, "MM\0*"s, "II+\0"s, "MM\0+"s}) {  // + for BigTIFF
-    if (StartsWith(bytes, start)) return ImageFileKind::kTiff;
+    if (StartsWith(bytes, start))
+      return IsRawTiff(bytes) ? ImageFileKind::kRaw : ImageFileKind::kTiff;
   }
   if (StartsWith(bytes, "\x76\x2F\x31\x01")) return ImageFileKind::kExr;
   if (StartsWith(bytes, "BM")) return ImageFileKind::kBmp;
-  // This test is as strict as OpenCV, which otherwise would try other decoders, one of which ends
-  // the program.
-  const bool is_pnm = bytes.size() > 2 && bytes[0] == 'P' && bytes[1] >= '1' && bytes[1] <= '6' &&
-                      std::isspace(static_cast<unsigned char>(bytes[2])) != 0;
-  if (is_pnm) return ImageFileKind::kPnm;
+  if (StartsWith(bytes, "RIFF") && HasAt(bytes, 8, "WEBP")) return ImageFileKind::kWebp;
+  if (IsIsoMedia(bytes, {"heic", "heix", "heim", "heis", "hevc", "hevx", "mif1", "msf1", "avif",
+                         "avis"})) {
+    return ImageFileKind::kHeif;
+  }
+  constexpr std::size_t kDicomMarkAt = 128;
+  if (HasAt(bytes, kDicomMarkAt, "DICM"))
+    return ImageFileKind::kDicom;
+  if (IsOtherRaw(bytes)) return ImageFileKind::kRaw;
+  const bool is_p = bytes.size() > 2 && bytes[0] == 'P' &&
+                    std::isspace(static_cast<unsigned char>(bytes[2])) != 0;
+  if (is_p && bytes[1] >= '1' && bytes[1] <= '7') return ImageFileKind::kPnm;
+  if (is_p && (bytes[1] == 'f' || bytes[1] == 'F')) return ImageFileKind::kPfm;
   return std::nullopt;
+}
+
+std::string NameOfOtherKind(const std::string& bytes) {
+  const std::vector<std::pair<std::string, std::string>> starts = {
+      {"GIF8", "GIF"},
+      {"8BPS", "PSD (Photoshop)"},
+      {"\0\0\0\x0CjP  "s, "JPEG 2000"},
+      {"\xFF\x4F\xFF\x51", "JPEG 2000"},
+      {"\xFF\x0A", "JPEG XL"},
+      {"\0\0\0\x0CJXL "s, "JPEG XL"},
+      {"#?RADIANCE", "Radiance HDR"},
+      {"#?RGBE", "Radiance HDR"},
+      {"SDPX", "DPX"},
+      {"XPDS", "DPX"},
+      {"SIMPLE  =", "FITS"},
+      {"%PDF", "PDF"},
+      {"\x93NUMPY", "NPY (numpy)"},
+      {"MATLAB ", "MAT (Matlab)"},
+      {"\x89HDF\r\n", "HDF5"},
+      {"PK\x03\x04", "ZIP"},
+      {"\x1F\x8B", "gzip"},
+      {"<?xml", "XML"},
+      {"<svg", "SVG"},
+      {"\x1A\x45\xDF\xA3", "Matroska or WebM video"},
+      {"NITF", "NITF"}};
+  for (const auto& [start, name] : starts) {
+    if (StartsWith(bytes, start)) return name;
+  }
+  if (bytes.compare(std::min<std::size_t>(4, bytes.size()), 4, "ftyp") == 0)
+    return "MP4 or MOV video";
+  if (StartsWith(bytes, "RIFF") &&
+      bytes.compare(std::min<std::size_t>(8, bytes.size()), 4, "AVI ") == 0)
+    return "AVI video";
+  return "";
+}
+
+std::string ReadableKinds() {
+  return HasImageLibrary()
+             ? "PNG, TIFF, JPEG, EXR, WebP, HEIF (HEIC, AVIF), BMP, PNM, PFM, DICOM or raw"
+             : "PNG, TIFF, PNM or PFM";
+}
+
+std::string NameOf(ImageFileKind kind) {
+  switch (kind) {
+    case ImageFileKind::kPng:
+      return "PNG";
+    case ImageFileKind::kTiff:
+      return "TIFF";
+    case ImageFileKind::kPnm:
+      return "PNM";
+    case ImageFileKind::kPfm:
+      return "PFM";
+    case ImageFileKind::kJpeg:
+      return "JPEG";
+    case ImageFileKind::kExr:
+      return "EXR";
+    case ImageFileKind::kWebp:
+      return "WebP";
+    case ImageFileKind::kHeif:
+      return "HEIF";
+    case ImageFileKind::kBmp:
+      return "BMP";
+    case ImageFileKind::kDicom:
+      return "DICOM";
+    case ImageFileKind::kRaw:
+      break;
+  }
+  return "raw";
 }
 
 void RequirePossibleSize(const std::string& bytes, ImageFileKind kind, const std::string& name) {
@@ -319,28 +390,11 @@ void RequirePossibleSize(const std::string& bytes, ImageFileKind kind, const std
   constexpr double kLittle = 1 << 20;
   const double needed = size->width_px * size->height_px * size->bytes_per_px;
   if (needed <= kLittle + size->most_of_a_byte * static_cast<double>(bytes.size())) {
-    RequireMemory(*size, name);
+    RequireMemory(size->width_px, size->height_px, size->bytes_per_px, name);
     return;
   }
   throw Error(fmt::format("{}: a broken image: {:.0f}x{:.0f} px do not fit into {} bytes", name,
                           size->width_px, size->height_px, bytes.size()));
-}
-
-cv::Mat DecodeUnchanged(const std::string& bytes, const std::string& name,
-                        const std::vector<ImageFileKind>& kinds, std::string* why) {
-  why->clear();
-  const std::optional<ImageFileKind> kind = KindOfImage(bytes);
-  if (!kind || std::find(kinds.begin(), kinds.end(), *kind) == kinds.end()) return {};
-  RequireWholePng(bytes, name);
-  RequirePossibleSize(bytes, *kind, name);
-  if (*kind == ImageFileKind::kPng) return DecodePngPixels(bytes, why);
-  const OpenCvCodecs* codecs = nullptr;
-  try {
-    codecs = &LoadedOpenCvCodecs();
-  } catch (const Error& error) {
-    throw Error(fmt::format("{}: {}", name, error.what()));
-  }
-  return codecs->decode(bytes, why);
 }
 
 }  // namespace thicklens::io

@@ -1,30 +1,41 @@
 #ifndef THICKLENS_TOOLS_IO_IMAGE_FILE_KIND_H_
 #define THICKLENS_TOOLS_IO_IMAGE_FILE_KIND_H_
 
-#include <opencv2/core/mat.hpp>
 #include <optional>
 #include <string>
-#include <vector>
 
 namespace thicklens::io {
 
-// The kinds of image files that are read. OpenCV would accept many more, through libraries that
-// nobody in this project has reviewed.
-enum class ImageFileKind { kPng, kJpeg, kTiff, kExr, kBmp, kPnm };
+// The kinds of image files that are read.
+enum class ImageFileKind {
+  kPng,
+  kTiff,
+  kPnm,
+  kPfm,
+  kJpeg,
+  kExr,
+  kWebp,
+  kHeif,  // also AVIF
+  kBmp,
+  kDicom,
+  kRaw
+};
 
-// Finds the kind by the first bytes; absent: another kind.
+// Finds the kind by the contents, never by the name; absent: another kind. A TIFF file that
+// contains the mosaic of a camera is kRaw.
 std::optional<ImageFileKind> KindOfImage(const std::string& bytes);
+// Names a kind that is not read ("GIF", "PSD"); empty if it is not known either.
+std::string NameOfOtherKind(const std::string& bytes);
+// Lists the kinds that are read: "PNG, TIFF, ... or raw".
+std::string ReadableKinds();
+std::string NameOf(ImageFileKind kind);
 
 // Decoders allocate memory by the size that a header states. Throws Error that begins with `name`
 // if so few bytes cannot hold that size at the kind's maximum compression. A header that cannot be
-// parsed passes; the decoder reports it.
+// parsed passes; the decoder reports it. Kinds whose size is found by their decoder pass as well.
 void RequirePossibleSize(const std::string& bytes, ImageFileKind kind, const std::string& name);
-
-// Decodes the image in the bytes of a file, unchanged and never rotated, red first. Empty if it is
-// of none of the kinds or cannot be decoded; `why` then gets the reason if it is known. Throws
-// Error that begins with `name` for incomplete PNG files and for impossible sizes.
-cv::Mat DecodeUnchanged(const std::string& bytes, const std::string& name,
-                        const std::vector<ImageFileKind>& kinds, std::string* why);
+// Throws Error that begins with `name` if an image that size needs more memory than there is.
+void RequireMemory(double width_px, double height_px, double bytes_per_px, const std::string& name);
 
 }  // namespace thicklens::io
 

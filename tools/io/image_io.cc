@@ -1,9 +1,12 @@
 #include "thicklens/io/image_io.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <opencv2/core.hpp>
 #include <vector>
 
 #include "thicklens/base/cancel.h"
@@ -25,32 +28,57 @@ void CopyValues(const cv::Mat& image, std::vector<std::uint16_t>* values) {
   }
 }
 
-}  // namespace
-
-cv::Mat DecodeImage(const std::string& bytes, const std::string& name) {
-  std::string why;
-  const cv::Mat image =
-      DecodeUnchanged(bytes, name,
-                      {ImageFileKind::kPng, ImageFileKind::kJpeg, ImageFileKind::kTiff,
-                       ImageFileKind::kBmp, ImageFileKind::kPnm},
-                      &why);
-  if (image.empty()) {
-    throw Error(fmt::format("{}: cannot be decoded as an image ({} bytes): {}", name, bytes.size(),
-                            why.empty() ? "a PNG, TIFF, JPEG, BMP or PNM file is expected" : why));
+// Returns the channels that are a photograph, in the order red, green, blue, alpha.
+cv::Mat PhotographOf(const DecodedImage& image, const std::string& name) {
+  const std::vector<std::string>& names = image.facts.channels;
+  const auto place = [&](const std::string& channel) {
+    return static_cast<int>(std::find(names.begin(), names.end(), channel) - names.begin());
+  };
+  const int none = static_cast<int>(names.size()), red = place("R"), green = place("G"),
+            blue = place("B"), grey = place("Y"), alpha = place("A");
+  std::vector<int> wanted;
+  if (red < none && green < none && blue < none) {
+    wanted = {red, green, blue};
+    if (alpha < none) wanted.push_back(alpha);
+  } else if (none == 2 && grey < none && alpha < none) {
+    wanted = {grey, grey, grey, alpha};
   }
-  if (image.depth() != CV_8U && image.depth() != CV_16U) {
-    throw Error(fmt::format(
-        "{}: an image with 8 or 16 bits per channel is expected, found one of {} bits{}", name,
-        8 * image.elemSize1(), image.depth() >= CV_32F ? ", float" : ""));
+  const bool is_usual = none == 1 || none == 3 || none == 4;
+  if (wanted.empty() || (none == 4 && wanted.size() == 3)) {
+    if (is_usual) return image.pixels;
+    throw Error(fmt::format("{}: 1, 3 or 4 channels are expected, found {} ({})", name, none,
+                            fmt::join(names, ", ")));
   }
-  const int channels = image.channels();
-  if (channels != 1 && channels != 3 && channels != 4) {
-    throw Error(fmt::format("{}: 1, 3 or 4 channels are expected, found {}", name, channels));
+  std::vector<int> from_to;
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    from_to.push_back(wanted[i]);
+    from_to.push_back(static_cast<int>(i));
   }
-  return image;
+  cv::Mat photograph(image.pixels.size(),
+                     CV_MAKETYPE(image.pixels.depth(), static_cast<int>(wanted.size())));
+  cv::mixChannels(&image.pixels, 1, &photograph, 1, from_to.data(), wanted.size());
+  return photograph;
 }
 
-cv::Mat ReadImageFile(const std::string& path) { return DecodeImage(ReadWholeFile(path), path); }
+}  // namespace
+
+cv::Mat DecodeImage(const std::string& bytes, const std::string& name, ImageFacts* facts) {
+  const DecodedImage image = DecodeImageFile(bytes, name);
+  if (facts != nullptr) *facts = image.facts;
+  const cv::Mat& pixels = image.pixels;
+  if (pixels.depth() != CV_8U && pixels.depth() != CV_16U) {
+    throw Error(fmt::format("{}: an image with 8 or 16 bits per channel is expected, found {}: {}",
+                            name, image.facts.sample_type,
+                            "convert it, or read it as a depth map"));
+  }
+  return PhotographOf(image, name);
+}
+
+cv::Mat ReadImageFile(const std::string& path, ImageFacts* facts) {
+  return DecodeImage(ReadWholeFile(path), path, facts);
+}
+
+std::string ReadableImageKinds() { return ReadableKinds(); }
 
 model::EncodedImage ToEncodedImage(const cv::Mat& image) {
   model::EncodedImage stored{

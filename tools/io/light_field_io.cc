@@ -22,6 +22,7 @@
 #include "thicklens/base/parallel.h"
 #include "thicklens/base/printable_text.h"
 #include "thicklens/base/stopwatch.h"
+#include "thicklens/io/image_file.h"
 #include "thicklens/io/image_io.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/light_field_file.h"
@@ -69,11 +70,10 @@ model::LinearImage ReadPngView(const std::string& path, const model::TransferCur
 
 model::LinearImage ReadTiffView(const std::string& path) {
   const std::string bytes = ReadWholeFile(path);
-  std::string why;
-  const cv::Mat image = DecodeUnchanged(bytes, path, {ImageFileKind::kTiff}, &why);
-  if (image.empty()) {
+  if (KindOfImage(bytes) != ImageFileKind::kTiff) {
     throw Error(fmt::format("{}: cannot be decoded as a TIFF file ({} bytes)", path, bytes.size()));
   }
+  const cv::Mat image = DecodeImageFile(bytes, path).pixels;
   if (image.type() != CV_32FC1 && image.type() != CV_32FC3) {
     throw Error(fmt::format(
         "{}: float values in 1 or 3 channels are expected, found {} channel(s) of {} bits{}", path,

@@ -108,18 +108,27 @@ int PngBits(const std::string& bytes) {
   return static_cast<std::uint8_t>(bytes[kBitsAt]);
 }
 
-std::string WithPngResolution(const std::string& png, int pixels_per_metre) {
-  const std::string resolution = BigEndianBytes(static_cast<std::uint32_t>(pixels_per_metre));
-  const std::string unit_metre(1, '\1');
-  const std::string content = resolution + resolution + unit_metre;  // across, down
-  const std::string checked = "pHYs" + content;
+int PngColourType(const std::string& bytes) {
+  if (!IsPng(bytes) || bytes.size() <= kColourTypeAt) return -1;
+  return static_cast<std::uint8_t>(bytes[kColourTypeAt]);
+}
+
+std::string WithPngChunk(const std::string& png, const std::string& type,
+                         const std::string& content) {
+  const std::string checked = type + content;
   const std::string chunk = BigEndianBytes(static_cast<std::uint32_t>(content.size())) + checked +
                             BigEndianBytes(Crc(checked, 0, checked.size()));
-  // It must precede the first IDAT chunk; directly behind IHDR is always allowed.
   const std::size_t header_bytes =
       kLengthBytes + kTypeBytes + BigEndian(png, kSignatureBytes) + kCrcBytes;
   std::string with = png;
   return with.insert(kSignatureBytes + header_bytes, chunk);
+}
+
+std::string WithPngResolution(const std::string& png, int pixels_per_metre) {
+  const std::string resolution = BigEndianBytes(static_cast<std::uint32_t>(pixels_per_metre));
+  const std::string unit_metre(1, '\1');
+  // It must precede the first IDAT chunk; directly behind IHDR is always allowed.
+  return WithPngChunk(png, "pHYs", resolution + resolution + unit_metre);  // across, down
 }
 
 }  // namespace thicklens::io

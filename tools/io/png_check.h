@@ -18,6 +18,13 @@ std::string WithoutPngTexts(const std::string& bytes);
 // Bits of each value of a PNG file; 0 for other files.
 int PngBits(const std::string& bytes);
 
+// 0 grey, 2 RGB, 3 with a palette, 4 grey with alpha, 6 RGBA; -1 for other files.
+int PngColourType(const std::string& bytes);
+
+// Returns a PNG file with another chunk directly behind its first one.
+std::string WithPngChunk(const std::string& png, const std::string& type,
+                         const std::string& content);
+
 // Returns a PNG file with its resolution: the chunk pHYs, by which programs print it at its true
 // size. `png` must be complete and have no resolution yet.
 std::string WithPngResolution(const std::string& png, int pixels_per_metre);

@@ -47,7 +47,7 @@ Decoding DecodingOf(const spng_ihdr& header, bool has_transparency) {
     case SPNG_COLOR_TYPE_TRUECOLOR_ALPHA:
       return {SPNG_FMT_PNG, 0, 4, depth};
     case SPNG_COLOR_TYPE_GRAYSCALE_ALPHA:
-      return {with_alpha, 0, 4, depth};
+      return {SPNG_FMT_PNG, 0, 2, depth};
     case SPNG_COLOR_TYPE_INDEXED:
       if (has_transparency) return {SPNG_FMT_RGBA8, SPNG_DECODE_TRNS, 4, CV_8U};
       return {SPNG_FMT_RGB8, 0, 3, CV_8U};

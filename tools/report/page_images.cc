@@ -12,8 +12,8 @@
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/printable_text.h"
+#include "thicklens/io/image_file.h"
 #include "thicklens/model/transfer_curve.h"
-#include "tools/io/opencv_codecs.h"
 #include "tools/io/png_pixels.h"
 
 namespace thicklens::tools {
@@ -68,13 +68,11 @@ std::array<std::uint8_t, 3> HatchColour(int x, int y) {
 }
 
 std::vector<unsigned char> Encoded(const cv::Mat& shown, bool jpeg) {
-  if (!jpeg) {
-    const std::string png = io::EncodePngPixels(shown, io::PngPacking::kSmall);
-    return {png.begin(), png.end()};
-  }
-  std::vector<unsigned char> bytes = io::LoadedOpenCvCodecs().encode_jpeg(shown, kJpegQuality);
-  if (bytes.empty()) throw Error("an image of the page could not be encoded as JPEG");
-  return bytes;
+  io::ImageWriting writing;
+  writing.jpeg_quality = kJpegQuality;
+  const std::string file = jpeg ? io::EncodeImageFile(shown, io::ImageFormat::kJpeg, writing)
+                                : io::EncodePngPixels(shown, io::PngPacking::kSmall);
+  return {file.begin(), file.end()};
 }
 
 }  // namespace
@@ -197,7 +195,8 @@ cv::Mat GreyMapped(const std::vector<float>& values, int width_px, int height_px
 
 std::string EmbeddedImage(const cv::Mat& shown, const std::string& alt, Packing packing,
                           int place_px) {
-  const bool jpeg = packing == Packing::kSmall && shown.rows * shown.cols >= kSmallestJpegPx;
+  const bool jpeg = packing == Packing::kSmall && shown.rows * shown.cols >= kSmallestJpegPx &&
+                    io::CanWrite(io::ImageFormat::kJpeg);
   return fmt::format(
       "<img{} src=\"data:image/{};base64,{}\" width=\"{}\" height=\"{}\" alt=\"{}\" "
       "style=\"max-width: {}px\"/>",

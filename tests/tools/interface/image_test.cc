@@ -66,7 +66,7 @@ TEST(ImageTest, TheBytesOfAFileAreThoseThatAreWritten) {
   const EncodedImageFile file = EncodeImage(light, options);
   EXPECT_EQ(file.clipped_values, 1U);
   EXPECT_EQ(WriteImage(folder / "a.png", light, options), 1U);
-  EXPECT_EQ(testing::ContentOf(folder / "a.png"), file.png);
+  EXPECT_EQ(testing::ContentOf(folder / "a.png"), file.bytes);
   EXPECT_EQ(ReadImage(folder / "a.png").encoded().values,
             (std::vector<std::uint16_t>{16384, 65535}));
 }

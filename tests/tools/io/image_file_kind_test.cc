@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "support/error_message.h"
+#include "thicklens/io/image_file.h"
 #include "tools/support/image_file_bytes.h"
 
 namespace thicklens::io {
@@ -60,9 +61,7 @@ TEST(ImageFileKind, EvenImagesCanBeInTheirFiles) {
     for (const int size : {1, 3000}) {
       const std::string bytes = EncodedAs(c, cv::Mat(size, size, CV_8U, cv::Scalar(128)));
       EXPECT_EQ(KindOfImage(bytes), c.kind);
-      std::string why;
-      const cv::Mat decoded = DecodeUnchanged(bytes, "x", {c.kind}, &why);
-      EXPECT_EQ(decoded.size(), cv::Size(size, size)) << why;
+      EXPECT_EQ(DecodeImageFile(bytes, "x").pixels.size(), cv::Size(size, size));
     }
   }
 }
@@ -152,15 +151,33 @@ TEST(ImageFileKind, AttributesLargerThanTheFileAreRefused) {
   }
 }
 
-TEST(ImageFileKind, OtherKindsAreNotDecoded) {
-  std::string why;
-  const std::string bmp = EncodedAs(Cases()[7], cv::Mat(4, 4, CV_8U, cv::Scalar(1)));
-  EXPECT_TRUE(DecodeUnchanged(bmp, "x", {ImageFileKind::kPng}, &why).empty());
-  EXPECT_FALSE(DecodeUnchanged(bmp, "x", {ImageFileKind::kBmp}, &why).empty());
-  // Files for which OpenCV uses GDAL and other libraries.
-  for (const char* bytes : {"", "GIF89a", "\x0Aplain", "NITF02.10", "RIFF....WEBP", "P1["}) {
+TEST(ImageFileKind, IsFoundByTheContents) {
+  using namespace std::string_literals;
+  EXPECT_EQ(KindOfImage("RIFF....WEBPVP8 "), ImageFileKind::kWebp);
+  EXPECT_EQ(KindOfImage("\0\0\0\x14"
+                        "ftypheic\0\0\0\0heic"s),
+            ImageFileKind::kHeif);
+  EXPECT_EQ(KindOfImage("\0\0\0\x18"
+                        "ftypmif1\0\0\0\0mif1avif"s),
+            ImageFileKind::kHeif);
+  EXPECT_EQ(KindOfImage("\0\0\0\x14"
+                        "ftypcrx \0\0\0\1crx "s),
+            ImageFileKind::kRaw);
+  EXPECT_EQ(KindOfImage("FUJIFILMCCD-RAW 0201"), ImageFileKind::kRaw);
+  EXPECT_EQ(KindOfImage(std::string(128, '\0') + "DICM"), ImageFileKind::kDicom);
+  EXPECT_EQ(KindOfImage("PF\n1 1\n-1\n"), ImageFileKind::kPfm);
+  EXPECT_EQ(KindOfImage("P7\nWIDTH 1"), ImageFileKind::kPnm);
+  for (const std::string& bytes :
+       {""s, "GIF89a"s, "\x0Aplain"s, "NITF02.10"s, "RIFF....AVI "s, "P1["s, "RIFF"s,
+        "\0\0\0\x14"
+        "ftypisom\0\0\0\0isom"s}) {
     EXPECT_FALSE(KindOfImage(bytes).has_value()) << bytes;
   }
+  EXPECT_EQ(NameOfOtherKind("\0\0\0\x14"
+                            "ftypisom\0\0\0\0isom"s),
+            "MP4 or MOV video");
+  EXPECT_EQ(NameOfOtherKind("RIFF....AVI "), "AVI video");
+  EXPECT_EQ(NameOfOtherKind("nothing"), "");
 }
 
 }  // namespace

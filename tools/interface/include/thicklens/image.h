@@ -96,17 +96,28 @@ class THICKLENS_EXPORT Image {
   bool is_from_file_ = false;
 };
 
-// Reads an image file: 8 or 16 bits; grey, RGB or RGBA; PNG, TIFF, JPEG and what the build's codecs
-// know. The values are exactly those of the file; the image is never rotated by its EXIF.
-// `transfer` states how light became the values, and replaces what a camera's file states. Throws
-// Error that names the file.
+// Reads an image file of 8 or 16 bits: grey, RGB or RGBA; PNG, TIFF, JPEG, WebP, HEIF, raw and what
+// else the build's library knows, by its contents. The values are exactly those of the file, raw
+// ones demosaiced; the image is never rotated by its EXIF. `transfer` states how light became the
+// values, and replaces what a camera's file states; if it is absent, the image has the transfer
+// that the file itself states (raw: linear). Throws Error that names the file.
 THICKLENS_EXPORT Image ReadImage(const std::string& path,
                                  std::optional<TransferCurve> transfer = std::nullopt);
 
+// The kinds of image files that are written. EXR and PFM hold linear light as floats; PNG, TIFF and
+// PNM 8 or 16 bits; the others 8 bits.
+enum class ImageFileFormat { kPng, kJpeg, kTiff, kExr, kWebp, kBmp, kPnm, kPfm };
+// The kind that the ending of a file's name stands for: .png .jpg .jpeg .tif .tiff .exr .webp .bmp
+// .pgm .ppm .pnm .pfm, in capitals or not. Throws Error that names the file and lists the endings,
+// also if this build cannot write the kind.
+THICKLENS_EXPORT ImageFileFormat ImageFormatOfName(const std::string& path);
+
 // The options of WriteImage and EncodeImage.
 struct ImageFileOptions {
-  // 8 or 16, of linear light. Encoded values keep their own bits; 16 is refused for values of 8
-  // bits.
+  // WriteImage takes the kind from the ending of the file's name instead.
+  ImageFileFormat format = ImageFileFormat::kPng;
+  // 8 or 16, of linear light in a file of integers, rounded to the nearest level; encoded values
+  // keep their own, and 16 is refused for values of 8 bits.
   int bits = 8;
   // Standard deviation of normal noise that is added to the encoded values before rounding, in
   // 1/255 of full scale, finite and >= 0; only for linear light.
@@ -119,18 +130,20 @@ struct ImageFileOptions {
   // and the constraint.
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
-// The bytes of a PNG file.
+// An image file in memory.
 struct EncodedImageFile {
-  std::string png;  // all bytes of the file
+  std::string bytes;  // all bytes of the file
   // Values of linear light half a level or more beyond the range, or NaN; 0 for encoded values.
   std::size_t clipped_values = 0;
 };
-// Makes what WriteImage writes. `source` of the image is not part of it. Throws OptionError.
+// Makes what WriteImage writes. `source` of the image is not part of it. Throws OptionError, and
+// Error if the kind does not hold such an image.
 THICKLENS_EXPORT EncodedImageFile EncodeImage(const Image& image,
                                               const ImageFileOptions& options = {});
-// Writes a PNG file. Linear light is encoded by the image's transfer curve and clipped. The file
-// appears completely or not at all. Returns the number of clipped values (half a level beyond the
-// range, or NaN); 0 for encoded values. Throws OptionError, and Error that names the file.
+// Writes a file of the kind that its name ends with. For a file of integers, linear light is
+// encoded by the image's transfer curve and clipped. The file appears completely or not at all.
+// Returns the number of clipped values (half a level beyond the range, or NaN); 0 for encoded
+// values. Throws OptionError, and Error that names the file.
 THICKLENS_EXPORT std::size_t WriteImage(const std::string& path, const Image& image,
                                         const ImageFileOptions& options = {});
 

@@ -5,18 +5,24 @@
 #include <string>
 
 #include "thicklens/base/export.h"
+#include "thicklens/io/image_file.h"
 #include "thicklens/model/scene.h"
 
 namespace thicklens::io {
 
-// Decodes the image in the bytes of a file, exactly as stored: 8 or 16 bit; 1, 3 (RGB) or 4 (RGBA)
-// channels; never rotated. Throws Error that begins with `name`.
-THICKLENS_EXPORT cv::Mat DecodeImage(const std::string& bytes, const std::string& name);
+// The narrow door for photographs: decodes what DecodeImageFile reads if it has 8 or 16 bits and 1,
+// 3 (RGB) or 4 (RGBA) channels. It is never rotated; values of fewer bits are spread; grey with
+// alpha becomes RGBA; raw files are demosaiced. `facts`, if not null, gets what the file states.
+// Throws Error that begins with `name`.
+THICKLENS_EXPORT cv::Mat DecodeImage(const std::string& bytes, const std::string& name,
+                                     ImageFacts* facts = nullptr);
 // Reads the file and decodes it as DecodeImage does. Throws Error that names the path.
-THICKLENS_EXPORT cv::Mat ReadImageFile(const std::string& path);
-// Throws Error if the library that reads JPEG, TIFF, EXR, BMP and PNM files and writes JPEG is
-// missing from the program's installation. PNG files need no such library.
+THICKLENS_EXPORT cv::Mat ReadImageFile(const std::string& path, ImageFacts* facts = nullptr);
+// Throws Error if the library that reads and writes all kinds but PNG, TIFF, PNM and PFM is missing
+// from the program's installation. A build without GPL parts does not need it.
 THICKLENS_EXPORT void RequireImageCodecs();
+// The kinds of files that this build reads, in words.
+THICKLENS_EXPORT std::string ReadableImageKinds();
 
 // Copies the values of a matrix as ReadImageFile returns it.
 THICKLENS_EXPORT model::EncodedImage ToEncodedImage(const cv::Mat& image);

@@ -1,4 +1,4 @@
-#include "tools/io/opencv_codecs.h"
+#include "tools/io/image_library.h"
 
 #include <dlfcn.h>
 #include <fmt/format.h>
@@ -13,10 +13,12 @@
 #include "thicklens/io/image_io.h"
 
 namespace thicklens::io {
+
+#ifdef THICKLENS_IMAGE_LIBRARY
 namespace {
 
-constexpr char kLibrary[] = THICKLENS_OPENCV_CODECS;
-constexpr char kEntry[] = "ThicklensOpenCvCodecs";
+constexpr char kLibrary[] = THICKLENS_IMAGE_LIBRARY;
+constexpr char kEntry[] = "ThicklensImageLibrary";
 
 // Looks where the search path of the program or of a shared library states; null is no such object.
 // Only absolute folders of that path are used, so that a library of this name in the current folder
@@ -54,27 +56,42 @@ std::string LibraryPath() {
   return found;
 }
 
-const OpenCvCodecs* Load() {
+const ImageLibrary* Load() {
   // The library is never closed: the libraries that OpenCV loads do not support unloading.
   const std::string path = LibraryPath();
   void* const library = path.empty() ? nullptr : dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
-  using Entry = const OpenCvCodecs* (*)();
+  using Entry = const ImageLibrary* (*)();
   const auto entry = library == nullptr ? nullptr : reinterpret_cast<Entry>(dlsym(library, kEntry));
   if (entry != nullptr) return entry();
   const char* const why = path.empty() ? "it is in no folder of the search path" : dlerror();
   throw Error(fmt::format(
-      "the library that reads JPEG, TIFF, EXR, BMP and PNM files and writes JPEG, {}, cannot be "
-      "loaded{}{}: it must be in the build folder or where thicklens was installed",
+      "the library that reads and writes JPEG, EXR, WebP and BMP files and reads HEIF, DICOM and "
+      "raw "
+      "files, {}, cannot be loaded{}{}: it must be in the build folder or where thicklens was "
+      "installed",
       kLibrary, why == nullptr ? "" : ": ", why == nullptr ? "" : why));
 }
 
 }  // namespace
 
-const OpenCvCodecs& LoadedOpenCvCodecs() {
-  static const OpenCvCodecs* const codecs = Load();
-  return *codecs;
+const ImageLibrary& LoadedImageLibrary() {
+  static const ImageLibrary* const library = Load();
+  return *library;
 }
 
-void RequireImageCodecs() { LoadedOpenCvCodecs(); }
+bool HasImageLibrary() { return true; }
+#else
+const ImageLibrary& LoadedImageLibrary() {
+  throw Error(
+      "this build has no GPL parts (THICKLENS_WITH_GPL=OFF), and therefore not the library that "
+      "reads this kind of file: it reads PNG, TIFF, PFM and PNM");
+}
+
+bool HasImageLibrary() { return false; }
+#endif
+
+void RequireImageCodecs() {
+  if (HasImageLibrary()) LoadedImageLibrary();
+}
 
 }  // namespace thicklens::io

@@ -1,0 +1,52 @@
+#ifndef THICKLENS_TOOLS_IO_IMAGE_LIBRARY_H_
+#define THICKLENS_TOOLS_IO_IMAGE_LIBRARY_H_
+
+#include <opencv2/core/mat.hpp>
+#include <string>
+#include <vector>
+
+#include "thicklens/io/image_file.h"
+#include "tools/io/image_file_kind.h"
+
+namespace thicklens::io {
+
+// What the library of decoders gets besides the bytes of a file.
+struct LibraryReading {
+  ImageFileKind kind = ImageFileKind::kJpeg;
+  ImageReading reading;
+  // Throws if an image of that size needs more memory than there is.
+  void (*require_memory)(double width_px, double height_px, double bytes_per_px,
+                         const std::string& name) = nullptr;
+};
+
+// One page or part of a file.
+struct LibraryPage {
+  int width_px = 0, height_px = 0;
+  std::string name;
+};
+
+// OpenImageIO with LibRaw and libheif. They are in a library of their own, which is loaded when an
+// image first needs it: with the 260 libraries that it depends on it takes more time and memory
+// than everything else that the program does at its start. No exception leaves a function, and
+// nothing is printed: `why` gets the reason if the result is false.
+struct ImageLibrary {
+  bool (*pages)(const std::string& bytes, const LibraryReading& reading,
+                std::vector<LibraryPage>* pages, std::string* why);
+  // Decodes page `reading.reading.page`. Of the facts, only those are set that the decoder knows:
+  // image_file.cc sets what the bytes of the file tell by themselves. The pixels of a raw file are
+  // its mosaic, unless they are to be demosaiced.
+  bool (*decode)(const std::string& bytes, const LibraryReading& reading, DecodedImage* image,
+                 std::string* why);
+  bool (*encode)(const cv::Mat& pixels, ImageFormat format, const ImageWriting& writing,
+                 std::string* bytes, std::string* why);
+};
+
+// Throws Error if that library is missing from the program's installation, or left out of the
+// build. Many threads may call it.
+const ImageLibrary& LoadedImageLibrary();
+// Whether the build has the library.
+bool HasImageLibrary();
+
+}  // namespace thicklens::io
+
+#endif  // THICKLENS_TOOLS_IO_IMAGE_LIBRARY_H_

@@ -1,0 +1,273 @@
+// HEIC and AVIF by libheif, which keeps 10 and 12 bits; OpenImageIO 2.4 makes 8 bits of them.
+#include <libheif/heif.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <memory>
+#include <opencv2/core.hpp>
+
+#include "tools/io/library/decoders.h"
+
+namespace thicklens::io {
+namespace {
+
+template <typename T, void (*Release)(T*)>
+struct Releases {
+  void operator()(T* object) const { Release(object); }
+};
+
+void ReleaseHandle(heif_image_handle* handle) { heif_image_handle_release(handle); }
+void ReleaseImage(heif_image* image) { heif_image_release(image); }
+
+using Context = std::unique_ptr<heif_context, Releases<heif_context, heif_context_free>>;
+using Handle = std::unique_ptr<heif_image_handle, Releases<heif_image_handle, ReleaseHandle>>;
+using Image = std::unique_ptr<heif_image, Releases<heif_image, ReleaseImage>>;
+
+void Require(heif_error error) {
+  if (error.code != heif_error_Ok) throw Refusal(error.message);
+}
+
+Context Opened(const std::string& bytes) {
+  Context context(heif_context_alloc());
+  if (!context) throw Refusal("no memory");
+  Require(heif_context_read_from_memory_without_copy(context.get(), bytes.data(), bytes.size(),
+                                                     nullptr));
+  return context;
+}
+
+// The main image first, then the others in the file's order.
+std::vector<heif_item_id> Images(heif_context* context) {
+  heif_item_id main = 0;
+  Require(heif_context_get_primary_image_ID(context, &main));
+  const int count = heif_context_get_number_of_top_level_images(context);
+  std::vector<heif_item_id> all(static_cast<std::size_t>(std::max(count, 0)));
+  heif_context_get_list_of_top_level_image_IDs(context, all.data(), count);
+  std::vector<heif_item_id> images = {main};
+  for (const heif_item_id id : all) {
+    if (id != main) images.push_back(id);
+  }
+  return images;
+}
+
+Handle HandleOf(heif_context* context, heif_item_id id) {
+  heif_image_handle* handle = nullptr;
+  Require(heif_context_get_image_handle(context, id, &handle));
+  return Handle(handle);
+}
+
+// Copies a plane of interleaved values of 8 or, in the machine's order, 16 bits.
+cv::Mat Interleaved(const heif_image* image, heif_channel channel, int type) {
+  int stride = 0;
+  const std::uint8_t* const plane = heif_image_get_plane_readonly(image, channel, &stride);
+  const int width = heif_image_get_width(image, channel);
+  const int height = heif_image_get_height(image, channel);
+  if (plane == nullptr || width < 1 || height < 1) throw Refusal("it has no pixels");
+  cv::Mat pixels(height, width, type);
+  for (int y = 0; y < height; ++y)
+    std::memcpy(pixels.ptr(y), plane + static_cast<std::ptrdiff_t>(stride) * y,
+                static_cast<std::size_t>(width) * pixels.elemSize());
+  return pixels;
+}
+
+StatedTransfer TransferOf(int code) {
+  switch (code) {
+    case 1:
+    case 6:
+    case 14:
+    case 15:
+      return StatedTransfer::kBt709;
+    case 8:
+      return StatedTransfer::kLinear;
+    case 13:
+      return StatedTransfer::kSrgb;
+    case 16:
+      return StatedTransfer::kPq;
+    case 18:
+      return StatedTransfer::kHlg;
+    default:
+      return StatedTransfer::kAbsent;
+  }
+}
+
+void TakeColour(const heif_image_handle* handle, ImageFacts* facts) {
+  const std::size_t size = heif_image_handle_get_raw_color_profile_size(handle);
+  constexpr std::size_t kMaxBytes = 32 << 20;
+  if (size > 0 && size <= kMaxBytes) {
+    facts->icc_profile.resize(size);
+    if (heif_image_handle_get_raw_color_profile(handle, facts->icc_profile.data()).code !=
+        heif_error_Ok) {
+      facts->icc_profile.clear();
+    }
+  }
+  heif_color_profile_nclx* nclx = nullptr;
+  if (heif_image_handle_get_nclx_color_profile(handle, &nclx).code != heif_error_Ok ||
+      nclx == nullptr) {
+    return;
+  }
+  facts->transfer = TransferOf(nclx->transfer_characteristics);
+  constexpr int kUnspecified = 2;
+  if (nclx->color_primaries != kUnspecified && nclx->color_primary_white_x > 0) {
+    facts->chromaticities = std::array<double, 8>{
+        nclx->color_primary_red_x,   nclx->color_primary_red_y,  nclx->color_primary_green_x,
+        nclx->color_primary_green_y, nclx->color_primary_blue_x, nclx->color_primary_blue_y,
+        nclx->color_primary_white_x, nclx->color_primary_white_y};
+  }
+  heif_nclx_color_profile_free(nclx);
+}
+
+// Boxes of a file of ISO/IEC 14496-12. libheif 1.15 applies the turns and mirrors of an image but
+// does not say which they are.
+class Boxes {
+ public:
+  explicit Boxes(const std::string& bytes) : bytes_(bytes) {}
+
+  struct Box {
+    std::size_t begin = 0, end = 0;  // of its content
+    std::string type;
+  };
+
+  std::uint32_t Number(std::size_t at, std::size_t count) const {
+    std::uint32_t value = 0;
+    for (std::size_t i = 0; i < count; ++i)
+      value =
+          value << 8 | (at + i < bytes_.size() ? static_cast<std::uint8_t>(bytes_[at + i]) : 0U);
+    return value;
+  }
+  std::vector<Box> Inside(std::size_t begin, std::size_t end) const {
+    std::vector<Box> boxes;
+    constexpr std::size_t kHeader = 8;
+    while (begin + kHeader <= end) {
+      std::size_t size = Number(begin, 4);
+      const std::size_t header = size == 1 ? 2 * kHeader : kHeader;
+      if (size == 1) size = Number(begin + 12, 4);  // of at most 4 GiB
+      if (size == 0) size = end - begin;
+      if (size < header || size > end - begin) break;
+      boxes.push_back({begin + header, begin + size, bytes_.substr(begin + 4, 4)});
+      begin += size;
+    }
+    return boxes;
+  }
+  Box Find(const Box& box, std::size_t skip, const std::string& type) const {
+    for (const Box& inner : Inside(box.begin + skip, box.end)) {
+      if (inner.type == type) return inner;
+    }
+    return {};
+  }
+
+ private:
+  const std::string& bytes_;
+};
+
+// How the decoded image becomes the displayed one: 1 to 8 as in EXIF.
+int OrientationOf(const std::string& bytes, heif_item_id id, bool* is_cropped) {
+  const Boxes boxes(bytes);
+  const Boxes::Box file{0, bytes.size(), ""};
+  const Boxes::Box properties = boxes.Find(boxes.Find(file, 0, "meta"), 4, "iprp");
+  const Boxes::Box list_box = boxes.Find(properties, 0, "ipco");
+  const std::vector<Boxes::Box> list = boxes.Inside(list_box.begin, list_box.end);
+  const Boxes::Box links = boxes.Find(properties, 0, "ipma");
+  // It is mirrored left to right or not, and then turned anticlockwise.
+  bool is_mirrored = false;
+  std::uint32_t turns = 0;
+  std::size_t at = links.begin + 8;
+  const std::uint32_t count = boxes.Number(links.begin + 4, 4);
+  const bool has_long_ids = boxes.Number(links.begin, 1) >= 1;
+  const bool has_long_links = (boxes.Number(links.begin + 3, 1) & 1U) != 0;
+  for (std::uint32_t i = 0; i < count && at < links.end; ++i) {
+    const std::uint32_t item = boxes.Number(at, has_long_ids ? 4 : 2);
+    at += has_long_ids ? 4 : 2;
+    const std::uint32_t item_links = boxes.Number(at++, 1);
+    for (std::uint32_t k = 0; k < item_links; ++k) {
+      const std::uint32_t link =
+          has_long_links ? boxes.Number(at, 2) & 0x7FFFU : boxes.Number(at, 1) & 0x7FU;
+      at += has_long_links ? 2 : 1;
+      if (item != id || link < 1 || link > list.size()) continue;
+      const Boxes::Box& property = list[link - 1];
+      const std::uint32_t value = boxes.Number(property.begin, 1) & 3U;
+      if (property.type == "clap") *is_cropped = true;
+      if (property.type == "irot") turns = (turns + value) % 4;
+      if (property.type == "imir") {  // 0: upside down, 1: left to right, as libheif has it
+        turns = ((value & 1U) == 1 ? 4 - turns : 6 - turns) % 4;
+        is_mirrored = !is_mirrored;
+      }
+    }
+  }
+  constexpr int kPlain[] = {1, 8, 3, 6}, kMirrored[] = {2, 5, 4, 7};
+  return is_mirrored ? kMirrored[turns] : kPlain[turns];
+}
+
+}  // namespace
+
+std::vector<LibraryPage> HeifPages(const std::string& bytes) {
+  const Context context = Opened(bytes);
+  std::vector<LibraryPage> pages;
+  for (const heif_item_id id : Images(context.get())) {
+    const Handle handle = HandleOf(context.get(), id);
+    pages.push_back({heif_image_handle_get_width(handle.get()),
+                     heif_image_handle_get_height(handle.get()), ""});
+  }
+  return pages;
+}
+
+// The pixels are those that the camera stored: turns, mirrors and crops are left to the caller, as
+// for all other kinds. The orientation in EXIF, which says the same again, is not used.
+DecodedImage DecodeHeif(const std::string& bytes, const LibraryReading& reading) {
+  const Context context = Opened(bytes);
+  const std::vector<heif_item_id> images = Images(context.get());
+  const auto page = static_cast<std::size_t>(reading.reading.page.value_or(0));
+  if (page >= images.size()) throw Refusal("it has no such image");
+  const Handle handle = HandleOf(context.get(), images[page]);
+  const int bits = heif_image_handle_get_luma_bits_per_pixel(handle.get());
+  const bool has_alpha = heif_image_handle_has_alpha_channel(handle.get()) != 0;
+  const bool is_wide = bits > 8;
+  const int channels = has_alpha ? 4 : 3;
+  reading.require_memory(heif_image_handle_get_width(handle.get()),
+                         heif_image_handle_get_height(handle.get()), channels * (is_wide ? 2 : 1),
+                         "its pixels");
+  const std::unique_ptr<heif_decoding_options,
+                        Releases<heif_decoding_options, heif_decoding_options_free>>
+      options(heif_decoding_options_alloc());
+  options->ignore_transformations = 1;
+  heif_image* decoded = nullptr;
+  const heif_chroma chroma =
+      is_wide
+          ? (has_alpha ? heif_chroma_interleaved_RRGGBBAA_LE : heif_chroma_interleaved_RRGGBB_LE)
+          : (has_alpha ? heif_chroma_interleaved_RGBA : heif_chroma_interleaved_RGB);
+  Require(heif_decode_image(handle.get(), &decoded, heif_colorspace_RGB, chroma, options.get()));
+  const Image image(decoded);
+  DecodedImage result;
+  result.pixels = Interleaved(image.get(), heif_channel_interleaved,
+                              CV_MAKETYPE(is_wide ? CV_16U : CV_8U, channels));
+  ImageFacts& facts = result.facts;
+  facts.container_bits = is_wide ? 16 : 8;
+  facts.sample_type = "unsigned " + std::to_string(bits) + "-bit integers";
+  facts.full_scale = std::ldexp(1.0, bits) - 1;
+  if (is_wide) {
+    facts.significant_bits = bits;
+    if (reading.reading.spread_bits) {
+      result.pixels.convertTo(result.pixels, result.pixels.type(), 65535 / *facts.full_scale);
+      facts.full_scale = 65535;
+    }
+  }
+  facts.channels = {"R", "G", "B"};
+  if (has_alpha) {
+    facts.channels.emplace_back("A");
+    facts.alpha = heif_image_handle_is_premultiplied_alpha(handle.get()) != 0
+                      ? AlphaKind::kAssociated
+                      : AlphaKind::kStraight;
+  }
+  TakeColour(handle.get(), &facts);
+  bool is_cropped = false;
+  facts.orientation = OrientationOf(bytes, images[page], &is_cropped);
+  if (is_cropped) facts.notes.emplace_back("The file's crop is not applied.");
+  if (bytes.compare(8, 4, "avif") == 0 || bytes.compare(8, 4, "avis") == 0)
+    facts.file_kind = "AVIF";
+  if (images.size() > 1 && !reading.reading.page)
+    facts.notes.emplace_back("The file's main image is taken.");
+  return result;
+}
+
+}  // namespace thicklens::io
