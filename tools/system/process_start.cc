@@ -61,16 +61,12 @@ bool IsRelativeCache(const char* variable) {
 }
 
 // Variables in the environment can make OpenCV end a program before its main() runs, if it cannot
-// read the value (OPENCV_DUMP_ERRORS=abc), write files into the current folder (OPENCV_TRACE=1) or
-// refuse images (OPENCV_IO_MAX_IMAGE_PIXELS=1). None of its variables is a setting of thicklens,
-// except the one that some versions need to read EXR.
+// read the value (OPENCV_DUMP_ERRORS=abc), or write files into the current folder (OPENCV_TRACE=1).
+// OpenImageIO loads decoders from the folders of OIIO_LIBRARY_PATH and takes limits and numbers of
+// threads from OPENIMAGEIO_OPTIONS. None of these variables is a setting of thicklens.
 bool IsSettingToForget(const char* variable) {
-  static const char* const kTruths[] = {"0",     "1",    "true",  "false", "True",
-                                        "False", "TRUE", "FALSE", nullptr};
-  static const char kExr[] = "OPENCV_IO_ENABLE_OPENEXR=";
-  if (IsRelativeCache(variable)) return true;
-  if (!BeginsWith(variable, "OPENCV_")) return false;
-  return !BeginsWith(variable, kExr) || !IsOneOf(variable + sizeof kExr - 1, kTruths);
+  return IsRelativeCache(variable) || BeginsWith(variable, "OPENCV_") ||
+         BeginsWith(variable, "OPENIMAGEIO_") || BeginsWith(variable, "OIIO_");
 }
 
 void ForgetSettings(int /*argc*/, char** /*argv*/, char** environment) {

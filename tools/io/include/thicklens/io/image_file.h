@@ -162,7 +162,7 @@ struct ImageWriting {
   bool is_linear = false;    // the values are linear in light; TIFF and PNG then say so
   bool half_floats = false;  // EXR
   std::string description;   // PNG, JPEG, TIFF and EXR
-  std::string icc_profile;   // PNG, JPEG, TIFF and WebP
+  std::string icc_profile;   // PNG, JPEG and TIFF
 };
 // Returns the bytes of a file. The values are written as they are: whoever makes 8 bits of light
 // says whether they are rounded or dithered. Grey, RGB or, in PNG, TIFF, EXR and WebP, RGBA with
