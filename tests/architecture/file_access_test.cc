@@ -37,7 +37,7 @@ const std::set<std::string>& Known() {
       "tools/io/journal_file.cc",               // grows during a run
       "tools/report/report_folder.cc",          // the head of an output: reading reports an input
       "tools/io/float_tiff.cc",                 // writes a file in an output folder
-      "tools/io/image_file_kind.cc",            // libtiff reads from memory
+      "tools/io/tiff_pixels.cc",                // libtiff reads and writes in memory
       "tools/system/standard_descriptors.cc",   // the null device
       "kernels/opencl/isolated_subprocess.cc",  // the null device
       "model/base/run_cost.cc",                 // files of /proc

@@ -8,6 +8,7 @@
 #include "thicklens/io/block_checkpoint.h"
 #include "thicklens/io/depth_io.h"
 #include "thicklens/io/exif.h"
+#include "thicklens/io/image_file.h"
 #include "thicklens/io/image_io.h"
 #include "thicklens/io/journal_file.h"
 #include "thicklens/io/light_field_io.h"
@@ -130,6 +131,15 @@ const std::vector<FuzzedReader>& FuzzedReaders() {
       {"image",
        [](const std::string& bytes, const TemporaryFolder&) {
          io::ToEncodedImage(io::DecodeImage(bytes, "picture.png"));
+       }},
+      {"image-file",
+       [](const std::string& bytes, const TemporaryFolder&) {
+         io::ImageReading reading;
+         reading.orientation = io::ImageOrientation::kDisplayed;
+         reading.raw = io::RawTreatment::kMosaicPlanes;
+         reading.spread_bits = false;
+         for (const io::DecodedImage& page : io::DecodeImagePages(bytes, "file", reading))
+           page.facts.OneLine();
        }},
       OfFile("photo-exif", "photo.jpg",
              [](const std::string& path) { io::ReadPhotoExif(path, 640, 480); }),

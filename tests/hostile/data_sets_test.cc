@@ -118,10 +118,14 @@ THICKLENS_SITUATION(
                    "20"),
              {"new count", "new traps"});
   ExpectDone(Shell("cd traps; \"$T\" explain ../camera.yaml --depth-range 290:310 --quiet"), {});
-  // This library is loaded as soon as an image needs it.
-  ExpectDone(Shell("cd traps; echo trap > thicklens_opencv_codecs.so; printf 'P5\\n2 "
-                   "2\\n255\\nabcd' > ../a.pgm; \"$T\" compare ../a.pgm ../a.pgm --quiet"),
-             {"new a.pgm", "new traps/thicklens_opencv_codecs.so"});
+  // This library is loaded as soon as an image needs it: a bitmap of 2 x 2 px.
+  ExpectDone(
+      Shell("cd traps; echo trap > thicklens_image_library.so; printf '"
+            "BM\\106\\0\\0\\0\\0\\0\\0\\0\\066\\0\\0\\0\\050\\0\\0\\0"
+            "\\002\\0\\0\\0\\002\\0\\0\\0\\001\\0\\030\\0\\0\\0\\0\\0\\020\\0\\0\\0"
+            "\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0"
+            "abcdef\\0\\0ghijkl\\0\\0' > ../a.bmp; \"$T\" compare ../a.bmp ../a.bmp --quiet"),
+      {"new a.bmp", "new traps/thicklens_image_library.so"});
 }
 
 THICKLENS_SITUATION(HostileDataSets, SettingsInTheCurrentFolder,

@@ -475,7 +475,7 @@ int ImageJImages(const std::string& description) {
 }  // namespace
 
 std::vector<TiffPage> TiffPages(const std::string& bytes) {
-  const OpenFile file(bytes);
+  OpenFile file(bytes);
   if (!file.tiff) throw Error(file.error.empty() ? "a TIFF file is expected" : file.error);
   std::vector<TiffPage> pages, reduced;
   std::string description;
@@ -488,9 +488,12 @@ std::vector<TiffPage> TiffPages(const std::string& bytes) {
         .push_back({i, static_cast<int>(std::min<std::uint32_t>(layout.width, 1U << 30)),
                     static_cast<int>(std::min<std::uint32_t>(layout.height, 1U << 30)),
                     samples * layout.bits, layout.compression});
-    if (TIFFReadDirectory(file.tiff.get()) != 1) break;
+    // A message about a tag that libtiff does not know is none about the directory.
+    if (TIFFLastDirectory(file.tiff.get()) != 0) break;
+    file.error.clear();
+    if (TIFFReadDirectory(file.tiff.get()) != 1)
+      throw Error(file.error.empty() ? "a directory of the file cannot be read" : file.error);
   }
-  if (!file.error.empty()) throw Error(file.error);
   if (pages.empty()) pages = reduced;
   if (pages.size() == 1 && ImageJImages(description) > 1) {
     throw Error(
@@ -534,7 +537,8 @@ DecodedImage DecodeTiff(const std::string& bytes, const TiffPage& page, bool spr
   if (tiff == nullptr ||
       (page.directory > 0 && TIFFSetDirectory(tiff, static_cast<tdir_t>(page.directory)) != 1))
     throw Error(file.error.empty() ? "a TIFF file is expected" : file.error);
-  Layout layout(tiff);
+  file.error.clear();  // messages about tags
+  const Layout layout(tiff);
   RequireReadable(layout);
   DecodedImage image;
   ImageFacts& facts = image.facts;

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "support/temporary_folder.h"
+#include "thicklens/io/image_io.h"
 #include "tools/support/child_process.h"
 
 namespace thicklens::tools {
@@ -112,7 +113,7 @@ std::string PoclLibrary() {
 }
 
 TEST_F(DoctorTest, SaysWhichImageFilesAreRead) {
-  EXPECT_EQ(Json("cpu")["image_files"], "PNG; JPEG, TIFF, EXR, BMP and PNM by OpenCV");
+  EXPECT_EQ(Json("cpu")["image_files"], io::ReadableImageKinds());
 }
 
 TEST_F(DoctorTest, FindsThisMachineWell) {

@@ -20,6 +20,7 @@ namespace thicklens::io {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::AnyOf;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 using tools::Encoded;
@@ -95,16 +96,16 @@ TEST(DecodeImage, RefusesATruncatedPng) {
 
 TEST(DecodeImage, RefusesFloats) {
   EXPECT_THAT(MessageOf(Encoded(cv::Mat(4, 4, CV_32F, cv::Scalar(0.5)), ".tiff")),
-              AllOf(HasSubstr("8 or 16 bits"), HasSubstr("32 bits, float")));
+              AllOf(HasSubstr("8 or 16 bits"), HasSubstr("found 32-bit floats")));
 }
 
 // The message is not that of the function inside that fails.
-TEST(DecodeImage, SaysWhatIsExpectedOfABrokenFile) {
+TEST(DecodeImage, SaysWhatIsWrongWithABrokenFile) {
   for (const std::string extension : {".ppm", ".bmp"}) {
     std::string bytes = Encoded(cv::Mat(40, 40, CV_8UC3, cv::Scalar(1, 2, 3)), extension);
     bytes.resize(bytes.size() / 2);
     EXPECT_THAT(MessageOf(bytes), HasSubstr("cannot be decoded as an image")) << extension;
-    EXPECT_THAT(MessageOf(bytes), HasSubstr("is expected")) << extension;
+    EXPECT_THAT(MessageOf(bytes), AnyOf(HasSubstr("are expected"), HasSubstr("BMP"))) << extension;
   }
 }
 

@@ -82,7 +82,7 @@ TEST(TrustedEnvironment, CompiledKernelsAreNotSharedWithOtherUsers) {
 TEST(TrustedEnvironment, LibrariesOfTheCurrentFolderAreNotLoaded) {
   const TemporaryFolder folder;
   for (const char* name : {"libcsv.so.3", "libfmt.so.9", "libOpenCL.so.1", "libpocl.so.2",
-                           "libopencv_core.so.406", "thicklens_opencv_codecs.so", ".exiv2"}) {
+                           "libopencv_core.so.406", "thicklens_image_library.so", ".exiv2"}) {
     folder.Put(name, "no library");
   }
   const ProgramRun run =
@@ -94,7 +94,7 @@ TEST(TrustedEnvironment, LibrariesOfTheCurrentFolderAreNotLoaded) {
 // The library of decoders is searched only by the search path of the program.
 TEST(TrustedEnvironment, DecodersAreNotFoundByARelativeSearchPath) {
   const TemporaryFolder folder;
-  folder.Put("thicklens_opencv_codecs.so", "no library");
+  folder.Put("thicklens_image_library.so", "no library");
   const ProgramRun run = RunProgram(
       "/usr/bin/env", {"LD_LIBRARY_PATH=.", THICKLENS_PROGRAM, "doctor", "--device", "cpu"},
       folder.path(), 60);

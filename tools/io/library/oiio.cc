@@ -108,6 +108,9 @@ class Input {
   [[noreturn]] void Fail(const std::string& otherwise) {
     std::string why = input_->geterror();
     if (why.empty()) why = OIIO::geterror();
+    // The path of a file in memory means nothing to the user.
+    const std::size_t at = file_ ? why.find(file_->path()) : std::string::npos;
+    if (at != std::string::npos) why.erase(at, file_->path().size());
     throw Refusal(why.empty() ? otherwise : why);
   }
 
