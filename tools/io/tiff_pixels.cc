@@ -271,9 +271,7 @@ void CopyRow(const Layout& layout, const std::uint8_t* from, std::size_t count, 
 void ReadChunks(const Layout& layout, OpenFile* file, cv::Mat* image) {
   TIFF* const tiff = file->tiff.get();
   const auto chunk_bytes = layout.is_tiled ? TIFFTileSize(tiff) : TIFFStripSize(tiff);
-  const auto row_bytes = layout.is_tiled     ? TIFFTileRowSize(tiff)
-                         : layout.IsPlanar() ? TIFFScanlineSize(tiff)
-                                             : TIFFScanlineSize(tiff);
+  const auto row_bytes = layout.is_tiled ? TIFFTileRowSize(tiff) : TIFFScanlineSize(tiff);
   // A chunk may be larger than the image, but not by much.
   const std::size_t samples = layout.SamplesPerChunkPixel();
   const std::size_t needed_row = (std::size_t{layout.chunk_width} * samples * layout.bits + 7) / 8;
@@ -283,8 +281,12 @@ void ReadChunks(const Layout& layout, OpenFile* file, cv::Mat* image) {
     throw Error(file->error.empty() ? "the sizes of its strips or tiles make no sense"
                                     : file->error);
   }
-  std::vector<std::uint64_t> buffer(static_cast<std::size_t>(chunk_bytes) / 8 + 2);  // aligned
-  auto* const bytes = reinterpret_cast<std::uint8_t*>(buffer.data());                // NOLINT
+  // Strips whose rows are those of the image are decoded into their place.
+  const bool is_direct = !layout.is_tiled && !layout.IsPlanar() && image->isContinuous() &&
+                         layout.bits % 8 == 0 &&
+                         static_cast<std::size_t>(row_bytes) == image->step[0];
+  std::vector<std::uint64_t> buffer(is_direct ? 0 : static_cast<std::size_t>(chunk_bytes) / 8 + 2);
+  auto* const bytes = reinterpret_cast<std::uint8_t*>(buffer.data());  // NOLINT: aligned
   const std::size_t planes = layout.IsPlanar() ? layout.samples : 1;
   const std::size_t step = layout.IsPlanar() ? layout.samples : 1;
   const std::size_t value_bytes = image->elemSize1();
@@ -301,7 +303,8 @@ void ReadChunks(const Layout& layout, OpenFile* file, cv::Mat* image) {
             layout.is_tiled
                 ? TIFFReadEncodedTile(tiff, TIFFComputeTile(tiff, x, y, 0, sample), bytes,
                                       chunk_bytes)
-                : TIFFReadEncodedStrip(tiff, TIFFComputeStrip(tiff, y, sample), bytes, wanted);
+                : TIFFReadEncodedStrip(tiff, TIFFComputeStrip(tiff, y, sample),
+                                       is_direct ? image->ptr(static_cast<int>(y)) : bytes, wanted);
         // Without an exception for it, memory that nobody wrote would become pixels.
         if (read != wanted) {
           throw Error(file->error.empty()
@@ -309,7 +312,7 @@ void ReadChunks(const Layout& layout, OpenFile* file, cv::Mat* image) {
                                         std::max<tmsize_t>(read, 0), wanted)
                           : file->error);
         }
-        for (std::uint32_t row = 0; row < rows; ++row) {
+        for (std::uint32_t row = 0; row < rows && !is_direct; ++row) {
           std::uint8_t* const to = image->ptr(static_cast<int>(y + row)) +
                                    (std::size_t{x} * layout.samples + plane) * value_bytes;
           CopyRow(layout, bytes + static_cast<std::size_t>(row_bytes) * row, columns * samples, to,
