@@ -147,7 +147,7 @@ model::RawDepthMap ReadDepthMap(const std::string& path) {
   reading.spread_bits = false;
   const DecodedImage decoded = DecodeImageFile(bytes, path, reading);
   const std::optional<int> channel = DepthChannel(decoded.facts.channels);
-  // A PNG of fewer bits is more likely a picture.
+  // A PNG of fewer bits is more likely a drawing.
   const bool has_few_bits = *kind == ImageFileKind::kPng && PngBits(bytes) < 8;
   if (!channel || has_few_bits) {
     throw Error(fmt::format(

@@ -56,7 +56,7 @@ ImageFileKind RequireKind(const std::string& bytes, const std::string& name) {
                   other.empty() ? "" : fmt::format("it is a {} file; ", other), ReadableKinds()));
 }
 
-// Of a JPEG file: the number of channels by its frame header, and whether it has an end.
+// The number of channels of a JPEG file by its frame header, and whether it has an end.
 struct JpegMarkers {
   int channels = 0;
   bool has_end = false;
@@ -380,8 +380,7 @@ class ImageFile {
       const std::string name = page.name.empty() ? "" : "'" + PrintableUtf8(page.name) + "' ";
       shown.push_back(fmt::format("{}{}x{}", name, page.width_px, page.height_px));
     }
-    return fmt::format("{} {} ({}{} px)", pages(),
-                       kind_ == ImageFileKind::kExr ? "parts" : "pages",
+    return fmt::format("{} {} ({}{} px)", pages(), kind_ == ImageFileKind::kExr ? "parts" : "pages",
                        fmt::join(shown, ", "), sizes_.size() > kShown ? ", .." : "");
   }
 

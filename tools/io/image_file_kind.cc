@@ -304,8 +304,7 @@ std::optional<ImageFileKind> KindOfImage(const std::string& bytes) {
     return ImageFileKind::kHeif;
   }
   constexpr std::size_t kDicomMarkAt = 128;
-  if (HasAt(bytes, kDicomMarkAt, "DICM"))
-    return ImageFileKind::kDicom;
+  if (HasAt(bytes, kDicomMarkAt, "DICM")) return ImageFileKind::kDicom;
   if (IsOtherRaw(bytes)) return ImageFileKind::kRaw;
   const bool is_p = bytes.size() > 2 && bytes[0] == 'P' &&
                     std::isspace(static_cast<unsigned char>(bytes[2])) != 0;

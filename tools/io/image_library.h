@@ -10,7 +10,7 @@
 
 namespace thicklens::io {
 
-// What the library of decoders gets besides the bytes of a file.
+// The request that the library of decoders gets besides the bytes of a file.
 struct LibraryReading {
   ImageFileKind kind = ImageFileKind::kJpeg;
   ImageReading reading;
@@ -33,7 +33,7 @@ struct ImageLibrary {
   bool (*pages)(const std::string& bytes, const LibraryReading& reading,
                 std::vector<LibraryPage>* pages, std::string* why);
   // Decodes page `reading.reading.page`. Of the facts, only those are set that the decoder knows:
-  // image_file.cc sets what the bytes of the file tell by themselves. The pixels of a raw file are
+  // image_file.cc sets what the bytes of the file state by themselves. The pixels of a raw file are
   // its mosaic, unless they are to be demosaiced.
   bool (*decode)(const std::string& bytes, const LibraryReading& reading, DecodedImage* image,
                  std::string* why);

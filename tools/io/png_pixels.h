@@ -7,8 +7,8 @@
 namespace thicklens::io {
 
 // Decodes the pixels of a PNG file as they are stored, with libspng: 8 or 16 bits (fewer are spread
-// over 8); 1, 2 (grey with alpha), 3 (RGB) or 4 channels (RGBA: also for images other than grey with
-// a transparent colour). Empty if they cannot be decoded; `why` then gets the reason.
+// over 8); 1, 2 (grey with alpha), 3 (RGB) or 4 channels (RGBA: also for images other than grey
+// with a transparent colour). Empty if they cannot be decoded; `why` then gets the reason.
 cv::Mat DecodePngPixels(const std::string& bytes, std::string* why);
 
 enum class PngPacking {

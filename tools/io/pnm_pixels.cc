@@ -253,7 +253,7 @@ DecodedImage DecodePfmImage(const std::string& bytes) {
       static_cast<std::size_t>(format.width_px) * static_cast<std::size_t>(channels);
   const std::size_t expected =
       row_values * static_cast<std::size_t>(format.height_px) * sizeof(float);
-  // The byte behind CR may be a value's first: only the number of bytes tells.
+  // The byte behind CR may be a value's first: only the number of bytes shows which.
   header.EndHeader(bytes.size() > header.at() + 1 && bytes.size() - header.at() - 2 == expected);
   const std::size_t at = header.at();
   if (bytes.size() - at != expected) {

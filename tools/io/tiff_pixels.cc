@@ -121,7 +121,7 @@ bool IsRawPhotometric(TIFF* tiff) {
   return photometric == kPhotometricCfa || photometric == kPhotometricLinearRaw;
 }
 
-// What one directory says about its values.
+// The arrangement and type of the values of one directory.
 struct Layout {
   std::uint32_t width = 0, height = 0;
   std::uint16_t bits = 1, samples = 1, format = SAMPLEFORMAT_UINT, planar = PLANARCONFIG_CONTIG;

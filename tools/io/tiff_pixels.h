@@ -9,7 +9,7 @@
 
 namespace thicklens::io {
 
-// What libtiff finds in a file of one or several pages. Reduced copies (previews, pyramids) and
+// One page of a file, as libtiff finds it. Reduced copies (previews, pyramids) and
 // masks are no pages.
 struct TiffPage {
   unsigned directory = 0;  // which of the file's directories

@@ -30,19 +30,6 @@ bool BeginsWith(const char* text, const char* start) {
   return *start == '\0';
 }
 
-bool IsOneOf(const char* text, const char* const* words) {
-  for (; *words != nullptr; ++words) {
-    const char* word = *words;
-    const char* at = text;
-    while (*word != '\0' && *at == *word) {
-      ++at;
-      ++word;
-    }
-    if (*word == '\0' && *at == '\0') return true;
-  }
-  return false;
-}
-
 // Compiled kernels are code. A relative path would take them from the current folder, which anybody
 // may have filled, and the standard for these folders requires that relative paths are ignored.
 constexpr int kFolderCount = 2;

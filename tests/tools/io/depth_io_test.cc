@@ -137,8 +137,7 @@ TEST_F(DepthFile, FloatImagesAreReadAsTheyAre) {
   }
 }
 
-// Of every sample type; an EXR file may have other channels besides Z. The files are those of
-// image_file_test.cc.
+// The files are those of image_file_test.cc; an EXR file may have other channels besides Z.
 TEST_F(DepthFile, EverySampleTypeIsRead) {
   const auto file = [](const std::string& name) {
     return std::string(THICKLENS_SOURCE_DIR) + "/tests/data/images/" + name;

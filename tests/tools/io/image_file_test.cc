@@ -490,7 +490,7 @@ TEST(ImageFile, RefusesTruncatedFiles) {
   }
 }
 
-// What a decoder makes of it does not matter, but every refusal names the file.
+// A decoder may make anything of it, but every refusal names the file.
 TEST(ImageFile, SurvivesDamagedFiles) {
   std::mt19937 random(4);
   for (const auto& entry : std::filesystem::directory_iterator(PathOf(""))) {

@@ -195,8 +195,8 @@ void ReadChannels(Input* input, int page, const OIIO::ImageSpec& spec, int begin
   }
 }
 
-// Places the data window into the display window: what lies beside the picture is cut, and the
-// picture has zeros where there are no data.
+// Places the data window into the display window: what lies beside the latter is cut, and it
+// has zeros where there are no data.
 void FitDisplayWindow(const OIIO::ImageSpec& spec, DecodedImage* image) {
   const cv::Rect data(spec.x, spec.y, spec.width, spec.height);
   const cv::Rect display(spec.full_x, spec.full_y, spec.full_width, spec.full_height);

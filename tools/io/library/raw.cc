@@ -118,7 +118,7 @@ cv::Mat Demosaiced(LibRaw* raw, RawFacts* facts) {
   options.output_bps = 16;
   options.gamm[0] = options.gamm[1] = 1;
   options.no_auto_bright = 1;
-  options.adjust_maximum_thr = 0;  // the white level does not depend on the picture
+  options.adjust_maximum_thr = 0;  // the white level does not depend on the image
   options.use_camera_wb = 1;
   options.use_auto_wb = 0;
   options.output_color = 1;  // the primaries of sRGB

@@ -17,13 +17,13 @@ enum class StatedTransfer { kAbsent, kLinear, kSrgb, kBt709, kGamma, kPq, kHlg }
 // kAssociated: the colours have been multiplied by alpha.
 enum class AlphaKind { kNone, kStraight, kAssociated };
 
-// What a raw file states about its sensor. Levels are in the sensor's numbers.
+// The facts that a raw file states about its sensor. Levels are in the sensor's numbers.
 struct RawFacts {
   std::string camera;  // maker and model; empty: not stated
   // Colours of the mosaic, row by row: "RGGB" for 2 x 2 px, 36 letters for X-Trans; empty: there is
   // no mosaic.
   std::string mosaic;
-  // Of the sites of each 2 x 2 px of the active area, row by row. The black level has been
+  // Levels of the sites of each 2 x 2 px of the active area, row by row. The black level has been
   // subtracted from the pixels, and the white level is their full scale.
   std::array<double, 4> black_level{};
   double white_level = 0;
@@ -38,7 +38,7 @@ struct RawFacts {
   int sensor_px_per_px = 1;
 };
 
-// What a file states about the image that was read from it.
+// The facts that a file states about the image that was read from it.
 struct ImageFacts {
   std::string file_kind;  // "PNG", "TIFF", "raw"
   std::uint64_t file_bytes = 0;
@@ -76,8 +76,8 @@ struct ImageFacts {
   THICKLENS_EXPORT std::string OneLine() const;
 };
 
-// What is made from the mosaic of a raw file. The black level is always subtracted, and the values
-// are linear in light.
+// The image that is made from the mosaic of a raw file. The black level is always subtracted, and
+// the values are linear in light.
 enum class RawTreatment {
   // Three colours at the sensor's sampling: AHD interpolation, the camera's white balance, linear
   // light with sRGB's primaries, 16 bits. Interpolation changes the spectrum of each colour.
