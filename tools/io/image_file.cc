@@ -22,6 +22,7 @@
 #include "tools/io/image_file_kind.h"
 #include "tools/io/image_library.h"
 #include "tools/io/image_metadata.h"
+#include "tools/io/jpeg_pixels.h"
 #include "tools/io/png_check.h"
 #include "tools/io/png_pixels.h"
 #include "tools/io/pnm_pixels.h"
@@ -54,47 +55,6 @@ ImageFileKind RequireKind(const std::string& bytes, const std::string& name) {
       bytes, name,
       fmt::format("{}a {} file is expected",
                   other.empty() ? "" : fmt::format("it is a {} file; ", other), ReadableKinds()));
-}
-
-// The number of channels of a JPEG file by its frame header, and whether it has an end.
-struct JpegMarkers {
-  int channels = 0;
-  bool has_end = false;
-};
-
-JpegMarkers MarkersOf(const std::string& bytes) {
-  JpegMarkers markers;
-  const auto byte = [&](std::size_t at) {
-    return at < bytes.size() ? static_cast<std::uint8_t>(bytes[at]) : std::uint8_t{0};
-  };
-  constexpr std::size_t kChannelsAt = 9;  // behind the marker, length, bits, height and width
-  for (std::size_t at = 2; at + 1 < bytes.size();) {
-    if (byte(at) != 0xFF) {
-      at = std::min(bytes.find('\xFF', at), bytes.size());
-      continue;
-    }
-    const unsigned marker = byte(at + 1);
-    if (marker == 0xD9) {
-      markers.has_end = true;
-      return markers;
-    }
-    const bool is_frame =
-        marker >= 0xC0 && marker <= 0xCF && marker != 0xC4 && marker != 0xC8 && marker != 0xCC;
-    if (is_frame) markers.channels = byte(at + kChannelsAt);
-    // Zero is a value 0xFF of the compressed data, 0xFF may precede a marker.
-    const bool is_alone = marker <= 1 || (marker >= 0xD0 && marker <= 0xD8);
-    at += marker == 0xFF ? 1
-          : is_alone     ? 2
-                         : 2 + static_cast<std::size_t>(byte(at + 2) << 8 | byte(at + 3));
-  }
-  return markers;
-}
-
-void RequireReadableJpeg(const std::string& bytes) {
-  const JpegMarkers markers = MarkersOf(bytes);
-  if (markers.channels == 4)
-    throw Error("a JPEG file in CMYK, whose colours depend on inks: convert it to RGB");
-  if (!markers.has_end) throw Error("it ends in the middle of the image");
 }
 
 DecodedImage DecodePng(const std::string& bytes, bool spread_bits) {
@@ -309,7 +269,6 @@ class ImageFile {
       for (const TiffPage& page : tiff_pages_)
         sizes_.push_back({page.width_px, page.height_px, ""});
     } else if (IsByLibrary()) {
-      if (kind_ == ImageFileKind::kJpeg) RequireReadableJpeg(bytes_);
       std::string why;
       if (!LoadedImageLibrary().pages(bytes_, ForLibrary(0), &sizes_, &why)) throw Error(why);
     }
@@ -318,7 +277,8 @@ class ImageFile {
 
   bool IsByLibrary() const {
     return kind_ != ImageFileKind::kPng && kind_ != ImageFileKind::kTiff &&
-           kind_ != ImageFileKind::kPnm && kind_ != ImageFileKind::kPfm;
+           kind_ != ImageFileKind::kJpeg && kind_ != ImageFileKind::kPnm &&
+           kind_ != ImageFileKind::kPfm;
   }
 
   LibraryReading ForLibrary(int page) const {
@@ -334,6 +294,8 @@ class ImageFile {
       case ImageFileKind::kTiff:
         return DecodeTiff(bytes_, tiff_pages_[static_cast<std::size_t>(page)],
                           reading_.spread_bits);
+      case ImageFileKind::kJpeg:
+        return DecodeJpeg(bytes_);
       case ImageFileKind::kPnm:
         return DecodePnm(bytes_, reading_.spread_bits);
       case ImageFileKind::kPfm:
@@ -425,8 +387,7 @@ std::string DepthName(int depth) {
 }
 
 bool IsByLibrary(ImageFormat format) {
-  return format == ImageFormat::kJpeg || format == ImageFormat::kExr ||
-         format == ImageFormat::kWebp || format == ImageFormat::kBmp;
+  return format == ImageFormat::kExr || format == ImageFormat::kWebp || format == ImageFormat::kBmp;
 }
 
 bool HoldsDepth(ImageFormat format, int depth) {
@@ -544,8 +505,6 @@ UsedBits BitsOf(const cv::Mat& pixels) {
   return used;
 }
 
-bool CanWrite(ImageFormat format) { return !IsByLibrary(format) || HasImageLibrary(); }
-
 ImageFormat FormatOfName(const std::string& path) {
   static const std::vector<std::pair<std::string, ImageFormat>> endings = {
       {".png", ImageFormat::kPng},   {".jpg", ImageFormat::kJpeg},  {".jpeg", ImageFormat::kJpeg},
@@ -616,6 +575,8 @@ std::string EncodeImageFile(const cv::Mat& pixels, ImageFormat format,
       return EncodePngFile(pixels, writing);
     case ImageFormat::kTiff:
       return EncodeTiff(pixels, writing);
+    case ImageFormat::kJpeg:
+      return EncodeJpeg(pixels, writing);
     case ImageFormat::kPnm:
       return EncodePnm(pixels);
     case ImageFormat::kPfm:

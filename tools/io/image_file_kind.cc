@@ -350,7 +350,7 @@ std::string NameOfOtherKind(const std::string& bytes) {
 std::string ReadableKinds() {
   return HasImageLibrary()
              ? "PNG, TIFF, JPEG, EXR, WebP, HEIF (HEIC, AVIF), BMP, PNM, PFM, DICOM or raw"
-             : "PNG, TIFF, PNM or PFM";
+             : "PNG, TIFF, JPEG, PNM or PFM";
 }
 
 std::string NameOf(ImageFileKind kind) {

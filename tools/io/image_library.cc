@@ -65,7 +65,7 @@ const ImageLibrary* Load() {
   if (entry != nullptr) return entry();
   const char* const why = path.empty() ? "it is in no folder of the search path" : dlerror();
   throw Error(fmt::format(
-      "the library that reads and writes JPEG, EXR, WebP and BMP files and reads HEIF, DICOM and "
+      "the library that reads and writes EXR, WebP and BMP files and reads HEIF, DICOM and "
       "raw "
       "files, {}, cannot be loaded{}{}: it must be in the build folder or where thicklens was "
       "installed",
@@ -84,7 +84,7 @@ bool HasImageLibrary() { return true; }
 const ImageLibrary& LoadedImageLibrary() {
   throw Error(
       "this build has no GPL parts (THICKLENS_WITH_GPL=OFF), and therefore not the library that "
-      "reads this kind of file: it reads PNG, TIFF, PFM and PNM");
+      "reads this kind of file: it reads PNG, TIFF, JPEG, PFM and PNM");
 }
 
 bool HasImageLibrary() { return false; }

@@ -12,7 +12,7 @@ namespace thicklens::io {
 
 // The request that the library of decoders gets besides the bytes of a file.
 struct LibraryReading {
-  ImageFileKind kind = ImageFileKind::kJpeg;
+  ImageFileKind kind = ImageFileKind::kExr;
   ImageReading reading;
   // Throws if an image of that size needs more memory than there is.
   void (*require_memory)(double width_px, double height_px, double bytes_per_px,

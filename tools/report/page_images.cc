@@ -70,6 +70,7 @@ std::array<std::uint8_t, 3> HatchColour(int x, int y) {
 std::vector<unsigned char> Encoded(const cv::Mat& shown, bool jpeg) {
   io::ImageWriting writing;
   writing.jpeg_quality = kJpegQuality;
+  writing.halves_colours = true;
   const std::string file = jpeg ? io::EncodeImageFile(shown, io::ImageFormat::kJpeg, writing)
                                 : io::EncodePngPixels(shown, io::PngPacking::kSmall);
   return {file.begin(), file.end()};
@@ -195,8 +196,7 @@ cv::Mat GreyMapped(const std::vector<float>& values, int width_px, int height_px
 
 std::string EmbeddedImage(const cv::Mat& shown, const std::string& alt, Packing packing,
                           int place_px) {
-  const bool jpeg = packing == Packing::kSmall && shown.rows * shown.cols >= kSmallestJpegPx &&
-                    io::CanWrite(io::ImageFormat::kJpeg);
+  const bool jpeg = packing == Packing::kSmall && shown.rows * shown.cols >= kSmallestJpegPx;
   return fmt::format(
       "<img{} src=\"data:image/{};base64,{}\" width=\"{}\" height=\"{}\" alt=\"{}\" "
       "style=\"max-width: {}px\"/>",

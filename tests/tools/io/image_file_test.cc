@@ -183,8 +183,8 @@ TEST(ImageFile, RefusesByNameWhatIsNoColourImage) {
   EXPECT_THAT(Refusal("i64.tif"), HasSubstr("signed 64-bit integers"));
   EXPECT_THAT(Refusal("imagej.tif"), HasSubstr("ImageJ stack of 2 images"));
   EXPECT_THAT(Refusal("mosaic.tif"), AllOf(HasSubstr("mosaic (RGGB)"), HasSubstr("develop it")));
-  SKIP_WITHOUT_LIBRARY();
   EXPECT_THAT(Refusal("cmyk.jpg"), HasSubstr("CMYK"));
+  SKIP_WITHOUT_LIBRARY();
   EXPECT_THAT(Refusal("animated.webp"), HasSubstr("animation"));
 }
 
@@ -231,9 +231,9 @@ TEST(ImageFile, CarriesTheColourProfile) {
   EXPECT_EQ(profile.size(), 196U);
   EXPECT_EQ(Read("profile.png").facts.icc_description, "Test profile");
   EXPECT_THAT(Read("profile.png").facts.OneLine(), HasSubstr("profile 'Test profile'"));
+  EXPECT_EQ(Read("smooth.jpg").facts.icc_profile, profile);
   SKIP_WITHOUT_LIBRARY();
-  for (const std::string name : {"smooth.jpg", "plain.webp"})
-    EXPECT_EQ(Read(name).facts.icc_profile, profile) << name;
+  EXPECT_EQ(Read("plain.webp").facts.icc_profile, profile);
 }
 
 TEST(ImageFile, TurnsEveryKindByOneRule) {
@@ -280,8 +280,8 @@ TEST(ImageFile, TurnsEveryKindByOneRule) {
   };
   check("orientation6.tif", 6);
   check("orientation6.png", 6);
-  SKIP_WITHOUT_LIBRARY();
   for (int k = 1; k <= 8; ++k) check("orientation" + std::to_string(k) + ".jpg", k);
+  SKIP_WITHOUT_LIBRARY();
   check("turned1.heic", 8);  // a turn by 90 degrees anticlockwise
   check("turned3.heic", 6);
   check("mirrored0.heic", 4);
@@ -289,7 +289,6 @@ TEST(ImageFile, TurnsEveryKindByOneRule) {
 }
 
 TEST(ImageFile, ReadsThePixelPitchOfExif) {
-  SKIP_WITHOUT_LIBRARY();
   ASSERT_TRUE(Read("orientation1.jpg").facts.pixel_pitch_mm);
   EXPECT_NEAR(*Read("orientation1.jpg").facts.pixel_pitch_mm, 0.005, 1e-9);
   EXPECT_FALSE(Read("orientation2.jpg").facts.pixel_pitch_mm);
@@ -301,10 +300,10 @@ TEST(ImageFile, ReadsLossyFilesNearly) {
   const Formula smooth = [](int x, int, int c) { return Smooth(x, c); };
   EXPECT_LE(Difference(Read("ycbcr_jpeg.tif").pixels, smooth), 3);
   EXPECT_EQ(Difference(Read("text.ppm").pixels, smooth), 0);
-  SKIP_WITHOUT_LIBRARY();
   EXPECT_LE(Difference(Read("smooth.jpg").pixels, smooth), 3);
   EXPECT_LE(Difference(Read("grey.jpg").pixels, smooth), 2);
   EXPECT_EQ(Read("grey.jpg").pixels.type(), CV_8UC1);
+  SKIP_WITHOUT_LIBRARY();
   EXPECT_LE(Difference(Read("rgb.heic").pixels, Rgb8), 2);
   const DecodedImage ten = Read("u10.heic");
   EXPECT_EQ(ten.facts.significant_bits, 10);
@@ -473,12 +472,12 @@ TEST(ImageFile, NamesTheKindsThatAreRead) {
 }
 
 TEST(ImageFile, RefusesTruncatedFiles) {
-  std::vector<std::string> names = {"u16_planar.tif", "u16_tiled.tif", "u16_zip.tif", "f32.tif",
-                                    "gamma.png",      "u16.ppm",       "text.ppm",    "bits.pbm",
-                                    "big_endian.pfm", "alpha.pam"};
+  std::vector<std::string> names = {"u16_planar.tif", "u16_tiled.tif",  "u16_zip.tif", "f32.tif",
+                                    "gamma.png",      "smooth.jpg",     "u16.ppm",     "text.ppm",
+                                    "bits.pbm",       "big_endian.pfm", "alpha.pam"};
   if (HasImageLibrary()) {
-    names.insert(names.end(), {"smooth.jpg", "z.exr", "mixed.exr", "alpha.webp", "rgb.bmp",
-                               "rgb.heic", "u12.avif", "mosaic.dng"});
+    names.insert(names.end(), {"z.exr", "mixed.exr", "alpha.webp", "rgb.bmp", "rgb.heic",
+                               "u12.avif", "mosaic.dng"});
   }
   for (const std::string& name : names) {
     const std::string bytes = ReadWholeFile(PathOf(name));
@@ -512,10 +511,10 @@ TEST(ImageFile, SurvivesDamagedFiles) {
 }
 
 TEST(ImageFile, SeveralThreadsDecodeAtOnce) {
-  std::vector<std::string> names = {"u16_planar.tif", "gamma.png", "u16.ppm"};
+  std::vector<std::string> names = {"u16_planar.tif", "gamma.png", "smooth.jpg", "u16.ppm"};
   if (HasImageLibrary())
-    names.insert(names.end(), {"smooth.jpg", "mixed.exr", "alpha.webp", "rgb.heic", "u12.dcm",
-                               "mosaic.dng", "rgb.bmp"});
+    names.insert(names.end(),
+                 {"mixed.exr", "alpha.webp", "rgb.heic", "u12.dcm", "mosaic.dng", "rgb.bmp"});
   std::vector<cv::Mat> alone;
   for (const std::string& name : names) alone.push_back(Read(name).pixels);
   std::vector<std::thread> threads;
@@ -551,7 +550,7 @@ TEST(ImageFormat, FollowsTheEnding) {
               AllOf(StartsWith("a.png/c.gif: "), HasSubstr(".jpg"), HasSubstr("found '.gif'")));
   EXPECT_THAT(ErrorOf([] { FormatOfName("png"); }), HasSubstr("found ''"));
   if (!HasImageLibrary()) {
-    EXPECT_THAT(ErrorOf([] { FormatOfName("c.jpg"); }), HasSubstr("THICKLENS_WITH_GPL=OFF"));
+    EXPECT_THAT(ErrorOf([] { FormatOfName("c.exr"); }), HasSubstr("THICKLENS_WITH_GPL=OFF"));
     return;
   }
   EXPECT_EQ(FormatOfName("c.jpeg"), ImageFormat::kJpeg);
@@ -609,7 +608,6 @@ TEST(ImageFormat, HoldsWhatWasWritten) {
 }
 
 TEST(ImageFormat, WritesJpegNearly) {
-  SKIP_WITHOUT_LIBRARY();
   cv::Mat image(32, 48, CV_8UC3);
   for (int y = 0; y < image.rows; ++y) {
     for (int x = 0; x < image.cols; ++x)
@@ -642,9 +640,7 @@ TEST(ImageFormat, WritesProfilesAndDescriptions) {
   ImageWriting writing;
   writing.icc_profile = profile;
   writing.description = "what it shows";
-  std::vector<ImageFormat> formats = {ImageFormat::kPng, ImageFormat::kTiff};
-  if (HasImageLibrary()) formats.push_back(ImageFormat::kJpeg);
-  for (const ImageFormat format : formats) {
+  for (const ImageFormat format : {ImageFormat::kPng, ImageFormat::kTiff, ImageFormat::kJpeg}) {
     const ImageFacts facts =
         DecodeImageFile(EncodeImageFile(RandomImage(CV_8UC3), format, writing), "m").facts;
     EXPECT_EQ(facts.icc_profile, profile) << NameOf(format);

@@ -1,4 +1,4 @@
-// JPEG, EXR, BMP and DICOM by OpenImageIO 2.4.
+// EXR, BMP and DICOM by OpenImageIO 2.4.
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 #include <sys/mman.h>
@@ -31,14 +31,12 @@ void SetUp() {
 
 const char* NameOfFormat(ImageFileKind kind) {
   switch (kind) {
-    case ImageFileKind::kExr:
-      return "openexr";
     case ImageFileKind::kBmp:
       return "bmp";
     case ImageFileKind::kDicom:
       return "dicom";
     default:
-      return "jpeg";
+      return "openexr";
   }
 }
 
@@ -305,8 +303,8 @@ DecodedImage DecodeByOiio(const std::string& bytes, const LibraryReading& readin
 
 std::string EncodeByOiio(const cv::Mat& pixels, ImageFormat format, const ImageWriting& writing) {
   SetUp();
-  const bool is_exr = format == ImageFormat::kExr, is_bmp = format == ImageFormat::kBmp;
-  const char* const name = is_exr ? "openexr" : is_bmp ? "bmp" : "jpeg";
+  const bool is_exr = format == ImageFormat::kExr, is_bmp = !is_exr;
+  const char* const name = is_exr ? "openexr" : "bmp";
   cv::Mat values = pixels.isContinuous() ? pixels : pixels.clone();
   if (is_bmp && values.channels() == 1)
     cv::merge(std::vector<cv::Mat>{values, values, values}, values);
@@ -315,19 +313,8 @@ std::string EncodeByOiio(const cv::Mat& pixels, ImageFormat format, const ImageW
   OIIO::ImageSpec spec(values.cols, values.rows, values.channels(),
                        is_exr ? (writing.half_floats ? OIIO::TypeDesc::HALF : OIIO::TypeDesc::FLOAT)
                               : OIIO::TypeDesc::UINT8);
-  const std::string quality = std::to_string(std::clamp(writing.jpeg_quality, 1, 100));
-  if (format == ImageFormat::kJpeg) {
-    spec.attribute("Compression", "jpeg:" + quality);
-    spec.attribute("jpeg:subsampling", "4:4:4");
-  }
   if (is_exr) spec.attribute("compression", "zip");
   if (!writing.description.empty()) spec.attribute("ImageDescription", writing.description);
-  if (!writing.icc_profile.empty() && !is_exr) {
-    spec.attribute(
-        "ICCProfile",
-        OIIO::TypeDesc(OIIO::TypeDesc::UINT8, static_cast<int>(writing.icc_profile.size())),
-        writing.icc_profile.data());
-  }
   std::vector<unsigned char> bytes;
   OIIO::Filesystem::IOVecOutput proxy(bytes);
   void* const pointer = static_cast<OIIO::Filesystem::IOProxy*>(&proxy);

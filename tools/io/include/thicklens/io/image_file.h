@@ -119,8 +119,8 @@ struct DecodedImage {
   ImageFacts facts;
 };
 
-// Decodes the image in the bytes of a file, whatever the file is called: PNG, TIFF, PFM and PNM,
-// and, unless the build has no GPL parts, JPEG, EXR, WebP, HEIF, AVIF, BMP, DICOM and camera raw.
+// Decodes the image in the bytes of a file, whatever the file is called: PNG, TIFF, JPEG, PFM and
+// PNM, and, unless the build has no GPL parts, EXR, WebP, HEIF, AVIF, BMP, DICOM and camera raw.
 // Several threads may decode at once. Throws Error that begins with `name` for other kinds, broken
 // files, and files of several pages where no page is chosen.
 THICKLENS_EXPORT DecodedImage DecodeImageFile(const std::string& bytes, const std::string& name,
@@ -149,8 +149,6 @@ enum class ImageFormat { kPng, kJpeg, kTiff, kExr, kWebp, kBmp, kPnm, kPfm };
 // .pgm .ppm .pnm .pfm, in capitals or not. Throws Error that names the file and these endings. It
 // also throws if the build cannot write the kind.
 THICKLENS_EXPORT ImageFormat FormatOfName(const std::string& path);
-// Whether this build writes the kind: without GPL parts only PNG, TIFF, PNM and PFM.
-THICKLENS_EXPORT bool CanWrite(ImageFormat format);
 // Whether the kind holds floats (EXR, PFM, TIFF) and integers of that many bits.
 THICKLENS_EXPORT bool HoldsFloats(ImageFormat format);
 THICKLENS_EXPORT bool HoldsBits(ImageFormat format, int bits);
@@ -158,11 +156,12 @@ THICKLENS_EXPORT bool HoldsBits(ImageFormat format, int bits);
 THICKLENS_EXPORT std::string NameOf(ImageFormat format);
 
 struct ImageWriting {
-  int jpeg_quality = 95;     // 1 to 100, also of WebP; 100 is lossless for WebP
-  bool is_linear = false;    // the values are linear in light; TIFF and PNG then say so
-  bool half_floats = false;  // EXR
-  std::string description;   // PNG, JPEG, TIFF and EXR
-  std::string icc_profile;   // PNG, JPEG and TIFF
+  int jpeg_quality = 95;        // 1 to 100, also of WebP; 100 is lossless for WebP
+  bool halves_colours = false;  // JPEG: colours at half resolution, for smaller files
+  bool is_linear = false;       // the values are linear in light; TIFF and PNG then say so
+  bool half_floats = false;     // EXR
+  std::string description;      // PNG, JPEG, TIFF and EXR
+  std::string icc_profile;      // PNG, JPEG and TIFF
 };
 // Returns the bytes of a file. The values are written as they are: whoever makes 8 bits of light
 // says whether they are rounded or dithered. Grey, RGB or, in PNG, TIFF, EXR and WebP, RGBA with

@@ -1,0 +1,212 @@
+#include "tools/io/jpeg_pixels.h"
+
+// libjpeg's header needs stdio's.
+#include <cstdio>
+// clang-format off
+#include <jpeglib.h>
+#include <jerror.h>
+// clang-format on
+
+#include <algorithm>
+#include <csetjmp>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <opencv2/core.hpp>
+
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/error.h"
+
+namespace thicklens::io {
+namespace {
+
+// libjpeg reports errors by a function that may not return.
+struct Failures {
+  jpeg_error_mgr manager{};  // the first member: libjpeg knows only this part
+  std::jmp_buf back{};
+  char message[JMSG_LENGTH_MAX] = "";
+};
+
+Failures* FailuresOf(j_common_ptr info) {
+  return reinterpret_cast<Failures*>(info->err);  // NOLINT: its first member
+}
+
+void Fail(j_common_ptr info) {
+  info->err->format_message(info, FailuresOf(info)->message);
+  std::longjmp(FailuresOf(info)->back, 1);  // NOLINT: C has no exceptions
+}
+
+// Damaged data would otherwise become grey pixels. A few bytes too many do no harm.
+void Warn(j_common_ptr info, int level) {
+  if (level >= 0) return;
+  const int code = info->err->msg_code;
+  if (code != JWRN_EXTRANEOUS_DATA && code != JWRN_ADOBE_XFORM && code != JWRN_JFIF_MAJOR)
+    Fail(info);
+}
+
+void KeepStill(j_common_ptr /*info*/) {}
+
+jpeg_error_mgr* Prepared(Failures* failures) {
+  jpeg_error_mgr* const manager = jpeg_std_error(&failures->manager);
+  manager->error_exit = Fail;
+  manager->emit_message = Warn;
+  manager->output_message = KeepStill;
+  return manager;
+}
+
+struct Decompression {
+  Failures failures;
+  jpeg_decompress_struct info{};
+
+  Decompression() {
+    info.err = Prepared(&failures);
+    jpeg_create_decompress(&info);
+  }
+  ~Decompression() { jpeg_destroy_decompress(&info); }
+  Decompression(const Decompression&) = delete;
+  Decompression& operator=(const Decompression&) = delete;
+};
+
+struct Compression {
+  Failures failures;
+  jpeg_compress_struct info{};
+  unsigned char* file = nullptr;
+  unsigned long size = 0;  // NOLINT: libjpeg's type
+
+  Compression() {
+    info.err = Prepared(&failures);
+    jpeg_create_compress(&info);
+  }
+  ~Compression() {
+    jpeg_destroy_compress(&info);
+    std::free(file);  // NOLINT: libjpeg takes it by malloc
+  }
+  Compression(const Compression&) = delete;
+  Compression& operator=(const Compression&) = delete;
+};
+
+// Between setjmp and the end of such a function there is no object with a destructor.
+bool ReadHeader(const std::string& bytes, Decompression* jpeg) {
+  if (setjmp(jpeg->failures.back) != 0) return false;                              // NOLINT
+  jpeg_mem_src(&jpeg->info, reinterpret_cast<const unsigned char*>(bytes.data()),  // NOLINT
+               static_cast<unsigned long>(bytes.size()));                          // NOLINT
+  jpeg_save_markers(&jpeg->info, JPEG_COM, 0xFFFF);
+  jpeg_read_header(&jpeg->info, TRUE);
+  return true;
+}
+
+bool Start(Decompression* jpeg) {
+  if (setjmp(jpeg->failures.back) != 0) return false;  // NOLINT
+  jpeg->info.out_color_space = jpeg->info.num_components == 1 ? JCS_GRAYSCALE : JCS_RGB;
+  jpeg_start_decompress(&jpeg->info);
+  return true;
+}
+
+bool ReadRow(Decompression* jpeg, std::uint8_t* row) {
+  if (setjmp(jpeg->failures.back) != 0) return false;  // NOLINT
+  JSAMPROW rows[] = {row};
+  jpeg_read_scanlines(&jpeg->info, static_cast<JSAMPARRAY>(rows), 1);
+  return true;
+}
+
+bool Finish(Decompression* jpeg) {
+  if (setjmp(jpeg->failures.back) != 0) return false;  // NOLINT
+  jpeg_finish_decompress(&jpeg->info);
+  return true;
+}
+
+bool Begin(const cv::Mat& pixels, const ImageWriting& writing, Compression* jpeg) {
+  if (setjmp(jpeg->failures.back) != 0) return false;  // NOLINT
+  jpeg_mem_dest(&jpeg->info, &jpeg->file, &jpeg->size);
+  jpeg->info.image_width = static_cast<JDIMENSION>(pixels.cols);
+  jpeg->info.image_height = static_cast<JDIMENSION>(pixels.rows);
+  jpeg->info.input_components = pixels.channels();
+  jpeg->info.in_color_space = pixels.channels() == 1 ? JCS_GRAYSCALE : JCS_RGB;
+  jpeg_set_defaults(&jpeg->info);
+  jpeg_set_quality(&jpeg->info, std::clamp(writing.jpeg_quality, 1, 100), TRUE);
+  if (!writing.halves_colours) {
+    jpeg->info.comp_info[0].h_samp_factor = 1;
+    jpeg->info.comp_info[0].v_samp_factor = 1;
+  }
+  jpeg_start_compress(&jpeg->info, TRUE);
+  constexpr std::size_t kMaxMarker = 65533;
+  if (!writing.icc_profile.empty()) {
+    jpeg_write_icc_profile(&jpeg->info,
+                           reinterpret_cast<const JOCTET*>(writing.icc_profile.data()),  // NOLINT
+                           static_cast<unsigned>(writing.icc_profile.size()));
+  }
+  if (!writing.description.empty()) {
+    jpeg_write_marker(&jpeg->info, JPEG_COM,
+                      reinterpret_cast<const JOCTET*>(writing.description.data()),  // NOLINT
+                      static_cast<unsigned>(std::min(writing.description.size(), kMaxMarker)));
+  }
+  return true;
+}
+
+bool WriteRow(const std::uint8_t* row, Compression* jpeg) {
+  if (setjmp(jpeg->failures.back) != 0) return false;  // NOLINT
+  JSAMPROW rows[] = {const_cast<JSAMPROW>(row)};       // NOLINT: libjpeg only reads them
+  jpeg_write_scanlines(&jpeg->info, static_cast<JSAMPARRAY>(rows), 1);
+  return true;
+}
+
+bool Finish(Compression* jpeg) {
+  if (setjmp(jpeg->failures.back) != 0) return false;  // NOLINT
+  jpeg_finish_compress(&jpeg->info);
+  return true;
+}
+
+}  // namespace
+
+DecodedImage DecodeJpeg(const std::string& bytes) {
+  Decompression jpeg;
+  const auto require = [&](bool done) {
+    if (!done) throw Error(jpeg.failures.message);
+  };
+  require(ReadHeader(bytes, &jpeg));
+  if (jpeg.info.num_components == 4 || jpeg.info.jpeg_color_space == JCS_CMYK ||
+      jpeg.info.jpeg_color_space == JCS_YCCK) {
+    throw Error("a JPEG file in CMYK, whose colours depend on inks: convert it to RGB");
+  }
+  if (jpeg.info.num_components != 1 && jpeg.info.num_components != 3)
+    throw Error("a JPEG file of 2 channels, whose meaning is not known");
+  require(Start(&jpeg));
+  DecodedImage image;
+  image.pixels.create(static_cast<int>(jpeg.info.output_height),
+                      static_cast<int>(jpeg.info.output_width), CV_8UC(jpeg.info.num_components));
+  for (int y = 0; y < image.pixels.rows; ++y) {
+    ThrowIfCancelled();
+    require(ReadRow(&jpeg, image.pixels.ptr(y)));
+  }
+  ImageFacts& facts = image.facts;
+  facts.container_bits = 8;
+  facts.full_scale = 255;
+  facts.sample_type = "unsigned 8-bit integers";
+  facts.channels = jpeg.info.num_components == 1 ? std::vector<std::string>{"Y"}
+                                                 : std::vector<std::string>{"R", "G", "B"};
+  for (const jpeg_marker_struct* marker = jpeg.info.marker_list; marker != nullptr;
+       marker = marker->next) {
+    if (marker->marker == JPEG_COM && facts.description.empty())
+      facts.description.assign(reinterpret_cast<const char*>(marker->data),  // NOLINT: text
+                               marker->data_length);
+  }
+  require(Finish(&jpeg));  // frees the markers
+  return image;
+}
+
+std::string EncodeJpeg(const cv::Mat& pixels, const ImageWriting& writing) {
+  Compression jpeg;
+  const auto require = [&](bool done) {
+    if (!done)
+      throw Error(std::string("an image could not be encoded as JPEG: ") + jpeg.failures.message);
+  };
+  require(Begin(pixels, writing, &jpeg));
+  for (int y = 0; y < pixels.rows; ++y) {
+    ThrowIfCancelled();
+    require(WriteRow(pixels.ptr(y), &jpeg));
+  }
+  require(Finish(&jpeg));
+  return {reinterpret_cast<const char*>(jpeg.file), jpeg.size};  // NOLINT: bytes
+}
+
+}  // namespace thicklens::io
