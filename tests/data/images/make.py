@@ -283,7 +283,7 @@ with open('u12.dcm', 'wb') as file:
 
 # A DNG file by hand: a preview of 16 x 12 px in the first directory, the mosaic of 64 x 48 px in
 # another; black 256, white 4095, RGGB, white balance 2, 1, 1.5.
-def dng(name, mosaic, preview, black, white, orientation=1, pattern=(0, 1, 1, 2)):
+def dng(name, mosaic, preview, black, white, orientation=1, pattern=(0, 1, 1, 2), balance=True):
     data = bytearray(b'II*\0\0\0\0\0')
 
     def add(content):
@@ -321,7 +321,7 @@ def dng(name, mosaic, preview, black, white, orientation=1, pattern=(0, 1, 1, 2)
         (279, 4, [preview.size]), (330, 4, [sub]), (50706, 1, [1, 4, 0, 0]),
         (50707, 1, [1, 1, 0, 0]), (50708, 2, b'Maker Model\0'),
         (50721, 10, [10000, 10000, 0, 1, 0, 1, 0, 1, 10000, 10000, 0, 1, 0, 1, 0, 1, 10000, 10000]),
-        (50728, 5, [1, 2, 1, 1, 2, 3]), (50778, 3, [21])])
+        (50778, 3, [21])] + ([(50728, 5, [1, 2, 1, 1, 2, 3])] if balance else []))
     struct.pack_into('<I', data, 4, main)
     with open(name, 'wb') as file:
         file.write(data)
@@ -333,3 +333,4 @@ mosaic = 256 + np.round((4095 - 256) * light * np.where((mx + my) % 2 == 1, 1,
                                                         np.where(my % 2 == 0, 0.5, 2 / 3)))
 dng('mosaic.dng', mosaic, np.full((12, 16, 3), 200, 'u1'), 256, 4095)
 dng('turned.dng', mosaic, np.full((12, 16, 3), 200, 'u1'), 256, 4095, orientation=6)
+dng('no_balance.dng', mosaic, np.full((12, 16, 3), 200, 'u1'), 256, 4095, balance=False)

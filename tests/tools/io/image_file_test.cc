@@ -438,7 +438,12 @@ TEST(ImageFile, ReadsTheSensorOfARawFileAndNeverItsPreview) {
   const cv::Mat inner = colours.pixels(cv::Rect(4, 4, 56, 40));
   EXPECT_LE(Difference(inner, [](int x, int, int) { return 65535 * Light(x + 4); }), 100);
   EXPECT_THAT(colours.facts.raw->treatment, HasSubstr("AHD"));
-  cv::Mat narrow = ReadImageFile(PathOf("mosaic.dng"));
+  // Without a white balance in the file, none is taken from the image.
+  const cv::Mat unbalanced = Read("no_balance.dng").pixels;
+  const cv::Scalar mean = cv::mean(unbalanced(cv::Rect(4, 4, 56, 40)));
+  EXPECT_NEAR(mean[0] / mean[1], 0.5, 0.02);
+  EXPECT_NEAR(mean[2] / mean[1], 2.0 / 3, 0.02);
+  const cv::Mat narrow = ReadImageFile(PathOf("mosaic.dng"));
   EXPECT_EQ(cv::norm(narrow, colours.pixels, cv::NORM_INF), 0);
   EXPECT_EQ(Read("turned.dng").facts.orientation, 6);
 

@@ -119,8 +119,10 @@ cv::Mat Demosaiced(LibRaw* raw, RawFacts* facts) {
   options.gamm[0] = options.gamm[1] = 1;
   options.no_auto_bright = 1;
   options.adjust_maximum_thr = 0;  // the white level does not depend on the image
-  options.use_camera_wb = 1;
   options.use_auto_wb = 0;
+  // Without factors in the file, LibRaw would take some from the image, other ones for each frame.
+  options.use_camera_wb = facts->camera_white_balance ? 1 : 0;
+  if (!facts->camera_white_balance) std::fill_n(options.user_mul, 4, 1.0F);
   options.output_color = 1;  // the primaries of sRGB
   options.user_flip = 0;     // as stored
   constexpr int kAhd = 3;
@@ -141,7 +143,7 @@ cv::Mat Demosaiced(LibRaw* raw, RawFacts* facts) {
                   : facts->mosaic.size() == 36 ? "black subtracted, demosaiced (X-Trans by LibRaw)"
                                                : "black subtracted, demosaiced (AHD)") +
       (facts->camera_white_balance ? ", the camera's white balance"
-                                   : ", no white balance stated: daylight") +
+                                   : ", no white balance in the file: none applied") +
       ", linear, sRGB primaries";
   return pixels;
 }
