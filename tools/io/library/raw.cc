@@ -123,8 +123,9 @@ cv::Mat Demosaiced(LibRaw* raw, RawFacts* facts) {
   // Without factors in the file, LibRaw would take some from the image, other ones for each frame.
   options.use_camera_wb = facts->camera_white_balance ? 1 : 0;
   if (!facts->camera_white_balance) std::fill_n(options.user_mul, 4, 1.0F);
-  options.output_color = 1;  // the primaries of sRGB
-  options.user_flip = 0;     // as stored
+  // The primaries of sRGB; colours that are not balanced have no place in them.
+  options.output_color = facts->camera_white_balance ? 1 : 0;
+  options.user_flip = 0;  // as stored
   constexpr int kAhd = 3;
   options.user_qual = kAhd;
   options.highlight = 0;  // clipped
@@ -142,9 +143,10 @@ cv::Mat Demosaiced(LibRaw* raw, RawFacts* facts) {
       std::string(facts->mosaic.empty()        ? "black subtracted"
                   : facts->mosaic.size() == 36 ? "black subtracted, demosaiced (X-Trans by LibRaw)"
                                                : "black subtracted, demosaiced (AHD)") +
-      (facts->camera_white_balance ? ", the camera's white balance"
-                                   : ", no white balance in the file: none applied") +
-      ", linear, sRGB primaries";
+      ", linear" +
+      (facts->camera_white_balance
+           ? ", the camera's white balance, sRGB primaries"
+           : ", the sensor's own colours (the file states no white balance)");
   return pixels;
 }
 
