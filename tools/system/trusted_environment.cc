@@ -39,10 +39,9 @@ constexpr const char* kPaths[] = {
     "PROJ_DATA"  // GDAL, of OpenCV
 };
 // Variables with lists of paths, separated by colons.
-constexpr const char* kPathLists[] = {"XDG_CONFIG_DIRS",         "XDG_DATA_DIRS",
-                                      "FONTCONFIG_PATH",         "GDAL_DRIVER_PATH",
-                                      "OPENCV_CORE_PLUGIN_PATH", "HWLOC_PLUGINS_PATH",
-                                      "LIBHEIF_PLUGIN_PATH",     "DCMDICTPATH"};
+constexpr const char* kPathLists[] = {
+    "XDG_CONFIG_DIRS",         "XDG_DATA_DIRS",      "FONTCONFIG_PATH",     "GDAL_DRIVER_PATH",
+    "OPENCV_CORE_PLUGIN_PATH", "HWLOC_PLUGINS_PATH", "LIBHEIF_PLUGIN_PATH", "DCMDICTPATH"};
 // Variables with a path, or with the name of a library that the system searches for in its folders.
 constexpr const char* kPathsOrNames[] = {"OCL_ICD_VENDORS", "OCL_ICD_FILENAMES", "OPENCL_LAYERS",
                                          "OPENCV_OPENCL_RUNTIME"};

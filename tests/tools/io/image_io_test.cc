@@ -105,7 +105,8 @@ TEST(DecodeImage, SaysWhatIsWrongWithABrokenFile) {
     std::string bytes = Encoded(cv::Mat(40, 40, CV_8UC3, cv::Scalar(1, 2, 3)), extension);
     bytes.resize(bytes.size() / 2);
     EXPECT_THAT(MessageOf(bytes), HasSubstr("cannot be decoded as an image")) << extension;
-    EXPECT_THAT(MessageOf(bytes), AnyOf(HasSubstr("are expected"), HasSubstr("end of file"))) << extension;
+    EXPECT_THAT(MessageOf(bytes), AnyOf(HasSubstr("are expected"), HasSubstr("end of file")))
+        << extension;
   }
 }
 

@@ -18,8 +18,8 @@ THICKLENS_EXPORT cv::Mat DecodeImage(const std::string& bytes, const std::string
                                      ImageFacts* facts = nullptr);
 // Reads the file and decodes it as DecodeImage does. Throws Error that names the path.
 THICKLENS_EXPORT cv::Mat ReadImageFile(const std::string& path, ImageFacts* facts = nullptr);
-// Throws Error if the library that reads and writes all kinds but PNG, TIFF, JPEG, PNM and PFM is missing
-// from the program's installation. A build without GPL parts does not need it.
+// Throws Error if the library that reads and writes all kinds but PNG, TIFF, JPEG, PNM and PFM is
+// missing from the program's installation. A build without GPL parts does not need it.
 THICKLENS_EXPORT void RequireImageCodecs();
 // The kinds of files that this build reads, in words.
 THICKLENS_EXPORT std::string ReadableImageKinds();
