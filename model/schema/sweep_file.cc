@@ -113,6 +113,7 @@ SweepFile ReadSweep(const std::string& path, const SweepReading& reading,
                     "target_period_mm",
                     "blur_floor_px",
                     "roi_px",
+                    "full_scale",
                     "frames",
                     "frames_csv",
                     "frames_dir",
@@ -151,6 +152,10 @@ SweepFile ReadSweep(const std::string& path, const SweepReading& reading,
     constexpr int kMax = 100000;
     sweep.roi = {numbers[0].Integer(0, kMax), numbers[1].Integer(0, kMax),
                  numbers[2].Integer(1, kMax), numbers[3].Integer(1, kMax)};
+  }
+  if (const auto white = root.Find("full_scale")) {
+    constexpr int kMaxValue = 65535;
+    sweep.full_scale = white->Integer(1, kMaxValue);
   }
   ReadSweepFrames(root, reading, &sweep, notices);
   NoteOrderAndRepeats(sweep, notices);
@@ -199,6 +204,7 @@ std::string SweepToYaml(const SweepFile& sweep) {
     out.List("roi_px", {std::to_string(sweep.roi.x), std::to_string(sweep.roi.y),
                         std::to_string(sweep.roi.width), std::to_string(sweep.roi.height)});
   }
+  if (sweep.full_scale) out.Number("full_scale", *sweep.full_scale);
   out.BeginList("frames");
   for (const SweepFrame& frame : sweep.frames) {
     out.BeginMapInLine();

@@ -1,7 +1,9 @@
 #include "thicklens/calibrate.h"
 
+#include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "thicklens/base/error.h"
 #include "thicklens/base/utc_time.h"
@@ -43,6 +45,10 @@ Calibration Calibrate(const Sweep& sweep, const CalibrateOptions& options, const
   RunScope scope(run);
   MeasuredSweep measured = MeasureSweep(sweep, options.map_field, &scope);
   Calibration calibration{std::move(measured.calibration), sweep.camera, ""};
+  if (measured.files != nullptr) {
+    calibration.frames_read =
+        std::make_shared<const std::vector<io::FilesRead>>(measured.files->Files());
+  }
   calibration.camera.calibration.reset();
   calibration.refusal = RefusalOf(calibration, options.method);
   if (!calibration.refusal.empty()) {

@@ -7,13 +7,25 @@
 #include "thicklens/opencv.h"
 
 namespace thicklens {
+namespace {
 
-MeasuredSweep MeasureSweep(const Sweep& sweep, bool map_field, RunScope* run) {
+// A sweep with too few frames is refused without opening them.
+Sweep Examined(const Sweep& sweep, const RunScope& run) {
+  std::string why;
+  if (!calib::HasEnoughFrames(FocusSweepOf(sweep), &why)) return sweep;
+  return ExamineFrames(sweep, run.control());
+}
+
+}  // namespace
+
+MeasuredSweep MeasureSweep(const Sweep& given, bool map_field, RunScope* run) {
+  const Sweep sweep = Examined(given, *run);
   for (const std::string& notice : NoticesOf(sweep)) run->Warn(notice);
   MeasuredSweep measured;
   measured.sweep = FocusSweepOf(sweep);
   if (sweep.frames == nullptr) {  // the files are hashed as they are read
-    measured.files = std::make_shared<io::FrameFiles>(sweep.description.frames);
+    measured.files = std::make_shared<io::FrameFiles>(sweep.description.frames,
+                                                      sweep.description.full_scale);
     measured.sweep.read_frame = [files = measured.files](std::size_t i) { return files->Read(i); };
   }
   calib::CalibrationOptions settings;

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "thicklens/base/error.h"
-#include "thicklens/io/image_io.h"
+#include "thicklens/io/frame_files.h"
 #include "tools/interface/validation.h"
 
 namespace thicklens {
@@ -171,9 +171,9 @@ calib::FocusSweep FocusSweepOf(const Sweep& sweep) {
       return MatFromImage(image, image.order());
     };
   } else {
-    focus_sweep.read_frame =
-        [frames = std::make_shared<const std::vector<model::SweepFrame>>(sweep.description.frames)](
-            std::size_t i) { return io::ReadImageFile(frames->at(i).image); };
+    focus_sweep.read_frame = [files = std::make_shared<io::FrameFiles>(
+                                  sweep.description.frames, sweep.description.full_scale)](
+                                 std::size_t i) { return files->Read(i); };
   }
   return focus_sweep;
 }

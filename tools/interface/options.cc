@@ -144,6 +144,8 @@ bool SweepOverrides::IsValid(std::string* why) const {
                  [why](const model::RegionOfInterest& region) {
                    return IsRect(why, "roi", {region.x, region.y, region.width, region.height});
                  }) &&
+         IfGiven(full_scale,
+                 [why](int white) { return WholeBetween(why, "full_scale", 1, 65535, white); }) &&
          IfGiven(direction,
                  [why](model::BenchDirection given) {
                    return OneOf(why, "direction", model::BenchDirection::kToward, given);

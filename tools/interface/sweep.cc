@@ -11,11 +11,15 @@
 
 #include "thicklens/base/error.h"
 #include "thicklens/base/input_file.h"
+#include "thicklens/base/output_file.h"
 #include "thicklens/calib/focus_sweep.h"
+#include "thicklens/io/full_scale.h"
+#include "thicklens/io/image_io.h"
 #include "thicklens/io/readings.h"
 #include "thicklens/model/camera_file.h"
 #include "tools/interface/missing_tolerances.h"
 #include "tools/interface/run_scope.h"
+#include "tools/interface/stated_transfer.h"
 #include "tools/interface/validation.h"
 
 namespace thicklens {
@@ -46,6 +50,7 @@ void ApplyOverrides(const SweepOverrides& overrides, const RunScope& run, model:
     file->floor.given_px = overrides.floor_px;
   }
   if (overrides.roi) file->roi = *overrides.roi;
+  if (overrides.full_scale) file->full_scale = overrides.full_scale;
   if (overrides.reading_sigma_mm) {
     file->reading_sigma_mm = *overrides.reading_sigma_mm;
     file->reading_sigma_stated = true;
@@ -119,6 +124,47 @@ Sweep Finish(model::SweepFile file, const std::string& sweep_yaml, const SweepOv
   return sweep;
 }
 
+// Whether another full scale gives the same calibration: it multiplies linear light by a constant.
+bool IsScaleFree(const TransferCurve& transfer) { return !(transfer == TransferCurve::Srgb()); }
+
+// Returns what the values of all frames show; frames are read until it is certain.
+io::FullScaleFinding FullScaleOfFrames(const std::vector<model::SweepFrame>& frames) {
+  io::ValueCounter values;
+  for (const model::SweepFrame& frame : frames) {
+    ThrowIfCancelled();
+    values.Add(io::ReadImageFile(frame.image), frame.image);
+    if (values.UsesWholeContainer()) break;
+  }
+  return values.Finding();
+}
+
+void TakeFullScale(const io::FullScaleFinding& finding, const RunScope& run, Sweep* sweep) {
+  // Below this value, frames of 16 bits are too dark to be measured, and values of fewer bits would
+  // be refused as if they were.
+  constexpr int kTooDark = 1023;
+  sweep->full_scale_reason = finding.reason;
+  const bool is_aligned = finding.kind == io::FullScaleFinding::Kind::kLeftAligned ||
+                          finding.kind == io::FullScaleFinding::Kind::kRightAligned;
+  if (is_aligned) {
+    sweep->description.full_scale = finding.full_scale;
+    sweep->full_scale_reason =
+        fmt::format("{}: {}-aligned values of {} bits, {} is full scale", finding.reason,
+                    finding.kind == io::FullScaleFinding::Kind::kLeftAligned ? "left" : "right",
+                    finding.bits, finding.full_scale);
+  }
+  if (finding.kind != io::FullScaleFinding::Kind::kUndecided) return;
+  const std::string remedy =
+      fmt::format("state it: {} {}, or 65535 for 16 bits", run.Option("full_scale"),
+                  finding.full_scale);
+  if (finding.full_scale <= kTooDark || !IsScaleFree(sweep->camera.sensor.transfer)) {
+    throw Error(fmt::format("{}: {}; {}", sweep->description.source, finding.reason, remedy));
+  }
+  sweep->notices.push_back(
+      fmt::format("{}; 65535 is taken as full scale, and with the transfer curve {} the result "
+                  "does not depend on it; {}",
+                  finding.reason, sweep->camera.sensor.transfer.Name(), remedy));
+}
+
 }  // namespace
 
 FrameSource::~FrameSource() = default;
@@ -189,6 +235,32 @@ Sweep ReadSweepFolder(const std::string& folder, const std::string& readings_csv
   model::SweepFile file = model::SweepFromFolder(folder, readings_csv, overrides.camera_path,
                                                  ReadingOf(overrides), &sweep.notices);
   return Finish(std::move(file), "", overrides, run, std::move(sweep));
+}
+
+Sweep ExamineFrames(Sweep sweep, const RunControl& control) {
+  checks::RequireValid(control);
+  const RunScope run(control);
+  const std::vector<model::SweepFrame>& frames = sweep.description.frames;
+  const bool is_done = !sweep.full_scale_reason.empty();
+  if (sweep.frames != nullptr || is_done || frames.empty()) return sweep;
+  const std::string& path = frames.front().image;
+  io::ImageFacts facts;
+  const cv::Mat first = io::ReadImageFile(path, &facts);
+  const std::string contradiction = TransferContradiction(facts, sweep.camera);
+  if (!contradiction.empty()) sweep.notices.push_back(fmt::format("{}: {}", path, contradiction));
+  const bool is_stated =
+      facts.raw || (facts.significant_bits && *facts.significant_bits < facts.container_bits);
+  if (sweep.description.full_scale) {
+    sweep.full_scale_reason =
+        fmt::format("{} is full scale, as stated", *sweep.description.full_scale);
+  } else if (is_stated) {
+    sweep.full_scale_reason = "the files state it";
+  } else if (first.depth() != CV_16U) {
+    sweep.full_scale_reason = "values of 8 bits";
+  } else {
+    TakeFullScale(FullScaleOfFrames(frames), run, &sweep);
+  }
+  return sweep;
 }
 
 std::vector<std::string> NoticesOf(const Sweep& sweep) {

@@ -7,12 +7,16 @@
 #include "thicklens/base/output_file.h"
 #include "thicklens/base/yaml_reader.h"
 #include "thicklens/io/data_hash.h"
+#include "thicklens/io/full_scale.h"
 #include "thicklens/io/image_io.h"
 
 namespace thicklens::io {
 
-FrameFiles::FrameFiles(std::vector<model::SweepFrame> frames)
-    : frames_(std::move(frames)), digests_(frames_.size()) {}
+FrameFiles::FrameFiles(std::vector<model::SweepFrame> frames, std::optional<int> full_scale)
+    : frames_(std::move(frames)),
+      full_scale_(full_scale),
+      digests_(frames_.size()),
+      facts_(frames_.size()) {}
 
 std::string FrameFiles::ReadAndDigest(std::size_t index) {
   std::string bytes = ReadWholeFile(frames_.at(index).image);
@@ -27,7 +31,24 @@ std::string FrameFiles::ReadAndDigest(std::size_t index) {
 }
 
 cv::Mat FrameFiles::Read(std::size_t index) {
-  return DecodeImage(ReadAndDigest(index), frames_.at(index).image);
+  const std::string& path = frames_.at(index).image;
+  ImageReading reading;
+  // A full scale that the caller states refers to the values as the file has them.
+  reading.spread_bits = !full_scale_;
+  ImageFacts facts;
+  const cv::Mat frame = DecodeImage(ReadAndDigest(index), path, reading, &facts);
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    facts_[index] = std::move(facts);
+  }
+  return full_scale_ ? ScaledToContainer(frame, *full_scale_, path) : frame;
+}
+
+std::vector<FilesRead> FrameFiles::Files() {
+  std::vector<std::string> paths;
+  for (const model::SweepFrame& frame : frames_) paths.push_back(frame.image);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return GroupFilesRead(paths, facts_);
 }
 
 std::string FrameFiles::DataSha256() {

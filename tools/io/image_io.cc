@@ -63,7 +63,12 @@ cv::Mat PhotographOf(const DecodedImage& image, const std::string& name) {
 }  // namespace
 
 cv::Mat DecodeImage(const std::string& bytes, const std::string& name, ImageFacts* facts) {
-  const DecodedImage image = DecodeImageFile(bytes, name);
+  return DecodeImage(bytes, name, ImageReading(), facts);
+}
+
+cv::Mat DecodeImage(const std::string& bytes, const std::string& name, const ImageReading& reading,
+                    ImageFacts* facts) {
+  const DecodedImage image = DecodeImageFile(bytes, name, reading);
   if (facts != nullptr) *facts = image.facts;
   const cv::Mat& pixels = image.pixels;
   if (pixels.depth() != CV_8U && pixels.depth() != CV_16U) {

@@ -101,6 +101,7 @@ SweepOverrides SweepOverridesOf(const SweepArguments& arguments) {
   TakeFloor(arguments, &overrides);
   TakeRoi(arguments.roi, &overrides);
   overrides.reading_sigma_mm = arguments.reading_sigma_mm;
+  overrides.full_scale = arguments.full_scale;
   overrides.readings = arguments.readings;
   for (const auto direction : {model::BenchDirection::kAway, model::BenchDirection::kToward}) {
     if (arguments.direction == model::BenchDirectionName(direction)) {
@@ -125,6 +126,7 @@ OptionNames SweepOptionNames() {
           {"floor_from_calibration", "--floor-from"},
           {"target", "--target"},
           {"roi", "--roi"},
+          {"full_scale", "--full-scale"},
           {"readings", "--readings"},
           {"readings.column", "--column"},
           {"readings.file_column", "--file-column"},

@@ -25,6 +25,7 @@ struct SweepArguments {
   std::string floor_from;  // a camera file
   std::string target;
   std::string roi;  // x,y,width,height
+  std::optional<int> full_scale;
   model::ReadingOptions readings;
 
   // Returns the files that no output may replace.

@@ -79,6 +79,14 @@ void AddSweepStatements(CLI::App* command, SweepArguments* sweep) {
       ->type_name("KIND");
   command->add_option("--roi", sweep->roi, "Part of the frames that is measured" + instead)
       ->type_name("X,Y,WIDTH,HEIGHT");
+  constexpr int kMaxValue = 65535;
+  command
+      ->add_option("--full-scale", sweep->full_scale,
+                   "Value in the files that stands for white, such as 1023 for 10 bits in a "
+                   "container of 16" +
+                       instead)
+      ->check(CLI::Range(1, kMaxValue))
+      ->type_name("N");
 }
 
 }  // namespace thicklens::tools

@@ -13,6 +13,9 @@
 #include "thicklens/sweep.h"
 
 namespace thicklens {
+namespace io {
+struct FilesRead;
+}
 
 // Which of the two results becomes the camera's calibration.
 enum class CalibrationMethod {
@@ -51,6 +54,8 @@ struct Calibration : calib::Calibration {
   // Why the sweep determines no camera by the chosen method, one line; empty: it does. The summary
   // has the outcome of the fit, which kPaper does not need.
   std::string refusal;
+  // What was read from the frames' files (thicklens/io/files_read.h); null: they are not files.
+  std::shared_ptr<const std::vector<io::FilesRead>> frames_read = nullptr;
 };
 
 // A sweep that determines no camera. The message is the reason.

@@ -39,6 +39,9 @@ struct Sweep {
   std::optional<model::SweepTruth> truth;
   // The assumptions that were made when the sweep was read, one line each.
   std::vector<std::string> notices;
+  // What shows the full scale of the frames' values, one line; empty: ExamineFrames has not been
+  // called, or the frames are not files.
+  std::string full_scale_reason;
 
   // Returns true if a calibration can be attempted: the camera, the readings and the options of
   // the description are possible and finite. Does not open a frame.
@@ -59,6 +62,8 @@ struct SweepOverrides {
   std::string floor_from_calibration;          // a camera file; excludes floor_px and floor_unknown
   std::optional<model::SweepTarget> target;    // kind of the target
   std::optional<model::RegionOfInterest> roi;  // px, inside the sensor
+  // The value in the files that stands for white, 1 to 65535, e.g. 1023 for values of 10 bits.
+  std::optional<int> full_scale;
   // Which readings are read, and in which unit (thicklens/model/readings.h).
   model::ReadingOptions readings;
 
@@ -77,6 +82,14 @@ THICKLENS_EXPORT Sweep ReadSweep(const std::string& path, const SweepOverrides& 
 // frames. `overrides.camera_path` is required.
 THICKLENS_EXPORT Sweep ReadSweepFolder(const std::string& folder, const std::string& readings_csv,
                                        const SweepOverrides& overrides, const RunControl& run = {});
+
+// Returns the sweep with the full scale of its frames (`description.full_scale`, unless it is given
+// or that of the container) and what shows it, and with a notice if the files state another
+// transfer curve than the camera. It reads the first frame; if that has 16 bits of which the file
+// does not state how many are used, it reads frames until their values show it. Calibrate and
+// VerifyCamera do this unless it has been done. Throws Error if the values do not show the full
+// scale and the result depends on it, and OptionError.
+THICKLENS_EXPORT Sweep ExamineFrames(Sweep sweep, const RunControl& run = {});
 
 // Assumptions about the sweep and its camera, one line each, which Calibrate reports before it
 // measures.

@@ -4,10 +4,12 @@
 #include <cstddef>
 #include <mutex>
 #include <opencv2/core/mat.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "thicklens/base/export.h"
+#include "thicklens/io/files_read.h"
 #include "thicklens/model/sweep_file.h"
 
 namespace thicklens::io {
@@ -15,10 +17,15 @@ namespace thicklens::io {
 // The image files of a sweep, read on request; several threads may read.
 class THICKLENS_EXPORT FrameFiles {
  public:
-  // Takes the paths of the frames; opens none.
-  explicit FrameFiles(std::vector<model::SweepFrame> frames);
+  // Takes the paths of the frames; opens none. `full_scale` is the value in the files that stands
+  // for white; absent: that of their container, or the one that they state.
+  explicit FrameFiles(std::vector<model::SweepFrame> frames,
+                      std::optional<int> full_scale = std::nullopt);
 
-  cv::Mat Read(std::size_t index);  // throws Error naming the file
+  // Returns a frame whose white is the full scale of its type. Throws Error that names the file.
+  cv::Mat Read(std::size_t index);
+  // What was read from the files so far.
+  std::vector<FilesRead> Files();
 
   // SHA-256 over lines "digest reading", one for each frame in the sweep's order, where digest is
   // that of the file's bytes and reading is in mm. The digest of a file is computed when the file
@@ -29,7 +36,9 @@ class THICKLENS_EXPORT FrameFiles {
   std::string ReadAndDigest(std::size_t index);
 
   std::vector<model::SweepFrame> frames_;
-  std::vector<std::string> digests_;  // empty: not read yet
+  std::optional<int> full_scale_;
+  std::vector<std::string> digests_;               // empty: not read yet
+  std::vector<std::optional<ImageFacts>> facts_;  // absent: not read yet
   std::mutex mutex_;
 };
 

@@ -16,6 +16,9 @@ namespace thicklens::io {
 // Throws Error that begins with `name`.
 THICKLENS_EXPORT cv::Mat DecodeImage(const std::string& bytes, const std::string& name,
                                      ImageFacts* facts = nullptr);
+// Likewise, with choices of how it is read.
+THICKLENS_EXPORT cv::Mat DecodeImage(const std::string& bytes, const std::string& name,
+                                     const ImageReading& reading, ImageFacts* facts);
 // Reads the file and decodes it as DecodeImage does. Throws Error that names the path.
 THICKLENS_EXPORT cv::Mat ReadImageFile(const std::string& path, ImageFacts* facts = nullptr);
 // Throws Error if the library that reads and writes all kinds but PNG, TIFF, JPEG, PNM and PFM is
