@@ -51,7 +51,9 @@ void ReadSensor(const YamlNode& node, Camera* camera) {
   const auto point = node.At("principal_point_px").ElementsExactly(2);
   sensor.principal_point_px = {ValueNode(point[0], camera).Number(),
                                ValueNode(point[1], camera).Number()};
-  sensor.transfer = ReadTransfer(node.At("transfer"));
+  const YamlNode transfer = node.At("transfer");
+  if (transfer.IsMap()) transfer.RequireKeys({"value", "assumed"});  // a curve has no tolerance
+  sensor.transfer = ReadTransfer(ValueNode(transfer, camera));
 }
 
 std::optional<Estimate> FindEstimate(const YamlNode& parent, const std::string& key,
@@ -185,7 +187,20 @@ class CameraWriter {
     StatedElement("sensor.principal_point_px[0]", sensor.principal_point_px.x());
     StatedElement("sensor.principal_point_px[1]", sensor.principal_point_px.y());
     out_.EndList();
-    out_.Text("transfer", sensor.transfer.Name());
+    WriteTransfer();
+    out_.EndMap();
+  }
+
+  void WriteTransfer() {
+    const std::string name = camera_.sensor.transfer.Name();
+    const Provenance* statement = StatementOf("sensor.transfer");
+    if (statement == nullptr || !statement->assumed) {
+      out_.Text("transfer", name);
+      return;
+    }
+    out_.BeginMapInLine("transfer");
+    out_.Text("value", name);
+    out_.Text("assumed", "true");
     out_.EndMap();
   }
 

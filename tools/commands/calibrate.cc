@@ -9,13 +9,16 @@
 #include <optional>
 #include <string>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/base/printable_text.h"
 #include "thicklens/base/utc_time.h"
+#include "thicklens/calib/calibrate.h"
 #include "thicklens/calib/focus_sweep.h"
+#include "thicklens/io/files_read.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/opencv.h"
 #include "thicklens/sweep.h"
@@ -29,6 +32,7 @@
 #include "tools/report/calibration_json.h"
 #include "tools/report/calibration_report.h"
 #include "tools/report/calibration_summary.h"
+#include "tools/report/files_read_json.h"
 #include "tools/report/input_summary.h"
 #include "tools/report/page_style.h"
 #include "tools/report/report_folder.h"
@@ -142,6 +146,16 @@ void WriteOutputs(const CalibrateOptions& options, const Sweep& sweep,
   }
 }
 
+// What was read from the files of the frames.
+std::string FramesLines(const Sweep& sweep, const Calibration& calibration) {
+  std::string lines;
+  if (calibration.frames_read && !calibration.frames_read->empty())
+    lines = fmt::format("frames     {}\n", PrintableUtf8(io::FilesReadLine(*calibration.frames_read)));
+  if (sweep.description.full_scale)
+    lines += fmt::format("full scale {}\n", PrintableUtf8(sweep.full_scale_reason));
+  return lines;
+}
+
 CommandResult RunCalibration(const CalibrateOptions& options, const Sweep& sweep) {
   Outputs outputs(options);
   const Calibration calibration = Measure(options, sweep);
@@ -155,7 +169,7 @@ CommandResult RunCalibration(const CalibrateOptions& options, const Sweep& sweep
   if (calibration.refusal.empty() || calibration.diagnostics.paper_recipe.done)
     PrintResult(
         options.common,
-        ReadingsLine(sweep) + CalibrationText(focus_sweep, calibration, TruthOf(sweep),
+        FramesLines(sweep, calibration) + ReadingsLine(sweep) + CalibrationText(focus_sweep, calibration, TruthOf(sweep),
                                               options.by_paper() ? "" : options.camera_output));
   if (options.by_paper() && outputs.camera && calibration.refusal.empty()) {
     PrintResult(options.common,
@@ -168,6 +182,12 @@ CommandResult RunCalibration(const CalibrateOptions& options, const Sweep& sweep
   result.is_written = outputs.camera || outputs.report;
   result.summary = CalibrationJson(focus_sweep, calibration, TruthOf(sweep), options.by_paper());
   result.summary["readings"] = PrintableUtf8(sweep.description.readings);
+  result.summary["read"] =
+      FilesReadJson(calibration.frames_read ? *calibration.frames_read
+                                            : std::vector<io::FilesRead>());
+  const auto& white = sweep.description.full_scale;
+  result.summary["full_scale"] = {{"value", white ? nlohmann::json(*white) : nlohmann::json()},
+                                  {"reason", PrintableUtf8(sweep.full_scale_reason)}};
   if (!calibration.refusal.empty()) {
     result.refusal = PrintableUtf8(fmt::format("{}: {}", options.sweep.input, calibration.refusal));
   }
@@ -193,8 +213,17 @@ CommandResult RunDry(const CalibrateOptions& options, const Sweep& sweep) {
   return {UnderstandingJson(sweep, found, options.by_paper() ? "source" : options.method), ""};
 }
 
+// Reads the sweep and, unless it has too few frames, what their values show.
+Sweep Examined(const CalibrateOptions& options) {
+  const CommandRun run(options.common, SweepOptionNames());
+  Sweep sweep = ReadSweepInput(options.sweep, run.control());
+  std::string why;
+  if (!calib::HasEnoughFrames(FocusSweepOf(sweep), &why)) return sweep;
+  return WithOptionNames(run.names(), [&] { return ExamineFrames(std::move(sweep), run.control()); });
+}
+
 CommandResult Calibrate(const CalibrateOptions& options) {
-  const Sweep sweep = ReadSweepInput(options.sweep);
+  const Sweep sweep = Examined(options);
   return options.dry_run ? RunDry(options, sweep) : RunCalibration(options, sweep);
 }
 

@@ -2,6 +2,7 @@
 #include "tools/commands/camera_init.h"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <cmath>
 #include <memory>
@@ -17,6 +18,7 @@
 #include "tools/commands/commands.h"
 #include "tools/options/command_frame.h"
 #include "tools/options/option_values.h"
+#include "tools/report/files_read_json.h"
 
 namespace thicklens::tools {
 namespace {
@@ -74,13 +76,30 @@ void DescribeLens(const CameraDescription& given, const Known& focal, const Know
   lens.aperture_radius_mm = Take(radius, "lens.aperture_radius_mm", camera);
 }
 
+// A given curve is taken as it is, and so is that of a raw file, whose values are linear. What
+// another file states is the photograph's, not the camera's, and is assumed to be that of all.
+void DescribeTransfer(const CameraDescription& given, const io::ImageFacts* facts,
+                      model::Camera* camera) {
+  model::TransferCurve& transfer = camera->sensor.transfer;
+  if (given.transfer) {
+    transfer = model::TransferCurve::FromName(*given.transfer);
+    return;
+  }
+  if (facts != nullptr && facts->raw) {
+    transfer = model::TransferCurve::Linear();
+    return;
+  }
+  const bool is_linear = facts != nullptr && facts->transfer == io::StatedTransfer::kLinear;
+  transfer = is_linear ? model::TransferCurve::Linear() : model::TransferCurve::Srgb();
+  camera->statements["sensor.transfer"] = {0, true};
+}
+
 void DescribeSensor(const CameraDescription& given, const Known& pitch_mm,
                     const Eigen::Vector2i& size_px, model::Camera* camera) {
   model::Sensor& sensor = camera->sensor;
   sensor.width_px = size_px.x();
   sensor.height_px = size_px.y();
   sensor.pixel_pitch_mm = Take(pitch_mm, "sensor.pixel_pitch_mm", camera);
-  sensor.transfer = model::TransferCurve::FromName(given.transfer);
   if (given.principal_point_px) {
     sensor.principal_point_px = *given.principal_point_px;
     return;
@@ -126,13 +145,15 @@ CommandResult InitCamera(const CameraInitOptions& options) {
   if (!options.output.empty()) output.emplace(options.output);
   std::optional<io::PhotoExif> photo;
   std::optional<Eigen::Vector2i> photo_size_px;
+  std::optional<io::ImageFacts> facts;
   if (!options.photo_path.empty()) {
-    const cv::Mat image = io::ReadImageFile(options.photo_path);
+    const cv::Mat image = io::ReadImageFile(options.photo_path, &facts.emplace());
+    spdlog::info("{}: {}", PrintableUtf8(options.photo_path), PrintableUtf8(facts->OneLine()));
     photo_size_px = Eigen::Vector2i(image.cols, image.rows);
     const Eigen::Vector2i size_px = options.camera.size_px.value_or(*photo_size_px);
     photo = io::ReadPhotoExif(options.photo_path, size_px.x(), size_px.y());
   }
-  const model::Camera camera = DescribedCamera(options.camera, photo, photo_size_px);
+  const model::Camera camera = DescribedCamera(options.camera, photo, photo_size_px, facts ? &*facts : nullptr);
   const std::string yaml = model::CameraToYaml(camera);
   if (output) output->Commit(yaml);
   PrintResult(options.common, output ? WrittenText({options.output}) : yaml);
@@ -153,6 +174,7 @@ CommandResult InitCamera(const CameraInitOptions& options) {
                      {camera.sensor.principal_point_px.x(), camera.sensor.principal_point_px.y()}},
                     {"transfer", camera.sensor.transfer.Name()},
                     {"psf", model::PsfName(camera.psf)},
+                    {"read", FileReadJson(options.photo_path, facts ? &*facts : nullptr)},
                     {"assumed", model::AssumedFields(camera)}};
   return result;
 }
@@ -195,9 +217,9 @@ void AddSensorOptions(CLI::App* command, CameraInitOptions* options) {
       ->type_name("X,Y");
   command
       ->add_option("--transfer", camera.transfer,
-                   "How light becomes encoded values: linear, srgb or gamma-2.2")
+                   "How light becomes encoded values: linear, srgb or gamma-2.2; default: linear "
+                   "for a raw photograph, or srgb, marked as assumed")
       ->check(TransferName())
-      ->capture_default_str()
       ->type_name("NAME");
   command->add_option("--psf", camera.psf, "Shape of the defocus blur: gaussian or disc")
       ->check(CLI::IsMember({"gaussian", "disc"}))
@@ -213,7 +235,8 @@ void AddSensorOptions(CLI::App* command, CameraInitOptions* options) {
 
 model::Camera DescribedCamera(const CameraDescription& description,
                               const std::optional<io::PhotoExif>& photo,
-                              const std::optional<Eigen::Vector2i>& photo_size_px) {
+                              const std::optional<Eigen::Vector2i>& photo_size_px,
+                              const io::ImageFacts* facts) {
   std::optional<double> pitch_mm;
   if (description.pixel_pitch_um) pitch_mm = *description.pixel_pitch_um / kUmPerMm;
   const std::string why_no_pitch =
@@ -237,6 +260,7 @@ model::Camera DescribedCamera(const CameraDescription& description,
                                           : PrintableUtf8(exif.model);
   DescribeLens(description, focal, f_number, &camera);
   DescribeSensor(description, pitch, *size_px, &camera);
+  DescribeTransfer(description, facts, &camera);
   camera.psf = description.psf == "disc" ? model::Psf::kDisc : model::Psf::kGaussian;
   std::string why;
   if (!camera.IsValid(&why)) throw Error(why);

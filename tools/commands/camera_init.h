@@ -5,6 +5,7 @@
 #include <string>
 
 #include "thicklens/io/exif.h"
+#include "thicklens/io/image_file.h"
 #include "thicklens/model/camera.h"
 
 namespace thicklens::tools {
@@ -18,7 +19,7 @@ struct CameraDescription {
   std::optional<double> pixel_pitch_um;
   std::optional<Eigen::Vector2i> size_px;
   std::optional<Eigen::Vector2d> principal_point_px;
-  std::string transfer = "srgb";
+  std::optional<std::string> transfer;  // absent: srgb, marked as assumed
   std::string psf = "gaussian";
   std::string name;
 };
@@ -26,9 +27,12 @@ struct CameraDescription {
 // Makes the camera file's content. Given values are used as they are; values from `photo` (of the
 // size `photo_size_px`) or by default are marked as assumed. Throws Error that lists what is
 // missing and how to give it.
+// `facts` is what the photograph's file states, null without one: a raw file has linear values,
+// which is not an assumption.
 model::Camera DescribedCamera(const CameraDescription& description,
                               const std::optional<io::PhotoExif>& photo,
-                              const std::optional<Eigen::Vector2i>& photo_size_px);
+                              const std::optional<Eigen::Vector2i>& photo_size_px,
+                              const io::ImageFacts* facts = nullptr);
 
 }  // namespace thicklens::tools
 

@@ -15,6 +15,7 @@
 #include "thicklens/base/printable_text.h"
 #include "thicklens/depth.h"
 #include "thicklens/image.h"
+#include "thicklens/io/files_read.h"
 #include "thicklens/light_field.h"
 #include "tools/commands/commands.h"
 #include "tools/options/command_frame.h"
@@ -23,6 +24,7 @@
 #include "tools/options/option_values.h"
 #include "tools/options/with_file_context.h"
 #include "tools/report/compare_table.h"
+#include "tools/report/files_read_json.h"
 
 namespace thicklens::tools {
 namespace {
@@ -55,8 +57,10 @@ bool IsToCrop(const Rect& crop, int width_px, int height_px) {
   return crop && (crop->width != width_px || crop->height != height_px);
 }
 
-Image ReadCroppedImage(const std::string& path, const Rect& crop) {
+Image ReadCroppedImage(const std::string& path, const Rect& crop,
+                       std::shared_ptr<const io::ImageFacts>* facts = nullptr) {
   Image image = thicklens::ReadImage(path);
+  if (facts != nullptr) *facts = image.facts();
   return IsToCrop(crop, image.width_px(), image.height_px()) ? image.Cropped(*crop) : image;
 }
 
@@ -76,14 +80,23 @@ CommandResult CompareImageFiles(const CompareOptions& options) {
                     PrintableUtf8(options.reference_path)));
   }
   Image reference = thicklens::ReadImage(options.reference_path);
+  const auto reference_facts = reference.facts();
   if (reading.crop) reference = reference.Cropped(*reading.crop);
-  const Image other = ReadCroppedImage(options.other_path, reading.crop);
+  std::shared_ptr<const io::ImageFacts> other_facts;
+  const Image other = ReadCroppedImage(options.other_path, reading.crop, &other_facts);
   thicklens::CompareOptions asked;
   asked.border_px = options.border_px;
   const ImageScores scores = CompareImages(reference, other, asked);
-  PrintResult(options.common, ImageScoresText(scores, options.border_px));
+  const std::vector<io::FilesRead> read = {{{options.reference_path}, *reference_facts},
+                                           {{options.other_path}, *other_facts}};
+  PrintResult(options.common,
+              fmt::format("reference  {}\nother      {}\n",
+                          PrintableUtf8(reference_facts->OneLine()),
+                          PrintableUtf8(other_facts->OneLine())) +
+                  ImageScoresText(scores, options.border_px));
   CommandResult result;
   result.summary = ImageScoresJson(scores);
+  result.summary["read"] = FilesReadJson(read);
   result.summary["status"] = "ok";
   result.summary["reason"] = "";
   result.summary["size"] = {reference.width_px(), reference.height_px()};

@@ -191,7 +191,10 @@ std::vector<std::pair<std::string, std::string>> SourcesOf(const EstimateOptions
                     depth.disparity_offset_px < 0 ? "-" : "+", std::abs(depth.disparity_offset_px));
   }
   const std::string from = summary["transfer_from"];
-  const std::string said = from == "option" ? "--transfer" : from == "camera" ? "the camera" : "";
+  const std::string said = from == "option"   ? "--transfer"
+                           : from == "camera" ? "the camera"
+                           : from == "file"   ? "the file"
+                                              : "";
   return {{"photograph", options.image_path},
           {"depth map", fmt::format("{} ({})", options.depth_path, how)},
           {"camera", options.camera_path},
@@ -263,6 +266,7 @@ CommandResult RunEstimate(const EstimateOptions& options) {
   WithOptionNames(EstimateOptionNames(), [&] {
     const CommandRun run(options.common, EstimateOptionNames());  // its progress line ends with it
     EstimateCall call = ReadEstimateCall(options, run.control());
+    outcome.photo_facts = call.photo.facts();
     ThrowIfCancelled();
     ContinueFrom(outputs.checkpoint, &call.settings);
     if (options.quality_target.has_value()) {

@@ -243,13 +243,25 @@ Image Image::Cropped(const model::PixelRect& rect) const {
 }
 
 Image ReadImage(const std::string& path, std::optional<TransferCurve> transfer) {
+  ImageReadOptions options;
+  options.transfer = transfer;
+  return ReadImage(path, options);
+}
+
+Image ReadImage(const std::string& path, const ImageReadOptions& options) {
+  checks::RequireOneOf("orientation", Orientation::kDisplayed, options.orientation);
+  io::ImageReading reading;
+  if (options.orientation == Orientation::kDisplayed)
+    reading.orientation = io::ImageOrientation::kDisplayed;
   Image image;
   io::ImageFacts facts;
-  image.pixels_ = io::ToEncodedImage(io::ReadImageFile(path, &facts));
-  image.transfer_ = transfer;
-  if (!transfer && facts.raw) image.transfer_ = TransferCurve::Linear();
+  image.pixels_ =
+      io::ToEncodedImage(io::DecodeImage(ReadWholeFile(path), path, reading, &facts));
+  image.transfer_ = options.transfer;
+  if (!options.transfer && facts.raw) image.transfer_ = TransferCurve::Linear();
   image.source_ = path;
   image.is_from_file_ = true;
+  image.facts_ = std::make_shared<const io::ImageFacts>(std::move(facts));
   return image;
 }
 

@@ -6,16 +6,19 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <utility>
 
 #include "thicklens/estimator/aperture_blur.h"
 #include "thicklens/estimator/depth_noise.h"
 #include "thicklens/estimator/estimate_checks.h"
 #include "thicklens/io/exif.h"
+#include "thicklens/io/image_file.h"
 #include "thicklens/model/effect_impact.h"
 #include "tools/interface/effects_choice.h"
 #include "tools/interface/exif_comparison.h"
 #include "tools/interface/prepare_aperture.h"
+#include "tools/interface/stated_transfer.h"
 #include "tools/interface/validation.h"
 #include "tools/interface/with_file_context.h"
 
@@ -33,6 +36,17 @@ struct PhotoFile {
   std::string name;  // in messages
   std::string path;  // empty: it is not from a file
 };
+
+// What a user should know about the orientation that the file states; empty: nothing.
+std::string OrientationRemark(const io::ImageFacts* facts, const RunScope& run) {
+  if (facts == nullptr || facts->orientation == 1) return "";
+  return facts->is_orientation_applied
+             ? fmt::format("orientation {} is applied ({}): the depth map must be turned alike",
+                           facts->orientation, run.Option("photo.orientation"))
+             : fmt::format("orientation {} is not applied, the pixels are as stored: a depth map of "
+                           "the turned image needs {}",
+                           facts->orientation, run.Option("photo.orientation"));
+}
 
 // ---- 1. Sizes and crop.
 
@@ -139,11 +153,32 @@ Camera CameraFor(const PhotoFile& photo, const std::optional<TransferCurve>& tra
   return options.crop ? model::CropCamera(camera, *options.crop) : camera;
 }
 
-TransferCurve TransferFor(const Image& photo, const std::optional<Camera>& camera,
-                          EstimateDiagnostics* diagnostics, RunScope* run) {
+// `facts` may be null.
+TransferCurve TransferFor(const Image& photo, const io::ImageFacts* facts,
+                          const std::optional<Camera>& camera, EstimateDiagnostics* diagnostics,
+                          RunScope* run) {
   diagnostics->transfer_from = photo.transfer() ? "image" : camera ? "camera" : "assumed";
-  if (camera) return camera->sensor.transfer;
+  if (camera) {
+    const std::string contradiction =
+        photo.transfer() || facts == nullptr ? "" : TransferContradiction(*facts, *camera);
+    if (!contradiction.empty()) {
+      run->Warn(fmt::format("{}: {}, or state it by {}", NameOf(photo), contradiction,
+                            run->Option("photo.transfer")));
+    }
+    return camera->sensor.transfer;
+  }
   if (photo.transfer()) return *photo.transfer();
+  if (facts != nullptr && !StatedTransferName(*facts).empty()) {
+    const auto stated = StatedTransferOf(*facts);
+    if (!stated) {
+      throw Error(fmt::format(
+          "{}: the file states the transfer curve {}, which cannot be decoded: convert the image "
+          "to sRGB or linear light, or state another curve by {}",
+          NameOf(photo), StatedTransferName(*facts), run->Option("photo.transfer")));
+    }
+    diagnostics->transfer_from = "file";
+    return *stated;
+  }
   run->Inform(fmt::format("{}: encoded values are assumed to be sRGB ({})", NameOf(photo),
                           run->Option("photo.transfer")));
   return TransferCurve::Srgb();
@@ -281,15 +316,19 @@ PreparedProblem Prepare(Image photo, DepthMap map, const std::optional<Camera>& 
                         const EstimateOptions& options, EstimateDiagnostics* diagnostics,
                         RunScope* run) {
   const PhotoFile file{NameOf(photo), photo.is_from_file() ? photo.source() : ""};
+  const std::shared_ptr<const io::ImageFacts> facts = photo.facts();
+  const std::string turned = OrientationRemark(facts.get(), *run);
+  if (!turned.empty()) run->Warn(file.name + ": " + turned);
   if (photo.channels() == 4) run->Warn(file.name + ": its alpha channel is ignored");
   Image part = photo.channels() == 4 ? photo.WithoutAlpha() : std::move(photo);
   const int full_width_px = std::max(part.width_px(), map.width_px);
   const int full_height_px = std::max(part.height_px(), map.height_px);
   CutToCrop(options.crop, &part, &map, run);
   if (map.width_px != part.width_px() || map.height_px != part.height_px()) {
-    throw Error(fmt::format("{}: it is {}x{} px, the image {} is {}x{} px: the sizes must be equal",
-                            NameOf(map), map.width_px, map.height_px, NameOf(part), part.width_px(),
-                            part.height_px()));
+    throw Error(fmt::format(
+        "{}: it is {}x{} px, the image {} is {}x{} px: the sizes must be equal{}", NameOf(map),
+        map.width_px, map.height_px, NameOf(part), part.width_px(), part.height_px(),
+        turned.empty() ? "" : "; of the image, " + turned));
   }
   PreparedProblem prepared;
   prepared.input = std::make_shared<estimator::EstimateInput>();
@@ -298,7 +337,7 @@ PreparedProblem Prepare(Image photo, DepthMap map, const std::optional<Camera>& 
     input.camera = CameraFor(file, part.transfer(), full_width_px, full_height_px, *camera, options,
                              diagnostics, run);
   }
-  input.transfer = TransferFor(part, input.camera, diagnostics, run);
+  input.transfer = TransferFor(part, facts.get(), input.camera, diagnostics, run);
   diagnostics->transfer = input.transfer;
   input.image = part.ToLight(input.transfer);
   part = Image();  // its memory is needed

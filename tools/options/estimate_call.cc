@@ -8,6 +8,7 @@
 #include <variant>
 
 #include "thicklens/model/light_field_grid.h"
+#include "tools/interface/stated_transfer.h"
 #include "tools/options/estimate_plan.h"
 #include "tools/options/option_values.h"
 
@@ -91,6 +92,7 @@ OptionNames EstimateOptionNames() {
           {"sensor_origin", "--sensor-origin"},
           {"exif", "--ignore-exif"},
           {"photo.transfer", "--transfer"},
+          {"photo.orientation", "--orientation displayed"},
           {"aperture.shape", "--aperture-shape"},
           {"aperture", "--aperture-shape and --aperture-of"},
           {"st_depth_mm", "--st-depth-mm"},
@@ -165,9 +167,10 @@ thicklens::EstimateOptions SettingsOf(const EstimateOptions& options) {
 EstimateCall ReadEstimateCall(const EstimateOptions& options, const RunControl& run) {
   EstimateCall call;
   call.settings = SettingsOf(options);
-  std::optional<TransferCurve> transfer;
-  if (!options.transfer.empty()) transfer = TransferCurve::FromName(options.transfer);
-  call.photo = ReadImage(options.image_path, transfer);
+  ImageReadOptions how;
+  if (!options.transfer.empty()) how.transfer = TransferCurve::FromName(options.transfer);
+  if (options.orientation == "displayed") how.orientation = Orientation::kDisplayed;
+  call.photo = ReadImage(options.image_path, how);
   call.depth = ReadDepth(options.depth_path, DepthMeaningOf(options.depth));
   if (!options.camera_path.empty()) call.camera = ReadCamera(options.camera_path);
   if (options.aperture_of.empty()) return call;
@@ -182,7 +185,9 @@ EstimateCall ReadEstimateCall(const EstimateOptions& options, const RunControl& 
 
 TransferCurve TransferOf(const EstimateCall& call) {
   if (call.photo.transfer()) return *call.photo.transfer();
-  return call.camera ? call.camera->sensor.transfer : TransferCurve::Srgb();
+  if (call.camera) return call.camera->sensor.transfer;
+  const auto stated = call.photo.facts() ? StatedTransferOf(*call.photo.facts()) : std::nullopt;
+  return stated.value_or(TransferCurve::Srgb());
 }
 
 Problem PrepareProblemOf(const EstimateOptions& options) {

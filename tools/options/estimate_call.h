@@ -36,7 +36,7 @@ thicklens::EstimateOptions SettingsOf(const EstimateOptions& options);
 // Reads photograph, depth map, camera and the views of --aperture-of. Throws Error and UsageError.
 EstimateCall ReadEstimateCall(const EstimateOptions& options, const RunControl& run);
 
-// The curve of the estimate: that of --transfer, of the camera, or sRGB.
+// The curve of the estimate: that of --transfer, of the camera, of the photograph's file, or sRGB.
 TransferCurve TransferOf(const EstimateCall& call);
 
 // Reads the files and prepares what a solver starts from. Notices go to stderr. For benchmarks.

@@ -68,9 +68,16 @@ void AddInputOptions(CLI::App* command, EstimateOptions* options) {
   command
       ->add_option("--transfer", options->transfer,
                    "How light became encoded values: linear, srgb or gamma-2.2; default: as the "
-                   "camera file states, or srgb without a camera")
+                   "camera file states; without a camera as the photograph's file states, or srgb")
       ->check(CLI::IsMember({"linear", "srgb", "gamma-2.2"}))
       ->type_name("NAME");
+  command
+      ->add_option("--orientation", options->orientation,
+                   "stored: the photograph's pixels as they are in the file (default); displayed: "
+                   "turned as its EXIF states, for a depth map that is turned alike; not with "
+                   "--camera")
+      ->check(CLI::IsMember({"stored", "displayed"}))
+      ->type_name("HOW");
   AddCropOption(command, &options->crop);
   command
       ->add_option("--sensor-origin", options->sensor_origin,
@@ -375,6 +382,9 @@ void CheckEstimateUsage(const EstimateOptions& options) {
   };
   const bool camera = !options.camera_path.empty();
   const bool aperture_of = !options.aperture_of.empty();
+  needs(options.orientation == "displayed", !camera,
+        "--orientation displayed: excludes --camera, which describes the sensor as stored; turn "
+        "the depth map instead");
   needs(!options.depth.kind.empty() && options.depth.kind != "disparity", camera,
         fmt::format("--depth-kind {} needs --camera; without a camera only a disparity map can be "
                     "used",

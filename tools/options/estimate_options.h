@@ -28,6 +28,7 @@ struct EstimateOptions {
   bool ignore_exif = false;  // for a photograph whose EXIF contradicts the camera file
   std::optional<double> st_depth_mm;
   std::string transfer;
+  std::string orientation;  // "stored" or "displayed"
   std::string solver = "scene";
   std::optional<double> memory_limit_mib;
   bool keep_depth_noise = false;

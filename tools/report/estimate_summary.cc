@@ -7,6 +7,7 @@
 
 #include "thicklens/base/printable_text.h"
 #include "tools/options/effect_options.h"
+#include "tools/report/files_read_json.h"
 #include "tools/system/peak_memory.h"
 
 namespace thicklens::tools {
@@ -252,7 +253,10 @@ json EstimateJson(const EstimateOptions& options, const EstimateOutcome& outcome
               {"size", {summary.width_px, summary.height_px}},
               {"channels", summary.channels},
               {"transfer", found.transfer.Name()},
-              {"transfer_from", found.transfer_from == "image" ? "option" : found.transfer_from},
+              {"transfer_from", found.transfer_from != "image"    ? found.transfer_from
+                                : options.transfer.empty() ? "file"
+                                                           : "option"},
+              {"read", FileReadJson(options.image_path, outcome.photo_facts.get())},
               {"aperture", ApertureJson(options, found)},
               {"exif", ExifJson(options, found)},
               {"seconds",
@@ -317,7 +321,10 @@ std::string EstimateText(const EstimateOptions& options, const EstimateOutcome& 
   const EstimateSummary& summary = estimate.summary;
   const EstimateDiagnostics& found = estimate.diagnostics;
   const EstimateSeconds& seconds = summary.seconds;
-  std::string text = DepthText(found);
+  std::string text;
+  if (outcome.photo_facts)
+    text += fmt::format("photograph   {}\n", PrintableUtf8(outcome.photo_facts->OneLine()));
+  text += DepthText(found);
   text += fmt::format("light field  {} x {} views of {} x {} px, {} channel(s)\n", summary.u_count,
                       summary.v_count, summary.width_px, summary.height_px, summary.channels);
   text += fmt::format("aperture     {}\n", PrintableUtf8(ApertureInWords(options, found)));

@@ -1,6 +1,7 @@
 #ifndef THICKLENS_TOOLS_REPORT_ESTIMATE_SUMMARY_H_
 #define THICKLENS_TOOLS_REPORT_ESTIMATE_SUMMARY_H_
 
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
 
@@ -16,6 +17,7 @@ struct EstimateOutcome {
   double files_seconds = 0;     // writing the views
   double total_seconds = 0;     // until the light field was written, without a page
   double clipped_fraction = 0;  // share of the values, by the views' files
+  std::shared_ptr<const io::ImageFacts> photo_facts;  // what was read as the photograph
 };
 
 // "gaussian (from the camera), views of LF": the aperture in words.

@@ -30,6 +30,7 @@ CameraDescription DataSheet() {
   camera.pixel_pitch_um = 6;
   camera.size_px = Eigen::Vector2i(640, 480);
   camera.principal_point_px = Eigen::Vector2d(320, 240);
+  camera.transfer = "srgb";
   return camera;
 }
 
@@ -93,6 +94,38 @@ TEST(DescribedCamera, MarksItsDefaultsAsAssumedInTheFileToo) {
   EXPECT_THAT(model::AssumedFields(read),
               ElementsAre("lens.lens_thickness_mm", "lens.rear_focal_length_mm",
                           "sensor.principal_point_px[0]", "sensor.principal_point_px[1]"));
+}
+
+TEST(DescribedCamera, MarksATransferCurveThatNobodyStatedAsAssumed) {
+  CameraDescription description = DataSheet();
+  description.transfer.reset();
+  const model::Camera camera = DescribedCamera(description, std::nullopt, std::nullopt);
+  EXPECT_EQ(camera.sensor.transfer.Name(), "srgb");
+  const std::string yaml = model::CameraToYaml(camera);
+  EXPECT_THAT(yaml, HasSubstr("transfer: {value: srgb, assumed: true}"));
+  const model::Camera read = model::ParseCamera(yaml, "memory");
+  EXPECT_EQ(read.sensor.transfer.Name(), "srgb");
+  EXPECT_THAT(model::AssumedFields(read), ElementsAre("sensor.transfer"));
+}
+
+TEST(DescribedCamera, TakesRawValuesAsLinearWithoutAssumingIt) {
+  CameraDescription description = DataSheet();
+  description.transfer.reset();
+  io::ImageFacts facts;
+  facts.raw.emplace();
+  const model::Camera camera = DescribedCamera(description, std::nullopt, std::nullopt, &facts);
+  EXPECT_EQ(camera.sensor.transfer.Name(), "linear");
+  EXPECT_THAT(model::AssumedFields(camera), IsEmpty());
+}
+
+TEST(DescribedCamera, AssumesTheStatedCurveOfAPhotographForTheCamera) {
+  CameraDescription description = DataSheet();
+  description.transfer.reset();
+  io::ImageFacts facts;
+  facts.transfer = io::StatedTransfer::kLinear;
+  const model::Camera camera = DescribedCamera(description, std::nullopt, std::nullopt, &facts);
+  EXPECT_EQ(camera.sensor.transfer.Name(), "linear");
+  EXPECT_THAT(model::AssumedFields(camera), ElementsAre("sensor.transfer"));
 }
 
 TEST(DescribedCamera, EverythingThatIsMissingIsReportedAtOnce) {

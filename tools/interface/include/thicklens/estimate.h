@@ -158,7 +158,7 @@ struct UnexplainedPatch {
 // How far the estimate can be trusted, and what its input was like.
 struct EstimateDiagnostics {
   TransferCurve transfer = TransferCurve::Srgb();  // curve by which the photograph was decoded
-  std::string transfer_from;                       // "image", "camera" or "assumed"
+  std::string transfer_from;                       // "image", "camera", "file" or "assumed"
   bool has_exif = false;                           // EXIF was found and compared
   std::vector<ExifComparison> exif;                // one per compared quantity
   std::string aperture_shape;                      // "uniform", "gaussian", "disc", ...

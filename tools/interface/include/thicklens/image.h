@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <variant>
@@ -14,6 +15,9 @@
 #include "thicklens/model/transfer_curve.h"
 
 namespace thicklens {
+namespace io {
+struct ImageFacts;
+}
 
 // The curve between linear light and encoded values: Linear(), Srgb() or Gamma(2.2).
 using TransferCurve = model::TransferCurve;
@@ -27,6 +31,19 @@ enum class ChannelOrder {
   kBgra,  // blue, green, red, alpha
 };
 THICKLENS_EXPORT std::string ChannelOrderName(ChannelOrder order);  // "grey", "rgb", ...
+
+// Whether the pixels of a file are turned as its EXIF, or its kind of file, states.
+enum class Orientation {
+  kAsStored,   // as the sensor has them; a camera file describes these
+  kDisplayed,  // as a viewer shows them
+};
+
+// How ReadImage reads a file.
+struct ImageReadOptions {
+  // How light became the values; it replaces what the file states. Absent: not stated.
+  std::optional<TransferCurve> transfer;
+  Orientation orientation = Orientation::kAsStored;
+};
 
 // An image with everything that its values need to be understood: the order of its channels and
 // how light became them. The values are either encoded (whole numbers of 8 or 16 bits, as files
@@ -67,6 +84,9 @@ class THICKLENS_EXPORT Image {
   const std::string& source() const { return source_; }
   // Whether EXIF can be read from source(): true for images of ReadImage.
   bool is_from_file() const { return is_from_file_; }
+  // What ReadImage found in the file (thicklens/io/image_file.h); null: the image was not read, or
+  // is a part of one that was.
+  const std::shared_ptr<const io::ImageFacts>& facts() const { return facts_; }
 
   // The values, channels interleaved in the order order(). encoded() throws Error for linear light,
   // light() for encoded values.
@@ -88,12 +108,12 @@ class THICKLENS_EXPORT Image {
   Image Cropped(const model::PixelRect& rect) const;
 
  private:
-  friend THICKLENS_EXPORT Image ReadImage(const std::string& path,
-                                          std::optional<TransferCurve> transfer);
+  friend THICKLENS_EXPORT Image ReadImage(const std::string& path, const ImageReadOptions& options);
   std::variant<model::EncodedImage, model::LinearImage> pixels_;
   std::optional<TransferCurve> transfer_;
   std::string source_;
   bool is_from_file_ = false;
+  std::shared_ptr<const io::ImageFacts> facts_;
 };
 
 // Reads an image file of 8 or 16 bits: grey, RGB or RGBA; PNG, TIFF, JPEG, WebP, HEIF, raw and what
@@ -103,6 +123,8 @@ class THICKLENS_EXPORT Image {
 // that the file itself states (raw: linear). Throws Error that names the file.
 THICKLENS_EXPORT Image ReadImage(const std::string& path,
                                  std::optional<TransferCurve> transfer = std::nullopt);
+// Likewise, with choices of how it is read.
+THICKLENS_EXPORT Image ReadImage(const std::string& path, const ImageReadOptions& options);
 
 // The kinds of image files that are written. EXR and PFM hold linear light as floats; PNG, TIFF and
 // PNM 8 or 16 bits; the others 8 bits.
