@@ -191,6 +191,16 @@ TEST_F(SweepFolder, OrderAndRepeatsAreReported) {
   EXPECT_THAT(notices_, ElementsAre(HasSubstr("1 frames have the same reading")));
 }
 
+TEST_F(SweepFolder, FullScaleIsAValueOfTheContainer) {
+  EXPECT_FALSE(Read(frames_).full_scale);
+  SweepFile sweep = Read(frames_ + "full_scale: 1023\n");
+  EXPECT_EQ(sweep.full_scale, 1023);
+  EXPECT_THAT(SweepToYaml(sweep), HasSubstr("full_scale: 1023\n"));
+  EXPECT_THAT(ErrorWith(frames_ + "full_scale: 0\n"), HasSubstr("full_scale"));
+  EXPECT_THAT(ErrorWith(frames_ + "full_scale: 65536\n"), HasSubstr("full_scale"));
+  EXPECT_THAT(ErrorWith(frames_ + "full_scale: white\n"), HasSubstr("full_scale"));
+}
+
 TEST_F(SweepFolder, YamlComesBack) {
   folder_.Put("q/[1], {2}: #3.png");
   SweepFile sweep =

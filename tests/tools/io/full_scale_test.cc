@@ -83,7 +83,7 @@ TEST(FullScale, UnclippedDarkValuesAreUndecided) {
   const FullScaleFinding finding = FindingOf(Texture(760));
   EXPECT_EQ(finding.kind, Kind::kUndecided);
   EXPECT_EQ(finding.full_scale, 1023);
-  EXPECT_THAT(finding.reason, AllOf(HasSubstr("760 of 65535"), HasSubstr("10 or 12 or 14 bits")));
+  EXPECT_THAT(finding.reason, AllOf(HasSubstr("759 of 65535"), HasSubstr("10 or 12 or 14 bits")));
   EXPECT_EQ(FindingOf(Texture(3000)).full_scale, 4095);
 }
 
