@@ -150,7 +150,8 @@ void WriteOutputs(const CalibrateOptions& options, const Sweep& sweep,
 std::string FramesLines(const Sweep& sweep, const Calibration& calibration) {
   std::string lines;
   if (calibration.frames_read && !calibration.frames_read->empty())
-    lines = fmt::format("frames     {}\n", PrintableUtf8(io::FilesReadLine(*calibration.frames_read)));
+    lines =
+        fmt::format("frames     {}\n", PrintableUtf8(io::FilesReadLine(*calibration.frames_read)));
   if (sweep.description.full_scale)
     lines += fmt::format("full scale {}\n", PrintableUtf8(sweep.full_scale_reason));
   return lines;
@@ -167,10 +168,10 @@ CommandResult RunCalibration(const CalibrateOptions& options, const Sweep& sweep
   }
   // A refusal before any measurement is one line on stderr.
   if (calibration.refusal.empty() || calibration.diagnostics.paper_recipe.done)
-    PrintResult(
-        options.common,
-        FramesLines(sweep, calibration) + ReadingsLine(sweep) + CalibrationText(focus_sweep, calibration, TruthOf(sweep),
-                                              options.by_paper() ? "" : options.camera_output));
+    PrintResult(options.common,
+                FramesLines(sweep, calibration) + ReadingsLine(sweep) +
+                    CalibrationText(focus_sweep, calibration, TruthOf(sweep),
+                                    options.by_paper() ? "" : options.camera_output));
   if (options.by_paper() && outputs.camera && calibration.refusal.empty()) {
     PrintResult(options.common,
                 fmt::format("{} has the results of the paper's method, not of the fit\n",
@@ -182,9 +183,8 @@ CommandResult RunCalibration(const CalibrateOptions& options, const Sweep& sweep
   result.is_written = outputs.camera || outputs.report;
   result.summary = CalibrationJson(focus_sweep, calibration, TruthOf(sweep), options.by_paper());
   result.summary["readings"] = PrintableUtf8(sweep.description.readings);
-  result.summary["read"] =
-      FilesReadJson(calibration.frames_read ? *calibration.frames_read
-                                            : std::vector<io::FilesRead>());
+  result.summary["read"] = FilesReadJson(calibration.frames_read ? *calibration.frames_read
+                                                                 : std::vector<io::FilesRead>());
   const auto& white = sweep.description.full_scale;
   result.summary["full_scale"] = {{"value", white ? nlohmann::json(*white) : nlohmann::json()},
                                   {"reason", PrintableUtf8(sweep.full_scale_reason)}};
@@ -219,7 +219,8 @@ Sweep Examined(const CalibrateOptions& options) {
   Sweep sweep = ReadSweepInput(options.sweep, run.control());
   std::string why;
   if (!calib::HasEnoughFrames(FocusSweepOf(sweep), &why)) return sweep;
-  return WithOptionNames(run.names(), [&] { return ExamineFrames(std::move(sweep), run.control()); });
+  return WithOptionNames(run.names(),
+                         [&] { return ExamineFrames(std::move(sweep), run.control()); });
 }
 
 CommandResult Calibrate(const CalibrateOptions& options) {

@@ -153,7 +153,8 @@ CommandResult InitCamera(const CameraInitOptions& options) {
     const Eigen::Vector2i size_px = options.camera.size_px.value_or(*photo_size_px);
     photo = io::ReadPhotoExif(options.photo_path, size_px.x(), size_px.y());
   }
-  const model::Camera camera = DescribedCamera(options.camera, photo, photo_size_px, facts ? &*facts : nullptr);
+  const model::Camera camera =
+      DescribedCamera(options.camera, photo, photo_size_px, facts ? &*facts : nullptr);
   const std::string yaml = model::CameraToYaml(camera);
   if (output) output->Commit(yaml);
   PrintResult(options.common, output ? WrittenText({options.output}) : yaml);

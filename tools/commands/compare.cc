@@ -89,11 +89,10 @@ CommandResult CompareImageFiles(const CompareOptions& options) {
   const ImageScores scores = CompareImages(reference, other, asked);
   const std::vector<io::FilesRead> read = {{{options.reference_path}, *reference_facts},
                                            {{options.other_path}, *other_facts}};
-  PrintResult(options.common,
-              fmt::format("reference  {}\nother      {}\n",
-                          PrintableUtf8(reference_facts->OneLine()),
-                          PrintableUtf8(other_facts->OneLine())) +
-                  ImageScoresText(scores, options.border_px));
+  PrintResult(options.common, fmt::format("reference  {}\nother      {}\n",
+                                          PrintableUtf8(reference_facts->OneLine()),
+                                          PrintableUtf8(other_facts->OneLine())) +
+                                  ImageScoresText(scores, options.border_px));
   CommandResult result;
   result.summary = ImageScoresJson(scores);
   result.summary["read"] = FilesReadJson(read);

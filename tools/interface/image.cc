@@ -255,8 +255,7 @@ Image ReadImage(const std::string& path, const ImageReadOptions& options) {
     reading.orientation = io::ImageOrientation::kDisplayed;
   Image image;
   io::ImageFacts facts;
-  image.pixels_ =
-      io::ToEncodedImage(io::DecodeImage(ReadWholeFile(path), path, reading, &facts));
+  image.pixels_ = io::ToEncodedImage(io::DecodeImage(ReadWholeFile(path), path, reading, &facts));
   image.transfer_ = options.transfer;
   if (!options.transfer && facts.raw) image.transfer_ = TransferCurve::Linear();
   image.source_ = path;

@@ -24,8 +24,8 @@ MeasuredSweep MeasureSweep(const Sweep& given, bool map_field, RunScope* run) {
   MeasuredSweep measured;
   measured.sweep = FocusSweepOf(sweep);
   if (sweep.frames == nullptr) {  // the files are hashed as they are read
-    measured.files = std::make_shared<io::FrameFiles>(sweep.description.frames,
-                                                      sweep.description.full_scale);
+    measured.files =
+        std::make_shared<io::FrameFiles>(sweep.description.frames, sweep.description.full_scale);
     measured.sweep.read_frame = [files = measured.files](std::size_t i) { return files->Read(i); };
   }
   calib::CalibrationOptions settings;

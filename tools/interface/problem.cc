@@ -43,9 +43,10 @@ std::string OrientationRemark(const io::ImageFacts* facts, const RunScope& run) 
   return facts->is_orientation_applied
              ? fmt::format("orientation {} is applied ({}): the depth map must be turned alike",
                            facts->orientation, run.Option("photo.orientation"))
-             : fmt::format("orientation {} is not applied, the pixels are as stored: a depth map of "
-                           "the turned image needs {}",
-                           facts->orientation, run.Option("photo.orientation"));
+             : fmt::format(
+                   "orientation {} is not applied, the pixels are as stored: a depth map of "
+                   "the turned image needs {}",
+                   facts->orientation, run.Option("photo.orientation"));
 }
 
 // ---- 1. Sizes and crop.
@@ -325,10 +326,10 @@ PreparedProblem Prepare(Image photo, DepthMap map, const std::optional<Camera>& 
   const int full_height_px = std::max(part.height_px(), map.height_px);
   CutToCrop(options.crop, &part, &map, run);
   if (map.width_px != part.width_px() || map.height_px != part.height_px()) {
-    throw Error(fmt::format(
-        "{}: it is {}x{} px, the image {} is {}x{} px: the sizes must be equal{}", NameOf(map),
-        map.width_px, map.height_px, NameOf(part), part.width_px(), part.height_px(),
-        turned.empty() ? "" : "; of the image, " + turned));
+    throw Error(
+        fmt::format("{}: it is {}x{} px, the image {} is {}x{} px: the sizes must be equal{}",
+                    NameOf(map), map.width_px, map.height_px, NameOf(part), part.width_px(),
+                    part.height_px(), turned.empty() ? "" : "; of the image, " + turned));
   }
   PreparedProblem prepared;
   prepared.input = std::make_shared<estimator::EstimateInput>();

@@ -153,9 +153,8 @@ void TakeFullScale(const io::FullScaleFinding& finding, const RunScope& run, Swe
                     finding.bits, finding.full_scale);
   }
   if (finding.kind != io::FullScaleFinding::Kind::kUndecided) return;
-  const std::string remedy =
-      fmt::format("state it: {} {}, or 65535 for 16 bits", run.Option("full_scale"),
-                  finding.full_scale);
+  const std::string remedy = fmt::format("state it: {} {}, or 65535 for 16 bits",
+                                         run.Option("full_scale"), finding.full_scale);
   if (finding.full_scale <= kTooDark || !IsScaleFree(sweep->camera.sensor.transfer)) {
     throw Error(fmt::format("{}: {}; {}", sweep->description.source, finding.reason, remedy));
   }

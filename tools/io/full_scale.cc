@@ -126,8 +126,8 @@ FullScaleFinding ValueCounter::Finding() const {
   FullScaleFinding finding;
   finding.reason = fmt::format("values reach {} of 65535", highest_);
   const int shift = LowestBit(set_bits_);
-  const auto used = std::count_if(counts_.begin(), counts_.end(),
-                                  [](std::uint64_t count) { return count > 0; });
+  const auto used =
+      std::count_if(counts_.begin(), counts_.end(), [](std::uint64_t count) { return count > 0; });
   const bool has_enough = used >= static_cast<std::ptrdiff_t>(kEnoughValues);
   if (shift > 0 && kContainerBits - shift >= kFewestBits && has_enough) {
     finding.kind = FullScaleFinding::Kind::kLeftAligned;

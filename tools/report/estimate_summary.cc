@@ -253,9 +253,9 @@ json EstimateJson(const EstimateOptions& options, const EstimateOutcome& outcome
               {"size", {summary.width_px, summary.height_px}},
               {"channels", summary.channels},
               {"transfer", found.transfer.Name()},
-              {"transfer_from", found.transfer_from != "image"    ? found.transfer_from
-                                : options.transfer.empty() ? "file"
-                                                           : "option"},
+              {"transfer_from", found.transfer_from != "image" ? found.transfer_from
+                                : options.transfer.empty()     ? "file"
+                                                               : "option"},
               {"read", FileReadJson(options.image_path, outcome.photo_facts.get())},
               {"aperture", ApertureJson(options, found)},
               {"exif", ExifJson(options, found)},

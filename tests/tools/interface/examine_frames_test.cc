@@ -20,13 +20,13 @@
 namespace thicklens {
 namespace {
 
-using testing::ErrorOf;
-using testing::SmallBenchSimulation;
-using testing::TemporaryFolder;
 using ::testing::AllOf;
 using ::testing::Contains;
+using testing::ErrorOf;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using testing::SmallBenchSimulation;
+using testing::TemporaryFolder;
 
 // Two frames of 16 bits that show every value from 0 to `highest`, one step per pixel; the last 100
 // pixels have `highest`.
@@ -96,8 +96,9 @@ TEST(StatedTransfer, AContradictionHasBothValues) {
   EXPECT_EQ(TransferContradiction(facts, camera), "");
   facts.transfer = io::StatedTransfer::kLinear;
   camera.sensor.transfer = TransferCurve::Srgb();
-  EXPECT_THAT(TransferContradiction(facts, camera),
-              AllOf(HasSubstr("curve linear"), HasSubstr("camera 'bench' has sensor.transfer: srgb")));
+  EXPECT_THAT(
+      TransferContradiction(facts, camera),
+      AllOf(HasSubstr("curve linear"), HasSubstr("camera 'bench' has sensor.transfer: srgb")));
   camera.sensor.transfer = TransferCurve::Linear();
   EXPECT_EQ(TransferContradiction(facts, camera), "");
   facts.transfer = io::StatedTransfer::kPq;

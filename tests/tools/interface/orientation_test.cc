@@ -20,11 +20,11 @@
 namespace thicklens {
 namespace {
 
-using testing::ErrorOf;
-using testing::TemporaryFolder;
 using ::testing::AllOf;
 using ::testing::Contains;
+using testing::ErrorOf;
 using ::testing::HasSubstr;
+using testing::TemporaryFolder;
 
 constexpr int kWidth = 48, kHeight = 32;
 
@@ -56,7 +56,7 @@ class OrientationTest : public ::testing::Test {
   static std::string Estimate(const Image& photo, const DepthMap& depth,
                               std::vector<std::string>* notices) {
     EstimateOptions options;
-    options.views = ViewCount{3, 3};
+    options.views = ViewCounts{3, 3};
     RunControl run;
     run.notice = [notices](const Notice& notice) { notices->push_back(notice.text); };
     return ErrorOf([&] { EstimateLightField(photo, depth, std::nullopt, options, run); });
@@ -84,8 +84,8 @@ TEST_F(OrientationTest, PixelsAreAsStoredUnlessTurningIsAskedFor) {
 TEST_F(OrientationTest, AnEstimateSaysThatItIsNotAppliedAndADifferentSizeNamesIt) {
   std::vector<std::string> notices;
   EXPECT_THAT(Estimate(ReadImage(Photo()), Depth(kHeight, kWidth), &notices),
-              AllOf(HasSubstr("the sizes must be equal"),
-                    HasSubstr("orientation 6 is not applied"), HasSubstr("photo.orientation")));
+              AllOf(HasSubstr("the sizes must be equal"), HasSubstr("orientation 6 is not applied"),
+                    HasSubstr("photo.orientation")));
   EXPECT_THAT(notices, Contains(HasSubstr("orientation 6 is not applied")));
 }
 

@@ -27,9 +27,8 @@ ImageFacts Facts(int width_px) {
 }
 
 TEST(FilesRead, EqualFilesAreOneGroupAndUnreadOnesNone) {
-  const auto groups =
-      GroupFilesRead({"a.png", "b.png", "c.png", "d.png"},
-                     {Facts(64), std::nullopt, Facts(32), Facts(32)});
+  const auto groups = GroupFilesRead({"a.png", "b.png", "c.png", "d.png"},
+                                     {Facts(64), std::nullopt, Facts(32), Facts(32)});
   ASSERT_THAT(groups, SizeIs(2));
   EXPECT_THAT(groups[0].files, ElementsAre("c.png", "d.png"));
   EXPECT_THAT(groups[1].files, ElementsAre("a.png"));

@@ -15,8 +15,8 @@ namespace thicklens::io {
 namespace {
 
 using Kind = FullScaleFinding::Kind;
-using testing::ErrorOf;
 using ::testing::AllOf;
+using testing::ErrorOf;
 using ::testing::HasSubstr;
 
 // A frame of grey texture with noise, whole numbers from 0 to `highest`, of which about `clipped`

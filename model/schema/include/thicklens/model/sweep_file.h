@@ -72,7 +72,7 @@ struct SweepFile {
   // The value in the files that stands for white, 1 to 65535; absent: that of their container, the
   // one that they state, or the one that their values show.
   std::optional<int> full_scale;
-  std::vector<SweepFrame> frames;           // in the order of the file
+  std::vector<SweepFrame> frames;  // in the order of the file
   // Describes in one line which readings were read, and in which unit; empty: the file lists them.
   std::string readings;
 };

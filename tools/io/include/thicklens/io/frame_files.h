@@ -37,7 +37,7 @@ class THICKLENS_EXPORT FrameFiles {
 
   std::vector<model::SweepFrame> frames_;
   std::optional<int> full_scale_;
-  std::vector<std::string> digests_;               // empty: not read yet
+  std::vector<std::string> digests_;              // empty: not read yet
   std::vector<std::optional<ImageFacts>> facts_;  // absent: not read yet
   std::mutex mutex_;
 };
