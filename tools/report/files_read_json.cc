@@ -11,7 +11,7 @@ namespace {
 using nlohmann::json;
 
 template <typename Value>
-json OrNull(const std::optional<Value>& value) {
+json ValueOrNull(const std::optional<Value>& value) {
   return value ? json(*value) : json();
 }
 
@@ -40,7 +40,7 @@ const char* AlphaName(io::AlphaKind alpha) {
   return alpha == io::AlphaKind::kStraight ? "straight" : "associated";
 }
 
-json Texts(const std::vector<std::string>& texts) {
+json PrintableTexts(const std::vector<std::string>& texts) {
   json list = json::array();
   for (const std::string& text : texts) list.push_back(PrintableUtf8(text));
   return list;
@@ -59,7 +59,7 @@ json RawJson(const io::ImageFacts& facts) {
           {"mosaic", raw.mosaic},
           {"black_level", raw.black_level},
           {"white_level", raw.white_level},
-          {"camera_white_balance", OrNull(raw.camera_white_balance)},
+          {"camera_white_balance", ValueOrNull(raw.camera_white_balance)},
           {"sensor_size_px", {raw.sensor_width_px, raw.sensor_height_px}},
           {"active_origin_px", {raw.active_left_px, raw.active_top_px}},
           {"active_size_px", {raw.active_width_px, raw.active_height_px}},
@@ -75,19 +75,19 @@ json FactsJson(const io::ImageFacts& facts) {
           {"page", facts.page},
           {"pages", facts.pages},
           {"part", PrintableUtf8(facts.part)},
-          {"channels", Texts(facts.channels)},
+          {"channels", PrintableTexts(facts.channels)},
           {"sample_type", facts.sample_type},
           {"container_bits", facts.container_bits},
-          {"significant_bits", OrNull(facts.significant_bits)},
+          {"significant_bits", ValueOrNull(facts.significant_bits)},
           {"transfer", transfer == nullptr ? json() : json(transfer)},
           {"gamma", facts.transfer == io::StatedTransfer::kGamma ? json(facts.gamma) : json()},
           {"icc_profile", ProfileJson(facts)},
-          {"chromaticities", OrNull(facts.chromaticities)},
+          {"chromaticities", ValueOrNull(facts.chromaticities)},
           {"orientation", facts.orientation},
           {"orientation_applied", facts.is_orientation_applied},
           {"alpha", AlphaName(facts.alpha)},
           {"raw", RawJson(facts)},
-          {"notes", Texts(facts.notes)}};
+          {"notes", PrintableTexts(facts.notes)}};
 }
 
 }  // namespace
@@ -95,7 +95,7 @@ json FactsJson(const io::ImageFacts& facts) {
 json FilesReadJson(const std::vector<io::FilesRead>& groups) {
   json list = json::array();
   for (const io::FilesRead& group : groups) {
-    json entry = {{"files", Texts(group.files)}};
+    json entry = {{"files", PrintableTexts(group.files)}};
     entry.update(FactsJson(group.facts));
     list.push_back(std::move(entry));
   }
