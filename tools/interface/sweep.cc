@@ -245,6 +245,12 @@ Sweep ExamineFrames(Sweep sweep, const RunControl& control) {
   const std::string& path = frames.front().image;
   io::ImageFacts facts;
   const cv::Mat first = io::ReadImageFile(path, &facts);
+  if (facts.raw && !(sweep.camera.sensor.transfer == TransferCurve::Linear())) {
+    throw Error(fmt::format(
+        "{}: the values of a raw file are linear, {} has sensor.transfer: {}: set it to linear",
+        path, sweep.camera.source.empty() ? "the camera" : sweep.camera.source,
+        sweep.camera.sensor.transfer.Name()));
+  }
   const std::string contradiction = TransferContradiction(facts, sweep.camera);
   if (!contradiction.empty()) sweep.notices.push_back(fmt::format("{}: {}", path, contradiction));
   const bool is_stated =

@@ -9,8 +9,10 @@
 
 #include "support/error_message.h"
 #include "support/temporary_folder.h"
+#include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/io/image_file.h"
+#include "thicklens/io/image_io.h"
 #include "thicklens/opencv.h"
 #include "thicklens/simulate.h"
 #include "thicklens/sweep.h"
@@ -87,6 +89,24 @@ TEST_F(ExamineFramesTest, AStatedFullScaleIsUsedAsItIs) {
   sweep.description.full_scale = 700;
   EXPECT_THAT(ErrorOf([&] { FocusSweepOf(sweep).read_frame(1); }),
               AllOf(HasSubstr("f1.tif"), HasSubstr("above the full scale of 700")));
+}
+
+TEST_F(ExamineFramesTest, RawFramesNeedACameraWithLinearValues) {
+  try {
+    io::RequireImageCodecs();
+  } catch (const Error& error) {
+    GTEST_SKIP() << error.what();
+  }
+  Sweep sweep;
+  sweep.camera = SmallBenchSimulation().camera;
+  sweep.camera.sensor.transfer = TransferCurve::Srgb();
+  sweep.description.frames = {{THICKLENS_SOURCE_DIR "/tests/data/images/mosaic.dng", 0}};
+  EXPECT_THAT(ErrorOf([&] { ExamineFrames(sweep); }),
+              AllOf(HasSubstr("mosaic.dng"), HasSubstr("linear"), HasSubstr("srgb")));
+  sweep.camera.sensor.transfer = TransferCurve::Linear();
+  const Sweep examined = ExamineFrames(sweep);
+  EXPECT_FALSE(examined.description.full_scale);
+  EXPECT_EQ(examined.full_scale_reason, "the files state it");
 }
 
 TEST(StatedTransfer, AContradictionHasBothValues) {
