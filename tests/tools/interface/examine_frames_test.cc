@@ -9,14 +9,13 @@
 
 #include "support/error_message.h"
 #include "support/temporary_folder.h"
-#include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/io/image_file.h"
-#include "thicklens/io/image_io.h"
 #include "thicklens/opencv.h"
 #include "thicklens/simulate.h"
 #include "thicklens/sweep.h"
 #include "tools/interface/stated_transfer.h"
+#include "tools/io/image_library.h"
 #include "tools/support/bench_simulation.h"
 
 namespace thicklens {
@@ -92,11 +91,7 @@ TEST_F(ExamineFramesTest, AStatedFullScaleIsUsedAsItIs) {
 }
 
 TEST_F(ExamineFramesTest, RawFramesNeedACameraWithLinearValues) {
-  try {
-    io::RequireImageCodecs();
-  } catch (const Error& error) {
-    GTEST_SKIP() << error.what();
-  }
+  if (!io::HasImageLibrary()) GTEST_SKIP() << "a build without GPL parts";
   Sweep sweep;
   sweep.camera = SmallBenchSimulation().camera;
   sweep.camera.sensor.transfer = TransferCurve::Srgb();
