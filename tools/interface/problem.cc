@@ -319,7 +319,8 @@ PreparedProblem Prepare(Image photo, DepthMap map, const std::optional<Camera>& 
   const PhotoFile file{NameOf(photo), photo.is_from_file() ? photo.source() : ""};
   const std::shared_ptr<const io::ImageFacts> facts = photo.facts();
   const std::string turned = OrientationRemark(facts.get(), *run);
-  if (!turned.empty()) run->Warn(file.name + ": " + turned);
+  // With a camera the comparison with EXIF says it.
+  if (!turned.empty() && !camera) run->Warn(file.name + ": " + turned);
   if (photo.channels() == 4) run->Warn(file.name + ": its alpha channel is ignored");
   Image part = photo.channels() == 4 ? photo.WithoutAlpha() : std::move(photo);
   const int full_width_px = std::max(part.width_px(), map.width_px);
