@@ -75,7 +75,7 @@ class Calibrator {
     Calibration result;
     for (const model::SweepFrame& frame : sweep.frames) {
       FrameMeasurement measurement;
-      measurement.image = frame.image;
+      measurement.image = frame.Name();
       measurement.reading_mm = frame.reading_mm;
       result.frames.push_back(measurement);
     }

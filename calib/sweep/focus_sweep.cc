@@ -112,7 +112,7 @@ bool FocusSweep::IsValid(std::string* why) const {
   }
   for (const model::SweepFrame& frame : frames) {
     if (!std::isfinite(frame.reading_mm)) {
-      return Fail(why, fmt::format("{}: reading_mm must be finite, found {}", frame.image,
+      return Fail(why, fmt::format("{}: reading_mm must be finite, found {}", frame.Name(),
                                    frame.reading_mm));
     }
   }
@@ -142,7 +142,7 @@ FocusSweep MakeFocusSweep(const model::SweepFile& file, const model::Camera& cam
 
 cv::Mat RegionOf(const cv::Mat& stored, const FocusSweep& sweep, std::size_t index) {
   const model::Sensor& sensor = sweep.camera.sensor;
-  const std::string& name = sweep.frames[index].image;
+  const std::string name = sweep.frames[index].Name();
   if (stored.cols != sensor.width_px || stored.rows != sensor.height_px) {
     throw Error(
         fmt::format("{}: the image has {} x {} px, but the camera's sensor has {} x {} px: the "
@@ -180,7 +180,7 @@ cv::Mat LinearChannel(const cv::Mat& stored, const FocusSweep& sweep, std::size_
   if (channel < 0 || channel >= colours) {
     throw Error(
         fmt::format("{}: channel {} is requested, but the image has {} channel(s), counted from 0",
-                    sweep.frames[index].image, channel, colours));
+                    sweep.frames[index].Name(), channel, colours));
   }
   const bool bytes = region.depth() == CV_8U;
   const auto decode = DecodeTableOf(sweep.camera.sensor.transfer, bytes ? 256 : 65536);

@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cstddef>
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <set>
 #include <system_error>
 
 #include "model/tables/table_text.h"
@@ -118,6 +120,36 @@ class Images {
   std::map<std::string, std::vector<std::size_t>> by_name_, by_stem_;
 };
 
+// The path without its ending.
+std::string StemOf(const std::string& path) { return fs::path(path).replace_extension().string(); }
+
+// The page of a row, or a number that counts from 0 or from 1.
+struct RowPage {
+  int number = 0;
+  bool is_index = false;  // "stack.tif[3]"
+};
+
+std::optional<int> WholeNumber(const std::string& text) {
+  int value = 0;
+  const auto [end, status] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (status != std::errc() || end != text.data() + text.size() || value < 0) return std::nullopt;
+  return value;
+}
+
+RowPage PageOfRow(const FileReading& row, const std::string& name, int pages) {
+  if (const auto number = WholeNumber(row.file)) return {*number, false};
+  const std::size_t bracket = row.file.rfind('[');
+  if (bracket != std::string::npos && row.file.back() == ']') {
+    const std::string file = NameIn(row.file.substr(0, bracket));
+    const auto page = WholeNumber(row.file.substr(bracket + 1, row.file.size() - bracket - 2));
+    if (page && (file.empty() || file == name)) return {*page, true};
+  }
+  throw Error(fmt::format(
+      "{}{} has {} pages, and '{}' is none of them: a row for each page is expected, '{}[0]' to "
+      "'{}[{}]' or its number, or no table if the file has OME-XML with positions",
+      row.place, name, pages, Shortened(row.file), name, name, pages - 1));
+}
+
 // Checks a frame early, because frames are read long after their names are known.
 void RequireFrame(const std::string& path, const std::string& place) {
   ReportInput(path);
@@ -152,9 +184,14 @@ std::vector<SweepFrame> PairFrames(const ReadingSet& readings,
     if (is_by_name && by_name++ == 0) first_by_name = &row;
     frames.push_back({path, row.reading_mm});
   }
-  std::vector<std::string> without_row;
+  std::set<std::string> stems;
+  for (const auto& [path, row] : row_of) stems.insert(StemOf(path));
+  std::vector<std::string> without_row, of_other_kind;
   for (const std::string& file : files) {
-    if (row_of.count(fs::path(file).lexically_normal().string()) == 0) without_row.push_back(file);
+    const std::string path = fs::path(file).lexically_normal().string();
+    if (row_of.count(path) > 0) continue;
+    // A camera that saves each photograph as raw and as JPEG.
+    (stems.count(StemOf(path)) > 0 ? of_other_kind : without_row).push_back(file);
   }
   // An image that was left out by mistake costs more than one that has to be moved away.
   if (!without_row.empty()) {
@@ -170,6 +207,47 @@ std::vector<SweepFrame> PairFrames(const ReadingSet& readings,
         Shortened(first_by_name->file),
         by_name > 1 ? fmt::format(", nor do the paths of {} more rows", by_name - 1) : "",
         folder.empty() ? "." : folder));
+  }
+  if (!of_other_kind.empty() && notices != nullptr) {
+    notices->push_back(fmt::format(
+        "{}{}: not used, because the table names the same photograph with another ending",
+        of_other_kind.front(),
+        of_other_kind.size() > 1 ? fmt::format(" and {} more", of_other_kind.size() - 1) : ""));
+  }
+  return frames;
+}
+
+std::vector<SweepFrame> PairPages(const ReadingSet& readings, const std::string& path, int pages) {
+  const std::string name = fs::path(path).filename().string();
+  std::vector<RowPage> places;
+  bool counts_from_one = true;
+  for (const FileReading& row : readings.rows) {
+    places.push_back(PageOfRow(row, name, pages));
+    counts_from_one = counts_from_one && !places.back().is_index && places.back().number > 0;
+  }
+  std::vector<SweepFrame> frames;
+  std::map<int, const FileReading*> row_of;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const FileReading& row = readings.rows[i];
+    const int page = places[i].number - (counts_from_one ? 1 : 0);
+    if (page >= pages) {
+      throw Error(fmt::format("{}'{}' is not a page of {}, which has {}", row.place,
+                              Shortened(row.file), name, pages));
+    }
+    const auto [known, added] = row_of.emplace(page, &row);
+    if (!added) {
+      throw Error(fmt::format("{}the page '{}' already has a reading, at {}", row.place,
+                              Shortened(row.file),
+                              known->second->place.substr(0, known->second->place.size() - 2)));
+    }
+    frames.push_back({path, row.reading_mm, page});
+  }
+  for (int page = 0; page < pages; ++page) {
+    if (row_of.count(page) > 0) continue;
+    throw Error(
+        fmt::format("{}: page {} (counted from 0) has no row in {}; it has {} pages, and {} "
+                    "rows are there",
+                    path, page, readings.source, pages, readings.rows.size()));
   }
   return frames;
 }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <set>
 
+#include "model/schema/frame_pairing.h"
 #include "model/schema/sweep_frames.h"
 #include "model/schema/yaml_fields.h"
 #include "model/schema/yaml_writer.h"
@@ -178,6 +179,19 @@ SweepFile SweepFromFolder(const std::string& folder, const std::string& table,
   return sweep;
 }
 
+SweepFile SweepFromPages(const std::string& path, int pages, const ReadingSet& readings,
+                         const std::string& camera_path, std::vector<std::string>* notices) {
+  SweepFile sweep;
+  sweep.source = path;
+  sweep.camera_path = camera_path;
+  sweep.frames = PairPages(readings, path, pages);
+  sweep.readings = readings.description;
+  if (notices != nullptr)
+    notices->insert(notices->end(), readings.notices.begin(), readings.notices.end());
+  NoteOrderAndRepeats(sweep, notices);
+  return sweep;
+}
+
 std::string SweepToYaml(const SweepFile& sweep) {
   YamlWriter out(kSchema);
   out.Text("camera", sweep.camera_path);
@@ -209,6 +223,7 @@ std::string SweepToYaml(const SweepFile& sweep) {
   for (const SweepFrame& frame : sweep.frames) {
     out.BeginMapInLine();
     out.Text("image", frame.image);
+    if (frame.page) out.Number("page", *frame.page);
     out.Number("reading_mm", frame.reading_mm);
     out.EndMap();
   }

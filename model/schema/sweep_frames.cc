@@ -7,6 +7,7 @@
 #include <array>
 #include <cctype>
 #include <filesystem>
+#include <map>
 #include <set>
 #include <system_error>
 
@@ -23,14 +24,6 @@ namespace fs = std::filesystem;
 // Whether the name begins with a dot: incomplete outputs, and the companion files that some systems
 // create for every file ("._frame.png").
 bool IsHidden(const fs::path& file) { return file.filename().string().rfind('.', 0) == 0; }
-
-bool IsImageName(const fs::path& file) {
-  static const std::set<std::string> kEndings = {".png", ".jpg", ".jpeg", ".tif", ".tiff",
-                                                 ".bmp", ".pgm", ".ppm",  ".pnm"};
-  std::string ending = file.extension().string();
-  for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return kEndings.count(ending) > 0;
-}
 
 // The folder of the YAML file may have any name. Only the text in the file is a pattern.
 std::string EscapedForGlob(const std::string& folder) {
@@ -64,11 +57,12 @@ std::vector<std::string> ImagesIn(const std::string& folder) {
   std::vector<std::string> here, below;
   for (const auto& entry : entries) {
     if (IsHidden(entry.path())) continue;
-    if (entry.is_regular_file(failure) && IsImageName(entry.path()))
+    if (entry.is_regular_file(failure) && IsNameOfImage(entry.path().string()))
       here.push_back(entry.path().string());
     if (!entry.is_directory(failure)) continue;
     for (const auto& inner : fs::directory_iterator(entry.path(), failure)) {
-      if (!IsHidden(inner.path()) && inner.is_regular_file(failure) && IsImageName(inner.path()))
+      if (!IsHidden(inner.path()) && inner.is_regular_file(failure) &&
+          IsNameOfImage(inner.path().string()))
         below.push_back(inner.path().string());
     }
   }
@@ -95,6 +89,8 @@ std::vector<std::string> FilesOfGlob(const YamlNode& pattern, const std::string&
   if (files.empty()) throw pattern.ErrorHere(fmt::format("no file matches '{}'", pattern.Text()));
   return files;
 }
+
+constexpr int kMaxPage = 999'999;
 
 // A value of the command line replaces that of the file.
 void Replace(const std::string& stated, std::string* value) {
@@ -132,9 +128,25 @@ ReadingOptions OptionsOf(const YamlNode& root, const ReadingOptions& replacement
   return options;
 }
 
+// A camera may save each photograph as raw and as JPEG. Without a table, nothing says which is
+// meant.
+void RequireOneKind(const std::vector<std::string>& files) {
+  std::map<std::string, std::string> file_of;
+  for (const std::string& file : files) {
+    const auto [known, added] = file_of.emplace(fs::path(file).replace_extension().string(), file);
+    if (added) continue;
+    const std::string ending = fs::path(file).extension().string();
+    throw Error(fmt::format(
+        "{} and {}: one photograph in two files; choose one kind by frames_glob ('*{}') in a sweep "
+        "file, or move the others elsewhere",
+        known->second, file, ending));
+  }
+}
+
 void TakeReadings(const SweepReading& reading, const std::string& table,
                   const ReadingOptions& options, const std::vector<std::string>& files,
                   const std::string& folder, SweepFile* sweep, std::vector<std::string>* notices) {
+  if (table.empty()) RequireOneKind(files);
   const ReadingReader reader = reading.reader ? reading.reader : ReadTextReadings;
   const ReadingSet readings = reader(table, files, options);
   if (notices != nullptr)
@@ -170,7 +182,7 @@ void RequireNoOptions(const YamlNode& root, const ReadingOptions& replacements) 
 void ReadListedFrames(const YamlNode& root, SweepFile* sweep) {
   std::set<std::string> images;
   for (const YamlNode& node : root.At("frames").Elements()) {
-    node.RequireKeys({"image", "reading_mm"});
+    node.RequireKeys({"image", "page", "reading_mm"});
     const YamlNode image = node.At("image");
     const std::string path = image.ResolvePath(image.Text());
     std::error_code failure;
@@ -181,14 +193,29 @@ void ReadListedFrames(const YamlNode& root, SweepFile* sweep) {
     } catch (const Error& error) {
       throw image.ErrorHere(error.what());
     }
-    if (!images.insert(path).second)
-      throw image.ErrorHere(fmt::format("'{}' is listed twice", image.Text()));
-    sweep->frames.push_back({path, node.At("reading_mm").Number()});
+    SweepFrame frame{path, node.At("reading_mm").Number()};
+    if (const auto page = node.Find("page")) frame.page = page->Integer(0, kMaxPage);
+    if (!images.insert(frame.Name()).second) {
+      throw image.ErrorHere(
+          fmt::format("'{}'{} is listed twice", image.Text(),
+                      frame.page ? fmt::format(", page {}", *frame.page) : std::string()));
+    }
+    sweep->frames.push_back(std::move(frame));
   }
   if (sweep->frames.empty()) throw root.At("frames").ErrorHere("at least one frame is expected");
 }
 
 }  // namespace
+
+bool IsNameOfImage(const std::string& path) {
+  static const std::set<std::string> kEndings = {
+      ".png", ".jpg", ".jpeg", ".tif",  ".tiff", ".bmp",  ".pgm", ".ppm", ".pnm",
+      ".dng", ".nef", ".cr2",  ".cr3",  ".arw",  ".raf",  ".rw2", ".orf", ".pef",
+      ".srw", ".nrw", ".webp", ".heic", ".heif", ".avif", ".dcm"};
+  std::string ending = fs::path(path).extension().string();
+  for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return kEndings.count(ending) > 0;
+}
 
 void ReadSweepFrames(const YamlNode& root, const SweepReading& reading, SweepFile* sweep,
                      std::vector<std::string>* notices) {

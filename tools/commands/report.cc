@@ -21,6 +21,7 @@
 #include "thicklens/estimator/disparity_map.h"
 #include "thicklens/io/aperture_statement.h"
 #include "thicklens/io/depth_io.h"
+#include "thicklens/io/frame_files.h"
 #include "thicklens/io/image_io.h"
 #include "thicklens/io/light_field_io.h"
 #include "thicklens/model/light_field.h"
@@ -246,8 +247,8 @@ SweepStrip ReadSweepStrip(const std::string& path, const std::optional<model::Ca
        ShotIndices(sweep.frames.size(), focus.value_or((sweep.frames.size() - 1) / 2))) {
     ThrowIfCancelled();
     const model::SweepFrame& frame = sweep.frames[i];
-    strip.shots.push_back({MiddleOf(io::ReadImageFile(frame.image), sweep.roi), frame.image,
-                           frame.reading_mm, focus == i});
+    strip.shots.push_back(
+        {MiddleOf(io::ReadFrame(frame), sweep.roi), frame.Name(), frame.reading_mm, focus == i});
   }
   return strip;
 }

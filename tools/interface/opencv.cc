@@ -63,7 +63,7 @@ std::vector<std::string> FrameNames(const std::vector<model::SweepFrame>& frames
   for (std::size_t i = 0; i < frames.size(); ++i) {
     const std::string number = fmt::format("frame {}", i);
     names.push_back(frames[i].image.empty() ? number
-                                            : fmt::format("{} ({})", number, frames[i].image));
+                                            : fmt::format("{} ({})", number, frames[i].Name()));
   }
   return names;
 }

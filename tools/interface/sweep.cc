@@ -13,8 +13,9 @@
 #include "thicklens/base/input_file.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/calib/focus_sweep.h"
+#include "thicklens/io/frame_files.h"
 #include "thicklens/io/full_scale.h"
-#include "thicklens/io/image_io.h"
+#include "thicklens/io/image_file.h"
 #include "thicklens/io/readings.h"
 #include "thicklens/model/camera_file.h"
 #include "tools/interface/missing_tolerances.h"
@@ -102,6 +103,42 @@ model::SweepReading ReadingOf(const SweepOverrides& overrides) {
   return {overrides.readings, io::ReadReadings};
 }
 
+// A sweep whose frames are the pages of one file; `table` is empty if its OME-XML has the readings.
+model::SweepFile SweepOfStack(const std::string& path, const std::string& table,
+                              const SweepOverrides& overrides, std::vector<std::string>* notices) {
+  const model::ReadingOptions& options = overrides.readings;
+  if (!options.name_pattern.empty() || options.source == "exif" || options.source == "sidecar") {
+    throw OptionError("readings.source",
+                      fmt::format("readings.source: the pages of {} have one name and one set of "
+                                  "metadata; a table or OME-XML states their readings",
+                                  path));
+  }
+  const std::string bytes = ReadWholeFile(path);
+  const int pages = io::PagesOfImage(bytes, path);
+  if (pages < 2) {
+    throw Error(fmt::format(
+        "{}: it has one image; a folder of frames or a file of several pages is expected", path));
+  }
+  io::ImageReading first;
+  first.page = 0;
+  const model::ReadingSet readings =
+      table.empty() ? io::ReadingsOfPages(io::DecodeImageFile(bytes, path, first).facts.description,
+                                          path, options)
+                    : io::ReadReadings(table, {path}, options);
+  return model::SweepFromPages(path, pages, readings, overrides.camera_path, notices);
+}
+
+// The file whose pages are the frames: the input itself, or the only image in the folder.
+std::optional<std::string> StackOf(const std::string& input) {
+  std::error_code failure;
+  if (!fs::is_directory(input, failure)) return input;
+  const std::vector<std::string> images = model::ImagesOfFolder(input);
+  if (images.size() != 1) return std::nullopt;
+  const std::string& path = images.front();
+  if (io::PagesOfImage(ReadWholeFile(path), path) < 2) return std::nullopt;
+  return path;
+}
+
 Sweep Finish(model::SweepFile file, const std::string& sweep_yaml, const SweepOverrides& overrides,
              const RunScope& run, Sweep sweep) {
   ApplyOverrides(overrides, run, &file);
@@ -132,7 +169,7 @@ io::FullScaleFinding FullScaleOfFrames(const std::vector<model::SweepFrame>& fra
   io::ValueCounter values;
   for (const model::SweepFrame& frame : frames) {
     ThrowIfCancelled();
-    values.Add(io::ReadImageFile(frame.image), frame.image);
+    values.Add(io::ReadFrame(frame), frame.Name());
     if (values.UsesWholeContainer()) break;
   }
   return values.Finding();
@@ -220,7 +257,13 @@ Sweep ReadSweepFolder(const std::string& folder, const std::string& readings_csv
                     "needs a camera file (thicklens camera init makes one)",
                     folder));
   }
-  if (readings_csv.empty() != overrides.readings.IsWithoutTable()) {
+  const bool is_without_table = overrides.readings.IsWithoutTable();
+  Sweep sweep;
+  if (const auto stack = StackOf(folder); stack && (readings_csv.empty() || !is_without_table)) {
+    model::SweepFile file = SweepOfStack(*stack, readings_csv, overrides, &sweep.notices);
+    return Finish(std::move(file), "", overrides, run, std::move(sweep));
+  }
+  if (readings_csv.empty() != is_without_table) {
     throw OptionError(
         "readings",
         readings_csv.empty()
@@ -230,7 +273,6 @@ Sweep ReadSweepFolder(const std::string& folder, const std::string& readings_csv
             : fmt::format("readings: either the table {} or the files themselves have the readings",
                           readings_csv));
   }
-  Sweep sweep;
   model::SweepFile file = model::SweepFromFolder(folder, readings_csv, overrides.camera_path,
                                                  ReadingOf(overrides), &sweep.notices);
   return Finish(std::move(file), "", overrides, run, std::move(sweep));
@@ -242,9 +284,9 @@ Sweep ExamineFrames(Sweep sweep, const RunControl& control) {
   const std::vector<model::SweepFrame>& frames = sweep.description.frames;
   const bool is_done = !sweep.full_scale_reason.empty();
   if (sweep.frames != nullptr || is_done || frames.empty()) return sweep;
-  const std::string& path = frames.front().image;
+  const std::string path = frames.front().Name();
   io::ImageFacts facts;
-  const cv::Mat first = io::ReadImageFile(path, &facts);
+  const cv::Mat first = io::ReadFrame(frames.front(), &facts);
   if (facts.raw && !(sweep.camera.sensor.transfer == TransferCurve::Linear())) {
     throw Error(fmt::format(
         "{}: the values of a raw file are linear, {} has sensor.transfer: {}: set it to linear",

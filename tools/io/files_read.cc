@@ -15,6 +15,16 @@ std::string NameOf(const std::string& path) {
   return PrintableUtf8(std::filesystem::path(path).filename().string());
 }
 
+// "31 pages of stack.tif: ", "31 files: ", "f007.tif and 2 more: ", or nothing for one file.
+std::string FilesText(const std::vector<std::string>& files, bool is_first, bool is_only) {
+  const bool are_pages = std::count(files.begin(), files.end(), files.front()) ==
+                         static_cast<std::ptrdiff_t>(files.size());
+  if (files.size() == 1) return is_only ? "" : NameOf(files.front()) + ": ";
+  if (are_pages) return fmt::format("{} pages of {}: ", files.size(), NameOf(files.front()));
+  if (is_first) return fmt::format("{} files: ", files.size());
+  return fmt::format("{} and {} more: ", NameOf(files.front()), files.size() - 1);
+}
+
 }  // namespace
 
 std::vector<FilesRead> GroupFilesRead(const std::vector<std::string>& paths,
@@ -46,14 +56,10 @@ std::string FilesReadLine(const std::vector<FilesRead>& groups) {
   for (std::size_t i = 0; i < groups.size() && i < kShown; ++i) {
     const FilesRead& group = groups[i];
     if (i > 0) line += "; ";
-    if (group.files.size() > 1) {
-      line += i == 0 ? fmt::format("{} files: ", group.files.size())
-                     : fmt::format("{} and {} more: ", NameOf(group.files.front()),
-                                   group.files.size() - 1);
-    } else if (groups.size() > 1) {
-      line += NameOf(group.files.front()) + ": ";
-    }
-    line += group.facts.OneLine();
+    line += FilesText(group.files, i == 0, groups.size() == 1);
+    ImageFacts facts = group.facts;
+    if (group.files.size() > 1) facts.pages = 1;  // the page is that of the first file only
+    line += facts.OneLine();
   }
   if (groups.size() > kShown) line += fmt::format("; and {} more kinds", groups.size() - kShown);
   return line;

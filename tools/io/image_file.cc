@@ -438,6 +438,11 @@ std::vector<DecodedImage> DecodeImagePages(const std::string& bytes, const std::
   return pages;
 }
 
+int PagesOfImage(const std::string& bytes, const std::string& name) {
+  const ImageReading reading;
+  return ImageFile(bytes, name, reading).pages();
+}
+
 DecodedImage ReadImageData(const std::string& path, const ImageReading& reading) {
   return DecodeImageFile(ReadWholeFile(path), path, reading);
 }

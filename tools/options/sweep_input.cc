@@ -59,6 +59,12 @@ bool HasSweepFile(const SweepArguments& arguments) {
   return fs::exists(fs::path(arguments.input) / kSweepName, failure);
 }
 
+// Whether the input is an image: its pages are the frames.
+bool IsStack(const SweepArguments& arguments) {
+  std::error_code failure;
+  return model::IsNameOfImage(arguments.input) && fs::is_regular_file(arguments.input, failure);
+}
+
 // Throws UsageError unless the input is a sweep's file, a folder with one, or a folder with a table
 // of readings.
 void CheckInput(const SweepArguments& arguments) {
@@ -70,16 +76,22 @@ void CheckInput(const SweepArguments& arguments) {
           "--readings (a table) and --reading-from or --reading-from-name (the files themselves) "
           "exclude each other");
     }
-    if (is_folder) return;
+    if (is_folder || IsStack(arguments)) return;
     throw UsageError(
         fmt::format("--readings requires a folder of frames; {} is not a folder", arguments.input));
   }
   if (!is_folder || HasSweepFile(arguments)) return;
   if (arguments.readings.IsWithoutTable()) return;
-  const auto pattern = model::ProposedNamePattern(model::ImagesOfFolder(arguments.input));
+  const std::vector<std::string> images = model::ImagesOfFolder(arguments.input);
+  const auto pattern = model::ProposedNamePattern(images);
   throw UsageError(fmt::format(
-      "{}: a folder without {} needs --readings (a table of file and reading) and --camera{}",
+      "{}: a folder without {} needs --readings (a table of file and reading) and --camera{}{}",
       arguments.input, kSweepName,
+      images.size() == 1
+          ? fmt::format("; if its pages are the frames and have positions (OME-TIFF), give the "
+                        "file itself: {}",
+                        images.front())
+          : "",
       pattern ? fmt::format("; if the one number that changes in the names is the reading: "
                             "--reading-from-name '{}' (--unit states its unit)",
                             *pattern)
@@ -146,7 +158,7 @@ Sweep ReadSweepInput(const SweepArguments& arguments, const RunControl& run) {
   return WithOptionNames(names, [&] {
     std::error_code failure;
     const bool is_plain_folder =
-        !arguments.readings_csv.empty() ||
+        !arguments.readings_csv.empty() || IsStack(arguments) ||
         (fs::is_directory(arguments.input, failure) && !HasSweepFile(arguments));
     return is_plain_folder
                ? ReadSweepFolder(arguments.input, arguments.readings_csv, overrides, named)

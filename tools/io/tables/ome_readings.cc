@@ -337,6 +337,10 @@ class PageReader {
   mutable std::string last_file_;
 };
 
+bool IsOmeXml(const std::string& text) {
+  return text.find("<OME") != std::string::npos || text.find(":OME") != std::string::npos;
+}
+
 }  // namespace
 
 PageReadings ReadingsOfOmeXml(const std::string& xml, const std::string& place,
@@ -388,9 +392,8 @@ model::ReadingSet ReadingsOfOmeFiles(const std::vector<std::string>& files,
   std::string description;
   for (const std::string& file : files) {
     const std::string xml = ImageDescriptionOf(file);
-    const bool is_xml =
-        xml.find("<OME") != std::string::npos || xml.find(":OME") != std::string::npos;
-    if (!is_xml) throw Error(file + ": its ImageDescription is no OME-XML, as an OME-TIFF has");
+    if (!IsOmeXml(xml))
+      throw Error(file + ": its ImageDescription is no OME-XML, as an OME-TIFF has");
     const PageReadings readings = ReadingsOfOmeXml(xml, file, options);
     // Each file of a set repeats the XML of all.
     const std::string name = fs::path(file).filename().string();
@@ -411,6 +414,46 @@ model::ReadingSet ReadingsOfOmeFiles(const std::vector<std::string>& files,
   if (set.rows.empty()) throw Error("no image, and therefore no OME-XML, is there");
   FinishMetadata("PositionZ", "", false, options, &set);
   set.description = fmt::format("{} in the OME-XML of {} files", description, set.rows.size());
+  return set;
+}
+
+model::ReadingSet ReadingsOfPages(const std::string& description, const std::string& path,
+                                  const model::ReadingOptions& options) {
+  const std::string name = fs::path(path).filename().string();
+  if (!IsOmeXml(description)) {
+    throw Error(fmt::format(
+        "{}: its ImageDescription is no OME-XML with positions of the pages; give a table by "
+        "--readings, with a row for each page: '{}[0]', '{}[1]', ..",
+        path, name, name));
+  }
+  PageReadings readings = ReadingsOfOmeXml(description, path, options);
+  std::set<std::string> files;
+  for (const PageReading& page : readings.pages) files.insert(fs::path(page.file).filename());
+  // A set of files repeats the XML of all in each; a file that stands alone may have been renamed.
+  if (files.size() > 1) {
+    const auto is_other = [&](const PageReading& page) {
+      return !page.file.empty() && fs::path(page.file).filename() != name;
+    };
+    readings.pages.erase(std::remove_if(readings.pages.begin(), readings.pages.end(), is_other),
+                         readings.pages.end());
+    if (readings.pages.empty())
+      throw Error(fmt::format("{}: its OME-XML names other files, but no page of this one", path));
+  }
+  model::ReadingSet set;
+  set.source = "its OME-XML";
+  for (const PageReading& page : readings.pages) {
+    if (page.channel != 0) {
+      throw Error(fmt::format(
+          "{}: page {} is of another channel: a sweep has one channel; extract its pages into a "
+          "file",
+          path, page.page));
+    }
+    const std::string row = fmt::format("{}[{}]", name, page.page);
+    set.rows.push_back({row, page.reading_mm, fmt::format("{}: page {}: ", path, page.page)});
+  }
+  FinishMetadata("PositionZ", "", false, options, &set);
+  set.description =
+      fmt::format("{} in the OME-XML of {} pages", readings.description, set.rows.size());
   return set;
 }
 

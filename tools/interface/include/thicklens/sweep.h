@@ -77,9 +77,10 @@ struct SweepOverrides {
 // file:line:column.
 THICKLENS_EXPORT Sweep ReadSweep(const std::string& path, const SweepOverrides& overrides = {},
                                  const RunControl& run = {});
-// Reads a folder of frames with a table of their readings (docs/file-formats.md). `readings_csv` is
-// empty if `overrides.readings` states that the readings are in the names or in the metadata of the
-// frames. `overrides.camera_path` is required.
+// Reads a folder of frames with a table of their readings (docs/file-formats.md), or one file (or a
+// folder with one file) whose pages are the frames. `readings_csv` is empty if `overrides.readings`
+// states that the readings are in the names or in the metadata of the frames, or if the OME-XML of
+// the pages has them. `overrides.camera_path` is required.
 THICKLENS_EXPORT Sweep ReadSweepFolder(const std::string& folder, const std::string& readings_csv,
                                        const SweepOverrides& overrides, const RunControl& run = {});
 

@@ -53,6 +53,11 @@ struct RegionOfInterest {
 struct SweepFrame {
   std::string image;      // path that can be opened
   double reading_mm = 0;  // what the scale of the bench shows; not a depth
+  // The page of a file of several, counted from 0; absent: the file has one image.
+  std::optional<int> page = std::nullopt;
+
+  // The name for messages: "stack.tif[3]" for page 3, otherwise the path.
+  std::string Name() const { return page ? image + "[" + std::to_string(*page) + "]" : image; }
 };
 
 // A focus sweep as its file describes it, schema thicklens/sweep/1 (docs/file-formats.md).
@@ -114,6 +119,15 @@ THICKLENS_EXPORT SweepFile SweepFromFolder(const std::string& folder, const std:
                                            const std::string& camera_path,
                                            const SweepReading& reading,
                                            std::vector<std::string>* notices);
+// A sweep of the pages of one file, `pages` of them. A row of `readings` names its page as
+// "stack.tif[3]", counted from 0, or by its number alone, counted from 0 or from 1. Throws Error
+// for a row or a page without its partner; `notices` may be null.
+THICKLENS_EXPORT SweepFile SweepFromPages(const std::string& path, int pages,
+                                          const ReadingSet& readings,
+                                          const std::string& camera_path,
+                                          std::vector<std::string>* notices);
+// Whether a file of that name is taken for an image, by its ending.
+THICKLENS_EXPORT bool IsNameOfImage(const std::string& path);
 // The images that a sweep from a folder has: those in the folder or, if it contains none, in its
 // direct sub-folders. Throws Error if the folder cannot be read.
 THICKLENS_EXPORT std::vector<std::string> ImagesOfFolder(const std::string& folder);

@@ -2,6 +2,7 @@
 #define THICKLENS_IO_FRAME_FILES_H_
 
 #include <cstddef>
+#include <memory>
 #include <mutex>
 #include <opencv2/core/mat.hpp>
 #include <optional>
@@ -13,6 +14,9 @@
 #include "thicklens/model/sweep_file.h"
 
 namespace thicklens::io {
+
+// Reads the image of a frame, or its page. Throws Error that names the frame.
+THICKLENS_EXPORT cv::Mat ReadFrame(const model::SweepFrame& frame, ImageFacts* facts = nullptr);
 
 // The image files of a sweep, read on request; several threads may read.
 class THICKLENS_EXPORT FrameFiles {
@@ -28,18 +32,23 @@ class THICKLENS_EXPORT FrameFiles {
   std::vector<FilesRead> Files();
 
   // SHA-256 over lines "digest reading", one for each frame in the sweep's order, where digest is
-  // that of the file's bytes and reading is in mm. The digest of a file is computed when the file
-  // is first read, or here.
+  // that of the file's bytes and reading is in mm; "digest page reading" for the page of a file of
+  // several. The digest of a file is computed when the file is first read, or here.
   std::string DataSha256();
 
  private:
-  std::string ReadAndDigest(std::size_t index);
+  using Bytes = std::shared_ptr<const std::string>;
+  Bytes ReadAndDigest(std::size_t index);
 
   std::vector<model::SweepFrame> frames_;
   std::optional<int> full_scale_;
   std::vector<std::string> digests_;              // empty: not read yet
   std::vector<std::optional<ImageFacts>> facts_;  // absent: not read yet
-  std::mutex mutex_;
+  // The file that was read last, kept for its other pages.
+  std::string stack_path_;
+  Bytes stack_;
+  std::string stack_digest_;
+  std::mutex mutex_, reading_stack_;
 };
 
 }  // namespace thicklens::io

@@ -129,6 +129,9 @@ THICKLENS_EXPORT DecodedImage DecodeImageFile(const std::string& bytes, const st
 THICKLENS_EXPORT std::vector<DecodedImage> DecodeImagePages(const std::string& bytes,
                                                             const std::string& name,
                                                             const ImageReading& reading = {});
+// Returns how many images the bytes of a file have: pages, parts or frames. Throws Error as
+// DecodeImageFile does.
+THICKLENS_EXPORT int PagesOfImage(const std::string& bytes, const std::string& name);
 // Reads the file and decodes it as DecodeImageFile does. Throws Error that names the path.
 THICKLENS_EXPORT DecodedImage ReadImageData(const std::string& path,
                                             const ImageReading& reading = {});

@@ -38,6 +38,12 @@ struct PageReadings {
 THICKLENS_EXPORT PageReadings ReadingsOfOmeXml(const std::string& xml, const std::string& place,
                                                const model::ReadingOptions& options);
 
+// Reads the readings of the pages of one file from the OME-XML in its first page, `description`.
+// Rows are named "stack.tif[3]". Throws Error.
+THICKLENS_EXPORT model::ReadingSet ReadingsOfPages(const std::string& description,
+                                                   const std::string& path,
+                                                   const model::ReadingOptions& options);
+
 }  // namespace thicklens::io
 
 #endif  // THICKLENS_IO_READINGS_H_
