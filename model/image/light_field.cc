@@ -192,6 +192,7 @@ LightField DescriptionOf(const LightField& light_field) {
   description.present = light_field.present;
   description.landing_step_px = light_field.landing_step_px;
   description.transfer = light_field.transfer;
+  description.colour_profile = light_field.colour_profile;
   description.grid = light_field.grid;
   description.camera = light_field.camera;
   description.origin = light_field.origin;

@@ -230,10 +230,12 @@ CommandResult Calibrate(const CalibrateOptions& options) {
 
 void AddSweepOptions(CLI::App* command, SweepArguments* sweep) {
   command
-      ->add_option("sweep", sweep->input,
-                   "Sweep description, or a folder of frames with --readings and --camera")
+      ->add_option(
+          "sweep", sweep->input,
+          "Sweep description, or a folder of frames (or a file whose pages are the frames) with "
+          "--readings and --camera")
       ->required()
-      ->type_name("SWEEP.yaml|DIR");
+      ->type_name("SWEEP.yaml|DIR|STACK.tif");
   AddReadingOptions(command, sweep);
   command->add_option("--camera", sweep->camera_path, "Camera file, instead of the sweep's own")
       ->type_name("CAMERA.yaml");

@@ -275,7 +275,7 @@ CommandResult RunEstimate(const EstimateOptions& options) {
     outcome.read_seconds = SecondsSince(start);
     io::LightFieldWriter writer(
         TransferOf(call), options.format == "tiff" ? io::ViewFormat::kTiff : io::ViewFormat::kPng,
-        &outputs.light_field);
+        &outputs.light_field, call.photo.ColourProfile(TransferOf(call)));
     EstimateInto(&writer, std::move(call), outputs.report.has_value(), run.control(), &outcome);
   });
   outcome.total_seconds = SecondsSince(start);

@@ -307,6 +307,7 @@ LightFieldEstimate Estimate(ViewSink* given_sink, Image photo, DepthMap depth,
   if (options.hidden_rays == HiddenRays::kTelea) Inpaint(*prepared.input, &run, &estimate);
   FillSummary(solved.summary, options.solver, run, &estimate);
   model::LightFieldOrigin& origin = estimate.light_field.origin;
+  estimate.light_field.colour_profile = std::move(prepared.colour_profile);
   EstimateSeconds& seconds = estimate.summary.seconds;
   if (sink && solved.views_in_sink) {
     seconds.sink = sink->seconds() / ResolveThreads(control.threads);

@@ -16,6 +16,7 @@
 #include "thicklens/io/image_file.h"
 #include "thicklens/io/image_io.h"
 #include "thicklens/io/light_field_io.h"
+#include "tools/interface/stated_transfer.h"
 #include "tools/interface/validation.h"
 #include "tools/interface/with_file_context.h"
 
@@ -193,6 +194,18 @@ model::LinearImage Image::ToLight(const TransferCurve& transfer) const {
   return is_linear() ? light() : model::ToLinear(encoded(), transfer);
 }
 
+std::optional<TransferCurve> Image::StatedTransfer() const {
+  return facts_ == nullptr ? std::nullopt : StatedTransferOf(*facts_);
+}
+
+std::string Image::ColourProfile(const TransferCurve& transfer) const {
+  const auto stated = facts_ == nullptr ? transfer_ : StatedTransfer();
+  if (!(stated == transfer)) return "";
+  return facts_ == nullptr ? colour_profile_ : facts_->icc_profile;
+}
+
+void Image::SetColourProfile(std::string icc_profile) { colour_profile_ = std::move(icc_profile); }
+
 Image Image::Encoded(int bits) const {
   const std::string where = source_.empty() ? "image" : source_;
   RequireBits(where, bits);
@@ -205,6 +218,7 @@ Image Image::Encoded(int bits) const {
   Image stored;
   stored.transfer_ = transfer_.value_or(TransferCurve::Srgb());
   stored.source_ = source_;
+  stored.colour_profile_ = colour_profile_;
   stored.is_from_file_ = is_from_file_;
   stored.pixels_ =
       WithFileContext(where, [&] { return model::ToEncoded(light(), *stored.transfer_, bits); });
@@ -231,6 +245,7 @@ Image Image::Cropped(const model::PixelRect& rect) const {
   Image cropped;
   cropped.transfer_ = transfer_;
   cropped.source_ = source_;
+  cropped.colour_profile_ = ColourProfile(transfer_.value_or(TransferCurve::Srgb()));
   cropped.is_from_file_ = is_from_file_;
   WithFileContext(source_.empty() ? "image" : source_, [&] {
     if (is_linear()) {
@@ -274,6 +289,8 @@ EncodedImageFile EncodeImage(const Image& image, const ImageFileOptions& options
   const io::ImageFormat format = InnerFormat(options.format);
   io::ImageWriting writing;
   writing.description = options.description;
+  writing.icc_profile = image.ColourProfile(
+      image.transfer().value_or(image.StatedTransfer().value_or(TransferCurve::Srgb())));
   EncodedImageFile file;
   if (!image.is_linear() && options.noise_levels != 0)
     throw OptionError("noise_levels", "noise_levels: is for linear light only");
@@ -289,6 +306,7 @@ EncodedImageFile EncodeImage(const Image& image, const ImageFileOptions& options
     const cv::Mat values(light.height_px, light.width_px, CV_32FC(light.channels),
                          const_cast<float*>(light.values.data()));  // NOLINT: only read
     writing.is_linear = true;
+    writing.icc_profile.clear();  // its curve is another one
     file.bytes = io::EncodeImageFile(values, format, writing);
     return file;
   }

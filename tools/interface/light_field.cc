@@ -82,8 +82,10 @@ Image ViewOf(const LightField& light_field, int k, int l) {
   model::LinearImage view = model::ViewImage(light_field, k, l);
   if (!light_field.IsPresent(k, l)) throw Error(fmt::format("view ({}, {}) is missing", k, l));
   const ChannelOrder order = OrderOf(view);
-  return Image::FromLight(view.width_px, view.height_px, order, std::move(view.values),
-                          light_field.transfer, fmt::format("view ({}, {})", k, l));
+  Image image = Image::FromLight(view.width_px, view.height_px, order, std::move(view.values),
+                                 light_field.transfer, fmt::format("view ({}, {})", k, l));
+  image.SetColourProfile(light_field.colour_profile);
+  return image;
 }
 
 OutputFolder ClaimLightFieldFolder(const std::string& folder, LightFieldFormat format) {
@@ -132,7 +134,8 @@ std::size_t WriteLightField(const std::string& folder, const LightFieldEstimate&
   OutputFolder output = ClaimLightFieldFolder(folder, format);
   io::LightFieldWriter writer(
       light_field.transfer,
-      format == LightFieldFormat::kPng ? io::ViewFormat::kPng : io::ViewFormat::kTiff, &output);
+      format == LightFieldFormat::kPng ? io::ViewFormat::kPng : io::ViewFormat::kTiff, &output,
+      light_field.colour_profile);
   io::WriteViews(light_field, &writer);
   const auto view_size = static_cast<std::ptrdiff_t>(light_field.view_size());
   for (int i = 0; i < light_field.u_count * light_field.v_count; ++i) {

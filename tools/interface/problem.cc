@@ -341,6 +341,8 @@ PreparedProblem Prepare(Image photo, DepthMap map, const std::optional<Camera>& 
   }
   input.transfer = TransferFor(part, facts.get(), input.camera, diagnostics, run);
   diagnostics->transfer = input.transfer;
+  if (facts != nullptr && StatedTransferOf(*facts) == input.transfer)
+    prepared.colour_profile = facts->icc_profile;
   input.image = part.ToLight(input.transfer);
   part = Image();  // its memory is needed
   const Camera* const known = input.camera ? &*input.camera : nullptr;

@@ -16,6 +16,7 @@ struct PreparedProblem {
   std::shared_ptr<estimator::EstimateInput> input;
   model::EffectSelection effects;
   std::vector<bool> was_hole;  // per pixel of the depth map
+  std::string colour_profile;  // of the photograph, if its curve is that of the input
 };
 
 // The steps of PrepareProblem. The options are valid.

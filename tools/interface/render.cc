@@ -29,9 +29,12 @@ Image ImageOf(model::LinearImage image, const LightField& light_field) {
     throw Error(fmt::format("{}: 1 or 3 channels are expected, found {}",
                             LightFieldName(light_field), image.channels));
   }
-  return Image::FromLight(image.width_px, image.height_px,
-                          image.channels == 1 ? ChannelOrder::kGrey : ChannelOrder::kRgb,
-                          std::move(image.values), light_field.transfer, light_field.source);
+  Image result =
+      Image::FromLight(image.width_px, image.height_px,
+                       image.channels == 1 ? ChannelOrder::kGrey : ChannelOrder::kRgb,
+                       std::move(image.values), light_field.transfer, light_field.source);
+  result.SetColourProfile(light_field.colour_profile);
+  return result;
 }
 
 // Which effects of a photograph of the light field are taken into account. Occlusion is contained

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <zlib.h>
 
 #include <algorithm>
 #include <cctype>
@@ -19,6 +18,7 @@
 #include "thicklens/base/output_file.h"
 #include "thicklens/base/printable_text.h"
 #include "thicklens/io/image_description.h"
+#include "tools/io/colour_profile.h"
 #include "tools/io/image_file_kind.h"
 #include "tools/io/image_library.h"
 #include "tools/io/image_metadata.h"
@@ -324,6 +324,7 @@ class ImageFile {
       TreatMosaic(reading_.raw, image);
       facts.transfer = StatedTransfer::kLinear;
     }
+    TakeProfileTransfer(&facts);
     SelectChannels(reading_, image);
     if (reading_.orientation == ImageOrientation::kDisplayed && facts.orientation != 1) {
       image->pixels = Upright(image->pixels, facts.orientation);
@@ -406,13 +407,7 @@ std::string EncodePngFile(const cv::Mat& pixels, const ImageWriting& writing) {
   std::string png = EncodePngPixels(
       pixels, pixels.depth() == CV_8U ? PngPacking::kRepetitions : PngPacking::kFast);
   if (!writing.icc_profile.empty()) {
-    uLongf size = compressBound(writing.icc_profile.size());
-    std::string packed(size, '\0');
-    compress(reinterpret_cast<Bytef*>(packed.data()), &size,              // NOLINT
-             reinterpret_cast<const Bytef*>(writing.icc_profile.data()),  // NOLINT
-             writing.icc_profile.size());
-    using namespace std::string_literals;
-    png = WithPngChunk(png, "iCCP", "ICC\0\0"s + packed.substr(0, size));
+    png = WithPngProfile(png, writing.icc_profile);
   } else if (writing.is_linear) {
     using namespace std::string_literals;
     png = WithPngChunk(png, "gAMA", "\0\x01\x86\xA0"s);  // 100000: gamma 1
@@ -459,9 +454,8 @@ std::string ImageFacts::OneLine() const {
     line += fmt::format(" ({} significant in {} bits)", *significant_bits, container_bits);
   line += ", " + TransferText(*this);
   if (!icc_profile.empty()) {
-    line += fmt::format(", profile '{}' ({} bytes, not applied)",
-                        icc_description.empty() ? "without a name" : PrintableUtf8(icc_description),
-                        icc_profile.size());
+    line += fmt::format(", profile '{}'", icc_description.empty() ? "without a name"
+                                                                  : PrintableUtf8(icc_description));
   }
   if (chromaticities) line += ", primaries stated";
   if (alpha != AlphaKind::kNone)

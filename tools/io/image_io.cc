@@ -7,12 +7,15 @@
 #include <cstddef>
 #include <cstdint>
 #include <opencv2/core.hpp>
+#include <utility>
 #include <vector>
 
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
+#include "tools/io/colour_profile.h"
 #include "tools/io/image_file_kind.h"
+#include "tools/io/png_check.h"
 #include "tools/io/png_pixels.h"
 
 namespace thicklens::io {
@@ -68,15 +71,23 @@ cv::Mat DecodeImage(const std::string& bytes, const std::string& name, ImageFact
 
 cv::Mat DecodeImage(const std::string& bytes, const std::string& name, const ImageReading& reading,
                     ImageFacts* facts) {
-  const DecodedImage image = DecodeImageFile(bytes, name, reading);
-  if (facts != nullptr) *facts = image.facts;
+  DecodedImage image = DecodeImageFile(bytes, name, reading);
   const cv::Mat& pixels = image.pixels;
   if (pixels.depth() != CV_8U && pixels.depth() != CV_16U) {
     throw Error(fmt::format("{}: an image with 8 or 16 bits per channel is expected, found {}: {}",
                             name, image.facts.sample_type,
                             "convert it, or read it as a depth map"));
   }
-  return PhotographOf(image, name);
+  cv::Mat photograph = PhotographOf(image, name);
+  try {
+    ConvertFromProfile(&image.facts, &photograph);
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const Error& error) {
+    throw Error(fmt::format("{}: {}", name, error.what()));
+  }
+  if (facts != nullptr) *facts = std::move(image.facts);
+  return photograph;
 }
 
 cv::Mat ReadImageFile(const std::string& path, ImageFacts* facts) {
@@ -107,14 +118,16 @@ model::EncodedImage WithoutAlpha(const model::EncodedImage& image) {
   return opaque;
 }
 
-std::string EncodePng(const model::EncodedImage& image) {
+std::string EncodePng(const model::EncodedImage& image, const std::string& icc_profile) {
   const cv::Mat wide(image.height_px, image.width_px, CV_16UC(image.channels),
                      const_cast<std::uint16_t*>(image.values.data()));  // NOLINT: only read
   cv::Mat values = wide;
   if (image.bits == 8) wide.convertTo(values, CV_8U);
   // Trying every filter takes three times as long and does not make images of 16 bits smaller;
   // images of 8 bits have repetitions.
-  return EncodePngPixels(values, image.bits == 8 ? PngPacking::kRepetitions : PngPacking::kFast);
+  const PngPacking packing = image.bits == 8 ? PngPacking::kRepetitions : PngPacking::kFast;
+  const std::string png = EncodePngPixels(values, packing);
+  return icc_profile.empty() ? png : WithPngProfile(png, icc_profile);
 }
 
 std::string EncodeBytesPng(const std::vector<std::uint8_t>& bytes, int width_px) {

@@ -209,6 +209,7 @@ void TakePng(const std::string& bytes, ImageFacts* facts) {
     at += kFrame + length;
   }
   // cICP precedes iCCP, iCCP precedes sRGB, sRGB precedes gAMA.
+  if (has_cicp) facts->icc_profile.clear();
   if (has_srgb && !has_cicp && facts->icc_profile.empty()) facts->transfer = StatedTransfer::kSrgb;
 }
 
@@ -312,6 +313,12 @@ void TakeMetadata(const std::string& bytes, ImageFileKind kind, ImageFacts* fact
       break;
   }
   if (!facts->icc_profile.empty()) facts->icc_description = IccDescription(facts->icc_profile);
+}
+
+std::string ColourProfileOf(const std::string& bytes) {
+  ImageFacts facts;
+  if (const auto kind = KindOfImage(bytes)) TakeMetadata(bytes, *kind, &facts);
+  return facts.icc_profile;
 }
 
 }  // namespace thicklens::io

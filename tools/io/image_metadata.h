@@ -13,6 +13,9 @@ namespace thicklens::io {
 // is damaged is left out: a photograph with a broken profile is still a photograph.
 void TakeMetadata(const std::string& bytes, ImageFileKind kind, ImageFacts* facts);
 
+// The ICC profile in the bytes of an image; empty: it has none.
+std::string ColourProfileOf(const std::string& bytes);
+
 // The text by which an ICC profile names itself; empty if it has none.
 std::string IccDescription(const std::string& profile);
 

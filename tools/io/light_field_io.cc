@@ -30,6 +30,7 @@
 #include "tools/io/float_tiff.h"
 #include "tools/io/hci_views.h"
 #include "tools/io/image_file_kind.h"
+#include "tools/io/image_metadata.h"
 
 namespace thicklens::io {
 
@@ -124,6 +125,17 @@ void ReportFilesOf(const std::string& folder, const model::LightFieldDescription
   }
 }
 
+// All views have the profile of the photograph, or none.
+std::string ProfileOfViews(const std::string& folder, const model::LightField& frame) {
+  for (int l = 0; l < frame.v_count; ++l) {
+    for (int k = 0; k < frame.u_count; ++k) {
+      if (!frame.IsPresent(k, l)) continue;
+      return ColourProfileOf(ReadWholeFile((fs::path(folder) / ViewFile(k, l, "png")).string()));
+    }
+  }
+  return "";
+}
+
 ViewSource OpenOwn(const std::string& folder, bool sparse) {
   const std::string description_path = (fs::path(folder) / kLightFieldMarker).string();
   const model::LightFieldDescription description =
@@ -153,6 +165,7 @@ ViewSource OpenOwn(const std::string& folder, bool sparse) {
   ReportFilesOf(folder, description);
 
   const bool is_png = description.view_format == "png";
+  if (is_png) frame.colour_profile = ProfileOfViews(folder, frame);
   source.read = [folder, is_png, format = description.view_format, transfer = frame.transfer](
                     int k, int l) {
     const std::string path = (fs::path(folder) / ViewFile(k, l, format)).string();
@@ -451,8 +464,8 @@ std::vector<std::string> LightFieldEntries() {
 }
 
 LightFieldWriter::LightFieldWriter(const model::TransferCurve& transfer, ViewFormat format,
-                                   OutputFolder* folder)
-    : transfer_(transfer), format_(format), folder_(folder) {
+                                   OutputFolder* folder, std::string icc_profile)
+    : transfer_(transfer), icc_profile_(std::move(icc_profile)), format_(format), folder_(folder) {
   constexpr int kBits = 16;
   if (format_ == ViewFormat::kPng) levels_.emplace(transfer, kBits);
 }
@@ -472,7 +485,7 @@ void LightFieldWriter::WriteView(int k, int l, const model::LinearImage& view) {
       WriteFloatTiff(view, path, shown);
     });
   } else {
-    folder_->Write(name, EncodePng(model::ToEncoded(view, *levels_)));
+    folder_->Write(name, EncodePng(model::ToEncoded(view, *levels_), icc_profile_));
     clipped = CountClipped(view, transfer_, levels_->bits());
   }
   const std::lock_guard<std::mutex> lock(mutex_);
@@ -513,7 +526,7 @@ void WriteViews(const model::LightField& light_field, LightFieldWriter* writer) 
 
 std::size_t WriteLightField(const model::LightField& light_field, ViewFormat format,
                             OutputFolder* folder) {
-  LightFieldWriter writer(light_field.transfer, format, folder);
+  LightFieldWriter writer(light_field.transfer, format, folder, light_field.colour_profile);
   WriteViews(light_field, &writer);
   return writer.Finish(light_field);
 }

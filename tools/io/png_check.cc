@@ -118,4 +118,14 @@ std::string WithPngResolution(const std::string& png, int pixels_per_metre) {
   return WithPngChunk(png, "pHYs", resolution + resolution + unit_metre);  // across, down
 }
 
+std::string WithPngProfile(const std::string& png, const std::string& icc_profile) {
+  uLongf size = compressBound(icc_profile.size());
+  std::string packed(size, '\0');
+  compress(reinterpret_cast<Bytef*>(packed.data()), &size,      // NOLINT
+           reinterpret_cast<const Bytef*>(icc_profile.data()),  // NOLINT
+           icc_profile.size());
+  using namespace std::string_literals;
+  return WithPngChunk(png, "iCCP", "ICC\0\0"s + packed.substr(0, size));
+}
+
 }  // namespace thicklens::io

@@ -25,6 +25,9 @@ int PngColourType(const std::string& bytes);
 std::string WithPngChunk(const std::string& png, const std::string& type,
                          const std::string& content);
 
+// Returns a PNG file with an ICC profile: the chunk iCCP.
+std::string WithPngProfile(const std::string& png, const std::string& icc_profile);
+
 // Returns a PNG file with its resolution: the chunk pHYs, by which programs print it at its true
 // size. `png` must be complete and have no resolution yet.
 std::string WithPngResolution(const std::string& png, int pixels_per_metre);

@@ -8,7 +8,6 @@
 #include <variant>
 
 #include "thicklens/model/light_field_grid.h"
-#include "tools/interface/stated_transfer.h"
 #include "tools/options/estimate_plan.h"
 #include "tools/options/option_values.h"
 
@@ -186,8 +185,7 @@ EstimateCall ReadEstimateCall(const EstimateOptions& options, const RunControl& 
 TransferCurve TransferOf(const EstimateCall& call) {
   if (call.photo.transfer()) return *call.photo.transfer();
   if (call.camera) return call.camera->sensor.transfer;
-  const auto stated = call.photo.facts() ? StatedTransferOf(*call.photo.facts()) : std::nullopt;
-  return stated.value_or(TransferCurve::Srgb());
+  return call.photo.StatedTransfer().value_or(TransferCurve::Srgb());
 }
 
 Problem PrepareProblemOf(const EstimateOptions& options) {

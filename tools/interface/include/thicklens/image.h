@@ -88,6 +88,16 @@ class THICKLENS_EXPORT Image {
   // is a part of one that was.
   const std::shared_ptr<const io::ImageFacts>& facts() const { return facts_; }
 
+  // The curve that the file states; absent: the image is not from a file, the file states none, or
+  // one that TransferCurve does not have.
+  std::optional<TransferCurve> StatedTransfer() const;
+  // The ICC profile of the values, which WriteImage writes with them: that of the file, if its
+  // curve is `transfer`, or the one that was set. Empty: none.
+  std::string ColourProfile(const TransferCurve& transfer) const;
+  // Sets the profile of linear light that will be stored by transfer(). The curve of the profile
+  // must be this one.
+  void SetColourProfile(std::string icc_profile);
+
   // The values, channels interleaved in the order order(). encoded() throws Error for linear light,
   // light() for encoded values.
   const model::EncodedImage& encoded() const;
@@ -114,6 +124,7 @@ class THICKLENS_EXPORT Image {
   std::string source_;
   bool is_from_file_ = false;
   std::shared_ptr<const io::ImageFacts> facts_;
+  std::string colour_profile_;
 };
 
 // Reads an image file of 8 or 16 bits: grey, RGB or RGBA; PNG, TIFF, JPEG, WebP, HEIF, raw and what

@@ -60,6 +60,9 @@ struct LightField {
   // is in the plane of focus, and for relative light fields.
   Eigen::Vector2d landing_step_px{0, 0};
   TransferCurve transfer = TransferCurve::Srgb();  // for storing views
+  // The ICC profile of stored views, whose curve is `transfer`: the bytes of the photograph's.
+  // Empty: none. Linear light has its primaries.
+  std::string colour_profile;
   std::optional<LightFieldGrid> grid;  // planes and steps, mm; absent: the light field is relative
   std::optional<Camera> camera;        // present if and only if `grid` is present
   LightFieldOrigin origin;             // how the light field was made

@@ -57,8 +57,10 @@ struct ImageFacts {
   // PFM: the magnitude of the header's scale, which is not applied to the values.
   double value_scale = 1;
   StatedTransfer transfer = StatedTransfer::kAbsent;
-  double gamma = 0;             // of StatedTransfer::kGamma: value = light^(1/gamma)
-  std::string icc_profile;      // its bytes; they are not applied
+  double gamma = 0;  // of StatedTransfer::kGamma: value = light^(1/gamma)
+  // The bytes of the colour profile. Its transfer curve is `transfer`; its primaries are those of
+  // the values, which are not converted.
+  std::string icc_profile;
   std::string icc_description;  // the profile's name for itself
   // x and y of red, green, blue and white in CIE 1931.
   std::optional<std::array<double, 8>> chromaticities;

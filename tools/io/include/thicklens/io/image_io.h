@@ -34,7 +34,8 @@ THICKLENS_EXPORT model::EncodedImage WithoutAlpha(const model::EncodedImage& ima
 
 // Encodes a PNG file of 1, 3 or 4 channels, 8 or 16 bit. The compression is light: a stronger one
 // takes much longer and hardly makes the noise of a photograph smaller.
-THICKLENS_EXPORT std::string EncodePng(const model::EncodedImage& image);
+THICKLENS_EXPORT std::string EncodePng(const model::EncodedImage& image,
+                                       const std::string& icc_profile = "");
 // Encodes bytes unchanged in one channel. Throws Error if they are not rows of that width.
 THICKLENS_EXPORT std::string EncodeBytesPng(const std::vector<std::uint8_t>& bytes, int width_px);
 

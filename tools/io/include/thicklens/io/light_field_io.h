@@ -47,8 +47,10 @@ THICKLENS_EXPORT std::vector<std::string> LightFieldEntries();
 // are made, in any order and from several threads at once; their description follows at the end.
 class THICKLENS_EXPORT LightFieldWriter {
  public:
-  // `folder` is not owned and must outlive the writer; the caller commits it.
-  LightFieldWriter(const model::TransferCurve& transfer, ViewFormat format, OutputFolder* folder);
+  // `folder` is not owned and must outlive the writer; the caller commits it. `icc_profile` is
+  // written into PNG files; its curve is `transfer`.
+  LightFieldWriter(const model::TransferCurve& transfer, ViewFormat format, OutputFolder* folder,
+                   std::string icc_profile = "");
 
   // Writes the view (k, l), linear light. Throws Error.
   void WriteView(int k, int l, const model::LinearImage& view);
@@ -67,6 +69,7 @@ class THICKLENS_EXPORT LightFieldWriter {
 
  private:
   const model::TransferCurve transfer_;
+  const std::string icc_profile_;
   std::optional<model::QuantisedLevels> levels_;  // levels of PNG files
   const ViewFormat format_;
   OutputFolder* folder_;
