@@ -52,7 +52,7 @@ io::ImageFormat InnerFormat(ImageFileFormat format) {
 std::string Encoded(const model::EncodedImage& image, io::ImageFormat format,
                     const io::ImageWriting& writing) {
   if (format == io::ImageFormat::kPng) {
-    const std::string png = io::EncodePng(image);
+    const std::string png = io::EncodePng(image, writing.icc_profile);
     return writing.description.empty() ? png : io::WithDescription(png, writing.description);
   }
   const cv::Mat wide(image.height_px, image.width_px, CV_16UC(image.channels),

@@ -9,6 +9,7 @@
 #include <system_error>
 #include <utility>
 
+#include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/input_file.h"
 #include "thicklens/base/output_file.h"
@@ -135,7 +136,13 @@ std::optional<std::string> StackOf(const std::string& input) {
   const std::vector<std::string> images = model::ImagesOfFolder(input);
   if (images.size() != 1) return std::nullopt;
   const std::string& path = images.front();
-  if (io::PagesOfImage(ReadWholeFile(path), path) < 2) return std::nullopt;
+  try {
+    if (io::PagesOfImage(ReadWholeFile(path), path) < 2) return std::nullopt;
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const Error&) {
+    return std::nullopt;  // whoever reads the frame says why it cannot be read
+  }
   return path;
 }
 

@@ -4,6 +4,7 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -152,6 +153,32 @@ void TakePngTransfer(const Bytes& png, std::size_t at, const std::string& type, 
   }
 }
 
+// EXIF as ImageMagick and Exiv2 wrote it before PNG had the chunk eXIf: a text of this name with a
+// line of its name, its length and hexadecimal digits. Empty: the chunk is another text.
+std::string ExifOfText(const std::string& type, const std::string& chunk) {
+  const std::size_t name_end = chunk.find('\0');
+  if (name_end == std::string::npos) return "";
+  const std::string name = chunk.substr(0, name_end);
+  if (name != "Raw profile type exif" && name != "Raw profile type APP1") return "";
+  const bool is_packed = type == "zTXt";
+  if (is_packed && name_end + 2 > chunk.size()) return "";
+  const std::string text =
+      is_packed ? Inflated(chunk.substr(name_end + 2)) : chunk.substr(name_end + 1);
+  // "\nexif\n      38\n45786966.."
+  std::size_t at = text.find('\n', 1);
+  if (at != std::string::npos) at = text.find('\n', at + 1);
+  std::string exif;
+  int digits = 0;
+  unsigned value = 0;
+  for (; at < text.size(); ++at) {
+    const auto c = static_cast<unsigned char>(text[at]);
+    if (std::isxdigit(c) == 0) continue;
+    value = value << 4U | (std::isdigit(c) != 0 ? c - '0' : (c | 0x20U) - 'a' + 10U);
+    if (++digits % 2 == 0) exif += static_cast<char>(value & 0xFFU);
+  }
+  return exif;
+}
+
 // ITU-T H.273, as PNG, HEIF and AVIF use it.
 StatedTransfer TransferOfCode(std::uint32_t code) {
   switch (code) {
@@ -203,6 +230,9 @@ void TakePng(const std::string& bytes, ImageFacts* facts) {
         facts->significant_bits = static_cast<int>(bits);
     } else if (type == "eXIf") {
       TakeExifOfMark(png.Part(content, length), facts);
+    } else if (type == "zTXt" || type == "tEXt") {
+      const std::string exif = ExifOfText(type, png.Part(content, length));
+      if (!exif.empty()) TakeExifOfMark(exif, facts);
     } else if (!has_cicp) {
       TakePngTransfer(png, content, type, facts);
     }

@@ -70,7 +70,7 @@ double Difference(const cv::Mat& pixels, const Formula& formula) {
   return largest;
 }
 
-struct Case {
+struct SampleCase {
   std::string name;
   int type;
   Formula formula;
@@ -93,7 +93,7 @@ TEST(ImageFile, ReadsEveryArrangementOfATiffFile) {
 }
 
 TEST(ImageFile, ReadsEverySampleTypeOfATiffFile) {
-  const std::vector<Case> cases = {
+  const std::vector<SampleCase> cases = {
       {"u8.tif", CV_8UC3, Rgb8},
       {"i8.tif", CV_8SC1, [](int x, int y, int) { return Grey8(x, y) - 100; }},
       {"i16.tif", CV_16SC1, [](int x, int y, int) { return Grey16(x, y, 0) - 30000; }},
@@ -109,7 +109,7 @@ TEST(ImageFile, ReadsEverySampleTypeOfATiffFile) {
       {"palette.tif", CV_8UC3, [](int x, int y, int c) {
          return (x + 6 * y) * std::array<int, 3>{1, 3, 7}[static_cast<std::size_t>(c)] % 256;
        }}};
-  for (const Case& c : cases) {
+  for (const SampleCase& c : cases) {
     SCOPED_TRACE(c.name);
     const DecodedImage image = Read(c.name);
     EXPECT_EQ(image.pixels.type(), c.type);
