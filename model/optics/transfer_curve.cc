@@ -2,7 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <charconv>
 #include <cmath>
+#include <optional>
+#include <string_view>
 
 #include "thicklens/base/error.h"
 
@@ -19,6 +22,20 @@ double DecodeSrgb(double stored) {
   return stored <= 0.04045 ? stored / 12.92 : std::pow((stored + 0.055) / 1.055, 2.4);
 }
 
+constexpr double kLeastGamma = 0.1, kMostGamma = 10;
+
+// The exponent in the name "gamma-2.2".
+std::optional<double> GammaOf(const std::string& name) {
+  constexpr std::string_view kBegin = "gamma-";
+  if (name.compare(0, kBegin.size(), kBegin) != 0) return std::nullopt;
+  double gamma = 0;
+  const char* const end = name.data() + name.size();
+  const auto [rest, status] = std::from_chars(name.data() + kBegin.size(), end, gamma);
+  if (status != std::errc() || rest != end || !(gamma >= kLeastGamma && gamma <= kMostGamma))
+    return std::nullopt;
+  return gamma;
+}
+
 }  // namespace
 
 TransferCurve TransferCurve::Gamma(double gamma) {
@@ -31,9 +48,11 @@ TransferCurve TransferCurve::Gamma(double gamma) {
 TransferCurve TransferCurve::FromName(const std::string& name) {
   if (name == "linear") return Linear();
   if (name == "srgb") return Srgb();
-  if (name == "gamma-2.2") return Gamma(2.2);
+  if (const auto gamma = GammaOf(name)) return Gamma(*gamma);
   throw Error(
-      fmt::format("transfer curve \"{}\" is unknown: it must be linear, srgb or gamma-2.2", name));
+      fmt::format("transfer curve \"{}\" is unknown: it must be linear, srgb, or gamma- with an "
+                  "exponent from {} to {}, as in gamma-2.2",
+                  name, kLeastGamma, kMostGamma));
 }
 
 std::string TransferCurve::Name() const {

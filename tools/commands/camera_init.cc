@@ -109,19 +109,6 @@ void DescribeSensor(const CameraDescription& given, const Known& pitch_mm,
                                Take({middle.y(), true}, "sensor.principal_point_px[1]", camera)};
 }
 
-CLI::Validator TransferName() {
-  return CLI::Validator(
-      [](std::string& name) {
-        try {
-          model::TransferCurve::FromName(name);
-          return std::string();
-        } catch (const Error& error) {
-          return std::string(error.what());
-        }
-      },
-      "");
-}
-
 void ParseTexts(CameraInitOptions* options) {
   if (!options->size.empty()) {
     const auto px = SplitPixels("--size", options->size, 'x', "WIDTHxHEIGHT");
@@ -218,9 +205,9 @@ void AddSensorOptions(CLI::App* command, CameraInitOptions* options) {
       ->type_name("X,Y");
   command
       ->add_option("--transfer", camera.transfer,
-                   "How light becomes encoded values: linear, srgb or gamma-2.2; default: linear "
-                   "for a raw photograph, or srgb, marked as assumed")
-      ->check(TransferName())
+                   "How light becomes encoded values: linear, srgb or gamma-G, e.g. gamma-2.2; "
+                   "default: linear for a raw photograph, or srgb, marked as assumed")
+      ->check(TransferCurveName())
       ->type_name("NAME");
   command->add_option("--psf", camera.psf, "Shape of the defocus blur: gaussian or disc")
       ->check(CLI::IsMember({"gaussian", "disc"}))

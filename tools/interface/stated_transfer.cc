@@ -26,7 +26,7 @@ std::optional<TransferCurve> StatedTransferOf(const io::ImageFacts& facts) {
     case io::StatedTransfer::kSrgb:
       return TransferCurve::Srgb();
     case io::StatedTransfer::kGamma:
-      if (!(facts.gamma > 0 && std::isfinite(facts.gamma))) return std::nullopt;
+      if (!(facts.gamma >= 0.1 && facts.gamma <= 10)) return std::nullopt;  // no photograph's
       return TransferCurve::Gamma(facts.gamma);
     case io::StatedTransfer::kBt709:
     case io::StatedTransfer::kPq:

@@ -130,7 +130,13 @@ std::string ProfileOfViews(const std::string& folder, const model::LightField& f
   for (int l = 0; l < frame.v_count; ++l) {
     for (int k = 0; k < frame.u_count; ++k) {
       if (!frame.IsPresent(k, l)) continue;
-      return ColourProfileOf(ReadWholeFile((fs::path(folder) / ViewFile(k, l, "png")).string()));
+      try {
+        return ColourProfileOf(ReadWholeFile((fs::path(folder) / ViewFile(k, l, "png")).string()));
+      } catch (const Interrupted&) {
+        throw;
+      } catch (const Error&) {
+        return "";  // whoever reads the view says why it cannot be read
+      }
     }
   }
   return "";

@@ -67,9 +67,9 @@ void AddInputOptions(CLI::App* command, EstimateOptions* options) {
       ->type_name("CAMERA.yaml");
   command
       ->add_option("--transfer", options->transfer,
-                   "How light became encoded values: linear, srgb or gamma-2.2; default: as the "
+                   "How light became encoded values: linear, srgb or gamma-G; default: as the "
                    "camera file states; without a camera as the photograph's file states, or srgb")
-      ->check(CLI::IsMember({"linear", "srgb", "gamma-2.2"}))
+      ->check(TransferCurveName())
       ->type_name("NAME");
   command
       ->add_option("--orientation", options->orientation,

@@ -7,6 +7,8 @@
 #include <optional>
 #include <sstream>
 
+#include "thicklens/model/transfer_curve.h"
+
 namespace thicklens::tools {
 namespace {
 
@@ -54,6 +56,19 @@ CLI::Validator Between(double lo, double hi, const std::string& hint) {
                                    : fmt::format("from {} to {} ({})", lo, hi, hint);
   return NumberThat(
       must, [lo, hi](double value) { return (lo == 0 ? value > 0 : value >= lo) && value <= hi; });
+}
+
+CLI::Validator TransferCurveName() {
+  return CLI::Validator(
+      [](std::string& name) {
+        try {
+          model::TransferCurve::FromName(name);
+          return std::string();
+        } catch (const Error& error) {
+          return std::string(error.what());
+        }
+      },
+      "");
 }
 
 CLI::Validator Inside(double lo, double hi, const std::string& hint) {

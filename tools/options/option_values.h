@@ -23,6 +23,9 @@ CLI::Validator Between(double lo, double hi, const std::string& hint);
 // Checks lo < value < hi.
 CLI::Validator Inside(double lo, double hi, const std::string& hint);
 
+// Checks the name of a transfer curve: linear, srgb, gamma-2.2.
+CLI::Validator TransferCurveName();
+
 // Returns the finite numbers of a text such as "3,4,640,480". Throws UsageError that names the
 // option, the invalid text and `form`, e.g. "x,y,width,height".
 std::vector<double> SplitNumbers(const std::string& option, const std::string& text, char separator,

@@ -13,7 +13,7 @@ namespace thicklens::model {
 namespace {
 
 TEST(TransferCurve, NamesRoundTrip) {
-  for (const char* name : {"linear", "srgb", "gamma-2.2"}) {
+  for (const char* name : {"linear", "srgb", "gamma-2.2", "gamma-2.19921875", "gamma-1.8"}) {
     EXPECT_EQ(TransferCurve::FromName(name).Name(), name);
   }
   EXPECT_EQ(TransferCurve::FromName("linear"), TransferCurve::Linear());
@@ -24,7 +24,8 @@ TEST(TransferCurve, NamesRoundTrip) {
 }
 
 TEST(TransferCurve, UnknownNameListsThePossibleOnes) {
-  for (const char* name : {"", "sRGB", "gamma", "gamma-", "gamma-2.2x", "rec709"}) {
+  for (const char* name : {"", "sRGB", "gamma", "gamma-", "gamma-2.2x", "rec709", "gamma-0",
+                           "gamma--2", "gamma-nan", "gamma-11", "gamma-2,2"}) {
     try {
       TransferCurve::FromName(name);
       ADD_FAILURE() << name;

@@ -22,8 +22,8 @@ class THICKLENS_EXPORT TransferCurve {
   // The curve stored = light^(1/gamma). Throws Error unless `gamma` is finite and > 0.
   static TransferCurve Gamma(double gamma);
 
-  // The curve of the name "linear", "srgb" or "gamma-2.2". Throws Error, which lists these names,
-  // for any other.
+  // The curve of the name "linear", "srgb", or "gamma-" with an exponent from 0.1 to 10, as in
+  // "gamma-2.2". Throws Error, which lists these names, for any other.
   static TransferCurve FromName(const std::string& name);
   // The name: "linear", "srgb", or "gamma-" with the exponent, as in "gamma-2.2".
   std::string Name() const;
