@@ -22,7 +22,7 @@ double DecodeSrgb(double stored) {
   return stored <= 0.04045 ? stored / 12.92 : std::pow((stored + 0.055) / 1.055, 2.4);
 }
 
-constexpr double kLeastGamma = 0.1, kMostGamma = 10;
+constexpr double kMinGamma = 0.1, kMaxGamma = 10;
 
 // The exponent in the name "gamma-2.2".
 std::optional<double> GammaOf(const std::string& name) {
@@ -31,7 +31,7 @@ std::optional<double> GammaOf(const std::string& name) {
   double gamma = 0;
   const char* const end = name.data() + name.size();
   const auto [rest, status] = std::from_chars(name.data() + kBegin.size(), end, gamma);
-  if (status != std::errc() || rest != end || !(gamma >= kLeastGamma && gamma <= kMostGamma))
+  if (status != std::errc() || rest != end || !(gamma >= kMinGamma && gamma <= kMaxGamma))
     return std::nullopt;
   return gamma;
 }
@@ -52,7 +52,7 @@ TransferCurve TransferCurve::FromName(const std::string& name) {
   throw Error(
       fmt::format("transfer curve \"{}\" is unknown: it must be linear, srgb, or gamma- with an "
                   "exponent from {} to {}, as in gamma-2.2",
-                  name, kLeastGamma, kMostGamma));
+                  name, kMinGamma, kMaxGamma));
 }
 
 std::string TransferCurve::Name() const {

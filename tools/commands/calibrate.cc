@@ -146,7 +146,7 @@ void WriteOutputs(const CalibrateOptions& options, const Sweep& sweep,
   }
 }
 
-// What was read from the files of the frames.
+// Describes what was read from the files of the frames.
 std::string FramesLines(const Sweep& sweep, const Calibration& calibration) {
   std::string lines;
   if (calibration.frames_read && !calibration.frames_read->empty())

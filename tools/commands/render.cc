@@ -375,7 +375,11 @@ void RequireHeld(const RenderOptions& options, const ImageFileOptions& file) {
 CommandResult RenderImage(const RenderOptions& options) {
   const auto start = Clock::now();
   ImageFileOptions file;
-  file.format = ImageFormatOfName(options.output);
+  try {
+    file.format = ImageFormatOfName(options.output);
+  } catch (const Error& error) {
+    throw UsageError(error.what());
+  }
   file.bits = options.bits.value_or(kDefaultBits);
   file.noise_levels = options.noise_levels.value_or(0);
   file.seed = static_cast<std::uint64_t>(options.seed.value_or(0));

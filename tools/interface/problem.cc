@@ -37,7 +37,7 @@ struct PhotoFile {
   std::string path;  // empty: it is not from a file
 };
 
-// What a user should know about the orientation that the file states; empty: nothing.
+// Says what a user should know about the orientation that the file states; empty: nothing.
 std::string OrientationRemark(const io::ImageFacts* facts, const RunScope& run) {
   if (facts == nullptr || facts->orientation == 1) return "";
   return facts->is_orientation_applied
@@ -319,7 +319,7 @@ PreparedProblem Prepare(Image photo, DepthMap map, const std::optional<Camera>& 
   const PhotoFile file{NameOf(photo), photo.is_from_file() ? photo.source() : ""};
   const std::shared_ptr<const io::ImageFacts> facts = photo.facts();
   const std::string turned = OrientationRemark(facts.get(), *run);
-  // With a camera the comparison with EXIF says it.
+  // If there is a camera, the comparison with EXIF says it.
   if (!turned.empty() && !camera) run->Warn(file.name + ": " + turned);
   if (photo.channels() == 4) run->Warn(file.name + ": its alpha channel is ignored");
   Image part = photo.channels() == 4 ? photo.WithoutAlpha() : std::move(photo);

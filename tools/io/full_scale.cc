@@ -14,9 +14,9 @@ namespace thicklens::io {
 namespace {
 
 constexpr std::size_t kLevels = 65536;
-constexpr int kContainerBits = 16, kFewestBits = 8, kMostBits = 14;
+constexpr int kContainerBits = 16, kMinBits = 8, kMaxBits = 14;
 // Values from here on need more than 14 bits.
-constexpr std::uint32_t kBeyondFourteenBits = 1U << kMostBits;
+constexpr std::uint32_t kBeyondFourteenBits = 1U << kMaxBits;
 // A share of this size at the highest value is clipping, as in calib/sweep/clipping.cc.
 constexpr double kClippedShare = 0.001;
 // A value that occurs so often has neighbours that occur too, unless values were stretched: a
@@ -59,8 +59,8 @@ std::size_t TypicalGap(const std::vector<std::uint64_t>& counts) {
 }
 
 int FewestBits(std::uint32_t highest) {
-  int bits = kFewestBits;
-  while (bits < kMostBits && highest >> bits != 0) bits += 2;
+  int bits = kMinBits;
+  while (bits < kMaxBits && highest >> bits != 0) bits += 2;
   return bits;
 }
 
@@ -70,7 +70,7 @@ FullScaleFinding Undecided(std::uint32_t highest) {
   finding.bits = FewestBits(highest);
   finding.full_scale = (1 << finding.bits) - 1;
   std::vector<int> bits;
-  for (int n = finding.bits; n <= kMostBits; n += 2) bits.push_back(n);
+  for (int n = finding.bits; n <= kMaxBits; n += 2) bits.push_back(n);
   finding.reason = fmt::format(
       "values reach {} of 65535 and use every step: right-aligned values of {} bits in a container "
       "of 16, or dark frames of 16 bits; values alone do not show which, because nothing is "
@@ -129,7 +129,7 @@ FullScaleFinding ValueCounter::Finding() const {
   const auto used =
       std::count_if(counts_.begin(), counts_.end(), [](std::uint64_t count) { return count > 0; });
   const bool has_enough = used >= static_cast<std::ptrdiff_t>(kEnoughValues);
-  if (shift > 0 && kContainerBits - shift >= kFewestBits && has_enough) {
+  if (shift > 0 && kContainerBits - shift >= kMinBits && has_enough) {
     finding.kind = FullScaleFinding::Kind::kLeftAligned;
     finding.bits = kContainerBits - shift;
     finding.full_scale = static_cast<int>(kLevels) - (1 << shift);
@@ -137,7 +137,7 @@ FullScaleFinding ValueCounter::Finding() const {
     return finding;
   }
   if (highest_ == 0 || highest_ >= kBeyondFourteenBits || shift > 0) return finding;
-  for (int bits = kFewestBits; bits <= kMostBits; ++bits) {
+  for (int bits = kMinBits; bits <= kMaxBits; ++bits) {
     if (highest_ != (1U << bits) - 1 || most_at_highest_ <= kClippedShare) continue;
     finding.kind = FullScaleFinding::Kind::kRightAligned;
     finding.bits = bits;

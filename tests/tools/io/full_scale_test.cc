@@ -78,7 +78,7 @@ TEST(FullScale, ClippedValuesShowTheEndOfRightAlignedOnes) {
   }
 }
 
-// The same numbers are an under-exposed frame of a camera with 16 bits.
+// An under-exposed frame of a camera with 16 bits has the same numbers.
 TEST(FullScale, UnclippedDarkValuesAreUndecided) {
   const FullScaleFinding finding = FindingOf(Texture(760));
   EXPECT_EQ(finding.kind, Kind::kUndecided);

@@ -54,7 +54,7 @@ struct Calibration : calib::Calibration {
   // Why the sweep determines no camera by the chosen method, one line; empty: it does. The summary
   // has the outcome of the fit, which kPaper does not need.
   std::string refusal;
-  // What was read from the frames' files (thicklens/io/files_read.h); null: they are not files.
+  // The facts about the frames' files (thicklens/io/files_read.h); null: they are not files.
   std::shared_ptr<const std::vector<io::FilesRead>> frames_read = nullptr;
 };
 

@@ -39,8 +39,8 @@ struct Sweep {
   std::optional<model::SweepTruth> truth;
   // The assumptions that were made when the sweep was read, one line each.
   std::vector<std::string> notices;
-  // What shows the full scale of the frames' values, one line; empty: ExamineFrames has not been
-  // called, or the frames are not files.
+  // Describes what shows the full scale of the frames' values, in one line; empty: ExamineFrames
+  // has not been called, or the frames are not files.
   std::string full_scale_reason;
 
   // Returns true if a calibration can be attempted: the camera, the readings and the options of

@@ -28,7 +28,7 @@ class THICKLENS_EXPORT FrameFiles {
 
   // Returns a frame whose white is the full scale of its type. Throws Error that names the file.
   cv::Mat Read(std::size_t index);
-  // What was read from the files so far.
+  // Returns what was read from the files so far.
   std::vector<FilesRead> Files();
 
   // SHA-256 over lines "digest reading", one for each frame in the sweep's order, where digest is

@@ -10,7 +10,7 @@
 
 namespace thicklens::io {
 
-// What the values of frames of 16 bits show about the value that stands for white.
+// The finding of frames of 16 bits about the value that stands for white.
 struct FullScaleFinding {
   enum class Kind {
     kContainer,     // white is 65535
