@@ -42,6 +42,7 @@ enum class Orientation {
 struct ImageReadOptions {
   // How light became the values; it replaces what the file states. Absent: not stated.
   std::optional<TransferCurve> transfer;
+  // Which way up the photograph is read.
   Orientation orientation = Orientation::kAsStored;
 };
 

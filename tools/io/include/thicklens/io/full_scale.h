@@ -12,13 +12,14 @@ namespace thicklens::io {
 
 // The finding of frames of 16 bits about the value that stands for white.
 struct FullScaleFinding {
+  // Which values the frames have.
   enum class Kind {
     kContainer,     // white is 65535
     kLeftAligned,   // fewer bits, the lowest ones of each value are 0
     kRightAligned,  // fewer bits, the highest ones of each value are 0
     kUndecided,     // right-aligned values and dark values of 16 bits look like this
   };
-  Kind kind = Kind::kContainer;
+  Kind kind = Kind::kContainer;  // which of them
   int bits = 16;           // of each value; kUndecided: the fewest that hold the highest value
   int full_scale = 65535;  // 2^bits - 1, or that times a power of 2 if left-aligned
   std::string reason;      // what decides, or why nothing does; one line
@@ -34,13 +35,12 @@ class THICKLENS_EXPORT ValueCounter {
   // Whether the frames so far show that values use all 16 bits, whatever the other frames have.
   bool UsesWholeContainer() const;
 
-  // Decides from all frames:
-  //   - all values are multiples of 2^k: left-aligned values of 16 - k bits, 8 at least;
-  //   - the highest value is 16384 or above: 16 bits;
-  //   - many values equal the highest one, which is 2^n - 1, n = 8 to 14: the scale ends there, and
-  //     the values are right-aligned values of n bits;
-  //   - neighbouring values that are 4 or more apart: fewer bits were stretched to 16;
-  //   - otherwise the values alone cannot show it: a dark frame of 16 bits has the same values.
+  // Decides from all frames. If all values are multiples of 2^k, they are left-aligned values of
+  // 16 - k bits, 8 at least. If the highest value is 16384 or above, they have 16 bits. If many
+  // values equal the highest one, which is 2^n - 1 with n = 8 to 14, the scale ends there, and they
+  // are right-aligned values of n bits. If neighbouring values are 4 or more apart, fewer bits were
+  // stretched to 16. Otherwise the values alone cannot show it: a dark frame of 16 bits has the
+  // same values.
   FullScaleFinding Finding() const;
 
  private:

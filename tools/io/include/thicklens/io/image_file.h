@@ -26,10 +26,11 @@ struct RawFacts {
   // Levels of the sites of each 2 x 2 px of the active area, row by row. The black level has been
   // subtracted from the pixels, and the white level is their full scale.
   std::array<double, 4> black_level{};
-  double white_level = 0;
+  double white_level = 0;  // the sensor's number for white
   // Factors of red, green and blue, 1 for green; absent: the file has none.
   std::optional<std::array<double, 3>> camera_white_balance;
   int sensor_width_px = 0, sensor_height_px = 0;  // with the masked margins
+  // The first pixel that saw light.
   int active_left_px = 0, active_top_px = 0;
   int active_width_px = 0, active_height_px = 0;  // the pixels that saw light
   std::string treatment;                          // how `pixels` came from the mosaic, in words
@@ -40,15 +41,16 @@ struct RawFacts {
 
 // The facts that a file states about the image that was read from it.
 struct ImageFacts {
-  std::string file_kind;  // "PNG", "TIFF", "raw"
-  std::uint64_t file_bytes = 0;
+  std::string file_kind;         // "PNG", "TIFF", "raw"
+  std::uint64_t file_bytes = 0;  // size of the file
+  // The size as stored, before any turning.
   int stored_width_px = 0, stored_height_px = 0;
-  int width_px = 0, height_px = 0;  // of the pixels returned
-  int page = 0, pages = 1;          // pages, parts or frames, counted from 0
-  std::string part;                 // name of the part of an EXR file
-  std::vector<std::string> channels;
-  std::string sample_type;  // as stored: "unsigned 16-bit integers", "half floats"
-  int container_bits = 0;   // of each value as stored
+  int width_px = 0, height_px = 0;    // of the pixels returned
+  int page = 0, pages = 1;            // pages, parts or frames, counted from 0
+  std::string part;                   // name of the part of an EXR file
+  std::vector<std::string> channels;  // their names, in the order of `pixels`
+  std::string sample_type;            // as stored: "unsigned 16-bit integers", "half floats"
+  int container_bits = 0;             // of each value as stored
   // Bits of each value that carry data, if the file states it (BitsPerSample, sBIT, maxval, white
   // level).
   std::optional<int> significant_bits;
@@ -56,7 +58,7 @@ struct ImageFacts {
   std::optional<double> full_scale;
   // PFM: the magnitude of the header's scale, which is not applied to the values.
   double value_scale = 1;
-  StatedTransfer transfer = StatedTransfer::kAbsent;
+  StatedTransfer transfer = StatedTransfer::kAbsent;  // what the file, or its profile, states
   double gamma = 0;  // of StatedTransfer::kGamma: value = light^(1/gamma)
   // The bytes of the colour profile. Its transfer curve is `transfer`; its primaries are those of
   // the values, which are not converted.
@@ -64,12 +66,12 @@ struct ImageFacts {
   std::string icc_description;  // the profile's name for itself
   // x and y of red, green, blue and white in CIE 1931.
   std::optional<std::array<double, 8>> chromaticities;
-  int orientation = 1;  // 1 to 8 as in EXIF; 1: upright as stored
-  bool is_orientation_applied = false;
-  AlphaKind alpha = AlphaKind::kNone;
+  int orientation = 1;                   // 1 to 8 as in EXIF; 1: upright as stored
+  bool is_orientation_applied = false;   // whether the pixels were turned by it
+  AlphaKind alpha = AlphaKind::kNone;    // kNone: there is no alpha channel
   std::optional<double> pixel_pitch_mm;  // of the sensor, as EXIF states it
   std::string description;               // the file's own text, e.g. OME-XML
-  std::optional<RawFacts> raw;
+  std::optional<RawFacts> raw;           // absent: it is not a raw file
   // Everything else that a user should know about this reading, one sentence each.
   std::vector<std::string> notes;
 
@@ -95,11 +97,13 @@ enum class RawTreatment {
   kMosaicPlanes,
 };
 
+// Which way up the pixels are returned.
 enum class ImageOrientation {
   kAsStored,   // the pixels as the sensor has them; a calibration refers to these
   kDisplayed,  // turned as EXIF states it
 };
 
+// What is read from a file, and how.
 struct ImageReading {
   // Which page, part or frame, counted from 0. A file of several is refused if this is absent.
   std::optional<int> page;
@@ -107,18 +111,19 @@ struct ImageReading {
   // EXR: only the channels "LAYER.X"; they are returned under their full names.
   std::string layer;
   std::vector<std::string> channels;  // only these, in this order; empty: all
-  ImageOrientation orientation = ImageOrientation::kAsStored;
-  RawTreatment raw = RawTreatment::kDemosaiced;
+  ImageOrientation orientation = ImageOrientation::kAsStored;  // which way up
+  RawTreatment raw = RawTreatment::kDemosaiced;  // what is made of a raw file's mosaic
   // Values of 1 to 7 and 9 to 15 bits are spread over 8 or 16 bits, so that white is the full scale
   // of the container; false: they keep their values, and `full_scale` says what white is.
   bool spread_bits = true;
 };
 
+// The values of a file, and the facts that it states.
 struct DecodedImage {
   // The values as the file has them, channels interleaved: CV_8U, 8S, 16U, 16S, 32S, 32F or 64F.
   // Half floats become 32F; unsigned integers of 32 bits become 64F.
   cv::Mat pixels;
-  ImageFacts facts;
+  ImageFacts facts;  // what the file states
 };
 
 // Decodes the image in the bytes of a file, whatever the file is called: PNG, TIFF, JPEG, PFM and
@@ -140,7 +145,7 @@ THICKLENS_EXPORT DecodedImage ReadImageData(const std::string& path,
 
 // Which numbers an image of integers has. `set_bits` is 0 for an image of zeros.
 struct UsedBits {
-  std::uint32_t highest = 0;
+  std::uint32_t highest = 0;   // the highest value
   std::uint32_t set_bits = 0;  // bitwise OR of all values
   // Index of the lowest set bit, 0 to 31; -1 if there is none.
   THICKLENS_EXPORT int LowestBit() const;
@@ -154,12 +159,14 @@ enum class ImageFormat { kPng, kJpeg, kTiff, kExr, kWebp, kBmp, kPnm, kPfm };
 // .pgm .ppm .pnm .pfm, in capitals or not. Throws Error that names the file and these endings. It
 // also throws if the build cannot write the kind.
 THICKLENS_EXPORT ImageFormat FormatOfName(const std::string& path);
-// Whether the kind holds floats (EXR, PFM, TIFF) and integers of that many bits.
+// Whether the kind holds floats: EXR, PFM and TIFF do.
 THICKLENS_EXPORT bool HoldsFloats(ImageFormat format);
+// Whether the kind holds integers of that many bits, 8 or 16.
 THICKLENS_EXPORT bool HoldsBits(ImageFormat format, int bits);
 // "JPEG"
 THICKLENS_EXPORT std::string NameOf(ImageFormat format);
 
+// How an image is written.
 struct ImageWriting {
   int jpeg_quality = 95;        // 1 to 100, also of WebP; 100 is lossless for WebP
   bool halves_colours = false;  // JPEG: colours at half resolution, for smaller files
