@@ -138,9 +138,17 @@ THICKLENS_EXPORT Image ReadImage(const std::string& path,
 // Likewise, with choices of how it is read.
 THICKLENS_EXPORT Image ReadImage(const std::string& path, const ImageReadOptions& options);
 
-// The kinds of image files that are written. EXR and PFM hold linear light as floats; PNG, TIFF and
-// PNM 8 or 16 bits; the others 8 bits.
-enum class ImageFileFormat { kPng, kJpeg, kTiff, kExr, kWebp, kBmp, kPnm, kPfm };
+// The kinds of image files that are written.
+enum class ImageFileFormat {
+  kPng,   // 8 and 16 bits
+  kJpeg,  // 8 bits, lossy
+  kTiff,  // 8 and 16 bits
+  kExr,   // linear light as floats
+  kWebp,  // 8 bits, lossy unless the quality is 100
+  kBmp,   // 8 bits
+  kPnm,   // 8 and 16 bits
+  kPfm,   // linear light as floats
+};
 // The kind that the ending of a file's name stands for: .png .jpg .jpeg .tif .tiff .exr .webp .bmp
 // .pgm .ppm .pnm .pfm, in capitals or not. Throws Error that names the file and lists the endings,
 // also if this build cannot write the kind.

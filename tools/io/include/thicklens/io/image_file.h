@@ -13,9 +13,21 @@
 namespace thicklens::io {
 
 // How the values of a file follow from light, as far as the file states it.
-enum class StatedTransfer { kAbsent, kLinear, kSrgb, kBt709, kGamma, kPq, kHlg };
-// kAssociated: the colours have been multiplied by alpha.
-enum class AlphaKind { kNone, kStraight, kAssociated };
+enum class StatedTransfer {
+  kAbsent,  // the file does not state it
+  kLinear,  // value = light
+  kSrgb,    // IEC 61966-2-1
+  kBt709,   // ITU-R BT.709
+  kGamma,   // value = light^(1/gamma)
+  kPq,      // SMPTE ST 2084
+  kHlg,     // ITU-R BT.2100, hybrid log-gamma
+};
+// The meaning of the channel alpha, if there is one, for the others.
+enum class AlphaKind {
+  kNone,        // there is no such channel
+  kStraight,    // the colours do not depend on it
+  kAssociated,  // the colours have been multiplied by it
+};
 
 // The facts that a raw file states about its sensor. Levels are in the sensor's numbers.
 struct RawFacts {
@@ -103,7 +115,7 @@ enum class ImageOrientation {
   kDisplayed,  // turned as EXIF states it
 };
 
-// What is read from a file, and how.
+// The choices of what is read from a file, and how.
 struct ImageReading {
   // Which page, part or frame, counted from 0. A file of several is refused if this is absent.
   std::optional<int> page;
@@ -154,7 +166,16 @@ struct UsedBits {
 THICKLENS_EXPORT UsedBits BitsOf(const cv::Mat& pixels);
 
 // The kinds of files that are written.
-enum class ImageFormat { kPng, kJpeg, kTiff, kExr, kWebp, kBmp, kPnm, kPfm };
+enum class ImageFormat {
+  kPng,   // 8 and 16 bits
+  kJpeg,  // 8 bits, lossy
+  kTiff,  // 8 and 16 bits, and floats
+  kExr,   // linear light as floats
+  kWebp,  // 8 bits, lossy unless the quality is 100
+  kBmp,   // 8 bits
+  kPnm,   // 8 and 16 bits
+  kPfm,   // linear light as floats
+};
 // The kind that the ending of a file's name stands for: .png .jpg .jpeg .tif .tiff .exr .webp .bmp
 // .pgm .ppm .pnm .pfm, in capitals or not. Throws Error that names the file and these endings. It
 // also throws if the build cannot write the kind.
