@@ -37,12 +37,21 @@ bool OptionsAreValid() {
   return options.IsValid(&why) || Fail("default options: " + why);
 }
 
-// Reads a bitmap of one blue pixel, which is decoded by the library beside the installed program.
+// Reads a bitmap of one blue pixel, which is decoded by the library beside the installed program. A
+// package without GPL parts says that it has none.
 bool BitmapIsRead() {
   const std::string bitmap(
       "BM\x3A\0\0\0\0\0\0\0\x36\0\0\0\x28\0\0\0\x01\0\0\0\x01\0\0\0\x01\0\x18\0"
       "\0\0\0\0\x04\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\xFF\0\0\0",
       58);
+  if (HAS_GPL_PARTS == 0) {
+    try {
+      thicklens::io::DecodeImage(bitmap, "one pixel");
+    } catch (const thicklens::Error& error) {
+      return std::string(error.what()).find("THICKLENS_WITH_GPL=OFF") != std::string::npos;
+    }
+    return Fail("a bitmap was read without GPL parts");
+  }
   const cv::Mat image = thicklens::io::DecodeImage(bitmap, "one pixel");
   const auto pixel = image.at<cv::Vec3b>(0, 0);
   return (pixel[0] == 0 && pixel[2] == 255) || Fail("the pixel is not blue");
