@@ -19,7 +19,7 @@ class HostileDisk : public HostileTest {
   // The commands, each of which writes disk/new. Some of them replace an older output.
   static std::vector<std::string> Writers() {
     return {Explain("disk/new"),
-            Render("disk/new"),
+            Render("disk/new.png"),
             Estimate("disk/new"),
             Estimate("disk/new --format tiff"),
             "\"$T\" estimate picture.png depth.pfm --depth-kind z --depth-unit mm --camera "
@@ -101,20 +101,21 @@ THICKLENS_SITUATION(HostileDisk, ALimitOnTheSizeOfFiles,
                     "beside it") {
   for (const char* trap : {"", "trap '' XFSZ; "}) {
     for (const char* blocks : {"0", "1", "2", "8"}) {
-      for (const std::string& script : {Explain("new"), Estimate("new"), Render("new")}) {
+      for (const std::string& script :
+           {Explain("new.png"), Estimate("new.png"), Render("new.png")}) {
         SCOPED_TRACE(std::string(trap) + blocks + " " + script);
         // The limit holds for all files, so the standard output goes into a pipe.
         const Outcome outcome =
             Shell("{ (" + std::string(trap) + "ulimit -f " + blocks + "; exec " + script +
                   ") 2>&1; echo $? >code; } | cat >&2; read code "
                   "<code; rm code; exit $code");
-        ExpectNothingBut(outcome, {"new"});
-        EXPECT_EQ(fs::exists(Work("new")), outcome.exit_code == 0);
+        ExpectNothingBut(outcome, {"new.png"});
+        EXPECT_EQ(fs::exists(Work("new.png")), outcome.exit_code == 0);
         if (outcome.exit_code != 0) {
           ASSERT_EQ(outcome.exit_code, 1) << outcome.err;
           EXPECT_THAT(ErrorsIn(outcome.err), ::testing::ElementsAre(HasSubstr("File too large")));
         }
-        fs::remove_all(Work("new"));
+        fs::remove_all(Work("new.png"));
       }
     }
   }

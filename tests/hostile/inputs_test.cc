@@ -29,7 +29,7 @@ const std::vector<std::string>& Slots() {
       "estimate picture.png @" + depth + "--camera camera.yaml -o new",
       "estimate picture.png depth.pfm" + depth + "--camera @ -o new",
       estimate + "--profile @ --within 3600s", estimate + "--aperture-of @",
-      "render @ --as-captured -o new", "compare @ picture.png", "compare picture.png @",
+      "render @ --as-captured -o new.png", "compare @ picture.png", "compare picture.png @",
       "compare lf lf --dibr @ depth.pfm" + depth, "compare lf lf --dibr picture.png @" + depth,
       "calibrate @ -o new", "calibrate frames --readings @ --camera camera.yaml -o new",
       "calibrate one.yaml --camera @ -o new", "calibrate one.yaml --truth @ -o new",
@@ -44,7 +44,7 @@ const std::vector<std::string>& Slots() {
       // Inputs that other files name.
       "calibrate sweep-of-it.yaml -o new", "calibrate camera-of-it.yaml -o new",
       "simulate image texture-of-it.yaml -o new", "simulate image scene-of-it.yaml -o new",
-      "render views-of-it --as-captured -o new"};
+      "render views-of-it --as-captured -o new.png"};
   return slots;
 }
 

@@ -23,8 +23,8 @@ class HostileLimits : public HostileTest {
   Outcome ExpectDoneOrReported(const std::string& limit, const std::string& script) {
     SCOPED_TRACE(limit + script);
     const Outcome outcome = Shell(limit + script);
-    ExpectNothingBut(outcome, {"new"});
-    EXPECT_EQ(fs::exists(Work("new")), outcome.exit_code == 0) << outcome.err;
+    ExpectNothingBut(outcome, {"new.png"});
+    EXPECT_EQ(fs::exists(Work("new.png")), outcome.exit_code == 0) << outcome.err;
     constexpr int kNotLoaded = 127;
     EXPECT_THAT(outcome.exit_code, AnyOf(0, 1, kNotLoaded)) << outcome.err;
     if (outcome.exit_code != 0) {
@@ -33,7 +33,7 @@ class HostileLimits : public HostileTest {
     if (outcome.exit_code == 1) {
       EXPECT_THAT(outcome.err, AnyOf(HasSubstr("thicklens: error: "), HasSubstr("libgomp: ")));
     }
-    fs::remove_all(Work("new"));
+    fs::remove_all(Work("new.png"));
     return outcome;
   }
 };
@@ -42,7 +42,7 @@ THICKLENS_SITUATION(HostileLimits, Memory, "`ulimit -v` allows from 60 to 400 MB
                     "Done, or refused as out of memory (by the loader or OpenMP where there is too "
                     "little for them); the output is complete or absent") {
   MakeSweep();
-  for (const std::string& script : {Estimate("new"), Calibrate("new"), Render("new")}) {
+  for (const std::string& script : {Estimate("new.png"), Calibrate("new.png"), Render("new.png")}) {
     for (int megabytes = 60; megabytes <= 400; megabytes += 68) {
       ExpectDoneOrReported("ulimit -v " + std::to_string(megabytes * 1000) + "; ", script);
     }
@@ -54,7 +54,7 @@ THICKLENS_SITUATION(HostileLimits, OpenFiles, "`ulimit -n` allows 3, 4, 5, ... 1
                     "Done, or refused with `Too many open files` (by the loader where it cannot "
                     "open libraries); nothing is left beside the output") {
   MakeSweep();
-  for (const std::string& script : {Render("new"), Estimate("new"), Calibrate("new")}) {
+  for (const std::string& script : {Render("new.png"), Estimate("new.png"), Calibrate("new.png")}) {
     for (int files = 3; files <= 12; ++files) {
       const Outcome outcome =
           ExpectDoneOrReported("ulimit -n " + std::to_string(files) + "; ", script);
@@ -74,18 +74,18 @@ THICKLENS_SITUATION(HostileLimits, Threads,
   std::string why_not;
   const std::string user = AsOrdinaryUser(&why_not);
   if (user.empty() || user == "env") GTEST_SKIP() << "only root can become a user without threads";
-  for (std::string script : {Estimate("new --threads 8"), Calibrate("new --threads 8")}) {
+  for (std::string script : {Estimate("new.png --threads 8"), Calibrate("new.png --threads 8")}) {
     script.replace(script.find("\"$T\""), 4, "exec " + user + " \"$T\"");
     for (const int threads : {1, 2, 3, 4, 6, 20}) {
       SCOPED_TRACE(std::to_string(threads) + ": " + script);
       const Outcome outcome = Shell("ulimit -u " + std::to_string(threads) + "; " + script);
-      ExpectNothingBut(outcome, {"new"});
-      EXPECT_EQ(fs::exists(Work("new")), outcome.exit_code == 0) << outcome.err;
+      ExpectNothingBut(outcome, {"new.png"});
+      EXPECT_EQ(fs::exists(Work("new.png")), outcome.exit_code == 0) << outcome.err;
       if (outcome.exit_code != 0) {
         EXPECT_EQ(outcome.exit_code, 1) << outcome.err;
         EXPECT_EQ(ErrorsIn(outcome.err).size(), 1U) << outcome.err;
       }
-      fs::remove_all(Work("new"));
+      fs::remove_all(Work("new.png"));
     }
   }
 }
@@ -112,7 +112,7 @@ THICKLENS_SITUATION(
     HostileLimits, Stack, "`ulimit -s` allows 64 to 1,024 KiB, or is unlimited",
     "Done, or refused with the limit and the size that is needed; never a segmentation fault") {
   MakeSweep();
-  for (const std::string& script : {Render("new"), Estimate("new"), Calibrate("new")}) {
+  for (const std::string& script : {Render("new.png"), Estimate("new.png"), Calibrate("new.png")}) {
     for (const char* kibibytes : {"64", "128", "256", "512", "1024", "unlimited"}) {
       const Outcome outcome =
           ExpectDoneOrReported(std::string("ulimit -s ") + kibibytes + "; ", script);

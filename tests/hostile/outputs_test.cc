@@ -51,10 +51,10 @@ THICKLENS_SITUATION(HostileOutputs, AFolderThatMayNotBeWritten,
   const std::string user = AsOrdinaryUser(&why_not);
   if (user.empty()) GTEST_SKIP() << why_not;
   ASSERT_EQ(::chmod(Work("closed").c_str(), 0555), 0);
-  for (std::string script : ToAny("closed/new")) {
+  for (std::string script : ToAny("closed/new.png")) {
     SCOPED_TRACE(script);
     script.replace(script.find("\"$T\""), 4, user + " \"$T\"");
-    ExpectRefused(Shell(script), 1, {"closed/new", "Permission denied"});
+    ExpectRefused(Shell(script), 1, {"closed/new.png", "Permission denied"});
   }
 }
 
@@ -83,7 +83,7 @@ THICKLENS_SITUATION(HostileOutputs, AReadOnlyFileSystem,
                     "Refused before any work with the output's name and the reason") {
   SKIP_WITHOUT_MOUNTS();
   fs::create_directory(Work("ro"));
-  for (const std::string& script : ToAny("ro/new")) {
+  for (const std::string& script : ToAny("ro/new.png")) {
     SCOPED_TRACE(script);
     ExpectRefused(Shell("unshare -m sh -c " +
                         Quoted("mount -t tmpfs none ro && mount -o remount,ro ro && " + script)),

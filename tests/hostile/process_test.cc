@@ -148,13 +148,13 @@ THICKLENS_SITUATION(HostileProcess, ASystemWithoutProc,
   SKIP_WITHOUT_MOUNTS();
   MakeSweep();
   for (const std::string& script :
-       {Explain("new"), Estimate("new"), Calibrate("new"), Render("new")}) {
+       {Explain("new.png"), Estimate("new.png"), Calibrate("new.png"), Render("new.png")}) {
     SCOPED_TRACE(script);
     const Outcome outcome =
         Shell("unshare -m sh -c " +
               Quoted("mount -t tmpfs none /proc && mount -t tmpfs none /sys && " + script));
-    ExpectDone(outcome, {"new new"});
-    fs::remove_all(Work("new"));
+    ExpectDone(outcome, {"new new.png"});
+    fs::remove_all(Work("new.png"));
   }
 }
 
