@@ -9,6 +9,7 @@
 
 #include "kernels/opencl/isolated_subprocess.h"
 #include "kernels/opencl/opencl_use.h"
+#include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 
 namespace thicklens::kernels {
@@ -168,12 +169,15 @@ cl::Program BuildProgram(const OpenClDevice& device, const std::vector<EmbeddedF
     program.build({device.device}, options.c_str());
     return program;
   } catch (const cl::BuildError& failure) {
+    // The compiler of PoCL removes its temporary files when a signal arrives, and then fails.
+    ThrowIfCancelled();
     std::string log;
     for (const auto& part : failure.getBuildLog()) log += part.second + "\n";
     throw Error(fmt::format("device {}: the kernels do not build for {} ({}): {}", device.name,
                             real, OpenClErrorText(failure.err()),
                             OneLine(WithFilesNamed(log, source))));
   } catch (const cl::Error& failure) {
+    ThrowIfCancelled();
     throw Error(fmt::format("device {}: the kernels do not build for {}: {}: {}", device.name, real,
                             failure.what(), OpenClErrorText(failure.err())));
   }
