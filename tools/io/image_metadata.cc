@@ -11,6 +11,8 @@
 #include <map>
 #include <optional>
 
+#include "tools/io/transfer_code.h"
+
 namespace thicklens::io {
 namespace {
 
@@ -177,27 +179,6 @@ std::string ExifOfText(const std::string& type, const std::string& chunk) {
     if (++digits % 2 == 0) exif += static_cast<char>(value & 0xFFU);
   }
   return exif;
-}
-
-// ITU-T H.273, as PNG, HEIF and AVIF use it.
-StatedTransfer TransferOfCode(std::uint32_t code) {
-  switch (code) {
-    case 1:
-    case 6:
-    case 14:
-    case 15:
-      return StatedTransfer::kBt709;
-    case 8:
-      return StatedTransfer::kLinear;
-    case 13:
-      return StatedTransfer::kSrgb;
-    case 16:
-      return StatedTransfer::kPq;
-    case 18:
-      return StatedTransfer::kHlg;
-    default:
-      return StatedTransfer::kAbsent;
-  }
 }
 
 void TakePng(const std::string& bytes, ImageFacts* facts) {

@@ -10,6 +10,7 @@
 #include <opencv2/core.hpp>
 
 #include "tools/io/library/decoders.h"
+#include "tools/io/transfer_code.h"
 
 namespace thicklens::io {
 namespace {
@@ -72,26 +73,6 @@ cv::Mat Interleaved(const heif_image* image, heif_channel channel, int type) {
   return pixels;
 }
 
-StatedTransfer TransferOf(int code) {
-  switch (code) {
-    case 1:
-    case 6:
-    case 14:
-    case 15:
-      return StatedTransfer::kBt709;
-    case 8:
-      return StatedTransfer::kLinear;
-    case 13:
-      return StatedTransfer::kSrgb;
-    case 16:
-      return StatedTransfer::kPq;
-    case 18:
-      return StatedTransfer::kHlg;
-    default:
-      return StatedTransfer::kAbsent;
-  }
-}
-
 void TakeColour(const heif_image_handle* handle, ImageFacts* facts) {
   const std::size_t size = heif_image_handle_get_raw_color_profile_size(handle);
   constexpr std::size_t kMaxBytes = 32 << 20;
@@ -107,7 +88,7 @@ void TakeColour(const heif_image_handle* handle, ImageFacts* facts) {
       nclx == nullptr) {
     return;
   }
-  facts->transfer = TransferOf(nclx->transfer_characteristics);
+  facts->transfer = TransferOfCode(nclx->transfer_characteristics);
   constexpr int kUnspecified = 2;
   if (nclx->color_primaries != kUnspecified && nclx->color_primary_white_x > 0) {
     facts->chromaticities = std::array<double, 8>{
