@@ -313,7 +313,8 @@ EncodedImage CropImage(const EncodedImage& image, const PixelRect& rect) {
 
 RawDepthMap CropDepth(const RawDepthMap& map, const PixelRect& rect) {
   RequireInside("depth map", rect, map.width_px, map.height_px);
-  return {rect.width, rect.height, CutOut(map.values, map.width_px, 1, rect), map.integer};
+  return {rect.width, rect.height, CutOut(map.values, map.width_px, 1, rect), map.integer,
+          map.largest_of_type};
 }
 
 Camera CropCamera(const Camera& camera, const PixelRect& rect) {

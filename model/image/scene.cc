@@ -72,6 +72,17 @@ EncodedImage EncodedBy(const LinearImage& image, int bits, const LevelOf& level_
 }
 
 void CheckConvention(const DepthConvention& convention, const std::string& depth_name) {
+  if (convention.kind == DepthKind::kInverse) {
+    if (!std::isfinite(convention.inverse_scale_dpt) || convention.inverse_scale_dpt == 0) {
+      throw Error(fmt::format("{}: inverse_scale_dpt is {}: it must be finite and not 0",
+                              depth_name, convention.inverse_scale_dpt));
+    }
+    if (!std::isfinite(convention.inverse_offset_dpt)) {
+      throw Error(fmt::format("{}: inverse_offset_dpt is {}: it must be finite", depth_name,
+                              convention.inverse_offset_dpt));
+    }
+    return;
+  }
   if (convention.kind != DepthKind::kDisparity) {
     if (!(convention.unit_mm > 0) || !std::isfinite(convention.unit_mm)) {
       throw Error(fmt::format("{}: the depth unit is {} mm: it must be finite and > 0", depth_name,
@@ -100,7 +111,8 @@ class DepthConverter {
  public:
   DepthConverter(const Camera& camera, const DepthConvention& convention)
       : convention_(convention), principal_point_px_(camera.sensor.principal_point_px) {
-    if (convention.kind == DepthKind::kZ) return;  // z is the only kind without calibration
+    // These kinds need no calibration.
+    if (convention.kind == DepthKind::kZ || convention.kind == DepthKind::kInverse) return;
     focal_scale_px_ = camera.focal_scale_px();
     if (convention.kind == DepthKind::kRange) return;
     inverse_focus_per_mm_ = 1 / camera.focus_depth_mm();
@@ -112,13 +124,20 @@ class DepthConverter {
   double DepthMm(double value, int x, int y, bool integer) const {
     constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
     if (!std::isfinite(value)) return kNone;
-    const bool zero_is_hole = integer || convention_.kind != DepthKind::kDisparity;
+    const bool zero_is_hole =
+        integer || convention_.kind == DepthKind::kZ || convention_.kind == DepthKind::kRange;
     if (value == 0 && zero_is_hole) return kNone;
     switch (convention_.kind) {
       case DepthKind::kZ:
         return value * convention_.unit_mm;
       case DepthKind::kRange:
         return value * convention_.unit_mm / RangeOverDepth(x, y);
+      case DepthKind::kInverse: {
+        constexpr double kMmPerMetre = 1000;
+        const double inverse_dpt =
+            convention_.inverse_scale_dpt * value + convention_.inverse_offset_dpt;
+        return inverse_dpt > 0 ? kMmPerMetre / inverse_dpt : kNone;
+      }
       case DepthKind::kDisparity:
         break;
     }
@@ -290,7 +309,26 @@ DepthKind DepthKindFromName(const std::string& name) {
   if (name == "z") return DepthKind::kZ;
   if (name == "range") return DepthKind::kRange;
   if (name == "disparity") return DepthKind::kDisparity;
-  throw Error(fmt::format("depth kind \"{}\" is unknown: it must be z, range or disparity", name));
+  if (name == "inverse") return DepthKind::kInverse;
+  throw Error(
+      fmt::format("depth kind \"{}\" is unknown: it must be z, range, disparity or inverse", name));
+}
+
+InverseScale InverseScaleBetween(double depth_at_zero_mm, double depth_at_full_scale_mm,
+                                 double full_scale) {
+  if (!(depth_at_zero_mm > 0) || !(depth_at_full_scale_mm > 0) ||
+      depth_at_zero_mm == depth_at_full_scale_mm) {
+    throw Error(fmt::format("inverse depth from {} to {} mm: two different depths > 0 are expected",
+                            depth_at_zero_mm, depth_at_full_scale_mm));
+  }
+  if (!(full_scale > 0) || !std::isfinite(full_scale)) {
+    throw Error(
+        fmt::format("inverse depth: the full scale is {}: it must be finite and > 0", full_scale));
+  }
+  constexpr double kMmPerMetre = 1000;
+  const double at_zero_dpt = kMmPerMetre / depth_at_zero_mm;
+  const double at_full_scale_dpt = kMmPerMetre / depth_at_full_scale_mm;
+  return {(at_full_scale_dpt - at_zero_dpt) / full_scale, at_zero_dpt};
 }
 
 double DepthUnitMm(const std::string& name) {
@@ -340,6 +378,9 @@ Scene MakeScene(const Camera& camera, LinearImage image, const RawDepthMap& map,
                  convention.kind == DepthKind::kDisparity
                      ? "check the scale and the offset of the disparity, and that the map does not "
                        "contain depths"
+                 : convention.kind == DepthKind::kInverse
+                     ? "check the scale and the offset of the inverse depth, or its near and far "
+                       "depth"
                      : "check the unit");
   scene.image = std::move(image);
   return scene;

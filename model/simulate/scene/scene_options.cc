@@ -82,6 +82,9 @@ std::string DepthComplaint(const SceneLayer& layer) {
   if (layer.depth->convention.kind == DepthKind::kDisparity) {
     return "depth.kind is disparity: it must be z or range";
   }
+  if (layer.depth->convention.kind == DepthKind::kInverse) {
+    return "depth.kind is inverse: it must be z or range";
+  }
   if (layer.outline.shape != OutlineOptions::Shape::kWhole) {
     return "outline: it is given for a layer with a depth map, which covers the whole image and "
            "must not have an outline";

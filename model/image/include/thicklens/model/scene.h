@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -62,8 +63,9 @@ enum class DepthKind {
   kZ,          // depth along the axis from Ap
   kRange,      // distance along the chief ray of the pixel, from the centre of Ap
   kDisparity,  // px per view step, near positive, 0 in the plane of focus
+  kInverse,    // 1/z by a scale and an offset, near positive
 };
-// The kind of the name "z", "range" or "disparity". Throws Error for any other name.
+// The kind of the name "z", "range", "disparity" or "inverse". Throws Error for any other name.
 THICKLENS_EXPORT DepthKind DepthKindFromName(const std::string& name);
 
 // A depth map as read from a file: one number per pixel, rows from top to bottom.
@@ -72,6 +74,8 @@ struct RawDepthMap {
   int height_px = 0;          // height, px
   std::vector<float> values;  // width * height numbers, in the unit of the map
   bool integer = false;       // true: the file format is integer, and 0 means "no data"
+  // The largest value that the file's integer type, or its stated range, can hold.
+  std::optional<double> largest_of_type = std::nullopt;
 };
 
 // How the numbers of a depth map are converted.
@@ -81,7 +85,18 @@ struct DepthConvention {
   double disparity_scale = 1;      // kDisparity: disparity_px = scale * value + offset
   double disparity_offset_px = 0;  // kDisparity: offset, px per view step
   double aperture_step_mm = 0;     // kDisparity: da, step on Ap between the views of the disparity
+  // kInverse: 1/z = scale * value + offset, in dioptres (1/m). The scale is not 0.
+  double inverse_scale_dpt = 1;
+  double inverse_offset_dpt = 0;
 };
+// Scale and offset of a map whose value 0 lies at one depth and whose value `full_scale` lies at
+// another, linear in 1/z: 1/z = 1/z0 + value/full_scale (1/z1 - 1/z0). Either depth may be
+// infinite. Throws Error if a depth is not > 0, both are equal, or full_scale is not > 0.
+struct InverseScale {
+  double scale_dpt = 1, offset_dpt = 0;
+};
+THICKLENS_EXPORT InverseScale InverseScaleBetween(double depth_at_zero_mm,
+                                                  double depth_at_full_scale_mm, double full_scale);
 // Millimetres per unit for the name "mm", "cm", "m" or "tum5000" (16-bit PNG of the TUM benchmark,
 // m x 5000). Throws Error for any other name.
 THICKLENS_EXPORT double DepthUnitMm(const std::string& name);
@@ -103,12 +118,13 @@ struct Scene {
 // Makes a scene of an image and its depth map. The map is converted to z by its convention:
 //   range: z = range/sqrt(1 + (t p/K)^2), t px from the principal point
 //   disparity: 1/z = 1/zf + d p/(da K)
-// Holes are NaN and infinities, 0 in integer maps and in maps of z and range, and disparities of
-// points at or beyond infinity. Throws Error, which names `depth_name`, if the sizes differ, a
-// depth is negative, all values are holes, or the depths are impossible for this camera (nearer
-// than its front focal point, or with a unit that is wrong by a factor of 1000); the latter message
-// states the minimum, median and maximum in mm. Throws Error also if the convention is invalid or
-// the camera lacks the calibration that range and disparity need.
+//   inverse: 1/z = scale * value + offset
+// Holes are NaN and infinities, 0 in integer maps and in maps of z and range, and disparities and
+// inverse depths of points at or beyond infinity. Throws Error, which names `depth_name`, if the
+// sizes differ, a depth is negative, all values are holes, or the depths are impossible for this
+// camera (nearer than its front focal point, or with a unit that is wrong by a factor of 1000); the
+// latter message states the minimum, median and maximum in mm. Throws Error also if the convention
+// is invalid or the camera lacks the calibration that range and disparity need.
 THICKLENS_EXPORT Scene MakeScene(const Camera& camera, LinearImage image, const RawDepthMap& map,
                                  const DepthConvention& convention, const std::string& depth_name);
 

@@ -1,0 +1,129 @@
+#include "thicklens/model/depth_holes.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "support/error_message.h"
+
+namespace thicklens::model {
+namespace {
+
+using ::testing::HasSubstr;
+using thicklens::testing::ErrorOf;
+
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr float kInfinite = std::numeric_limits<float>::infinity();
+
+RawDepthMap RowOf(std::vector<float> values, bool integer = false,
+                  std::optional<double> largest = std::nullopt) {
+  const int width = static_cast<int>(values.size());
+  return {width, 1, std::move(values), integer, largest};
+}
+
+std::vector<bool> HolesIn(const RawDepthMap& map) {
+  std::vector<bool> holes;
+  for (const float value : map.values) holes.push_back(std::isnan(value));
+  return holes;
+}
+
+TEST(DepthHoles, EveryReasonIsCountedOnce) {
+  RawDepthMap map = RowOf({1, 0, kNan, kInfinite, -kInfinite, -1, 9999, 2});
+  HoleRules rules;
+  rules.hole_values = {9999};
+  const DepthHoles holes = MarkHoles(DepthKind::kZ, rules, &map);
+  EXPECT_EQ(holes.pixels, 8U);
+  EXPECT_EQ(holes.zero, 1U);
+  EXPECT_EQ(holes.not_a_number, 1U);
+  EXPECT_EQ(holes.infinite, 2U);
+  EXPECT_EQ(holes.negative, 1U);
+  EXPECT_EQ(holes.listed, 1U);
+  EXPECT_EQ(holes.largest, 0U);
+  EXPECT_EQ(holes.total(), 6U);
+  EXPECT_EQ(HolesIn(map), (std::vector<bool>{false, true, true, true, true, true, true, false}));
+  EXPECT_THAT(holes.InWords(), HasSubstr("0: 12.5 %"));
+  EXPECT_THAT(holes.InWords(), HasSubstr("infinite: 25.0 %"));
+}
+
+// A file of floats cannot hold 0.1 exactly.
+TEST(DepthHoles, AHoleValueIsComparedAsTheFileHoldsIt) {
+  RawDepthMap map = RowOf({0.1F, 0.2F});
+  HoleRules rules;
+  rules.hole_values = {0.1};
+  EXPECT_EQ(MarkHoles(DepthKind::kDisparity, rules, &map).listed, 1U);
+}
+
+TEST(DepthHoles, NegativeDisparitiesAreValues) {
+  for (const DepthKind kind : {DepthKind::kDisparity, DepthKind::kInverse}) {
+    RawDepthMap map = RowOf({-1, 0, 1});
+    EXPECT_EQ(MarkHoles(kind, {}, &map).total(), 0U);
+  }
+}
+
+// The map of a camera that looks along -z is not a map of holes.
+TEST(DepthHoles, AMapOfTheOtherSignIsLeftToItsReader) {
+  RawDepthMap map = RowOf({-1, -2, -3, 4});
+  EXPECT_EQ(MarkHoles(DepthKind::kZ, {}, &map).total(), 0U);
+  EXPECT_EQ(map.values.front(), -1);
+}
+
+TEST(DepthHoles, TheLargestValueOfTheTypeIsAMarkIfNothingComesNearIt) {
+  const auto marked = [](DepthKind kind, std::vector<float> values, double largest,
+                         bool is_value = false) {
+    RawDepthMap map = RowOf(std::move(values), true, largest);
+    HoleRules rules;
+    rules.largest_is_value = is_value;
+    return MarkHoles(kind, rules, &map).largest;
+  };
+  EXPECT_EQ(marked(DepthKind::kZ, {800, 1690, 65535, 65535}, 65535), 2U);
+  EXPECT_EQ(marked(DepthKind::kRange, {800, 4095}, 4095), 1U);
+  EXPECT_EQ(marked(DepthKind::kZ, {800, 64000, 65535}, 65535), 0U);
+  EXPECT_EQ(marked(DepthKind::kZ, {800, 1690, 65535}, 65535, true), 0U);
+  // Relative maps are scaled to reach it, and so are maps of 8 bits.
+  EXPECT_EQ(marked(DepthKind::kDisparity, {80, 65535}, 65535), 0U);
+  EXPECT_EQ(marked(DepthKind::kInverse, {80, 65535}, 65535), 0U);
+  EXPECT_EQ(marked(DepthKind::kZ, {80, 255}, 255), 0U);
+}
+
+TEST(DepthHoles, ZeroOfAnIntegerDisparityIsAHoleUnlessItIsDeclaredAValue) {
+  RawDepthMap map = RowOf({0, 5}, true, 255);
+  EXPECT_EQ(MarkHoles(DepthKind::kDisparity, {}, &map).zero, 1U);
+  RawDepthMap as_value = RowOf({0, 5}, true, 255);
+  HoleRules rules;
+  rules.zero_is_value = true;
+  EXPECT_EQ(MarkHoles(DepthKind::kDisparity, rules, &as_value).zero, 0U);
+  EXPECT_EQ(as_value.values.front(), 0);
+  EXPECT_FALSE(as_value.integer);  // otherwise its user would take 0 for a hole
+  EXPECT_THAT(ErrorOf([&] { MarkHoles(DepthKind::kZ, rules, &as_value); }),
+              HasSubstr("zero_is_value"));
+}
+
+TEST(DepthHoles, AreasOfZerosDifferFromScatteredOnes) {
+  constexpr int kSize = 20;
+  RawDepthMap area{kSize, kSize, {}, true, 255};
+  RawDepthMap scattered = area;
+  for (int y = 0; y < kSize; ++y) {
+    for (int x = 0; x < kSize; ++x) {
+      area.values.push_back(x < kSize / 2 ? 0.0F : 200.0F);
+      scattered.values.push_back((x + 3 * y) % 4 == 0 ? 0.0F : 200.0F);
+    }
+  }
+  EXPECT_TRUE(MarkHoles(DepthKind::kDisparity, {}, &area).zeros_form_areas);
+  EXPECT_FALSE(MarkHoles(DepthKind::kDisparity, {}, &scattered).zeros_form_areas);
+}
+
+TEST(DepthHoles, WrongRulesAndSizesAreRefused) {
+  HoleRules rules;
+  rules.hole_values = {std::nan("")};
+  RawDepthMap map = RowOf({1, 2});
+  EXPECT_THAT(ErrorOf([&] { MarkHoles(DepthKind::kZ, rules, &map); }), HasSubstr("hole_values"));
+  map.values.pop_back();
+  EXPECT_THAT(ErrorOf([&] { MarkHoles(DepthKind::kZ, {}, &map); }), HasSubstr("1 values for 2x1"));
+}
+
+}  // namespace
+}  // namespace thicklens::model
