@@ -112,7 +112,8 @@ Baseline ReadBaseline(const CompareOptions& options, const Rect& crop, bool has_
   if (depth.kind.empty() && !has_camera) depth.kind = "disparity";
   Baseline baseline;
   baseline.photo = ReadCroppedImage(options.dibr_paths.front(), crop);
-  baseline.depth = ReadDepth(options.dibr_paths.back(), DepthMeaningOf(depth));
+  baseline.depth =
+      ReadDepth(options.dibr_paths.back(), DepthMeaningOf(depth), DepthReadOptionsOf(depth));
   if (IsToCrop(crop, baseline.depth.width_px, baseline.depth.height_px))
     baseline.depth = baseline.depth.Cropped(*crop);
   baseline.remove_falloff = options.without.empty();

@@ -88,7 +88,8 @@ CameraExplanation ExplanationOf(const ExplainOptions& options, const Camera& cam
   if (options.depth_path.empty()) {
     asked.depth_range = ParseDepthRange(options.depth_range);
   } else {
-    asked.depth = ReadDepth(options.depth_path, DepthMeaningOf(options.depth));
+    asked.depth = ReadDepth(options.depth_path, DepthMeaningOf(options.depth),
+                            DepthReadOptionsOf(options.depth));
   }
   asked.depth_count = options.steps;
   asked.effects = EffectSelectionOf(options.effects);

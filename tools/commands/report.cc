@@ -24,6 +24,7 @@
 #include "thicklens/io/frame_files.h"
 #include "thicklens/io/image_io.h"
 #include "thicklens/io/light_field_io.h"
+#include "thicklens/model/depth_holes.h"
 #include "thicklens/model/light_field.h"
 #include "thicklens/model/light_field_grid.h"
 #include "thicklens/model/sweep_file.h"
@@ -141,7 +142,16 @@ PageDepth ReadDepth(const ReportOptions& options, const model::LightField& light
         fmt::format("--depth-kind {}: {} has no camera, so its depth map must be a disparity",
                     options.depth.kind, options.light_field_path));
   }
-  model::RawDepthMap map = io::ReadDepthMap(options.depth_path);
+  const DepthReadOptions reading = DepthReadOptionsOf(options.depth);
+  model::RawDepthMap map = io::ReadDepthFile(options.depth_path, reading.file).map;
+  if (reading.near_mm) {
+    const model::InverseScale scale = model::InverseScaleBetween(*reading.far_mm, *reading.near_mm,
+                                                                 map.largest_of_type.value_or(1));
+    convention.inverse_scale_dpt = scale.scale_dpt;
+    convention.inverse_offset_dpt = scale.offset_dpt;
+  }
+  WithFileContext(options.depth_path,
+                  [&] { return model::MarkHoles(convention.kind, reading.holes, &map); });
   const auto crop = CropRect(options.reading.crop);
   if (NeedsCrop(crop, map.width_px, map.height_px)) {
     map = WithFileContext(options.depth_path, [&] { return model::CropDepth(map, *crop); });

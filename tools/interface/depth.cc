@@ -1,5 +1,7 @@
 #include "thicklens/depth.h"
 
+#include <fmt/format.h>
+
 #include <utility>
 
 #include "thicklens/base/output_file.h"
@@ -28,15 +30,38 @@ std::string LengthUnitName(LengthUnit unit) {
 DepthMap DepthMap::Cropped(const model::PixelRect& rect) const {
   return WithFileContext(source.empty() ? "depth" : source, [&] {
     model::RawDepthMap map = model::CropDepth({width_px, height_px, values, is_integer}, rect);
-    return DepthMap{map.width_px, map.height_px, std::move(map.values),
-                    map.integer,  meaning,       source};
+    return DepthMap{map.width_px, map.height_px, std::move(map.values), map.integer,
+                    meaning,      source,        largest_of_type,       holes,
+                    notes,        warnings};
   });
 }
 
-DepthMap ReadDepth(const std::string& path, const DepthMeaning& meaning) {
+DepthMap ReadDepth(const std::string& path, const DepthMeaning& meaning,
+                   const DepthReadOptions& options) {
   checks::RequireValid(meaning);
-  model::RawDepthMap map = io::ReadDepthMap(path);
-  return {map.width_px, map.height_px, std::move(map.values), map.integer, meaning, path};
+  std::string why;
+  if (!options.IsValid(meaning, &why)) throw OptionError(why.substr(0, why.find(':')), why);
+  io::DepthFile file = io::ReadDepthFile(path, options.file);
+  DepthMap depth{file.map.width_px,
+                 file.map.height_px,
+                 std::move(file.map.values),
+                 file.map.integer,
+                 meaning,
+                 path,
+                 file.map.largest_of_type,
+                 options.holes,
+                 std::move(file.notes),
+                 std::move(file.warnings)};
+  if (!options.near_mm) return depth;
+  const double full_scale = depth.largest_of_type.value_or(1);
+  const model::InverseScale scale =
+      model::InverseScaleBetween(*options.far_mm, *options.near_mm, full_scale);
+  depth.meaning.inverse_scale_dpt = scale.scale_dpt;
+  depth.meaning.inverse_offset_dpt = scale.offset_dpt;
+  depth.notes.push_back(
+      fmt::format("The value 0 lies at {:g} mm, the value {:g} at {:g} mm, linear in 1/z.",
+                  *options.far_mm, full_scale, *options.near_mm));
+  return depth;
 }
 
 std::string EncodeDepth(const DepthMap& depth) {

@@ -31,9 +31,13 @@ ExplainedScene SceneOfMap(DepthMap depth, const Camera& camera) {
   }
   model::DepthConvention convention;
   convention.kind = depth.meaning.kind;
-  convention.unit_mm = model::DepthUnitMm(LengthUnitName(depth.meaning.unit));
-  const model::RawDepthMap map{depth.width_px, depth.height_px, std::move(depth.values),
-                               depth.is_integer};
+  if (depth.meaning.unit != LengthUnit::kNone)
+    convention.unit_mm = model::DepthUnitMm(LengthUnitName(depth.meaning.unit));
+  convention.inverse_scale_dpt = depth.meaning.inverse_scale_dpt;
+  convention.inverse_offset_dpt = depth.meaning.inverse_offset_dpt;
+  model::RawDepthMap map{depth.width_px, depth.height_px, std::move(depth.values), depth.is_integer,
+                         depth.largest_of_type};
+  WithFileContext(name, [&] { return model::MarkHoles(convention.kind, depth.holes, &map); });
   model::LinearImage empty{map.width_px, map.height_px, 1, {}};
   empty.values.assign(map.values.size(), 0.0F);
   const model::Scene scene = model::MakeScene(camera, std::move(empty), map, convention, name);

@@ -77,8 +77,25 @@ bool ImageFileOptions::IsValid(std::string* why) const {
 }
 
 bool DepthMeaning::IsValid(std::string* why) const {
-  if (!OneOf(why, "kind", DepthKind::kDisparity, kind)) return false;
+  if (!OneOf(why, "kind", DepthKind::kInverse, kind)) return false;
   if (!OneOf(why, "unit", LengthUnit::kTum5000, unit)) return false;
+  if (kind == DepthKind::kInverse) {
+    if (unit != LengthUnit::kNone) {
+      return Fail(
+          why, "unit",
+          "an inverse depth has none, its scale gives dioptres; found " + LengthUnitName(unit));
+    }
+    if (!Finite(why, "inverse_scale_dpt", inverse_scale_dpt)) return false;
+    if (inverse_scale_dpt == 0) {
+      return Fail(why, "inverse_scale_dpt",
+                  "a number that is not 0 is expected: all points would lie at one depth");
+    }
+    if (!Finite(why, "inverse_offset_dpt", inverse_offset_dpt)) return false;
+  } else if (!(inverse_scale_dpt == 1)) {
+    return Fail(why, "inverse_scale_dpt", "is for kInverse only");
+  } else if (!(inverse_offset_dpt == 0)) {
+    return Fail(why, "inverse_offset_dpt", "is for kInverse only");
+  }
   if (kind == DepthKind::kDisparity) {
     if (unit != LengthUnit::kNone) {
       return Fail(why, "unit",
@@ -91,7 +108,7 @@ bool DepthMeaning::IsValid(std::string* why) const {
     }
     return Finite(why, "disparity_offset_px", disparity_offset_px);
   }
-  if (unit == LengthUnit::kNone) {
+  if (unit == LengthUnit::kNone && kind != DepthKind::kInverse) {
     return Fail(why, "unit", "kZ and kRange need one: mm, cm, m or tum5000; it is never guessed");
   }
   // NaN differs from both defaults.
@@ -113,7 +130,23 @@ bool DepthMap::IsValid(std::string* why) const {
         why, "values",
         fmt::format("{} x {} numbers are expected, found {}", width_px, height_px, values.size()));
   }
-  return Member(why, "meaning", meaning);
+  if (!Member(why, "meaning", meaning)) return false;
+  std::string reason;
+  return holes.IsValid(meaning.kind, &reason) || Fail(why, "holes", reason);
+}
+
+bool DepthReadOptions::IsValid(const DepthMeaning& meaning, std::string* why) const {
+  std::string reason;
+  if (!holes.IsValid(meaning.kind, &reason)) return Fail(why, "holes", reason);
+  if (near_mm.has_value() != far_mm.has_value()) {
+    return Fail(why, near_mm ? "far_mm" : "near_mm", "near_mm and far_mm belong together");
+  }
+  if (!near_mm) return true;
+  if (meaning.kind != DepthKind::kInverse) return Fail(why, "near_mm", "is for kInverse only");
+  if (!(*near_mm > 0)) return Unexpected(why, "near_mm", "a depth above 0", *near_mm);
+  if (!(*far_mm > 0)) return Unexpected(why, "far_mm", "a depth above 0, or infinity", *far_mm);
+  return *near_mm != *far_mm ||
+         Fail(why, "far_mm", "a depth that differs from near_mm is expected");
 }
 
 bool SweepOverrides::IsValid(std::string* why) const {

@@ -16,7 +16,7 @@ namespace {
 std::string NameOf(const DepthMap& map) { return map.source.empty() ? "depth" : map.source; }
 
 model::RawDepthMap RawOf(const DepthMap& map) {
-  return {map.width_px, map.height_px, map.values, map.is_integer};
+  return {map.width_px, map.height_px, map.values, map.is_integer, map.largest_of_type};
 }
 
 double UnitMm(LengthUnit unit) {
@@ -36,13 +36,17 @@ estimator::DisparityMap WithoutHoles(const estimator::DisparityMap& map,
   return estimator::FillHoles(map, image, &prepared->holes, at_infinity);
 }
 
-PreparedDepth PrepareByCamera(const DepthMap& map, const model::LinearImage& image,
-                              const Camera& camera, const model::LightFieldGrid& grid) {
+// `raw` has the map's values, in which NaN marks the holes.
+PreparedDepth PrepareByCamera(const DepthMap& map, const model::RawDepthMap& raw,
+                              const model::LinearImage& image, const Camera& camera,
+                              const model::LightFieldGrid& grid) {
   model::DepthConvention convention;
   convention.kind = map.meaning.kind;
   convention.unit_mm = UnitMm(map.meaning.unit);
   convention.disparity_scale = map.meaning.disparity_scale;
   convention.disparity_offset_px = map.meaning.disparity_offset_px;
+  convention.inverse_scale_dpt = map.meaning.inverse_scale_dpt;
+  convention.inverse_offset_dpt = map.meaning.inverse_offset_dpt;
   if (convention.kind == DepthKind::kDisparity) {
     convention.aperture_step_mm = ApertureStepMm(grid, camera);
   }
@@ -50,7 +54,7 @@ PreparedDepth PrepareByCamera(const DepthMap& map, const model::LinearImage& ima
   model::LinearImage empty{map.width_px, map.height_px, 1, {}};
   empty.values.assign(map.values.size(), 0.0F);
   const model::Scene scene =
-      model::MakeScene(camera, std::move(empty), RawOf(map), convention, NameOf(map));
+      model::MakeScene(camera, std::move(empty), raw, convention, NameOf(map));
   PreparedDepth prepared;
   prepared.depth = scene.depth;
   prepared.disparity = WithFileContext(NameOf(map), [&] {
@@ -70,16 +74,26 @@ PreparedDepth PrepareDepth(const DepthMap& map, const model::LinearImage& image,
                             NameOf(map), map.width_px, map.height_px, image.width_px,
                             image.height_px));
   }
-  if (camera != nullptr) return PrepareByCamera(map, image, *camera, *grid);
+  model::RawDepthMap raw = RawOf(map);
+  const model::DepthHoles found = WithFileContext(
+      NameOf(map), [&] { return model::MarkHoles(map.meaning.kind, map.holes, &raw); });
+  if (camera != nullptr) {
+    PreparedDepth prepared = PrepareByCamera(map, raw, image, *camera, *grid);
+    prepared.found_holes = found;
+    return prepared;
+  }
   if (map.meaning.kind != DepthKind::kDisparity) {
     throw OptionError("depth.meaning.kind",
                       fmt::format("depth.meaning.kind: {} needs a camera; without a camera only a "
                                   "disparity map can be used",
-                                  map.meaning.kind == DepthKind::kRange ? "range" : "z"));
+                                  map.meaning.kind == DepthKind::kRange     ? "range"
+                                  : map.meaning.kind == DepthKind::kInverse ? "inverse"
+                                                                            : "z"));
   }
   PreparedDepth prepared;
+  prepared.found_holes = found;
   prepared.disparity = WithFileContext(NameOf(map), [&] {
-    return WithoutHoles(estimator::DisparityFromMap(RawOf(map), map.meaning.disparity_scale,
+    return WithoutHoles(estimator::DisparityFromMap(raw, map.meaning.disparity_scale,
                                                     map.meaning.disparity_offset_px),
                         image, -std::numeric_limits<double>::infinity(), &prepared);
   });

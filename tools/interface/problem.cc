@@ -65,8 +65,9 @@ Image Cropped(const Image& photo, const PixelRect& rect) {
 DepthMap Cropped(const DepthMap& depth, const PixelRect& rect) {
   model::RawDepthMap part =
       model::CropDepth({depth.width_px, depth.height_px, depth.values, depth.is_integer}, rect);
-  return {part.width_px, part.height_px, std::move(part.values),
-          part.integer,  depth.meaning,  depth.source};
+  return {part.width_px, part.height_px, std::move(part.values), part.integer,
+          depth.meaning, depth.source,   depth.largest_of_type,  depth.holes,
+          depth.notes,   depth.warnings};
 }
 
 // Photograph and depth are cut alike. If only one of them has the crop's size, it was cut before.
@@ -253,8 +254,69 @@ void CheckDisparities(const DepthMap& map, const estimator::DisparityMap& dispar
       map.meaning.kind == DepthKind::kDisparity
           ? fmt::format("{} and {}", run.Option("depth.meaning.disparity_scale"),
                         run.Option("depth.meaning.disparity_offset_px"))
+      : map.meaning.kind == DepthKind::kInverse
+          ? fmt::format("{} and {}, and the camera's aperture and focus,",
+                        run.Option("depth.meaning.inverse_scale_dpt"),
+                        run.Option("depth.meaning.inverse_offset_dpt"))
           : fmt::format("{}, and the camera's aperture and focus,",
                         run.Option("depth.meaning.unit"))));
+}
+
+// A map of 8 or 16 bits without a scale holds grey levels, which mean px only by accident. The test
+// is the blur that they would mean: the views at the two ends of the aperture see half of the
+// points more than an image apart.
+void CheckScaleIsGiven(const DepthMap& map, const estimator::DisparityMap& disparity,
+                       const Eigen::ArrayXXd& weights, const RunScope& run) {
+  const DepthMeaning& meaning = map.meaning;
+  if (!map.is_integer || meaning.kind != DepthKind::kDisparity || meaning.disparity_scale != 1 ||
+      meaning.disparity_offset_px != 0) {
+    return;
+  }
+  const double step = disparity.step.x() != 0 ? disparity.step.x() : disparity.step.y();
+  std::vector<float> sizes;
+  sizes.reserve(disparity.disparity.size());
+  for (const float value : disparity.disparity) sizes.push_back(std::abs(value));
+  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+  std::nth_element(sizes.begin(), middle, sizes.end());
+  const double median_px = static_cast<double>(*middle) * std::abs(step);
+  const auto steps = static_cast<double>(std::max(weights.rows(), weights.cols()) - 1);
+  const int size_px = std::min(disparity.width_px, disparity.height_px);
+  if (median_px * steps <= size_px) return;
+  throw Error(fmt::format(
+      "{}: the whole numbers of the map are taken as px per view step: with a median of {:.4g} px "
+      "the outermost views see a point {:.4g} px apart, and the image has {} px; grey levels need "
+      "a scale, disparity = scale * value + offset: {} and {}",
+      NameOf(map), median_px, median_px * steps, size_px,
+      run.Option("depth.meaning.disparity_scale"),
+      run.Option("depth.meaning.disparity_offset_px")));
+}
+
+// Reports what the reader of the map found, and which of its values are taken as holes for a reason
+// that the user may see differently.
+void ReportDepth(const DepthMap& map, const model::DepthHoles& holes, RunScope* run) {
+  for (const std::string& note : map.notes) run->Inform(fmt::format("{}: {}", NameOf(map), note));
+  for (const std::string& warning : map.warnings)
+    run->Warn(fmt::format("{}: {}", NameOf(map), warning));
+  const auto percent = [&](std::size_t count) {
+    return 100 * static_cast<double>(count) / static_cast<double>(holes.pixels);
+  };
+  if (holes.zeros_form_areas) {
+    run->Warn(fmt::format(
+        "{}: {:.1f} % of its values are 0 and taken as 'no depth', but they form whole areas, like "
+        "the far end of a relative map: if 0 is a value there, state it by {}",
+        NameOf(map), percent(holes.zero), run->Option("depth.holes.zero_is_value")));
+  }
+  if (holes.largest > 0) {
+    run->Warn(fmt::format(
+        "{}: {:.1f} % of its values are {:g}, the largest of its type, far above all others: they "
+        "are taken as 'no depth'; if they are depths, state it by {}",
+        NameOf(map), percent(holes.largest), map.largest_of_type.value_or(0),
+        run->Option("depth.holes.largest_is_value")));
+  }
+  if (holes.negative > 0) {
+    run->Warn(fmt::format("{}: {:.1f} % of its values are negative and taken as 'no depth'",
+                          NameOf(map), percent(holes.negative)));
+  }
 }
 
 void SmoothNoisyDepth(const EstimateOptions& options, estimator::DisparityMap* disparity,
@@ -361,12 +423,15 @@ PreparedProblem Prepare(Image photo, DepthMap map, const std::optional<Camera>& 
   prepared.was_hole = std::move(prepared_depth.was_hole);
   diagnostics->depth = prepared_depth.depth;
   diagnostics->holes_filled = prepared_depth.holes;
+  diagnostics->holes = prepared_depth.found_holes;
+  ReportDepth(map, prepared_depth.found_holes, run);
   diagnostics->holes_share = static_cast<double>(prepared_depth.holes) /
                              static_cast<double>(input.disparity.disparity.size());
   if (prepared_depth.depth && map.meaning.kind != DepthKind::kDisparity) {
     WarnOfUnlikelyDepth(map, *input.camera, *prepared_depth.depth, run);
   }
   CheckDisparities(map, input.disparity, *run);
+  CheckScaleIsGiven(map, input.disparity, input.weights, *run);
   SmoothNoisyDepth(options, &input.disparity, diagnostics, run->threads());
   diagnostics->disparity_range_px = DisparityRangePx(input.disparity);
   prepared.effects = SelectEffects(options, input.camera, prepared_depth.depth);

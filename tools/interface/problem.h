@@ -41,6 +41,7 @@ struct PreparedDepth {
   estimator::DisparityMap disparity;
   std::size_t holes = 0;
   std::vector<bool> was_hole;
+  model::DepthHoles found_holes;                // of the map, by reason
   std::optional<model::DepthStatistics> depth;  // mm from Ap, with a camera
 };
 // `camera` and `grid` are both null or both set. Throws Error that names the map's source.

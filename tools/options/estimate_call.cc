@@ -104,6 +104,11 @@ OptionNames EstimateOptionNames() {
           {"depth.meaning.unit", "--depth-unit"},
           {"depth.meaning.disparity_scale", "--disparity-scale"},
           {"depth.meaning.disparity_offset_px", "--disparity-offset"},
+          {"depth.meaning.inverse_scale_dpt", "--inverse-scale"},
+          {"depth.meaning.inverse_offset_dpt", "--inverse-offset"},
+          {"depth.holes", "--hole-value"},
+          {"depth.holes.zero_is_value", "--zero-is value"},
+          {"depth.holes.largest_is_value", "--largest-is value"},
           {"hidden_rays", "--fill"},
           {"device", "--device"},
           {"memory_limit_mib", "--memory-limit"},
@@ -170,7 +175,8 @@ EstimateCall ReadEstimateCall(const EstimateOptions& options, const RunControl& 
   if (!options.transfer.empty()) how.transfer = TransferCurve::FromName(options.transfer);
   if (options.orientation == "displayed") how.orientation = Orientation::kDisplayed;
   call.photo = ReadImage(options.image_path, how);
-  call.depth = ReadDepth(options.depth_path, DepthMeaningOf(options.depth));
+  call.depth = ReadDepth(options.depth_path, DepthMeaningOf(options.depth),
+                         DepthReadOptionsOf(options.depth));
   if (!options.camera_path.empty()) call.camera = ReadCamera(options.camera_path);
   if (options.aperture_of.empty()) return call;
   LightFieldReadOptions reading;

@@ -85,13 +85,15 @@ void AddDepthOptions(CLI::App* command, const std::string& required, DepthOption
       ->add_option(
           "--depth-kind", options->kind,
           required +
-              ". Meaning of the depth map: z (along the axis), range (along the pixel's ray) "
-              "or disparity (px per view step, near positive, 0 in the plane of focus)")
-      ->check(CLI::IsMember({"z", "range", "disparity"}))
+              ". Meaning of the depth map: z (along the axis), range (along the pixel's ray), "
+              "disparity (px per view step, near positive, 0 in the plane of focus) or inverse "
+              "(1/z)")
+      ->check(CLI::IsMember({"z", "range", "disparity", "inverse"}))
       ->type_name("KIND");
   command
       ->add_option("--depth-unit", options->unit,
-                   "Unit of z and range: mm, cm, m, or tum5000 (16-bit PNG, metres times 5000)")
+                   "Unit of z and range, and of --depth-near and --depth-far: mm, cm, m, or "
+                   "tum5000 (16-bit PNG, metres times 5000)")
       ->check(CLI::IsMember({"mm", "cm", "m", "tum5000"}))
       ->type_name("UNIT");
   command
@@ -106,17 +108,117 @@ void AddDepthOptions(CLI::App* command, const std::string& required, DepthOption
       ->check(Finite())
       ->capture_default_str()
       ->type_name("PX");
+  command
+      ->add_option("--inverse-scale", options->inverse_scale_dpt,
+                   "Scale of inverse depths: 1/z in dioptres (1/m) = scale * value + offset")
+      ->check(Finite())
+      ->capture_default_str()
+      ->type_name("DPT");
+  command
+      ->add_option("--inverse-offset", options->inverse_offset_dpt,
+                   "Offset of inverse depths, see --inverse-scale")
+      ->check(Finite())
+      ->capture_default_str()
+      ->type_name("DPT");
+  command
+      ->add_option(
+          "--depth-near", options->near,
+          "Inverse depth: depth of the largest value (255, 65535, or 1 of floats), instead "
+          "of a scale")
+      ->type_name("X");
+  command
+      ->add_option("--depth-far", options->far,
+                   "Inverse depth: depth of the value 0; inf for infinity. A map whose zeros are "
+                   "near has the smaller depth here")
+      ->type_name("X");
+  command
+      ->add_option("--hole-value", options->hole_values,
+                   "Value that means 'no depth', besides NaN and infinities; may be repeated")
+      ->check(Finite())
+      ->type_name("X");
+  command
+      ->add_option("--zero-is", options->zero_is,
+                   "Meaning of 0 in an integer map of disparity or inverse depth: hole (default) "
+                   "or value")
+      ->check(CLI::IsMember({"hole", "value"}))
+      ->type_name("WHAT");
+  command
+      ->add_option("--largest-is", options->largest_is,
+                   "Meaning of the largest value of the type, e.g. 65535, in a map of z or range: "
+                   "hole if all others are far below it (default), or value")
+      ->check(CLI::IsMember({"hole", "value"}))
+      ->type_name("WHAT");
+  command
+      ->add_option("--depth-channel", options->channel,
+                   "Name of the channel that holds the depth, e.g. ViewLayer.Depth.Z of an EXR "
+                   "file; default: the only one, or the one named Z, depth or disparity")
+      ->type_name("NAME");
+  command
+      ->add_option("--pfm-scale", options->pfm_scale,
+                   "The scale in the header of a PFM file: apply it to the values (default, except "
+                   "for 1/255) or ignore it")
+      ->check(CLI::IsMember({"apply", "ignore"}))
+      ->type_name("WHAT");
 }
+
+namespace {
+
+void CheckOptionsOfKind(const DepthOptions& options, model::DepthKind kind) {
+  const auto refuse = [](bool is_given, const std::string& what) {
+    if (is_given) throw UsageError(what);
+  };
+  const bool is_inverse = kind == model::DepthKind::kInverse;
+  const bool has_lengths = kind == model::DepthKind::kZ || kind == model::DepthKind::kRange;
+  const bool has_ends = options.near.has_value() || options.far.has_value();
+  const bool has_scale = options.inverse_scale_dpt != 1 || options.inverse_offset_dpt != 0;
+  refuse(!is_inverse && (has_ends || has_scale),
+         fmt::format("--inverse-scale, --inverse-offset, --depth-near and --depth-far require "
+                     "--depth-kind inverse, found {}",
+                     options.kind));
+  refuse(has_lengths && !options.zero_is.empty(),
+         fmt::format("--zero-is: a {} of 0 is not a depth; --depth-kind disparity or inverse is "
+                     "expected",
+                     options.kind));
+  refuse(!has_lengths && !options.largest_is.empty(),
+         fmt::format("--largest-is requires --depth-kind z or range, found {}: there the largest "
+                     "value is always a value; see --hole-value",
+                     options.kind));
+  if (!is_inverse) return;
+  refuse(options.near.has_value() != options.far.has_value(),
+         "--depth-near and --depth-far belong together");
+  refuse(has_ends && has_scale,
+         "--depth-near and --depth-far give the scale: --inverse-scale and --inverse-offset cannot "
+         "be given as well");
+  refuse(has_ends && (options.unit.empty() || options.unit == "tum5000"),
+         "--depth-near and --depth-far need --depth-unit mm, cm or m");
+  refuse(!has_ends && !options.unit.empty(),
+         fmt::format("--depth-unit {}: an inverse depth is in dioptres by --inverse-scale, or "
+                     "between --depth-near and --depth-far",
+                     options.unit));
+  refuse(options.inverse_scale_dpt == 0, "--inverse-scale: must not be 0");
+  refuse(has_ends && !(*options.near > 0 && *options.far > 0 && *options.near != *options.far),
+         "--depth-near and --depth-far: two different depths above 0 are expected");
+  refuse(options.disparity_scale != 1 || options.disparity_offset_px != 0,
+         "--disparity-scale and --disparity-offset require --depth-kind disparity, found inverse; "
+         "see --inverse-scale");
+}
+
+}  // namespace
 
 model::DepthConvention ConventionOf(const DepthOptions& options) {
   if (options.kind.empty()) {
     throw UsageError(
-        "--depth-kind is missing: z, range or disparity must be given, a depth map does not state "
-        "it "
-        "itself");
+        "--depth-kind is missing: z, range, disparity or inverse must be given, a depth map does "
+        "not state it itself");
   }
   model::DepthConvention convention;
   convention.kind = model::DepthKindFromName(options.kind);
+  CheckOptionsOfKind(options, convention.kind);
+  if (convention.kind == model::DepthKind::kInverse) {
+    convention.inverse_scale_dpt = options.inverse_scale_dpt;
+    convention.inverse_offset_dpt = options.inverse_offset_dpt;
+    return convention;
+  }
   if (convention.kind == model::DepthKind::kDisparity) {
     if (!options.unit.empty()) {
       throw UsageError(fmt::format(
@@ -148,6 +250,11 @@ DepthMeaning DepthMeaningOf(const DepthOptions& options) {
   const model::DepthConvention convention = ConventionOf(options);
   DepthMeaning meaning;
   meaning.kind = convention.kind;
+  if (meaning.kind == DepthKind::kInverse) {
+    meaning.inverse_scale_dpt = options.inverse_scale_dpt;
+    meaning.inverse_offset_dpt = options.inverse_offset_dpt;
+    return meaning;  // the unit is that of near and far
+  }
   for (const auto unit : {LengthUnit::kMillimetre, LengthUnit::kCentimetre, LengthUnit::kMetre,
                           LengthUnit::kTum5000}) {
     if (options.unit == LengthUnitName(unit)) meaning.unit = unit;
@@ -155,6 +262,23 @@ DepthMeaning DepthMeaningOf(const DepthOptions& options) {
   meaning.disparity_scale = options.disparity_scale;
   meaning.disparity_offset_px = options.disparity_offset_px;
   return meaning;
+}
+
+DepthReadOptions DepthReadOptionsOf(const DepthOptions& options) {
+  const model::DepthConvention convention = ConventionOf(options);
+  DepthReadOptions reading;
+  reading.file.channel = options.channel;
+  if (options.pfm_scale == "apply") reading.file.pfm_scale = io::PfmScale::kApplied;
+  if (options.pfm_scale == "ignore") reading.file.pfm_scale = io::PfmScale::kIgnored;
+  reading.holes.hole_values = options.hole_values;
+  reading.holes.zero_is_value = options.zero_is == "value";
+  reading.holes.largest_is_value = options.largest_is == "value";
+  if (convention.kind == model::DepthKind::kInverse && options.near) {
+    const double unit_mm = model::DepthUnitMm(options.unit);
+    reading.near_mm = *options.near * unit_mm;
+    reading.far_mm = *options.far * unit_mm;
+  }
+  return reading;
 }
 
 void AddApertureShapeOption(CLI::App* command, std::string* text) {

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "thicklens/depth.h"
 #include "thicklens/io/light_field_io.h"
@@ -39,22 +40,33 @@ void AddReadingOptions(CLI::App* command, ReadingOptions* options);
 io::LightFieldReading ReadingOf(const ReadingOptions& options);                // throws UsageError
 LightFieldReadOptions LightFieldReadOptionsOf(const ReadingOptions& options);  // throws UsageError
 
-// The options --depth-kind, --depth-unit, --disparity-scale and --disparity-offset state what a
-// depth map's numbers mean. Kind and unit are never guessed: z and range need a unit, disparity has
-// none.
+// The options --depth-kind, --depth-unit, --disparity-scale and --disparity-offset, and those of
+// inverse depth, state what a depth map's numbers mean. Kind and unit are never guessed: z and
+// range need a unit, disparity has none, and inverse has that of --depth-near and --depth-far. The
+// others state which values of the file are depths.
 struct DepthOptions {
   std::string kind;
   std::string unit;
   double disparity_scale = 1;
   double disparity_offset_px = 0;
+  double inverse_scale_dpt = 1;
+  double inverse_offset_dpt = 0;
+  std::optional<double> near, far;  // in the unit
+  std::vector<double> hole_values = {};
+  std::string zero_is, largest_is;  // "hole" or "value"; empty: by rule
+  std::string channel;
+  std::string pfm_scale;  // "apply" or "ignore"; empty: by rule
 };
 // `required` begins the description of --depth-kind: when the kind must be given.
 void AddDepthOptions(CLI::App* command, const std::string& required, DepthOptions* options);
-// Throws UsageError if the kind is not given, z or range have no unit, or disparity has one.
+// Throws UsageError if the kind is not given, z or range have no unit, disparity has one, or an
+// option is for another kind. Near and far are not part of the result: they need the file.
 model::DepthConvention ConventionOf(const DepthOptions& options);
 
 // Likewise in the form of the interface.
 DepthMeaning DepthMeaningOf(const DepthOptions& options);
+// How the map is read. Throws UsageError as ConventionOf does.
+DepthReadOptions DepthReadOptionsOf(const DepthOptions& options);
 
 // The option --aperture-shape.
 void AddApertureShapeOption(CLI::App* command, std::string* text);

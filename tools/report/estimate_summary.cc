@@ -222,6 +222,8 @@ std::string DepthText(const EstimateDiagnostics& found) {
   if (found.holes_filled > 0) {
     text += fmt::format("holes        {} px, filled along the surfaces around them ({:.1f} %)\n",
                         found.holes_filled, std::min(99.9, 100 * found.holes_share));
+    const std::string reasons = found.holes.InWords();
+    if (!reasons.empty()) text += fmt::format("             {}\n", reasons);
   }
   return text;
 }
@@ -272,6 +274,13 @@ json EstimateJson(const EstimateOptions& options, const EstimateOutcome& outcome
               {"effect_impacts", EffectsJson(found.effects)},
               {"holes_filled", found.holes_filled},
               {"holes_share", found.holes_share},
+              {"holes",
+               {{"zero", found.holes.zero},
+                {"nan", found.holes.not_a_number},
+                {"infinite", found.holes.infinite},
+                {"negative", found.holes.negative},
+                {"largest_of_type", found.holes.largest},
+                {"hole_value", found.holes.listed}}},
               {"clipped_fraction", outcome.clipped_fraction},
               {"rays",
                {{"visible_fraction", found.rays_visible},

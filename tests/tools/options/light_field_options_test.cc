@@ -92,7 +92,8 @@ TEST(DepthOptions, KindAndUnitAreNotGuessed) {
   const auto message = [](const DepthOptions& options) {
     return UsageErrorOf([&] { ConventionOf(options); });
   };
-  EXPECT_THAT(message({}), AllOf(HasSubstr("--depth-kind"), HasSubstr("z, range or disparity")));
+  EXPECT_THAT(message({}),
+              AllOf(HasSubstr("--depth-kind"), HasSubstr("z, range, disparity or inverse")));
   EXPECT_THAT(message(KindAndUnit("z", "")), AllOf(HasSubstr("--depth-unit"), HasSubstr("mm")));
   EXPECT_THAT(message(KindAndUnit("range", "")), HasSubstr("--depth-unit"));
   EXPECT_THAT(message(KindAndUnit("disparity", "mm")), HasSubstr("--depth-unit mm"));

@@ -1,10 +1,13 @@
 #ifndef THICKLENS_DEPTH_H_
 #define THICKLENS_DEPTH_H_
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "thicklens/base/export.h"
+#include "thicklens/io/depth_io.h"
+#include "thicklens/model/depth_holes.h"
 #include "thicklens/model/light_field.h"
 #include "thicklens/model/scene.h"
 
@@ -12,12 +15,13 @@ namespace thicklens {
 
 // The meaning of a depth map's numbers: kZ is the depth along the axis from the aperture plane Ap;
 // kRange the distance along the chief ray of the pixel from the centre of Ap; kDisparity the
-// displacement in px per view step, positive for near points, 0 in the plane of focus.
+// displacement in px per view step, positive for near points, 0 in the plane of focus; kInverse 1/z
+// by a scale and an offset, as relative maps and phones store it.
 using DepthKind = model::DepthKind;
 
 // Unit of the numbers of a depth map.
 enum class LengthUnit {
-  kNone,        // not stated; a disparity has no unit
+  kNone,        // not stated; a disparity and an inverse depth have no unit
   kMillimetre,  // 1 mm per unit of the map
   kCentimetre,  // 10 mm per unit of the map
   kMetre,       // 1000 mm per unit of the map
@@ -34,6 +38,10 @@ struct DepthMeaning {
   // is finite and not 0, the offset finite.
   double disparity_scale = 1;
   double disparity_offset_px = 0;  // px per view step
+  // Only for kInverse: 1/z in dioptres (1/m) = inverse_scale_dpt * value + inverse_offset_dpt. The
+  // scale is finite and not 0, the offset finite. The defaults are those of a map of dioptres.
+  double inverse_scale_dpt = 1;
+  double inverse_offset_dpt = 0;
 
   // Returns whether kind, unit, scale and offset are stated and fit each other. Otherwise `why`, if
   // not null, gets the reason.
@@ -41,13 +49,18 @@ struct DepthMeaning {
 };
 
 // A depth map: one number per pixel, rows from top to bottom. NaN and infinities are holes; so is 0
-// in maps of whole numbers, and in kZ and kRange.
+// in maps of whole numbers, and in kZ and kRange, and what `holes` states (model::MarkHoles).
 struct DepthMap {
   int width_px = 0, height_px = 0;  // size, px
   std::vector<float> values;        // width * height numbers
   bool is_integer = false;          // the file's type is integer, so that 0 means "no data"
   DepthMeaning meaning;             // what the numbers mean
   std::string source;               // file that it was read from; messages name it
+  // The largest value that the type of the file holds, if it is an integer type.
+  std::optional<double> largest_of_type = std::nullopt;
+  model::HoleRules holes = {};  // which values are no depths
+  // What the reader found: remarks and doubts, one sentence each.
+  std::vector<std::string> notes = {}, warnings = {};
 
   // Returns a rectangle of the map, px. Throws Error if it is empty or not inside.
   THICKLENS_EXPORT DepthMap Cropped(const model::PixelRect& rect) const;
@@ -56,10 +69,24 @@ struct DepthMap {
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 
-// Reads a map of one channel: PFM, 8- or 16-bit PNG, 16-bit or float TIFF, float EXR. Throws
-// OptionError if the meaning is not valid, before the file is opened, and Error that names the
-// file.
-THICKLENS_EXPORT DepthMap ReadDepth(const std::string& path, const DepthMeaning& meaning);
+// How a depth map is read.
+struct DepthReadOptions {
+  io::DepthReading file;   // which of its values are the depth
+  model::HoleRules holes;  // which of them are no depths
+  // kInverse: the depths, mm, of the largest value of the file's integer type, or of 1 in a map of
+  // floats, and of 0; the far one may be infinite. They give the meaning's scale and offset. For a
+  // map whose zeros are near, near_mm is the larger one.
+  std::optional<double> near_mm, far_mm;
+
+  // Returns whether the options fit the meaning. Otherwise `why`, if not null, gets the reason.
+  THICKLENS_EXPORT bool IsValid(const DepthMeaning& meaning, std::string* why) const;
+};
+
+// Reads a map of one channel, or of three or more equal ones: PFM, NPY, PNG, PGM, TIFF, EXR, JPEG.
+// Throws OptionError if the meaning or the options are not valid, before the file is opened, and
+// Error that names the file.
+THICKLENS_EXPORT DepthMap ReadDepth(const std::string& path, const DepthMeaning& meaning,
+                                    const DepthReadOptions& options = {});
 // The bytes of a PFM file (float, little endian) with the values; the meaning is not part of it.
 THICKLENS_EXPORT std::string EncodeDepth(const DepthMap& depth);
 // Writes that file, completely or not at all.

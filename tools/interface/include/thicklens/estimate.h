@@ -170,6 +170,7 @@ struct EstimateDiagnostics {
   std::optional<model::DepthStatistics> depth;   // mm from Ap, with a camera
   std::size_t holes_filled = 0;                  // number of pixels of the map
   double holes_share = 0;                        // the same over all pixels
+  model::DepthHoles holes;                       // the map's holes by reason
   std::pair<double, double> disparity_range_px{0, 0};         // px per view step
   std::optional<double> depth_noise_px, depth_noise_left_px;  // px per view step [D93], [D94]
   double largest_step_px = 0;  // displacement between neighbouring views

@@ -1,0 +1,30 @@
+#ifndef THICKLENS_TOOLS_IO_DEPTH_DEPTH_READERS_H_
+#define THICKLENS_TOOLS_IO_DEPTH_DEPTH_READERS_H_
+
+#include <opencv2/core/mat.hpp>
+#include <string>
+
+#include "thicklens/io/depth_io.h"
+#include "thicklens/io/image_file.h"
+
+// One reader per kind of file; depth_file.cc selects it by the first bytes. Each throws Error that
+// begins with `name`.
+namespace thicklens::io {
+
+// A PFM file of one channel ("Pf").
+DepthFile DecodePfmDepth(const std::string& bytes, const std::string& name, PfmScale scale);
+
+bool IsNpy(const std::string& bytes);
+DepthFile DecodeNpyDepth(const std::string& bytes, const std::string& name);
+
+// Any kind that DecodeImageFile reads.
+DepthFile DecodeImageDepth(const std::string& bytes, const std::string& name,
+                           const DepthReading& reading);
+
+// Why a picture of three different channels is no depth map: the colour map on which its colours
+// lie, with the share that does, or that they lie on none.
+std::string WordsOnColours(const cv::Mat& rgb, bool is_lossy);
+
+}  // namespace thicklens::io
+
+#endif  // THICKLENS_TOOLS_IO_DEPTH_DEPTH_READERS_H_

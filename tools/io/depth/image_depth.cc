@@ -1,0 +1,276 @@
+// Depth maps in files of images: which channel holds the depth, and what its type can hold.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <vector>
+
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/printable_text.h"
+#include "tools/io/depth/depth_readers.h"
+#include "tools/io/image_file_kind.h"
+#include "tools/io/image_library.h"
+#include "tools/io/png_check.h"
+
+namespace thicklens::io {
+namespace {
+
+constexpr std::array<ImageFileKind, 8> kDepthKinds = {
+    ImageFileKind::kPng,  ImageFileKind::kTiff, ImageFileKind::kExr, ImageFileKind::kPnm,
+    ImageFileKind::kJpeg, ImageFileKind::kPfm,  ImageFileKind::kBmp, ImageFileKind::kWebp};
+
+std::string TypeName(const cv::Mat& image) {
+  static const char* const kNames[] = {"8-bit",         "signed 8-bit",  "16-bit",
+                                       "signed 16-bit", "signed 32-bit", "32-bit float",
+                                       "64-bit float",  "16-bit float"};
+  return fmt::format("{} values in {} channel(s)", kNames[image.depth()], image.channels());
+}
+
+std::string ExpectedOf(ImageFileKind kind) {
+  if (kind == ImageFileKind::kPng) return "a PNG depth map has 8- or 16-bit values";
+  if (kind == ImageFileKind::kTiff) return "a TIFF depth map has integer or float values";
+  if (kind == ImageFileKind::kPnm) return "a PGM depth map has 8- or 16-bit values";
+  if (kind == ImageFileKind::kExr) return "an EXR depth map has float values";
+  return "a depth map has values";
+}
+
+std::string Listed(const std::vector<std::string>& names) {
+  return PrintableUtf8(fmt::format("{}", fmt::join(names, ", ")));
+}
+
+std::string InLowerCase(std::string text) {
+  for (char& letter : text) {
+    if (letter >= 'A' && letter <= 'Z') letter = static_cast<char>(letter - 'A' + 'a');
+  }
+  return text;
+}
+
+// The parts of "ViewLayer.Depth.Z" in lower case.
+std::vector<std::string> PartsOf(const std::string& name) {
+  std::vector<std::string> parts;
+  std::size_t begin = 0;
+  for (std::size_t end = 0; end != std::string::npos; begin = end + 1) {
+    end = name.find('.', begin);
+    parts.push_back(InLowerCase(name.substr(begin, end - begin)));
+  }
+  return parts;
+}
+
+bool IsAlphaName(const std::string& name) { return PartsOf(name).back() == "a"; }
+
+// The channels whose name says that they are a depth: by the last part Z or, if there is none, by
+// any part.
+std::vector<int> NamedDepth(const std::vector<std::string>& names) {
+  std::vector<int> by_end, by_part;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const std::vector<std::string> parts = PartsOf(names[i]);
+    if (parts.back() == "z") by_end.push_back(static_cast<int>(i));
+    const bool is_depth = std::any_of(parts.begin(), parts.end(), [](const std::string& part) {
+      return part == "depth" || part == "disparity";
+    });
+    if (is_depth && !IsAlphaName(names[i])) by_part.push_back(static_cast<int>(i));
+  }
+  return by_end.empty() ? by_part : by_end;
+}
+
+// The largest difference between the channels of a pixel, as far as they are finite; infinite where
+// only some of them are.
+double LargestDifference(const cv::Mat& pixels, const std::vector<int>& channels) {
+  double largest = 0;
+  const auto stride = static_cast<std::size_t>(pixels.channels());
+  for (int y = 0; y < pixels.rows; ++y) {
+    ThrowIfCancelled();
+    cv::Mat row;
+    pixels.row(y).convertTo(row, CV_64F);
+    const auto* values = row.ptr<double>(0);
+    for (std::size_t x = 0; x < static_cast<std::size_t>(pixels.cols); ++x, values += stride) {
+      const double first = values[channels[0]];
+      for (const int channel : channels) {
+        const double value = values[channel];
+        if (value == first || (std::isnan(value) && std::isnan(first))) continue;
+        const double difference = std::abs(value - first);
+        largest = std::isnan(difference) ? std::numeric_limits<double>::infinity()
+                                         : std::max(largest, difference);
+      }
+    }
+  }
+  return largest;
+}
+
+// Chooses the channel of the depth.
+class DepthChannel {
+ public:
+  DepthChannel(const DecodedImage& image, ImageFileKind kind, const std::string& name)
+      : pixels_(image.pixels), names_(image.facts.channels), kind_(kind), name_(name) {}
+
+  int Choose(const std::string& wanted, DepthFile* file) {
+    if (!wanted.empty()) return OfName(wanted);
+    if (names_.size() == 1) return 0;
+    const std::vector<int> named = NamedDepth(names_);
+    if (named.size() == 1) {
+      file->notes.push_back(
+          fmt::format("The channel '{}' of {} is taken.", NameAt(named[0]), Listed(names_)));
+      return named[0];
+    }
+    if (named.size() > 1) {
+      throw Error(fmt::format("{}: {} channels may be the depth: name one of {}", name_,
+                              named.size(), Listed(names_)));
+    }
+    return OfEqualOnes(file);
+  }
+
+  std::optional<int> alpha() const { return alpha_; }
+
+ private:
+  std::string NameAt(int channel) const {
+    return PrintableUtf8(names_[static_cast<std::size_t>(channel)]);
+  }
+
+  int OfName(const std::string& wanted) const {
+    const auto found = std::find(names_.begin(), names_.end(), wanted);
+    if (found == names_.end()) {
+      throw Error(fmt::format("{}: no channel '{}': it has {}", name_, PrintableUtf8(wanted),
+                              Listed(names_)));
+    }
+    return static_cast<int>(found - names_.begin());
+  }
+
+  int OfEqualOnes(DepthFile* file) {
+    std::vector<int> colours;
+    for (std::size_t i = 0; i < names_.size(); ++i) {
+      if (IsAlphaName(names_[i]) && (names_.size() == 2 || names_.size() == 4)) {
+        alpha_ = static_cast<int>(i);
+      } else {
+        colours.push_back(static_cast<int>(i));
+      }
+    }
+    if (colours.size() == 1) return colours[0];
+    // The colours of a grey JPEG file that was stored as a colour one differ by rounding.
+    constexpr double kJpegLevels = 3;
+    const double allowed = kind_ == ImageFileKind::kJpeg ? kJpegLevels : 0;
+    const double difference = LargestDifference(pixels_, colours);
+    if (colours.size() < 3 || difference > allowed) ThrowOfColours(colours);
+    file->notes.push_back(fmt::format("Its {} channels ({}) {}: they are one map.", colours.size(),
+                                      Listed(names_),
+                                      difference == 0 ? "are equal" : "are equal up to rounding"));
+    return colours[0];
+  }
+
+  [[noreturn]] void ThrowOfColours(const std::vector<int>& colours) const {
+    std::string words = "its channels differ";
+    if (colours.size() == 3) {
+      cv::Mat rgb(pixels_.size(), CV_MAKETYPE(pixels_.depth(), 3));
+      std::vector<int> from_to;
+      for (int i = 0; i < 3; ++i) {
+        from_to.push_back(colours[static_cast<std::size_t>(i)]);
+        from_to.push_back(i);
+      }
+      cv::mixChannels(&pixels_, 1, &rgb, 1, from_to.data(), 3);
+      words = WordsOnColours(rgb, kind_ == ImageFileKind::kJpeg);
+    }
+    throw Error(
+        fmt::format("{}: {} in one channel, or in three channels that are equal, found {} ({}); {}",
+                    name_, ExpectedOf(kind_), TypeName(pixels_), Listed(names_), words));
+  }
+
+  const cv::Mat& pixels_;
+  const std::vector<std::string>& names_;
+  const ImageFileKind kind_;
+  const std::string& name_;
+  std::optional<int> alpha_;
+};
+
+std::optional<double> LargestOfType(const ImageFacts& facts) {
+  if (facts.sample_type.find("float") != std::string::npos) return std::nullopt;
+  if (facts.full_scale) return facts.full_scale;
+  if (facts.container_bits < 1 || facts.container_bits > 64) return std::nullopt;
+  const bool is_unsigned = facts.sample_type.find("unsigned") != std::string::npos;
+  return std::ldexp(1.0, facts.container_bits - (is_unsigned ? 0 : 1)) - 1;
+}
+
+// Transparent pixels are holes; a channel that is transparent everywhere says nothing.
+void TakeAlpha(const cv::Mat& pixels, int channel, DepthFile* file) {
+  cv::Mat alpha;
+  cv::extractChannel(pixels, alpha, channel);
+  std::vector<std::size_t> transparent;
+  std::size_t place = 0;
+  for (int y = 0; y < alpha.rows; ++y) {
+    cv::Mat row;
+    alpha.row(y).convertTo(row, CV_64F);
+    for (int x = 0; x < alpha.cols; ++x, ++place) {
+      if (row.at<double>(0, x) == 0) transparent.push_back(place);
+    }
+  }
+  if (transparent.empty() || transparent.size() == place) {
+    file->notes.emplace_back("Its alpha channel is ignored.");
+    return;
+  }
+  for (const std::size_t hole : transparent)
+    file->map.values[hole] = std::numeric_limits<float>::quiet_NaN();
+  file->notes.push_back(fmt::format("{} transparent pixels are holes (NaN).", transparent.size()));
+}
+
+}  // namespace
+
+DepthFile DecodeImageDepth(const std::string& bytes, const std::string& name,
+                           const DepthReading& reading) {
+  const std::optional<ImageFileKind> kind = KindOfImage(bytes);
+  if (!kind || std::find(kDepthKinds.begin(), kDepthKinds.end(), *kind) == kDepthKinds.end()) {
+    const std::string other = kind ? NameOf(*kind) : NameOfOtherKind(bytes);
+    throw Error(
+        fmt::format("{}: not a depth map: a PFM, NPY, PNG, PGM, TIFF, EXR or JPEG file is "
+                    "expected{}",
+                    name, other.empty() ? "" : fmt::format(", found {}", other)));
+  }
+  ImageReading image_reading;
+  image_reading.spread_bits = false;
+  const DecodedImage decoded = DecodeImageFile(bytes, name, image_reading);
+  // A PNG of fewer bits is more likely a drawing.
+  if (*kind == ImageFileKind::kPng && PngBits(bytes) < 8 && decoded.pixels.channels() == 1) {
+    throw Error(fmt::format("{}: {} in one channel, found {} ({} bits in the file)", name,
+                            ExpectedOf(*kind), TypeName(decoded.pixels), PngBits(bytes)));
+  }
+  DepthFile file;
+  DepthChannel chooser(decoded, *kind, name);
+  const int channel = chooser.Choose(reading.channel, &file);
+  cv::Mat values;
+  cv::extractChannel(decoded.pixels, values, channel);
+  values.convertTo(values, CV_32F);  // exact for 16 bits
+  const double factor = *kind == ImageFileKind::kPfm && reading.pfm_scale == PfmScale::kApplied
+                            ? decoded.facts.value_scale
+                            : 1;
+  file.map.width_px = values.cols;
+  file.map.height_px = values.rows;
+  file.map.integer = decoded.facts.sample_type.find("float") == std::string::npos;
+  file.map.largest_of_type = LargestOfType(decoded.facts);
+  file.map.values.reserve(values.total());
+  for (int y = 0; y < values.rows; ++y) {
+    ThrowIfCancelled();
+    const auto* row = values.ptr<float>(y);
+    for (int x = 0; x < values.cols; ++x)
+      file.map.values.push_back(factor == 1 ? row[x] : static_cast<float>(factor * row[x]));
+  }
+  if (chooser.alpha()) TakeAlpha(decoded.pixels, *chooser.alpha(), &file);
+  file.description = decoded.facts.OneLine();
+  if (*kind == ImageFileKind::kJpeg) {
+    file.warnings.emplace_back(
+        "A depth map in a JPEG file: compression blurs its edges and changes its values by some "
+        "levels, also those that mean 'no depth'; use PNG, TIFF or PFM if the program that made it "
+        "can write them.");
+  }
+  if (decoded.facts.orientation != 1) {
+    file.notes.push_back(fmt::format(
+        "It states the orientation {}, which is not applied: the map is read as it is stored.",
+        decoded.facts.orientation));
+  }
+  return file;
+}
+
+}  // namespace thicklens::io

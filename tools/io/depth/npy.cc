@@ -1,0 +1,211 @@
+// NPY files of numpy [source: numpy.lib.format, "Format Version 1.0" to "3.0"]: the magic
+// "\x93NUMPY", two bytes of version, the length of the header in 2 bytes (version 1) or 4 bytes
+// (2, 3), little endian, the header as text of a Python dictionary with descr, fortran_order and
+// shape, and the values.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <charconv>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <optional>
+#include <vector>
+
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/printable_text.h"
+#include "tools/io/depth/depth_readers.h"
+
+namespace thicklens::io {
+namespace {
+
+constexpr char kNpyMagic[] = "\x93NUMPY";
+constexpr std::size_t kNpyMagicBytes = 6;
+constexpr std::size_t kMaxNpySidePx = 100000;
+
+struct NpyHeader {
+  char kind = 'f';  // f, i or u
+  std::size_t bytes_per_value = 4;
+  bool is_big_endian = false;
+  bool is_fortran_order = false;
+  std::vector<std::size_t> shape;
+};
+
+Error NpyError(const std::string& name, const std::string& what) {
+  return Error(fmt::format("{}: broken NPY: {}", name, what));
+}
+
+// What stands behind 'key': in the dictionary, up to the end of the text.
+std::string BehindKey(const std::string& text, const std::string& key, const std::string& name) {
+  for (const char quote : {'\'', '"'}) {
+    const std::string quoted = quote + key + quote;
+    const std::size_t at = text.find(quoted);
+    if (at == std::string::npos) continue;
+    std::size_t begin = text.find(':', at + quoted.size());
+    if (begin == std::string::npos) break;
+    begin = text.find_first_not_of(" \t", begin + 1);
+    if (begin == std::string::npos) break;
+    return text.substr(begin);
+  }
+  throw NpyError(name, fmt::format("its header has no '{}'", key));
+}
+
+void TakeType(const std::string& text, const std::string& name, NpyHeader* header) {
+  const std::string expected =
+      "numbers f2, f4, f8, i1 to i8 or u1 to u8 of either byte order are expected";
+  const char quote = text[0];
+  const std::size_t end = text.find(quote, 1);
+  if ((quote != '\'' && quote != '"') || end == std::string::npos) {
+    throw Error(fmt::format("{}: an NPY file of a structured type; {}", name, expected));
+  }
+  const std::string type = text.substr(1, end - 1);
+  const bool has_order = !type.empty() && std::strchr("<>|=", type[0]) != nullptr;
+  const std::string rest = type.substr(has_order ? 1 : 0);
+  const bool is_known =
+      rest.size() == 2 && (std::strchr("iu", rest[0]) != nullptr
+                               ? std::strchr("1248", rest[1]) != nullptr
+                               : rest[0] == 'f' && std::strchr("248", rest[1]) != nullptr);
+  if (!is_known) {
+    throw Error(
+        fmt::format("{}: an NPY file of the type '{}'; {}", name, PrintableUtf8(type), expected));
+  }
+  header->kind = rest[0];
+  header->bytes_per_value = static_cast<std::size_t>(rest[1] - '0');
+  header->is_big_endian = type[0] == '>';
+}
+
+void TakeShape(const std::string& text, const std::string& name, NpyHeader* header) {
+  const std::size_t end = text.find(')');
+  if (text[0] != '(' || end == std::string::npos) throw NpyError(name, "its shape is no tuple");
+  const char* at = text.data() + 1;
+  const char* const last = text.data() + end;
+  while (at < last) {
+    if (*at == ' ' || *at == ',') {
+      ++at;
+      continue;
+    }
+    std::size_t side = 0;
+    const auto [rest, status] = std::from_chars(at, last, side);
+    if (status != std::errc()) {
+      throw NpyError(name, fmt::format("its shape is {}", PrintableUtf8(text.substr(0, end + 1))));
+    }
+    header->shape.push_back(side);
+    at = rest;
+  }
+}
+
+std::uint64_t BitsAt(const char* bytes, std::size_t count, bool is_big_endian) {
+  std::uint64_t bits = 0;
+  for (std::size_t i = 0; i < count; ++i)
+    bits = bits << 8 | static_cast<std::uint8_t>(bytes[is_big_endian ? i : count - 1 - i]);
+  return bits;
+}
+
+double HalfFloat(std::uint64_t bits) {
+  const auto fraction = static_cast<double>(bits & 0x3FFU);
+  const int exponent = static_cast<int>(bits >> 10 & 0x1FU);
+  constexpr int kSpecial = 31, kBias = 15, kFractionBits = 10;
+  double value = 0;
+  if (exponent == kSpecial) {
+    value = fraction == 0 ? INFINITY : NAN;
+  } else if (exponent == 0) {
+    value = std::ldexp(fraction, 1 - kBias - kFractionBits);
+  } else {
+    value = std::ldexp(fraction + 1024, exponent - kBias - kFractionBits);
+  }
+  return (bits & 0x8000U) != 0 ? -value : value;
+}
+
+float NpyValue(const char* bytes, const NpyHeader& header) {
+  const std::size_t count = header.bytes_per_value;
+  const std::uint64_t bits = BitsAt(bytes, count, header.is_big_endian);
+  if (header.kind == 'u') return static_cast<float>(bits);
+  if (header.kind == 'i') {
+    const std::size_t unused = 64 - 8 * count;
+    // The shift back keeps the sign.
+    return static_cast<float>(static_cast<std::int64_t>(bits << unused) >> unused);
+  }
+  if (count == 2) return static_cast<float>(HalfFloat(bits));
+  if (count == 4) {
+    const auto narrow = static_cast<std::uint32_t>(bits);
+    float value = 0;
+    std::memcpy(&value, &narrow, sizeof value);
+    return value;
+  }
+  double value = 0;
+  std::memcpy(&value, &bits, sizeof value);
+  return static_cast<float>(value);
+}
+
+NpyHeader ReadNpyHeader(const std::string& bytes, const std::string& name, std::size_t* at) {
+  const std::size_t length_bytes =
+      bytes.size() > kNpyMagicBytes && bytes[kNpyMagicBytes] == '\1' ? 2 : 4;
+  *at = kNpyMagicBytes + 2 + length_bytes;
+  if (bytes.size() < *at) throw NpyError(name, "it ends in its header");
+  const auto length =
+      static_cast<std::size_t>(BitsAt(bytes.data() + kNpyMagicBytes + 2, length_bytes, false));
+  if (length > bytes.size() - *at) {
+    throw NpyError(name, fmt::format("a header of {} bytes in a file of {}", length, bytes.size()));
+  }
+  const std::string text = bytes.substr(*at, length);
+  *at += length;
+  NpyHeader header;
+  TakeType(BehindKey(text, "descr", name), name, &header);
+  TakeShape(BehindKey(text, "shape", name), name, &header);
+  header.is_fortran_order = BehindKey(text, "fortran_order", name).compare(0, 4, "True") == 0;
+  return header;
+}
+
+}  // namespace
+
+bool IsNpy(const std::string& bytes) { return bytes.compare(0, kNpyMagicBytes, kNpyMagic) == 0; }
+
+DepthFile DecodeNpyDepth(const std::string& bytes, const std::string& name) {
+  std::size_t at = 0;
+  const NpyHeader header = ReadNpyHeader(bytes, name, &at);
+  // Axes of length 1 do not change the order of the values: (1, 480, 640), (480, 640, 1).
+  std::vector<std::size_t> sides;
+  for (const std::size_t side : header.shape) {
+    if (side != 1) sides.push_back(side);
+  }
+  if (sides.size() < 2 && header.shape.size() == 2) sides = header.shape;
+  if (sides.size() != 2) {
+    throw Error(fmt::format(
+        "{}: an NPY file of the shape ({}); (height, width) is expected, one value per pixel", name,
+        fmt::join(header.shape, ", ")));
+  }
+  if (sides[0] < 1 || sides[1] < 1 || sides[0] > kMaxNpySidePx || sides[1] > kMaxNpySidePx) {
+    throw NpyError(name, fmt::format("its shape is ({}, {})", sides[0], sides[1]));
+  }
+  const std::size_t expected = sides[0] * sides[1] * header.bytes_per_value;
+  if (bytes.size() - at != expected) {
+    throw NpyError(name, fmt::format("{} bytes of values for {}x{} px: {} are expected",
+                                     bytes.size() - at, sides[1], sides[0], expected));
+  }
+  DepthFile file;
+  file.map.width_px = static_cast<int>(sides[1]);
+  file.map.height_px = static_cast<int>(sides[0]);
+  file.map.integer = header.kind != 'f';
+  const auto bits = static_cast<int>(8 * header.bytes_per_value);
+  if (file.map.integer)
+    file.map.largest_of_type = std::ldexp(1.0, header.kind == 'i' ? bits - 1 : bits) - 1;
+  file.map.values.reserve(sides[0] * sides[1]);
+  for (std::size_t y = 0; y < sides[0]; ++y) {
+    ThrowIfCancelled();
+    for (std::size_t x = 0; x < sides[1]; ++x) {
+      const std::size_t place = header.is_fortran_order ? x * sides[0] + y : y * sides[1] + x;
+      file.map.values.push_back(
+          NpyValue(bytes.data() + at + place * header.bytes_per_value, header));
+    }
+  }
+  file.description = fmt::format(
+      "NPY, {} x {} px, {}", sides[1], sides[0],
+      header.kind == 'f'
+          ? fmt::format("{}-bit floats", bits)
+          : fmt::format("{} {}-bit integers", header.kind == 'i' ? "signed" : "unsigned", bits));
+  return file;
+}
+
+}  // namespace thicklens::io
