@@ -211,6 +211,43 @@ TEST(MakeScene, HolesOfZAndRangeAndTheStatistics) {
   }
 }
 
+// A point at 2 m has 0.5 dioptres.
+TEST(MakeScene, InverseDepthIsLinearInDioptres) {
+  Camera camera = BenchCamera();
+  camera.calibration.reset();  // not needed
+  DepthConvention convention = Convention(DepthKind::kInverse);
+  convention.inverse_scale_dpt = 0.01;
+  convention.inverse_offset_dpt = 0.5;
+  RawDepthMap map = MapOf(0);
+  map.values[1] = 50;
+  map.values[2] = 150;
+  map.values[3] = -50;   // at infinity
+  map.values[4] = -100;  // beyond it
+  const Scene scene = MakeScene(camera, GreyImage(), map, convention, "inverse.pfm");
+  EXPECT_EQ(scene.depth_mm[0], 2000);
+  EXPECT_EQ(scene.depth_mm[1], 1000);
+  EXPECT_EQ(scene.depth_mm[2], 500);
+  EXPECT_TRUE(std::isnan(scene.depth_mm[3]));
+  EXPECT_TRUE(std::isnan(scene.depth_mm[4]));
+  EXPECT_EQ(scene.depth.holes, 2U);
+  map.integer = true;
+  EXPECT_TRUE(
+      std::isnan(MakeScene(camera, GreyImage(), map, convention, "inverse.png").depth_mm[0]));
+}
+
+TEST(InverseScale, IsLinearBetweenItsEnds) {
+  const InverseScale scale = InverseScaleBetween(2500, 400, 255);
+  EXPECT_NEAR(1000 / scale.offset_dpt, 2500, 1e-9);
+  EXPECT_NEAR(1000 / (255 * scale.scale_dpt + scale.offset_dpt), 400, 1e-9);
+  EXPECT_NEAR(127.5 * scale.scale_dpt + scale.offset_dpt, (0.4 + 2.5) / 2, 1e-12);
+  EXPECT_EQ(InverseScaleBetween(kInfinity, 400, 1).offset_dpt, 0);
+  EXPECT_LT(InverseScaleBetween(400, 2500, 255).scale_dpt, 0);
+  EXPECT_THROW(InverseScaleBetween(400, 400, 255), Error);
+  EXPECT_THROW(InverseScaleBetween(0, 400, 255), Error);
+  EXPECT_THROW(InverseScaleBetween(2500, -400, 255), Error);
+  EXPECT_THROW(InverseScaleBetween(2500, 400, 0), Error);
+}
+
 TEST(MakeScene, KeepsTheImage) {
   LinearImage image = GreyImage();
   image.values[17] = 0.25F;
@@ -322,12 +359,19 @@ TEST(MakeScene, RefusesImpossibleConventions) {
   disparity = Convention(DepthKind::kDisparity);
   disparity.disparity_offset_px = std::nan("");
   expect_refusal("disparity_offset_px", disparity);
+  DepthConvention inverse = Convention(DepthKind::kInverse);
+  inverse.inverse_scale_dpt = 0;
+  expect_refusal("inverse_scale_dpt", inverse);
+  inverse = Convention(DepthKind::kInverse);
+  inverse.inverse_offset_dpt = std::nan("");
+  expect_refusal("inverse_offset_dpt", inverse);
 }
 
 TEST(Depth, NamesAndUnits) {
   EXPECT_EQ(DepthKindFromName("z"), DepthKind::kZ);
   EXPECT_EQ(DepthKindFromName("range"), DepthKind::kRange);
   EXPECT_EQ(DepthKindFromName("disparity"), DepthKind::kDisparity);
+  EXPECT_EQ(DepthKindFromName("inverse"), DepthKind::kInverse);
   ExpectSays(MessageOf([] { DepthKindFromName("depth"); }), {"depth", "z", "range", "disparity"});
   EXPECT_EQ(DepthUnitMm("mm"), 1);
   EXPECT_EQ(DepthUnitMm("cm"), 10);

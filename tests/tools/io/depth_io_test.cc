@@ -9,7 +9,9 @@
 #include <filesystem>
 #include <limits>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "support/error_message.h"
@@ -43,7 +45,7 @@ std::string Swapped(std::string values) {
   return values;
 }
 
-class DepthFile : public ::testing::Test {
+class DepthFileTest : public ::testing::Test {
  protected:
   model::RawDepthMap Read(const std::string& bytes) {
     return ReadDepthMap(folder_.Put("depth", bytes));
@@ -59,7 +61,7 @@ class DepthFile : public ::testing::Test {
   TemporaryFolder folder_;
 };
 
-TEST_F(DepthFile, PfmOfEitherByteOrderHasItsRowsBottomUp) {
+TEST_F(DepthFileTest, PfmOfEitherByteOrderHasItsRowsBottomUp) {
   for (const std::string& bytes :
        {"Pf\n3 2\n1.0\n" + kBigEndianValues, "Pf\n3 2\n-1.0\n" + Swapped(kBigEndianValues),
         "Pf 3\n2\t-0.0039\n" + Swapped(kBigEndianValues), "Pf\r\n3 2\r\n1\n" + kBigEndianValues}) {
@@ -73,12 +75,12 @@ TEST_F(DepthFile, PfmOfEitherByteOrderHasItsRowsBottomUp) {
 
 // A value may look like white space: there is exactly one such byte between the scale and the
 // values.
-TEST_F(DepthFile, PfmValuesMayBeginWithWhiteSpace) {
+TEST_F(DepthFileTest, PfmValuesMayBeginWithWhiteSpace) {
   EXPECT_THAT(Read(std::string("Pf\n1 1\n-1\n\x0A\x20\x0D\x40", 14)).values,
               ElementsAre(::testing::FloatNear(2.2051F, 1e-3F)));
 }
 
-TEST_F(DepthFile, PfmRoundTripKeepsEveryBit) {
+TEST_F(DepthFileTest, PfmRoundTripKeepsEveryBit) {
   model::RawDepthMap map{2, 3, {}, false};
   map.values = {0.1F,
                 -0.0F,
@@ -93,7 +95,7 @@ TEST_F(DepthFile, PfmRoundTripKeepsEveryBit) {
   EXPECT_EQ(std::memcmp(back.values.data(), map.values.data(), 6 * sizeof(float)), 0);
 }
 
-TEST_F(DepthFile, ABrokenPfmIsRefused) {
+TEST_F(DepthFileTest, ABrokenPfmIsRefused) {
   EXPECT_THAT(Refusal("Pf\n3 2\n1.0\n" + kBigEndianValues.substr(0, 23)),
               AllOf(HasSubstr("23 bytes"), HasSubstr("3x2"), HasSubstr("24")));
   EXPECT_THAT(Refusal("Pf\n3 2\n1.0\n" + kBigEndianValues + "x"), HasSubstr("25 bytes"));
@@ -111,7 +113,7 @@ TEST_F(DepthFile, ABrokenPfmIsRefused) {
   EXPECT_THAT(Refusal("Pf"), HasSubstr("broken PFM"));
 }
 
-TEST_F(DepthFile, IntegerImagesAreReadAsTheyAre) {
+TEST_F(DepthFileTest, IntegerImagesAreReadAsTheyAre) {
   const cv::Mat shallow = (cv::Mat_<unsigned char>(2, 2) << 0, 1, 200, 255);
   const cv::Mat deep = (cv::Mat_<unsigned short>(1, 3) << 0, 5000, 65535);
   const model::RawDepthMap from_shallow = Read(Encoded(shallow, ".png"));
@@ -126,7 +128,7 @@ TEST_F(DepthFile, IntegerImagesAreReadAsTheyAre) {
   }
 }
 
-TEST_F(DepthFile, FloatImagesAreReadAsTheyAre) {
+TEST_F(DepthFileTest, FloatImagesAreReadAsTheyAre) {
   const cv::Mat depth = (cv::Mat_<float>(2, 2) << 0.1F, -3.0F, 1e-30F, 1e30F);
   for (const char* format : {".tiff", ".exr"}) {
     const std::string bytes =
@@ -138,7 +140,7 @@ TEST_F(DepthFile, FloatImagesAreReadAsTheyAre) {
 }
 
 // The files are those of image_file_test.cc; an EXR file may have other channels besides Z.
-TEST_F(DepthFile, EverySampleTypeIsRead) {
+TEST_F(DepthFileTest, EverySampleTypeIsRead) {
   const auto file = [](const std::string& name) {
     return std::string(THICKLENS_SOURCE_DIR) + "/tests/data/images/" + name;
   };
@@ -157,29 +159,186 @@ TEST_F(DepthFile, EverySampleTypeIsRead) {
     EXPECT_EQ(ReadDepthMap(file(name)).values.front(), 102.5F) << name;
 }
 
-TEST_F(DepthFile, WhatIsNoDepthMapIsRefused) {
+TEST_F(DepthFileTest, WhatIsNoDepthMapIsRefused) {
   const cv::Mat colour(2, 2, CV_16UC3, cv::Scalar(1, 2, 3));
   EXPECT_THAT(Refusal(Encoded(colour, ".png")),
-              AllOf(HasSubstr("16-bit values in 3 channel"), HasSubstr("one channel")));
+              AllOf(HasSubstr("16-bit values in 3 channel"), HasSubstr("one channel"),
+                    HasSubstr("its channels differ")));
   EXPECT_THAT(Refusal(Encoded(colour, ".tiff")), HasSubstr("3 channel"));
   EXPECT_THAT(Refusal(Encoded(cv::Mat(2, 2, CV_32FC3, cv::Scalar(1, 2, 3)), ".exr")),
               HasSubstr("3 channel"));
-  EXPECT_THAT(Refusal(Encoded(cv::Mat(8, 8, CV_8U, cv::Scalar(9)), ".jpg")),
-              HasSubstr("PFM, PNG, PGM, TIFF or EXR"));
+  EXPECT_THAT(Refusal("GIF89a"),
+              AllOf(HasSubstr("PFM, NPY, PNG, PGM, TIFF, EXR or JPEG"), HasSubstr("found GIF")));
   EXPECT_THAT(Refusal("a text"), HasSubstr("not a depth map"));
   EXPECT_THAT(Refusal(""), HasSubstr("not a depth map"));
   EXPECT_THAT(ErrorOf([&] { ReadDepthMap(folder_ / "none.pfm"); }), HasSubstr("none.pfm"));
   EXPECT_THAT(ErrorOf([&] { ReadDepthMap(folder_.path()); }), HasSubstr("is a folder"));
 }
 
+TEST_F(DepthFileTest, EqualChannelsAreOneMap) {
+  const cv::Mat grey = (cv::Mat_<unsigned short>(1, 3) << 7, 0, 65535);
+  cv::Mat rgb, rgba;
+  cv::merge(std::vector<cv::Mat>{grey, grey, grey}, rgb);
+  const cv::Mat opaque(1, 3, CV_16U, cv::Scalar(65535));
+  cv::merge(std::vector<cv::Mat>{grey, grey, grey, opaque}, rgba);
+  for (const cv::Mat& picture : {rgb, rgba}) {
+    const std::string path = folder_.Put("depth", Encoded(picture, ".png"));
+    const DepthFile file = ReadDepthFile(path);
+    EXPECT_THAT(file.map.values, ElementsAre(7, 0, 65535));
+    EXPECT_TRUE(file.map.integer);
+    EXPECT_EQ(file.map.largest_of_type, 65535);
+    ASSERT_FALSE(file.notes.empty());
+    EXPECT_THAT(file.notes.front(), HasSubstr("3 channels"));
+  }
+  // PF: the same in floats.
+  const std::string three = kBigEndianValues.substr(0, 4);
+  EXPECT_THAT(Read("PF\n1 1\n1.0\n" + three + three + three).values, ElementsAre(1));
+}
+
+TEST_F(DepthFileTest, TransparentPixelsAreHoles) {
+  const cv::Mat grey = (cv::Mat_<unsigned char>(1, 3) << 7, 8, 9);
+  const cv::Mat alpha = (cv::Mat_<unsigned char>(1, 3) << 255, 0, 1);
+  cv::Mat rgba;
+  cv::merge(std::vector<cv::Mat>{grey, grey, grey, alpha}, rgba);
+  const model::RawDepthMap map = Read(Encoded(rgba, ".png"));
+  EXPECT_EQ(map.values[0], 7);
+  EXPECT_TRUE(std::isnan(map.values[1]));
+  EXPECT_EQ(map.values[2], 9);
+}
+
+// OpenCV draws the pictures; the reader has tables of the same maps, so that the share of the
+// pixels on the map tests the decision and not the tables.
+TEST_F(DepthFileTest, APictureInFalseColoursIsNamed) {
+  cv::Mat ramp(16, 256, CV_8U);
+  for (int y = 0; y < ramp.rows; ++y) {
+    for (int x = 0; x < ramp.cols; ++x)
+      ramp.at<unsigned char>(y, x) = static_cast<unsigned char>(x);
+  }
+  const std::vector<std::pair<int, std::string>> maps = {{cv::COLORMAP_JET, "'jet'"},
+                                                         {cv::COLORMAP_VIRIDIS, "'viridis'"},
+                                                         {cv::COLORMAP_MAGMA, "'magma'"},
+                                                         {cv::COLORMAP_TURBO, "'turbo'"}};
+  for (const auto& [code, name] : maps) {
+    cv::Mat picture;
+    cv::applyColorMap(ramp, picture, code);
+    EXPECT_THAT(Refusal(Encoded(picture, ".png")),
+                AllOf(HasSubstr("it is a picture in the colours of the map " + name),
+                      HasSubstr("100.0 %")));
+    EXPECT_THAT(Refusal(Encoded(picture, ".jpg")), HasSubstr(name));
+  }
+  cv::Mat noise(64, 64, CV_8UC3);
+  cv::RNG random(5);
+  random.fill(noise, cv::RNG::UNIFORM, 0, 256);
+  EXPECT_THAT(Refusal(Encoded(noise, ".png")), HasSubstr("no known colour map"));
+}
+
+TEST_F(DepthFileTest, AJpegIsReadWithAWarning) {
+  const std::string path =
+      folder_.Put("depth", Encoded(cv::Mat(8, 8, CV_8U, cv::Scalar(9)), ".jpg"));
+  const DepthFile file = ReadDepthFile(path);
+  EXPECT_EQ(file.map.values.front(), 9);
+  ASSERT_EQ(file.warnings.size(), 1U);
+  EXPECT_THAT(file.warnings.front(), HasSubstr("JPEG"));
+}
+
+TEST_F(DepthFileTest, TheScaleOfPfmIsAppliedExceptForThatOfMiddlebury) {
+  const auto first = [&](const std::string& scale, PfmScale use) {
+    DepthReading reading;
+    reading.pfm_scale = use;
+    const std::string path = folder_.Put("depth", "Pf\n3 2\n" + scale + "\n" + kBigEndianValues);
+    return ReadDepthFile(path, reading).map.values.front();
+  };
+  EXPECT_EQ(first("2", PfmScale::kByRule), 8);
+  EXPECT_EQ(first("2", PfmScale::kIgnored), 4);
+  EXPECT_EQ(first("0.003922", PfmScale::kByRule), 4);
+  EXPECT_NEAR(first("0.003922", PfmScale::kApplied), 4.0 / 255, 1e-5);
+  EXPECT_EQ(first("1", PfmScale::kApplied), 4);
+}
+
+// LF may be the first byte of a value: the number of bytes decides.
+TEST_F(DepthFileTest, PfmLinesMayEndWithCrLf) {
+  EXPECT_THAT(Read("Pf\r\n3 2\r\n1.0\r\n" + kBigEndianValues).values,
+              ElementsAre(4, 5, 6, 1, 2, 3));
+  const std::string begins_with_lf("\n\0\0\0", 4);
+  EXPECT_EQ(Read("Pf\r\n1 1\r\n-1.0\r" + begins_with_lf).values.size(), 1U);
+}
+
+std::string Npy(const std::string& dictionary, const std::string& values) {
+  std::string header = "\x93NUMPY";
+  header += '\x01';
+  header += '\0';
+  header += static_cast<char>(dictionary.size() + 1);
+  header += '\0';
+  return header + dictionary + "\n" + values;
+}
+
+TEST_F(DepthFileTest, NpyOfAnyTypeAndOrderIsRead) {
+  const std::string rows = "'fortran_order': False, 'shape': (2, 3), }";
+  EXPECT_THAT(Read(Npy("{'descr': '>f4', " + rows, kBigEndianValues)).values,
+              ElementsAre(1, 2, 3, 4, 5, 6));
+  EXPECT_THAT(Read(Npy("{'descr': '<f4', " + rows, Swapped(kBigEndianValues))).values,
+              ElementsAre(1, 2, 3, 4, 5, 6));
+  EXPECT_THAT(
+      Read(Npy("{'descr': '>f4', 'fortran_order': True, 'shape': (2, 3), }", kBigEndianValues))
+          .values,
+      ElementsAre(1, 3, 5, 2, 4, 6));
+  const model::RawDepthMap bytes =
+      Read(Npy("{'descr': '|u1', 'fortran_order': False, 'shape': (1, 2, 2), }", "\1\2\3\xFF"));
+  EXPECT_THAT(bytes.values, ElementsAre(1, 2, 3, 255));
+  EXPECT_TRUE(bytes.integer);
+  EXPECT_EQ(bytes.largest_of_type, 255);
+  EXPECT_THAT(Read(Npy("{'descr': '<i2', 'fortran_order': False, 'shape': (1, 2), }",
+                       std::string("\xFF\xFF\x00\x01", 4)))
+                  .values,
+              ElementsAre(-1, 256));
+  // Half floats: 1, -2, the smallest one and infinity.
+  EXPECT_THAT(Read(Npy("{'descr': '<f2', 'fortran_order': False, 'shape': (2, 2), }",
+                       std::string("\x00\x3C\x00\xC0\x01\x00\x00\x7C", 8)))
+                  .values,
+              ElementsAre(1, -2, 5.9604644775390625e-8F, std::numeric_limits<float>::infinity()));
+}
+
+TEST_F(DepthFileTest, ABrokenNpyIsRefused) {
+  const std::string rows = "'fortran_order': False, 'shape': (2, 3), }";
+  EXPECT_THAT(Refusal(Npy("{'descr': '<f4', " + rows, kBigEndianValues.substr(0, 23))),
+              AllOf(HasSubstr("23 bytes"), HasSubstr("24 are expected")));
+  EXPECT_THAT(Refusal(Npy("{'descr': '<c8', " + rows, kBigEndianValues)), HasSubstr("'<c8'"));
+  EXPECT_THAT(Refusal(Npy("{'descr': [('x', '<f4')], " + rows, kBigEndianValues)),
+              HasSubstr("structured"));
+  EXPECT_THAT(Refusal(Npy("{" + rows, kBigEndianValues)), HasSubstr("'descr'"));
+  EXPECT_THAT(Refusal(Npy("{'descr': '<f4', 'fortran_order': False, 'shape': (1, 2, 3, 2), }", "")),
+              HasSubstr("(height, width)"));
+  EXPECT_THAT(Refusal(Npy("{'descr': '<f4', 'fortran_order': False, 'shape': (99999999999999999999,"
+                          " 2), }",
+                          "")),
+              HasSubstr("shape"));
+  EXPECT_THAT(
+      Refusal(Npy("{'descr': '<f8', 'fortran_order': False, 'shape': (99999, 99999), }", "")),
+      HasSubstr("0 bytes"));
+  EXPECT_THAT(Refusal("\x93NUMPY\x01"), HasSubstr("header"));
+  EXPECT_THAT(Refusal(std::string("\x93NUMPY\x02\0\xFF\xFF\xFF\xFF{", 13)),
+              HasSubstr("a header of 4294967295 bytes"));
+}
+
+TEST_F(DepthFileTest, AChannelIsTakenByItsName) {
+  if (!io::HasImageLibrary()) GTEST_SKIP() << "no EXR in this build";
+  const std::string path = std::string(THICKLENS_SOURCE_DIR) + "/tests/data/images/mixed.exr";
+  DepthReading reading;
+  reading.channel = "Z";
+  EXPECT_EQ(ReadDepthFile(path, reading).map.values.front(), 102.5F);
+  reading.channel = "nothing";
+  EXPECT_THAT(ErrorOf([&] { ReadDepthFile(path, reading); }),
+              AllOf(HasSubstr("no channel 'nothing'"), HasSubstr("Z")));
+}
+
 // One bit a pixel: decoding spreads 0 and 1 to 0 and 255.
-TEST_F(DepthFile, APngWhoseNumbersWouldBeChangedIsRefused) {
+TEST_F(DepthFileTest, APngWhoseNumbersWouldBeChangedIsRefused) {
   const cv::Mat bits = (cv::Mat_<unsigned char>(2, 2) << 0, 255, 255, 0);
   EXPECT_THAT(Refusal(Encoded(bits, ".png", {cv::IMWRITE_PNG_BILEVEL, 1})),
               HasSubstr("1 bits in the file"));
 }
 
-TEST_F(DepthFile, ABrokenImageIsRefused) {
+TEST_F(DepthFileTest, ABrokenImageIsRefused) {
   cv::Mat depth(40, 40, CV_16U);
   cv::randu(depth, 0, 65535);
   const std::string png = Encoded(depth, ".png");
