@@ -86,6 +86,27 @@ TEST(DepthInterfaceTest, EveryBitIsReadBack) {
   EXPECT_EQ(read.source, path);
 }
 
+TEST(DepthInterfaceTest, NearAndFarGiveTheScaleOfAnInverseDepth) {
+  const TemporaryFolder folder;
+  const std::string path = folder.Put("map.pgm", std::string("P5\n2 1\n255\n\x00\xFF", 13));
+  DepthMeaning meaning;
+  meaning.kind = DepthKind::kInverse;
+  DepthReadOptions options;
+  options.near_mm = 400;
+  options.far_mm = 2500;
+  const DepthMap map = ReadDepth(path, meaning, options);
+  EXPECT_THAT(map.values, ElementsAre(0, 255));
+  EXPECT_NEAR(map.meaning.inverse_offset_dpt, 0.4, 1e-12);
+  EXPECT_NEAR(255 * map.meaning.inverse_scale_dpt + map.meaning.inverse_offset_dpt, 2.5, 1e-12);
+  EXPECT_EQ(map.largest_of_type, 255);
+  options.far_mm.reset();
+  EXPECT_EQ(FieldOfOptionError([&] { ReadDepth(path, meaning, options); }), "far_mm");
+  options.far_mm = 400;
+  EXPECT_EQ(FieldOfOptionError([&] { ReadDepth(path, meaning, options); }), "far_mm");
+  options.far_mm = 2500;
+  EXPECT_EQ(FieldOfOptionError([&] { ReadDepth(path, kDepthInMm, options); }), "near_mm");
+}
+
 TEST(DepthInterfaceTest, TheBytesContainNothingButTheValues) {
   DepthMap other = MapOfSpecialValues();
   other.meaning = {DepthKind::kDisparity, LengthUnit::kNone, 0.5, -3};

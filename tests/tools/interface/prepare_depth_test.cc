@@ -68,6 +68,47 @@ TEST(PrepareDepth, WithoutACameraADisparityIsScaledAndFilled) {
   EXPECT_FALSE(prepared.depth);
 }
 
+TEST(PrepareDepth, HolesAreCountedByReason) {
+  DepthMap map{kMapWidth, kMapHeight, {0, 7, 9, 4, 5, 6}, true, KindAndUnit("disparity", ""),
+               "d.png"};
+  map.holes.hole_values = {9};
+  const PreparedDepth prepared = PrepareDepth(map, GreyImage(), nullptr, nullptr);
+  EXPECT_EQ(prepared.holes, 2U);
+  EXPECT_EQ(prepared.found_holes.zero, 1U);
+  EXPECT_EQ(prepared.found_holes.listed, 1U);
+  EXPECT_THAT(prepared.was_hole, ElementsAre(true, false, true, false, false, false));
+  map.holes = {};
+  map.holes.zero_is_value = true;
+  EXPECT_EQ(PrepareDepth(map, GreyImage(), nullptr, nullptr).holes, 0U);
+}
+
+TEST(PrepareDepth, TheLargestValueOfTheTypeIsNoDepth) {
+  const model::Camera camera = MapCamera();
+  const model::LightFieldGrid grid = model::DefaultGrid(camera, 3, 3);
+  DepthMap map{
+      kMapWidth, kMapHeight, {400, 500, 600, 700, 800, 65535}, true, KindAndUnit("z", "mm"),
+      "d.png"};
+  map.largest_of_type = 65535;
+  const PreparedDepth prepared = PrepareDepth(map, GreyImage(), &camera, &grid);
+  EXPECT_EQ(prepared.found_holes.largest, 1U);
+  ASSERT_TRUE(prepared.depth);
+  EXPECT_EQ(prepared.depth->max_mm, 800);
+}
+
+TEST(PrepareDepth, InverseDepthIsThatOfItsDepth) {
+  const model::Camera camera = MapCamera();
+  const model::LightFieldGrid grid = model::DefaultGrid(camera, 3, 3);
+  DepthMap map{kMapWidth, kMapHeight, {2.5F, 2, 1, 1.25F, 2, 0}, false, {}, "d.npy"};
+  map.meaning.kind = DepthKind::kInverse;  // dioptres
+  const PreparedDepth inverse = PrepareDepth(map, GreyImage(), &camera, &grid);
+  EXPECT_EQ(inverse.holes, 1U);  // 0 is at infinity
+  map.values = {400, 500, 1000, 800, 500, kHole};
+  map.meaning = KindAndUnit("z", "mm");
+  const PreparedDepth z = PrepareDepth(map, GreyImage(), &camera, &grid);
+  for (std::size_t i = 0; i + 1 < map.values.size(); ++i)
+    EXPECT_NEAR(inverse.disparity.disparity[i], z.disparity.disparity[i], 1e-6) << i;
+}
+
 TEST(PrepareDepth, WithoutACameraMillimetresMeanNothing) {
   EXPECT_THAT(ErrorOf([] {
                 Prepared(MapOf(std::vector<float>(6, 500)), "d.pfm", KindAndUnit("z", "mm"),

@@ -107,6 +107,51 @@ TEST(DepthOptions, KindAndUnitAreNotGuessed) {
   EXPECT_EQ(ConventionOf(KindAndUnit("range", "m")).kind, model::DepthKind::kRange);
 }
 
+TEST(DepthOptions, OfAnotherKindAreRefused) {
+  const auto message = [](const DepthOptions& options) {
+    return UsageErrorOf([&] { ConventionOf(options); });
+  };
+  DepthOptions options = KindAndUnit("z", "mm");
+  options.near = 1;
+  EXPECT_THAT(message(options), HasSubstr("--depth-kind inverse"));
+  options = KindAndUnit("z", "mm");
+  options.zero_is = "value";
+  EXPECT_THAT(message(options), HasSubstr("--zero-is"));
+  options = KindAndUnit("disparity", "");
+  options.largest_is = "hole";
+  EXPECT_THAT(message(options), HasSubstr("--largest-is"));
+  options = KindAndUnit("inverse", "mm");
+  EXPECT_THAT(message(options), HasSubstr("--depth-unit mm"));
+  options.near = 400;
+  EXPECT_THAT(message(options), HasSubstr("belong together"));
+  options.far = 400;
+  EXPECT_THAT(message(options), HasSubstr("two different depths"));
+  options.far = 2500;
+  options.unit.clear();
+  EXPECT_THAT(message(options), HasSubstr("need --depth-unit"));
+  options.unit = "m";
+  options.inverse_scale_dpt = 2;
+  EXPECT_THAT(message(options), HasSubstr("cannot be given as well"));
+}
+
+TEST(DepthOptions, NearAndFarAreHandedOnInMm) {
+  DepthOptions options = KindAndUnit("inverse", "m");
+  options.near = 0.4;
+  options.far = 2.5;
+  options.hole_values = {-1};
+  options.zero_is = "value";
+  options.pfm_scale = "ignore";
+  const DepthReadOptions reading = DepthReadOptionsOf(options);
+  ASSERT_TRUE(reading.near_mm);
+  EXPECT_NEAR(*reading.near_mm, 400, 1e-9);
+  EXPECT_NEAR(*reading.far_mm, 2500, 1e-9);
+  EXPECT_TRUE(reading.holes.zero_is_value);
+  EXPECT_THAT(reading.holes.hole_values, ::testing::ElementsAre(-1));
+  EXPECT_EQ(reading.file.pfm_scale, io::PfmScale::kIgnored);
+  EXPECT_EQ(DepthMeaningOf(options).kind, DepthKind::kInverse);
+  EXPECT_EQ(DepthMeaningOf(options).unit, LengthUnit::kNone);
+}
+
 TEST(DepthOptions, AreHandedToTheInterface) {
   for (const char* unit : {"mm", "cm", "m", "tum5000"}) {
     const DepthMeaning meaning = DepthMeaningOf(KindAndUnit("range", unit));
