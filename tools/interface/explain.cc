@@ -11,6 +11,7 @@
 #include "tools/interface/effects_choice.h"
 #include "tools/interface/run_scope.h"
 #include "tools/interface/validation.h"
+#include "tools/interface/with_file_context.h"
 
 namespace thicklens {
 namespace {
