@@ -15,7 +15,7 @@
 #include "thicklens/io/image_io.h"
 #include "thicklens/model/light_field_file.h"
 #include "tools/io/confidence_file_name.h"
-#include "tools/io/hci_views.h"
+#include "tools/io/lightfields/view_pixels.h"
 
 namespace thicklens::io {
 namespace {
@@ -53,15 +53,16 @@ void WriteConfidence(const std::vector<estimator::Confidence>& of_rays, int u_co
 std::vector<estimator::Confidence> ReadConfidence(const std::string& folder, int threads) {
   std::error_code ignored;
   if (!fs::is_directory(folder, ignored)) {
+    // A light field in one image, such as a quilt, has none.
+    if (fs::exists(folder, ignored) && IsImageName(folder)) return {};
     throw Error(fmt::format("{}: {}; the folder of a light field is expected", folder,
                             fs::exists(folder, ignored) ? "is a file" : "does not exist"));
   }
   const fs::path description_path = fs::path(folder) / kLightFieldMarker;
   if (!fs::exists(description_path, ignored)) {
-    if (!HciNumbers(folder).empty()) return {};  // this layout has none
+    if (!ImageNames(folder).empty()) return {};  // only our own layout has some
     throw Error(
-        fmt::format("{}: the folder of a light field is expected, with {} or views of the HCI "
-                    "layout",
+        fmt::format("{}: the folder of a light field is expected, with {} or images of views",
                     folder, kLightFieldMarker));
   }
   const model::LightFieldDescription description =

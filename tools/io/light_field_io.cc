@@ -6,31 +6,22 @@
 #include <atomic>
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
 #include <filesystem>
 #include <functional>
-#include <map>
 #include <opencv2/core/utility.hpp>
-#include <opencv2/imgproc.hpp>
-#include <sstream>
 #include <system_error>
-#include <utility>
 
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/input_file.h"
 #include "thicklens/base/parallel.h"
-#include "thicklens/base/printable_text.h"
 #include "thicklens/base/stopwatch.h"
-#include "thicklens/io/image_file.h"
 #include "thicklens/io/image_io.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/light_field_file.h"
 #include "tools/io/confidence_file_name.h"
 #include "tools/io/float_tiff.h"
-#include "tools/io/hci_views.h"
-#include "tools/io/image_file_kind.h"
-#include "tools/io/image_metadata.h"
+#include "tools/io/view_files.h"
 
 namespace thicklens::io {
 
@@ -43,315 +34,12 @@ namespace fs = std::filesystem;
 
 constexpr char kCameraFile[] = "camera.yaml";
 constexpr char kViewsFolder[] = "views";
-constexpr char kHciStem[] = "input_Cam";
-constexpr int kMaxHciNumber = 999999;
 constexpr char kHciSignature[] = "# Written by thicklens.\n";
 
 // Returns the value of --threads, which RunCommand has passed to OpenCV.
 int Threads() { return std::max(1, cv::getNumThreads()); }
 
-// A light field without its values, and how to read them.
-struct ViewSource {
-  std::string folder;
-  model::LightField frame;
-  // Reads the view (k, l) of the frame in linear light; called from several threads.
-  std::function<model::LinearImage(int k, int l)> read;
-};
-
 std::string NameOf(ViewFormat format) { return format == ViewFormat::kPng ? "png" : "tiff"; }
-
-// Puts "view (3, 0): " in front of a message about that view.
-Error ViewError(int k, int l, const std::string& what) {
-  return Error(fmt::format("view ({}, {}): {}", k, l, what));
-}
-
-model::LinearImage ReadPngView(const std::string& path, const model::TransferCurve& transfer) {
-  return model::ToLinear(WithoutAlpha(ToEncodedImage(ReadImageFile(path))), transfer);
-}
-
-model::LinearImage ReadTiffView(const std::string& path) {
-  const std::string bytes = ReadWholeFile(path);
-  if (KindOfImage(bytes) != ImageFileKind::kTiff) {
-    throw Error(fmt::format("{}: cannot be decoded as a TIFF file ({} bytes)", path, bytes.size()));
-  }
-  const cv::Mat image = DecodeImageFile(bytes, path).pixels;
-  if (image.type() != CV_32FC1 && image.type() != CV_32FC3) {
-    throw Error(fmt::format(
-        "{}: float values in 1 or 3 channels are expected, found {} channel(s) of {} bits{}", path,
-        image.channels(), 8 * image.elemSize1(), image.depth() >= CV_32F ? ", float" : ""));
-  }
-  model::LinearImage light{image.cols, image.rows, image.channels(), {}};
-  light.values.reserve(image.total() * static_cast<std::size_t>(image.channels()));
-  for (int y = 0; y < image.rows; ++y) {
-    ThrowIfCancelled();
-    const auto* row = image.ptr<float>(y);
-    light.values.insert(light.values.end(), row,
-                        row + static_cast<std::ptrdiff_t>(image.cols) * image.channels());
-  }
-  return light;
-}
-
-std::string Listed(const std::vector<std::string>& names) {
-  constexpr std::size_t kShown = 5;
-  const std::vector<std::string> shown(
-      names.begin(), names.begin() + static_cast<std::ptrdiff_t>(std::min(kShown, names.size())));
-  const std::string more =
-      names.size() > kShown ? fmt::format(" and {} more", names.size() - kShown) : "";
-  return fmt::format("{}{}", fmt::join(shown, ", "), more);
-}
-
-Error MissingViews(const std::string& folder, const std::vector<std::string>& names) {
-  return Error(
-      fmt::format("{}: missing: {}; the option sparse accepts a light field with views missing",
-                  folder, Listed(names)));
-}
-
-// ---- The layout of thicklens.
-
-std::string ViewFile(int k, int l, const std::string& format) {
-  return fmt::format("{}/{}.{}", kViewsFolder, model::ViewFileStem(k, l), format);
-}
-
-// Includes the views that were not requested: the light field as a whole is the input.
-void ReportFilesOf(const std::string& folder, const model::LightFieldDescription& description) {
-  const model::LightField& frame = description.light_field;
-  for (int l = 0; l < frame.v_count; ++l) {
-    for (int k = 0; k < frame.u_count; ++k) {
-      if (!frame.IsPresent(k, l)) continue;
-      ReportInput((fs::path(folder) / ViewFile(k, l, description.view_format)).string());
-      if (!description.has_confidence) continue;
-      ReportInput((fs::path(folder) / ConfidenceFileName(k, l)).string());
-    }
-  }
-}
-
-// All views have the profile of the photograph, or none.
-std::string ProfileOfViews(const std::string& folder, const model::LightField& frame) {
-  for (int l = 0; l < frame.v_count; ++l) {
-    for (int k = 0; k < frame.u_count; ++k) {
-      if (!frame.IsPresent(k, l)) continue;
-      try {
-        return ColourProfileOf(ReadWholeFile((fs::path(folder) / ViewFile(k, l, "png")).string()));
-      } catch (const Interrupted&) {
-        throw;
-      } catch (const Error&) {
-        return "";  // whoever reads the view says why it cannot be read
-      }
-    }
-  }
-  return "";
-}
-
-ViewSource OpenOwn(const std::string& folder, bool sparse) {
-  const std::string description_path = (fs::path(folder) / kLightFieldMarker).string();
-  const model::LightFieldDescription description =
-      model::ReadLightFieldDescription(description_path);
-  ViewSource source;
-  source.folder = folder;
-  source.frame = description.light_field;
-  model::LightField& frame = source.frame;
-  if (!description.camera_file.empty()) {
-    const std::string camera = (fs::path(folder) / description.camera_file).string();
-    frame.camera = model::ReadCamera(camera);
-    const model::Sensor& sensor = frame.camera->sensor;
-    if (sensor.width_px != frame.s_count || sensor.height_px != frame.t_count) {
-      throw Error(fmt::format(
-          "{}: its sensor has {}x{} px, the views of {} have {}x{}: the sizes must be equal",
-          camera, sensor.width_px, sensor.height_px, description_path, frame.s_count,
-          frame.t_count));
-    }
-  }
-  std::vector<std::string> missing;
-  for (int l = 0; l < frame.v_count; ++l) {
-    for (int k = 0; k < frame.u_count; ++k) {
-      if (!frame.IsPresent(k, l)) missing.push_back(fmt::format("view ({}, {})", k, l));
-    }
-  }
-  if (!missing.empty() && !sparse) throw MissingViews(folder, missing);
-  ReportFilesOf(folder, description);
-
-  const bool is_png = description.view_format == "png";
-  if (is_png) frame.colour_profile = ProfileOfViews(folder, frame);
-  source.read = [folder, is_png, format = description.view_format, transfer = frame.transfer](
-                    int k, int l) {
-    const std::string path = (fs::path(folder) / ViewFile(k, l, format)).string();
-    return is_png ? ReadPngView(path, transfer) : ReadTiffView(path);
-  };
-  return source;
-}
-
-// ---- The HCI layout.
-
-std::string HciFile(int number) { return fmt::format("{}{:03}.png", kHciStem, number); }
-
-}  // namespace
-
-std::vector<int> HciNumbers(const std::string& folder) {
-  std::vector<int> numbers;
-  std::error_code failure;
-  for (const auto& entry : fs::directory_iterator(folder, failure)) {
-    const std::string name = entry.path().filename().string();
-    if (name.rfind(kHciStem, 0) != 0) continue;
-    const int number = std::atoi(name.c_str() + sizeof kHciStem - 1);
-    if (number >= 0 && number <= kMaxHciNumber && name == HciFile(number))
-      numbers.push_back(number);
-  }
-  if (failure) throw Error(fmt::format("{}: cannot be read: {}", folder, failure.message()));
-  std::sort(numbers.begin(), numbers.end());
-  return numbers;
-}
-
-namespace {
-
-std::string Trimmed(const std::string& text) {
-  const auto begin = text.find_first_not_of(" \t\r");
-  if (begin == std::string::npos) return "";
-  return text.substr(begin, text.find_last_not_of(" \t\r") - begin + 1);
-}
-
-// Returns num_cams_x of the benchmark's parameters.cfg, an INI file, or 0 if there is no such file.
-int HciRowLength(const std::string& folder) {
-  const std::string path = (fs::path(folder) / kHciMarker).string();
-  std::error_code ignored;
-  if (!fs::exists(path, ignored)) return 0;
-  std::istringstream lines(ReadTextFile(path));
-  std::string line;
-  for (int number = 1; std::getline(lines, line); ++number) {
-    const auto equals = line.find('=');
-    if (equals == std::string::npos || Trimmed(line.substr(0, equals)) != "num_cams_x") continue;
-    const std::string text = Trimmed(line.substr(equals + 1));
-    char* end = nullptr;
-    const long value = std::strtol(text.c_str(), &end, 10);
-    if (text.empty() || *end != '\0' || value < 1 || value > kMaxHciNumber) {
-      throw Error(
-          fmt::format("{}:{}: num_cams_x: a whole number from 1 to {} is expected, found '{}'",
-                      path, number, kMaxHciNumber, PrintableUtf8(text)));
-    }
-    return static_cast<int>(value);
-  }
-  throw Error(fmt::format("{}: num_cams_x is missing; add it, or set the option grid", path));
-}
-
-int InferredRowLength(const std::string& folder, const std::vector<int>& numbers) {
-  if (const int length = HciRowLength(folder)) return length;
-  const auto count = static_cast<int>(numbers.size());
-  const auto edge = static_cast<int>(std::lround(std::sqrt(count)));
-  if (edge * edge == count && numbers.back() == count - 1) return edge;
-  throw Error(
-      fmt::format("{}: {} views from {} to {} do not form a full square, and there is no {}: "
-                  "the option grid must state how many views the numbering counts per row",
-                  folder, count, HciFile(numbers.front()), HciFile(numbers.back()), kHciMarker));
-}
-
-ViewSource OpenHci(const std::string& folder, int grid, bool sparse) {
-  const std::vector<int> numbers = HciNumbers(folder);
-  if (numbers.empty()) {
-    throw Error(fmt::format("{}: not a light field: neither {} nor {}, {}, ... are in it", folder,
-                            kLightFieldMarker, HciFile(0), HciFile(1)));
-  }
-  for (const int number : numbers) ReportInput((fs::path(folder) / HciFile(number)).string());
-  const int row = grid > 0 ? grid : InferredRowLength(folder, numbers);
-  int first_u = row, last_u = 0;
-  for (const int number : numbers) {
-    first_u = std::min(first_u, number % row);
-    last_u = std::max(last_u, number % row);
-  }
-  const int first_v = numbers.front() / row;
-  const int last_v = numbers.back() / row;
-
-  ViewSource source;
-  source.folder = folder;
-  model::LightField& frame = source.frame;
-  frame.u_count = last_u - first_u + 1;
-  frame.v_count = last_v - first_v + 1;
-  const auto number_of = [row, first_u, first_v](int k, int l) {
-    return (first_v + l) * row + first_u + k;
-  };
-  frame.weights = Eigen::ArrayXXd::Zero(frame.v_count, frame.u_count);
-  std::vector<std::string> missing;
-  for (int l = 0; l < frame.v_count; ++l) {
-    for (int k = 0; k < frame.u_count; ++k) {
-      const bool there = std::binary_search(numbers.begin(), numbers.end(), number_of(k, l));
-      frame.present.push_back(there);
-      if (there) frame.weights(l, k) = 1.0 / static_cast<double>(numbers.size());
-      if (!there) missing.push_back(HciFile(number_of(k, l)));
-    }
-  }
-  if (missing.empty()) frame.present.clear();
-  if (!missing.empty() && !sparse) throw MissingViews(folder, missing);
-  frame.origin.method = "imported";
-  source.read = [folder, number_of](int k, int l) {
-    return ReadPngView((fs::path(folder) / HciFile(number_of(k, l))).string(),
-                       model::TransferCurve::Srgb());
-  };
-  return source;
-}
-
-// ---- Both layouts.
-
-// Reads views of a frame whose view (0, 0) is the view (first_k, first_l) of the files.
-class ViewReader {
- public:
-  ViewReader(const ViewSource& source, int first_k, int first_l)
-      : source_(source), first_k_(first_k), first_l_(first_l) {}
-
-  model::LinearImage Read(int k, int l) const {
-    ThrowIfCancelled();
-    try {
-      return source_.read(first_k_ + k, first_l_ + l);
-    } catch (const Interrupted&) {
-      throw;
-    } catch (const Error& error) {
-      throw ViewError(first_k_ + k, first_l_ + l, error.what());
-    }
-  }
-
-  // Reads a view likewise, and requires the size and channels of the frame.
-  model::LinearImage ReadLike(const model::LightField& frame, int k, int l) const {
-    model::LinearImage image = Read(k, l);
-    RequireLike(frame, k, l, image);
-    return image;
-  }
-
-  // Throws Error unless the view has the size and channels of the frame.
-  void RequireLike(const model::LightField& frame, int k, int l,
-                   const model::LinearImage& image) const {
-    if (image.width_px == frame.s_count && image.height_px == frame.t_count &&
-        image.channels == frame.channels) {
-      return;
-    }
-    throw Error(fmt::format(
-        "{}: view ({}, {}) has {}x{} px in {} channel(s), the light field {}x{} in {}: they must "
-        "be equal",
-        source_.folder, first_k_ + k, first_l_ + l, image.width_px, image.height_px, image.channels,
-        frame.s_count, frame.t_count, frame.channels));
-  }
-
- private:
-  const ViewSource& source_;
-  int first_k_, first_l_;
-};
-
-std::pair<int, int> FirstPresent(const model::LightField& frame) {
-  for (int l = 0; l < frame.v_count; ++l) {
-    for (int k = 0; k < frame.u_count; ++k) {
-      if (frame.IsPresent(k, l)) return {k, l};
-    }
-  }
-  return {0, 0};
-}
-
-// Puts the folder's name in front of a message about a request that the light field does not fit.
-template <typename Work>
-auto NamingTheFolder(const std::string& folder, const Work& work) {
-  try {
-    return work();
-  } catch (const Interrupted&) {
-    throw;
-  } catch (const Error& error) {
-    throw Error(fmt::format("{}: {}", folder, error.what()));
-  }
-}
 
 // Throws Error unless image files can store such views.
 void RequireStorable(int channels) {
@@ -408,54 +96,6 @@ std::string HciParameters(const model::LightField& light_field) {
 }
 
 }  // namespace
-
-model::LightField ReadLightField(const std::string& folder, const LightFieldReading& reading) {
-  std::error_code ignored;
-  if (!fs::is_directory(folder, ignored)) {
-    throw Error(fmt::format("{}: {}; the folder of a light field is expected", folder,
-                            fs::exists(folder, ignored) ? "is a file" : "does not exist"));
-  }
-  const ViewSource source = fs::exists(fs::path(folder) / kLightFieldMarker, ignored)
-                                ? OpenOwn(folder, reading.sparse)
-                                : OpenHci(folder, reading.grid, reading.sparse);
-  model::LightField frame = source.frame;
-  if (reading.u_count > 0) {
-    frame = NamingTheFolder(
-        folder, [&] { return model::InnerViews(frame, reading.u_count, reading.v_count); });
-  }
-  const ViewReader reader(source, (source.frame.u_count - frame.u_count) / 2,
-                          (source.frame.v_count - frame.v_count) / 2);
-  const std::pair<int, int> first_place = FirstPresent(frame);
-  model::LinearImage first = reader.Read(first_place.first, first_place.second);
-  if (frame.s_count == 0) {  // the size is known only from the views themselves
-    frame.s_count = first.width_px;
-    frame.t_count = first.height_px;
-    frame.channels = first.channels;
-  }
-  model::LightField light_field =
-      reading.crop ? NamingTheFolder(folder, [&] { return CropViews(frame, *reading.crop); })
-                   : frame;
-  // Memory is allocated only after a view was found to have the stated size: a wrong size could
-  // exhaust the memory.
-  reader.RequireLike(frame, first_place.first, first_place.second, first);
-  light_field.values.assign(light_field.ViewStart(light_field.channels, 0, 0), 0.0F);
-  // Several threads cannot set bits of one std::vector<bool>.
-  const std::vector<bool> present = std::exchange(light_field.present, {});
-  ParallelFor(frame.u_count * frame.v_count, Threads(), [&](int i) {
-    const int k = i % frame.u_count;
-    const int l = i / frame.u_count;
-    if (!frame.IsPresent(k, l)) return;
-    const bool is_first = std::pair(k, l) == first_place;
-    model::LinearImage view = is_first ? std::move(first) : reader.ReadLike(frame, k, l);
-    if (reading.crop) view = model::CropImage(view, *reading.crop);
-    model::SetView(&light_field, k, l, view);
-  });
-  light_field.present = present;
-  std::string why;
-  if (!light_field.IsValid(&why)) throw Error(fmt::format("{}: {}", folder, why));
-  light_field.source = folder;
-  return light_field;
-}
 
 std::vector<std::string> LightFieldEntries() {
   std::vector<std::string> entries = {kLightFieldMarker, kCameraFile};

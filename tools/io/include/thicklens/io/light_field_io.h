@@ -23,15 +23,40 @@ struct LightFieldReading {
   // --views: the inner ones; 0: all
   int u_count = 0, v_count = 0;
   std::optional<model::PixelRect> crop;  // --crop
+  // --layout NAME[:UxV]: the layout, one of LightFieldLayouts(); empty: it is recognised. The
+  // numbers are views, tiles or pixels of a lenslet across and down; 0: not stated.
+  std::string layout;
+  int layout_u = 0, layout_v = 0;
+  std::string name;  // --name: the pattern of names, "view_{v}_{u}.jpg"
+  // --view-order: exchanges rows and columns, and then counts columns or rows backwards.
+  bool swap_uv = false, mirror_u = false, mirror_v = false;
 };
 
-// Reads a folder of our layout (lightfield.yaml) or of the HCI layout (input_CamNNN.png row-major,
-// NNN = grid * v + u, and parameters.cfg if it exists), then takes the inner views and the crop.
-// HCI light fields are relative, sRGB, with uniform weights. Throws Error that names the folder and
-// the view that is missing, broken or of another size. Unless `sparse` is set, a view that is
-// missing within the smallest rectangle that holds the others is such an Error.
+// What was found when a light field was read.
+struct LightFieldFacts {
+  std::string kind;      // "a Stanford folder"
+  bool is_own = false;   // the layout of thicklens, which states everything itself
+  std::string one_line;  // "PATH: read as a Stanford folder: 17 x 17 views of 1024 x 1024 px, ..."
+  std::vector<std::string> left_out;  // black views, "(0, 4)"
+  std::vector<std::string> notices;   // what may make the light field wrong, one sentence each
+};
+
+// Names of the layouts: "thicklens", "hci", "stanford", "names" (folders); "quilt", "parts",
+// "lenslets", "tiles" (files).
+THICKLENS_EXPORT std::vector<std::string> LightFieldLayouts();
+
+// Reads a light field in one of these layouts (docs/file-formats.md), then takes the inner views
+// and the crop. All but our own are relative, sRGB unless the files state linear light, with
+// uniform weights; black views are left out. Throws Error that names the folder and the view that
+// is missing, broken or of another size, or what was found if it has none of the layouts. Unless
+// `sparse` is set, a view that is missing within the smallest rectangle that holds the others is
+// such an Error.
 THICKLENS_EXPORT model::LightField ReadLightField(const std::string& folder,
                                                   const LightFieldReading& reading);
+// Likewise; `facts` gets what was found.
+THICKLENS_EXPORT model::LightField ReadLightField(const std::string& folder,
+                                                  const LightFieldReading& reading,
+                                                  LightFieldFacts* facts);
 
 // How the views are stored.
 enum class ViewFormat {

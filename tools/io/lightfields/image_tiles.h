@@ -1,0 +1,29 @@
+#ifndef THICKLENS_TOOLS_IO_LIGHTFIELDS_IMAGE_TILES_H_
+#define THICKLENS_TOOLS_IO_LIGHTFIELDS_IMAGE_TILES_H_
+
+#include <opencv2/core/mat.hpp>
+#include <string>
+
+#include "thicklens/io/image_file.h"
+
+namespace thicklens::io {
+
+// Reads the one image of all views. Throws Error, also for several pages.
+DecodedImage ReadViewsImage(const std::string& path);
+
+// Numbers of pixels or of views along both axes; 0: not found.
+struct AxisCounts {
+  int across = 0, down = 0;
+};
+// How often an image repeats itself across and down, as views side by side do: the differences at
+// the distance of one view are much smaller than at half of it. At most 40; 1: it does not repeat.
+AxisCounts RepetitionsOf(const cv::Mat& pixels);
+// The period of the differences between neighbouring pixels, as the edges of square lenslets have
+// it: 2 to 20 px; 0: there is none, or the axes differ.
+int LensletPitchOf(const cv::Mat& pixels);
+// "1, 2, 4, 8": the numbers from 2 to 40 that divide both sides.
+std::string CommonDivisors(int width_px, int height_px);
+
+}  // namespace thicklens::io
+
+#endif  // THICKLENS_TOOLS_IO_LIGHTFIELDS_IMAGE_TILES_H_

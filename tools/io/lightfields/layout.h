@@ -1,0 +1,58 @@
+#ifndef THICKLENS_TOOLS_IO_LIGHTFIELDS_LAYOUT_H_
+#define THICKLENS_TOOLS_IO_LIGHTFIELDS_LAYOUT_H_
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "thicklens/io/light_field_io.h"
+#include "thicklens/model/light_field.h"
+
+namespace thicklens::io {
+
+// A light field without its values, and how to read them.
+struct ViewSource {
+  // Size and channels may be 0: they are then those of the first view.
+  model::LightField frame;
+  // Reads the view (k, l) of the frame in linear light; called from several threads.
+  std::function<model::LinearImage(int k, int l)> read;
+  // Our own layout states which views there are, and in which order: nothing is examined.
+  bool is_own = false;
+  std::string kind;                  // "a Stanford folder"
+  std::vector<std::string> details;  // clauses for the line that says what was read
+  std::vector<std::string> notices;  // sentences
+};
+
+// A file or a folder that may be a light field.
+struct LayoutInput {
+  std::string path;
+  bool is_folder = false;
+  // The option layout names this layout: what does not fit is an error.
+  bool is_forced = false;
+  const LightFieldReading* reading = nullptr;
+};
+
+// A layout of light fields. A new one is a file of this folder with one function, a line in
+// light_field_reader.cc, and a test.
+struct Layout {
+  const char* name;   // in the option layout
+  const char* marks;  // how it is recognised, for messages
+  bool is_of_folders;
+  // Returns nothing if the input has another layout. Throws Error that names the folder and the
+  // file if the input has this layout but cannot be read.
+  std::optional<ViewSource> (*open)(const LayoutInput& input);
+};
+
+std::optional<ViewSource> OpenOwnFolder(const LayoutInput& input);
+std::optional<ViewSource> OpenHciFolder(const LayoutInput& input);
+std::optional<ViewSource> OpenStanfordFolder(const LayoutInput& input);
+std::optional<ViewSource> OpenNamedFolder(const LayoutInput& input);
+std::optional<ViewSource> OpenQuilt(const LayoutInput& input);
+std::optional<ViewSource> OpenLensletImage(const LayoutInput& input);
+std::optional<ViewSource> OpenTiledImage(const LayoutInput& input);
+std::optional<ViewSource> OpenImageParts(const LayoutInput& input);
+
+}  // namespace thicklens::io
+
+#endif  // THICKLENS_TOOLS_IO_LIGHTFIELDS_LAYOUT_H_

@@ -1,0 +1,418 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <filesystem>
+#include <opencv2/core/utility.hpp>
+#include <system_error>
+#include <utility>
+
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/output_file.h"
+#include "thicklens/base/parallel.h"
+#include "thicklens/base/printable_text.h"
+#include "thicklens/io/light_field_io.h"
+#include "tools/io/image_file_kind.h"
+#include "tools/io/lightfields/layout.h"
+#include "tools/io/lightfields/view_grid.h"
+#include "tools/io/lightfields/view_names.h"
+#include "tools/io/lightfields/view_order.h"
+#include "tools/io/lightfields/view_pixels.h"
+#include "tools/io/view_files.h"
+
+namespace thicklens::io {
+namespace {
+
+namespace fs = std::filesystem;
+
+// All layouts, in the order in which they are tried.
+constexpr std::array<Layout, 8> kLayouts = {{
+    {"thicklens", "lightfield.yaml", true, OpenOwnFolder},
+    {"hci", "input_Cam000.png, input_Cam001.png, ...", true, OpenHciFolder},
+    {"stanford", "out_00_00_Y_X_.png, ...", true, OpenStanfordFolder},
+    {"names", "names in which a row and a column change", true, OpenNamedFolder},
+    {"quilt", "_qs8x6a0.75 in the name", false, OpenQuilt},
+    {"parts", "an EXR file of several parts", false, OpenImageParts},
+    {"lenslets", "eslf in the name", false, OpenLensletImage},
+    {"tiles", "views side by side", false, OpenTiledImage},
+}};
+
+// Returns the value of --threads, which RunCommand has passed to OpenCV.
+int ReadingThreads() { return std::max(1, cv::getNumThreads()); }
+
+// Puts "view (3, 0): " in front of a message about that view.
+Error ViewError(int k, int l, const std::string& what) {
+  return Error(fmt::format("view ({}, {}): {}", k, l, what));
+}
+
+// Reads views of a frame whose view (0, 0) is the view (first_k, first_l) of the files.
+class ViewReader {
+ public:
+  ViewReader(std::string path, const ViewSource& source, int first_k, int first_l)
+      : path_(std::move(path)), source_(source), first_k_(first_k), first_l_(first_l) {}
+
+  model::LinearImage Read(int k, int l) const {
+    ThrowIfCancelled();
+    try {
+      return source_.read(first_k_ + k, first_l_ + l);
+    } catch (const Interrupted&) {
+      throw;
+    } catch (const Error& error) {
+      throw ViewError(first_k_ + k, first_l_ + l, error.what());
+    }
+  }
+
+  // Reads a view likewise, and requires the size and channels of the frame.
+  model::LinearImage ReadLike(const model::LightField& frame, int k, int l) const {
+    model::LinearImage image = Read(k, l);
+    RequireLike(frame, k, l, image);
+    return image;
+  }
+
+  // Throws Error unless the view has the size and channels of the frame.
+  void RequireLike(const model::LightField& frame, int k, int l,
+                   const model::LinearImage& image) const {
+    if (image.width_px == frame.s_count && image.height_px == frame.t_count &&
+        image.channels == frame.channels) {
+      return;
+    }
+    throw Error(fmt::format(
+        "{}: view ({}, {}) has {}x{} px in {} channel(s), the light field {}x{} in {}: they must "
+        "be equal",
+        path_, first_k_ + k, first_l_ + l, image.width_px, image.height_px, image.channels,
+        frame.s_count, frame.t_count, frame.channels));
+  }
+
+ private:
+  std::string path_;
+  const ViewSource& source_;
+  int first_k_, first_l_;
+};
+
+std::pair<int, int> FirstPresent(const model::LightField& frame) {
+  for (int l = 0; l < frame.v_count; ++l) {
+    for (int k = 0; k < frame.u_count; ++k) {
+      if (frame.IsPresent(k, l)) return {k, l};
+    }
+  }
+  return {0, 0};
+}
+
+// Puts the folder's name in front of a message about a request that the light field does not fit.
+template <typename Work>
+auto NamingTheFolder(const std::string& folder, const Work& work) {
+  try {
+    return work();
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const Error& error) {
+    throw Error(fmt::format("{}: {}", folder, error.what()));
+  }
+}
+
+// ---- Which layout it is.
+
+std::string NamesOfLayouts(bool is_of_folders) {
+  std::vector<std::string> names;
+  for (const Layout& layout : kLayouts) {
+    if (layout.is_of_folders == is_of_folders) names.push_back(layout.name);
+  }
+  return fmt::format("{}", fmt::join(names, ", "));
+}
+
+const Layout& LayoutNamed(const std::string& name) {
+  for (const Layout& layout : kLayouts) {
+    if (name == layout.name) return layout;
+  }
+  throw Error(fmt::format("the option layout: {} or {} is expected, found '{}'",
+                          NamesOfLayouts(true), NamesOfLayouts(false), PrintableUtf8(name)));
+}
+
+// What is in a folder that has no known layout.
+std::string ContentOfFolder(const std::string& folder) {
+  const std::vector<std::string> names = ImageNames(folder);
+  if (names.empty()) return "found no images";
+  std::string content = fmt::format("found {} image(s): {}", names.size(), Listed(names));
+  if (const auto proposal = ProposedPattern(names)) {
+    content += fmt::format(
+        "; {} of them differ in {} number(s), and the option name reads them: '{}'{}",
+        proposal->names, proposal->changing, PrintableUtf8(proposal->pattern),
+        proposal->changing == 1 ? " ({n} counts row by row; the option grid states the length of a "
+                                  "row)"
+                                : "");
+  } else {
+    content += "; the option name states how views are named, e.g. 'view_{v}_{u}.jpg'";
+  }
+  return content;
+}
+
+[[noreturn]] void ThrowNoLayout(const std::string& path, bool is_folder) {
+  if (is_folder) {
+    throw Error(fmt::format("{}: not a light field: neither {} nor {} nor {} are in it; {}", path,
+                            kLightFieldMarker, fmt::format("{}, {}, ...", HciFile(0), HciFile(1)),
+                            LayoutNamed("stanford").marks, ContentOfFolder(path)));
+  }
+  throw Error(fmt::format(
+      "{}: is a file; the folder of a light field is expected, or an image of many views: a quilt "
+      "(its name states its tiles, e.g. _qs8x6a0.75), lenslets (eslf in the name, or the option "
+      "layout: lenslets:14x14), or views side by side, which this image does not show (the option "
+      "layout: tiles:9x9)",
+      path));
+}
+
+// Opens a file or a folder by the first layout that it has, or by that of the options.
+ViewSource OpenSource(const std::string& path, const LightFieldReading& reading) {
+  std::error_code ignored;
+  LayoutInput input;
+  input.path = path;
+  input.is_folder = fs::is_directory(path, ignored);
+  input.reading = &reading;
+  if (!input.is_folder && !fs::exists(path, ignored)) {
+    throw Error(fmt::format("{}: does not exist; the folder of a light field is expected", path));
+  }
+  const Layout* layout = reading.layout.empty() ? nullptr : &LayoutNamed(reading.layout);
+  // A stated pattern of names is that of a folder, or of the parts of a file.
+  if (layout == nullptr && !reading.name.empty())
+    layout = &LayoutNamed(input.is_folder ? "names" : "parts");
+  if (layout != nullptr) {
+    if (layout->is_of_folders != input.is_folder) {
+      const char* const kind = input.is_folder ? "folder" : "file";
+      throw Error(
+          fmt::format("{}: is a {}, but the layout {} is that of a {} (layouts of a {}: {})", path,
+                      kind, layout->name, input.is_folder ? "file" : "folder", kind,
+                      NamesOfLayouts(input.is_folder)));
+    }
+    input.is_forced = true;
+    if (std::optional<ViewSource> source = layout->open(input)) return *std::move(source);
+    ThrowNoLayout(path, input.is_folder);
+  }
+  if (!input.is_folder && !KindOfImage(ReadWholeFile(path))) ThrowNoLayout(path, false);
+  for (const Layout& candidate : kLayouts) {
+    if (candidate.is_of_folders != input.is_folder) continue;
+    if (std::optional<ViewSource> source = candidate.open(input)) return *std::move(source);
+  }
+  ThrowNoLayout(path, input.is_folder);
+}
+
+// ---- The order of the views.
+
+// Exchanges rows and columns, and then counts columns or rows backwards, as the options state.
+void Reorder(const LightFieldReading& reading, ViewSource* source) {
+  if (!reading.swap_uv && !reading.mirror_u && !reading.mirror_v) return;
+  const model::LightField before = source->frame;
+  model::LightField& frame = source->frame;
+  if (reading.swap_uv) std::swap(frame.u_count, frame.v_count);
+  const auto place_before = [swap = reading.swap_uv, mirror_u = reading.mirror_u,
+                             mirror_v = reading.mirror_v, u_count = frame.u_count,
+                             v_count = frame.v_count](int k, int l) {
+    const int column = mirror_u ? u_count - 1 - k : k;
+    const int row = mirror_v ? v_count - 1 - l : l;
+    return swap ? std::pair(row, column) : std::pair(column, row);
+  };
+  frame.weights.resize(frame.v_count, frame.u_count);
+  frame.present.clear();
+  for (int l = 0; l < frame.v_count; ++l) {
+    for (int k = 0; k < frame.u_count; ++k) {
+      const auto [old_k, old_l] = place_before(k, l);
+      frame.weights(l, k) = before.weights(old_l, old_k);
+      if (!before.present.empty()) frame.present.push_back(before.IsPresent(old_k, old_l));
+    }
+  }
+  source->read = [read = std::move(source->read), place_before](int k, int l) {
+    const auto [old_k, old_l] = place_before(k, l);
+    return read(old_k, old_l);
+  };
+  std::vector<std::string> changes;
+  if (reading.swap_uv) changes.emplace_back("rows and columns exchanged");
+  if (reading.mirror_u) changes.emplace_back("columns counted backwards");
+  if (reading.mirror_v) changes.emplace_back("rows counted backwards");
+  source->details.push_back(
+      fmt::format("{} as the option view-order states", fmt::join(changes, " and ")));
+}
+
+// States what the shifts between the views say about their order.
+void ReportOrder(const std::string& path, const model::LightField& light_field,
+                 LightFieldFacts* facts) {
+  const ViewOrderFinding finding = FindViewOrder(light_field);
+  constexpr char kMirrored[] =
+      "the shifts do not say which of both counts backwards: in the right order near things have "
+      "the larger disparity";
+  switch (finding.order) {
+    case ViewOrder::kUndecided:
+      facts->one_line +=
+          fmt::format("; whether rows and columns are in order cannot be decided: {}", finding.why);
+      break;
+    case ViewOrder::kAsStated:
+      facts->one_line += "; the shifts between the views agree with their order";
+      break;
+    case ViewOrder::kSwapped:
+      facts->notices.push_back(fmt::format(
+          "{}: rows and columns of the views are exchanged: the scene shifts up or down between "
+          "neighbours in a row; the option view-order swap exchanges them",
+          path));
+      break;
+    case ViewOrder::kMirrored:
+      facts->notices.push_back(fmt::format(
+          "{}: the rows or the columns of the views count backwards: disparities have opposite "
+          "signs across and down; the option view-order mirror-u or mirror-v turns them ({})",
+          path, kMirrored));
+      break;
+    case ViewOrder::kSwappedMirrored:
+      facts->notices.push_back(fmt::format(
+          "{}: rows and columns of the views are exchanged, and one of them counts backwards; the "
+          "option view-order swap,mirror-u or swap,mirror-v turns them ({})",
+          path, kMirrored));
+      break;
+    case ViewOrder::kIrregular:
+      facts->notices.push_back(fmt::format(
+          "{}: the shifts between neighbouring views fit no order of rows and columns: the views "
+          "may be shuffled, or not rectified",
+          path));
+  }
+  if (finding.step_ratio != 1) {
+    facts->notices.push_back(fmt::format(
+        "{}: the shifts between views are about {:g} times as large down as across: the steps "
+        "between views differ, but one step is taken for both",
+        path, finding.step_ratio));
+  }
+}
+
+// ---- Black views.
+
+// No value of a black view is above this, linear light: 3 levels of 255 in sRGB, the noise of JPEG.
+constexpr float kMostOfBlack = 0.001F;
+// Where the median view is not brighter than this somewhere, the light field is too dark to judge.
+constexpr float kLeastOfOthers = 0.01F;
+
+float HighestValue(const model::LightField& light_field, int k, int l) {
+  float highest = 0;
+  for (int channel = 0; channel < light_field.channels; ++channel) {
+    const float* const first = light_field.values.data() + light_field.ViewStart(channel, k, l);
+    for (std::size_t i = 0; i < light_field.view_size(); ++i) highest = std::max(highest, first[i]);
+  }
+  return highest;
+}
+
+// Leaves out views without light among others that have some, such as those outside the round
+// aperture of a plenoptic camera.
+void LeaveOutBlackViews(model::LightField* light_field, LightFieldFacts* facts) {
+  const int count = light_field->u_count * light_field->v_count;
+  std::vector<float> highest(static_cast<std::size_t>(count), 0.0F);
+  ParallelFor(count, ReadingThreads(), [&](int i) {
+    ThrowIfCancelled();
+    highest[static_cast<std::size_t>(i)] =
+        HighestValue(*light_field, i % light_field->u_count, i / light_field->u_count);
+  });
+  std::vector<float> known;
+  for (int i = 0; i < count; ++i) {
+    if (light_field->IsPresent(i % light_field->u_count, i / light_field->u_count))
+      known.push_back(highest[static_cast<std::size_t>(i)]);
+  }
+  if (known.empty()) return;
+  const auto middle = known.begin() + static_cast<std::ptrdiff_t>(known.size() / 2);
+  std::nth_element(known.begin(), middle, known.end());
+  if (*middle < kLeastOfOthers) return;
+  std::vector<std::string> black;
+  for (int i = 0; i < count; ++i) {
+    const int k = i % light_field->u_count;
+    const int l = i / light_field->u_count;
+    if (!light_field->IsPresent(k, l) || highest[static_cast<std::size_t>(i)] > kMostOfBlack)
+      continue;
+    black.push_back(fmt::format("({}, {})", k, l));
+    if (light_field->present.empty())
+      light_field->present.assign(static_cast<std::size_t>(count), true);
+    light_field->present[static_cast<std::size_t>(i)] = false;
+    light_field->weights(l, k) = 0;
+    for (int channel = 0; channel < light_field->channels; ++channel) {
+      const auto first = light_field->values.begin() +
+                         static_cast<std::ptrdiff_t>(light_field->ViewStart(channel, k, l));
+      std::fill(first, first + static_cast<std::ptrdiff_t>(light_field->view_size()), 0.0F);
+    }
+  }
+  if (black.empty()) return;
+  light_field->weights /= light_field->weights.sum();
+  facts->left_out = black;
+  facts->notices.push_back(fmt::format("{}: {} of {} views are black and left out: {}",
+                                       light_field->source, black.size(), known.size(),
+                                       Listed(black)));
+}
+
+std::string OneLine(const ViewSource& source, const model::LightField& light_field) {
+  std::string line = fmt::format("read as {}: {} x {} views of {} x {} px, {}", source.kind,
+                                 light_field.u_count, light_field.v_count, light_field.s_count,
+                                 light_field.t_count, light_field.channels == 1 ? "grey" : "RGB");
+  if (light_field.channels != 1 && light_field.channels != 3)
+    line = fmt::format("{} ({} channels)", line, light_field.channels);
+  for (const std::string& detail : source.details) line += ", " + detail;
+  return line;
+}
+
+}  // namespace
+
+std::vector<std::string> LightFieldLayouts() {
+  std::vector<std::string> names;
+  for (const Layout& layout : kLayouts) names.emplace_back(layout.name);
+  return names;
+}
+
+model::LightField ReadLightField(const std::string& folder, const LightFieldReading& reading) {
+  LightFieldFacts ignored;
+  return ReadLightField(folder, reading, &ignored);
+}
+
+model::LightField ReadLightField(const std::string& folder, const LightFieldReading& reading,
+                                 LightFieldFacts* facts) {
+  *facts = {};
+  ViewSource source = OpenSource(folder, reading);
+  Reorder(reading, &source);
+  model::LightField frame = source.frame;
+  if (reading.u_count > 0) {
+    frame = NamingTheFolder(
+        folder, [&] { return model::InnerViews(frame, reading.u_count, reading.v_count); });
+  }
+  const ViewReader reader(folder, source, (source.frame.u_count - frame.u_count) / 2,
+                          (source.frame.v_count - frame.v_count) / 2);
+  const std::pair<int, int> first_place = FirstPresent(frame);
+  model::LinearImage first = reader.Read(first_place.first, first_place.second);
+  if (frame.s_count == 0) {  // the size is known only from the views themselves
+    frame.s_count = first.width_px;
+    frame.t_count = first.height_px;
+    frame.channels = first.channels;
+  }
+  model::LightField light_field =
+      reading.crop ? NamingTheFolder(folder, [&] { return CropViews(frame, *reading.crop); })
+                   : frame;
+  // Memory is allocated only after a view was found to have the stated size: a wrong size could
+  // exhaust the memory.
+  reader.RequireLike(frame, first_place.first, first_place.second, first);
+  light_field.values.assign(light_field.ViewStart(light_field.channels, 0, 0), 0.0F);
+  // Several threads cannot set bits of one std::vector<bool>.
+  const std::vector<bool> present = std::exchange(light_field.present, {});
+  ParallelFor(frame.u_count * frame.v_count, ReadingThreads(), [&](int i) {
+    const int k = i % frame.u_count;
+    const int l = i / frame.u_count;
+    if (!frame.IsPresent(k, l)) return;
+    const bool is_first = std::pair(k, l) == first_place;
+    model::LinearImage view = is_first ? std::move(first) : reader.ReadLike(frame, k, l);
+    if (reading.crop) view = model::CropImage(view, *reading.crop);
+    model::SetView(&light_field, k, l, view);
+  });
+  light_field.present = present;
+  light_field.source = folder;
+  facts->kind = source.kind;
+  facts->is_own = source.is_own;
+  facts->notices = source.notices;
+  facts->one_line = folder + ": " + OneLine(source, light_field);
+  if (!source.is_own) {
+    LeaveOutBlackViews(&light_field, facts);
+    ReportOrder(folder, light_field, facts);
+  }
+  std::string why;
+  if (!light_field.IsValid(&why)) throw Error(fmt::format("{}: {}", folder, why));
+  return light_field;
+}
+
+}  // namespace thicklens::io

@@ -1,0 +1,47 @@
+#ifndef THICKLENS_TOOLS_IO_LIGHTFIELDS_VIEW_GRID_H_
+#define THICKLENS_TOOLS_IO_LIGHTFIELDS_VIEW_GRID_H_
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tools/io/lightfields/layout.h"
+
+namespace thicklens::io {
+
+// A view and the numbers that its name gives it.
+struct NumberedView {
+  int u = 0, v = 0;  // column and row
+  std::string file;  // name of the file or of the part
+};
+
+// The smallest rectangle of views that holds the given ones. Numbers may have any start and any
+// constant step.
+struct ViewGrid {
+  model::LightField frame;         // counts, weights and present views
+  std::vector<std::string> files;  // index l * U + k; empty: the view is missing
+  const std::string& At(int k, int l) const {
+    return files[static_cast<std::size_t>(l * frame.u_count + k)];
+  }
+};
+// Throws Error that begins with `path` if two views have one place, if the numbers span too much,
+// or if views are missing and `reading.sparse` is not set; then `name_of` names the missing ones.
+ViewGrid GridOfViews(const std::string& path, const std::vector<NumberedView>& views,
+                     const LightFieldReading& reading);
+
+// The same for views in one row of numbers, counted from 0 row by row. The length of a row is that
+// of the options layout or grid; otherwise the views must form a full square.
+ViewGrid GridOfNumbers(const std::string& path, const std::vector<NumberedView>& views,
+                       const LightFieldReading& reading);
+
+// "a.png, b.png and 3 more"
+std::string Listed(const std::vector<std::string>& names);
+// Throws an Error that names missing views and the option that accepts them.
+[[noreturn]] void ThrowMissingViews(const std::string& path, const std::vector<std::string>& names);
+
+// A frame of u x v views, all present, with equal weights.
+model::LightField FullFrame(int u_count, int v_count);
+
+}  // namespace thicklens::io
+
+#endif  // THICKLENS_TOOLS_IO_LIGHTFIELDS_VIEW_GRID_H_

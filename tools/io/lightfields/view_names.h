@@ -1,0 +1,55 @@
+#ifndef THICKLENS_TOOLS_IO_LIGHTFIELDS_VIEW_NAMES_H_
+#define THICKLENS_TOOLS_IO_LIGHTFIELDS_VIEW_NAMES_H_
+
+#include <optional>
+#include <regex>
+#include <string>
+#include <vector>
+
+#include "tools/io/lightfields/view_grid.h"
+
+namespace thicklens::io {
+
+// The numbers that a name holds at the places of a pattern.
+struct NameNumbers {
+  std::optional<int> u, v, n;  // column, row; number of the view, counted row by row
+  std::optional<double> x, y;  // position of the camera
+};
+
+// A pattern of names: "view_{v}_{u}.jpg". {v} is the row, {u} the column, {n} a number that counts
+// row by row, {x} and {y} are positions, and * is any text.
+class NamePattern {
+ public:
+  // Throws Error for a pattern that cannot give each view a place.
+  explicit NamePattern(const std::string& pattern);
+
+  // Returns nothing if the name does not fit.
+  std::optional<NameNumbers> Match(const std::string& name) const;
+  bool HasRowAndColumn() const { return has_row_and_column_; }
+  const std::string& text() const { return text_; }
+
+ private:
+  std::string text_;
+  std::string places_;  // letters of the places, in their order
+  bool has_row_and_column_ = false;
+  std::regex expression_;
+};
+
+// Patterns that names suggest: each is that of the largest group of names that differ only in
+// numbers.
+struct NameProposal {
+  std::string pattern;    // "view_{v}_{u}.png", or "frame_{n}.png" with one changing number
+  int changing = 0;       // how many numbers change
+  std::size_t names = 0;  // how many names it fits
+};
+// Returns nothing if no two names differ only in their numbers, or if more than two numbers change.
+std::optional<NameProposal> ProposedPattern(const std::vector<std::string>& names);
+
+// The grid of the names that fit the pattern; `others` gets the names that do not.
+ViewGrid GridOfNames(const std::string& path, const NamePattern& pattern,
+                     const std::vector<std::string>& names, const LightFieldReading& reading,
+                     std::vector<std::string>* others);
+
+}  // namespace thicklens::io
+
+#endif  // THICKLENS_TOOLS_IO_LIGHTFIELDS_VIEW_NAMES_H_

@@ -1,0 +1,335 @@
+#include "tools/io/lightfields/view_order.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+#include <vector>
+
+#include "thicklens/base/cancel.h"
+
+namespace thicklens::io {
+namespace {
+
+// Views are compared at most at this size, px: finer details tell nothing more.
+constexpr int kMostPx = 320;
+// Largest shift that is followed, px of the compared size.
+constexpr int kMostShiftPx = 6;
+// Standard deviation of a shift besides the one that noise causes, px: interpolation, occlusions.
+constexpr double kShiftFloorPx = 0.1;
+// A tile counts at most this much: tiles at occlusions fit nothing.
+constexpr double kMostCost = 25;
+// A tile shows a shift if no shift at all costs at least this much.
+constexpr double kShows = 9;
+constexpr int kFewestTiles = 3;
+// Tiles overlap by half along both axes: four tiles have the information of one.
+constexpr double kOverlap = 4;
+// By this much an order must be better than another.
+constexpr double kDecides = 30;
+
+using Vector2 = Eigen::Vector2d;
+using Matrix2 = Eigen::Matrix2d;
+
+// The shift of a tile of one view in another, with the inverse of its covariance.
+struct Shift {
+  Vector2 px{0, 0};
+  Matrix2 weight = Matrix2::Zero();
+};
+// The shifts of a tile to the neighbour across and to that below.
+struct TileShifts {
+  Shift across, down;
+};
+
+// Square root of the mean of the channels, whose noise hardly depends on the brightness; reduced.
+cv::Mat ComparedView(const model::LightField& light_field, int k, int l) {
+  cv::Mat grey(light_field.t_count, light_field.s_count, CV_32F, cv::Scalar(0));
+  for (int y = 0; y < grey.rows; ++y) {
+    ThrowIfCancelled();
+    auto* row = grey.ptr<float>(y);
+    for (int x = 0; x < grey.cols; ++x) {
+      float sum = 0;
+      for (int channel = 0; channel < light_field.channels; ++channel) {
+        const float value =
+            light_field.values[light_field.ViewStart(channel, k, l) +
+                               static_cast<std::size_t>(y) * static_cast<std::size_t>(grey.cols) +
+                               static_cast<std::size_t>(x)];
+        sum += std::isfinite(value) ? std::clamp(value, 0.0F, 4.0F) : 0.0F;
+      }
+      row[x] = std::sqrt(sum / static_cast<float>(light_field.channels));
+    }
+  }
+  const int factor = (std::max(grey.rows, grey.cols) + kMostPx - 1) / kMostPx;
+  if (factor <= 1) return grey;
+  cv::Mat reduced;
+  cv::resize(grey, reduced,
+             cv::Size(std::max(1, grey.cols / factor), std::max(1, grey.rows / factor)), 0, 0,
+             cv::INTER_AREA);
+  return reduced;
+}
+
+float Interpolated(const cv::Mat& image, double x, double y) {
+  const int x0 = std::clamp(static_cast<int>(std::floor(x)), 0, image.cols - 2);
+  const int y0 = std::clamp(static_cast<int>(std::floor(y)), 0, image.rows - 2);
+  const auto fx = static_cast<float>(x - x0);
+  const auto fy = static_cast<float>(y - y0);
+  const auto* upper = image.ptr<float>(y0);
+  const auto* lower = image.ptr<float>(y0 + 1);
+  return (1 - fy) * ((1 - fx) * upper[x0] + fx * upper[x0 + 1]) +
+         fy * ((1 - fx) * lower[x0] + fx * lower[x0 + 1]);
+}
+
+// The tiles on which views are compared.
+struct Tiling {
+  int edge = 0, margin = 0;
+  explicit Tiling(const cv::Mat& view) {
+    const int side = std::min(view.rows, view.cols);
+    const int most_shift = std::clamp(side / 8, 1, kMostShiftPx);
+    margin = most_shift + 2;
+    edge = std::clamp(side / 6, 8, 16);
+  }
+  int most_shift() const { return margin - 2; }
+};
+
+// Whole-pixel shift with the least difference; nothing if it is at the limit.
+std::optional<cv::Point> CoarseShift(const cv::Mat& from, const cv::Mat& to, int x0, int y0,
+                                     const Tiling& tiling) {
+  const int most = tiling.most_shift();
+  double least = std::numeric_limits<double>::infinity();
+  cv::Point best;
+  for (int dy = -most; dy <= most; ++dy) {
+    for (int dx = -most; dx <= most; ++dx) {
+      double sum = 0;
+      for (int y = y0; y < y0 + tiling.edge; ++y) {
+        const auto* a = from.ptr<float>(y);
+        const auto* b = to.ptr<float>(y + dy);
+        for (int x = x0; x < x0 + tiling.edge; ++x) {
+          const double difference = a[x] - b[x + dx];
+          sum += difference * difference;
+        }
+      }
+      // Equal differences, as in flat tiles: the smaller shift.
+      if (sum < least || (sum == least && std::hypot(dx, dy) < std::hypot(best.x, best.y))) {
+        least = sum;
+        best = {dx, dy};
+      }
+    }
+  }
+  if (std::abs(best.x) == most || std::abs(best.y) == most) return std::nullopt;
+  return best;
+}
+
+// The shift of a tile: the least squares of its differences, by Gauss-Newton steps. Its covariance
+// follows from the differences that remain.
+std::optional<Shift> ShiftOf(const cv::Mat& from, const cv::Mat& to, int x0, int y0,
+                             const Tiling& tiling) {
+  const std::optional<cv::Point> coarse = CoarseShift(from, to, x0, y0, tiling);
+  if (!coarse) return std::nullopt;
+  Matrix2 normal = Matrix2::Zero();
+  for (int y = y0; y < y0 + tiling.edge; ++y) {
+    for (int x = x0; x < x0 + tiling.edge; ++x) {
+      const Vector2 gradient(0.5 * (from.at<float>(y, x + 1) - from.at<float>(y, x - 1)),
+                             0.5 * (from.at<float>(y + 1, x) - from.at<float>(y - 1, x)));
+      normal += gradient * gradient.transpose();
+    }
+  }
+  // A tile without details has no weight; along an edge only its normal has.
+  constexpr double kSmall = 1e-9;
+  const double ridge = kSmall + 1e-3 * normal.trace();
+  const Eigen::LDLT<Matrix2> solver(normal + ridge * Matrix2::Identity());
+  Vector2 shift(coarse->x, coarse->y);
+  double squares = 0;
+  for (int step = 0; step < 6; ++step) {
+    Vector2 right = Vector2::Zero();
+    squares = 0;
+    for (int y = y0; y < y0 + tiling.edge; ++y) {
+      for (int x = x0; x < x0 + tiling.edge; ++x) {
+        const Vector2 gradient(0.5 * (from.at<float>(y, x + 1) - from.at<float>(y, x - 1)),
+                               0.5 * (from.at<float>(y + 1, x) - from.at<float>(y - 1, x)));
+        const double difference =
+            from.at<float>(y, x) - Interpolated(to, x + shift.x(), y + shift.y());
+        right += gradient * difference;
+        squares += difference * difference;
+      }
+    }
+    const Vector2 update = solver.solve(right);
+    if (!(update.norm() < 1)) return std::nullopt;
+    shift += update;
+    if ((shift - Vector2(coarse->x, coarse->y)).cwiseAbs().maxCoeff() > 1) return std::nullopt;
+  }
+  const double variance = squares / (tiling.edge * tiling.edge - 2) + kSmall;
+  const Matrix2 covariance = variance * (normal + ridge * Matrix2::Identity()).inverse() +
+                             kShiftFloorPx * kShiftFloorPx * Matrix2::Identity();
+  return Shift{shift, covariance.inverse()};
+}
+
+// The directions, up to one common sign, of the shifts across and down in an order of views.
+struct Hypothesis {
+  ViewOrder order;
+  Vector2 across, down;
+};
+const std::array<Hypothesis, 4>& Hypotheses() {
+  static const std::array<Hypothesis, 4> all = {{{ViewOrder::kAsStated, {1, 0}, {0, 1}},
+                                                 {ViewOrder::kMirrored, {1, 0}, {0, -1}},
+                                                 {ViewOrder::kSwapped, {0, 1}, {1, 0}},
+                                                 {ViewOrder::kSwappedMirrored, {0, 1}, {-1, 0}}}};
+  return all;
+}
+
+double Square(const Shift& shift) { return shift.px.dot(shift.weight * shift.px); }
+
+// Squared deviation of a tile's shifts from the best disparity in that order, limited.
+double CostOf(const TileShifts& tile, const Vector2& across, const Vector2& down) {
+  const double product =
+      across.dot(tile.across.weight * tile.across.px) + down.dot(tile.down.weight * tile.down.px);
+  const double square = across.dot(tile.across.weight * across) + down.dot(tile.down.weight * down);
+  const double cost =
+      Square(tile.across) + Square(tile.down) - (square > 0 ? product * product / square : 0);
+  return std::clamp(cost, 0.0, kMostCost);
+}
+
+struct Fit {
+  double cost = std::numeric_limits<double>::infinity();
+  double ratio = 1;
+};
+
+// The cost of an order, with the ratio of both steps that fits best; 1 unless another is clearly
+// better.
+Fit FitOf(const std::vector<TileShifts>& tiles, const Hypothesis& hypothesis) {
+  constexpr std::array<double, 7> kRatios = {1, 0.25, 0.5, 0.71, 1.41, 2, 4};
+  Fit best;
+  for (const double ratio : kRatios) {
+    double cost = 0;
+    for (const TileShifts& tile : tiles)
+      cost += CostOf(tile, hypothesis.across, ratio * hypothesis.down) / kOverlap;
+    if (cost + (ratio == 1 ? 0 : kDecides) < best.cost) best = {cost, ratio};
+  }
+  return best;
+}
+
+// Three views: one, its neighbour `step` views across, and that `step` views down.
+struct Triple {
+  int k = 0, l = 0, step = 0;
+  bool has_across = false, has_down = false;
+};
+
+// The triple nearest to the middle whose views are known.
+std::optional<Triple> TripleInTheMiddle(const model::LightField& light_field, int step) {
+  const bool has_across = light_field.u_count > step;
+  const bool has_down = light_field.v_count > step;
+  if (!has_across && !has_down) return std::nullopt;
+  if (light_field.u_count > 1 && light_field.v_count > 1 && !(has_across && has_down))
+    return std::nullopt;
+  std::optional<Triple> best;
+  double least = std::numeric_limits<double>::infinity();
+  const int last_k = light_field.u_count - 1 - (has_across ? step : 0);
+  const int last_l = light_field.v_count - 1 - (has_down ? step : 0);
+  for (int l = 0; l <= last_l; ++l) {
+    for (int k = 0; k <= last_k; ++k) {
+      if (!light_field.IsPresent(k, l) || (has_across && !light_field.IsPresent(k + step, l)) ||
+          (has_down && !light_field.IsPresent(k, l + step))) {
+        continue;
+      }
+      const double away = std::hypot(k - last_k / 2.0, l - last_l / 2.0);
+      if (away < least) {
+        least = away;
+        best = Triple{k, l, step, has_across, has_down};
+      }
+    }
+  }
+  return best;
+}
+
+ViewOrderFinding FindingOf(const model::LightField& light_field, const Triple& triple) {
+  const cv::Mat from = ComparedView(light_field, triple.k, triple.l);
+  const cv::Mat across =
+      triple.has_across ? ComparedView(light_field, triple.k + triple.step, triple.l) : cv::Mat();
+  const cv::Mat down =
+      triple.has_down ? ComparedView(light_field, triple.k, triple.l + triple.step) : cv::Mat();
+  const Tiling tiling(from);
+  std::vector<TileShifts> tiles;
+  int lost = 0, showing = 0;
+  for (int y = tiling.margin; y + tiling.edge + tiling.margin <= from.rows; y += tiling.edge / 2) {
+    for (int x = tiling.margin; x + tiling.edge + tiling.margin <= from.cols;
+         x += tiling.edge / 2) {
+      ThrowIfCancelled();
+      const std::optional<Shift> a =
+          triple.has_across ? ShiftOf(from, across, x, y, tiling) : Shift{};
+      const std::optional<Shift> b = triple.has_down ? ShiftOf(from, down, x, y, tiling) : Shift{};
+      if (!a || !b) {
+        ++lost;
+        continue;
+      }
+      tiles.push_back({*a, *b});
+      if (Square(*a) + Square(*b) >= kShows) ++showing;
+    }
+  }
+  ViewOrderFinding finding;
+  if (tiles.empty() && lost == 0) {
+    finding.why = "the views are too small";
+    return finding;
+  }
+  if (showing < kFewestTiles) {
+    finding.why = lost > static_cast<int>(tiles.size())
+                      ? "the shifts between neighbouring views are too large to be followed"
+                      : "the shifts between the views are too small, or the views have no details";
+    return finding;
+  }
+  std::array<Fit, 4> fits;
+  for (std::size_t i = 0; i < fits.size(); ++i) fits[i] = FitOf(tiles, Hypotheses()[i]);
+  const bool is_line = !triple.has_across || !triple.has_down;
+  std::size_t best = 0;
+  for (std::size_t i = 1; i < fits.size(); ++i) {
+    if (fits[i].cost < fits[best].cost) best = i;
+  }
+  // How well the best order explains the tiles that show a shift, compared with no shift.
+  double unexplained = 0;
+  for (const TileShifts& tile : tiles) {
+    if (Square(tile.across) + Square(tile.down) < kShows) continue;
+    const Hypothesis& hypothesis = Hypotheses()[best];
+    if (CostOf(tile, hypothesis.across, fits[best].ratio * hypothesis.down) >= kMostCost)
+      ++unexplained;
+  }
+  if (2 * unexplained > showing) {
+    finding.order = ViewOrder::kIrregular;
+    return finding;
+  }
+  double second = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < fits.size(); ++i) {
+    // Of a single row or column only the axis shows: i / 2.
+    if (i != best && (!is_line || i / 2 != best / 2)) second = std::min(second, fits[i].cost);
+  }
+  if (second - fits[best].cost < kDecides) {
+    finding.why = "the shifts between the views fit several orders";
+    return finding;
+  }
+  finding.order = Hypotheses()[best].order;
+  finding.step_ratio = fits[best].ratio;
+  return finding;
+}
+
+}  // namespace
+
+ViewOrderFinding FindViewOrder(const model::LightField& light_field) {
+  ViewOrderFinding finding;
+  finding.why = light_field.u_count * light_field.v_count == 1
+                    ? "there is one view"
+                    : "no view has known neighbours across and down";
+  // Small shifts show between views that are farther apart.
+  for (int step = 1;; step *= 2) {
+    const std::optional<Triple> triple = TripleInTheMiddle(light_field, step);
+    if (!triple) return finding;
+    ViewOrderFinding next = FindingOf(light_field, *triple);
+    if (next.order != ViewOrder::kUndecided) {
+      // Large shifts between distant views look irregular.
+      if (next.order == ViewOrder::kIrregular && step > 1) return finding;
+      return next;
+    }
+    finding = next;
+  }
+}
+
+}  // namespace thicklens::io
