@@ -154,7 +154,9 @@ CommandResult Compare(const CompareOptions& options) {
                     "folder {} and the file {}",
                     PrintableUtf8(folder), PrintableUtf8(file)));
   }
-  return is_folder ? CompareFolders(options) : CompareImageFiles(options);
+  // A file is a light field only if the options say so.
+  const bool is_light_field = is_folder || !options.reading.layout.empty();
+  return is_light_field ? CompareFolders(options) : CompareImageFiles(options);
 }
 
 // ---- The command line.

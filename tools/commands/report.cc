@@ -17,6 +17,7 @@
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
+#include "thicklens/base/printable_text.h"
 #include "thicklens/base/utc_time.h"
 #include "thicklens/estimator/disparity_map.h"
 #include "thicklens/io/aperture_statement.h"
@@ -71,7 +72,10 @@ bool NeedsCrop(const std::optional<model::PixelRect>& crop, int width_px, int he
 
 model::LightField ReadCropped(const std::string& path, io::LightFieldReading reading) {
   const std::optional<model::PixelRect> crop = std::exchange(reading.crop, std::nullopt);
-  const model::LightField light_field = io::ReadLightField(path, reading);
+  io::LightFieldFacts facts;
+  const model::LightField light_field = io::ReadLightField(path, reading, &facts);
+  if (!facts.is_own) spdlog::info("{}", PrintableUtf8(facts.one_line));
+  for (const std::string& notice : facts.notices) spdlog::warn("{}", PrintableUtf8(notice));
   if (NeedsCrop(crop, light_field.s_count, light_field.t_count)) {
     return WithFileContext(path, [&] { return model::CropViews(light_field, *crop); });
   }

@@ -26,6 +26,15 @@ io::LightFieldReading ReadingOf(const LightFieldReadOptions& options) {
     reading.v_count = options.inner_views->v;
   }
   reading.crop = options.crop;
+  reading.layout = options.layout;
+  if (options.layout_counts) {
+    reading.layout_u = options.layout_counts->u;
+    reading.layout_v = options.layout_counts->v;
+  }
+  reading.name = options.view_name;
+  reading.swap_uv = options.view_order.swap;
+  reading.mirror_u = options.view_order.mirror_u;
+  reading.mirror_v = options.view_order.mirror_v;
   return reading;
 }
 
@@ -61,8 +70,13 @@ LightField ReadLightField(const std::string& folder, const LightFieldReadOptions
                           const RunControl& run) {
   checks::RequireValid(run);
   checks::RequireValid(options);
-  const RunScope scope(run);
-  return io::ReadLightField(folder, ReadingOf(options));
+  RunScope scope(run);
+  io::LightFieldFacts facts;
+  LightField light_field = io::ReadLightField(folder, ReadingOf(options), &facts);
+  // Our own files state everything themselves.
+  if (!facts.is_own) scope.Inform(facts.one_line);
+  for (const std::string& notice : facts.notices) scope.Warn(notice);
+  return light_field;
 }
 
 std::vector<std::uint8_t> ReadConfidence(const std::string& folder, const RunControl& run) {

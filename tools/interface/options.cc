@@ -1,9 +1,15 @@
 // The checks of every option struct of the interface.
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <set>
+#include <string>
 #include <type_traits>
+#include <vector>
 
+#include "thicklens/base/printable_text.h"
 #include "thicklens/calibrate.h"
 #include "thicklens/compare.h"
 #include "thicklens/depth.h"
@@ -11,6 +17,7 @@
 #include "thicklens/estimate.h"
 #include "thicklens/explain.h"
 #include "thicklens/image.h"
+#include "thicklens/io/light_field_io.h"
 #include "thicklens/kernels/device.h"
 #include "thicklens/light_field.h"
 #include "thicklens/render.h"
@@ -193,11 +200,31 @@ bool CalibrateOptions::IsValid(std::string* why) const {
          OneOf(why, "on_refusal", OnRefusal::kReturn, on_refusal);
 }
 
+namespace {
+
+bool IsLayout(std::string* why, const LightFieldReadOptions& options) {
+  constexpr int kMostCounts = 100;
+  const std::vector<std::string> names = io::LightFieldLayouts();
+  if (!options.layout.empty() &&
+      std::find(names.begin(), names.end(), options.layout) == names.end()) {
+    return Fail(why, "layout",
+                fmt::format("must be one of {}, or empty, is '{}'", fmt::join(names, ", "),
+                            PrintableUtf8(options.layout)));
+  }
+  if (!options.layout_counts) return true;
+  if (options.layout.empty()) return Fail(why, "layout_counts", "needs a layout");
+  return WholeBetween(why, "layout_counts.u", 1, kMostCounts, options.layout_counts->u) &&
+         WholeBetween(why, "layout_counts.v", 1, kMostCounts, options.layout_counts->v);
+}
+
+}  // namespace
+
 bool LightFieldReadOptions::IsValid(std::string* why) const {
   return WholeBetween(why, "hci_grid", 0, kMaxGrid, hci_grid) &&
          IfGiven(inner_views,
                  [why](const ViewCounts& views) { return AreViews(why, "inner_views", views); }) &&
-         IfGiven(crop, [why](const PixelRect& rect) { return IsRect(why, "crop", rect); });
+         IfGiven(crop, [why](const PixelRect& rect) { return IsRect(why, "crop", rect); }) &&
+         IsLayout(why, *this);
 }
 
 bool EffectSelection::IsValid(std::string* why) const {

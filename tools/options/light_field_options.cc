@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cstddef>
 #include <tuple>
 #include <vector>
 
@@ -13,6 +15,7 @@ namespace thicklens::tools {
 namespace {
 
 constexpr int kMaxGrid = 1000;
+constexpr int kMaxLayoutCount = 100;
 
 }  // namespace
 
@@ -49,6 +52,59 @@ std::optional<model::PixelRect> CropRect(const CropOption& option) {
   return model::PixelRect{px[0], px[1], px[2], px[3]};
 }
 
+namespace {
+
+// The value of --layout.
+struct LayoutRequest {
+  std::string name;
+  int u_count = 0, v_count = 0;
+};
+
+LayoutRequest LayoutOf(const std::string& text) {
+  LayoutRequest request;
+  if (text.empty()) return request;
+  const std::size_t colon = text.find(':');
+  request.name = text.substr(0, colon);
+  const std::vector<std::string> names = io::LightFieldLayouts();
+  if (std::find(names.begin(), names.end(), request.name) == names.end()) {
+    throw UsageError(
+        fmt::format("--layout: {} is expected, found '{}'", fmt::join(names, ", "), text));
+  }
+  if (colon == std::string::npos) return request;
+  const std::string form = "NAME:UxV (numbers across and down, e.g. lenslets:14x14)";
+  const std::vector<int> counts =
+      SplitWhole("--layout", text.substr(colon + 1), 'x', form, 1, kMaxLayoutCount);
+  if (counts.size() != 2)
+    throw UsageError(fmt::format("--layout: {} is expected, found '{}'", form, text));
+  request.u_count = counts[0];
+  request.v_count = counts[1];
+  return request;
+}
+
+ViewOrderChange ViewOrderOf(const std::string& text) {
+  ViewOrderChange change;
+  if (text.empty()) return change;
+  for (std::size_t begin = 0; begin <= text.size();) {
+    const std::size_t end = std::min(text.find(',', begin), text.size());
+    const std::string word = text.substr(begin, end - begin);
+    bool* const flag = word == "swap"       ? &change.swap
+                       : word == "mirror-u" ? &change.mirror_u
+                       : word == "mirror-v" ? &change.mirror_v
+                                            : nullptr;
+    if (flag == nullptr || *flag) {
+      throw UsageError(fmt::format(
+          "--view-order: swap, mirror-u and mirror-v, each once, with commas between them are "
+          "expected, found '{}'",
+          text));
+    }
+    *flag = true;
+    begin = end + 1;
+  }
+  return change;
+}
+
+}  // namespace
+
 void AddReadingOptions(CLI::App* command, ReadingOptions* options) {
   command
       ->add_option("--grid", options->grid,
@@ -59,10 +115,36 @@ void AddReadingOptions(CLI::App* command, ReadingOptions* options) {
   command->add_flag("--sparse", options->sparse, "Accept a light field with missing views");
   AddViewsOption(command, &options->views, "Use only the UxV views in the middle");
   AddCropOption(command, &options->crop);
+  command
+      ->add_option(
+          "--layout", options->layout,
+          fmt::format("Layout of the light field: {}; UxV: views or tiles across and down, "
+                      "or pixels of a lenslet; default: recognised",
+                      fmt::join(io::LightFieldLayouts(), ", ")))
+      ->type_name("NAME[:UxV]");
+  command
+      ->add_option("--name", options->name,
+                   "Names of the views: {v} is the row, {u} the column, {n} a number that counts "
+                   "row by row, * any text, e.g. 'view_{v}_{u}.jpg'")
+      ->type_name("PATTERN");
+  command
+      ->add_option("--view-order", options->view_order,
+                   "Correct the order of the views: swap (rows and columns), mirror-u (columns "
+                   "backwards), mirror-v (rows backwards), or several with commas")
+      ->type_name("CHANGES");
 }
 
 io::LightFieldReading ReadingOf(const ReadingOptions& options) {
   io::LightFieldReading reading;
+  const LayoutRequest layout = LayoutOf(options.layout);
+  reading.layout = layout.name;
+  reading.layout_u = layout.u_count;
+  reading.layout_v = layout.v_count;
+  reading.name = options.name;
+  const ViewOrderChange change = ViewOrderOf(options.view_order);
+  reading.swap_uv = change.swap;
+  reading.mirror_u = change.mirror_u;
+  reading.mirror_v = change.mirror_v;
   reading.grid = options.grid;
   reading.sparse = options.sparse;
   std::tie(reading.u_count, reading.v_count) = ViewCounts(options.views);
@@ -72,6 +154,12 @@ io::LightFieldReading ReadingOf(const ReadingOptions& options) {
 
 LightFieldReadOptions LightFieldReadOptionsOf(const ReadingOptions& options) {
   LightFieldReadOptions reading;
+  const LayoutRequest layout = LayoutOf(options.layout);
+  reading.layout = layout.name;
+  if (layout.u_count > 0)
+    reading.layout_counts = thicklens::ViewCounts{layout.u_count, layout.v_count};
+  reading.view_name = options.name;
+  reading.view_order = ViewOrderOf(options.view_order);
   reading.hci_grid = options.grid;
   reading.allow_missing_views = options.sparse;
   const auto [u_count, v_count] = ViewCounts(options.views);

@@ -29,12 +29,14 @@ struct CropOption {
 void AddCropOption(CLI::App* command, CropOption* option);
 std::optional<model::PixelRect> CropRect(const CropOption& option);  // throws UsageError
 
-// The options --grid N, --sparse, --views and --crop for a light field that is read.
+// The options --grid N, --sparse, --views, --crop, --layout NAME[:UxV], --name PATTERN and
+// --view-order CHANGES for a light field that is read.
 struct ReadingOptions {
   int grid = 0;
   bool sparse = false;
   ViewsOption views;
   CropOption crop;
+  std::string layout, name, view_order;
 };
 void AddReadingOptions(CLI::App* command, ReadingOptions* options);
 io::LightFieldReading ReadingOf(const ReadingOptions& options);                // throws UsageError

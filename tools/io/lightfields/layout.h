@@ -35,7 +35,7 @@ struct LayoutInput {
 
 // A layout of light fields. A new one is a file of this folder with one function, a line in
 // light_field_reader.cc, and a test.
-struct Layout {
+struct ViewLayout {
   const char* name;   // in the option layout
   const char* marks;  // how it is recognised, for messages
   bool is_of_folders;

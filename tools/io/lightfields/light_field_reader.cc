@@ -29,7 +29,7 @@ namespace {
 namespace fs = std::filesystem;
 
 // All layouts, in the order in which they are tried.
-constexpr std::array<Layout, 8> kLayouts = {{
+constexpr std::array<ViewLayout, 8> kLayouts = {{
     {"thicklens", "lightfield.yaml", true, OpenOwnFolder},
     {"hci", "input_Cam000.png, input_Cam001.png, ...", true, OpenHciFolder},
     {"stanford", "out_00_00_Y_X_.png, ...", true, OpenStanfordFolder},
@@ -117,14 +117,14 @@ auto NamingTheFolder(const std::string& folder, const Work& work) {
 
 std::string NamesOfLayouts(bool is_of_folders) {
   std::vector<std::string> names;
-  for (const Layout& layout : kLayouts) {
+  for (const ViewLayout& layout : kLayouts) {
     if (layout.is_of_folders == is_of_folders) names.push_back(layout.name);
   }
   return fmt::format("{}", fmt::join(names, ", "));
 }
 
-const Layout& LayoutNamed(const std::string& name) {
-  for (const Layout& layout : kLayouts) {
+const ViewLayout& LayoutNamed(const std::string& name) {
+  for (const ViewLayout& layout : kLayouts) {
     if (name == layout.name) return layout;
   }
   throw Error(fmt::format("the option layout: {} or {} is expected, found '{}'",
@@ -173,7 +173,7 @@ ViewSource OpenSource(const std::string& path, const LightFieldReading& reading)
   if (!input.is_folder && !fs::exists(path, ignored)) {
     throw Error(fmt::format("{}: does not exist; the folder of a light field is expected", path));
   }
-  const Layout* layout = reading.layout.empty() ? nullptr : &LayoutNamed(reading.layout);
+  const ViewLayout* layout = reading.layout.empty() ? nullptr : &LayoutNamed(reading.layout);
   // A stated pattern of names is that of a folder, or of the parts of a file.
   if (layout == nullptr && !reading.name.empty())
     layout = &LayoutNamed(input.is_folder ? "names" : "parts");
@@ -190,7 +190,7 @@ ViewSource OpenSource(const std::string& path, const LightFieldReading& reading)
     ThrowNoLayout(path, input.is_folder);
   }
   if (!input.is_folder && !KindOfImage(ReadWholeFile(path))) ThrowNoLayout(path, false);
-  for (const Layout& candidate : kLayouts) {
+  for (const ViewLayout& candidate : kLayouts) {
     if (candidate.is_of_folders != input.is_folder) continue;
     if (std::optional<ViewSource> source = candidate.open(input)) return *std::move(source);
   }
@@ -354,7 +354,7 @@ std::string OneLine(const ViewSource& source, const model::LightField& light_fie
 
 std::vector<std::string> LightFieldLayouts() {
   std::vector<std::string> names;
-  for (const Layout& layout : kLayouts) names.emplace_back(layout.name);
+  for (const ViewLayout& layout : kLayouts) names.emplace_back(layout.name);
   return names;
 }
 

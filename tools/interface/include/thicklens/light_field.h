@@ -26,7 +26,13 @@ struct ViewCounts {
   int u = 0, v = 0;  // across, down
 };
 
-// The part of a light field's folder that is read.
+// How the order of views is changed when they are read.
+struct ViewOrderChange {
+  bool swap = false;                        // rows and columns are exchanged, before the others
+  bool mirror_u = false, mirror_v = false;  // columns, rows are counted backwards
+};
+
+// The part of a light field's folder that is read, and its layout.
 struct LightFieldReadOptions {
   // Row length of the HCI numbering input_CamNNN.png, 1 to 1000; 0: parameters.cfg says it, or the
   // views are a full square.
@@ -34,14 +40,25 @@ struct LightFieldReadOptions {
   bool allow_missing_views = false;       // any set of views may be present
   std::optional<ViewCounts> inner_views;  // take only these views in the middle
   std::optional<PixelRect> crop;          // take only this rectangle of each view
+  // The layout (docs/file-formats.md): "thicklens", "hci", "stanford", "names", "quilt", "parts",
+  // "lenslets" or "tiles"; empty: it is recognised.
+  std::string layout;
+  // Views or tiles across and down, or pixels of a lenslet, each from 1 to 100; needs `layout`.
+  std::optional<ViewCounts> layout_counts;
+  // Pattern of the names of views: "view_{v}_{u}.jpg" with the row {v} and the column {u}, or with
+  // {n}, which counts row by row; empty: the layout states the names.
+  std::string view_name;
+  ViewOrderChange view_order;  // how the order of the views is corrected
 
   // Returns whether all members are valid. Otherwise `why`, if not null, gets the field, the value
   // and the constraint.
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 
-// Reads the folder of a light field: ours (lightfield.yaml) or the HCI layout, which is read as
-// sRGB with equal weights. Throws OptionError, and Error that names the folder and the view.
+// Reads a light field: the folder of ours (lightfield.yaml) or of another layout, or one file with
+// all views (docs/file-formats.md). Views of other layouts are read as sRGB, unless their files
+// state linear light, with equal weights; black views are left out. Notices say what was read and
+// what may be wrong with it. Throws OptionError, and Error that names the folder and the view.
 THICKLENS_EXPORT LightField ReadLightField(const std::string& folder,
                                            const LightFieldReadOptions& options = {},
                                            const RunControl& run = {});

@@ -1,0 +1,236 @@
+// Light fields in the layouts of other programs. OpenCV writes the images: an encoder of its own.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <opencv2/imgcodecs.hpp>
+#include <string>
+#include <vector>
+
+#include "support/error_message.h"
+#include "support/temporary_folder.h"
+#include "thicklens/io/light_field_io.h"
+
+namespace thicklens::io {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using thicklens::testing::ErrorOf;
+using thicklens::testing::TemporaryFolder;
+
+constexpr int kS = 96, kT = 64;
+
+// The scene at (x, y) px: smooth details in both directions.
+double Scene(double x, double y) {
+  return 128 + 40 * std::sin(0.61 * x + 0.2 * y) + 35 * std::sin(0.17 * x - 0.53 * y + 1) +
+         30 * std::sin(0.31 * x + 0.43 * y + 2);
+}
+
+// The view `a` steps to the right and `b` steps down: what the middle view shows at x is at
+// x - a d. The disparity is that of a plane.
+cv::Mat View(double a, double b, double disparity_px = 0.7) {
+  cv::Mat view(kT, kS, CV_8UC3);
+  for (int y = 0; y < kT; ++y) {
+    for (int x = 0; x < kS; ++x) {
+      const auto level =
+          cv::saturate_cast<uchar>(Scene(x + a * disparity_px, y + b * disparity_px));
+      view.at<cv::Vec3b>(y, x) = {level, level, level};
+    }
+  }
+  return view;
+}
+
+std::string Encoded(const cv::Mat& image, const std::string& ending = ".png") {
+  std::vector<unsigned char> bytes;
+  cv::imencode(ending, image, bytes);
+  return {bytes.begin(), bytes.end()};
+}
+
+int LevelAt(const model::LightField& light_field, int k, int l, int x, int y) {
+  const double light = model::ViewImage(light_field, k, l).at(x, y, 0);
+  return static_cast<int>(std::lround(255 * model::TransferCurve::Srgb().Encode(light)));
+}
+
+class LightFieldLayouts : public ::testing::Test {
+ protected:
+  // A folder of 3 x 3 views; name(v, u) names them, and view(u, v) makes them.
+  std::string Folder(const std::function<std::string(int, int)>& name,
+                     const std::function<cv::Mat(int, int)>& view, const char* ending = ".png") {
+    for (int v = 0; v < 3; ++v) {
+      for (int u = 0; u < 3; ++u) folder_.Put("lf/" + name(v, u), Encoded(view(u, v), ending));
+    }
+    return folder_ / "lf";
+  }
+  // Requires that every view is the one of that place.
+  void ExpectViews(const model::LightField& light_field) {
+    ASSERT_EQ(light_field.u_count, 3);
+    ASSERT_EQ(light_field.v_count, 3);
+    for (int l = 0; l < 3; ++l) {
+      for (int k = 0; k < 3; ++k) {
+        EXPECT_EQ(LevelAt(light_field, k, l, 30, 20), View(k - 1, l - 1).at<cv::Vec3b>(20, 30)[0])
+            << k << ", " << l;
+      }
+    }
+  }
+  model::LightField Read(const std::string& path, const LightFieldReading& reading = {}) {
+    return ReadLightField(path, reading, &facts_);
+  }
+
+  TemporaryFolder folder_;
+  LightFieldFacts facts_;
+};
+
+std::string RowAndColumn(int v, int u) {
+  return "view_" + std::to_string(v) + "_" + std::to_string(u) + ".png";
+}
+cv::Mat InOrder(int u, int v) { return View(u - 1, v - 1); }
+
+TEST_F(LightFieldLayouts, NamesWithTwoChangingNumbersAreRowAndColumn) {
+  ExpectViews(Read(Folder(RowAndColumn, InOrder)));
+  EXPECT_THAT(facts_.one_line, AllOf(HasSubstr("view_{v}_{u}.png"), HasSubstr("3 x 3 views"),
+                                     HasSubstr("agree with their order")));
+  EXPECT_THAT(facts_.notices, IsEmpty());
+}
+
+TEST_F(LightFieldLayouts, APatternStatesTheNames) {
+  LightFieldReading reading;
+  reading.name = "c{u} r{v}*";
+  ExpectViews(Read(
+      Folder(
+          [](int v, int u) { return "c" + std::to_string(u) + " r" + std::to_string(v) + "x.png"; },
+          InOrder),
+      reading));
+  for (const char* wrong : {"view_{v}.png", "view_{a}_{u}.png", "view", "{u}_{u}_{v}"}) {
+    reading.name = wrong;
+    EXPECT_THAT(ErrorOf([&] { Read(folder_ / "lf", reading); }), HasSubstr("the option name"));
+  }
+  reading.name = "other_{v}_{u}.png";
+  EXPECT_THAT(ErrorOf([&] { Read(folder_ / "lf", reading); }),
+              AllOf(HasSubstr("no name fits"), HasSubstr("c{v} r{u}x.png")));
+}
+
+TEST_F(LightFieldLayouts, OneChangingNumberIsProposedOnly) {
+  const std::string path = Folder(
+      [](int v, int u) { return "frame_" + std::to_string(3 * v + u + 10) + ".png"; }, InOrder);
+  EXPECT_THAT(ErrorOf([&] { Read(path); }), HasSubstr("frame_{n}.png"));
+  LightFieldReading reading;
+  reading.name = "frame_{n}.png";
+  ExpectViews(Read(path, reading));
+}
+
+TEST_F(LightFieldLayouts, StanfordNamesHavePositions) {
+  ExpectViews(Read(Folder(
+      [](int v, int u) {
+        return "out_0" + std::to_string(v) + "_0" + std::to_string(u) + "_" +
+               std::to_string(10.5 + 2.0 * v) + "_" + std::to_string(-20.0 + 2.0 * u) + "_.png";
+      },
+      InOrder)));
+  EXPECT_THAT(facts_.one_line,
+              AllOf(HasSubstr("a Stanford folder"), HasSubstr("2 per column, 2 per row")));
+  EXPECT_THAT(facts_.notices, IsEmpty());
+}
+
+TEST_F(LightFieldLayouts, HciNamesMayBeOfJpegFiles) {
+  const model::LightField light_field =
+      Read(Folder([](int v, int u) { return "input_Cam00" + std::to_string(3 * v + u) + ".jpg"; },
+                  InOrder, ".jpg"));
+  EXPECT_EQ(light_field.u_count, 3);
+  EXPECT_NEAR(LevelAt(light_field, 2, 0, 30, 20), View(1, -1).at<cv::Vec3b>(20, 30)[0], 4);
+}
+
+TEST_F(LightFieldLayouts, BlackViewsAreNamedAndLeftOut) {
+  const model::LightField light_field = Read(Folder(RowAndColumn, [](int u, int v) {
+    return u == 2 && v == 0 ? cv::Mat(kT, kS, CV_8UC3, cv::Scalar(0, 1, 0)) : InOrder(u, v);
+  }));
+  EXPECT_THAT(facts_.left_out, ElementsAre("(2, 0)"));
+  EXPECT_FALSE(light_field.IsPresent(2, 0));
+  EXPECT_TRUE(light_field.IsPresent(0, 0));
+  EXPECT_NEAR(light_field.weights(0, 0), 1.0 / 8, 1e-12);
+  EXPECT_TRUE(light_field.IsValid(nullptr));
+}
+
+TEST_F(LightFieldLayouts, ExchangedRowsAndColumnsAreReportedAndExchanged) {
+  const std::string path = Folder(RowAndColumn, [](int u, int v) { return InOrder(v, u); });
+  Read(path);
+  EXPECT_THAT(facts_.notices, ElementsAre(HasSubstr("view-order swap")));
+  LightFieldReading reading;
+  reading.swap_uv = true;
+  ExpectViews(Read(path, reading));
+  EXPECT_THAT(facts_.notices, IsEmpty());
+}
+
+TEST_F(LightFieldLayouts, AMirroredDirectionIsReportedAndTurned) {
+  const std::string path = Folder(RowAndColumn, [](int u, int v) { return InOrder(u, 2 - v); });
+  Read(path);
+  EXPECT_THAT(facts_.notices, ElementsAre(HasSubstr("mirror-v")));
+  LightFieldReading reading;
+  reading.mirror_v = true;
+  ExpectViews(Read(path, reading));
+  EXPECT_THAT(facts_.notices, IsEmpty());
+}
+
+TEST_F(LightFieldLayouts, EqualViewsDecideNothing) {
+  Read(Folder(RowAndColumn, [](int, int) { return View(0, 0); }));
+  EXPECT_THAT(facts_.notices, IsEmpty());
+  EXPECT_THAT(facts_.one_line, HasSubstr("cannot be decided"));
+}
+
+TEST_F(LightFieldLayouts, AQuiltBeginsAtItsBottomLeft) {
+  cv::Mat quilt(2 * kT, 3 * kS, CV_8UC3);
+  for (int i = 0; i < 6; ++i)
+    View(i - 2.5, 0).copyTo(quilt(cv::Rect(i % 3 * kS, (1 - i / 3) * kT, kS, kT)));
+  const model::LightField light_field = Read(folder_.Put("scene_qs3x2a1.5.png", Encoded(quilt)));
+  ASSERT_EQ(light_field.u_count, 6);
+  ASSERT_EQ(light_field.v_count, 1);
+  for (int k = 0; k < 6; ++k)
+    EXPECT_EQ(LevelAt(light_field, k, 0, 30, 20), View(k - 2.5, 0).at<cv::Vec3b>(20, 30)[0]);
+  EXPECT_THAT(facts_.notices, IsEmpty());
+  EXPECT_THAT(ErrorOf([&] { Read(folder_.Put("scene_qs5x7a1.png", Encoded(quilt))); }),
+              HasSubstr("5 x 7 tiles"));
+}
+
+TEST_F(LightFieldLayouts, ViewsSideBySideAndLenslets) {
+  cv::Mat tiles(3 * kT, 3 * kS, CV_8UC3), lenslets(3 * kT, 3 * kS, CV_8UC3);
+  for (int l = 0; l < 3; ++l) {
+    for (int k = 0; k < 3; ++k) {
+      const cv::Mat view = InOrder(k, l);
+      view.copyTo(tiles(cv::Rect(k * kS, l * kT, kS, kT)));
+      for (int y = 0; y < kT; ++y) {
+        for (int x = 0; x < kS; ++x)
+          lenslets.at<cv::Vec3b>(3 * y + l, 3 * x + k) = view.at<cv::Vec3b>(y, x);
+      }
+    }
+  }
+  LightFieldReading reading;
+  reading.layout = "tiles";
+  reading.layout_u = reading.layout_v = 3;
+  ExpectViews(Read(folder_.Put("tiles.png", Encoded(tiles)), reading));
+  reading = {};
+  reading.grid = 3;
+  ExpectViews(Read(folder_.Put("x_eslf.png", Encoded(lenslets)), reading));
+  EXPECT_THAT(facts_.one_line, HasSubstr("lenslets of 3 x 3 px"));
+}
+
+TEST_F(LightFieldLayouts, WhatDoesNotFitIsNamed) {
+  const std::string path = Folder(RowAndColumn, InOrder);
+  LightFieldReading reading;
+  reading.layout = "quilt";
+  EXPECT_THAT(ErrorOf([&] { Read(path, reading); }), HasSubstr("is a folder"));
+  reading.layout = "lytro";
+  EXPECT_THAT(ErrorOf([&] { Read(path, reading); }), HasSubstr("found 'lytro'"));
+  std::remove((path + "/view_1_1.png").c_str());
+  EXPECT_THAT(ErrorOf([&] { Read(path); }),
+              AllOf(HasSubstr("row 1, column 1"), HasSubstr("sparse")));
+  folder_.Put("lf/view_999999_7.png", Encoded(View(0, 0)));
+  EXPECT_THAT(ErrorOf([&] { Read(path); }), HasSubstr("at most"));
+  EXPECT_THAT(
+      ErrorOf([&] { Read(folder_.Put("a_qs2x2a1.png", Encoded(View(0, 0)).substr(0, 99))); }),
+      HasSubstr("a_qs2x2a1.png"));
+}
+
+}  // namespace
+}  // namespace thicklens::io
