@@ -126,7 +126,8 @@ class DepthChannel {
     return OfEqualOnes(file);
   }
 
-  std::optional<int> alpha() const { return alpha_; }
+  // The alpha channel, or -1.
+  int alpha() const { return alpha_; }
 
  private:
   std::string NameAt(int channel) const {
@@ -184,7 +185,7 @@ class DepthChannel {
   const std::vector<std::string>& names_;
   const ImageFileKind kind_;
   const std::string& name_;
-  std::optional<int> alpha_;
+  int alpha_ = -1;
 };
 
 std::optional<double> LargestOfType(const ImageFacts& facts) {
@@ -257,7 +258,7 @@ DepthFile DecodeImageDepth(const std::string& bytes, const std::string& name,
     for (int x = 0; x < values.cols; ++x)
       file.map.values.push_back(factor == 1 ? row[x] : static_cast<float>(factor * row[x]));
   }
-  if (chooser.alpha()) TakeAlpha(decoded.pixels, *chooser.alpha(), &file);
+  if (chooser.alpha() >= 0) TakeAlpha(decoded.pixels, chooser.alpha(), &file);
   file.description = decoded.facts.OneLine();
   if (*kind == ImageFileKind::kJpeg) {
     file.warnings.emplace_back(
