@@ -11,6 +11,7 @@
 #include "model/base/random_draws.h"
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/printable_text.h"
 #include "thicklens/model/quantised_levels.h"
 
 namespace thicklens::model {
@@ -303,6 +304,45 @@ LinearImage ToGrey(const LinearImage& image) {
                           0.0722F * image.values[i + 2]);
   }
   return grey;
+}
+
+std::string DepthFlipName(DepthFlip flip) {
+  switch (flip) {
+    case DepthFlip::kRows:
+      return "rows";
+    case DepthFlip::kColumns:
+      return "columns";
+    case DepthFlip::kBoth:
+      return "both";
+    case DepthFlip::kNone:
+      break;
+  }
+  return "none";
+}
+
+DepthFlip DepthFlipFromName(const std::string& name) {
+  for (const DepthFlip flip :
+       {DepthFlip::kNone, DepthFlip::kRows, DepthFlip::kColumns, DepthFlip::kBoth}) {
+    if (name == DepthFlipName(flip)) return flip;
+  }
+  throw Error(
+      fmt::format("flip of a depth map: none, rows, columns or both is expected, found '{}'",
+                  PrintableUtf8(name)));
+}
+
+void FlipDepth(DepthFlip flip, int width_px, std::vector<float>* values) {
+  if (width_px < 1 || values->size() % static_cast<std::size_t>(width_px) != 0) {
+    throw Error(fmt::format("flip of a depth map: {} values are no full rows of {} px",
+                            values->size(), width_px));
+  }
+  // Turned by 180 degrees, all values are in the opposite order; with the rows in their own order
+  // again, only the columns are reversed.
+  if (flip == DepthFlip::kRows || flip == DepthFlip::kBoth)
+    std::reverse(values->begin(), values->end());
+  if (flip == DepthFlip::kRows || flip == DepthFlip::kColumns) {
+    for (auto row = values->begin(); row != values->end(); row += width_px)
+      std::reverse(row, row + width_px);
+  }
 }
 
 DepthKind DepthKindFromName(const std::string& name) {

@@ -42,6 +42,7 @@ DepthMap ReadDepth(const std::string& path, const DepthMeaning& meaning,
   std::string why;
   if (!options.IsValid(meaning, &why)) throw OptionError(why.substr(0, why.find(':')), why);
   io::DepthFile file = io::ReadDepthFile(path, options.file);
+  model::FlipDepth(options.flip, file.map.width_px, &file.map.values);
   DepthMap depth{file.map.width_px,
                  file.map.height_px,
                  std::move(file.map.values),

@@ -130,11 +130,51 @@ void CheckResult(const PreparedProblem& prepared, const Solved& solved,
                                   disparity.width_px, disparity.height_px, noise_sigma);
 }
 
+// Residual in terms of the noise above which a photograph is in doubt, and above which this is
+// reported also where nothing else is.
+constexpr double kDoubtful = 1.5, kUnexplainedAnyway = 2;
+
+bool IsInDoubt(const EstimateDiagnostics& found, double limit) {
+  return found.residual_rms && found.noise_sigma &&
+         *found.residual_rms > limit * *found.noise_sigma;
+}
+
+// A photograph in doubt may have a map whose rows or columns are stored the other way.
+void CheckFlips(const PreparedProblem& prepared, const EstimateOptions& options, RunScope* run,
+                LightFieldEstimate* estimate) {
+  EstimateDiagnostics& found = estimate->diagnostics;
+  if (!std::holds_alternative<SceneSolver>(options.solver) || !IsInDoubt(found, kDoubtful)) return;
+  const auto start = Clock::now();
+  estimator::DepthFlipOptions check;
+  check.falloff = prepared.effects.on.Has(Effect::kFalloff);
+  check.threads = run->threads();
+  check.memory_limit_mib = options.memory_limit_mib;
+  try {
+    found.depth_flips = estimator::CheckDepthFlips(*prepared.input, check);
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const Error& error) {
+    run->Detail(fmt::format("reversed depth maps were not tried: {}", error.what()));
+  }
+  estimate->summary.seconds.depth_flips = SecondsSince(start);
+}
+
 // The depth map without its values.
 struct DepthFile {
   std::string name;  // in messages
   DepthMeaning meaning;
 };
+
+std::string WordsOf(model::DepthFlip flip) {
+  switch (flip) {
+    case model::DepthFlip::kRows:
+      return "upside down";
+    case model::DepthFlip::kColumns:
+      return "with left and right exchanged";
+    default:
+      return "turned by 180 degrees";
+  }
+}
 
 // Returns the warnings about the result, one line each, with their numbers.
 std::vector<std::string> WarningsOf(const DepthFile& depth, bool has_camera, const RunScope& run,
@@ -187,14 +227,32 @@ std::vector<std::string> WarningsOf(const DepthFile& depth, bool has_camera, con
                           run.Option("depth.meaning.disparity_offset_px"))
             : "are the depth's unit, and the camera's aperture and focus, right?"));
   }
-  constexpr double kUnexplained = 1.5;  // times the noise
-  if (found.residual_rms && found.noise_sigma && !found.unexplained_share &&
-      *found.residual_rms > kUnexplained * *found.noise_sigma) {
+  const bool is_reversed = found.depth_flips && found.depth_flips->better;
+  if (is_reversed) {
+    const estimator::DepthFlipCheck& flips = *found.depth_flips;
+    warnings.push_back(fmt::format(
+        "{}: {}, the map explains the photograph down to {:.1f} grey levels, as it is only to "
+        "{:.1f} (noise: {:.1f}{}): it is probably stored the other way; {} {} reads it so",
+        depth.name, WordsOf(flips.better->flip), kEightBitLevels * flips.better->residual_rms,
+        kEightBitLevels * flips.trials.front().residual_rms, kEightBitLevels * flips.noise_sigma,
+        summary.width_px >= 256 && summary.height_px >= 256 ? ", at a reduced size" : "",
+        run.Option("depth.flip"), model::DepthFlipName(flips.better->flip)));
+  }
+  if (IsInDoubt(found, kDoubtful) && !found.unexplained_share && !is_reversed) {
     warnings.push_back(fmt::format(
         "the photograph has a residual of {:.1f} grey levels (noise: {:.1f}), and nearly "
         "everywhere it receives light from points that the centre view does not show: check the "
         "depth, its unit and the aperture, which may also be too wide for an image of {} x {} px",
         kEightBitLevels * *found.residual_rms, noise_levels, summary.width_px, summary.height_px));
+  }
+  const bool is_reported = is_reversed || !found.patches.empty() || !found.unexplained_share ||
+                           *found.unexplained_share > estimator::kMaxUnexplained;
+  if (IsInDoubt(found, kUnexplainedAnyway) && !is_reported) {
+    warnings.push_back(fmt::format(
+        "the photograph has a residual of {:.1f} grey levels, {:.1f} times its noise, in places "
+        "and near the edges of the depth: depth and photograph do not fit there; are the map's "
+        "edges, its alignment, and the meaning of its values right?",
+        kEightBitLevels * *found.residual_rms, *found.residual_rms / *found.noise_sigma));
   }
   if (found.blur_check) {
     const std::string blur =
@@ -325,6 +383,7 @@ LightFieldEstimate Estimate(ViewSink* given_sink, Image photo, DepthMap depth,
   origin.date = NowIso8601();
   estimate.summary.effects = origin.effects;
   CheckResult(prepared, solved, &estimate);
+  CheckFlips(prepared, options, &run, &estimate);
   ThrowIfCancelled();
   const auto rays_start = Clock::now();
   GiveRays(prepared, control.threads, sink ? &*sink : nullptr, &solved, &estimate);

@@ -104,6 +104,7 @@ OptionNames EstimateOptionNames() {
           {"depth.meaning.unit", "--depth-unit"},
           {"depth.meaning.disparity_scale", "--disparity-scale"},
           {"depth.meaning.disparity_offset_px", "--disparity-offset"},
+          {"depth.flip", "--depth-flip"},
           {"depth.meaning.inverse_scale_dpt", "--inverse-scale"},
           {"depth.meaning.inverse_offset_dpt", "--inverse-offset"},
           {"depth.holes", "--hole-value"},

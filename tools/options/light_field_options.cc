@@ -247,6 +247,12 @@ void AddDepthOptions(CLI::App* command, const std::string& required, DepthOption
                    "for 1/255) or ignore it")
       ->check(CLI::IsMember({"apply", "ignore"}))
       ->type_name("WHAT");
+  command
+      ->add_option("--depth-flip", options->flip,
+                   "Reverse the rows, the columns or both of the depth map, which its file stores "
+                   "the other way")
+      ->check(CLI::IsMember({"rows", "columns", "both"}))
+      ->type_name("WHAT");
 }
 
 namespace {
@@ -358,6 +364,7 @@ DepthReadOptions DepthReadOptionsOf(const DepthOptions& options) {
   reading.file.channel = options.channel;
   if (options.pfm_scale == "apply") reading.file.pfm_scale = io::PfmScale::kApplied;
   if (options.pfm_scale == "ignore") reading.file.pfm_scale = io::PfmScale::kIgnored;
+  if (!options.flip.empty()) reading.flip = model::DepthFlipFromName(options.flip);
   reading.holes.hole_values = options.hole_values;
   reading.holes.zero_is_value = options.zero_is == "value";
   reading.holes.largest_is_value = options.largest_is == "value";

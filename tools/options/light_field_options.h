@@ -58,6 +58,7 @@ struct DepthOptions {
   std::string zero_is, largest_is;  // "hole" or "value"; empty: by rule
   std::string channel;
   std::string pfm_scale;  // "apply" or "ignore"; empty: by rule
+  std::string flip;       // "rows", "columns" or "both"; empty: none
 };
 // `required` begins the description of --depth-kind: when the kind must be given.
 void AddDepthOptions(CLI::App* command, const std::string& required, DepthOptions* options);

@@ -113,6 +113,19 @@ json BlurCheckJson(const EstimateDiagnostics& found) {
   return out;
 }
 
+// Returns {noise_sigma, trials: [{flip, residual_rms}, ..], better}, or null without a check.
+json DepthFlipsJson(const EstimateDiagnostics& found) {
+  if (!found.depth_flips) return nullptr;
+  json trials = json::array();
+  for (const estimator::DepthFlipTrial& trial : found.depth_flips->trials) {
+    trials.push_back(
+        {{"flip", model::DepthFlipName(trial.flip)}, {"residual_rms", trial.residual_rms}});
+  }
+  json better = nullptr;
+  if (found.depth_flips->better) better = model::DepthFlipName(found.depth_flips->better->flip);
+  return {{"noise_sigma", found.depth_flips->noise_sigma}, {"trials", trials}, {"better", better}};
+}
+
 void AddScene(const LightFieldEstimate& estimate, json* out) {
   const EstimateDiagnostics& found = estimate.diagnostics;
   out->update({{"block_solver", nullptr},
@@ -123,7 +136,8 @@ void AddScene(const LightFieldEstimate& estimate, json* out) {
                {"reweightings", found.reweightings},
                {"residual_patches", PatchesJson(found.patches)},
                {"unexplained_share", OrNull(found.unexplained_share)},
-               {"blur_check", BlurCheckJson(found)}});
+               {"blur_check", BlurCheckJson(found)},
+               {"depth_flips", DepthFlipsJson(found)}});
 }
 
 void AddBlocks(const LightFieldEstimate& estimate, json* out) {
@@ -265,6 +279,7 @@ json EstimateJson(const EstimateOptions& options, const EstimateOutcome& outcome
                {{"read", read_seconds},
                 {"setup", read_seconds + seconds.setup},
                 {"blur_check", seconds.blur_check},
+                {"depth_flips", seconds.depth_flips},
                 {"solve", seconds.solve},
                 {"views", seconds.views},
                 {"files", outcome.files_seconds},
@@ -349,9 +364,10 @@ std::string EstimateText(const EstimateOptions& options, const EstimateOutcome& 
   text += ConfidenceText(found);
   if (found.inpainting) text += fmt::format("inpainting   {}\n", found.inpainting->message);
   text += fmt::format(
-      "time         {:.2f} s: set-up {:.2f}, {}solve {:.2f}, views {:.2f}, files {:.2f}\n",
+      "time         {:.2f} s: set-up {:.2f}, {}solve {:.2f}, {}views {:.2f}, files {:.2f}\n",
       outcome.total_seconds, json_summary["seconds"]["setup"].get<double>(),
       found.blur_check ? fmt::format("blur check {:.2f}, ", seconds.blur_check) : "", seconds.solve,
+      found.depth_flips ? fmt::format("reversed depth {:.2f}, ", seconds.depth_flips) : "",
       seconds.views, outcome.files_seconds);
   text += fmt::format("memory       {:.0f} MiB at most ({:.0f} predicted)\n",
                       json_summary["peak_rss_mib"].get<double>(), found.predicted_memory_mib);

@@ -426,6 +426,22 @@ TEST(Image, GreyIsTakenInLinearLight) {
   EXPECT_NEAR(grey.values[0], 0.2126 + 0.7152 * 0.2158605, 1e-6);
 }
 
+TEST(DepthMap, FlipsReverseRowsColumnsOrBoth) {
+  const std::vector<float> map = {1, 2, 3, 4, 5, 6};
+  const auto flipped = [&map](const std::string& name) {
+    std::vector<float> values = map;
+    FlipDepth(DepthFlipFromName(name), 3, &values);
+    return values;
+  };
+  EXPECT_EQ(flipped("none"), map);
+  EXPECT_EQ(flipped("rows"), (std::vector<float>{4, 5, 6, 1, 2, 3}));
+  EXPECT_EQ(flipped("columns"), (std::vector<float>{3, 2, 1, 6, 5, 4}));
+  EXPECT_EQ(flipped("both"), (std::vector<float>{6, 5, 4, 3, 2, 1}));
+  EXPECT_THROW(DepthFlipFromName("rot180"), Error);
+  std::vector<float> partial(5);
+  EXPECT_THROW(FlipDepth(DepthFlip::kRows, 3, &partial), Error);
+}
+
 TEST(Image, GreyDropsAlpha) {
   const LinearImage rgba{2, 1, 4, {0.1F, 0.2F, 0.3F, 0.9F, 0.4F, 0.5F, 0.6F, 0.0F}};
   const LinearImage rgb{2, 1, 3, {0.1F, 0.2F, 0.3F, 0.4F, 0.5F, 0.6F}};

@@ -141,12 +141,14 @@ TEST(DepthOptions, NearAndFarAreHandedOnInMm) {
   options.hole_values = {-1};
   options.zero_is = "value";
   options.pfm_scale = "ignore";
+  options.flip = "rows";
   const DepthReadOptions reading = DepthReadOptionsOf(options);
   ASSERT_TRUE(reading.near_mm);
   EXPECT_NEAR(*reading.near_mm, 400, 1e-9);
   EXPECT_NEAR(*reading.far_mm, 2500, 1e-9);
   EXPECT_TRUE(reading.holes.zero_is_value);
   EXPECT_THAT(reading.holes.hole_values, ::testing::ElementsAre(-1));
+  EXPECT_EQ(reading.flip, model::DepthFlip::kRows);
   EXPECT_EQ(reading.file.pfm_scale, io::PfmScale::kIgnored);
   EXPECT_EQ(DepthMeaningOf(options).kind, DepthKind::kInverse);
   EXPECT_EQ(DepthMeaningOf(options).unit, LengthUnit::kNone);

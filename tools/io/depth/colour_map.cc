@@ -91,9 +91,14 @@ struct Match {
   const char* name = "";
   double share = 0;        // of the samples that lie on the map
   double mean_levels = 0;  // their mean distance from it
+  std::size_t parts = 0;   // how many of the 32 parts of the map they use
 };
 
-// None if the samples have too few of the map's colours: a few colours lie on some map by chance.
+// A few colours lie on some map by chance.
+constexpr std::size_t kMinParts = 3;
+
+// None if no sample lies on the map, or if all that do lie on so few of its parts that this may be
+// chance and they are not its very colours.
 std::optional<Match> MatchOf(const std::vector<Colour>& samples, const NamedMap& map,
                              int tolerance) {
   const std::vector<Colour> colours = ColoursOf(map.code);
@@ -110,9 +115,9 @@ std::optional<Match> MatchOf(const std::vector<Colour>& samples, const NamedMap&
     sum += distance;
     used.insert(static_cast<std::size_t>(nearest - colours.begin()) / 8);
   }
-  constexpr std::size_t kMinUsed = 3;  // of the 32 parts of the map
-  if (near == 0 || used.size() < kMinUsed) return std::nullopt;
-  return Match{map.name, near / static_cast<double>(samples.size()), sum / near};
+  constexpr double kVeryColours = 3;  // levels; rounding of the map's definitions
+  if (near == 0 || (used.size() < kMinParts && sum / near > kVeryColours)) return std::nullopt;
+  return Match{map.name, near / static_cast<double>(samples.size()), sum / near, used.size()};
 }
 
 }  // namespace
@@ -133,10 +138,12 @@ std::string WordsOnColours(const cv::Mat& rgb, bool is_lossy) {
   }
   constexpr double kSure = 0.95, kLikely = 0.75;
   if (best && best->share >= kLikely) {
+    const bool is_sure = best->share >= kSure && best->parts >= kMinParts;
     return fmt::format(
         "it is {}a picture in the colours of the map '{}' ({:.1f} % of its pixels lie within {} "
-        "levels of them): save the depth itself, one channel, instead of its picture",
-        best->share >= kSure ? "" : "probably ", best->name, 100 * best->share, tolerance);
+        "levels of them{}): save the depth itself, one channel, instead of its picture",
+        is_sure ? "" : "probably ", best->name, 100 * best->share, tolerance,
+        best->parts >= kMinParts ? "" : ", though it has few colours");
   }
   return "its channels differ, and its colours lie on no known colour map: it is not a depth map";
 }

@@ -73,6 +73,8 @@ struct DepthMap {
 struct DepthReadOptions {
   io::DepthReading file;   // which of its values are the depth
   model::HoleRules holes;  // which of them are no depths
+  // Reverses rows or columns, for a file that stores them in another order than its format says.
+  model::DepthFlip flip = model::DepthFlip::kNone;
   // kInverse: the depths, mm, of the largest value of the file's integer type, or of 1 in a map of
   // floats, and of 0; the far one may be infinite. They give the meaning's scale and offset. For a
   // map whose zeros are near, near_mm is the larger one.

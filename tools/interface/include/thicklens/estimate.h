@@ -15,6 +15,7 @@
 #include "thicklens/depth.h"
 #include "thicklens/effects.h"
 #include "thicklens/estimator/blur_check.h"
+#include "thicklens/estimator/depth_flips.h"
 #include "thicklens/estimator/inpaint.h"
 #include "thicklens/estimator/scene_solver.h"
 #include "thicklens/image.h"
@@ -84,10 +85,11 @@ struct EstimateOptions {
 struct EstimateSeconds {
   double prepare = 0;                           // camera, aperture, depth, effects
   double setup = 0, blur_check = 0, solve = 0;  // of the solver, and of check_blur
+  double depth_flips = 0;                       // the search for reversed rows and columns
   double views = 0;                             // making the views, and inpainting
   double sink = 0;  // giving views and confidence to a ViewSink; shared among the threads
   // The sum of all parts, s.
-  double total() const { return prepare + setup + blur_check + solve + views + sink; }
+  double total() const { return prepare + setup + blur_check + solve + depth_flips + views + sink; }
 };
 
 // The result in numbers.
@@ -193,7 +195,9 @@ struct EstimateDiagnostics {
   std::optional<estimator::InpaintSummary> inpainting;  // of HiddenRays::kTelea
   std::optional<estimator::BlurCheck> blur_check;       // of SceneSolver::check_blur
   BlurProposal blur_proposal;                           // that follows from it
-  std::vector<Notice> notices;                          // remarks on the call, in their order
+  // Of SceneSolver, for a photograph that stays unexplained.
+  std::optional<estimator::DepthFlipCheck> depth_flips;
+  std::vector<Notice> notices;  // remarks on the call, in their order
 };
 
 // One block of BlockSolver: position and size in px.

@@ -68,6 +68,22 @@ enum class DepthKind {
 // The kind of the name "z", "range", "disparity" or "inverse". Throws Error for any other name.
 THICKLENS_EXPORT DepthKind DepthKindFromName(const std::string& name);
 
+// Which order of a depth map's values is reversed, for files whose rows or columns are stored the
+// other way.
+enum class DepthFlip {
+  kNone,     // none
+  kRows,     // the first row is the lowest
+  kColumns,  // the first column is the right one
+  kBoth,     // both: the map is turned by 180 degrees
+};
+// The name "none", "rows", "columns" or "both".
+THICKLENS_EXPORT std::string DepthFlipName(DepthFlip flip);
+// The flip of that name. Throws Error for any other name.
+THICKLENS_EXPORT DepthFlip DepthFlipFromName(const std::string& name);
+// Reverses the values of a map of width_px columns in place. Throws Error unless they are full
+// rows.
+THICKLENS_EXPORT void FlipDepth(DepthFlip flip, int width_px, std::vector<float>* values);
+
 // A depth map as read from a file: one number per pixel, rows from top to bottom.
 struct RawDepthMap {
   int width_px = 0;           // width, px

@@ -1,0 +1,47 @@
+#ifndef THICKLENS_ESTIMATOR_DEPTH_FLIPS_H_
+#define THICKLENS_ESTIMATOR_DEPTH_FLIPS_H_
+
+#include <optional>
+#include <vector>
+
+#include "thicklens/base/export.h"
+#include "thicklens/estimator/estimate_input.h"
+#include "thicklens/model/scene.h"
+
+namespace thicklens::estimator {
+
+// The photograph as one order of the depth map explains it.
+struct DepthFlipTrial {
+  model::DepthFlip flip = model::DepthFlip::kNone;  // the order
+  double residual_rms = 0;                          // rms of H r - I, in encoded values
+};
+
+// What CheckDepthFlips found.
+struct DepthFlipCheck {
+  double noise_sigma = 0;              // of encoded values, in the image that was checked
+  std::vector<DepthFlipTrial> trials;  // the map as it is first, then reversed
+  // The order that explains the photograph instead. Absent if the map as it is does, or if none
+  // does.
+  std::optional<DepthFlipTrial> better;
+};
+
+// How CheckDepthFlips is run.
+struct DepthFlipOptions {
+  bool falloff = true;                     // use the irradiance of [S12] if there is a camera
+  int threads = 0;                         // 0: one per core
+  std::optional<double> memory_limit_mib;  // for the whole process
+};
+
+// Checks whether a photograph that its depth map does not explain fits the map in another order of
+// rows or columns, by solving for the scene with each, as EstimateScene does, on the photograph
+// reduced to less than a million pixels. All orders have the same disparities, so that only their
+// place makes the difference: a wrong scale or focus leaves all of them unexplained. An order is
+// better if its residual is near the noise, that is within a factor of two, and has at most 0.35 of
+// the excess variance over the noise that the map as it is leaves. Throws Error for inputs that do
+// not fit.
+THICKLENS_EXPORT DepthFlipCheck CheckDepthFlips(const EstimateInput& input,
+                                                const DepthFlipOptions& options);
+
+}  // namespace thicklens::estimator
+
+#endif  // THICKLENS_ESTIMATOR_DEPTH_FLIPS_H_

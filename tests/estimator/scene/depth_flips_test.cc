@@ -1,0 +1,95 @@
+// The search for depth maps whose rows or columns are stored the other way.
+#include "thicklens/estimator/depth_flips.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstddef>
+#include <random>
+
+#include "thicklens/base/error.h"
+
+namespace thicklens::estimator {
+namespace {
+
+constexpr int kSizePx = 128;
+constexpr int kViews = 5;
+constexpr double kNoise = 1.0 / 255;
+
+// A near square in the upper left quarter of a scene in focus. The photograph is made without the
+// estimator: the square's texture is averaged over its shifts in the views.
+struct SquareScene {
+  EstimateInput input;
+  explicit SquareScene(double near_px = 1.5, unsigned seed = 1) {
+    std::mt19937 random(seed);
+    std::normal_distribution<double> noise(0, kNoise);
+    input.weights = Eigen::ArrayXXd::Constant(kViews, kViews, 1.0 / (kViews * kViews));
+    input.transfer = model::TransferCurve::Linear();
+    input.image = {kSizePx, kSizePx, 1, {}};
+    input.disparity.width_px = input.disparity.height_px = kSizePx;
+    for (int y = 0; y < kSizePx; ++y) {
+      for (int x = 0; x < kSizePx; ++x) {
+        const bool is_near = IsNear(x, y);
+        double sum = 0;
+        for (int view = 0; view < kViews * kViews; ++view) {
+          const double shift = is_near ? near_px : 0;
+          sum += Texture(x + shift * (view % kViews - kViews / 2),
+                         y + shift * (view / kViews - kViews / 2));
+        }
+        input.image.values.push_back(static_cast<float>(sum / (kViews * kViews) + noise(random)));
+        input.disparity.disparity.push_back(is_near ? static_cast<float>(near_px) : 0.0F);
+      }
+    }
+  }
+  static bool IsNear(int x, int y) { return x >= 16 && x < 64 && y >= 8 && y < 56; }
+  static double Texture(double x, double y) {
+    return 0.5 + 0.12 * std::sin(1.9 * x) * std::cos(1.3 * y) + 0.1 * std::sin(0.4 * x + 0.7 * y);
+  }
+  void Flip(model::DepthFlip flip) { model::FlipDepth(flip, kSizePx, &input.disparity.disparity); }
+};
+
+TEST(DepthFlips, TheReversedOrderIsFoundAndNoOther) {
+  for (const model::DepthFlip flip :
+       {model::DepthFlip::kRows, model::DepthFlip::kColumns, model::DepthFlip::kBoth}) {
+    SquareScene scene;
+    scene.Flip(flip);
+    const DepthFlipCheck check = CheckDepthFlips(scene.input, {});
+    ASSERT_TRUE(check.better) << model::DepthFlipName(flip);
+    EXPECT_EQ(check.better->flip, flip) << model::DepthFlipName(flip);
+    ASSERT_EQ(check.trials.size(), 4U);
+    EXPECT_EQ(check.trials.front().flip, model::DepthFlip::kNone);
+    EXPECT_GT(check.trials.front().residual_rms, 1.5 * check.better->residual_rms);
+  }
+}
+
+TEST(DepthFlips, TheRightOrderStays) {
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    EXPECT_FALSE(CheckDepthFlips(SquareScene(1.5, seed).input, {}).better) << seed;
+  }
+}
+
+// What else leaves a photograph unexplained is no reversed map.
+TEST(DepthFlips, AWrongScaleOrPlaceIsNoReversedMap) {
+  SquareScene doubled;
+  for (float& value : doubled.input.disparity.disparity) value = value * 2 + 1;
+  EXPECT_FALSE(CheckDepthFlips(doubled.input, {}).better);
+  SquareScene elsewhere;  // the map of another scene
+  for (std::size_t i = 0; i < elsewhere.input.disparity.disparity.size(); ++i) {
+    elsewhere.input.disparity.disparity[i] = (i / 16) % 3 == 0 ? 1.5F : 0.0F;
+  }
+  EXPECT_FALSE(CheckDepthFlips(elsewhere.input, {}).better);
+}
+
+TEST(DepthFlips, ASharpPhotographIsNoReversedMap) {
+  SquareScene sharp(0);
+  for (int y = 0; y < kSizePx; ++y) {
+    for (int x = 0; x < kSizePx; ++x) {
+      sharp.input.disparity.disparity[static_cast<std::size_t>(y * kSizePx + x)] =
+          y < kSizePx / 2 ? 1.5F : 0.5F;
+    }
+  }
+  EXPECT_FALSE(CheckDepthFlips(sharp.input, {}).better);
+}
+
+}  // namespace
+}  // namespace thicklens::estimator
