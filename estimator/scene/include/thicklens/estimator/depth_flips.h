@@ -37,7 +37,7 @@ struct DepthFlipOptions {
 // reduced to less than a million pixels. All orders have the same disparities, so that only their
 // place makes the difference: a wrong scale or focus leaves all of them unexplained. An order is
 // better if its residual is near the noise, that is within a factor of two, and has at most 0.35 of
-// the excess variance over the noise that the map as it is leaves. Throws Error for inputs that do
+// the excess variance over the noise that the map as it is leaves. Derived here [D121]. Throws Error for inputs that do
 // not fit.
 THICKLENS_EXPORT DepthFlipCheck CheckDepthFlips(const EstimateInput& input,
                                                 const DepthFlipOptions& options);
