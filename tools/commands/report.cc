@@ -74,7 +74,7 @@ model::LightField ReadCropped(const std::string& path, io::LightFieldReading rea
   const std::optional<model::PixelRect> crop = std::exchange(reading.crop, std::nullopt);
   io::LightFieldFacts facts;
   const model::LightField light_field = io::ReadLightField(path, reading, &facts);
-  if (!facts.is_own) spdlog::info("{}", PrintableUtf8(facts.one_line));
+  if (!facts.is_plain) spdlog::info("{}", PrintableUtf8(facts.one_line));
   for (const std::string& notice : facts.notices) spdlog::warn("{}", PrintableUtf8(notice));
   if (NeedsCrop(crop, light_field.s_count, light_field.t_count)) {
     return WithFileContext(path, [&] { return model::CropViews(light_field, *crop); });

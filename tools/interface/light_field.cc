@@ -73,8 +73,7 @@ LightField ReadLightField(const std::string& folder, const LightFieldReadOptions
   RunScope scope(run);
   io::LightFieldFacts facts;
   LightField light_field = io::ReadLightField(folder, ReadingOf(options), &facts);
-  // Our own files state everything themselves.
-  if (!facts.is_own) scope.Inform(facts.one_line);
+  if (!facts.is_plain) scope.Inform(facts.one_line);
   for (const std::string& notice : facts.notices) scope.Warn(notice);
   return light_field;
 }

@@ -13,6 +13,7 @@
 
 #include "support/error_message.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/input_file.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/io/image_file.h"
 #include "tools/io/image_file_kind.h"
@@ -92,7 +93,9 @@ TEST(FormatTable, WhatTheRowsSayIsReadIsRead) {
     if (refused != kRefused.end()) {
       EXPECT_THAT(row->second.read, HasSubstr(refused->second)) << name;
       const std::string refusal = ErrorOf([&] { DecodeImageFile(bytes, name, reading); });
-      if (HasImageLibrary()) EXPECT_THAT(refusal, HasSubstr(refused->second)) << name;
+      if (HasImageLibrary()) {
+        EXPECT_THAT(refusal, HasSubstr(refused->second)) << name;
+      }
       continue;
     }
     try {
@@ -111,8 +114,11 @@ TEST(FormatTable, WhatTheRowsSayIsReadIsRead) {
     if (row.read.rfind("refused by name", 0) == 0) continue;
     const bool is_own =
         kind == "PNG" || kind == "TIFF" || kind == "PNM" || kind == "PFM" || kind == "JPEG";
-    if (HasImageLibrary() || is_own) EXPECT_GE(files_read[kind], 1) << kind;
-    if (!HasImageLibrary() && !is_own) EXPECT_EQ(files_read[kind], 0) << kind;
+    if (HasImageLibrary() || is_own) {
+      EXPECT_GE(files_read[kind], 1) << kind;
+    } else {
+      EXPECT_EQ(files_read[kind], 0) << kind;
+    }
   }
 }
 
@@ -124,7 +130,12 @@ TEST(FormatTable, WhatTheRowsSayIsWrittenIsWritten) {
   for (const FormatRow& row : FormatRows()) {
     const auto ending = endings.find(KindOfRow(row.kind));
     if (ending == endings.end()) continue;
-    const std::string refusal = ErrorOf([&] { FormatOfName("image" + ending->second); });
+    std::string refusal;
+    try {
+      FormatOfName("image" + ending->second);
+    } catch (const Error& error) {
+      refusal = error.what();
+    }
     if (row.written.empty()) {
       EXPECT_FALSE(refusal.empty()) << row.kind;
       continue;

@@ -116,7 +116,8 @@ std::optional<Match> MatchOf(const std::vector<Colour>& samples, const NamedMap&
     used.insert(static_cast<std::size_t>(nearest - colours.begin()) / 8);
   }
   constexpr double kVeryColours = 3;  // levels; rounding of the map's definitions
-  if (near == 0 || (used.size() < kMinParts && sum / near > kVeryColours)) return std::nullopt;
+  const bool is_chance = used.size() < 2 || (used.size() < kMinParts && sum / near > kVeryColours);
+  if (near == 0 || is_chance) return std::nullopt;
   return Match{map.name, near / static_cast<double>(samples.size()), sum / near, used.size()};
 }
 

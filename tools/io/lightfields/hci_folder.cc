@@ -146,6 +146,7 @@ std::optional<ViewSource> OpenHciFolder(const LayoutInput& input) {
   if (missing.empty()) frame.present.clear();
   if (!missing.empty() && !input.reading->sparse) ThrowMissingViews(folder, missing);
   if (!missing.empty()) source.details.push_back(fmt::format("missing: {}", Listed(missing)));
+  source.is_plain = source.details.empty();
   frame.origin.method = "imported";
   source.read = [folder, number_of, ending = views.ending](int k, int l) {
     const std::string path = (fs::path(folder) / HciFile(number_of(k, l), ending)).string();

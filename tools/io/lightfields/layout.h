@@ -19,6 +19,7 @@ struct ViewSource {
   std::function<model::LinearImage(int k, int l)> read;
   // Our own layout states which views there are, and in which order: nothing is examined.
   bool is_own = false;
+  bool is_plain = false;             // see LightFieldFacts
   std::string kind;                  // "a Stanford folder"
   std::vector<std::string> details;  // clauses for the line that says what was read
   std::vector<std::string> notices;  // sentences

@@ -404,6 +404,7 @@ model::LightField ReadLightField(const std::string& folder, const LightFieldRead
   light_field.source = folder;
   facts->kind = source.kind;
   facts->is_own = source.is_own;
+  facts->is_plain = source.is_plain;
   facts->notices = source.notices;
   facts->one_line = folder + ": " + OneLine(source, light_field);
   if (!source.is_own) {

@@ -88,7 +88,7 @@ std::optional<ViewSource> OpenOwnFolder(const LayoutInput& input) {
   const model::LightFieldDescription description =
       model::ReadLightFieldDescription(description_path);
   ViewSource source;
-  source.is_own = true;
+  source.is_own = source.is_plain = true;
   source.kind = "a light field of thicklens";
   source.frame = description.light_field;
   model::LightField& frame = source.frame;

@@ -22,7 +22,7 @@ using ::testing::IsEmpty;
 using thicklens::testing::ErrorOf;
 using thicklens::testing::TemporaryFolder;
 
-constexpr int kS = 96, kT = 64;
+constexpr int kViewWidthPx = 96, kViewHeightPx = 64;
 
 // The scene at (x, y) px: smooth details in both directions.
 double Scene(double x, double y) {
@@ -33,9 +33,9 @@ double Scene(double x, double y) {
 // The view `a` steps to the right and `b` steps down: what the middle view shows at x is at
 // x - a d. The disparity is that of a plane.
 cv::Mat View(double a, double b, double disparity_px = 0.7) {
-  cv::Mat view(kT, kS, CV_8UC3);
-  for (int y = 0; y < kT; ++y) {
-    for (int x = 0; x < kS; ++x) {
+  cv::Mat view(kViewHeightPx, kViewWidthPx, CV_8UC3);
+  for (int y = 0; y < kViewHeightPx; ++y) {
+    for (int x = 0; x < kViewWidthPx; ++x) {
       const auto level =
           cv::saturate_cast<uchar>(Scene(x + a * disparity_px, y + b * disparity_px));
       view.at<cv::Vec3b>(y, x) = {level, level, level};
@@ -144,7 +144,8 @@ TEST_F(LightFieldLayouts, HciNamesMayBeOfJpegFiles) {
 
 TEST_F(LightFieldLayouts, BlackViewsAreNamedAndLeftOut) {
   const model::LightField light_field = Read(Folder(RowAndColumn, [](int u, int v) {
-    return u == 2 && v == 0 ? cv::Mat(kT, kS, CV_8UC3, cv::Scalar(0, 1, 0)) : InOrder(u, v);
+    return u == 2 && v == 0 ? cv::Mat(kViewHeightPx, kViewWidthPx, CV_8UC3, cv::Scalar(0, 1, 0))
+                            : InOrder(u, v);
   }));
   EXPECT_THAT(facts_.left_out, ElementsAre("(2, 0)"));
   EXPECT_FALSE(light_field.IsPresent(2, 0));
@@ -180,9 +181,11 @@ TEST_F(LightFieldLayouts, EqualViewsDecideNothing) {
 }
 
 TEST_F(LightFieldLayouts, AQuiltBeginsAtItsBottomLeft) {
-  cv::Mat quilt(2 * kT, 3 * kS, CV_8UC3);
+  cv::Mat quilt(2 * kViewHeightPx, 3 * kViewWidthPx, CV_8UC3);
   for (int i = 0; i < 6; ++i)
-    View(i - 2.5, 0).copyTo(quilt(cv::Rect(i % 3 * kS, (1 - i / 3) * kT, kS, kT)));
+    View(i - 2.5, 0)
+        .copyTo(quilt(cv::Rect(i % 3 * kViewWidthPx, (1 - i / 3) * kViewHeightPx, kViewWidthPx,
+                               kViewHeightPx)));
   const model::LightField light_field = Read(folder_.Put("scene_qs3x2a1.5.png", Encoded(quilt)));
   ASSERT_EQ(light_field.u_count, 6);
   ASSERT_EQ(light_field.v_count, 1);
@@ -194,13 +197,15 @@ TEST_F(LightFieldLayouts, AQuiltBeginsAtItsBottomLeft) {
 }
 
 TEST_F(LightFieldLayouts, ViewsSideBySideAndLenslets) {
-  cv::Mat tiles(3 * kT, 3 * kS, CV_8UC3), lenslets(3 * kT, 3 * kS, CV_8UC3);
+  cv::Mat tiles(3 * kViewHeightPx, 3 * kViewWidthPx, CV_8UC3),
+      lenslets(3 * kViewHeightPx, 3 * kViewWidthPx, CV_8UC3);
   for (int l = 0; l < 3; ++l) {
     for (int k = 0; k < 3; ++k) {
       const cv::Mat view = InOrder(k, l);
-      view.copyTo(tiles(cv::Rect(k * kS, l * kT, kS, kT)));
-      for (int y = 0; y < kT; ++y) {
-        for (int x = 0; x < kS; ++x)
+      view.copyTo(
+          tiles(cv::Rect(k * kViewWidthPx, l * kViewHeightPx, kViewWidthPx, kViewHeightPx)));
+      for (int y = 0; y < kViewHeightPx; ++y) {
+        for (int x = 0; x < kViewWidthPx; ++x)
           lenslets.at<cv::Vec3b>(3 * y + l, 3 * x + k) = view.at<cv::Vec3b>(y, x);
       }
     }

@@ -36,6 +36,8 @@ struct LightFieldReading {
 struct LightFieldFacts {
   std::string kind;      // "a Stanford folder"
   bool is_own = false;   // the layout of thicklens, which states everything itself
+  // The reading needs no words: the layout of thicklens, or that of HCI with all of its views.
+  bool is_plain = false;
   std::string one_line;  // "PATH: read as a Stanford folder: 17 x 17 views of 1024 x 1024 px, ..."
   std::vector<std::string> left_out;  // black views, "(0, 4)"
   std::vector<std::string> notices;   // what may make the light field wrong, one sentence each
