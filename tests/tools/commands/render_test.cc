@@ -34,7 +34,6 @@ using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-using ::testing::StartsWith;
 using thicklens::testing::CentredSensor;
 using thicklens::testing::ContentOf;
 using thicklens::testing::TemporaryFolder;
