@@ -3,6 +3,7 @@
 
 #include <opencv2/core/mat.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "thicklens/io/image_file.h"
@@ -25,6 +26,17 @@ struct LibraryPage {
   std::string name;
 };
 
+// The depth image of a HEIF file, and what belongs to it.
+struct LibraryDepth {
+  cv::Mat numbers;  // CV_8U or CV_16U, as stored, neither turned nor cropped; empty: there is none
+  int bits = 0;     // of each number
+  std::string xmp;  // of the depth image; empty: it has none
+  // The fields of its depth representation information (ITU-T H.265): "z_near" 0.3.
+  std::vector<std::pair<std::string, double>> stated;
+  std::string photo_xmp;                 // of the photograph
+  std::vector<std::string> other_types;  // of the other auxiliary images, without alpha
+};
+
 // OpenImageIO with LibRaw and libheif. They are in a library of their own, which is loaded when an
 // image first needs it: with the 260 libraries that it depends on it takes more time and memory
 // than everything else that the program does at its start. No exception leaves a function, and
@@ -37,6 +49,9 @@ struct ImageLibrary {
   // its mosaic, unless they are to be demosaiced.
   bool (*decode)(const std::string& bytes, const LibraryReading& reading, DecodedImage* image,
                  std::string* why);
+  // Finds the depth image of the main image; a file without one is no failure.
+  bool (*depth)(const std::string& bytes, const LibraryReading& reading, LibraryDepth* depth,
+                std::string* why);
   bool (*encode)(const cv::Mat& pixels, ImageFormat format, const ImageWriting& writing,
                  std::string* bytes, std::string* why);
 };

@@ -18,6 +18,7 @@ DecodedImage DecodeRaw(const std::string& bytes, const LibraryReading& reading);
 
 std::vector<LibraryPage> HeifPages(const std::string& bytes);
 DecodedImage DecodeHeif(const std::string& bytes, const LibraryReading& reading);
+LibraryDepth HeifDepth(const std::string& bytes, const LibraryReading& reading);
 
 std::vector<LibraryPage> WebpPages(const std::string& bytes);
 DecodedImage DecodeWebp(const std::string& bytes, const LibraryReading& reading);

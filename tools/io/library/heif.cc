@@ -251,4 +251,96 @@ DecodedImage DecodeHeif(const std::string& bytes, const LibraryReading& reading)
   return result;
 }
 
+namespace {
+
+// The XMP packet that belongs to an image; empty: there is none.
+std::string XmpOf(const heif_image_handle* handle) {
+  const int count = heif_image_handle_get_number_of_metadata_blocks(handle, "mime");
+  std::vector<heif_item_id> ids(static_cast<std::size_t>(std::max(count, 0)));
+  heif_image_handle_get_list_of_metadata_block_IDs(handle, "mime", ids.data(), count);
+  for (const heif_item_id id : ids) {
+    const char* const type = heif_image_handle_get_metadata_content_type(handle, id);
+    if (type == nullptr || std::strcmp(type, "application/rdf+xml") != 0) continue;
+    const std::size_t size = heif_image_handle_get_metadata_size(handle, id);
+    constexpr std::size_t kMaxBytes = 256 << 20;
+    if (size > kMaxBytes) throw Refusal("XMP of " + std::to_string(size) + " bytes");
+    std::string packet(size, '\0');
+    Require(heif_image_handle_get_metadata(handle, id, packet.data()));
+    return packet;
+  }
+  return "";
+}
+
+std::vector<std::string> AuxiliaryTypesOf(const heif_image_handle* handle, heif_item_id depth) {
+  const int filter = LIBHEIF_AUX_IMAGE_FILTER_OMIT_ALPHA | LIBHEIF_AUX_IMAGE_FILTER_OMIT_DEPTH;
+  const int count = heif_image_handle_get_number_of_auxiliary_images(handle, filter);
+  std::vector<heif_item_id> ids(static_cast<std::size_t>(std::max(count, 0)));
+  heif_image_handle_get_list_of_auxiliary_image_IDs(handle, filter, ids.data(), count);
+  std::vector<std::string> types;
+  for (const heif_item_id id : ids) {
+    heif_image_handle* auxiliary = nullptr;
+    if (id == depth || heif_image_handle_get_auxiliary_image_handle(handle, id, &auxiliary).code !=
+                           heif_error_Ok) {
+      continue;
+    }
+    const Handle owner(auxiliary);
+    const char* type = nullptr;
+    if (heif_image_handle_get_auxiliary_type(auxiliary, &type).code != heif_error_Ok || !type)
+      continue;
+    types.emplace_back(type);
+    heif_image_handle_free_auxiliary_types(auxiliary, &type);
+  }
+  return types;
+}
+
+void TakeRepresentation(const heif_image_handle* handle, heif_item_id id, LibraryDepth* depth) {
+  const heif_depth_representation_info* info = nullptr;
+  if (heif_image_handle_get_depth_image_representation_info(handle, id, &info) == 0 || !info)
+    return;
+  depth->stated.emplace_back("depth_representation_type", info->depth_representation_type);
+  if (info->has_z_near != 0) depth->stated.emplace_back("z_near", info->z_near);
+  if (info->has_z_far != 0) depth->stated.emplace_back("z_far", info->z_far);
+  if (info->has_d_min != 0) depth->stated.emplace_back("d_min", info->d_min);
+  if (info->has_d_max != 0) depth->stated.emplace_back("d_max", info->d_max);
+  heif_depth_representation_info_free(info);
+}
+
+}  // namespace
+
+// The depth image is returned as it is stored, like the photograph by DecodeHeif: both are turned
+// alike when they are displayed.
+LibraryDepth HeifDepth(const std::string& bytes, const LibraryReading& reading) {
+  const Context context = Opened(bytes);
+  const Handle photo = HandleOf(context.get(), Images(context.get())[0]);
+  LibraryDepth depth;
+  depth.photo_xmp = XmpOf(photo.get());
+  heif_item_id id = 0;
+  const bool has_depth = heif_image_handle_has_depth_image(photo.get()) != 0 &&
+                         heif_image_handle_get_list_of_depth_image_IDs(photo.get(), &id, 1) == 1;
+  depth.other_types = AuxiliaryTypesOf(photo.get(), id);
+  if (!has_depth) return depth;
+  heif_image_handle* opened = nullptr;
+  Require(heif_image_handle_get_depth_image_handle(photo.get(), id, &opened));
+  const Handle handle(opened);
+  depth.xmp = XmpOf(handle.get());
+  TakeRepresentation(photo.get(), id, &depth);
+  depth.bits = heif_image_handle_get_luma_bits_per_pixel(handle.get());
+  if (depth.bits < 1 || depth.bits > 16)
+    throw Refusal("a depth image of " + std::to_string(depth.bits) + " bits");
+  reading.require_memory(heif_image_handle_get_width(handle.get()),
+                         heif_image_handle_get_height(handle.get()), depth.bits > 8 ? 2 : 1,
+                         "its depth image");
+  const std::unique_ptr<heif_decoding_options,
+                        Releases<heif_decoding_options, heif_decoding_options_free>>
+      options(heif_decoding_options_alloc());
+  options->ignore_transformations = 1;
+  heif_image* decoded = nullptr;
+  // The numbers are those of the luma channel, which no conversion of colours may touch.
+  Require(heif_decode_image(handle.get(), &decoded, heif_colorspace_undefined,
+                            heif_chroma_undefined, options.get()));
+  const Image image(decoded);
+  depth.numbers = Interleaved(image.get(), heif_channel_Y, depth.bits > 8 ? CV_16UC1 : CV_8UC1);
+  return depth;
+}
+
 }  // namespace thicklens::io

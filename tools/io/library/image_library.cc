@@ -51,6 +51,11 @@ bool Decode(const std::string& bytes, const LibraryReading& reading, DecodedImag
   });
 }
 
+bool Depth(const std::string& bytes, const LibraryReading& reading, LibraryDepth* depth,
+           std::string* why) {
+  return Guarded(why, [&] { *depth = HeifDepth(bytes, reading); });
+}
+
 bool Encode(const cv::Mat& pixels, ImageFormat format, const ImageWriting& writing,
             std::string* bytes, std::string* why) {
   return Guarded(why, [&] {
@@ -65,6 +70,6 @@ bool Encode(const cv::Mat& pixels, ImageFormat format, const ImageWriting& writi
 extern "C" __attribute__((visibility("default"))) const thicklens::io::ImageLibrary*
 ThicklensImageLibrary() {
   static const thicklens::io::ImageLibrary library{thicklens::io::Pages, thicklens::io::Decode,
-                                                   thicklens::io::Encode};
+                                                   thicklens::io::Depth, thicklens::io::Encode};
   return &library;
 }

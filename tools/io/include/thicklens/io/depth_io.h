@@ -1,6 +1,7 @@
 #ifndef THICKLENS_IO_DEPTH_IO_H_
 #define THICKLENS_IO_DEPTH_IO_H_
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -45,6 +46,52 @@ THICKLENS_EXPORT DepthFile DecodeDepthFile(const std::string& bytes, const std::
 THICKLENS_EXPORT DepthFile ReadDepthFile(const std::string& path, const DepthReading& reading = {});
 // The map of ReadDepthFile alone.
 THICKLENS_EXPORT model::RawDepthMap ReadDepthMap(const std::string& path);
+
+// A depth map that is part of a photograph's file.
+struct EmbeddedDepth {
+  // The numbers as they are stored; NaN where there is none.
+  model::RawDepthMap map;
+  // The meaning of offset + scale * number. kZ and kRange: a length in mm, or, if `is_inverse`, its
+  // inverse in dioptres (1/m). kInverse: dioptres, and `is_inverse` is true.
+  model::DepthKind kind = model::DepthKind::kZ;
+  bool is_inverse = false;
+  double scale = 1, offset = 0;  // of the numbers, see `kind`
+  // Whether the file states the unit of length. If not, scale and offset are those for metres, and
+  // the true ones are an unknown multiple of them.
+  bool has_unit = true;
+  std::string form;                   // "GDepth", "Dynamic Depth", "Apple's disparity"
+  std::string description;            // in one line: form, size, type and range
+  std::vector<std::string> notes;     // one sentence each, without the file's name
+  std::vector<std::string> warnings;  // likewise
+};
+
+// The result of a search for depth in a photograph.
+struct EmbeddedDepthSearch {
+  std::optional<EmbeddedDepth> depth;  // absent: there is none
+  // What else the file holds that may be taken for it, in words: "a second image of 320 x 240 px
+  // that is not stated to be depth".
+  std::vector<std::string> others;
+};
+
+// The forms that are looked for, in words.
+THICKLENS_EXPORT std::string EmbeddedDepthForms();
+// Finds and decodes the depth map inside a photograph: GDepth in XMP (of JPEG, PNG, WebP, TIFF and
+// HEIF), Dynamic Depth and Apple's depth or disparity behind a JPEG, and, unless the build has no
+// GPL parts, the auxiliary depth image of HEIF. Throws Error that begins with `name` if the file
+// states that it holds depth and its fields contradict one another, are missing or point outside
+// the file.
+THICKLENS_EXPORT EmbeddedDepthSearch FindEmbeddedDepth(const std::string& bytes,
+                                                       const std::string& name);
+// Reads the file and searches it.
+THICKLENS_EXPORT EmbeddedDepthSearch ReadEmbeddedDepthFile(const std::string& path);
+// Returns the depths: mm of kZ and kRange, dioptres of kInverse; NaN where there is none. They are
+// floats, so that 0 dioptres is a value.
+THICKLENS_EXPORT model::RawDepthMap DepthsOf(const EmbeddedDepth& depth);
+// Returns the map in the size of its photograph. The stored numbers are interpolated linearly
+// between the four around a pixel; beside a hole the nearest one is taken. Throws Error that begins
+// with `name` if the map has another aspect ratio than the photograph, or more pixels.
+THICKLENS_EXPORT EmbeddedDepth Enlarged(const EmbeddedDepth& depth, int width_px, int height_px,
+                                        const std::string& name);
 
 // Encodes the map as a PFM file (little endian).
 THICKLENS_EXPORT std::string EncodePfm(const model::RawDepthMap& map);
