@@ -180,7 +180,7 @@ PageDepth DepthForPage(const LightFieldEstimate& estimate) {
 
 // Returns for the page what was read, and what was assumed.
 std::vector<std::pair<std::string, std::string>> SourcesOf(const EstimateOptions& options,
-                                                           const std::string& aperture,
+                                                           const EstimateOutcome& outcome,
                                                            const nlohmann::json& summary) {
   const DepthOptions& depth = options.depth;
   std::string how = depth.kind;
@@ -195,17 +195,20 @@ std::vector<std::pair<std::string, std::string>> SourcesOf(const EstimateOptions
                            : from == "camera" ? "the camera"
                            : from == "file"   ? "the file"
                                               : "";
-  return {{"photograph", options.image_path},
-          {"depth map", fmt::format("{} ({})", options.depth_path, how)},
-          {"camera", options.camera_path},
-          {"part of both", options.crop.text},
-          {"encoded values", fmt::format("{} ({})", summary["transfer"].get<std::string>(),
-                                         said.empty() ? "assumed" : "from " + said)},
-          {"aperture", aperture}};
+  return {
+      {"photograph", options.image_path},
+      {"depth map", options.depth_path.empty() ? outcome.embedded_depth
+                                               : fmt::format("{} ({})", options.depth_path, how)},
+      {"camera", options.camera_path},
+      {"part of both", options.crop.text},
+      {"encoded values", fmt::format("{} ({})", summary["transfer"].get<std::string>(),
+                                     said.empty() ? "assumed" : "from " + said)},
+      {"aperture", ApertureInWords(options, outcome.estimate.diagnostics)}};
 }
 
-std::string Page(const EstimateOptions& options, const LightFieldEstimate& estimate,
+std::string Page(const EstimateOptions& options, const EstimateOutcome& outcome,
                  const nlohmann::json& summary) {
+  const LightFieldEstimate& estimate = outcome.estimate;
   LightFieldPageInput page;
   page.name = options.output_folder;
   page.light_field = &estimate.light_field;
@@ -216,7 +219,7 @@ std::string Page(const EstimateOptions& options, const LightFieldEstimate& estim
                           options.common.json_path);
   if (estimate.maps) page.maps = &*estimate.maps;
   page.warnings = estimate.summary.warnings;
-  page.sources = SourcesOf(options, ApertureInWords(options, estimate.diagnostics), summary);
+  page.sources = SourcesOf(options, outcome, summary);
   page.mosaic = true;
   page.version = Version();
   page.date = estimate.light_field.origin.date;
@@ -267,6 +270,7 @@ CommandResult RunEstimate(const EstimateOptions& options) {
     const CommandRun run(options.common, EstimateOptionNames());  // its progress line ends with it
     EstimateCall call = ReadEstimateCall(options, run.control());
     outcome.photo_facts = call.photo.facts();
+    if (options.depth_path.empty()) outcome.embedded_depth = call.depth.notes.front();
     ThrowIfCancelled();
     ContinueFrom(outputs.checkpoint, &call.settings);
     if (options.quality_target.has_value()) {
@@ -289,7 +293,7 @@ CommandResult RunEstimate(const EstimateOptions& options) {
     text += ChoiceText(*choice, outcome.total_seconds);
   }
   std::string page;
-  if (outputs.report) page = Page(options, outcome.estimate, result.summary);
+  if (outputs.report) page = Page(options, outcome, result.summary);
   ThrowIfCancelled();
   outputs.light_field.Commit();
   result.is_written = true;

@@ -2,6 +2,7 @@
 #include "thicklens/explain.h"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <limits>
 #include <memory>
@@ -12,11 +13,13 @@
 
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/output_file.h"
+#include "thicklens/base/printable_text.h"
 #include "thicklens/camera.h"
 #include "thicklens/depth.h"
 #include "tools/commands/commands.h"
 #include "tools/options/command_frame.h"
 #include "tools/options/effect_options.h"
+#include "tools/options/embedded_depth.h"
 #include "tools/options/interface_options.h"
 #include "tools/options/light_field_options.h"
 #include "tools/options/option_values.h"
@@ -82,14 +85,27 @@ OptionNames ExplainOptionNames() {
           {"measure_costs", "--costs"}};
 }
 
+// A photograph with a depth map inside states what the map means.
+DepthMap DepthOf(const ExplainOptions& options) {
+  if (options.depth.kind.empty()) {
+    if (std::optional<DepthMap> inside = ReadEmbeddedDepth(options.depth_path)) {
+      RefuseOtherMeaning(options.depth, *inside);
+      spdlog::info("{}: {}", PrintableUtf8(options.depth_path),
+                   PrintableUtf8(inside->notes.front()));
+      return std::move(*inside);
+    }
+  }
+  return ReadDepth(options.depth_path, DepthMeaningOf(options.depth),
+                   DepthReadOptionsOf(options.depth));
+}
+
 // Its progress line ends with it.
 CameraExplanation ExplanationOf(const ExplainOptions& options, const Camera& camera) {
   thicklens::ExplainOptions asked;
   if (options.depth_path.empty()) {
     asked.depth_range = ParseDepthRange(options.depth_range);
   } else {
-    asked.depth = ReadDepth(options.depth_path, DepthMeaningOf(options.depth),
-                            DepthReadOptionsOf(options.depth));
+    asked.depth = DepthOf(options);
   }
   asked.depth_count = options.steps;
   asked.effects = EffectSelectionOf(options.effects);
@@ -159,6 +175,7 @@ void CheckUsage(const ExplainOptions& options) {
     throw UsageError("--costs: not available with --as-sweep, whose effects take hardly any time");
   }
   if (!options.depth_path.empty()) {
+    if (options.depth.kind.empty()) return;  // a photograph states it
     if (ConventionOf(options.depth).kind == model::DepthKind::kDisparity) {
       throw UsageError(
           "--depth-kind disparity: disparities refer to views, but a camera alone has no views; z "
@@ -187,7 +204,8 @@ void AddExplainCommand(CLI::App* program, CommandAction* action) {
       ->type_name("NEAR:FAR");
   command
       ->add_option("--depth", options->depth_path,
-                   "Depth map of the scene, instead of --depth-range")
+                   "Depth map of the scene, or a photograph with one inside, instead of "
+                   "--depth-range")
       ->type_name("MAP");
   AddDepthOptions(command, "Required with --depth", &options->depth);
   command

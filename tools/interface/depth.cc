@@ -65,6 +65,37 @@ DepthMap ReadDepth(const std::string& path, const DepthMeaning& meaning,
   return depth;
 }
 
+std::optional<DepthMap> ReadEmbeddedDepth(const std::string& path, int width_px, int height_px) {
+  if (width_px < 0 || height_px < 0 || (width_px == 0) != (height_px == 0)) {
+    throw OptionError("width_px", fmt::format("width_px, height_px: two sides >= 1, or two zeros, "
+                                              "are expected, found {} and {}",
+                                              width_px, height_px));
+  }
+  std::optional<io::EmbeddedDepth> found = std::move(io::ReadEmbeddedDepthFile(path).depth);
+  if (!found) return std::nullopt;
+  if (!found->has_unit) {
+    throw Error(fmt::format(
+        "{}: the depth map inside has no unit of length ({}): its depths are known up to a factor "
+        "only; write it by `thicklens depth extract`, scale it, and give it as a depth map of its "
+        "own",
+        path, found->description));
+  }
+  if (width_px > 0) found = io::Enlarged(*found, width_px, height_px, path);
+  model::RawDepthMap depths = io::DepthsOf(*found);
+  DepthMap map;
+  map.width_px = depths.width_px;
+  map.height_px = depths.height_px;
+  map.values = std::move(depths.values);
+  map.meaning.kind = found->kind;
+  if (found->kind != DepthKind::kInverse) map.meaning.unit = LengthUnit::kMillimetre;
+  map.source = path;
+  map.notes = std::move(found->notes);
+  map.notes.insert(map.notes.begin(),
+                   fmt::format("The depth map inside is used: {}.", found->description));
+  map.warnings = std::move(found->warnings);
+  return map;
+}
+
 std::string EncodeDepth(const DepthMap& depth) {
   checks::RequireValid(depth);
   return io::EncodePfm({depth.width_px, depth.height_px, depth.values, depth.is_integer});

@@ -8,6 +8,7 @@
 #include <variant>
 
 #include "thicklens/model/light_field_grid.h"
+#include "tools/options/embedded_depth.h"
 #include "tools/options/estimate_plan.h"
 #include "tools/options/option_values.h"
 
@@ -176,8 +177,10 @@ EstimateCall ReadEstimateCall(const EstimateOptions& options, const RunControl& 
   if (!options.transfer.empty()) how.transfer = TransferCurve::FromName(options.transfer);
   if (options.orientation == "displayed") how.orientation = Orientation::kDisplayed;
   call.photo = ReadImage(options.image_path, how);
-  call.depth = ReadDepth(options.depth_path, DepthMeaningOf(options.depth),
-                         DepthReadOptionsOf(options.depth));
+  call.depth = options.depth_path.empty()
+                   ? DepthInsidePhoto(options, call.photo.width_px(), call.photo.height_px())
+                   : ReadDepth(options.depth_path, DepthMeaningOf(options.depth),
+                               DepthReadOptionsOf(options.depth));
   if (!options.camera_path.empty()) call.camera = ReadCamera(options.camera_path);
   if (options.aperture_of.empty()) return call;
   LightFieldReadOptions reading;

@@ -57,10 +57,13 @@ void AddInputOptions(CLI::App* command, EstimateOptions* options) {
   command->add_option("image", options->image_path, "The photograph (PNG, JPEG or TIFF)")
       ->required()
       ->type_name("IMAGE");
-  command->add_option("depth", options->depth_path, "Its depth map, of the same size")
-      ->required()
+  command
+      ->add_option(
+          "depth", options->depth_path,
+          "Its depth map, of the same size; default: the one inside the photograph's file, "
+          "as phones store it")
       ->type_name("DEPTH");
-  AddDepthOptions(command, "Required", &options->depth);
+  AddDepthOptions(command, "Required with DEPTH", &options->depth);
   command
       ->add_option("--camera", options->camera_path,
                    "The calibrated camera; optional if the depth map holds disparities")
@@ -385,7 +388,11 @@ void CheckEstimateUsage(const EstimateOptions& options) {
   needs(options.orientation == "displayed", !camera,
         "--orientation displayed: excludes --camera, which describes the sensor as stored; turn "
         "the depth map instead");
-  needs(!options.depth.kind.empty() && options.depth.kind != "disparity", camera,
+  const bool has_depth = !options.depth_path.empty();
+  needs(options.orientation == "displayed", has_depth,
+        "--orientation displayed: the depth map inside a photograph is stored like its pixels, and "
+        "both are used as they are stored; leave the option out, or give DEPTH");
+  needs(has_depth && !options.depth.kind.empty() && options.depth.kind != "disparity", camera,
         fmt::format("--depth-kind {} needs --camera; without a camera only a disparity map can be "
                     "used",
                     options.depth.kind));

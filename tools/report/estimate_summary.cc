@@ -242,6 +242,10 @@ std::string DepthText(const EstimateDiagnostics& found) {
   return text;
 }
 
+json TextOrNull(const std::string& text) {
+  return text.empty() ? json() : json(PrintableUtf8(text));
+}
+
 }  // namespace
 
 std::string ApertureInWords(const EstimateOptions& options, const EstimateDiagnostics& found) {
@@ -273,6 +277,7 @@ json EstimateJson(const EstimateOptions& options, const EstimateOutcome& outcome
                                 : options.transfer.empty()     ? "file"
                                                                : "option"},
               {"read", FileReadJson(options.image_path, outcome.photo_facts.get())},
+              {"embedded_depth", TextOrNull(outcome.embedded_depth)},
               {"aperture", ApertureJson(options, found)},
               {"exif", ExifJson(options, found)},
               {"seconds",
@@ -348,6 +353,8 @@ std::string EstimateText(const EstimateOptions& options, const EstimateOutcome& 
   std::string text;
   if (outcome.photo_facts)
     text += fmt::format("photograph   {}\n", PrintableUtf8(outcome.photo_facts->OneLine()));
+  if (!outcome.embedded_depth.empty())
+    text += fmt::format("depth map    {}\n", PrintableUtf8(outcome.embedded_depth));
   text += DepthText(found);
   text += fmt::format("light field  {} x {} views of {} x {} px, {} channel(s)\n", summary.u_count,
                       summary.v_count, summary.width_px, summary.height_px, summary.channels);

@@ -18,6 +18,7 @@ struct EstimateOutcome {
   double total_seconds = 0;     // until the light field was written, without a page
   double clipped_fraction = 0;  // share of the values, by the views' files
   std::shared_ptr<const io::ImageFacts> photo_facts;  // what was read as the photograph
+  std::string embedded_depth;  // the depth map inside it, in one line; empty: DEPTH was given
 };
 
 // "gaussian (from the camera), views of LF": the aperture in words.

@@ -1,0 +1,30 @@
+#ifndef THICKLENS_TOOLS_OPTIONS_EMBEDDED_DEPTH_H_
+#define THICKLENS_TOOLS_OPTIONS_EMBEDDED_DEPTH_H_
+
+#include <string>
+#include <vector>
+
+#include "thicklens/depth.h"
+#include "tools/options/estimate_options.h"
+#include "tools/options/light_field_options.h"
+
+namespace thicklens::tools {
+
+// The names of the depth options that were given, apart from --depth-kind.
+std::vector<std::string> GivenDepthOptions(const DepthOptions& options);
+
+// Throws UsageError if an option states what the depth map inside `path` states itself: it names
+// both. A --depth-kind that agrees is accepted.
+void RefuseOtherMeaning(const DepthOptions& options, const DepthMap& inside);
+
+// The kind of a map in words: "inverse depth (1/z)".
+std::string KindInWords(model::DepthKind kind);
+
+// Returns the depth map inside the photograph of `estimate`, in the photograph's size. Throws Error
+// if there is none, with what was looked for and found, and UsageError if the options contradict it
+// or the camera is missing that it needs.
+DepthMap DepthInsidePhoto(const EstimateOptions& options, int width_px, int height_px);
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_OPTIONS_EMBEDDED_DEPTH_H_
