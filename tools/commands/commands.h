@@ -18,6 +18,7 @@ void AddReportCommand(CLI::App* program, CommandAction* action);
 void AddExplainCommand(CLI::App* program, CommandAction* action);
 void AddDoctorCommand(CLI::App* program, CommandAction* action);
 void AddCameraCommand(CLI::App* program, CommandAction* action);
+void AddDepthCommand(CLI::App* program, CommandAction* action);
 void AddTargetCommand(CLI::App* program, CommandAction* action);
 void AddBenchCommand(CLI::App* program, CommandAction* action);
 

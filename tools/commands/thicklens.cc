@@ -141,6 +141,7 @@ int Main(int argc, char** argv) {
   tools::AddCameraCommand(&program, &action);
   tools::AddCalibrateCommand(&program, &action);
   tools::AddExplainCommand(&program, &action);
+  tools::AddDepthCommand(&program, &action);
   tools::AddEstimateCommand(&program, &action);
   tools::AddRenderCommand(&program, &action);
   tools::AddCompareCommand(&program, &action);

@@ -36,12 +36,40 @@ DepthMap DepthMap::Cropped(const model::PixelRect& rect) const {
   });
 }
 
+namespace {
+
+// A photograph in the place of its depth map is refused; one with a map inside says so.
+io::DepthFile ReadFileOrSayWhatIsInside(const std::string& path, const io::DepthReading& reading) {
+  try {
+    return io::ReadDepthFile(path, reading);
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const Error& error) {
+    std::string inside;
+    try {
+      const auto found = io::ReadEmbeddedDepthFile(path).depth;
+      if (found) inside = found->description;
+    } catch (const Interrupted&) {
+      throw;
+    } catch (const Error&) {
+      inside.clear();  // the first reason is the one that was asked for
+    }
+    if (inside.empty()) throw;
+    throw Error(fmt::format(
+        "{}; the file is a photograph with a depth map inside ({}): without a depth map of its own "
+        "it is used, and `thicklens depth extract` writes it",
+        error.what(), inside));
+  }
+}
+
+}  // namespace
+
 DepthMap ReadDepth(const std::string& path, const DepthMeaning& meaning,
                    const DepthReadOptions& options) {
   checks::RequireValid(meaning);
   std::string why;
   if (!options.IsValid(meaning, &why)) throw OptionError(why.substr(0, why.find(':')), why);
-  io::DepthFile file = io::ReadDepthFile(path, options.file);
+  io::DepthFile file = ReadFileOrSayWhatIsInside(path, options.file);
   model::FlipDepth(options.flip, file.map.width_px, &file.map.values);
   DepthMap depth{file.map.width_px,
                  file.map.height_px,
