@@ -25,19 +25,31 @@ Error NoDepth(const std::string& path) {
       others.empty() ? "" : fmt::format("; found: {}", fmt::join(others, "; "))));
 }
 
-// How a camera file for the photograph is made: by what EXIF states, and by what it does not.
-std::string CameraRemedy(const std::string& path, int width_px, int height_px) {
+// How the user gets a camera for the photograph: EXIF and data sheets describe it, a sweep
+// calibrates it. An inverse depth is linear in the disparity, so that it can do without one.
+std::string CameraRemedy(const std::string& path, model::DepthKind kind, int width_px,
+                         int height_px) {
   std::string why;
   const io::PhotoExif exif = io::ReadExifIfAny(path, width_px, height_px, &why);
   std::vector<std::string> missing;
   if (!exif.focal_length_mm) missing.emplace_back("--focal-mm MM");
   if (!exif.f_number) missing.emplace_back("--f-number N");
   if (!exif.pixel_pitch_mm) missing.emplace_back("--pitch-um UM");
-  return fmt::format(
-      "`thicklens camera init --from-exif {}{}{} -o camera.yaml` makes one from data sheets{}, and "
-      "`thicklens calibrate` measures it",
+  std::string text = fmt::format(
+      "`thicklens camera init --from-exif {}{}{} -o camera.yaml` describes it{}, and `thicklens "
+      "calibrate` completes it",
       path, missing.empty() ? "" : " ", fmt::join(missing, " "),
-      missing.empty() ? " as EXIF states them" : "; EXIF does not state these values");
+      missing.empty() ? "" : " (the photograph's EXIF does not state these values)");
+  if (kind == model::DepthKind::kInverse) {
+    text += fmt::format(
+        ". Without a camera, `thicklens depth extract {} --enlarge -o inverse.pfm` writes "
+        "dioptres, "
+        "which --depth-kind disparity --disparity-scale S --disparity-offset O takes: S px per "
+        "view "
+        "step and dioptre, O = -S/zf for a distance in focus of zf metres",
+        path);
+  }
+  return text;
 }
 
 }  // namespace
@@ -103,7 +115,8 @@ DepthMap DepthInsidePhoto(const EstimateOptions& options, int width_px, int heig
       "--camera is missing: the depth map inside {} is {}, and how far its points move from view "
       "to "
       "view depends on the camera; {}",
-      path, KindInWords(inside->meaning.kind), CameraRemedy(path, width_px, height_px)));
+      path, KindInWords(inside->meaning.kind),
+      CameraRemedy(path, inside->meaning.kind, width_px, height_px)));
 }
 
 }  // namespace thicklens::tools

@@ -199,8 +199,8 @@ void SearchHeif(const std::string& bytes, const std::string& name, EmbeddedDepth
   cv::Mat numbers;
   found.numbers.convertTo(numbers, CV_32F);
   depth.map.values.assign(numbers.begin<float>(), numbers.end<float>());
-  depth.description = fmt::format("HEIF, {} x {} px, unsigned {}-bit integers", found.numbers.cols,
-                                  found.numbers.rows, found.bits);
+  depth.description = fmt::format("HEIF, {} x {} px, numbers to {:g}", found.numbers.cols,
+                                  found.numbers.rows, *depth.map.largest_of_type);
   TakeAppleMeaning(xmp, place, &depth);
 }
 

@@ -92,7 +92,9 @@ EmbeddedDepth OfStoredImage(const std::string& bytes, const std::string& mime,
   DepthFile file = DecodeImageDepth(bytes, name, {});
   EmbeddedDepth depth;
   depth.map = std::move(file.map);
-  depth.description = std::move(file.description);
+  depth.description =
+      fmt::format("{}, {} x {} px, numbers to {:g}", NameOf(*kind), depth.map.width_px,
+                  depth.map.height_px, depth.map.largest_of_type.value_or(1));
   depth.notes = std::move(file.notes);
   if (is_jpeg) {
     depth.warnings.emplace_back(
