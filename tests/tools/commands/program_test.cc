@@ -201,8 +201,8 @@ TEST_F(ProgramTest, WithoutACommandItPrintsTheHelp) {
 TEST_F(ProgramTest, TheHelpListsTheCommandsInTheOrderOfWorkWithExamples) {
   const std::string help = Run({"--help"}).out;
   std::size_t at = help.find("Subcommands:");
-  for (const char* command : {"target", "camera", "calibrate", "explain", "estimate", "render",
-                              "compare", "report", "simulate", "bench", "doctor"}) {
+  for (const char* command : {"target", "camera", "calibrate", "explain", "depth", "estimate",
+                              "render", "compare", "report", "simulate", "bench", "doctor"}) {
     at = help.find(std::string("\n  ") + command + " ", at);
     ASSERT_NE(at, std::string::npos) << command;
   }
@@ -220,7 +220,7 @@ TEST_F(ProgramTest, TheHelpOfEstimateHasItsOptionsInGroups) {
     at = help.find(part, at);
     ASSERT_NE(at, std::string::npos) << part;
   }
-  EXPECT_THAT(help, HasSubstr("Required. Meaning of the depth map"));
+  EXPECT_THAT(help, HasSubstr("Required with DEPTH. Meaning of the depth map"));
   EXPECT_THAT(Run({"explain", "--help"}).out, HasSubstr("Required with --depth. Meaning"));
   EXPECT_THAT(Run({"compare", "--help"}).out, HasSubstr("Required with --dibr. Meaning"));
 }

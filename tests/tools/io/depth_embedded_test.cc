@@ -47,27 +47,27 @@ std::vector<float> HalvesOf(const EmbeddedDepth& depth) {
 }
 
 // The bytes with another text of the same length in the place of the first `from`.
-std::string With(std::string bytes, const std::string& from, const std::string& to) {
+std::string Altered(std::string bytes, const std::string& from, const std::string& to) {
   EXPECT_EQ(from.size(), to.size());
   const std::size_t at = bytes.find(from);
   EXPECT_NE(at, std::string::npos) << from;
   return bytes.replace(at, from.size(), to);
 }
 
-std::string RefusalOf(const std::string& bytes) {
+std::string EmbeddedRefusal(const std::string& bytes) {
   std::string message = ErrorOf([&] { FindEmbeddedDepth(bytes, "photo.jpg"); });
   EXPECT_THAT(message, StartsWith("photo.jpg: "));
   return message;
 }
 
-auto Near(float value) { return ::testing::FloatNear(value, 1e-4F * value); }
+auto AboutDepth(float value) { return ::testing::FloatNear(value, 1e-4F * value); }
 
 TEST(EmbeddedDepthTest, GDepthOfInverseRangeIsInDioptres) {
   const EmbeddedDepth depth = DepthInside("gdepth_inverse.jpg");
   EXPECT_EQ(depth.kind, model::DepthKind::kInverse);
   EXPECT_EQ(depth.map.width_px, 32);
   EXPECT_EQ(depth.map.height_px, 24);
-  EXPECT_THAT(HalvesOf(depth), ElementsAre(Near(2.08F), Near(0.4F)));
+  EXPECT_THAT(HalvesOf(depth), ElementsAre(AboutDepth(2.08F), AboutDepth(0.4F)));
   EXPECT_EQ(depth.form, "GDepth");
   EXPECT_THAT(depth.description,
               AllOf(HasSubstr("RangeInverse from 0.4 to 2.5 m along the optical axis"),
@@ -79,23 +79,19 @@ TEST(EmbeddedDepthTest, GDepthOfInverseRangeIsInDioptres) {
 TEST(EmbeddedDepthTest, GDepthAlongTheRayIsARangeInMillimetres) {
   const EmbeddedDepth depth = DepthInside("gdepth_linear_ray.jpg");
   EXPECT_EQ(depth.kind, model::DepthKind::kRange);
-  EXPECT_THAT(HalvesOf(depth), ElementsAre(Near(420), Near(900)));
+  EXPECT_THAT(HalvesOf(depth), ElementsAre(AboutDepth(420), AboutDepth(900)));
   EXPECT_THAT(depth.warnings, ElementsAre(HasSubstr("stored as JPEG")));
 }
 
 // An inverse range is no inverse depth: it is turned into the range itself.
 TEST(EmbeddedDepthTest, AnInverseRangeAlongTheRayIsARange) {
-  const std::string bytes =
-      With(PhotoWithDepth("gdepth_linear_ray.jpg"), "RangeLinear<", "Unknown    <");
-  EXPECT_THAT(RefusalOf(bytes), AllOf(HasSubstr("GDepth:Format is 'Unknown'"),
-                                      HasSubstr("RangeInverse or RangeLinear is expected")));
   EmbeddedDepth depth;
   depth.map = {2, 1, {0, 255}, true, 255};
   depth.kind = model::DepthKind::kRange;
   depth.is_inverse = true;
   depth.offset = 2.5;
   depth.scale = (0.5 - 2.5) / 255;
-  EXPECT_THAT(DepthsOf(depth).values, ElementsAre(Near(400), Near(2000)));
+  EXPECT_THAT(DepthsOf(depth).values, ElementsAre(AboutDepth(400), AboutDepth(2000)));
 }
 
 TEST(EmbeddedDepthTest, TheExtendedPacketIsPutTogether) {
@@ -125,7 +121,7 @@ TEST(EmbeddedDepthTest, TheExtendedPacketMayBeOutOfOrder) {
   ASSERT_TRUE(found.depth);
   EXPECT_EQ(found.depth->map.values, DepthInside("gdepth_extended.jpg").map.values);
   const std::string without = bytes.substr(0, second) + bytes.substr(second + length(second));
-  EXPECT_THAT(RefusalOf(without), HasSubstr("extended XMP: "));
+  EXPECT_THAT(EmbeddedRefusal(without), HasSubstr("extended XMP: "));
   const std::string doubled =
       bytes.substr(0, second) + bytes.substr(second, length(second)) + bytes.substr(second);
   EXPECT_TRUE(FindEmbeddedDepth(doubled, "photo.jpg").depth);
@@ -135,18 +131,18 @@ TEST(EmbeddedDepthTest, DynamicDepthIsBehindThePicture) {
   const EmbeddedDepth depth = DepthInside("dynamic_depth.jpg");
   EXPECT_EQ(depth.kind, model::DepthKind::kZ);
   EXPECT_EQ(depth.form, "Dynamic Depth");
-  EXPECT_THAT(HalvesOf(depth), ElementsAre(Near(1400), Near(3000)));
+  EXPECT_THAT(HalvesOf(depth), ElementsAre(AboutDepth(1400), AboutDepth(3000)));
 }
 
 TEST(EmbeddedDepthTest, AnItemOfTheContainerFollowsThoseBeforeIt) {
   const EmbeddedDepth depth = DepthInside("container_depth.jpg");
   EXPECT_EQ(depth.kind, model::DepthKind::kInverse);
-  EXPECT_THAT(HalvesOf(depth), ElementsAre(Near(1.65F), Near(0.25F)));
+  EXPECT_THAT(HalvesOf(depth), ElementsAre(AboutDepth(1.65F), AboutDepth(0.25F)));
 }
 
 TEST(EmbeddedDepthTest, WithoutAUnitTheDepthsAreRelative) {
-  const EmbeddedDepthSearch found =
-      FindEmbeddedDepth(With(PhotoWithDepth("dynamic_depth.jpg"), "Meters", "  None"), "photo.jpg");
+  const EmbeddedDepthSearch found = FindEmbeddedDepth(
+      Altered(PhotoWithDepth("dynamic_depth.jpg"), "Meters", "  None"), "photo.jpg");
   ASSERT_TRUE(found.depth);
   EXPECT_FALSE(found.depth->has_unit);
   EXPECT_THAT(found.depth->description, HasSubstr("from 1 to 3 (no unit)"));
@@ -155,7 +151,7 @@ TEST(EmbeddedDepthTest, WithoutAUnitTheDepthsAreRelative) {
 TEST(EmbeddedDepthTest, ApplesDisparityBehindAJpegIsFoundByItsXmp) {
   const EmbeddedDepth depth = DepthInside("apple_disparity.jpg");
   EXPECT_EQ(depth.kind, model::DepthKind::kInverse);
-  EXPECT_THAT(HalvesOf(depth), ElementsAre(Near(1.01F), Near(3.05F)));
+  EXPECT_THAT(HalvesOf(depth), ElementsAre(AboutDepth(1.01F), AboutDepth(3.05F)));
 }
 
 TEST(EmbeddedDepthTest, OtherImagesAreNamed) {
@@ -179,13 +175,13 @@ TEST(EmbeddedDepthTest, HeicStatesItsMeaningInTheXmpOfTheDepthImage) {
   // As the pixels are stored, though both images state to be turned.
   EXPECT_EQ(disparity.map.width_px, 128);
   EXPECT_EQ(disparity.map.height_px, 64);
-  EXPECT_THAT(HalvesOf(disparity), ElementsAre(Near(0.9F), Near(2.5F)));
+  EXPECT_THAT(HalvesOf(disparity), ElementsAre(AboutDepth(0.9F), AboutDepth(2.5F)));
   EXPECT_THAT(disparity.warnings, IsEmpty());
   const EmbeddedDepth z = DepthInside("apple_depth.heic");
   EXPECT_EQ(z.kind, model::DepthKind::kZ);
-  EXPECT_THAT(HalvesOf(z), ElementsAre(Near(1400), Near(3000)));
+  EXPECT_THAT(HalvesOf(z), ElementsAre(AboutDepth(1400), AboutDepth(3000)));
   EXPECT_THAT(z.warnings, ElementsAre(HasSubstr("depthData:Accuracy is relative")));
-  EXPECT_THAT(RefusalOf(PhotoWithDepth("apple_wrong_range.heic")),
+  EXPECT_THAT(EmbeddedRefusal(PhotoWithDepth("apple_wrong_range.heic")),
               AllOf(HasSubstr("apdi:FloatMinValue is 3"), HasSubstr("apdi:FloatMaxValue is 0.5")));
   const EmbeddedDepthSearch none =
       FindEmbeddedDepth(PhotoWithDepth("depth_without_xmp.heic"), "photo.heic");
@@ -195,37 +191,44 @@ TEST(EmbeddedDepthTest, HeicStatesItsMeaningInTheXmpOfTheDepthImage) {
 
 TEST(EmbeddedDepthTest, WrongFieldsOfGDepthAreNamed) {
   const std::string photo = PhotoWithDepth("gdepth_inverse.jpg");
-  EXPECT_THAT(RefusalOf(With(photo, ">0.4<", ">2.5<")),
+  EXPECT_THAT(EmbeddedRefusal(Altered(photo, ">0.4<", ">2.5<")),
               AllOf(HasSubstr("GDepth:Near is 2.5 and GDepth:Far is 2.5"),
                     HasSubstr("0 < Near < Far is expected")));
-  EXPECT_THAT(RefusalOf(With(photo, ">0.4<", ">abc<")), HasSubstr("GDepth:Near is 'abc'"));
-  EXPECT_THAT(RefusalOf(With(photo, ">0.4<", ">nan<")), HasSubstr("GDepth:Near is 'nan'"));
-  EXPECT_THAT(RefusalOf(With(photo, ">m<", ">y<")),
+  EXPECT_THAT(EmbeddedRefusal(Altered(photo, ">0.4<", ">abc<")), HasSubstr("GDepth:Near is 'abc'"));
+  EXPECT_THAT(EmbeddedRefusal(Altered(photo, ">0.4<", ">nan<")), HasSubstr("GDepth:Near is 'nan'"));
+  EXPECT_THAT(EmbeddedRefusal(Altered(photo, ">RangeInverse<", ">InverseRange<")),
+              AllOf(HasSubstr("GDepth:Format is 'InverseRange'"),
+                    HasSubstr("RangeInverse or RangeLinear is expected")));
+  EXPECT_THAT(EmbeddedRefusal(Altered(photo, ">m<", ">y<")),
               AllOf(HasSubstr("GDepth:Units is 'y'"), HasSubstr("m or mm is expected")));
   const std::string data = "<GDepth:Data>iVBORw0K";
-  EXPECT_THAT(RefusalOf(With(photo, data, "<GDepth:Data>iVB!Rw0K")),
+  EXPECT_THAT(EmbeddedRefusal(Altered(photo, data, "<GDepth:Data>iVB!Rw0K")),
               AllOf(HasSubstr("GDepth:Data: character"), HasSubstr("is '!'")));
-  EXPECT_THAT(RefusalOf(With(photo, data, "<GDepth:Data>AAAAAAAA")),
+  EXPECT_THAT(EmbeddedRefusal(Altered(photo, data, "<GDepth:Data>AAAAAAAA")),
               HasSubstr("a PNG or JPEG image is expected"));
-  std::string without = With(photo, "<GDepth:Data>", "<GDepth:Dada>");
-  EXPECT_THAT(RefusalOf(With(without, "</GDepth:Data>", "</GDepth:Dada>")),
+  std::string without = Altered(photo, "<GDepth:Data>", "<GDepth:Dada>");
+  EXPECT_THAT(EmbeddedRefusal(Altered(without, "</GDepth:Data>", "</GDepth:Dada>")),
               HasSubstr("GDepth:Data is missing"));
-  EXPECT_THAT(RefusalOf(With(photo, "</rdf:RDF>", "</rdf:RDD>")), HasSubstr("not valid XML"));
+  EXPECT_THAT(EmbeddedRefusal(Altered(photo, "</rdf:RDF>", "</rdf:RDD>")),
+              HasSubstr("not valid XML"));
 }
 
 TEST(EmbeddedDepthTest, WrongItemsOfAContainerAreNamed) {
   const std::string photo = PhotoWithDepth("dynamic_depth.jpg");
-  EXPECT_THAT(RefusalOf(photo.substr(0, photo.size() - 1)),
+  EXPECT_THAT(EmbeddedRefusal(photo.substr(0, photo.size() - 1)),
               AllOf(HasSubstr("item 2 of the container (android/depthmap)"),
                     HasSubstr("the file ends at 4867")));
-  EXPECT_THAT(RefusalOf(With(photo, "Length>79<", "Length>-1<")), HasSubstr("is '-1'"));
-  EXPECT_THAT(RefusalOf(With(photo, "Length>79<", "Length>00<")), HasSubstr("Item:Length"));
-  EXPECT_THAT(RefusalOf(With(photo, "Length>79<", "Length>78<")), HasSubstr("android/depthmap"));
+  EXPECT_THAT(EmbeddedRefusal(Altered(photo, "Length>79<", "Length>-1<")), HasSubstr("is '-1'"));
+  EXPECT_THAT(EmbeddedRefusal(Altered(photo, "Length>79<", "Length>00<")),
+              HasSubstr("Item:Length"));
+  EXPECT_THAT(EmbeddedRefusal(Altered(photo, "Length>79<", "Length>78<")),
+              HasSubstr("android/depthmap"));
   const std::string uri = "<DepthMap:DepthURI>android/depthmap<";
   const std::string other =
-      With(With(photo, uri, "<DepthMap:DepthURI>android/depthmaq<"), ">Depth<", ">Dopth<");
-  EXPECT_THAT(RefusalOf(other), AllOf(HasSubstr("DepthMap:DepthURI is 'android/depthmaq'"),
-                                      HasSubstr("which has 'primary_image', 'android/depthmap'")));
+      Altered(Altered(photo, uri, "<DepthMap:DepthURI>android/depthmaq<"), ">Depth<", ">Dopth<");
+  EXPECT_THAT(EmbeddedRefusal(other),
+              AllOf(HasSubstr("DepthMap:DepthURI is 'android/depthmaq'"),
+                    HasSubstr("which has 'primary_image', 'android/depthmap'")));
 }
 
 // No damage may crash, hang or allocate what the file cannot hold.
