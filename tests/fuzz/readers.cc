@@ -128,6 +128,11 @@ const std::vector<FuzzedReader>& FuzzedReaders() {
                io::ReadLightField(fs::path(path).parent_path().parent_path().string(), {});
              }),
       OfFile("depth-map", "depth.pfm", [](const std::string& path) { io::ReadDepthMap(path); }),
+      {"embedded-depth",
+       [](const std::string& bytes, const TemporaryFolder&) {
+         const io::EmbeddedDepthSearch found = io::FindEmbeddedDepth(bytes, "photo.jpg");
+         if (found.depth) io::DepthsOf(*found.depth);
+       }},
       {"image",
        [](const std::string& bytes, const TemporaryFolder&) {
          io::ToEncodedImage(io::DecodeImage(bytes, "picture.png"));

@@ -28,6 +28,7 @@ const std::vector<std::string>& Slots() {
       "estimate @ depth.pfm" + depth + "--camera camera.yaml -o new",
       "estimate picture.png @" + depth + "--camera camera.yaml -o new",
       "estimate picture.png depth.pfm" + depth + "--camera @ -o new",
+      "estimate @ --camera camera.yaml -o new", "depth extract @ -o new.pfm",
       estimate + "--profile @ --within 3600s", estimate + "--aperture-of @",
       "render @ --as-captured -o new.png", "compare @ picture.png", "compare picture.png @",
       "compare lf lf --dibr @ depth.pfm" + depth, "compare lf lf --dibr picture.png @" + depth,
