@@ -324,12 +324,8 @@ LibraryDepth HeifDepth(const std::string& bytes, const LibraryReading& reading) 
   const Handle handle(opened);
   depth.xmp = XmpOf(handle.get());
   TakeRepresentation(photo.get(), id, &depth);
-  depth.bits = heif_image_handle_get_luma_bits_per_pixel(handle.get());
-  if (depth.bits < 1 || depth.bits > 16)
-    throw Refusal("a depth image of " + std::to_string(depth.bits) + " bits");
   reading.require_memory(heif_image_handle_get_width(handle.get()),
-                         heif_image_handle_get_height(handle.get()), depth.bits > 8 ? 2 : 1,
-                         "its depth image");
+                         heif_image_handle_get_height(handle.get()), 2, "its depth image");
   const std::unique_ptr<heif_decoding_options,
                         Releases<heif_decoding_options, heif_decoding_options_free>>
       options(heif_decoding_options_alloc());
@@ -339,6 +335,11 @@ LibraryDepth HeifDepth(const std::string& bytes, const LibraryReading& reading) 
   Require(heif_decode_image(handle.get(), &decoded, heif_colorspace_undefined,
                             heif_chroma_undefined, options.get()));
   const Image image(decoded);
+  // The header may state other bits than the compressed data have.
+  depth.bits = heif_image_get_bits_per_pixel_range(image.get(), heif_channel_Y);
+  const int stored_bits = heif_image_get_bits_per_pixel(image.get(), heif_channel_Y);
+  if (depth.bits < 1 || depth.bits > 16 || stored_bits != (depth.bits > 8 ? 16 : 8))
+    throw Refusal("a depth image of " + std::to_string(depth.bits) + " bits");
   depth.numbers = Interleaved(image.get(), heif_channel_Y, depth.bits > 8 ? CV_16UC1 : CV_8UC1);
   return depth;
 }
