@@ -16,7 +16,7 @@ constexpr char kDepthData[] = "http://ns.apple.com/depthData/1.0/";
 
 double PixelNumber(const XmpNode& xmp, const char* field, const std::string& meaning,
                    const std::string& name) {
-  return NumberOf(xmp, {kPixelData, "apdi", field}, meaning, name);
+  return XmpNumberOf(xmp, {kPixelData, "apdi", field}, meaning, name);
 }
 
 }  // namespace

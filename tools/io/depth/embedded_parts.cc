@@ -35,8 +35,8 @@ std::string Shortened(const std::string& text) {
 
 }  // namespace
 
-double NumberOf(const XmpNode& xmp, const XmpField& field, const std::string& meaning,
-                const std::string& name) {
+double XmpNumberOf(const XmpNode& xmp, const XmpField& field, const std::string& meaning,
+                   const std::string& name) {
   const std::optional<std::string> text = xmp.Text(field.space, field.name);
   if (!text) throw Error(fmt::format("{}: {} is missing: {}", name, field.Shown(), meaning));
   double value = 0;

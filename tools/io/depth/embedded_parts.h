@@ -22,8 +22,8 @@ struct XmpField {
 
 // The number of the field. Throws Error that names file, field and value if it is missing or not a
 // finite number; `meaning` says in words what it should be.
-double NumberOf(const XmpNode& xmp, const XmpField& field, const std::string& meaning,
-                const std::string& name);
+double XmpNumberOf(const XmpNode& xmp, const XmpField& field, const std::string& meaning,
+                   const std::string& name);
 
 // Decodes base64 with white space in it. Throws Error that begins with `name` if it is another
 // text.

@@ -81,7 +81,7 @@ class RangeFields {
   std::optional<std::string> Of(const char* field) const { return fields_.Text(space_, field); }
 
   double Number(const char* field, const std::string& meaning) const {
-    return NumberOf(fields_, {space_, prefix_, field}, meaning, name_);
+    return XmpNumberOf(fields_, {space_, prefix_, field}, meaning, name_);
   }
 
   bool IsAxial() const {
