@@ -158,8 +158,10 @@ class DepthChannel {
     const double allowed = kind_ == ImageFileKind::kJpeg ? kJpegLevels : 0;
     const double difference = LargestDifference(pixels_, colours);
     if (colours.size() < 3 || difference > allowed) ThrowOfColours(colours);
+    std::vector<std::string> names;
+    for (const int channel : colours) names.push_back(names_[static_cast<std::size_t>(channel)]);
     file->notes.push_back(fmt::format("Its {} channels ({}) {}: they are one map.", colours.size(),
-                                      Listed(names_),
+                                      Listed(names),
                                       difference == 0 ? "are equal" : "are equal up to rounding"));
     return colours[0];
   }
