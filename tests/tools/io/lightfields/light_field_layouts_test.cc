@@ -44,7 +44,7 @@ cv::Mat View(double a, double b, double disparity_px = 0.7) {
   return view;
 }
 
-std::string Encoded(const cv::Mat& image, const std::string& ending = ".png") {
+std::string EncodedTile(const cv::Mat& image, const std::string& ending = ".png") {
   std::vector<unsigned char> bytes;
   cv::imencode(ending, image, bytes);
   return {bytes.begin(), bytes.end()};
@@ -61,7 +61,7 @@ class LightFieldLayouts : public ::testing::Test {
   std::string Folder(const std::function<std::string(int, int)>& name,
                      const std::function<cv::Mat(int, int)>& view, const char* ending = ".png") {
     for (int v = 0; v < 3; ++v) {
-      for (int u = 0; u < 3; ++u) folder_.Put("lf/" + name(v, u), Encoded(view(u, v), ending));
+      for (int u = 0; u < 3; ++u) folder_.Put("lf/" + name(v, u), EncodedTile(view(u, v), ending));
     }
     return folder_ / "lf";
   }
@@ -186,13 +186,14 @@ TEST_F(LightFieldLayouts, AQuiltBeginsAtItsBottomLeft) {
     View(i - 2.5, 0)
         .copyTo(quilt(cv::Rect(i % 3 * kViewWidthPx, (1 - i / 3) * kViewHeightPx, kViewWidthPx,
                                kViewHeightPx)));
-  const model::LightField light_field = Read(folder_.Put("scene_qs3x2a1.5.png", Encoded(quilt)));
+  const model::LightField light_field =
+      Read(folder_.Put("scene_qs3x2a1.5.png", EncodedTile(quilt)));
   ASSERT_EQ(light_field.u_count, 6);
   ASSERT_EQ(light_field.v_count, 1);
   for (int k = 0; k < 6; ++k)
     EXPECT_EQ(LevelAt(light_field, k, 0, 30, 20), View(k - 2.5, 0).at<cv::Vec3b>(20, 30)[0]);
   EXPECT_THAT(facts_.notices, IsEmpty());
-  EXPECT_THAT(ErrorOf([&] { Read(folder_.Put("scene_qs5x7a1.png", Encoded(quilt))); }),
+  EXPECT_THAT(ErrorOf([&] { Read(folder_.Put("scene_qs5x7a1.png", EncodedTile(quilt))); }),
               HasSubstr("5 x 7 tiles"));
 }
 
@@ -213,10 +214,10 @@ TEST_F(LightFieldLayouts, ViewsSideBySideAndLenslets) {
   LightFieldReading reading;
   reading.layout = "tiles";
   reading.layout_u = reading.layout_v = 3;
-  ExpectViews(Read(folder_.Put("tiles.png", Encoded(tiles)), reading));
+  ExpectViews(Read(folder_.Put("tiles.png", EncodedTile(tiles)), reading));
   reading = {};
   reading.grid = 3;
-  ExpectViews(Read(folder_.Put("x_eslf.png", Encoded(lenslets)), reading));
+  ExpectViews(Read(folder_.Put("x_eslf.png", EncodedTile(lenslets)), reading));
   EXPECT_THAT(facts_.one_line, HasSubstr("lenslets of 3 x 3 px"));
 }
 
@@ -230,10 +231,10 @@ TEST_F(LightFieldLayouts, WhatDoesNotFitIsNamed) {
   std::remove((path + "/view_1_1.png").c_str());
   EXPECT_THAT(ErrorOf([&] { Read(path); }),
               AllOf(HasSubstr("row 1, column 1"), HasSubstr("sparse")));
-  folder_.Put("lf/view_999999_7.png", Encoded(View(0, 0)));
+  folder_.Put("lf/view_999999_7.png", EncodedTile(View(0, 0)));
   EXPECT_THAT(ErrorOf([&] { Read(path); }), HasSubstr("at most"));
   EXPECT_THAT(
-      ErrorOf([&] { Read(folder_.Put("a_qs2x2a1.png", Encoded(View(0, 0)).substr(0, 99))); }),
+      ErrorOf([&] { Read(folder_.Put("a_qs2x2a1.png", EncodedTile(View(0, 0)).substr(0, 99))); }),
       HasSubstr("a_qs2x2a1.png"));
 }
 
