@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "calib/calibrate/focus_solution.h"
+#include "calib/calibrate/response_effects.h"
 #include "calib/edges/edge_blur.h"
 #include "calib/fit/blur_measurement.h"
 #include "calib/fit/source_recipe.h"
@@ -411,6 +412,9 @@ class Calibrator {
     if (sweep_.target_period_mm) CheckMagnification(sweep_, reference_, Grey(reference_), &result_);
     if (result_.summary.outcome == Outcome::kRefused) return;
     WidenByContradictions(evidence.setup, fit);
+    task.scales = scales_;
+    task.tick = [] { ThrowIfCancelled(); };
+    CheckCameraResponse(task, evidence, fit, &result_);
     if (options_.map_field) MapField(sweep_, evidence, fit, &store_, &result_);
   }
 

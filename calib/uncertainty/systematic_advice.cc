@@ -128,4 +128,16 @@ void WidenByTrials(const std::string& name, const std::string& remedy,
   SortAndAdvise(calibration);
 }
 
+void WidenRatio(const std::string& name, const Eigen::Vector2d& moves, const std::string& remedy,
+                Calibration* calibration) {
+  SystematicPart part;
+  part.name = name;
+  part.remedy = remedy;
+  part.blur_ratio = moves;
+  std::optional<Result>& ratio = calibration->summary.blur_ratio;
+  if (ratio && ratio->systematic) *ratio->systematic += moves;
+  calibration->diagnostics.systematic_parts.push_back(part);
+  SortAndAdvise(calibration);
+}
+
 }  // namespace thicklens::calib

@@ -1,6 +1,7 @@
 #ifndef THICKLENS_CALIB_UNCERTAINTY_SYSTEMATIC_ADVICE_H_
 #define THICKLENS_CALIB_UNCERTAINTY_SYSTEMATIC_ADVICE_H_
 
+#include <Eigen/Core>
 #include <string>
 #include <vector>
 
@@ -29,6 +30,11 @@ void WidenFocus(const std::string& name, double move_mm, const std::string& reme
 void WidenByTrials(const std::string& name, const std::string& remedy,
                    const std::vector<BlurFitSetup>& setups, const BlurFitResult& fit,
                    Calibration* calibration);
+
+// Adds a part that moves kappa alone, by `moves` (lowest <= 0 <= highest), to the table and
+// linearly to the interval of kappa.
+void WidenRatio(const std::string& name, const Eigen::Vector2d& moves, const std::string& remedy,
+                Calibration* calibration);
 
 }  // namespace thicklens::calib
 

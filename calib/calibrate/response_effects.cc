@@ -1,0 +1,285 @@
+#include "calib/calibrate/response_effects.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <opencv2/core.hpp>
+#include <string>
+
+#include "calib/fit/frame_outliers.h"
+#include "calib/registration/scale_tracking.h"
+#include "calib/response/light_exponent.h"
+#include "calib/response/processing_traces.h"
+#include "calib/response/response_frames.h"
+#include "calib/response/weak_detail.h"
+#include "calib/uncertainty/systematic_advice.h"
+
+namespace thicklens::calib {
+namespace {
+
+constexpr double kLeastNoiseSteps = 0.6;     // noise that rounding does not hide, steps of the file
+constexpr double kAgrees = 0.1;              // |ln exponent| of a curve that describes the frames
+constexpr double kReachOfLoss = 2;           // standard deviations
+constexpr double kLargestRatioChange = 0.5;  // of kappa
+constexpr double kClippingMargin = 1.0 / 64;  // of full scale, over which a clipped value spreads
+
+BlurTask TaskWith(const BlurTask& task, const FocusSweep& sweep, FrameStore& store) {
+  BlurTask other(sweep, store);
+  other.frames = task.frames;
+  other.reference = task.reference;
+  other.scales = task.scales;
+  other.scale_follows_readings = task.scale_follows_readings;
+  other.law = task.law;
+  other.offset_mm = task.offset_mm;
+  other.scale_centre_mm = task.scale_centre_mm;
+  other.reading_sigma_mm = task.reading_sigma_mm;
+  other.reading_sigma_is_known = task.reading_sigma_is_known;
+  other.start_focus_depth_mm = task.start_focus_depth_mm;
+  other.pixel_noise = task.pixel_noise;
+  other.threads = task.threads;
+  other.tick = task.tick;
+  return other;
+}
+
+class ResponseCheck {
+ public:
+  ResponseCheck(const BlurTask& task, const BlurEvidence& evidence, const BlurFitResult& fit,
+                Calibration* calibration)
+      : task_(task), evidence_(evidence), fit_(fit), result_(*calibration) {}
+
+  void Run() {
+    frames_ = FramesReadBy(task_.store);
+    if (frames_.frames.size() < 5) return;
+    size_ = task_.store.Grey(frames_.frames.front().frame).size();
+    CameraResponse& response = result_.diagnostics.response;
+    response.measured = true;
+    response.light_exponent = MeasureLightExponent(frames_, size_);
+    if (response.ContradictsTransfer()) ReportTransfer();
+    response.weak_detail_loss = MeasureWeakDetailLoss(InTrueLight(), size_);
+    response.noise_rise = MeasureNoiseRise(frames_, size_, LeastNoise());
+    response.block_grid = MeasureBlockGrid(frames_, size_);
+    if (response.LosesWeakDetail() || response.IsCompressed()) ReportProcessing();
+    if (response.IsSharpened()) ReportSharpening();
+  }
+
+ private:
+  ResponseFrames FramesReadBy(FrameStore& store) const {
+    ResponseFrames frames;
+    frames.read_grey = [&store](std::size_t frame) { return store.Grey(frame); };
+    frames.centre = centre();
+    frames.psf = result_.diagnostics.blur.better_psf;
+    frames.tick = task_.tick;
+    const model::TransferCurve& curve = task_.sweep.camera.sensor.transfer;
+    for (const ScaleSample& sample : task_.scales) {
+      const FrameMeasurement& measured = result_.frames[sample.frame];
+      if (sample.scale_is_from_reading || !measured.rejection.empty()) continue;
+      ResponseFrame frame;
+      frame.frame = sample.frame;
+      frame.registration = sample.registration;
+      frame.registration.scale = sample.scale;
+      frame.variance_px2 = FittedDefocusVariance(evidence_.setup, fit_, measured.depth_mm);
+      if (measured.statistics.saturated_fraction > 0)
+        frame.brightest = curve.Decode(measured.statistics.saturation_level - kClippingMargin);
+      if (measured.statistics.black_fraction > 0)
+        frame.darkest = curve.Decode(measured.statistics.black_level + kClippingMargin);
+      frames.frames.push_back(frame);
+    }
+    return frames;
+  }
+
+  cv::Point2d centre() const { return RegionCentre(task_.sweep); }
+
+  // The frames in light that is corrected for a wrong transfer, so that processing is not confused
+  // with it.
+  ResponseFrames InTrueLight() const {
+    ResponseFrames frames = frames_;
+    const CameraResponse& response = result_.diagnostics.response;
+    if (!response.ContradictsTransfer()) return frames;
+    frames.read_grey = [read = frames_.read_grey,
+                        exponent = response.light_exponent->value](std::size_t frame) {
+      cv::Mat light;
+      cv::pow(cv::max(read(frame), 0), exponent, light);
+      return light;
+    };
+    return frames;
+  }
+
+  // Noise in linear light that the rounding of the file does not hide.
+  double LeastNoise() {
+    const FrameStatistics& typical = result_.frames[frames_.frames.front().frame].statistics;
+    const double step =
+        task_.store.Stored(frames_.frames.front().frame).depth() == CV_8U ? 1.0 / 255 : 1.0 / 65535;
+    const model::TransferCurve& curve = task_.sweep.camera.sensor.transfer;
+    return kLeastNoiseSteps *
+           (curve.Decode(typical.mean_encoded + step) - curve.Decode(typical.mean_encoded));
+  }
+
+  // ---- transfer ----
+  FocusSweep ReadBy(const model::TransferCurve& curve) const {
+    FocusSweep sweep = task_.sweep;
+    sweep.camera.sensor.transfer = curve;
+    return sweep;
+  }
+
+  std::optional<model::Estimate> ExponentBy(const model::TransferCurve& curve) const {
+    const FocusSweep sweep = ReadBy(curve);
+    FrameStore store(sweep);
+    ResponseFrames frames = FramesReadBy(store);
+    const model::TransferCurve& stated = task_.sweep.camera.sensor.transfer;
+    for (ResponseFrame& frame : frames.frames) {
+      if (frame.darkest >= 0) frame.darkest = curve.Decode(stated.Encode(frame.darkest));
+      if (frame.brightest <= 1) frame.brightest = curve.Decode(stated.Encode(frame.brightest));
+    }
+    return MeasureLightExponent(frames, size_);
+  }
+
+  // The curve whose light the blur conserves: a usual one, or else a power.
+  std::optional<model::TransferCurve> BetterCurve() const {
+    const model::TransferCurve& stated = task_.sweep.camera.sensor.transfer;
+    std::optional<model::TransferCurve> best;
+    double least = std::numeric_limits<double>::infinity();
+    std::optional<model::Estimate> of_linear;
+    for (const model::TransferCurve& curve :
+         {model::TransferCurve::Linear(), model::TransferCurve::Srgb()}) {
+      if (curve == stated) continue;
+      const std::optional<model::Estimate> exponent = ExponentBy(curve);
+      if (curve == model::TransferCurve::Linear()) of_linear = exponent;
+      if (!exponent || !(exponent->value > 0)) continue;
+      const double off = std::abs(std::log(exponent->value));
+      if (off < std::max(kAgrees, 2 * exponent->sigma / exponent->value) && off < least) {
+        least = off;
+        best = curve;
+      }
+    }
+    if (best) return best;
+    if (stated == model::TransferCurve::Linear())
+      of_linear = result_.diagnostics.response.light_exponent;
+    if (!of_linear || !(of_linear->value > 0.1 && of_linear->value < 10)) return std::nullopt;
+    return model::TransferCurve::Gamma(std::round(100 * of_linear->value) / 100);
+  }
+
+  // The blur of the frames in the light of another curve, with everything else as it was.
+  std::optional<BlurFitSetup> SetupBy(const model::TransferCurve& curve) const {
+    const FocusSweep sweep = ReadBy(curve);
+    FrameStore store(sweep);
+    BlurEvidence evidence = MeasureBlur(TaskWith(task_, sweep, store));
+    Calibration scratch = result_;
+    if (evidence.setup.estimators.empty() || RejectOutliers(sweep.direction, &evidence, &scratch))
+      return std::nullopt;
+    evidence.setup.floor_variance_px2 = evidence_.setup.floor_variance_px2;
+    return evidence.setup;
+  }
+
+  void ReportTransfer() {
+    CameraResponse& response = result_.diagnostics.response;
+    const std::optional<model::TransferCurve> better = BetterCurve();
+    std::string text = fmt::format(
+        "the frames contradict sensor.transfer: {} of the camera file: out of focus the mean of "
+        "textured parts changes against that of flat parts, although a lens spreads light and "
+        "loses none. The light is the value that was read to the power {:.3g} +- {:.2g} (1 if the "
+        "transfer were right); gain, black level, vignetting and clipping do not explain this",
+        task_.sweep.camera.sensor.transfer.Name(), response.light_exponent->value,
+        response.light_exponent->sigma);
+    if (better) {
+      response.better_transfer = better->Name();
+      const double before = result_.summary.blur_ratio->value;
+      if (const auto setup = SetupBy(*better)) {
+        const BlurFitResult trial = FitBlur(*setup, &fit_);
+        if (trial.done) {
+          text += fmt::format(
+              "; with transfer {} kappa is {:.4f} instead of {:.4f}, and zf moves "
+              "by {:+.3f} mm",
+              better->Name(), trial.values[kBlurRatio], before,
+              trial.values[kFocusDepth] - fit_.values[kFocusDepth]);
+        }
+        WidenByTrials("sensor.transfer",
+                      fmt::format("state transfer: {} in the camera file", better->Name()),
+                      {*setup}, fit_, &result_);
+      }
+      text += fmt::format(
+          ". State transfer: {} in the camera file, or use frames whose transfer is known (a "
+          "camera that changes the contrast of each part of an image by itself looks the same)",
+          better->Name());
+    }
+    result_.summary.warnings.push_back(text);
+  }
+
+  // ---- processing ----
+  void ReportProcessing() {
+    const CameraResponse& response = result_.diagnostics.response;
+    const model::Estimate loss = response.weak_detail_loss.value_or(model::Estimate{0, 0});
+    const bool loses = response.LosesWeakDetail();
+    const double kappa = result_.summary.blur_ratio->value;
+    const double usual = CameraResponse::kLossToRatio * std::max(0.0, loss.value);
+    const double bound = loses ? CameraResponse::kLargestFactor * usual
+                               : CameraResponse::kLossToRatio *
+                                     (std::max(0.0, loss.value) + kReachOfLoss * loss.sigma);
+    const double most = std::min(kLargestRatioChange, bound);
+    const std::string grid =
+        response.block_grid
+            ? fmt::format(
+                  "the steps at the borders of blocks of 8 x 8 px are {:.0f} % larger than "
+                  "others, as compression (JPEG) makes them",
+                  100 * response.block_grid->value)
+            : "";
+    std::string text;
+    if (loses) {
+      text = fmt::format(
+          "the camera, or a program, removed weak detail: per factor e of contrast, detail loses "
+          "{:.2g} +- {:.2g} % beyond what the blur takes, and a lens loses nothing. {}. This makes "
+          "kappa too large, by about {:.2g} % here (at most {:.2g} %, by simulated sweeps), and "
+          "the "
+          "interval of kappa contains it: use frames without noise reduction (raw), in a file "
+          "without loss",
+          100 * loss.value, 100 * loss.sigma,
+          response.IsCompressed()
+              ? "Compression is a cause: " + grid + "; noise reduction may be another"
+              : std::string("Noise reduction has this effect; no blocks of a compression are seen"),
+          100 * usual, 100 * most);
+    } else {
+      text = fmt::format(
+          "the frames were strongly compressed: {}. Compression removes weak detail and makes "
+          "kappa "
+          "too large{}: use files without loss, or of a higher quality",
+          grid,
+          response.weak_detail_loss
+              ? fmt::format("; by the weak detail of these frames, by at most {:.2g} %", 100 * most)
+              : ", by an amount that this target does not show");
+    }
+    result_.summary.warnings.push_back(text);
+    if (most > 0)
+      WidenRatio("removed weak detail", {-most * kappa, 0},
+                 "use frames without noise reduction and compression", &result_);
+  }
+
+  void ReportSharpening() {
+    const model::Estimate& rise = *result_.diagnostics.response.noise_rise;
+    result_.summary.warnings.push_back(fmt::format(
+        "the frames are sharpened: the noise of single pixels has {:.0f} +- {:.0f} % more power "
+        "than that of 4 x 4 px, and only sharpening makes noise rise toward fine detail. A filter "
+        "that is the same in all frames changes the blur floor and moves kappa by less than {:.1g} "
+        "% (by simulated sweeps); the blur floor is that of lens and sharpening together, and a "
+        "floor that was measured without sharpening does not hold",
+        100 * rise.value, 100 * rise.sigma, 100 * CameraResponse::kSharpeningOnRatio));
+    const double move = CameraResponse::kSharpeningOnRatio * result_.summary.blur_ratio->value;
+    WidenRatio("sharpening", {-move, move}, "switch the sharpening of the camera off", &result_);
+  }
+
+  const BlurTask& task_;
+  const BlurEvidence& evidence_;
+  const BlurFitResult& fit_;
+  Calibration& result_;
+  ResponseFrames frames_;
+  cv::Size size_;
+};
+
+}  // namespace
+
+void CheckCameraResponse(const BlurTask& task, const BlurEvidence& evidence,
+                         const BlurFitResult& fit, Calibration* calibration) {
+  ResponseCheck(task, evidence, fit, calibration).Run();
+}
+
+}  // namespace thicklens::calib
