@@ -75,6 +75,19 @@ std::vector<std::string> DiagnosisLines(const calib::Calibration& calibration) {
   return lines;
 }
 
+std::string ResponseLine(const calib::CameraResponse& response) {
+  std::vector<std::string> found;
+  if (response.light_exponent)
+    found.push_back(
+        fmt::format("the light is the value as read to the power {}",
+                    WithError(response.light_exponent->value, response.light_exponent->sigma, "")));
+  if (response.weak_detail_loss)
+    found.push_back(fmt::format("weak detail loses {} per factor e of contrast",
+                                SignedWithError(100 * response.weak_detail_loss->value,
+                                                100 * response.weak_detail_loss->sigma, "%")));
+  return fmt::format("{}", fmt::join(found, "; "));
+}
+
 nlohmann::json SharpestJson(const calib::Calibration& calibration) {
   const calib::SharpestReading& sharpest = calibration.diagnostics.sharpest;
   nlohmann::json out = {{"done", sharpest.done}, {"message", PrintableUtf8(sharpest.message)}};
@@ -114,6 +127,22 @@ nlohmann::json StructureJson(const calib::FrameStructureFinding& structure) {
   out["bands_run_along"] = !structure.HasBands()         ? nlohmann::json(nullptr)
                            : structure.bands_are_columns ? nlohmann::json("columns")
                                                          : nlohmann::json("rows");
+  return out;
+}
+
+nlohmann::json ResponseJson(const calib::CameraResponse& response) {
+  if (!response.measured) return nullptr;
+  nlohmann::json out = {{"light_exponent", ErrorJson(response.light_exponent)},
+                        {"weak_detail_loss", ErrorJson(response.weak_detail_loss)},
+                        {"noise_rise", ErrorJson(response.noise_rise)},
+                        {"block_grid", ErrorJson(response.block_grid)}};
+  out["contradicts_transfer"] = response.ContradictsTransfer();
+  out["loses_weak_detail"] = response.LosesWeakDetail();
+  out["is_sharpened"] = response.IsSharpened();
+  out["is_compressed"] = response.IsCompressed();
+  out["better_transfer"] = response.better_transfer.empty()
+                               ? nlohmann::json(nullptr)
+                               : nlohmann::json(PrintableUtf8(response.better_transfer));
   return out;
 }
 

@@ -23,11 +23,15 @@ std::string ScaleChangeLine(const calib::ScaleModel& scale);
 // "the image scale against the readings: the target moves as stated (chi2 31); then ...": one line
 // for each comparison.
 std::vector<std::string> DiagnosisLines(const calib::Calibration& calibration);
+// "the light is the value as read to the power 1.002 +- 0.004; weak detail loses -0.1 +- 0.2 %":
+// what the frames show of the camera's transfer and processing; empty if they show nothing.
+std::string ResponseLine(const calib::CameraResponse& response);
 
 // The findings as JSON; null if nothing was measured.
 nlohmann::json SharpestJson(const calib::Calibration& calibration);
 nlohmann::json DiagnosesJson(const calib::Calibration& calibration);
 nlohmann::json StructureJson(const calib::FrameStructureFinding& structure);
+nlohmann::json ResponseJson(const calib::CameraResponse& response);
 
 }  // namespace thicklens::tools
 
