@@ -1,0 +1,123 @@
+// Traces of processing on frames that were made without the project's simulator.
+#include <gtest/gtest.h>
+
+#include <opencv2/imgcodecs.hpp>
+#include <vector>
+
+#include "calib/response/processing_traces.h"
+#include "calib/response/weak_detail.h"
+#include "tests/calib/response/response_scene.h"
+#include "thicklens/calib/camera_response.h"
+
+namespace thicklens::calib {
+namespace {
+
+using thicklens::testing::ReadFrom;
+using thicklens::testing::ResponseScene;
+using thicklens::testing::Rounded;
+
+CameraResponse ResponseTo(const ResponseScene& scene, cv::Mat (*process)(const cv::Mat& bytes)) {
+  std::vector<cv::Mat> light;
+  ResponseFrames frames = scene.Make(&light);
+  for (cv::Mat& image : light) {
+    cv::Mat bytes;
+    image.convertTo(bytes, CV_8U, 255);
+    process(bytes).convertTo(image, CV_32F, 1.0 / 255);
+  }
+  ReadFrom(light, &frames);
+  const cv::Size size = light.front().size();
+  CameraResponse response;
+  response.measured = true;
+  response.weak_detail_loss = MeasureWeakDetailLoss(frames, size);
+  response.noise_rise = MeasureNoiseRise(frames, size, 0.6 / 255);
+  response.block_grid = MeasureBlockGrid(frames, size);
+  return response;
+}
+
+cv::Mat Unchanged(const cv::Mat& bytes) { return bytes; }
+
+// Edge-preserving smoothing, written out here: pixels of like grey are averaged.
+cv::Mat Denoised(const cv::Mat& bytes) {
+  cv::Mat smooth;
+  cv::bilateralFilter(bytes, smooth, 9, 18, 3);
+  return smooth;
+}
+
+cv::Mat Sharpened(const cv::Mat& bytes) {
+  cv::Mat wide, sharp;
+  cv::GaussianBlur(bytes, wide, cv::Size(), 1);
+  cv::addWeighted(bytes, 2, wide, -1, 0, sharp);
+  return sharp;
+}
+
+cv::Mat Smoothed(const cv::Mat& bytes) {
+  cv::Mat smooth;
+  cv::GaussianBlur(bytes, smooth, cv::Size(), 0.7);
+  return smooth;
+}
+
+template <int quality>
+cv::Mat Compressed(const cv::Mat& bytes) {
+  std::vector<unsigned char> file;
+  cv::imencode(".jpg", bytes, file, {cv::IMWRITE_JPEG_QUALITY, quality});
+  return cv::imdecode(file, cv::IMREAD_UNCHANGED);
+}
+
+ResponseScene Noisy() {
+  ResponseScene scene;
+  scene.noise = 0.012;
+  scene.largest_sigma_px = 9;
+  scene.frames = 21;
+  scene.scale_step = 0.003;
+  return scene;
+}
+
+TEST(Processing, AnUnprocessedCameraIsNotAccused) {
+  const CameraResponse found = ResponseTo(Noisy(), &Unchanged);
+  ASSERT_TRUE(found.weak_detail_loss && found.noise_rise && found.block_grid);
+  EXPECT_NEAR(found.weak_detail_loss->value, 0, 4 * found.weak_detail_loss->sigma + 0.004);
+  EXPECT_NEAR(found.noise_rise->value, 0, 0.15);
+  EXPECT_NEAR(found.block_grid->value, 0, 0.1);
+  EXPECT_FALSE(found.LosesWeakDetail() || found.IsSharpened() || found.IsCompressed());
+}
+
+TEST(Processing, NoiseReductionLosesWeakDetail) {
+  const CameraResponse found = ResponseTo(Noisy(), &Denoised);
+  EXPECT_TRUE(found.LosesWeakDetail());
+  EXPECT_FALSE(found.IsSharpened() || found.IsCompressed());
+}
+
+TEST(Processing, SharpeningRaisesTheNoiseAndLosesNoDetail) {
+  const CameraResponse found = ResponseTo(Noisy(), &Sharpened);
+  EXPECT_TRUE(found.IsSharpened());
+  EXPECT_FALSE(found.LosesWeakDetail() || found.IsCompressed());
+}
+
+// A lens, demosaicing and resampling smooth all detail alike.
+TEST(Processing, SmoothingAlikeIsNoProcessing) {
+  const CameraResponse found = ResponseTo(Noisy(), &Smoothed);
+  ASSERT_TRUE(found.noise_rise);
+  EXPECT_LT(found.noise_rise->value, 0);
+  EXPECT_FALSE(found.LosesWeakDetail() || found.IsSharpened() || found.IsCompressed());
+}
+
+TEST(Processing, StrongCompressionShowsItsBlocks) {
+  EXPECT_TRUE(ResponseTo(Noisy(), &Compressed<15>).IsCompressed());
+  EXPECT_FALSE(ResponseTo(Noisy(), &Compressed<95>).IsCompressed());
+}
+
+TEST(ProcessingSlow, NoGoodFramesAreAccused) {
+  int accused = 0;
+  for (std::uint64_t seed = 200; seed < 240; ++seed) {
+    ResponseScene scene = Noisy();
+    scene.seed = seed;
+    scene.noise = 0.003 * static_cast<double>(1 + seed % 5);
+    scene.smallest_disc_px = 1 + 0.5 * static_cast<double>(seed % 4);
+    const CameraResponse found = ResponseTo(scene, seed % 2 == 0 ? &Unchanged : &Smoothed);
+    accused += found.LosesWeakDetail() || found.IsSharpened() || found.IsCompressed() ? 1 : 0;
+  }
+  EXPECT_EQ(accused, 0);
+}
+
+}  // namespace
+}  // namespace thicklens::calib
