@@ -191,7 +191,7 @@ void ForgetSignalHandlers() {
                                     std::optional<double> memory_left_mib) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   ForgetSignalHandlers();
-  // libmatio and libhdf5 write their warnings there.
+  // libhdf5 writes its warnings there.
   const int nowhere = open("/dev/null", O_RDWR | O_CLOEXEC);
   if (nowhere < 0) _exit(1);
   for (const int standard : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) dup2(nowhere, standard);

@@ -132,6 +132,13 @@ class HdfArrays : public ArraySource {
     const StoredNumber number = NumberOf(Require(H5Dget_type(data_set), name));
     const auto count = static_cast<std::size_t>(H5Sget_simple_extent_npoints(space));
     const std::size_t bytes = count * BytesOf(number);
+    // Numbers that were never written have no bytes in the file.
+    constexpr std::size_t kMostOfAByte = 1032;
+    const hsize_t stored = H5Dget_storage_size(data_set);
+    if (bytes / kMostOfAByte > stored || stored == 0) {
+      throw ArrayRefusal(name + ": the " + std::to_string(bytes) + " bytes of its numbers are " +
+                         std::to_string(stored) + " bytes in the file");
+    }
     const auto values = std::make_unique<unsigned char[]>(bytes);
     if (H5Dread(data_set, InMemory(number), H5S_ALL, H5S_ALL, H5P_DEFAULT, values.get()) < 0)
       Refuse(name);

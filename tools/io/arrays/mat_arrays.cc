@@ -1,145 +1,428 @@
-// Variables of Matlab's files. MAT 5 is read by libmatio, MAT 7.3 as the HDF5 file that it is.
+// Variables of Matlab's files. MAT 7.3 is read as the HDF5 file that it is. MAT 5 is read here and
+// not by libmatio 1.5.23, which returns zeros for the rest of a truncated file, and the bytes of
+// other variables if a variable states more numbers than it has. The format is that of MathWorks'
+// "MAT-File Format": elements of a type, a length and so many bytes.
+#include <fcntl.h>
 #include <hdf5.h>
-#include <matio.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <zlib.h>
 
+#include <algorithm>
+#include <array>
+#include <cstring>
 #include <limits>
+#include <memory>
 
 #include "tools/io/arrays/arrays.h"
 
 namespace thicklens::io {
 namespace {
 
-constexpr int kMostVariables = 1000;
-constexpr int kMostAxes = 32;
-constexpr std::size_t kMostTasks = 100;
+constexpr std::size_t kHeaderBytes = 128;
+constexpr std::size_t kMostVariables = 1000;
+constexpr std::size_t kMostAxes = 32;
 constexpr std::size_t kMostLetters = 200;
+// Bytes of a variable that are inflated to find its name and size, and those of a structure.
+constexpr std::size_t kStartBytes = 4096;
+constexpr std::size_t kMostOptionsBytes = std::size_t{64} << 20;
 
-StoredNumber NumberOfClass(const matvar_t& variable) {
-  if (variable.isComplex != 0 || variable.isLogical != 0) return StoredNumber::kOther;
-  switch (variable.class_type) {
-    case MAT_C_UINT8:
+// Types of elements, and classes of variables.
+enum MatType : std::uint32_t {
+  kMiInt8 = 1,
+  kMiUint8 = 2,
+  kMiInt16 = 3,
+  kMiUint16 = 4,
+  kMiInt32 = 5,
+  kMiUint32 = 6,
+  kMiSingle = 7,
+  kMiDouble = 9,
+  kMiMatrix = 14,
+  kMiCompressed = 15,
+  kMiUtf8 = 16,
+};
+enum MatClass : std::uint32_t {
+  kMxCell = 1,
+  kMxStruct = 2,
+  kMxChar = 4,
+  kMxDouble = 6,
+  kMxSingle = 7,
+  kMxUint8 = 9,
+  kMxUint16 = 11,
+};
+
+struct Bytes {
+  const unsigned char* first = nullptr;
+  std::size_t count = 0;
+};
+struct Element {
+  std::uint32_t type = 0;
+  Bytes data;
+};
+
+template <typename Number>
+Number NumberAt(const unsigned char* at, bool is_swapped) {
+  std::array<unsigned char, sizeof(Number)> bytes;
+  std::copy(at, at + sizeof(Number), bytes.begin());
+  if (is_swapped) std::reverse(bytes.begin(), bytes.end());
+  Number number;
+  std::memcpy(&number, bytes.data(), sizeof number);
+  return number;
+}
+
+// Elements that follow each other.
+class Elements {
+ public:
+  Elements(Bytes bytes, bool is_swapped) : bytes_(bytes), is_swapped_(is_swapped) {}
+
+  bool AtEnd() const { return at_ >= bytes_.count; }
+  // With `may_end` the bytes are the start of more, and the element may end beyond them.
+  Element Next(bool may_end = false) {
+    constexpr std::size_t kTag = 8, kSmall = 4;
+    if (bytes_.count - at_ < kTag) throw ArrayRefusal("it ends within a variable");
+    const unsigned char* const tag = bytes_.first + at_;
+    Element element;
+    element.type = NumberAt<std::uint32_t>(tag, is_swapped_);
+    // An element of at most 4 bytes has them in its tag.
+    if (element.type >> 16U != 0) {
+      element.data = {tag + kSmall, element.type >> 16U};
+      element.type &= 0xFFFFU;
+      if (element.data.count > kSmall) throw ArrayRefusal("an element has a wrong length");
+      at_ += kTag;
+      return element;
+    }
+    std::size_t length = NumberAt<std::uint32_t>(tag + kSmall, is_swapped_);
+    const std::size_t left = bytes_.count - at_ - kTag;
+    if (length > left && !may_end) {
+      throw ArrayRefusal("it ends within a variable: " + std::to_string(length) +
+                         " bytes are stated, " + std::to_string(left) + " are left");
+    }
+    length = std::min(length, left);
+    element.data = {tag + kTag, length};
+    const std::size_t padded = element.type == kMiCompressed ? length : (length + 7) / 8 * 8;
+    at_ = std::min(bytes_.count, at_ + kTag + padded);
+    return element;
+  }
+  Element Next(std::uint32_t type, const char* what) {
+    const Element element = Next();
+    if (element.type != type) throw ArrayRefusal(std::string("a variable has no ") + what);
+    return element;
+  }
+
+ private:
+  Bytes bytes_;
+  std::size_t at_ = 0;
+  bool is_swapped_ = false;
+};
+
+// What begins a variable, and where its contents follow.
+struct Variable {
+  std::uint32_t kind = 0;
+  bool is_complex = false, is_logical = false;
+  std::vector<std::uint64_t> size;
+  std::string name;
+  Elements contents;
+
+  std::uint64_t Count() const {
+    std::uint64_t count = 1;
+    for (const std::uint64_t along : size) {
+      if (along > 0 && count > std::numeric_limits<std::uint64_t>::max() / along)
+        throw ArrayRefusal(name + " is too large");
+      count *= along;
+    }
+    return count;
+  }
+};
+
+Variable VariableOf(Bytes matrix, bool is_swapped) {
+  Variable variable{0, false, false, {}, "", Elements(matrix, is_swapped)};
+  Elements& elements = variable.contents;
+  const Element flags = elements.Next(kMiUint32, "flags");
+  if (flags.data.count != 8) throw ArrayRefusal("a variable has no flags");
+  const auto bits = NumberAt<std::uint32_t>(flags.data.first, is_swapped);
+  variable.kind = bits & 0xFFU;
+  variable.is_complex = (bits & 0x800U) != 0;
+  variable.is_logical = (bits & 0x200U) != 0;
+  const Element size = elements.Next(kMiInt32, "size");
+  if (size.data.count / 4 > kMostAxes) throw ArrayRefusal("a variable has too many axes");
+  for (std::size_t i = 0; i + 4 <= size.data.count; i += 4) {
+    const auto count = NumberAt<std::int32_t>(size.data.first + i, is_swapped);
+    if (count < 0) throw ArrayRefusal("a variable has a negative size");
+    variable.size.push_back(static_cast<std::uint64_t>(count));
+  }
+  const Element name = elements.Next();
+  variable.name.assign(reinterpret_cast<const char*>(name.data.first),
+                       std::min(name.data.count, kMostLetters));
+  return variable;
+}
+
+StoredNumber NumberOf(const Variable& variable) {
+  if (variable.is_complex || variable.is_logical) return StoredNumber::kOther;
+  switch (variable.kind) {
+    case kMxUint8:
       return StoredNumber::kUint8;
-    case MAT_C_UINT16:
+    case kMxUint16:
       return StoredNumber::kUint16;
-    case MAT_C_SINGLE:
+    case kMxSingle:
       return StoredNumber::kFloat;
-    case MAT_C_DOUBLE:
+    case kMxDouble:
       return StoredNumber::kDouble;
     default:
       return StoredNumber::kOther;
   }
 }
 
-std::string WordsOfClass(const matvar_t& variable) {
-  if (variable.isComplex != 0) return "complex numbers";
-  if (variable.isLogical != 0) return "logical values";
-  switch (variable.class_type) {
-    case MAT_C_UINT8:
-      return "unsigned 8-bit integers";
-    case MAT_C_UINT16:
-      return "unsigned 16-bit integers";
-    case MAT_C_SINGLE:
-      return "32-bit floats";
-    case MAT_C_DOUBLE:
-      return "64-bit floats";
-    case MAT_C_INT8:
-    case MAT_C_INT16:
-    case MAT_C_INT32:
-    case MAT_C_INT64:
-      return "signed integers";
-    case MAT_C_UINT32:
-    case MAT_C_UINT64:
-      return "unsigned integers of more than 16 bits";
-    case MAT_C_STRUCT:
-      return "a structure";
-    case MAT_C_CELL:
-      return "cells";
-    case MAT_C_SPARSE:
-      return "a sparse matrix";
+std::string WordsOf(const Variable& variable) {
+  if (variable.is_complex) return "complex numbers";
+  if (variable.is_logical) return "logical values";
+  constexpr std::array<const char*, 16> kWords = {"no numbers",
+                                                  "cells",
+                                                  "a structure",
+                                                  "an object",
+                                                  "text",
+                                                  "a sparse matrix",
+                                                  "64-bit floats",
+                                                  "32-bit floats",
+                                                  "signed 8-bit integers",
+                                                  "unsigned 8-bit integers",
+                                                  "signed 16-bit integers",
+                                                  "unsigned 16-bit integers",
+                                                  "signed 32-bit integers",
+                                                  "unsigned 32-bit integers",
+                                                  "signed 64-bit integers",
+                                                  "unsigned 64-bit integers"};
+  return kWords[variable.kind < kWords.size() ? variable.kind : 0];
+}
+
+// Bytes of a number of an element; 0: none.
+std::size_t BytesOfType(std::uint32_t type) {
+  switch (type) {
+    case kMiInt8:
+    case kMiUint8:
+    case kMiUtf8:
+      return 1;
+    case kMiInt16:
+    case kMiUint16:
+      return 2;
+    case kMiInt32:
+    case kMiUint32:
+    case kMiSingle:
+      return 4;
+    case kMiDouble:
+      return 8;
     default:
-      return "no numbers";
+      return 0;
   }
 }
 
-std::string TextOf(const matvar_t* text) {
-  if (text == nullptr || text->class_type != MAT_C_CHAR || text->data == nullptr ||
-      text->rank < 1) {
-    return "";
+double ValueAt(const unsigned char* at, std::uint32_t type, bool is_swapped) {
+  switch (type) {
+    case kMiInt8:
+      return static_cast<signed char>(*at);
+    case kMiInt16:
+      return NumberAt<std::int16_t>(at, is_swapped);
+    case kMiUint16:
+      return NumberAt<std::uint16_t>(at, is_swapped);
+    case kMiInt32:
+      return NumberAt<std::int32_t>(at, is_swapped);
+    case kMiUint32:
+      return NumberAt<std::uint32_t>(at, is_swapped);
+    case kMiSingle:
+      return static_cast<double>(NumberAt<float>(at, is_swapped));
+    case kMiDouble:
+      return NumberAt<double>(at, is_swapped);
+    default:
+      return *at;
   }
-  std::size_t count = 1;
-  for (int i = 0; i < text->rank; ++i) count *= text->dims[i];
-  std::string letters;
-  // Matlab writes UTF-16 or UTF-8.
-  const bool is_wide = text->data_type == MAT_T_UINT16 || text->data_type == MAT_T_UTF16;
-  if (count > kMostLetters || text->nbytes < count * (is_wide ? 2 : 1)) return "";
-  for (std::size_t i = 0; i < count; ++i) {
-    letters += static_cast<char>(is_wide ? static_cast<const mat_uint16_t*>(text->data)[i]
-                                         : static_cast<const mat_uint8_t*>(text->data)[i]);
+}
+
+// Passes the numbers on as those of the variable's class: Matlab stores them in the smallest type
+// that holds all of them.
+template <typename Number>
+void PutAs(const Element& element, bool is_swapped, const PutBytes& put) {
+  const std::size_t each = BytesOfType(element.type);
+  std::vector<Number> numbers(element.data.count / each);
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    const double value = ValueAt(element.data.first + i * each, element.type, is_swapped);
+    if constexpr (std::numeric_limits<Number>::is_integer) {
+      if (!(value >= 0 && value <= std::numeric_limits<Number>::max()))
+        throw ArrayRefusal("a number does not fit into its type");
+    }
+    numbers[i] = static_cast<Number>(value);
   }
-  return letters;
+  put(numbers.data(), numbers.size() * sizeof(Number));
+}
+
+std::string TextOf(Bytes matrix, bool is_swapped) {
+  Variable text = VariableOf(matrix, is_swapped);
+  if (text.kind != kMxChar || text.Count() > kMostLetters || text.contents.AtEnd()) return "";
+  const Element letters = text.contents.Next();
+  const std::size_t each = BytesOfType(letters.type);
+  std::string result;
+  for (std::size_t i = 0; each > 0 && i + each <= letters.data.count; i += each) {
+    result += static_cast<char>(
+        static_cast<int>(ValueAt(letters.data.first + i, letters.type, is_swapped)) & 0x7F);
+  }
+  return result;
+}
+
+// Inflates at most so many bytes.
+std::vector<unsigned char> Inflated(Bytes compressed, std::size_t most_bytes) {
+  std::vector<unsigned char> bytes(most_bytes);
+  z_stream stream{};
+  if (inflateInit(&stream) != Z_OK) throw ArrayRefusal("zlib cannot begin");
+  const std::unique_ptr<z_stream, int (*)(z_stream*)> end(&stream, inflateEnd);
+  std::size_t in = 0, out = 0;
+  int result = Z_OK;
+  while (result == Z_OK && out < bytes.size()) {
+    constexpr std::size_t kAtOnce = std::size_t{1} << 28;
+    const std::size_t in_now = std::min(compressed.count - in, kAtOnce);
+    const std::size_t out_now = std::min(bytes.size() - out, kAtOnce);
+    stream.next_in = const_cast<unsigned char*>(compressed.first + in);  // NOLINT: zlib reads it
+    stream.avail_in = static_cast<uInt>(in_now);
+    stream.next_out = bytes.data() + out;
+    stream.avail_out = static_cast<uInt>(out_now);
+    result = inflate(&stream, Z_NO_FLUSH);
+    in += in_now - stream.avail_in;
+    out += out_now - stream.avail_out;
+  }
+  if (result != Z_OK && result != Z_STREAM_END && result != Z_BUF_ERROR)
+    throw ArrayRefusal("the compressed bytes of a variable are damaged");
+  bytes.resize(out);
+  return bytes;
 }
 
 class MatArrays : public ArraySource {
  public:
-  explicit MatArrays(const std::string& path) : file_(Mat_Open(path.c_str(), MAT_ACC_RDONLY)) {
-    if (file_ == nullptr) throw ArrayRefusal("no file of Matlab 5 or later");
+  explicit MatArrays(const std::string& path) {
+    const int file = open(path.c_str(), O_RDONLY | O_CLOEXEC);
+    struct stat status {};
+    if (file < 0 || fstat(file, &status) != 0) throw ArrayRefusal("it cannot be opened");
+    bytes_.count = static_cast<std::size_t>(status.st_size);
+    if (bytes_.count < kHeaderBytes) throw ArrayRefusal("it ends within its header");
+    void* const map = mmap(nullptr, bytes_.count, PROT_READ, MAP_PRIVATE, file, 0);
+    if (map == MAP_FAILED) throw ArrayRefusal("it cannot be mapped into memory");
+    bytes_.first = static_cast<const unsigned char*>(map);
+    // "IM" by a machine with the lowest byte first, as all on which this program runs.
+    is_swapped_ = bytes_.first[kHeaderBytes - 2] == 'M';
   }
 
   StoredFile Content() override {
     StoredFile content;
-    bool has_options = false;
-    for (int i = 0; i < kMostVariables; ++i) {
-      const matvar_t* const variable = Mat_VarReadNextInfo(file_);
-      if (variable == nullptr) break;
-      if (variable->name == nullptr || variable->rank < 0 || variable->rank > kMostAxes) continue;
-      StoredArray array;
-      array.name = variable->name;
-      array.size.assign(variable->dims, variable->dims + variable->rank);
-      array.number = NumberOfClass(*variable);
-      array.type = WordsOfClass(*variable);
-      has_options = has_options || array.name == "DecodeOptions";
-      content.arrays.push_back(array);
+    Elements elements({bytes_.first + kHeaderBytes, bytes_.count - kHeaderBytes}, is_swapped_);
+    while (!elements.AtEnd() && elements_.size() < kMostVariables) {
+      const Element element = elements.Next();
+      if (element.type != kMiCompressed && element.type != kMiMatrix) continue;
+      if (element.data.count == 0) continue;
+      std::vector<unsigned char> start;
+      const Variable variable = VariableOf(StartOf(element, &start), is_swapped_);
+      content.arrays.push_back(
+          {variable.name, variable.size, NumberOf(variable), WordsOf(variable)});
+      elements_.push_back(element);
     }
-    if (has_options) ReadTasks(&content);
+    for (std::size_t i = 0; i < elements_.size(); ++i) {
+      if (content.arrays[i].name != "DecodeOptions") continue;
+      std::vector<unsigned char> whole;
+      content.tasks = TasksOf(WholeOf(elements_[i], kMostOptionsBytes, &whole));
+    }
     return content;
   }
 
   void Read(const std::string& name, const PutBytes& put) override {
-    Mat_Rewind(file_);
-    matvar_t* const variable = Mat_VarReadInfo(file_, name.c_str());
-    if (variable == nullptr) throw ArrayRefusal(name + " is not in it");
-    const std::size_t each = BytesOf(NumberOfClass(*variable));
-    std::size_t bytes = each;
-    for (int i = 0; i < variable->rank; ++i) {
-      const std::size_t count = variable->dims[i];
-      if (count > 0 && bytes > std::numeric_limits<std::size_t>::max() / count)
-        throw ArrayRefusal(name + " is too large");
-      bytes *= count;
+    for (const Element& element : elements_) {
+      std::vector<unsigned char> start, whole;
+      if (VariableOf(StartOf(element, &start), is_swapped_).name != name) continue;
+      const Bytes matrix = WholeOf(element, std::numeric_limits<std::uint32_t>::max(), &whole);
+      Variable variable = VariableOf(matrix, is_swapped_);
+      const Element numbers = variable.contents.Next();
+      const std::size_t each = BytesOfType(numbers.type);
+      if (each == 0 || numbers.data.count % each != 0 ||
+          numbers.data.count / each != variable.Count()) {
+        throw ArrayRefusal("the size of " + name + " states " + std::to_string(variable.Count()) +
+                           " numbers, its data are " + std::to_string(numbers.data.count) +
+                           " bytes");
+      }
+      Put(numbers, NumberOf(variable), put);
+      return;
     }
-    if (each == 0 || Mat_VarReadDataAll(file_, variable) != 0 || variable->data == nullptr ||
-        variable->nbytes != bytes) {
-      throw ArrayRefusal("the numbers of " + name + " cannot be read");
-    }
-    put(variable->data, bytes);
+    throw ArrayRefusal(name + " is not in it");
   }
 
  private:
-  void ReadTasks(StoredFile* content) {
-    Mat_Rewind(file_);
-    matvar_t* const options = Mat_VarRead(file_, "DecodeOptions");
-    if (options == nullptr || options->class_type != MAT_C_STRUCT) return;
-    matvar_t* const tasks = Mat_VarGetStructFieldByName(options, "OptionalTasks", 0);
-    if (tasks == nullptr) return;
-    content->tasks.emplace();
-    if (tasks->class_type == MAT_C_CHAR) content->tasks->push_back(TextOf(tasks));
-    if (tasks->class_type != MAT_C_CELL || tasks->data == nullptr) return;
-    std::size_t count = 1;
-    for (int i = 0; i < tasks->rank; ++i) count *= tasks->dims[i];
-    for (std::size_t i = 0; i < count && i < kMostTasks; ++i)
-      content->tasks->push_back(TextOf(static_cast<matvar_t* const*>(tasks->data)[i]));
+  // The first bytes of a variable's contents.
+  Bytes StartOf(const Element& element, std::vector<unsigned char>* bytes) const {
+    if (element.type == kMiMatrix) return element.data;
+    *bytes = Inflated(element.data, kStartBytes);
+    return Elements({bytes->data(), bytes->size()}, is_swapped_).Next(true).data;
   }
 
-  mat_t* file_ = nullptr;
+  // All bytes of a variable's contents.
+  Bytes WholeOf(const Element& element, std::size_t most_bytes,
+                std::vector<unsigned char>* bytes) const {
+    if (element.type == kMiMatrix) return element.data;
+    constexpr std::size_t kTag = 8, kMostOfAByte = 1032;
+    const std::vector<unsigned char> tag = Inflated(element.data, kTag);
+    if (tag.size() < kTag) throw ArrayRefusal("it ends within a variable");
+    const std::size_t length = NumberAt<std::uint32_t>(tag.data() + 4, is_swapped_);
+    if (length > most_bytes || length / kMostOfAByte > element.data.count) {
+      throw ArrayRefusal(std::to_string(element.data.count) + " bytes cannot hold the " +
+                         std::to_string(length) + " bytes of a variable");
+    }
+    *bytes = Inflated(element.data, kTag + length);
+    const Element matrix = Elements({bytes->data(), bytes->size()}, is_swapped_).Next();
+    if (matrix.type != kMiMatrix) throw ArrayRefusal("compressed bytes hold no variable");
+    return matrix.data;
+  }
+
+  void Put(const Element& numbers, StoredNumber number, const PutBytes& put) const {
+    const bool is_as_stored = (number == StoredNumber::kUint8 && numbers.type == kMiUint8) ||
+                              (number == StoredNumber::kUint16 && numbers.type == kMiUint16) ||
+                              (number == StoredNumber::kFloat && numbers.type == kMiSingle) ||
+                              (number == StoredNumber::kDouble && numbers.type == kMiDouble);
+    if (is_as_stored && !is_swapped_) return put(numbers.data.first, numbers.data.count);
+    switch (number) {
+      case StoredNumber::kUint8:
+        return PutAs<std::uint8_t>(numbers, is_swapped_, put);
+      case StoredNumber::kUint16:
+        return PutAs<std::uint16_t>(numbers, is_swapped_, put);
+      case StoredNumber::kFloat:
+        return PutAs<float>(numbers, is_swapped_, put);
+      case StoredNumber::kDouble:
+        return PutAs<double>(numbers, is_swapped_, put);
+      default:
+        throw ArrayRefusal("it has no numbers");
+    }
+  }
+
+  // The texts in the cells of the field OptionalTasks; absent if there is no such field.
+  std::optional<std::vector<std::string>> TasksOf(Bytes matrix) const {
+    Variable options = VariableOf(matrix, is_swapped_);
+    if (options.kind != kMxStruct) return std::nullopt;
+    const Element length = options.contents.Next(kMiInt32, "length of names");
+    const Element names = options.contents.Next(kMiInt8, "names of fields");
+    const std::size_t each =
+        length.data.count == 4 ? NumberAt<std::uint32_t>(length.data.first, is_swapped_) : 0;
+    for (std::size_t at = 0; each > 0 && at + each <= names.data.count; at += each) {
+      const Element field = options.contents.Next(kMiMatrix, "fields");
+      const auto* const letters = reinterpret_cast<const char*>(names.data.first + at);
+      if (std::string(letters, strnlen(letters, each)) != "OptionalTasks") continue;
+      std::vector<std::string> tasks;
+      if (field.data.count == 0) return tasks;
+      Variable cells = VariableOf(field.data, is_swapped_);
+      if (cells.kind == kMxChar) tasks.push_back(TextOf(field.data, is_swapped_));
+      while (cells.kind == kMxCell && !cells.contents.AtEnd()) {
+        const Element cell = cells.contents.Next(kMiMatrix, "cells");
+        if (cell.data.count > 0) tasks.push_back(TextOf(cell.data, is_swapped_));
+      }
+      return tasks;
+    }
+    return std::nullopt;
+  }
+
+  Bytes bytes_;
+  bool is_swapped_ = false;
+  std::vector<Element> elements_;
 };
 
 }  // namespace
