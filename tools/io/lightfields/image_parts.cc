@@ -1,5 +1,7 @@
 // A file with a view in each part: EXR files with several parts, whose names hold the row and the
-// column, and, where the option layout says so, the pages of a TIFF file.
+// column, and, where the option layout says so, the pages of a TIFF file. EXR files of several
+// views name them in their attributes: `view` in each part, or `multiView` for the channels of one
+// part (openexr.com/en/latest/MultiViewOpenEXR.html); these names are then used.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -20,27 +22,172 @@
 namespace thicklens::io {
 namespace {
 
+// What the header of one part of an EXR file says about views.
+struct ExrPart {
+  std::string view;                // the view that it is
+  std::vector<std::string> views;  // those of its channels, that without a prefix first
+  std::vector<std::string> channels;
+};
+
+// Reads numbers and texts of a header; what lies beyond the end is empty.
+class ExrHeader {
+ public:
+  explicit ExrHeader(const std::string& bytes) : bytes_(bytes) {}
+  std::string Text(std::size_t end) {
+    const std::size_t found = std::min(bytes_.find('\0', at_), std::min(end, bytes_.size()));
+    const std::string text = at_ < found ? bytes_.substr(at_, found - at_) : "";
+    at_ = std::max(at_, found) + 1;
+    return text;
+  }
+  std::string Text() { return Text(bytes_.size()); }
+  std::size_t Length() {
+    std::size_t value = 0;
+    for (std::size_t i = 4; i-- > 0;)
+      value =
+          value << 8 | (at_ + i < bytes_.size() ? static_cast<unsigned char>(bytes_[at_ + i]) : 0);
+    at_ += 4;
+    return value;
+  }
+  std::string Bytes(std::size_t count) {
+    const std::string text = at_ < bytes_.size() ? bytes_.substr(at_, count) : "";
+    at_ += count;
+    return text;
+  }
+  bool AtEnd() const { return at_ >= bytes_.size(); }
+  std::size_t at() const { return at_; }
+  void GoTo(std::size_t at) { at_ = at; }
+
+ private:
+  const std::string& bytes_;
+  std::size_t at_ = 8;  // after the magic number and the version
+};
+
+bool IsExr(const std::string& bytes) { return KindOfImage(bytes) == ImageFileKind::kExr; }
+
 // Whether the version field of an EXR file says that it has several parts (bit 12;
 // openexr.com/en/latest/OpenEXRFileLayout.html).
 bool IsMultiPartExr(const std::string& bytes) {
   constexpr std::size_t kSecondByteOfFlags = 5;
   constexpr unsigned kMultiPart = 0x10;
-  return KindOfImage(bytes) == ImageFileKind::kExr && bytes.size() > kSecondByteOfFlags &&
+  return IsExr(bytes) && bytes.size() > kSecondByteOfFlags &&
          (static_cast<unsigned char>(bytes[kSecondByteOfFlags]) & kMultiPart) != 0;
+}
+
+// The headers of an EXR file: attributes of a name, a type, a length and a value.
+std::vector<ExrPart> ExrPartsOf(const std::string& bytes) {
+  std::vector<ExrPart> parts(1);
+  if (!IsExr(bytes)) return parts;
+  ExrHeader header(bytes);
+  while (!header.AtEnd()) {
+    const std::string name = header.Text();
+    if (name.empty()) {  // the end of a header; an empty header ends all of them
+      if (!IsMultiPartExr(bytes) || header.AtEnd() || bytes[header.at()] == '\0') break;
+      parts.emplace_back();
+      continue;
+    }
+    const std::string type = header.Text();
+    const std::size_t length = header.Length();
+    const std::size_t end = header.at() + length;
+    if (end > bytes.size()) break;
+    ExrPart& part = parts.back();
+    if (name == "view" && type == "string") part.view = header.Bytes(length);
+    while (name == "multiView" && type == "stringvector" && header.at() + 4 <= end)
+      part.views.push_back(header.Bytes(std::min(header.Length(), end - header.at())));
+    while (name == "channels" && type == "chlist" && header.at() + 1 < end) {
+      part.channels.push_back(header.Text(end));
+      header.Bytes(16);
+    }
+    header.GoTo(end);
+  }
+  return parts;
+}
+
+// The channels of a view in a part of several: "left.R", or "R" of the first view.
+std::vector<std::string> ChannelsOfView(const ExrPart& part, std::size_t view) {
+  const std::string prefix = view == 0 ? "" : part.views[view] + ".";
+  for (const std::vector<std::string>& wanted :
+       {std::vector<std::string>{"R", "G", "B"}, std::vector<std::string>{"Y"}}) {
+    std::vector<std::string> names;
+    for (const std::string& channel : wanted) {
+      if (std::find(part.channels.begin(), part.channels.end(), prefix + channel) !=
+          part.channels.end()) {
+        names.push_back(prefix + channel);
+      }
+    }
+    if (names.size() == wanted.size()) return names;
+  }
+  return {};
+}
+
+// The views of a file whose only part has the channels of several.
+std::optional<ViewSource> OpenMultiView(const LayoutInput& input, const std::string& bytes,
+                                        const ExrPart& part) {
+  std::string text = input.reading->name;
+  if (text.empty()) {
+    const std::optional<NameProposal> proposal = ProposedPattern(part.views);
+    if (!proposal) {
+      // Files of a left and a right view are no light fields.
+      if (!input.is_forced) return std::nullopt;
+      throw Error(fmt::format(
+          "{}: it has {} views: {}; views whose names hold the row and the column are expected, or "
+          "the option name states how they are named, e.g. 'view_{{v}}_{{u}}'",
+          input.path, part.views.size(), Listed(part.views)));
+    }
+    text = proposal->pattern;
+  }
+  std::vector<std::string> others;
+  const ViewGrid grid =
+      GridOfNames(input.path, NamePattern(text), part.views, *input.reading, &others);
+  ViewSource source;
+  source.kind = fmt::format("an EXR file of {} views named '{}'", part.views.size() - others.size(),
+                            PrintableUtf8(text));
+  source.frame = grid.frame;
+  if (!others.empty()) source.details.push_back(fmt::format("not used: {}", Listed(others)));
+  source.read = [file = std::make_shared<const std::string>(bytes), part, grid, path = input.path](
+                    int k, int l) {
+    const std::string& view = grid.At(k, l);
+    const auto at = std::find(part.views.begin(), part.views.end(), view) - part.views.begin();
+    const std::string name = fmt::format("{}, view '{}'", path, PrintableUtf8(view));
+    ImageReading reading;
+    reading.channels = ChannelsOfView(part, static_cast<std::size_t>(at));
+    if (reading.channels.empty()) {
+      throw Error(fmt::format("{}: it has no channels R, G and B and no channel Y", name));
+    }
+    const DecodedImage image = DecodeImageFile(*file, name, reading);
+    return LightOfPixels(image.pixels, image.facts, name);
+  };
+  return source;
+}
+
+// The names of the parts, or their views if each is another view.
+std::vector<std::string> NamesOfParts(const std::vector<DecodedImage>& pages,
+                                      const std::vector<ExrPart>& parts) {
+  std::set<std::string> views;
+  for (const ExrPart& part : parts) views.insert(part.view);
+  std::vector<std::string> names;
+  const bool has_views =
+      parts.size() == pages.size() && views.size() == pages.size() && views.count("") == 0;
+  for (std::size_t i = 0; i < pages.size(); ++i) {
+    const ImageFacts& facts = pages[i].facts;
+    names.push_back(has_views            ? parts[i].view
+                    : facts.part.empty() ? fmt::format("page {}", facts.page)
+                                         : facts.part);
+  }
+  return names;
 }
 
 }  // namespace
 
 std::optional<ViewSource> OpenImageParts(const LayoutInput& input) {
   const std::string bytes = ReadWholeFile(input.path);
+  const std::vector<ExrPart> parts = ExrPartsOf(bytes);
+  if (parts.size() == 1 && parts[0].views.size() > 1) {
+    return OpenMultiView(input, bytes, parts[0]);
+  }
   if (!input.is_forced && !IsMultiPartExr(bytes)) return std::nullopt;
   const auto pages =
       std::make_shared<const std::vector<DecodedImage>>(DecodeImagePages(bytes, input.path));
-  std::vector<std::string> names;
-  for (const DecodedImage& page : *pages) {
-    names.push_back(page.facts.part.empty() ? fmt::format("page {}", page.facts.page)
-                                            : page.facts.part);
-  }
+  const std::vector<std::string> names = NamesOfParts(*pages, parts);
   if (std::set<std::string>(names.begin(), names.end()).size() != names.size()) {
     throw Error(fmt::format("{}: two parts have one name: {}", input.path, Listed(names)));
   }

@@ -23,6 +23,7 @@ struct ViewSource {
   std::string kind;                  // "a Stanford folder"
   std::vector<std::string> details;  // clauses for the line that says what was read
   std::vector<std::string> notices;  // sentences
+  std::string mirrored;              // a clause: which direction files of this layout mirror
 };
 
 // A file or a folder that may be a light field.
@@ -53,6 +54,11 @@ std::optional<ViewSource> OpenQuilt(const LayoutInput& input);
 std::optional<ViewSource> OpenLensletImage(const LayoutInput& input);
 std::optional<ViewSource> OpenTiledImage(const LayoutInput& input);
 std::optional<ViewSource> OpenImageParts(const LayoutInput& input);
+std::optional<ViewSource> OpenMatFile(const LayoutInput& input);
+std::optional<ViewSource> OpenHdf5File(const LayoutInput& input);
+
+// Whether it is a MAT or HDF5 file, which no other reader can read.
+bool IsFileOfArrays(const std::string& path);
 
 }  // namespace thicklens::io
 

@@ -29,11 +29,13 @@ namespace {
 namespace fs = std::filesystem;
 
 // All layouts, in the order in which they are tried.
-constexpr std::array<ViewLayout, 8> kLayouts = {{
+constexpr std::array<ViewLayout, 10> kLayouts = {{
     {"thicklens", "lightfield.yaml", true, OpenOwnFolder},
     {"hci", "input_Cam000.png, input_Cam001.png, ...", true, OpenHciFolder},
     {"stanford", "out_00_00_Y_X_.png, ...", true, OpenStanfordFolder},
     {"names", "names in which a row and a column change", true, OpenNamedFolder},
+    {"mat", "a MAT file with a variable LF", false, OpenMatFile},
+    {"hdf5", "an HDF5 file with a data set LF", false, OpenHdf5File},
     {"quilt", "_qs8x6a0.75 in the name", false, OpenQuilt},
     {"parts", "an EXR file of several parts", false, OpenImageParts},
     {"lenslets", "eslf in the name", false, OpenLensletImage},
@@ -159,7 +161,7 @@ std::string ContentOfFolder(const std::string& folder) {
       "{}: is a file; the folder of a light field is expected, or an image of many views: a quilt "
       "(its name states its tiles, e.g. _qs8x6a0.75), lenslets (eslf in the name, or the option "
       "layout: lenslets:14x14), or views side by side, which this image does not show (the option "
-      "layout: tiles:9x9)",
+      "layout: tiles:9x9), or a MAT or HDF5 file with an array LF",
       path));
 }
 
@@ -189,7 +191,8 @@ ViewSource OpenSource(const std::string& path, const LightFieldReading& reading)
     if (std::optional<ViewSource> source = layout->open(input)) return *std::move(source);
     ThrowNoLayout(path, input.is_folder);
   }
-  if (!input.is_folder && !KindOfImage(ReadWholeFile(path))) ThrowNoLayout(path, false);
+  if (!input.is_folder && !IsFileOfArrays(path) && !KindOfImage(ReadWholeFile(path)))
+    ThrowNoLayout(path, false);
   for (const ViewLayout& candidate : kLayouts) {
     if (candidate.is_of_folders != input.is_folder) continue;
     if (std::optional<ViewSource> source = candidate.open(input)) return *std::move(source);
@@ -234,12 +237,14 @@ void Reorder(const LightFieldReading& reading, ViewSource* source) {
 }
 
 // States what the shifts between the views say about their order.
-void ReportOrder(const std::string& path, const model::LightField& light_field,
-                 LightFieldFacts* facts) {
+void ReportOrder(const std::string& path, const ViewSource& source,
+                 const model::LightField& light_field, LightFieldFacts* facts) {
   const ViewOrderFinding finding = FindViewOrder(light_field);
-  constexpr char kMirrored[] =
-      "the shifts do not say which of both counts backwards: in the right order near things have "
-      "the larger disparity";
+  const std::string mirrored =
+      source.mirrored.empty()
+          ? "the shifts do not say which of both counts backwards: in the right order near things "
+            "have the larger disparity"
+          : source.mirrored;
   switch (finding.order) {
     case ViewOrder::kUndecided:
       facts->one_line +=
@@ -258,13 +263,13 @@ void ReportOrder(const std::string& path, const model::LightField& light_field,
       facts->notices.push_back(fmt::format(
           "{}: the rows or the columns of the views count backwards: disparities have opposite "
           "signs across and down; the option view-order mirror-u or mirror-v turns them ({})",
-          path, kMirrored));
+          path, mirrored));
       break;
     case ViewOrder::kSwappedMirrored:
       facts->notices.push_back(fmt::format(
           "{}: rows and columns of the views are exchanged, and one of them counts backwards; the "
           "option view-order swap,mirror-u or swap,mirror-v turns them ({})",
-          path, kMirrored));
+          path, mirrored));
       break;
     case ViewOrder::kIrregular:
       facts->notices.push_back(fmt::format(
@@ -282,62 +287,112 @@ void ReportOrder(const std::string& path, const model::LightField& light_field,
 
 // ---- Black views.
 
-// No value of a black view is above this, linear light: 3 levels of 255 in sRGB, the noise of JPEG.
+// A value up to this, linear light, is black: 3 levels of 255 in sRGB, the noise of JPEG.
 constexpr float kMostOfBlack = 0.001F;
-// Where the median view is not brighter than this somewhere, the light field is too dark to judge.
+// A view is black if no more of its values than this share are brighter: hot pixels.
+constexpr double kMostHotShare = 1e-4;
+// Views are judged where the middle one has at least this share of values above this light. In a
+// dark scene with a lamp, a view that does not see the lamp is black too, and right.
 constexpr float kLeastOfOthers = 0.01F;
+constexpr double kLeastBrightShare = 0.01;
+// Views with less than this part of the middle mean are reported: they are hardly within the
+// aperture, but they have light.
+constexpr double kDim = 0.1;
 
-float HighestValue(const model::LightField& light_field, int k, int l) {
-  float highest = 0;
+struct ViewLight {
+  double above_black = 0, bright = 0;  // shares of the values
+  double mean = 0;
+};
+
+ViewLight LightOf(const model::LightField& light_field, int k, int l) {
+  ViewLight light;
   for (int channel = 0; channel < light_field.channels; ++channel) {
     const float* const first = light_field.values.data() + light_field.ViewStart(channel, k, l);
-    for (std::size_t i = 0; i < light_field.view_size(); ++i) highest = std::max(highest, first[i]);
+    for (std::size_t i = 0; i < light_field.view_size(); ++i) {
+      light.above_black += first[i] > kMostOfBlack ? 1 : 0;
+      light.bright += first[i] > kLeastOfOthers ? 1 : 0;
+      light.mean += std::isfinite(first[i]) ? static_cast<double>(first[i]) : 0;
+    }
   }
-  return highest;
+  const double count = static_cast<double>(light_field.view_size()) * light_field.channels;
+  return {light.above_black / count, light.bright / count, light.mean / count};
+}
+
+double MiddleOf(const std::vector<ViewLight>& lights, double ViewLight::*what) {
+  std::vector<double> values;
+  for (const ViewLight& light : lights) values.push_back(light.*what);
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+void LeaveOut(int k, int l, model::LightField* light_field) {
+  if (light_field->present.empty()) {
+    light_field->present.assign(
+        static_cast<std::size_t>(light_field->u_count * light_field->v_count), true);
+  }
+  light_field->present[static_cast<std::size_t>(l * light_field->u_count + k)] = false;
+  light_field->weights(l, k) = 0;
+  for (int channel = 0; channel < light_field->channels; ++channel) {
+    const auto first = light_field->values.begin() +
+                       static_cast<std::ptrdiff_t>(light_field->ViewStart(channel, k, l));
+    std::fill(first, first + static_cast<std::ptrdiff_t>(light_field->view_size()), 0.0F);
+  }
 }
 
 // Leaves out views without light among others that have some, such as those outside the round
-// aperture of a plenoptic camera.
-void LeaveOutBlackViews(model::LightField* light_field, LightFieldFacts* facts) {
+// aperture of a plenoptic camera. Our own layout states its views and their weights: a black view
+// of it is reported, and the statement is not overruled.
+void ExamineDarkViews(bool is_own, model::LightField* light_field, LightFieldFacts* facts) {
   const int count = light_field->u_count * light_field->v_count;
-  std::vector<float> highest(static_cast<std::size_t>(count), 0.0F);
+  std::vector<ViewLight> all(static_cast<std::size_t>(count));
   ParallelFor(count, ReadingThreads(), [&](int i) {
     ThrowIfCancelled();
-    highest[static_cast<std::size_t>(i)] =
-        HighestValue(*light_field, i % light_field->u_count, i / light_field->u_count);
+    all[static_cast<std::size_t>(i)] =
+        LightOf(*light_field, i % light_field->u_count, i / light_field->u_count);
   });
-  std::vector<float> known;
+  std::vector<ViewLight> known;
   for (int i = 0; i < count; ++i) {
     if (light_field->IsPresent(i % light_field->u_count, i / light_field->u_count))
-      known.push_back(highest[static_cast<std::size_t>(i)]);
+      known.push_back(all[static_cast<std::size_t>(i)]);
   }
   if (known.empty()) return;
-  const auto middle = known.begin() + static_cast<std::ptrdiff_t>(known.size() / 2);
-  std::nth_element(known.begin(), middle, known.end());
-  if (*middle < kLeastOfOthers) return;
-  std::vector<std::string> black;
+  const bool is_bright = MiddleOf(known, &ViewLight::bright) >= kLeastBrightShare;
+  const double middle_mean = MiddleOf(known, &ViewLight::mean);
+  std::vector<std::string> black, dim;
+  const bool leaves_out = is_bright && !is_own;
   for (int i = 0; i < count; ++i) {
     const int k = i % light_field->u_count;
     const int l = i / light_field->u_count;
-    if (!light_field->IsPresent(k, l) || highest[static_cast<std::size_t>(i)] > kMostOfBlack)
-      continue;
-    black.push_back(fmt::format("({}, {})", k, l));
-    if (light_field->present.empty())
-      light_field->present.assign(static_cast<std::size_t>(count), true);
-    light_field->present[static_cast<std::size_t>(i)] = false;
-    light_field->weights(l, k) = 0;
-    for (int channel = 0; channel < light_field->channels; ++channel) {
-      const auto first = light_field->values.begin() +
-                         static_cast<std::ptrdiff_t>(light_field->ViewStart(channel, k, l));
-      std::fill(first, first + static_cast<std::ptrdiff_t>(light_field->view_size()), 0.0F);
+    const ViewLight& light = all[static_cast<std::size_t>(i)];
+    if (!light_field->IsPresent(k, l)) continue;
+    if (light.above_black <= kMostHotShare) {
+      black.push_back(fmt::format("({}, {})", k, l));
+      if (leaves_out) LeaveOut(k, l, light_field);
+    } else if (is_bright && light.mean < kDim * middle_mean) {
+      dim.push_back(fmt::format("({}, {})", k, l));
     }
   }
-  if (black.empty()) return;
-  light_field->weights /= light_field->weights.sum();
-  facts->left_out = black;
-  facts->notices.push_back(fmt::format("{}: {} of {} views are black and left out: {}",
-                                       light_field->source, black.size(), known.size(),
-                                       Listed(black)));
+  const auto notice = [&](const std::vector<std::string>& views, const char* what) {
+    facts->notices.push_back(fmt::format("{}: {} of {} views are {}: {}", light_field->source,
+                                         views.size(), known.size(), what, Listed(views)));
+  };
+  if (!black.empty() && leaves_out) {
+    light_field->weights /= light_field->weights.sum();
+    facts->left_out = black;
+    notice(black, "black and left out");
+  } else if (!black.empty() && is_bright) {
+    notice(black,
+           "black, and kept because lightfield.yaml states them (present there and the option "
+           "sparse leave them out)");
+  } else if (black.size() < known.size() && !black.empty() && !is_own) {
+    notice(black, "black, and kept because the others are dark too");
+  }
+  if (!dim.empty() && !is_own) {
+    notice(dim,
+           "darker than a tenth of the others and kept, they may be at the edge of the aperture "
+           "(the option views takes the inner ones)");
+  }
 }
 
 std::string OneLine(const ViewSource& source, const model::LightField& light_field) {
@@ -407,10 +462,8 @@ model::LightField ReadLightField(const std::string& folder, const LightFieldRead
   facts->is_plain = source.is_plain;
   facts->notices = source.notices;
   facts->one_line = folder + ": " + OneLine(source, light_field);
-  if (!source.is_own) {
-    LeaveOutBlackViews(&light_field, facts);
-    ReportOrder(folder, light_field, facts);
-  }
+  ExamineDarkViews(source.is_own, &light_field, facts);
+  if (!source.is_own) ReportOrder(folder, source, light_field, facts);
   std::string why;
   if (!light_field.IsValid(&why)) throw Error(fmt::format("{}: {}", folder, why));
   return light_field;

@@ -43,8 +43,8 @@ struct LightFieldFacts {
   std::vector<std::string> notices;   // what may make the light field wrong, one sentence each
 };
 
-// Names of the layouts: "thicklens", "hci", "stanford", "names" (folders); "quilt", "parts",
-// "lenslets", "tiles" (files).
+// Names of the layouts: "thicklens", "hci", "stanford", "names" (folders); "mat", "hdf5", "quilt",
+// "parts", "lenslets", "tiles" (files).
 THICKLENS_EXPORT std::vector<std::string> LightFieldLayouts();
 
 // Reads a light field in one of these layouts (docs/file-formats.md), then takes the inner views

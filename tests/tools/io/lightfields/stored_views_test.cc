@@ -1,0 +1,177 @@
+// Light fields in MAT and HDF5 files. tests/data/lightfields/README.md says who wrote them.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+
+#include "support/error_message.h"
+#include "support/temporary_folder.h"
+#include "thicklens/base/error.h"
+#include "thicklens/io/light_field_io.h"
+#include "thicklens/model/transfer_curve.h"
+
+namespace thicklens::io {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using thicklens::testing::ContentOf;
+using thicklens::testing::ErrorOf;
+using thicklens::testing::TemporaryFolder;
+
+std::string StoredFilePath(const std::string& name) {
+  return THICKLENS_SOURCE_DIR "/tests/data/lightfields/" + name;
+}
+
+class StoredViews : public ::testing::Test {
+ protected:
+  model::LightField Read(const std::string& path) { return ReadLightField(path, {}, &facts_); }
+
+  // Requires the levels of README.md, as light by the curve.
+  static void ExpectLevels(const model::LightField& light_field,
+                           const model::TransferCurve& curve) {
+    ASSERT_EQ(light_field.u_count, 3);
+    ASSERT_EQ(light_field.v_count, 2);
+    ASSERT_EQ(light_field.s_count, 8);
+    ASSERT_EQ(light_field.t_count, 6);
+    ASSERT_EQ(light_field.channels, 3);
+    for (int t = 0; t < 2; ++t) {
+      for (int s = 0; s < 3; ++s) {
+        if (!light_field.IsPresent(s, t)) continue;
+        const model::LinearImage view = model::ViewImage(light_field, s, t);
+        for (int v = 0; v < 6; ++v) {
+          for (int u = 0; u < 8; ++u) {
+            for (int c = 0; c < 3; ++c) {
+              const int level = 17 * t + 29 * s + 5 * v + 3 * u + 11 * c;
+              ASSERT_NEAR(view.at(u, v, c), curve.Decode(level / 255.0), 1e-6)
+                  << t << s << v << u << c;
+            }
+          }
+        }
+      }
+    }
+  }
+
+  // The error about a file with another byte at the first place of a text, moved by `away`.
+  std::string ErrorWith(const std::string& name, const std::string& at, std::size_t away,
+                        const std::string& bytes) {
+    std::string content = ContentOf(StoredFilePath(name));
+    const std::size_t place = content.find(at);
+    EXPECT_NE(place, std::string::npos);
+    content.replace(place + away, bytes.size(), bytes);
+    const std::string path = folder_.Put(name, content);
+    return ErrorOf([&] { Read(path); });
+  }
+
+  TemporaryFolder folder_;
+  LightFieldFacts facts_;
+};
+
+TEST_F(StoredViews, TheToolboxHasTheRowOfTheViewFirst) {
+  const model::LightField light_field = Read(StoredFilePath("levels-5.mat"));
+  ExpectLevels(light_field, model::TransferCurve::Srgb());
+  EXPECT_THAT(facts_.one_line, AllOf(HasSubstr("the variable LF of a MAT file: 3 x 2 views"),
+                                     HasSubstr("integers are taken as sRGB")));
+  EXPECT_EQ(facts_.kind, "the variable LF of a MAT file");
+}
+
+TEST_F(StoredViews, CorrectedColoursAreSrgb) {
+  for (const char* name : {"corrected-5-compressed.mat", "corrected-7.3.mat"}) {
+    ExpectLevels(Read(StoredFilePath(name)), model::TransferCurve::Srgb());
+    EXPECT_THAT(facts_.one_line, HasSubstr("taken as sRGB")) << name;
+  }
+}
+
+TEST_F(StoredViews, UncorrectedColoursAreLinear) {
+  ExpectLevels(Read(StoredFilePath("linear-7.3.mat")), model::TransferCurve::Linear());
+  EXPECT_THAT(facts_.one_line, HasSubstr("it is linear light"));
+}
+
+TEST_F(StoredViews, AViewWithoutWeightIsLeftOut) {
+  for (const char* name : {"corrected-5-compressed.mat", "linear-7.3.mat"}) {
+    const model::LightField light_field = Read(StoredFilePath(name));
+    EXPECT_FALSE(light_field.IsPresent(2, 0)) << name;
+    EXPECT_TRUE(light_field.IsPresent(0, 1)) << name;
+    EXPECT_NEAR(light_field.weights(0, 0), 1.0 / 5, 1e-12) << name;
+    EXPECT_THAT(facts_.one_line, HasSubstr("view (2, 0)")) << name;
+  }
+}
+
+TEST_F(StoredViews, TheHeidelbergSetHasTheRowOfTheViewFirst) {
+  ExpectLevels(Read(StoredFilePath("heidelberg.h5")), model::TransferCurve::Srgb());
+  EXPECT_THAT(facts_.one_line,
+              AllOf(HasSubstr("the data set LF of an HDF5 file"), HasSubstr("dH 0.1"),
+                    HasSubstr("focalLength 9.375"), HasSubstr("GT_DEPTH is in it and not read")));
+  EXPECT_THAT(facts_.notices, Not(Contains(HasSubstr("attribute"))));
+}
+
+TEST_F(StoredViews, OtherContentsAreNamed) {
+  EXPECT_THAT(ErrorOf([&] { Read(StoredFilePath("signed-5.mat")); }),
+              AllOf(HasSubstr("signed-5.mat"), HasSubstr("signed 16-bit integers"),
+                    HasSubstr("2 x 3 x 6 x 8 x 3")));
+  EXPECT_THAT(ErrorOf([&] { Read(StoredFilePath("picture-5.mat")); }),
+              AllOf(HasSubstr("LF(t, s, v, u, c)"), HasSubstr("picture (6 x 8 x 3")));
+  LightFieldReading reading;
+  reading.layout = "hdf5";
+  EXPECT_THAT(ErrorOf([&] { ReadLightField(StoredFilePath("levels-5.mat"), reading); }),
+              HasSubstr("the layout mat"));
+  EXPECT_THAT(ErrorOf([&] { ReadLightField(StoredFilePath("README.md"), reading); }),
+              HasSubstr("neither"));
+}
+
+TEST_F(StoredViews, TruncatedFilesAreRefused) {
+  for (const char* name : {"levels-5.mat", "corrected-5-compressed.mat", "linear-7.3.mat",
+                           "corrected-7.3.mat", "heidelberg.h5"}) {
+    const std::string content = ContentOf(StoredFilePath(name));
+    for (const std::size_t part : {2, 3, 4}) {
+      const std::string path = folder_.Put(name, content.substr(0, content.size() * part / 5));
+      EXPECT_THAT(ErrorOf([&] { Read(path); }), HasSubstr(name)) << part;
+    }
+  }
+}
+
+TEST_F(StoredViews, LyingSizesAreRefused) {
+  using namespace std::string_literals;
+  // The number of channels in levels-5.mat, after the four other sizes.
+  const std::string sizes = "\2\0\0\0\3\0\0\0\6\0\0\0\10\0\0\0\3\0\0\0"s;
+  EXPECT_THAT(ErrorWith("levels-5.mat", sizes, 16, "\4"),
+              HasSubstr("states 1152 numbers, its data are 864 bytes"));
+  // 2 billion columns.
+  EXPECT_THAT(ErrorWith("levels-5.mat", sizes, 12, "\xFF\xFF\xFF\x7F"), HasSubstr("levels-5.mat"));
+  EXPECT_THAT(ErrorWith("levels-5.mat", sizes, 0, "\0"s), HasSubstr("0 views"));
+  EXPECT_THAT(ErrorWith("levels-5.mat", sizes, 0, "\xFF\xFF\xFF\xFF"), HasSubstr("negative"));
+  // The first size of LF in heidelberg.h5, 8 bytes each.
+  const std::string shape = "\2\0\0\0\0\0\0\0\3\0\0\0\0\0\0\0\6\0\0\0\0\0\0\0"s;
+  EXPECT_THAT(ErrorWith("heidelberg.h5", shape, 0, "\xE8\3"), HasSubstr("heidelberg.h5"));
+  EXPECT_THAT(ErrorWith("heidelberg.h5", shape, 0, "\xFF\xFF\xFF\xFF\xFF\xFF\xFF\x7F"),
+              HasSubstr("heidelberg.h5"));
+}
+
+// libhdf5 fails for some of these files: that must not end this process.
+TEST_F(StoredViews, DamagedFilesAreReadOrRefused) {
+  for (const char* name : {"heidelberg.h5", "corrected-7.3.mat", "corrected-5-compressed.mat"}) {
+    const std::string content = ContentOf(StoredFilePath(name));
+    unsigned random = 12345;
+    const auto next = [&random](std::size_t below) {
+      random = random * 1664525U + 1013904223U;
+      return static_cast<std::size_t>(random >> 8U) % below;
+    };
+    for (int i = 0; i < 60; ++i) {
+      std::string damaged = content;
+      for (int bytes = 0; bytes < 3; ++bytes)
+        damaged[next(damaged.size())] = static_cast<char>(next(256));
+      const std::string path = folder_.Put(name, damaged);
+      try {
+        Read(path);
+      } catch (const Error& error) {
+        ASSERT_THAT(error.what(), HasSubstr(name));
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace thicklens::io
