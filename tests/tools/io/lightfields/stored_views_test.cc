@@ -126,6 +126,7 @@ TEST_F(StoredViews, TruncatedFilesAreRefused) {
   for (const char* name : {"levels-5.mat", "corrected-5-compressed.mat", "linear-7.3.mat",
                            "corrected-7.3.mat", "heidelberg.h5"}) {
     const std::string content = ContentOf(StoredFilePath(name));
+    ASSERT_FALSE(content.empty()) << name;
     for (const std::size_t part : {2, 3, 4}) {
       const std::string path = folder_.Put(name, content.substr(0, content.size() * part / 5));
       EXPECT_THAT(ErrorOf([&] { Read(path); }), HasSubstr(name)) << part;
@@ -154,6 +155,7 @@ TEST_F(StoredViews, LyingSizesAreRefused) {
 TEST_F(StoredViews, DamagedFilesAreReadOrRefused) {
   for (const char* name : {"heidelberg.h5", "corrected-7.3.mat", "corrected-5-compressed.mat"}) {
     const std::string content = ContentOf(StoredFilePath(name));
+    ASSERT_FALSE(content.empty()) << name;
     unsigned random = 12345;
     const auto next = [&random](std::size_t below) {
       random = random * 1664525U + 1013904223U;
