@@ -27,6 +27,9 @@ constexpr double kMostCost = 25;
 // A tile shows a shift if no shift at all costs at least this much.
 constexpr double kShows = 9;
 constexpr int kFewestTiles = 3;
+// The differences that remain may have at most this part of a tile's variance. Of two views with
+// nothing in common but their noise, it is 1 or more at any shift.
+constexpr double kMatches = 0.5;
 // Tiles overlap by half along both axes: four tiles have the information of one.
 constexpr double kOverlap = 4;
 // By this much an order must be better than another.
@@ -161,7 +164,18 @@ std::optional<Shift> ShiftOf(const cv::Mat& from, const cv::Mat& to, int x0, int
     shift += update;
     if ((shift - Vector2(coarse->x, coarse->y)).cwiseAbs().maxCoeff() > 1) return std::nullopt;
   }
-  const double variance = squares / (tiling.edge * tiling.edge - 2) + kSmall;
+  double sum = 0, sum_squares = 0;
+  for (int y = y0; y < y0 + tiling.edge; ++y) {
+    for (int x = x0; x < x0 + tiling.edge; ++x) {
+      const double value = from.at<float>(y, x);
+      sum += value;
+      sum_squares += value * value;
+    }
+  }
+  const int count = tiling.edge * tiling.edge;
+  // Noise alone has a best shift too, which says nothing: no weight.
+  if (squares > kMatches * (sum_squares - sum * sum / count)) return Shift{};
+  const double variance = squares / (count - 2) + kSmall;
   const Matrix2 covariance = variance * (normal + ridge * Matrix2::Identity()).inverse() +
                              kShiftFloorPx * kShiftFloorPx * Matrix2::Identity();
   return Shift{shift, covariance.inverse()};
