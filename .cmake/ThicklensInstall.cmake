@@ -45,6 +45,8 @@ if(THICKLENS_BUILDS_SHARED AND NOT THICKLENS_SHARED_LIBS)
       install(TARGETS thicklens_image_library LIBRARY DESTINATION ${THICKLENS_LIBRARY_DIR}
                                                       ${component})
     endif()
+    install(TARGETS thicklens_array_library LIBRARY DESTINATION ${THICKLENS_LIBRARY_DIR}
+                                                    ${component})
   endfunction()
   thicklens_install_shared_component()
 endif()

@@ -127,6 +127,8 @@ const std::vector<FuzzedReader>& FuzzedReaders() {
              [](const std::string& path) {
                io::ReadLightField(fs::path(path).parent_path().parent_path().string(), {});
              }),
+      OfFile("light-field-file", "light-field",
+             [](const std::string& path) { io::ReadLightField(path, {}); }),
       OfFile("depth-map", "depth.pfm", [](const std::string& path) { io::ReadDepthMap(path); }),
       {"embedded-depth",
        [](const std::string& bytes, const TemporaryFolder&) {

@@ -81,8 +81,9 @@ TEST(TrustedEnvironment, CompiledKernelsAreNotSharedWithOtherUsers) {
 // A file with the name of a library that is not a library stops the loader wherever it looks at it.
 TEST(TrustedEnvironment, LibrariesOfTheCurrentFolderAreNotLoaded) {
   const TemporaryFolder folder;
-  for (const char* name : {"libcsv.so.3", "libfmt.so.9", "libOpenCL.so.1", "libpocl.so.2",
-                           "libopencv_core.so.406", "thicklens_image_library.so", ".exiv2"}) {
+  for (const char* name :
+       {"libcsv.so.3", "libfmt.so.9", "libOpenCL.so.1", "libpocl.so.2", "libopencv_core.so.406",
+        "thicklens_image_library.so", "thicklens_array_library.so", ".exiv2"}) {
     folder.Put(name, "no library");
   }
   const ProgramRun run =

@@ -2,13 +2,14 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
-#include <Eigen/LU>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "thicklens/base/cancel.h"
@@ -30,6 +31,11 @@ constexpr int kFewestTiles = 3;
 // The differences that remain may have at most this part of a tile's variance. Of two views with
 // nothing in common but their noise, it is 1 or more at any shift.
 constexpr double kMatches = 0.5;
+// A tile fits at two places, as patterns that repeat themselves do, if its differences at the
+// second are larger by less than this part of its variance.
+constexpr double kSamePattern = 0.25;
+// Gradients along an axis count where they are this many times those that noise has.
+constexpr double kAboveNoise = 3;
 // Tiles overlap by half along both axes: four tiles have the information of one.
 constexpr double kOverlap = 4;
 // By this much an order must be better than another.
@@ -98,9 +104,37 @@ struct Tiling {
   int most_shift() const { return margin - 2; }
 };
 
+// Gradients and variance of a tile, summed over its pixels.
+struct TileDetails {
+  Matrix2 normal = Matrix2::Zero();
+  double variance = 0;
+};
+TileDetails DetailsOf(const cv::Mat& from, int x0, int y0, const Tiling& tiling) {
+  TileDetails details;
+  double sum = 0, squares = 0;
+  for (int y = y0; y < y0 + tiling.edge; ++y) {
+    for (int x = x0; x < x0 + tiling.edge; ++x) {
+      const Vector2 gradient(0.5 * (from.at<float>(y, x + 1) - from.at<float>(y, x - 1)),
+                             0.5 * (from.at<float>(y + 1, x) - from.at<float>(y - 1, x)));
+      details.normal += gradient * gradient.transpose();
+      const double value = from.at<float>(y, x);
+      sum += value;
+      squares += value * value;
+    }
+  }
+  details.variance = squares - sum * sum / (tiling.edge * tiling.edge);
+  return details;
+}
+
+struct Coarse {
+  cv::Point shift;
+  bool is_only = true;  // no other shift fits nearly as well
+};
+
 // Whole-pixel shift with the least difference; nothing if it is at the limit.
-std::optional<cv::Point> CoarseShift(const cv::Mat& from, const cv::Mat& to, int x0, int y0,
-                                     const Tiling& tiling) {
+std::optional<Coarse> CoarseShift(const cv::Mat& from, const cv::Mat& to, int x0, int y0,
+                                  const Tiling& tiling, const TileDetails& details) {
+  std::vector<std::pair<cv::Point, double>> differences;
   const int most = tiling.most_shift();
   double least = std::numeric_limits<double>::infinity();
   cv::Point best;
@@ -120,31 +154,35 @@ std::optional<cv::Point> CoarseShift(const cv::Mat& from, const cv::Mat& to, int
         least = sum;
         best = {dx, dy};
       }
+      differences.emplace_back(cv::Point(dx, dy), sum);
     }
   }
   if (std::abs(best.x) == most || std::abs(best.y) == most) return std::nullopt;
-  return best;
+  Coarse coarse{best, true};
+  for (const auto& [shift, sum] : differences) {
+    const Vector2 away(shift.x - best.x, shift.y - best.y);
+    // Along an edge a tile fits everywhere: that is no repetition.
+    const bool is_elsewhere =
+        away.norm() > 1.5 && away.dot(details.normal * away) > details.variance;
+    if (is_elsewhere && sum < least + kSamePattern * details.variance) coarse.is_only = false;
+  }
+  return coarse;
 }
 
 // The shift of a tile: the least squares of its differences, by Gauss-Newton steps. Its covariance
 // follows from the differences that remain.
 std::optional<Shift> ShiftOf(const cv::Mat& from, const cv::Mat& to, int x0, int y0,
                              const Tiling& tiling) {
-  const std::optional<cv::Point> coarse = CoarseShift(from, to, x0, y0, tiling);
-  if (!coarse) return std::nullopt;
-  Matrix2 normal = Matrix2::Zero();
-  for (int y = y0; y < y0 + tiling.edge; ++y) {
-    for (int x = x0; x < x0 + tiling.edge; ++x) {
-      const Vector2 gradient(0.5 * (from.at<float>(y, x + 1) - from.at<float>(y, x - 1)),
-                             0.5 * (from.at<float>(y + 1, x) - from.at<float>(y - 1, x)));
-      normal += gradient * gradient.transpose();
-    }
-  }
-  // A tile without details has no weight; along an edge only its normal has.
+  const TileDetails details = DetailsOf(from, x0, y0, tiling);
+  const Matrix2& normal = details.normal;
+  const std::optional<Coarse> found = CoarseShift(from, to, x0, y0, tiling, details);
+  if (!found) return std::nullopt;
+  if (!found->is_only) return Shift{};
+  const cv::Point coarse = found->shift;
   constexpr double kSmall = 1e-9;
   const double ridge = kSmall + 1e-3 * normal.trace();
   const Eigen::LDLT<Matrix2> solver(normal + ridge * Matrix2::Identity());
-  Vector2 shift(coarse->x, coarse->y);
+  Vector2 shift(coarse.x, coarse.y);
   double squares = 0;
   for (int step = 0; step < 6; ++step) {
     Vector2 right = Vector2::Zero();
@@ -162,23 +200,24 @@ std::optional<Shift> ShiftOf(const cv::Mat& from, const cv::Mat& to, int x0, int
     const Vector2 update = solver.solve(right);
     if (!(update.norm() < 1)) return std::nullopt;
     shift += update;
-    if ((shift - Vector2(coarse->x, coarse->y)).cwiseAbs().maxCoeff() > 1) return std::nullopt;
-  }
-  double sum = 0, sum_squares = 0;
-  for (int y = y0; y < y0 + tiling.edge; ++y) {
-    for (int x = x0; x < x0 + tiling.edge; ++x) {
-      const double value = from.at<float>(y, x);
-      sum += value;
-      sum_squares += value * value;
-    }
+    if ((shift - Vector2(coarse.x, coarse.y)).cwiseAbs().maxCoeff() > 1) return std::nullopt;
   }
   const int count = tiling.edge * tiling.edge;
   // Noise alone has a best shift too, which says nothing: no weight.
-  if (squares > kMatches * (sum_squares - sum * sum / count)) return Shift{};
+  if (squares > kMatches * details.variance) return Shift{};
   const double variance = squares / (count - 2) + kSmall;
-  const Matrix2 covariance = variance * (normal + ridge * Matrix2::Identity()).inverse() +
-                             kShiftFloorPx * kShiftFloorPx * Matrix2::Identity();
-  return Shift{shift, covariance.inverse()};
+  // A tile without details has no weight; along an edge only its normal has. The noise of the
+  // differences is that of two values, and a gradient has a quarter of it.
+  const double of_noise = kAboveNoise * count * variance / 4;
+  const Eigen::SelfAdjointEigenSolver<Matrix2> axes(normal);
+  Matrix2 weight = Matrix2::Zero();
+  for (int i = 0; i < 2; ++i) {
+    const double information = axes.eigenvalues()[i] - of_noise;
+    if (information <= 0) continue;
+    const Vector2 axis = axes.eigenvectors().col(i);
+    weight += axis * axis.transpose() / (variance / information + kShiftFloorPx * kShiftFloorPx);
+  }
+  return Shift{shift, weight};
 }
 
 // The directions, up to one common sign, of the shifts across and down in an order of views.
