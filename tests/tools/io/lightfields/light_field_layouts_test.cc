@@ -2,7 +2,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <functional>
 #include <opencv2/imgcodecs.hpp>
 #include <string>
@@ -152,6 +154,60 @@ TEST_F(LightFieldLayouts, BlackViewsAreNamedAndLeftOut) {
   EXPECT_TRUE(light_field.IsPresent(0, 0));
   EXPECT_NEAR(light_field.weights(0, 0), 1.0 / 8, 1e-12);
   EXPECT_TRUE(light_field.IsValid(nullptr));
+}
+
+TEST_F(LightFieldLayouts, BlackViewsOfADarkSceneAreKept) {
+  // One lamp in the dark, which the corner views do not see.
+  const auto night = [](int u, int v) {
+    cv::Mat view(kT, kS, CV_8UC3, cv::Scalar::all(2));
+    if (u == 1 || v == 1) view.at<cv::Vec3b>(30, 40) = {255, 255, 255};
+    return view;
+  };
+  const model::LightField light_field = Read(Folder(RowAndColumn, night));
+  EXPECT_THAT(facts_.left_out, IsEmpty());
+  EXPECT_TRUE(light_field.IsPresent(0, 0));
+  EXPECT_THAT(facts_.notices, ElementsAre(AllOf(HasSubstr("4 of 9 views are black, and kept"),
+                                                HasSubstr("(0, 0), (2, 0), (0, 2), (2, 2)"))));
+  // Without the lamp all views are alike.
+  Read(Folder(RowAndColumn, [](int, int) { return cv::Mat(kT, kS, CV_8UC3, cv::Scalar::all(2)); }));
+  EXPECT_THAT(facts_.notices, IsEmpty());
+}
+
+TEST_F(LightFieldLayouts, HotPixelsDoNotMakeAViewBright) {
+  Read(Folder(RowAndColumn, [](int u, int v) {
+    if (u != 0 || v != 0) return InOrder(u, v);
+    cv::Mat view(kT, kS, CV_8UC3, cv::Scalar::all(1));
+    view.at<cv::Vec3b>(30, 40)[1] = 255;
+    return view;
+  }));
+  EXPECT_THAT(facts_.left_out, ElementsAre("(0, 0)"));
+}
+
+TEST_F(LightFieldLayouts, DimViewsAreNamedAndKept) {
+  const model::LightField light_field = Read(Folder(RowAndColumn, [](int u, int v) {
+    return u == 2 && v == 2 ? cv::Mat(InOrder(u, v) * 0.2) : InOrder(u, v);
+  }));
+  EXPECT_TRUE(light_field.IsPresent(2, 2));
+  EXPECT_THAT(facts_.left_out, IsEmpty());
+  EXPECT_THAT(facts_.notices,
+              ElementsAre(AllOf(HasSubstr("1 of 9 views are darker"), HasSubstr("(2, 2)"))));
+}
+
+TEST_F(LightFieldLayouts, ABlackViewOfOurOwnIsNamedAndKept) {
+  model::LightField light_field = Read(Folder(RowAndColumn, InOrder));
+  for (int c = 0; c < 3; ++c) {
+    const auto start =
+        light_field.values.begin() + static_cast<std::ptrdiff_t>(light_field.ViewStart(c, 2, 0));
+    std::fill(start, start + kS * kT, 0.0F);
+  }
+  OutputFolder output(folder_ / "own", kLightFieldMarker, LightFieldEntries());
+  WriteLightField(light_field, ViewFormat::kPng, &output);
+  output.Commit();
+  const model::LightField own = Read(folder_ / "own");
+  EXPECT_TRUE(own.IsPresent(2, 0));
+  EXPECT_NEAR(own.weights(2, 2), 1.0 / 9, 1e-9);
+  EXPECT_THAT(facts_.notices,
+              ElementsAre(AllOf(HasSubstr("black, and kept"), HasSubstr("(2, 0)"))));
 }
 
 TEST_F(LightFieldLayouts, ExchangedRowsAndColumnsAreReportedAndExchanged) {
