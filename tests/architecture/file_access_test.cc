@@ -37,6 +37,7 @@ const std::set<std::string>& Known() {
       "tools/io/journal_file.cc",               // grows during a run
       "tools/report/report_folder.cc",          // the head of an output: reading reports an input
       "tools/io/float_tiff.cc",                 // writes a file in an output folder
+      "tools/io/array_file.cc",                 // the first bytes of an input; /proc
       "tools/io/tiff_pixels.cc",                // libtiff reads and writes in memory
       "tools/system/standard_descriptors.cc",   // the null device
       "kernels/opencl/isolated_subprocess.cc",  // the null device
