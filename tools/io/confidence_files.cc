@@ -14,8 +14,9 @@
 #include "thicklens/base/parallel.h"
 #include "thicklens/io/image_io.h"
 #include "thicklens/model/light_field_file.h"
+#include "tools/io/array_file.h"
 #include "tools/io/confidence_file_name.h"
-#include "tools/io/lightfields/view_pixels.h"
+#include "tools/io/image_names.h"
 
 namespace thicklens::io {
 namespace {
@@ -53,8 +54,8 @@ void WriteConfidence(const std::vector<estimator::Confidence>& of_rays, int u_co
 std::vector<estimator::Confidence> ReadConfidence(const std::string& folder, int threads) {
   std::error_code ignored;
   if (!fs::is_directory(folder, ignored)) {
-    // A light field in one image, such as a quilt, has none.
-    if (fs::exists(folder, ignored) && IsImageName(folder)) return {};
+    // A light field in one image, such as a quilt, or in one array has none.
+    if (fs::exists(folder, ignored) && (IsImageName(folder) || FormatOfArrays(folder))) return {};
     throw Error(fmt::format("{}: {}; the folder of a light field is expected", folder,
                             fs::exists(folder, ignored) ? "is a file" : "does not exist"));
   }

@@ -16,6 +16,7 @@
 #include "thicklens/base/printable_text.h"
 #include "thicklens/io/light_field_io.h"
 #include "tools/io/image_file_kind.h"
+#include "tools/io/image_names.h"
 #include "tools/io/lightfields/layout.h"
 #include "tools/io/lightfields/view_grid.h"
 #include "tools/io/lightfields/view_names.h"

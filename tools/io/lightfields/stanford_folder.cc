@@ -10,6 +10,7 @@
 
 #include "thicklens/base/error.h"
 #include "thicklens/base/input_file.h"
+#include "tools/io/image_names.h"
 #include "tools/io/lightfields/layout.h"
 #include "tools/io/lightfields/view_grid.h"
 #include "tools/io/lightfields/view_names.h"

@@ -3,7 +3,6 @@
 
 #include <opencv2/core/mat.hpp>
 #include <string>
-#include <vector>
 
 #include "thicklens/io/image_file.h"
 #include "thicklens/model/scene.h"
@@ -20,12 +19,6 @@ model::LinearImage LightOfPixels(const cv::Mat& pixels, const ImageFacts& facts,
                                  const std::string& name);
 // Reads a file of any kind as LightOfPixels does.
 model::LinearImage ReadLightOfFile(const std::string& path);
-
-// Whether the name ends like that of an image file.
-bool IsImageName(const std::string& name);
-// Names of the image files that are directly in a folder, sorted. Hidden files are left out. Throws
-// Error if the folder cannot be read.
-std::vector<std::string> ImageNames(const std::string& folder);
 
 }  // namespace thicklens::io
 
