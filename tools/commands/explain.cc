@@ -85,10 +85,12 @@ OptionNames ExplainOptionNames() {
           {"measure_costs", "--costs"}};
 }
 
-// A photograph with a depth map inside states what the map means.
-DepthMap DepthOf(const ExplainOptions& options) {
+// A photograph with a depth map inside states what the map means. Such a map is smaller than the
+// sensor.
+DepthMap DepthOf(const ExplainOptions& options, const model::Sensor& sensor) {
   if (options.depth.kind.empty()) {
-    if (std::optional<DepthMap> inside = ReadEmbeddedDepth(options.depth_path)) {
+    if (std::optional<DepthMap> inside =
+            ReadEmbeddedDepth(options.depth_path, sensor.width_px, sensor.height_px)) {
       RefuseOtherMeaning(options.depth, *inside);
       spdlog::info("{}: {}", PrintableUtf8(options.depth_path),
                    PrintableUtf8(inside->notes.front()));
@@ -105,7 +107,7 @@ CameraExplanation ExplanationOf(const ExplainOptions& options, const Camera& cam
   if (options.depth_path.empty()) {
     asked.depth_range = ParseDepthRange(options.depth_range);
   } else {
-    asked.depth = DepthOf(options);
+    asked.depth = DepthOf(options, camera.sensor);
   }
   asked.depth_count = options.steps;
   asked.effects = EffectSelectionOf(options.effects);

@@ -149,7 +149,8 @@ TEST_F(DepthInsideTest, EstimateTakesTheWrittenFileByThePrintedOptions) {
       ASSERT_EQ(Start({"depth", "extract", path, "--enlarge", "-o", map, "--json", json}).exit_code,
                 0);
       Arguments more = {map, "--camera", camera_};
-      for (const auto& option : Json()["options"]) more.push_back(option);
+      const nlohmann::json extracted = Json();
+      for (const auto& option : extracted["options"]) more.push_back(option);
       const ProgramResult result = Start(Estimate(path, more));
       ASSERT_EQ(result.exit_code, 0) << name << result.err;
       EXPECT_TRUE(Json()["embedded_depth"].is_null());
