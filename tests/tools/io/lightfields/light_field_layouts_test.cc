@@ -159,7 +159,7 @@ TEST_F(LightFieldLayouts, BlackViewsAreNamedAndLeftOut) {
 TEST_F(LightFieldLayouts, BlackViewsOfADarkSceneAreKept) {
   // One lamp in the dark, which the corner views do not see.
   const auto night = [](int u, int v) {
-    cv::Mat view(kT, kS, CV_8UC3, cv::Scalar::all(2));
+    cv::Mat view(kViewHeightPx, kViewWidthPx, CV_8UC3, cv::Scalar::all(2));
     if (u == 1 || v == 1) view.at<cv::Vec3b>(30, 40) = {255, 255, 255};
     return view;
   };
@@ -169,14 +169,16 @@ TEST_F(LightFieldLayouts, BlackViewsOfADarkSceneAreKept) {
   EXPECT_THAT(facts_.notices, ElementsAre(AllOf(HasSubstr("4 of 9 views are black, and kept"),
                                                 HasSubstr("(0, 0), (2, 0), (0, 2), (2, 2)"))));
   // Without the lamp all views are alike.
-  Read(Folder(RowAndColumn, [](int, int) { return cv::Mat(kT, kS, CV_8UC3, cv::Scalar::all(2)); }));
+  Read(Folder(RowAndColumn, [](int, int) {
+    return cv::Mat(kViewHeightPx, kViewWidthPx, CV_8UC3, cv::Scalar::all(2));
+  }));
   EXPECT_THAT(facts_.notices, IsEmpty());
 }
 
 TEST_F(LightFieldLayouts, HotPixelsDoNotMakeAViewBright) {
   Read(Folder(RowAndColumn, [](int u, int v) {
     if (u != 0 || v != 0) return InOrder(u, v);
-    cv::Mat view(kT, kS, CV_8UC3, cv::Scalar::all(1));
+    cv::Mat view(kViewHeightPx, kViewWidthPx, CV_8UC3, cv::Scalar::all(1));
     view.at<cv::Vec3b>(30, 40)[1] = 255;
     return view;
   }));
@@ -198,7 +200,7 @@ TEST_F(LightFieldLayouts, ABlackViewOfOurOwnIsNamedAndKept) {
   for (int c = 0; c < 3; ++c) {
     const auto start =
         light_field.values.begin() + static_cast<std::ptrdiff_t>(light_field.ViewStart(c, 2, 0));
-    std::fill(start, start + kS * kT, 0.0F);
+    std::fill(start, start + kViewWidthPx * kViewHeightPx, 0.0F);
   }
   OutputFolder output(folder_ / "own", kLightFieldMarker, LightFieldEntries());
   WriteLightField(light_field, ViewFormat::kPng, &output);
