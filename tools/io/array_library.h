@@ -45,9 +45,9 @@ enum class ArrayFormat : std::uint8_t {
   kHdf5,  // any other HDF5 file
 };
 
-// libhdf5 and a reader of MAT 5 files, in a library of their own, which is loaded when a file first needs it.
-// array_file.h calls these functions in a process of their own, because damaged files make libhdf5
-// read and write outside of its memory. `why` gets the reason of a failure.
+// libhdf5 and a reader of MAT 5 files, in a library of their own, which is loaded when a file first
+// needs it. array_file.h calls these functions in a process of their own, because damaged files
+// make libhdf5 read and write outside of its memory. `why` gets the reason of a failure.
 struct ArrayLibrary {
   // Makes the libraries ready before that process begins.
   void (*prepare)();
