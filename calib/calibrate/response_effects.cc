@@ -213,9 +213,10 @@ class ResponseCheck {
     const bool loses = response.LosesWeakDetail();
     const double kappa = result_.summary.blur_ratio->value;
     const double usual = CameraResponse::kLossToRatio * std::max(0.0, loss.value);
-    const double bound = loses ? CameraResponse::kLargestFactor * usual
-                               : CameraResponse::kLossToRatio *
-                                     (std::max(0.0, loss.value) + kReachOfLoss * loss.sigma);
+    // Without significance the loss may be as large as its errors allow.
+    const double loss_at_most = std::max(0.0, loss.value) + (loses ? 0 : kReachOfLoss * loss.sigma);
+    const double bound =
+        CameraResponse::kLargestFactor * CameraResponse::kLossToRatio * loss_at_most;
     const double most = std::min(kLargestRatioChange, bound);
     const std::string grid =
         response.block_grid

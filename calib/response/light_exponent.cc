@@ -21,6 +21,7 @@ constexpr int kParts = 4;              // of the field, per axis
 constexpr int kNuisances = 9;
 constexpr Eigen::Index kMinWindows = 60;
 constexpr double kPixelsPerWindow = 4;  // windows are sampled so densely that 4 are one value
+constexpr double kMinChange = 1e-6;     // of the variance over the mean, relative to the mean
 constexpr int kMaxRounds = 8;
 constexpr double kSmallSlope = 0.003;
 
@@ -185,6 +186,8 @@ class ExponentFit {
     const Eigen::MatrixXd basis = Eigen::HouseholderQR<Eigen::MatrixXd>(nuisances).householderQ() *
                                   Eigen::MatrixXd::Identity(n, kNuisances);
     for (Eigen::VectorXd* of : {&rest, &change}) *of -= basis * (basis.transpose() * *of);
+    const double least = kMinChange * mean.mean();
+    if (!(change.squaredNorm() > static_cast<double>(n) * least * least)) return;
     const double slope = rest.dot(change) / change.squaredNorm();
     const double freedom =
         std::max(1.0, static_cast<double>(n) / kPixelsPerWindow - kNuisances - 1);

@@ -10,7 +10,7 @@
 namespace thicklens::calib {
 
 // Measures the power p to which the values, as they were read, must be raised to be proportional to
-// the light [D91]. A lens out of focus spreads the light of a part of the target and loses none.
+// the light [D122]. A lens out of focus spreads the light of a part of the target and loses none.
 // The mean m of the light within a window is therefore the same in the sharpest frame, with the
 // window blurred as much as the frame, whatever the texture. Of values that are a power of the
 // light it is not: with the variance v of the values within the window,

@@ -10,7 +10,7 @@
 namespace thicklens::calib {
 
 // Measures the noise power of single pixels over that of 4 x 4 px, relative to white noise, minus
-// 1 [D93]. Only frames whose blur is at least 6 px are used: what they show within a few pixels is
+// 1 [D124]. Only frames whose blur is at least 6 px are used: what they show within a few pixels is
 // noise, and what is left of the target lowers the value. The noise of a sensor is white, and
 // demosaicing makes it smoother; only sharpening makes it rise toward fine detail. `least_noise` is
 // the standard deviation, in linear light, below which the rounding of the file hides it. Returns
@@ -19,7 +19,7 @@ std::optional<model::Estimate> MeasureNoiseRise(const ResponseFrames& frames, cv
                                                 double least_noise);
 
 // Measures the mean second difference across the borders of blocks of 8 x 8 px over that of other
-// pixels, minus 1, at the place of the grid where it is largest [D94]. The smaller one of those of
+// pixels, minus 1, at the place of the grid where it is largest [D125]. The smaller one of those of
 // rows and columns counts, because a sensor that is read out in groups of columns has only one.
 // Returns nothing for fewer than 3 frames.
 std::optional<model::Estimate> MeasureBlockGrid(const ResponseFrames& frames, cv::Size size);

@@ -12,15 +12,15 @@ constexpr int kLargestCropPx = 512;
 
 // A disc of the given radius, with the share of each pixel of its rim, sum 1.
 cv::Mat DiscKernel(double radius_px) {
-  constexpr int kParts = 8;  // per pixel and axis
+  constexpr int kSubpixels = 8;  // per pixel and axis
   const int reach = static_cast<int>(std::ceil(radius_px + 0.5));
   cv::Mat kernel = cv::Mat::zeros(2 * reach + 1, 2 * reach + 1, CV_32F);
   for (int y = 0; y < kernel.rows; ++y) {
     for (int x = 0; x < kernel.cols; ++x) {
       int inside = 0;
-      for (int part = 0; part < kParts * kParts; ++part) {
-        const double u = x - reach + (part % kParts + 0.5) / kParts - 0.5;
-        const double v = y - reach + (part / kParts + 0.5) / kParts - 0.5;
+      for (int part = 0; part < kSubpixels * kSubpixels; ++part) {
+        const double u = x - reach + (part % kSubpixels + 0.5) / kSubpixels - 0.5;
+        const double v = y - reach + (part / kSubpixels + 0.5) / kSubpixels - 0.5;
         inside += u * u + v * v <= radius_px * radius_px ? 1 : 0;
       }
       kernel.at<float>(y, x) = static_cast<float>(inside);

@@ -9,7 +9,7 @@
 
 namespace thicklens::calib {
 
-// Measures whether weak detail is lost beyond what the blur takes [D92]. A lens is linear: it
+// Measures whether weak detail is lost beyond what the blur takes [D123]. A lens is linear: it
 // multiplies detail of one frequency by the same factor, whatever its contrast. Noise reduction and
 // compression remove what is as weak as noise. In a band of the frequencies, the detail y of a
 // blurred frame is compared with the detail p that the blur leaves of the sharpest frame; a second

@@ -36,7 +36,7 @@ TEST(CameraResponse, AFindingIsSignificantAndLarge) {
   EXPECT_FALSE(response.IsSharpened());
   response.noise_rise = model::Estimate{1, 0.05};
   EXPECT_TRUE(response.IsSharpened());
-  response.block_grid = model::Estimate{0.6, 0.05};
+  response.block_grid = model::Estimate{2, 0.05};
   EXPECT_TRUE(response.IsCompressed());
 }
 

@@ -19,7 +19,7 @@ struct CameraResponse {
   static constexpr double kMinExponent = 0.25;  // |ln exponent|
   static constexpr double kMinLoss = 0.01;      // of weak detail, per factor e of contrast
   static constexpr double kMinNoiseRise = 0.2;  // relative to white noise
-  static constexpr double kMinBlockGrid = 0.3;  // relative to the steps between other pixels
+  static constexpr double kMinBlockGrid = 1.5;  // relative to the steps between other pixels
   static constexpr double kLossToRatio = 0.5;   // d ln kappa/d loss of a power law of contrast
   static constexpr double kLargestFactor = 4;   // largest shift of kappa over that of the law
   static constexpr double kSharpeningOnRatio = 0.001;  // relative change of kappa by sharpening
