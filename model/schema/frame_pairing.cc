@@ -136,14 +136,20 @@ std::optional<int> WholeNumber(const std::string& text) {
   return value;
 }
 
-RowPage PageOfRow(const FileReading& row, const std::string& name, int pages) {
-  if (const auto number = WholeNumber(row.file)) return {*number, false};
+// Nothing if the row names no page of the file `name`.
+std::optional<RowPage> FindPageOfRow(const FileReading& row, const std::string& name) {
+  if (const auto number = WholeNumber(row.file)) return RowPage{*number, false};
   const std::size_t bracket = row.file.rfind('[');
   if (bracket != std::string::npos && row.file.back() == ']') {
     const std::string file = NameIn(row.file.substr(0, bracket));
     const auto page = WholeNumber(row.file.substr(bracket + 1, row.file.size() - bracket - 2));
-    if (page && (file.empty() || file == name)) return {*page, true};
+    if (page && (file.empty() || file == name)) return RowPage{*page, true};
   }
+  return std::nullopt;
+}
+
+RowPage PageOfRow(const FileReading& row, const std::string& name, int pages) {
+  if (const auto page = FindPageOfRow(row, name)) return *page;
   throw Error(fmt::format(
       "{}{} has {} pages, and '{}' is none of them: a row for each page is expected, '{}[0]' to "
       "'{}[{}]' or its number, or no table if the file has OME-XML with positions",
@@ -215,6 +221,50 @@ std::vector<SweepFrame> PairFrames(const ReadingSet& readings,
         of_other_kind.size() > 1 ? fmt::format(" and {} more", of_other_kind.size() - 1) : ""));
   }
   return frames;
+}
+
+std::map<int, const FileReading*> RowsOfFrames(const ReadingSet& readings, const std::string& path,
+                                               int frames, std::vector<std::string>* notices) {
+  const std::string name = fs::path(path).filename().string();
+  std::vector<RowPage> places;
+  bool has_zero = false, has_index = false;
+  int highest = 0;
+  for (const FileReading& row : readings.rows) {
+    const auto place = FindPageOfRow(row, name);
+    if (!place) {
+      throw Error(fmt::format(
+          "{}{} has {} frames, and '{}' is none of them: the number of a frame is expected, or "
+          "'{}[12]', which counts from 0; a column of times is named by --time-column",
+          row.place, name, frames, Shortened(row.file), name));
+    }
+    places.push_back(*place);
+    has_zero = has_zero || place->number == 0;
+    has_index = has_index || place->is_index;
+    highest = std::max(highest, place->number);
+  }
+  const bool counts_from_one = !has_zero && !has_index && highest == frames;
+  if (!counts_from_one && !has_zero && !has_index && notices != nullptr) {
+    notices->push_back(fmt::format(
+        "{}: the numbers of frames are taken to count from 0, as no row has 0 or {}, the number of "
+        "all frames",
+        readings.source, frames));
+  }
+  std::map<int, const FileReading*> row_of;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const FileReading& row = readings.rows[i];
+    const int number = places[i].number - (counts_from_one ? 1 : 0);
+    if (number >= frames) {
+      throw Error(fmt::format("{}'{}' is not a frame of {}, which has {}, counted from 0",
+                              row.place, Shortened(row.file), name, frames));
+    }
+    const auto [known, added] = row_of.emplace(number, &row);
+    if (!added) {
+      throw Error(fmt::format("{}the frame '{}' already has a reading, at {}", row.place,
+                              Shortened(row.file),
+                              known->second->place.substr(0, known->second->place.size() - 2)));
+    }
+  }
+  return row_of;
 }
 
 std::vector<SweepFrame> PairPages(const ReadingSet& readings, const std::string& path, int pages) {

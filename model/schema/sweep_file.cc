@@ -54,6 +54,8 @@ void ReadFloor(const YamlNode& root, SweepFile* sweep) {
   }
 }
 
+}  // namespace
+
 void NoteOrderAndRepeats(const SweepFile& sweep, std::vector<std::string>* notices) {
   if (notices == nullptr) return;
   std::vector<double> readings;
@@ -72,8 +74,6 @@ void NoteOrderAndRepeats(const SweepFile& sweep, std::vector<std::string>* notic
         "or 0 without such a law");
   }
 }
-
-}  // namespace
 
 std::string BenchDirectionName(BenchDirection direction) {
   return direction == BenchDirection::kAway ? "away" : "toward";

@@ -171,6 +171,7 @@ void RequireNoOptions(const YamlNode& root, const ReadingOptions& replacements) 
   }
   const bool is_any = replacements.IsWithoutTable() || !replacements.column.empty() ||
                       !replacements.file_column.empty() || !replacements.unit.empty() ||
+                      !replacements.time_column.empty() || !replacements.time_unit.empty() ||
                       replacements.scale_mm || !replacements.decimal.empty();
   if (is_any) {
     throw root.At("frames").ErrorHere(

@@ -23,6 +23,9 @@ void ReadFramesOfFolder(const std::string& folder, const std::string& table,
                         const SweepReading& reading, SweepFile* sweep,
                         std::vector<std::string>* notices);
 
+// Adds to `notices`, which may be null, what is unusual about the readings of the frames.
+void NoteOrderAndRepeats(const SweepFile& sweep, std::vector<std::string>* notices);
+
 }  // namespace thicklens::model
 
 #endif  // THICKLENS_MODEL_SCHEMA_SWEEP_FRAMES_H_

@@ -67,6 +67,21 @@ const Words& OtherWords() {
   return words;
 }
 
+// Names of times, in the same languages.
+const Words& TimeWords() {
+  static const Words words = {"time", "times", "timestamp", "timestamps", "elapsed",    "t",
+                              "zeit", "temps", "heure",     "tiempo",     "hora",       "tempo",
+                              "tijd", "tid",   "czas",      "čas",        "время",      "时间",
+                              "時間", "시간",  "pts",       "seconds",    "zeitstempel"};
+  return words;
+}
+
+bool IsUnitOfTime(const std::string& unit) {
+  static const Words units = {"s",  "sec", "secs", "second", "seconds", "sekunde", "sekunden",
+                              "ms", "us",  "ns",   "min",    "h",       "hr",      "hours"};
+  return units.count(unit) > 0;
+}
+
 // Lower case of Latin and Cyrillic letters in UTF-8; other bytes as they are.
 std::string LowerCase(const std::string& text) {
   std::string lower;
@@ -179,6 +194,25 @@ class Finder {
   Finder(const TableCells& table, const std::string& path, const ReadingOptions& options)
       : table_(table), path_(path), options_(options) {}
 
+  // The columns that may have the times or the numbers of the frames of a video.
+  VideoColumns FindForVideo(ReadingColumns* columns) {
+    FindHeader();
+    CountCells();
+    VideoColumns found;
+    found.has_header = HasHeader();
+    for (std::size_t column = 0; column < found_.width; ++column) {
+      if (HasHeader() ? IsTime(column) : IsContentOfTimes(column)) found.times.push_back(column);
+      const auto words = NameOf(CellOf(column)).words;
+      const bool is_page = std::find(words.begin(), words.end(), "page") != words.end();
+      if (HasHeader() && (HasWord(words, FileWords()) || is_page)) found.files.push_back(column);
+    }
+    // Without names, only the first column can be told from the readings.
+    if (!HasHeader() && !found.times.empty() && found.times.front() != 0) found.times.clear();
+    if (!HasHeader() && found.times.size() > 1) found.times.resize(1);
+    *columns = found_;
+    return found;
+  }
+
   ReadingColumns Find() {
     FindHeader();
     CountCells();
@@ -227,13 +261,15 @@ class Finder {
   // The first row is a header if it has neither a number nor the name of a file.
   void FindHeader() {
     const bool is_first = NamesCell(table_.rows.front(), options_.column) ||
-                          NamesCell(table_.rows.front(), options_.file_column);
+                          NamesCell(table_.rows.front(), options_.file_column) ||
+                          NamesCell(table_.rows.front(), options_.time_column);
     const std::size_t beginning = is_first ? 0 : FindBeginning();
     found_.first_row = beginning;
     if (beginning > 0) found_.last_skipped_line = table_.rows[beginning - 1].line;
     const TableRow& first = table_.rows[beginning];
-    const bool is_asked_for =
-        NamesCell(first, options_.column) || NamesCell(first, options_.file_column);
+    const bool is_asked_for = NamesCell(first, options_.column) ||
+                              NamesCell(first, options_.file_column) ||
+                              NamesCell(first, options_.time_column);
     const bool has_data = HasNumber(first) || HasFile(first);
     const auto& comment = table_.comment.cells;
     if (is_asked_for || !has_data) {
@@ -327,7 +363,32 @@ class Finder {
     return found.front();
   }
 
+  bool IsTime(std::size_t column) const {
+    const ColumnName name = NameOf(CellOf(column));
+    if (std::find(name.words.begin(), name.words.end(), "exposure") != name.words.end())
+      return false;
+    // A column of positions may have a name such as "focus_time_avg", but hardly a unit of time.
+    if (HasWord(name.words, ReadingWords())) return false;
+    return HasWord(name.words, TimeWords()) ||
+           (name.words.empty() && IsUnitOfTime(LowerCase(name.unit)));
+  }
+
+  // Whether the cells are "00:01:02" or numbers that are not whole.
+  bool IsContentOfTimes(std::size_t column) const {
+    bool has_fraction = false;
+    for (std::size_t i = found_.first_row; i < table_.rows.size(); ++i) {
+      const auto& cells = table_.rows[i].cells;
+      if (column >= cells.size()) continue;
+      const std::string& cell = cells[column];
+      if (cell.find(':') != std::string::npos) return true;
+      if (LooksLikeNumber(cell) && cell.find_first_of(".,") != std::string::npos)
+        has_fraction = true;
+    }
+    return has_fraction;
+  }
+
   std::size_t FindFile() const {
+    if (!options_.time_column.empty()) return Named(options_.time_column, "--time-column");
     if (!options_.file_column.empty()) return Named(options_.file_column, "--file-column");
     const auto has_file_name = [&](std::size_t column) {
       return HasWord(NameOf(CellOf(column)).words, FileWords());
@@ -397,8 +458,9 @@ class Finder {
 
   std::size_t RequireOther(std::size_t column) const {
     if (column == found_.file && found_.width > 1) {
-      throw Error(fmt::format("{}--column: {} has the files; name the column of the readings",
-                              Place(), ColumnText(found_, column)));
+      throw Error(fmt::format("{}--column: {} has the {}; name the column of the readings", Place(),
+                              ColumnText(found_, column),
+                              options_.time_column.empty() ? "files" : "times"));
     }
     return column;
   }
@@ -451,6 +513,11 @@ std::string ColumnText(const ReadingColumns& columns, std::size_t column) {
   const std::string number = fmt::format("column {}", column + 1);
   if (column >= columns.header.cells.size() || columns.header.cells[column].empty()) return number;
   return number + " " + Quoted(columns.header.cells[column]);
+}
+
+VideoColumns FindVideoColumns(const TableCells& table, const std::string& path,
+                              const ReadingOptions& options, ReadingColumns* columns) {
+  return Finder(table, path, options).FindForVideo(columns);
 }
 
 ReadingColumns FindColumns(const TableCells& table, const std::string& path,

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <string>
+#include <vector>
 
 #include "model/tables/table_cells.h"
 #include "thicklens/model/readings.h"
@@ -24,6 +25,15 @@ struct ReadingColumns {
 // decide, if several columns may be meant or none.
 ReadingColumns FindColumns(const TableCells& table, const std::string& path,
                            const ReadingOptions& options);
+
+// The columns of a table for a video that may have the times of its frames or their numbers.
+struct VideoColumns {
+  bool has_header = false;
+  std::vector<std::size_t> times;  // by their names or, without a header, by their content
+  std::vector<std::size_t> files;  // by their names: "frame", "page", "file"
+};
+VideoColumns FindVideoColumns(const TableCells& table, const std::string& path,
+                              const ReadingOptions& options, ReadingColumns* columns);
 
 // A column in messages: "column 2 'z_mm'".
 std::string ColumnText(const ReadingColumns& columns, std::size_t column);

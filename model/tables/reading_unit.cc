@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <map>
+#include <set>
 
 #include "model/tables/table_text.h"
 #include "thicklens/base/error.h"
@@ -149,6 +150,13 @@ bool ReadingOptions::IsValid(std::string* why) const {
     return fail(fmt::format("decimal: comma or point is expected, found '{}'", Shown(decimal)));
   if (!source.empty() && source != "exif" && source != "sidecar" && source != "ome")
     return fail(fmt::format("source: exif, sidecar or ome is expected, found '{}'", Shown(source)));
+  if (!time_column.empty() && !file_column.empty())
+    return fail("time_column: excludes file_column: a row is of a time or of a frame");
+  static const std::set<std::string> units_of_time = {"s", "ms", "us", "ns", "min", "h"};
+  if (!time_unit.empty() && units_of_time.count(time_unit) == 0) {
+    return fail(fmt::format("time_unit: s, ms, us, ns, min or h is expected, found '{}'",
+                            Shown(time_unit)));
+  }
   if (!source.empty() && !name_pattern.empty())
     return fail("name_pattern: excludes source, which takes the readings from inside the files");
   if (!name_pattern.empty()) {

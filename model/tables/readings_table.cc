@@ -220,10 +220,11 @@ class Reader {
     const bool is_stated = !unit_.empty() || !options_.unit.empty() || options_.scale_mm;
     if (!is_stated) unit += " (no unit is stated)";
     if (options_.scale_mm) unit += fmt::format(" of {} mm", *options_.scale_mm);
-    set->description =
-        fmt::format("{} of {}, {}, {} row{}; files from {}", ColumnText(columns_, columns_.reading),
-                    fs::path(path_).filename().string(), unit, set->rows.size(),
-                    set->rows.size() == 1 ? "" : "s", ColumnText(columns_, columns_.file));
+    set->description = fmt::format(
+        "{} of {}, {}, {} row{}; {} from {}", ColumnText(columns_, columns_.reading),
+        fs::path(path_).filename().string(), unit, set->rows.size(),
+        set->rows.size() == 1 ? "" : "s", options_.time_column.empty() ? "files" : "times",
+        ColumnText(columns_, columns_.file));
     if (table_.separator != ',') set->description += "; " + SeparatorName(table_.separator);
     if (is_comma_seen_) set->description += "; decimal comma";
     if (encoding != "UTF-8") set->description += "; " + encoding;

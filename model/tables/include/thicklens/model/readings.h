@@ -25,6 +25,10 @@ struct ReadingOptions {
   // "exif": the metadata of the files (EXIF, XMP). "sidecar": a JSON file beside each file. "ome":
   // the OME-XML in each file. All instead of a table.
   std::string source;
+  // The column of times, likewise, in a table for the frames of a video; excludes `file_column`.
+  std::string time_column;
+  // Unit of the times: s, ms, us, ns, min or h. It replaces a unit that the table states.
+  std::string time_unit;
 
   // Returns whether the values are possible and do not contradict each other. Otherwise `why`, if
   // not null, gets the field, the value and the constraint.
@@ -50,6 +54,23 @@ struct ReadingSet {
   std::vector<std::string> notices;  // assumptions, one line each
 };
 
+// The reading at one time.
+struct TimedReading {
+  double time_s = 0;  // on the clock of the table
+  double reading_mm = 0;
+  std::string place;  // for messages: "table.csv:3: "
+};
+
+// The readings of a sweep by time.
+struct TimedReadingSet {
+  std::vector<TimedReading> rows;  // in rising order of time
+  // Whether the table, or an option, states the unit of the times; otherwise they are seconds.
+  bool is_time_unit_stated = false;
+  std::string description;           // as in ReadingSet
+  std::string source;                // likewise
+  std::vector<std::string> notices;  // assumptions, one line each
+};
+
 // Reads the readings of a sweep. `table` is empty if they come from the files themselves; `files`
 // are the images of the sweep. Throws Error that names the place.
 using ReadingReader = std::function<ReadingSet(
@@ -66,6 +87,21 @@ THICKLENS_EXPORT ReadingSet ReadTextReadings(const std::string& table,
 // line, column and value.
 THICKLENS_EXPORT ReadingSet ReadingsOfTable(const std::string& bytes, const std::string& path,
                                             const ReadingOptions& options);
+
+// Whether a table for a video has times, and not the numbers of frames: `options.time_column` or
+// the names of the columns say it or, without a header, numbers that are not whole. Throws Error if
+// it has both, or several columns of times, and no option selects one.
+THICKLENS_EXPORT bool HasTimes(const std::string& bytes, const std::string& path,
+                               const ReadingOptions& options);
+// Reads a table of times and readings. A time is a number, "mm:ss.f", "hh:mm:ss.f", or a date and a
+// time ("2026-11-27T10:20:30.5"), which becomes seconds since 1970. Throws Error as ReadingsOfTable
+// does, also for times that do not rise or fall from row to row.
+THICKLENS_EXPORT TimedReadingSet TimedReadingsOfTable(const std::string& bytes,
+                                                      const std::string& path,
+                                                      const ReadingOptions& options);
+// The seconds of one such time with a decimal point, in s unless a unit follows it ("12 ms"), or
+// nothing if it is none.
+THICKLENS_EXPORT std::optional<double> SecondsOfTime(const std::string& text);
 
 // Reads `options.name_pattern` in the name of each file. The unit is the one that follows
 // "{reading}" in the pattern, if there is one. Throws Error that names the file.
