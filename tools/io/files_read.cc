@@ -16,11 +16,15 @@ std::string NameOf(const std::string& path) {
 }
 
 // "31 pages of stack.tif: ", "31 files: ", "f007.tif and 2 more: ", or nothing for one file.
-std::string FilesText(const std::vector<std::string>& files, bool is_first, bool is_only) {
+std::string FilesText(const FilesRead& group, bool is_first, bool is_only) {
+  const std::vector<std::string>& files = group.files;
   const bool are_pages = std::count(files.begin(), files.end(), files.front()) ==
                          static_cast<std::ptrdiff_t>(files.size());
   if (files.size() == 1) return is_only ? "" : NameOf(files.front()) + ": ";
-  if (are_pages) return fmt::format("{} pages of {}: ", files.size(), NameOf(files.front()));
+  if (are_pages) {
+    return fmt::format("{} {} of {}: ", files.size(), group.facts.video ? "frames" : "pages",
+                       NameOf(files.front()));
+  }
   if (is_first) return fmt::format("{} files: ", files.size());
   return fmt::format("{} and {} more: ", NameOf(files.front()), files.size() - 1);
 }
@@ -56,7 +60,7 @@ std::string FilesReadLine(const std::vector<FilesRead>& groups) {
   for (std::size_t i = 0; i < groups.size() && i < kShown; ++i) {
     const FilesRead& group = groups[i];
     if (i > 0) line += "; ";
-    line += FilesText(group.files, i == 0, groups.size() == 1);
+    line += FilesText(group, i == 0, groups.size() == 1);
     ImageFacts facts = group.facts;
     if (group.files.size() > 1) facts.pages = 1;  // the page is that of the first file only
     line += facts.OneLine();

@@ -2,8 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <fstream>
+#include <string_view>
 #include <utility>
 
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/base/yaml_reader.h"
 #include "thicklens/io/data_hash.h"
@@ -18,7 +22,39 @@ FrameFiles::FrameFiles(std::vector<model::SweepFrame> frames, std::optional<int>
       digests_(frames_.size()),
       facts_(frames_.size()) {}
 
+namespace {
+
+// Throws Error for the name of a video without the number of a frame.
+void RequireNumber(const model::SweepFrame& frame) {
+  if (frame.page || !IsNameOfVideo(frame.image) || !IsVideoFile(frame.image)) return;
+  throw Error(fmt::format(
+      "{}: a video has many frames: 'page' states the number of the one that is meant, from 0",
+      frame.image));
+}
+
+std::string DigestOfFile(const std::string& path) {
+  constexpr std::size_t kPiece = std::size_t{1} << 20;
+  std::ifstream file(path, std::ios::binary);
+  std::string piece(kPiece, '\0');
+  Sha256 digest;
+  while (file) {
+    ThrowIfCancelled();
+    file.read(piece.data(), static_cast<std::streamsize>(kPiece));
+    digest.Add(std::string_view(piece).substr(0, static_cast<std::size_t>(file.gcount())));
+  }
+  if (!file.eof()) throw Error(fmt::format("{}: cannot be read to its end", path));
+  return digest.Hex();
+}
+
+}  // namespace
+
 cv::Mat ReadFrame(const model::SweepFrame& frame, ImageFacts* facts) {
+  RequireNumber(frame);
+  if (frame.page && IsVideoFile(frame.image)) {
+    DecodedImage image = VideoFile(frame.image).Read(*frame.page);
+    if (facts != nullptr) *facts = std::move(image.facts);
+    return image.pixels;
+  }
   ImageReading reading;
   reading.page = frame.page;
   return DecodeImage(ReadWholeFile(frame.image), frame.Name(), reading, facts);
@@ -49,8 +85,48 @@ FrameFiles::Bytes FrameFiles::ReadAndDigest(std::size_t index) {
   return bytes;
 }
 
+VideoFile* FrameFiles::VideoOf(std::size_t index) {
+  const model::SweepFrame& frame = frames_.at(index);
+  if (!frame.page) return nullptr;
+  const std::lock_guard<std::mutex> one_opener(opening_video_);
+  const auto known = videos_.find(frame.image);
+  if (known != videos_.end()) return known->second.get();
+  std::unique_ptr<VideoFile> video;
+  if (IsVideoFile(frame.image)) {
+    video = std::make_unique<VideoFile>(frame.image);
+    std::vector<int> numbers;
+    for (const model::SweepFrame& other : frames_) {
+      if (other.page && other.image == frame.image) numbers.push_back(*other.page);
+    }
+    video->Expect(numbers);
+  }
+  return videos_.emplace(frame.image, std::move(video)).first->second.get();
+}
+
+void FrameFiles::DigestVideo(std::size_t index) {
+  const std::string& path = frames_.at(index).image;
+  const std::lock_guard<std::mutex> one_reader(reading_stack_);
+  std::string& digest = video_digests_[path];
+  if (digest.empty()) digest = DigestOfFile(path);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  digests_[index] = digest;
+}
+
+cv::Mat FrameFiles::ReadVideo(VideoFile* video, std::size_t index) {
+  const model::SweepFrame& frame = frames_.at(index);
+  DigestVideo(index);
+  DecodedImage image = video->Read(*frame.page);
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    facts_[index] = std::move(image.facts);
+  }
+  return full_scale_ ? ScaledToContainer(image.pixels, *full_scale_, frame.Name()) : image.pixels;
+}
+
 cv::Mat FrameFiles::Read(std::size_t index) {
   const model::SweepFrame& frame = frames_.at(index);
+  RequireNumber(frame);
+  if (VideoFile* const video = VideoOf(index)) return ReadVideo(video, index);
   ImageReading reading;
   reading.page = frame.page;
   // A full scale that the caller states refers to the values as the file has them.
@@ -74,7 +150,13 @@ std::vector<FilesRead> FrameFiles::Files() {
 std::string FrameFiles::DataSha256() {
   std::string lines;
   for (std::size_t i = 0; i < frames_.size(); ++i) {
-    if (digests_[i].empty()) ReadAndDigest(i);
+    if (digests_[i].empty()) {
+      if (VideoOf(i) != nullptr) {
+        DigestVideo(i);
+      } else {
+        ReadAndDigest(i);
+      }
+    }
     const std::optional<int>& page = frames_[i].page;
     lines += fmt::format("{} {}{}\n", digests_[i], page ? fmt::format("{} ", *page) : "",
                          YamlNumber(frames_[i].reading_mm));

@@ -375,6 +375,21 @@ std::string TransferText(const ImageFacts& facts) {
   return "transfer not stated";
 }
 
+// "; yuv420p, chroma 4:2:0, matrix BT.601 (assumed), limited range (assumed)"
+std::string VideoText(const VideoFacts& video) {
+  const auto assumed = [](bool is_stated) { return is_stated ? "" : " (assumed)"; };
+  std::string text = "; " + video.pixel_format;
+  if (!video.chroma.empty()) text += ", chroma " + video.chroma;
+  if (!video.matrix.empty())
+    text += fmt::format(", matrix {}{}", video.matrix, assumed(video.is_matrix_stated));
+  text += fmt::format(", {} range{}", video.is_full_range ? "full" : "limited",
+                      assumed(video.is_range_stated));
+  if (video.pixel_aspect != 1) {
+    text += fmt::format(", pixels {:.4g} times as wide as high (not applied)", video.pixel_aspect);
+  }
+  return text;
+}
+
 std::string DepthName(int depth) {
   static const char* const kNames[] = {"unsigned 8-bit integers",
                                        "signed 8-bit integers",
@@ -475,6 +490,7 @@ std::string ImageFacts::OneLine() const {
         raw->black_level[0], raw->white_level,
         raw->camera.empty() ? "" : ", " + PrintableUtf8(raw->camera), raw->treatment);
   }
+  if (video) line += VideoText(*video);
   for (const std::string& note : notes) line += " " + note;
   return line;
 }

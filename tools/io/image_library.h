@@ -1,6 +1,7 @@
 #ifndef THICKLENS_TOOLS_IO_IMAGE_LIBRARY_H_
 #define THICKLENS_TOOLS_IO_IMAGE_LIBRARY_H_
 
+#include <memory>
 #include <opencv2/core/mat.hpp>
 #include <string>
 #include <utility>
@@ -8,6 +9,7 @@
 
 #include "thicklens/io/image_file.h"
 #include "tools/io/image_file_kind.h"
+#include "tools/io/video/video_decoder.h"
 
 namespace thicklens::io {
 
@@ -37,10 +39,10 @@ struct LibraryDepth {
   std::vector<std::string> other_types;  // of the other auxiliary images, without alpha
 };
 
-// OpenImageIO with LibRaw and libheif. They are in a library of their own, which is loaded when an
-// image first needs it: with the 260 libraries that it depends on it takes more time and memory
-// than everything else that the program does at its start. No exception leaves a function, and
-// nothing is printed: `why` gets the reason if the result is false.
+// OpenImageIO with LibRaw, libheif and FFmpeg. They are in a library of their own, which is loaded
+// when an image first needs it: with the 260 libraries that it depends on it takes more time and
+// memory than everything else that the program does at its start. No exception leaves a function,
+// and nothing is printed: `why` gets the reason if the result is false.
 struct ImageLibrary {
   bool (*pages)(const std::string& bytes, const LibraryReading& reading,
                 std::vector<LibraryPage>* pages, std::string* why);
@@ -54,6 +56,9 @@ struct ImageLibrary {
                 std::string* why);
   bool (*encode)(const cv::Mat& pixels, ImageFormat format, const ImageWriting& writing,
                  std::string* bytes, std::string* why);
+  // Opens a video by its path: it may be larger than the memory.
+  bool (*open_video)(const std::string& path, const VideoOpening& opening,
+                     std::unique_ptr<VideoDecoder>* video, std::string* why);
 };
 
 // Throws Error if that library is missing from the program's installation, or left out of the

@@ -66,6 +66,21 @@ json RawJson(const io::ImageFacts& facts) {
           {"treatment", raw.treatment}};
 }
 
+json VideoJson(const io::ImageFacts& facts) {
+  if (!facts.video) return nullptr;
+  const io::VideoFacts& video = *facts.video;
+  return {{"container", video.container},
+          {"codec", video.codec},
+          {"lossless", video.is_lossless},
+          {"pixel_format", video.pixel_format},
+          {"chroma", video.chroma},
+          {"matrix", video.matrix},
+          {"matrix_stated", video.is_matrix_stated},
+          {"full_range", video.is_full_range},
+          {"range_stated", video.is_range_stated},
+          {"pixel_aspect", video.pixel_aspect}};
+}
+
 json FactsJson(const io::ImageFacts& facts) {
   const char* const transfer = TransferName(facts.transfer);
   return {{"line", facts.OneLine()},
@@ -87,6 +102,7 @@ json FactsJson(const io::ImageFacts& facts) {
           {"orientation_applied", facts.is_orientation_applied},
           {"alpha", AlphaName(facts.alpha)},
           {"raw", RawJson(facts)},
+          {"video", VideoJson(facts)},
           {"notes", PrintableTexts(facts.notes)}};
 }
 

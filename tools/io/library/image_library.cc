@@ -1,5 +1,6 @@
 // The library that tools/io/image_library.h describes.
 #include <exception>
+#include <memory>
 
 #include "tools/io/library/decoders.h"
 
@@ -64,12 +65,18 @@ bool Encode(const cv::Mat& pixels, ImageFormat format, const ImageWriting& writi
   });
 }
 
+bool OpenVideoFile(const std::string& path, const VideoOpening& opening,
+                   std::unique_ptr<VideoDecoder>* video, std::string* why) {
+  return Guarded(why, [&] { *video = OpenVideo(path, opening); });
+}
+
 }  // namespace
 }  // namespace thicklens::io
 
 extern "C" __attribute__((visibility("default"))) const thicklens::io::ImageLibrary*
 ThicklensImageLibrary() {
   static const thicklens::io::ImageLibrary library{thicklens::io::Pages, thicklens::io::Decode,
-                                                   thicklens::io::Depth, thicklens::io::Encode};
+                                                   thicklens::io::Depth, thicklens::io::Encode,
+                                                   thicklens::io::OpenVideoFile};
   return &library;
 }

@@ -2,6 +2,7 @@
 #define THICKLENS_IO_FRAME_FILES_H_
 
 #include <cstddef>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <opencv2/core/mat.hpp>
@@ -11,11 +12,13 @@
 
 #include "thicklens/base/export.h"
 #include "thicklens/io/files_read.h"
+#include "thicklens/io/video_file.h"
 #include "thicklens/model/sweep_file.h"
 
 namespace thicklens::io {
 
-// Reads the image of a frame, or its page. Throws Error that names the frame.
+// Reads the image of a frame, its page, or the frame of that number of a video. Throws Error that
+// names the frame.
 THICKLENS_EXPORT cv::Mat ReadFrame(const model::SweepFrame& frame, ImageFacts* facts = nullptr);
 
 // The image files of a sweep, read on request; several threads may read.
@@ -33,12 +36,17 @@ class THICKLENS_EXPORT FrameFiles {
 
   // SHA-256 over lines "digest reading", one for each frame in the sweep's order, where digest is
   // that of the file's bytes and reading is in mm; "digest page reading" for the page of a file of
-  // several. The digest of a file is computed when the file is first read, or here.
+  // several, and of a video, whose pages are its frames. The digest of a file is computed when the
+  // file is first read, or here.
   std::string DataSha256();
 
  private:
   using Bytes = std::shared_ptr<const std::string>;
   Bytes ReadAndDigest(std::size_t index);
+  // The video that the frame is of; null: it is of another file.
+  VideoFile* VideoOf(std::size_t index);
+  cv::Mat ReadVideo(VideoFile* video, std::size_t index);
+  void DigestVideo(std::size_t index);
 
   std::vector<model::SweepFrame> frames_;
   std::optional<int> full_scale_;
@@ -48,7 +56,10 @@ class THICKLENS_EXPORT FrameFiles {
   std::string stack_path_;
   Bytes stack_;
   std::string stack_digest_;
-  std::mutex mutex_, reading_stack_;
+  // A video is opened once, for all of its frames; null: the file is no video.
+  std::map<std::string, std::unique_ptr<VideoFile>> videos_;
+  std::map<std::string, std::string> video_digests_;
+  std::mutex mutex_, reading_stack_, opening_video_;
 };
 
 }  // namespace thicklens::io

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "thicklens/base/export.h"
+#include "thicklens/io/video_facts.h"
 
 namespace thicklens::io {
 
@@ -84,6 +85,7 @@ struct ImageFacts {
   std::optional<double> pixel_pitch_mm;  // of the sensor, as EXIF states it
   std::string description;               // the file's own text, e.g. OME-XML
   std::optional<RawFacts> raw;           // absent: it is not a raw file
+  std::optional<VideoFacts> video;       // absent: it is not a frame of a video
   // Everything else that a user should know about this reading, one sentence each.
   std::vector<std::string> notes;
 
