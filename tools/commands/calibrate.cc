@@ -232,11 +232,12 @@ void AddSweepOptions(CLI::App* command, SweepArguments* sweep) {
   command
       ->add_option(
           "sweep", sweep->input,
-          "Sweep description, or a folder of frames (or a file whose pages are the frames) with "
-          "--readings and --camera")
+          "Sweep description, or a folder of frames (or a file whose pages are the frames, or a "
+          "video) with --readings and --camera")
       ->required()
-      ->type_name("SWEEP.yaml|DIR|STACK.tif");
+      ->type_name("SWEEP.yaml|DIR|STACK.tif|VIDEO.mp4");
   AddReadingOptions(command, sweep);
+  AddVideoOptions(command, sweep);
   command->add_option("--camera", sweep->camera_path, "Camera file, instead of the sweep's own")
       ->type_name("CAMERA.yaml");
   command->add_option("--truth", sweep->truth_path, "True values to compare with (of a simulation)")

@@ -174,10 +174,11 @@ void AddCameraVerifyCommand(CLI::App* camera, CommandAction* action) {
       ->type_name("CAMERA.yaml");
   command
       ->add_option("sweep", options->sweep.input,
-                   "Description of the new sweep, or a folder of frames with --readings")
+                   "Description of the new sweep, or a folder of frames or a video with --readings")
       ->required()
-      ->type_name("SWEEP.yaml|DIR");
+      ->type_name("SWEEP.yaml|DIR|VIDEO.mp4");
   AddReadingOptions(command, &options->sweep);
+  AddVideoOptions(command, &options->sweep);
   AddSweepStatements(command, &options->sweep);
   command->add_flag("--same-bench", options->verification.same_bench,
                     "The camera is mounted on the bench as before: compare the bench offset too");

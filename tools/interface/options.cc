@@ -175,7 +175,8 @@ bool SweepOverrides::IsValid(std::string* why) const {
   const auto non_negative = [why](const char* field) {
     return [why, field](double value) { return NonNegative(why, field, value); };
   };
-  return Member(why, "readings", readings) && IfGiven(offset_mm, finite("offset_mm")) &&
+  return Member(why, "readings", readings) && Member(why, "video", video) &&
+         IfGiven(offset_mm, finite("offset_mm")) &&
          IfGiven(offset_sigma_mm, non_negative("offset_sigma_mm")) &&
          IfGiven(reading_sigma_mm, non_negative("reading_sigma_mm")) &&
          IfGiven(floor_px,

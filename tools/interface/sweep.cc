@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <cstddef>
 #include <filesystem>
 #include <system_error>
 #include <utility>
@@ -18,6 +19,7 @@
 #include "thicklens/io/full_scale.h"
 #include "thicklens/io/image_file.h"
 #include "thicklens/io/readings.h"
+#include "thicklens/io/video_file.h"
 #include "thicklens/model/camera_file.h"
 #include "tools/interface/missing_tolerances.h"
 #include "tools/interface/run_scope.h"
@@ -129,6 +131,104 @@ model::SweepFile SweepOfStack(const std::string& path, const std::string& table,
   return model::SweepFromPages(path, pages, readings, overrides.camera_path, notices);
 }
 
+// A table of text, not JSON or XML, which name frames by their own rules.
+bool IsTextTable(const std::string& text) {
+  const std::size_t begin = text.find_first_not_of("\xEF\xBB\xBF \t\r\n");
+  return begin == std::string::npos || std::string("{[<").find(text[begin]) == std::string::npos;
+}
+
+std::string BitRateText(double bits_per_second) {
+  constexpr double kMega = 1e6, kKilo = 1e3;
+  return bits_per_second >= kMega ? fmt::format("{:.3g} Mbit/s", bits_per_second / kMega)
+                                  : fmt::format("{:.3g} kbit/s", bits_per_second / kKilo);
+}
+
+// Says that frames of a video are compressed, and no more: how much of their detail is lost is not
+// known from the file.
+std::string CompressionOfVideo(const std::string& path, const io::VideoFacts& video,
+                               const io::VideoCompression* measured) {
+  std::string amount;
+  if (measured != nullptr) {
+    if (measured->bits_per_second) amount = ", " + BitRateText(*measured->bits_per_second);
+    amount += fmt::format(", {:.3g} bits per pixel", measured->bits_per_pixel);
+  }
+  return fmt::format(
+      "{}: its frames are compressed ({}{}); the stated errors include no part for what the "
+      "compression changes",
+      path, video.codec, amount);
+}
+bool IsCompressionOfVideo(const std::string& notice) {
+  return notice.find(": its frames are compressed (") != std::string::npos;
+}
+
+void NoteVideo(const std::string& path, const io::VideoSurvey& survey,
+               std::vector<std::string>* notices) {
+  const io::VideoFacts& video = *survey.facts.video;
+  if (!video.is_lossless) notices->push_back(CompressionOfVideo(path, video, &survey.compression));
+  if (survey.is_interlaced) {
+    notices->push_back(fmt::format(
+        "{}: it is interlaced: the even and the odd rows of a frame are of two times, half a frame "
+        "apart, and one reading is taken for both",
+        path));
+  }
+  if (video.pixel_aspect != 1) {
+    notices->push_back(fmt::format(
+        "{}: it states pixels that are {:.4g} times as wide as high; they are used as stored, with "
+        "the one pixel pitch of the camera file",
+        path, video.pixel_aspect));
+  }
+}
+
+void RequireNoVideoOptions(const std::string& path, const SweepOverrides& overrides) {
+  const model::ReadingOptions& readings = overrides.readings;
+  if (!overrides.video.IsGiven() && readings.time_column.empty() && readings.time_unit.empty())
+    return;
+  throw OptionError(
+      "video", fmt::format("video: times, a constant speed and a choice of frames are for a video; "
+                           "{} is none",
+                           path));
+}
+
+// A sweep whose frames are those of a video.
+model::SweepFile SweepOfVideo(const std::string& path, const std::string& table,
+                              const SweepOverrides& overrides, std::vector<std::string>* notices) {
+  const model::ReadingOptions& options = overrides.readings;
+  if (options.IsWithoutTable()) {
+    throw OptionError("readings.source",
+                      fmt::format("readings.source: the frames of {} have one name and one set of "
+                                  "metadata; a table or a constant speed states their readings",
+                                  path));
+  }
+  if (table.empty() == !overrides.video.reading_start.has_value()) {
+    throw OptionError(
+        "readings",
+        fmt::format("readings: {} needs either a table of its readings, by time or by frame, or a "
+                    "constant speed (video.reading_start and video.reading_end)",
+                    path));
+  }
+  model::VideoTable readings;
+  if (!table.empty()) {
+    const std::string text = ReadTextFile(table);
+    if (IsTextTable(text) && model::HasTimes(text, table, options)) {
+      readings.by_time = model::TimedReadingsOfTable(text, table, options);
+    } else {
+      readings.by_frame = io::ReadReadings(table, {path}, options);
+    }
+  }
+  const io::VideoSurvey survey = io::VideoFile(path).Survey();
+  NoteVideo(path, survey, notices);
+  return model::SweepFromVideo(path, survey.frames, readings, overrides.video, options,
+                               overrides.camera_path, notices);
+}
+
+// Whether the input is taken for a video: by its content, or by its name, so that a broken one is
+// refused as such.
+bool IsVideo(const std::string& input) {
+  std::error_code failure;
+  return fs::is_regular_file(input, failure) &&
+         (io::IsVideoFile(input) || io::IsNameOfVideo(input));
+}
+
 // The file whose pages are the frames: the input itself, or the only image in the folder.
 std::optional<std::string> StackOf(const std::string& input) {
   std::error_code failure;
@@ -174,9 +274,10 @@ bool IsScaleFree(const TransferCurve& transfer) { return !(transfer == TransferC
 // Returns what the values of all frames show; frames are read until it is certain.
 io::FullScaleFinding FullScaleOfFrames(const std::vector<model::SweepFrame>& frames) {
   io::ValueCounter values;
-  for (const model::SweepFrame& frame : frames) {
+  io::FrameFiles files(frames);  // opens a file of many frames once
+  for (std::size_t i = 0; i < frames.size(); ++i) {
     ThrowIfCancelled();
-    values.Add(io::ReadFrame(frame), frame.Name());
+    values.Add(files.Read(i), frames[i].Name());
     if (values.UsesWholeContainer()) break;
   }
   return values.Finding();
@@ -246,6 +347,7 @@ Sweep ReadSweep(const std::string& path, const SweepOverrides& overrides,
     }
     yaml = inside.string();
   }
+  RequireNoVideoOptions(path, overrides);
   Sweep sweep;
   model::SweepFile file = model::ReadSweep(yaml, ReadingOf(overrides), &sweep.notices);
   if (!overrides.camera_path.empty()) file.camera_path = overrides.camera_path;
@@ -266,6 +368,11 @@ Sweep ReadSweepFolder(const std::string& folder, const std::string& readings_csv
   }
   const bool is_without_table = overrides.readings.IsWithoutTable();
   Sweep sweep;
+  if (IsVideo(folder)) {
+    model::SweepFile file = SweepOfVideo(folder, readings_csv, overrides, &sweep.notices);
+    return Finish(std::move(file), "", overrides, run, std::move(sweep));
+  }
+  RequireNoVideoOptions(folder, overrides);
   if (const auto stack = StackOf(folder); stack && (readings_csv.empty() || !is_without_table)) {
     model::SweepFile file = SweepOfStack(*stack, readings_csv, overrides, &sweep.notices);
     return Finish(std::move(file), "", overrides, run, std::move(sweep));
@@ -302,6 +409,10 @@ Sweep ExamineFrames(Sweep sweep, const RunControl& control) {
   }
   const std::string contradiction = TransferContradiction(facts, sweep.camera);
   if (!contradiction.empty()) sweep.notices.push_back(fmt::format("{}: {}", path, contradiction));
+  const bool is_noted =
+      std::any_of(sweep.notices.begin(), sweep.notices.end(), IsCompressionOfVideo);
+  if (facts.video && !facts.video->is_lossless && !is_noted)
+    sweep.notices.push_back(CompressionOfVideo(frames.front().image, *facts.video, nullptr));
   const bool is_stated =
       facts.raw || (facts.significant_bits && *facts.significant_bits < facts.container_bits);
   if (sweep.description.full_scale) {

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <system_error>
 
+#include "thicklens/io/video_file.h"
 #include "tools/options/option_values.h"
 
 namespace thicklens::tools {
@@ -65,10 +66,39 @@ bool IsStack(const SweepArguments& arguments) {
   return model::IsNameOfImage(arguments.input) && fs::is_regular_file(arguments.input, failure);
 }
 
+// Whether the input is a video, by its name or by its content.
+bool IsVideo(const SweepArguments& arguments) {
+  std::error_code failure;
+  return fs::is_regular_file(arguments.input, failure) &&
+         (io::IsNameOfVideo(arguments.input) || io::IsVideoFile(arguments.input));
+}
+
+// A video needs a table or a constant speed; other inputs have neither times nor speeds.
+void CheckVideo(const SweepArguments& arguments) {
+  const bool has_speed = arguments.video.reading_start || arguments.video.reading_end;
+  if (arguments.readings.IsWithoutTable()) {
+    throw UsageError(fmt::format(
+        "{}: the frames of a video have one name and one set of metadata; their readings come from "
+        "--readings, or from --reading-start and --reading-end",
+        arguments.input));
+  }
+  if (arguments.readings_csv.empty() == has_speed) return;
+  throw UsageError(
+      has_speed ? std::string("--readings (a table) and --reading-start (a constant speed) exclude "
+                              "each other")
+                : fmt::format("{}: a video needs --readings (a table of its readings by time or by "
+                              "frame), or --reading-start and --reading-end for a constant speed",
+                              arguments.input));
+}
+
 // Throws UsageError unless the input is a sweep's file, a folder with one, or a folder with a table
 // of readings.
 void CheckInput(const SweepArguments& arguments) {
   std::error_code failure;
+  if (IsVideo(arguments)) {
+    CheckVideo(arguments);
+    return;
+  }
   const bool is_folder = fs::is_directory(arguments.input, failure);
   if (!arguments.readings_csv.empty()) {
     if (arguments.readings.IsWithoutTable()) {
@@ -115,6 +145,7 @@ SweepOverrides SweepOverridesOf(const SweepArguments& arguments) {
   overrides.reading_sigma_mm = arguments.reading_sigma_mm;
   overrides.full_scale = arguments.full_scale;
   overrides.readings = arguments.readings;
+  overrides.video = arguments.video;
   for (const auto direction : {model::BenchDirection::kAway, model::BenchDirection::kToward}) {
     if (arguments.direction == model::BenchDirectionName(direction)) {
       overrides.direction = direction;
@@ -146,7 +177,17 @@ OptionNames SweepOptionNames() {
           {"readings.scale_mm", "--reading-scale"},
           {"readings.decimal", "--decimal"},
           {"readings.source", "--reading-from"},
-          {"readings.name_pattern", "--reading-from-name"}};
+          {"readings.name_pattern", "--reading-from-name"},
+          {"readings.time_column", "--time-column"},
+          {"readings.time_unit", "--time-unit"},
+          {"video.reading_start", "--reading-start"},
+          {"video.reading_end", "--reading-end"},
+          {"video.time_start_s", "--time-start"},
+          {"video.time_end_s", "--time-end"},
+          {"video.time_offset", "--time-offset"},
+          {"video.every", "--every"},
+          {"video.frames", "--frames"},
+          {"video", "--reading-start, --time-start, --every and the like"}};
 }
 
 Sweep ReadSweepInput(const SweepArguments& arguments, const RunControl& run) {
@@ -158,7 +199,7 @@ Sweep ReadSweepInput(const SweepArguments& arguments, const RunControl& run) {
   return WithOptionNames(names, [&] {
     std::error_code failure;
     const bool is_plain_folder =
-        !arguments.readings_csv.empty() || IsStack(arguments) ||
+        !arguments.readings_csv.empty() || IsStack(arguments) || IsVideo(arguments) ||
         (fs::is_directory(arguments.input, failure) && !HasSweepFile(arguments));
     return is_plain_folder
                ? ReadSweepFolder(arguments.input, arguments.readings_csv, overrides, named)

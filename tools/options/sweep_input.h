@@ -13,7 +13,7 @@ namespace thicklens::tools {
 
 // A sweep as the command line specifies it. Texts are as typed; empty: not given.
 struct SweepArguments {
-  std::string input;  // SWEEP.yaml, or a folder with `readings_csv`
+  std::string input;  // SWEEP.yaml, a folder with `readings_csv`, a stack or a video
   std::string readings_csv;
   std::string camera_path;
   std::string truth_path;
@@ -27,6 +27,7 @@ struct SweepArguments {
   std::string roi;  // x,y,width,height
   std::optional<int> full_scale;
   model::ReadingOptions readings;
+  model::VideoSelection video;
 
   // Returns the files that no output may replace.
   std::vector<std::string> Files() const;

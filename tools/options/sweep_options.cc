@@ -46,6 +46,55 @@ void AddReadingOptions(CLI::App* command, SweepArguments* sweep) {
       ->type_name("PATTERN");
 }
 
+void AddVideoOptions(CLI::App* command, SweepArguments* sweep) {
+  model::ReadingOptions* readings = &sweep->readings;
+  model::VideoSelection* video = &sweep->video;
+  command
+      ->add_option("--time-column", readings->time_column,
+                   "Video: column of the times in the table, by its name or number")
+      ->type_name("NAME");
+  command
+      ->add_option("--time-unit", readings->time_unit,
+                   "Video: unit of the times; replaces the one in the table")
+      ->check(CLI::IsMember({"s", "ms", "us", "ns", "min", "h"}))
+      ->type_name("UNIT");
+  command
+      ->add_option("--time-offset", video->time_offset,
+                   "Video: the time of the first frame on the clock of the table; default 0")
+      ->type_name("TIME");
+  command
+      ->add_option("--reading-start", video->reading_start,
+                   "Video at constant speed, without a table: the reading at --time-start, in "
+                   "--unit (default mm)")
+      ->type_name("READING");
+  command
+      ->add_option("--reading-end", video->reading_end,
+                   "Video at constant speed: the reading at --time-end")
+      ->type_name("READING");
+  command
+      ->add_option("--time-start", video->time_start_s,
+                   "Video: frames before are not used; default: the first frame, which is at 0")
+      ->check(NonNegative())
+      ->type_name("S");
+  command
+      ->add_option("--time-end", video->time_end_s,
+                   "Video: frames after are not used; default: the last frame")
+      ->check(NonNegative())
+      ->type_name("S");
+  constexpr int kMostFrames = 1'000'000;
+  CLI::Option* every =
+      command->add_option("--every", video->every, "Video: every N-th usable frame, from the first")
+          ->check(CLI::Range(1, kMostFrames))
+          ->type_name("N");
+  command
+      ->add_option("--frames", video->frames,
+                   "Video: at most N frames, evenly chosen; default: all, or every n-th so that at "
+                   "most 300 remain")
+      ->check(CLI::Range(2, kMostFrames))
+      ->excludes(every)
+      ->type_name("N");
+}
+
 void AddSweepStatements(CLI::App* command, SweepArguments* sweep) {
   const std::string instead = "; overrides the sweep file";
   command->add_option("--offset-mm", sweep->offset_mm, "Depth of reading 0, or unknown" + instead)

@@ -15,6 +15,10 @@ void AddSweepStatements(CLI::App* command, SweepArguments* sweep);
 // --reading-scale, --decimal, --reading-from, --reading-from-name.
 void AddReadingOptions(CLI::App* command, SweepArguments* sweep);
 
+// Adds the options for a video: --time-column, --time-unit, --time-offset, --reading-start,
+// --reading-end, --time-start, --time-end, --every, --frames.
+void AddVideoOptions(CLI::App* command, SweepArguments* sweep);
+
 }  // namespace thicklens::tools
 
 #endif  // THICKLENS_TOOLS_OPTIONS_SWEEP_OPTIONS_H_

@@ -11,6 +11,7 @@
 #include "thicklens/camera.h"
 #include "thicklens/image.h"
 #include "thicklens/model/sweep_file.h"
+#include "thicklens/model/video_sweep.h"
 #include "thicklens/run.h"
 
 namespace thicklens {
@@ -66,6 +67,8 @@ struct SweepOverrides {
   std::optional<int> full_scale;
   // Which readings are read, and in which unit (thicklens/model/readings.h).
   model::ReadingOptions readings;
+  // Which frames of a video are used, and its constant speed; only for ReadSweepFolder of a video.
+  model::VideoSelection video;
 
   // Returns whether all statements are in their range and do not contradict each other. Otherwise
   // `why`, if not null, gets the field, the value and the constraint.
@@ -78,9 +81,10 @@ struct SweepOverrides {
 THICKLENS_EXPORT Sweep ReadSweep(const std::string& path, const SweepOverrides& overrides = {},
                                  const RunControl& run = {});
 // Reads a folder of frames with a table of their readings (docs/file-formats.md), or one file (or a
-// folder with one file) whose pages are the frames. `readings_csv` is empty if `overrides.readings`
-// states that the readings are in the names or in the metadata of the frames, or if the OME-XML of
-// the pages has them. `overrides.camera_path` is required.
+// folder with one file) whose pages are the frames, or a video, which is decoded once.
+// `readings_csv` is empty if `overrides.readings` states that the readings are in the names or in
+// the metadata of the frames, if the OME-XML of the pages has them, or if `overrides.video` states
+// a constant speed. `overrides.camera_path` is required.
 THICKLENS_EXPORT Sweep ReadSweepFolder(const std::string& folder, const std::string& readings_csv,
                                        const SweepOverrides& overrides, const RunControl& run = {});
 
