@@ -15,6 +15,10 @@
 namespace thicklens::model {
 namespace {
 
+// Times that differ by less are equal: decimal fractions are rounded, and seconds since 1970 have
+// no finer steps.
+constexpr double kSameTimeS = 1e-6;
+
 // A frame with its reading.
 struct ReadFrameOfVideo {
   int number = 0;
@@ -117,8 +121,8 @@ class VideoSweep {
     const double to = selection_.time_end_s.value_or(0);
     for (std::size_t i = 0; i < frames_.size(); ++i) {
       const int number = static_cast<int>(i);
-      const bool is_early = selection_.time_start_s && TimeOf(number) < from;
-      const bool is_late = selection_.time_end_s && TimeOf(number) > to;
+      const bool is_early = selection_.time_start_s && TimeOf(number) < from - kSameTimeS;
+      const bool is_late = selection_.time_end_s && TimeOf(number) > to + kSameTimeS;
       if (is_early || is_late) {
         ++outside_;
       } else if (frames_[i].is_damaged) {
@@ -143,8 +147,10 @@ class VideoSweep {
                       "ends at {:.6g} s",
                       path_, from, to, LastTime()));
     }
-    if (to > LastTime()) {
-      // The end is on the clock of the video: a mistake in the unit would stay unnoticed.
+    // Players show a length that includes the time for which the last frame is shown.
+    const double last_shown =
+        LastTime() + LastTime() / static_cast<double>(std::max<std::size_t>(frames_.size() - 1, 1));
+    if (to > last_shown + kSameTimeS) {  // a mistake in the unit would stay unnoticed
       throw Error(fmt::format("{}: --time-end is {:.6g} s, but the last frame is at {:.6g} s",
                               path_, to, LastTime()));
     }
@@ -180,11 +186,11 @@ class VideoSweep {
     std::size_t next = 0;
     for (const int number : usable_) {
       const double time = TimeOf(number) + offset;
-      while (next < rows.size() && rows[next].time_s < time) ++next;
-      if (next == rows.size() || (next == 0 && rows[0].time_s > time)) {
+      if (time < rows.front().time_s - kSameTimeS || time > rows.back().time_s + kSameTimeS) {
         ++without_reading_;
         continue;
       }
+      while (next + 1 < rows.size() && rows[next].time_s < time) ++next;
       if (next == 0) {
         read.push_back({number, rows[0].reading_mm});
         continue;
