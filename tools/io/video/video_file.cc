@@ -9,7 +9,9 @@
 #include <deque>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <set>
@@ -21,6 +23,7 @@
 #include "thicklens/base/input_file.h"
 #include "tools/io/image_file_kind.h"
 #include "tools/io/image_library.h"
+#include "tools/io/video/frame_spool.h"
 #include "tools/io/video/video_decoder.h"
 #include "tools/io/video/video_kind.h"
 
@@ -28,6 +31,7 @@ namespace thicklens::io {
 namespace {
 
 constexpr std::size_t kMostKeptBytes = std::size_t{128} << 20;
+constexpr double kNoSpool = std::numeric_limits<double>::infinity();  // no disk has so much left
 
 // The first bytes of a regular file; empty if it cannot be read.
 std::string StartOf(const std::string& path) {
@@ -205,7 +209,11 @@ class VideoFile::Reader {
   }
 
   cv::Mat DecodeFrame(int frame) {
-    const bool must_move = frame < next_ || IsBehindAKey(frame);
+    if (spool_ && spool_->Has(frame)) {
+      const cv::Mat pixels = spool_->Read(frame);
+      if (!pixels.empty()) return pixels;
+    }
+    const bool must_move = frame < next_ || (!IsSpooling() && IsBehindAKey(frame));
     if (must_move && !Jump(frame)) Open();
     if (const auto kept = kept_.find(frame); kept != kept_.end()) return kept->second;
     for (;;) {
@@ -215,14 +223,43 @@ class VideoFile::Reader {
         throw Error(fmt::format("{}: frame {} is not there: it has {} frames, counted from 0",
                                 path_, frame, next_));
       }
+      if (!spool_) StartSpool();
       const int decoded = next_ - 1;
       const bool is_wanted = decoded == frame;
-      if (!is_wanted && expected_.count(decoded) == 0) continue;
+      const bool is_spooled = IsSpooling() && expected_.count(decoded) > 0;
+      const bool is_kept =
+          !IsSpooling() && expected_.count(decoded) > 0 && IsWorthKeeping(decoded, frame);
+      if (!is_wanted && !is_kept && (!is_spooled || spool_->Has(decoded))) continue;
       const cv::Mat pixels = PixelsOfFrame();
-      // A caller that reads backwards finds the frames before this one.
-      Keep(decoded, pixels);
+      if (is_spooled) {
+        spool_->Write(decoded, pixels);
+      } else {
+        // A caller that reads backwards finds the frames before this one.
+        Keep(decoded, pixels);
+      }
       if (is_wanted) return pixels;
     }
+  }
+
+  bool IsSpooling() const { return spool_ && spool_->IsUsable(); }
+
+  // Once the size of frames is known. Frames that fit into the memory that is kept need no file.
+  void StartSpool() {
+    const double bytes = BytesOfFrame() * static_cast<double>(expected_.size());
+    spool_ = std::make_unique<FrameSpool>(bytes > static_cast<double>(kMostKeptBytes) ? bytes
+                                                                                      : kNoSpool);
+  }
+  double BytesOfFrame() const {
+    const ImageFacts& facts = decoder_->facts();
+    return static_cast<double>(facts.width_px) * facts.height_px *
+           static_cast<double>(facts.channels.size()) * (facts.container_bits > 8 ? 2 : 1);
+  }
+
+  // Whether the frame will still be kept when decoding has arrived at `target`. The conversion of
+  // its colours takes longer than its decoding.
+  bool IsWorthKeeping(int frame, int target) const {
+    return (target - frame) * BytesOfFrame() < static_cast<double>(kMostKeptBytes) &&
+           kept_.count(frame) == 0;
   }
 
   // The last key frame at or before the frame, as far as it has been counted.
@@ -281,6 +318,7 @@ class VideoFile::Reader {
   bool can_jump_ = true;            // as far as is known
   bool has_jumped_ = false;         // since the file was opened
   std::set<int> expected_;
+  std::unique_ptr<FrameSpool> spool_;  // null: no frame has been decoded yet
   std::map<int, cv::Mat> kept_;
   std::deque<int> order_;
   std::size_t kept_bytes_ = 0;

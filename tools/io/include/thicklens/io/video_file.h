@@ -26,11 +26,12 @@ struct VideoSurvey {
   bool is_interlaced = false;             // the rows of some frames are of two times
 };
 
-// A video file, whose frames are read by their number, from 0 in the order of display. It is
-// decoded as often as needed; at most 128 MiB of frames are kept. Frames are found by counting,
-// never by a frame rate: a jump to a key frame is used only if the frame that is then found has the
-// time stamp and the values that counting found. Several threads may read; one of them decodes at a
-// time.
+// A video file, whose frames are read by their number, from 0 in the order of display. Frames are
+// found by counting, never by a frame rate: a jump to a key frame is used only if the frame that is
+// then found has the time stamp and the values that counting found. At most 128 MiB of frames are
+// kept in memory. If those that Expect states are larger, they are kept in a file without a name in
+// TMPDIR or /var/tmp, so that a sweep is decoded once, or, if that has no room, decoded again when
+// they are read. Several threads may read; one of them decodes at a time.
 class THICKLENS_EXPORT VideoFile {
  public:
   // Opens the file and its first stream of pictures. Throws Error that begins with `path` if it is
