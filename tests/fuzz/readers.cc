@@ -13,12 +13,15 @@
 #include "thicklens/io/journal_file.h"
 #include "thicklens/io/light_field_io.h"
 #include "thicklens/io/readings.h"
+#include "thicklens/io/video_file.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/light_field_file.h"
 #include "thicklens/model/readings.h"
 #include "thicklens/model/scene_simulator.h"
 #include "thicklens/model/sweep_file.h"
 #include "thicklens/model/sweep_simulator.h"
+#include "tools/io/image_library.h"
+#include "tools/io/video/video_kind.h"
 #include "tools/options/estimate_profile.h"
 #include "tools/report/estimate_records.h"
 
@@ -75,6 +78,18 @@ void ReadCheckpoint(const std::string& bytes, const TemporaryFolder& folder) {
   }
 }
 
+// A build without GPL parts only looks at the structure of the container.
+void ReadVideo(const std::string& path) {
+  if (io::HasImageLibrary()) {
+    io::VideoFile(path).Survey();
+    return;
+  }
+  const auto kind =
+      io::KindOfVideo(thicklens::testing::ContentOf(path).substr(0, io::kVideoStart), path);
+  if (!kind) throw Error(path + ": it is no video");
+  io::RequireWholeVideo(path, *kind);
+}
+
 }  // namespace
 
 const std::vector<FuzzedReader>& FuzzedReaders() {
@@ -107,6 +122,12 @@ const std::vector<FuzzedReader>& FuzzedReaders() {
        [](const std::string& bytes, const TemporaryFolder&) {
          io::ReadingsOfOmeXml(bytes, "stack.ome.tif", {});
        }},
+      {"readings-times",
+       [](const std::string& bytes, const TemporaryFolder&) {
+         model::HasTimes(bytes, "times.csv", {});
+         model::TimedReadingsOfTable(bytes, "times.csv", {});
+       }},
+      OfFile("video", "sweep.mkv", ReadVideo),
       OfFile("sweep-truth-yaml", "truth.yaml",
              [](const std::string& path) { model::ReadSweepTruth(path); }),
       OfFile("sweep-simulation-yaml", "simulation.yaml",
