@@ -36,6 +36,7 @@ struct VideoSelection {
   // Returns whether the values are possible and do not contradict each other. Otherwise `why`, if
   // not null, gets the field, the value and the constraint.
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
+  // Whether any value is given.
   bool IsGiven() const {
     return reading_start || reading_end || time_start_s || time_end_s || !time_offset.empty() ||
            every || frames;
