@@ -212,7 +212,8 @@ class VideoSweep {
           "s: state by --time-offset which time of the table is that of the first frame{}",
           source, first, last, path_, LastTime(), UnitHint()));
     }
-    // As milliseconds taken for seconds, nearly all of the table lies behind the end of the video.
+    // If milliseconds are taken for seconds, nearly all of the table lies behind the end of the
+    // video.
     constexpr double kMuchLonger = 20;
     const bool is_suspect = !table_.by_time->is_time_unit_stated &&
                             last - first > kMuchLonger * std::max(LastTime(), 1e-3);
@@ -254,13 +255,13 @@ class VideoSweep {
         kept.push_back((*read)[(i * (count - 1) + (wanted - 1) / 2) / (wanted - 1)]);
     } else {
       step_ = selection_.every ? static_cast<std::size_t>(*selection_.every)
-                               : (count + kMostVideoFrames - 1) / kMostVideoFrames;
+                               : (count + kMaxVideoFrames - 1) / kMaxVideoFrames;
       for (std::size_t i = 0; i < count; i += step_) kept.push_back((*read)[i]);
     }
     *read = std::move(kept);
   }
 
-  // What was left out, with the reasons.
+  // The counts of the frames that were left out, with the reasons.
   std::string LeftOut() const {
     std::string text;
     const auto add = [&](const std::string& reason) {

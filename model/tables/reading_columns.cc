@@ -206,7 +206,7 @@ class Finder {
       const bool is_page = std::find(words.begin(), words.end(), "page") != words.end();
       if (HasHeader() && (HasWord(words, FileWords()) || is_page)) found.files.push_back(column);
     }
-    // Without names, only the first column can be told from the readings.
+    // Without names, only the first column can be distinguished from the readings.
     if (!HasHeader() && !found.times.empty() && found.times.front() != 0) found.times.clear();
     if (!HasHeader() && found.times.size() > 1) found.times.resize(1);
     *columns = found_;

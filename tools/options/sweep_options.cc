@@ -81,16 +81,16 @@ void AddVideoOptions(CLI::App* command, SweepArguments* sweep) {
                    "Video: frames after are not used; default: the last frame")
       ->check(NonNegative())
       ->type_name("S");
-  constexpr int kMostFrames = 1'000'000;
+  constexpr int kMaxFrames = 1'000'000;
   CLI::Option* every =
       command->add_option("--every", video->every, "Video: every N-th usable frame, from the first")
-          ->check(CLI::Range(1, kMostFrames))
+          ->check(CLI::Range(1, kMaxFrames))
           ->type_name("N");
   command
       ->add_option("--frames", video->frames,
                    "Video: at most N frames, evenly chosen; default: all, or every n-th so that at "
                    "most 300 remain")
-      ->check(CLI::Range(2, kMostFrames))
+      ->check(CLI::Range(2, kMaxFrames))
       ->excludes(every)
       ->type_name("N");
 }

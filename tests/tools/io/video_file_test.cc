@@ -135,7 +135,7 @@ TEST(VideoFileTest, FramesHaveTheirTimes) {
   ASSERT_EQ(variable.frames.size(), 12U);
   for (int n = 0; n < 12; ++n) {
     const double expected = n < 6 ? 0.1 * n : 0.6 + 0.25 * (n - 6);
-    // The encoder was told a rate of 10 frames per second, in whose steps it keeps times.
+    // The rate of the encoder was 10 frames per second, and it rounds times to its steps.
     EXPECT_NEAR(variable.frames[static_cast<std::size_t>(n)].time_s.value_or(-1), expected, 0.051)
         << n;
   }
@@ -256,7 +256,7 @@ TEST_F(BrokenVideoTest, FilesThatAreNoVideo) {
 TEST_F(BrokenVideoTest, NoPictures) {
   SKIP_WITHOUT_VIDEO();
   EXPECT_THAT(Refusal(VideoPath("sound.mp4")),
-              AllOf(HasSubstr("no stream of pictures"), HasSubstr("aac (audio)")));
+              AllOf(HasSubstr("no stream of images"), HasSubstr("aac (audio)")));
 }
 
 TEST_F(BrokenVideoTest, HugeStatedSize) {

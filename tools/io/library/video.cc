@@ -2,7 +2,7 @@
 //
 // OpenImageIO 2.4, which contains a reader of videos on top of the same libraries, does not
 // suffice: it states no time stamps, it finds a frame by multiplying its number with a constant
-// frame rate (of a video with a variable rate it returned a picture that no frame has), it converts
+// frame rate (of a video with a variable rate it returned an image that no frame has), it converts
 // colours by the coefficients of BT.601 whatever the file states, and it opens files by the ending
 // of their name. OpenCV's videoio has the last three defects as well.
 extern "C" {
@@ -296,32 +296,31 @@ class FfmpegVideo : public VideoDecoder {
 
   void FindStream() {
     std::string others;
-    int pictures = 0;
+    int streams = 0;
     for (unsigned i = 0; i < format_->nb_streams; ++i) {
       AVStream* const stream = format_->streams[i];
       stream->discard = AVDISCARD_ALL;
       const AVCodecParameters& parameters = *stream->codecpar;
-      // A cover of a film is one picture beside it.
+      // a cover of a film is one image beside it.
       const bool is_cover = (stream->disposition & AV_DISPOSITION_ATTACHED_PIC) != 0;
       if (parameters.codec_type == AVMEDIA_TYPE_VIDEO && !is_cover) {
-        ++pictures;
+        ++streams;
         if (stream_ == nullptr) stream_ = stream;
         continue;
       }
       const char* const type = av_get_media_type_string(parameters.codec_type);
       others += (others.empty() ? "" : ", ") +
-                (is_cover ? std::string("a cover picture")
+                (is_cover ? std::string("a cover image")
                           : NameOfCodec(parameters.codec_id) + " (" + (type ? type : "data") + ")");
     }
     if (stream_ == nullptr) {
-      throw Refusal("it has no stream of pictures" +
+      throw Refusal("it has no stream of images" +
                     (others.empty() ? std::string() : "; it has " + others));
     }
-    if (pictures > 1) {
-      throw Refusal(
-          "it has " + std::to_string(pictures) +
-          " streams of pictures: extract the one that is meant (ffmpeg -i FILE -map 0:v:0 "
-          "-c copy NEW)");
+    if (streams > 1) {
+      throw Refusal("it has " + std::to_string(streams) +
+                    " streams of images: extract the one that is meant (ffmpeg -i FILE -map 0:v:0 "
+                    "-c copy NEW)");
     }
     stream_->discard = AVDISCARD_DEFAULT;
     RequireSize(*stream_->codecpar);
@@ -338,9 +337,9 @@ class FfmpegVideo : public VideoDecoder {
     if (!codec_ || avcodec_parameters_to_context(codec_.get(), &parameters) < 0)
       throw Refusal("no memory to decode a video");
     codec_->pkt_timebase = stream_->time_base;
-    constexpr std::int64_t kMostPixels = std::int64_t{1} << 28;
+    constexpr std::int64_t kMaxPixels = std::int64_t{1} << 28;
     constexpr int kThreads = 4;
-    codec_->max_pixels = kMostPixels;
+    codec_->max_pixels = kMaxPixels;
     codec_->thread_count = kThreads;
     const int code = avcodec_open2(codec_.get(), decoder, nullptr);
     if (code < 0) throw Refusal("its decoder cannot be opened: " + ReasonOf(code));
@@ -401,7 +400,7 @@ class FfmpegVideo : public VideoDecoder {
     while (!is_draining_) {
       const int code = av_read_frame(format_.get(), packet_.get());
       if (code < 0) {
-        // What lies behind a place that cannot be read is not reached. Containers are checked for
+        // Nothing behind a place that cannot be read is reached. Containers are checked for
         // their full length beforehand.
         is_draining_ = true;
         avcodec_send_packet(codec_.get(), nullptr);

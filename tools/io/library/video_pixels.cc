@@ -156,7 +156,7 @@ void DescribePixels(const AVFrame& frame, ImageFacts* facts) {
     facts->notes.emplace_back("Its alpha channel is not read.");
 }
 
-// FNV-1a over words of 8 bytes, folded: it has to tell frames of one video apart, not to resist
+// FNV-1a over words of 8 bytes, folded: it has to distinguish frames of one video, not to resist
 // anybody.
 std::uint64_t DigestOfPixels(const AVFrame& frame) {
   const AVPixFmtDescriptor& known = Describe(frame);

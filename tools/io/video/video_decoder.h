@@ -20,7 +20,7 @@ enum class VideoKind {
   kRawHevc,          // without time stamps
 };
 
-// What is known of a decoded frame besides its pixels.
+// The facts about a decoded frame besides its pixels.
 struct VideoStamp {
   bool has_stamp = false;      // whether the container states when it is shown
   std::int64_t stamp = 0;      // in the units of the stream; finds the frame again

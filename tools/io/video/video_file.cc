@@ -30,7 +30,7 @@
 namespace thicklens::io {
 namespace {
 
-constexpr std::size_t kMostKeptBytes = std::size_t{128} << 20;
+constexpr std::size_t kMaxKeptBytes = std::size_t{128} << 20;
 constexpr double kNoSpool = std::numeric_limits<double>::infinity();  // no disk has so much left
 
 // The first bytes of a regular file; empty if it cannot be read.
@@ -69,8 +69,8 @@ void RequireMemoryOfFrame(double width_px, double height_px, double bytes_per_px
 
 bool IsNameOfVideo(const std::string& path) {
   static const std::set<std::string> kEndings = {
-      ".mp4", ".m4v",   ".mov",  ".3gp",  ".mkv", ".webm", ".avi",  ".ts",   ".m2ts",
-      ".mts", ".mjpeg", ".mjpg", ".h264", ".264", ".avc",  ".hevc", ".h265", ".265"};
+      ".mp4",  ".m4v", ".mov",   ".3gp",  ".mkv",  ".webm", ".avi",  ".ts",
+      ".m2ts", ".mts", ".mjpeg", ".mjpg", ".h264", ".avc",  ".hevc", ".h265"};
   std::string ending = std::filesystem::path(path).extension().string();
   for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   return kEndings.count(ending) > 0;
@@ -176,7 +176,7 @@ class VideoFile::Reader {
     if (index < stamps_.size()) {
       if (stamps_[index].digest != stamp.digest) {
         if (!has_jumped_) throw Error(path_ + ": the file was changed while it was read");
-        // What follows this key frame depends on what is before it: only counting is right.
+        // The frames behind this key frame depend on those before it: only counting is right.
         can_jump_ = false;
         Open();
         return Step();
@@ -201,7 +201,7 @@ class VideoFile::Reader {
     if (!kept_.emplace(frame, pixels).second) return;
     order_.push_back(frame);
     kept_bytes_ += bytes;
-    while (kept_bytes_ > kMostKeptBytes && order_.size() > 1) {
+    while (kept_bytes_ > kMaxKeptBytes && order_.size() > 1) {
       kept_.erase(order_.front());
       order_.pop_front();
       kept_bytes_ -= bytes;  // all frames have one size
@@ -246,8 +246,8 @@ class VideoFile::Reader {
   // Once the size of frames is known. Frames that fit into the memory that is kept need no file.
   void StartSpool() {
     const double bytes = BytesOfFrame() * static_cast<double>(expected_.size());
-    spool_ = std::make_unique<FrameSpool>(bytes > static_cast<double>(kMostKeptBytes) ? bytes
-                                                                                      : kNoSpool);
+    spool_ =
+        std::make_unique<FrameSpool>(bytes > static_cast<double>(kMaxKeptBytes) ? bytes : kNoSpool);
   }
   double BytesOfFrame() const {
     const ImageFacts& facts = decoder_->facts();
@@ -258,7 +258,7 @@ class VideoFile::Reader {
   // Whether the frame will still be kept when decoding has arrived at `target`. The conversion of
   // its colours takes longer than its decoding.
   bool IsWorthKeeping(int frame, int target) const {
-    return (target - frame) * BytesOfFrame() < static_cast<double>(kMostKeptBytes) &&
+    return (target - frame) * BytesOfFrame() < static_cast<double>(kMaxKeptBytes) &&
            kept_.count(frame) == 0;
   }
 
@@ -283,8 +283,8 @@ class VideoFile::Reader {
     can_jump_ = false;
     std::string why;
     if (!wanted.has_stamp || !decoder_->Seek(wanted.stamp, &why)) return false;
-    constexpr int kMostBefore = 64;  // frames that are shown before the key frame
-    for (int i = 0; i < kMostBefore; ++i) {
+    constexpr int kMaxBefore = 64;  // frames that are shown before the key frame
+    for (int i = 0; i < kMaxBefore; ++i) {
       ThrowIfCancelled();
       VideoStamp stamp;
       if (decoder_->Next(&stamp, &why) != VideoDecoder::Step::kFrame) return false;

@@ -102,7 +102,7 @@ void RequireWholeBoxes(const std::string& path) {
     if (size == 1) size = Big(header, 8, 8);
     if (size == 0) size = file.size() - at;  // up to the end
     has_index = has_index || name == "moov";
-    // What is no box ends the walk: some cameras append a text.
+    // The walk ends at bytes that are no box: some cameras append a text.
     const bool is_box = size >= kHeader && std::all_of(name.begin(), name.end(), [](char c) {
                           return std::isprint(static_cast<unsigned char>(c)) != 0;
                         });
@@ -145,7 +145,7 @@ std::optional<std::uint64_t> EbmlNumber(const std::string& bytes, std::size_t* a
   return value;
 }
 
-// Matroska: a header, then a segment with everything else, whose size a live recording leaves open.
+// Matroska: a header, then a segment with all other data, whose size a live recording leaves open.
 void RequireWholeSegment(const std::string& path) {
   Peek file(path);
   const std::string start = file.Bytes(0, kVideoStart);
@@ -167,8 +167,8 @@ void RequireWholeSegment(const std::string& path) {
 std::optional<VideoKind> KindOfVideo(const std::string& start, const std::string& path) {
   const std::string ending = LowerEnding(path);
   static const std::array<const char*, 2> kMjpeg = {".mjpeg", ".mjpg"};
-  static const std::array<const char*, 3> kH264 = {".h264", ".264", ".avc"};
-  static const std::array<const char*, 3> kHevc = {".hevc", ".h265", ".265"};
+  static const std::array<const char*, 2> kH264 = {".h264", ".avc"};
+  static const std::array<const char*, 2> kHevc = {".hevc", ".h265"};
   if (HasTextAt(start, 0, "\xFF\xD8\xFF") && IsOneOf(ending, kMjpeg)) return VideoKind::kRawMjpeg;
   if (KindOfImage(start)) return std::nullopt;  // HEIF has the boxes of MP4
   if (IsIsoVideo(start)) return VideoKind::kIsoMedia;

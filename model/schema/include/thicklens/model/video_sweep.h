@@ -11,7 +11,7 @@
 
 namespace thicklens::model {
 
-// What is known of one frame of a video before its pixels are used.
+// The facts about one frame of a video that are known before its pixels are used.
 struct VideoFrame {
   std::optional<double> time_s;   // since the first frame; absent: the video states no times
   bool repeats_previous = false;  // its values are those of the frame before
@@ -51,7 +51,7 @@ struct VideoTable {
 };
 
 // More frames are thinned out, unless VideoSelection says how many are used.
-constexpr int kMostVideoFrames = 300;
+constexpr int kMaxVideoFrames = 300;
 
 // A sweep of frames of a video; SweepFrame::page is the number of a frame, from 0. Frames that
 // repeat the one before, damaged frames, and frames without a reading are left out and counted in

@@ -25,7 +25,7 @@ struct VideoFacts {
   double pixel_aspect = 1;  // width of a pixel over its height, as stated; 1 if it is not
 };
 
-// What the frames of a video are compressed to, measured from all of them.
+// The amount of data of the compressed frames of a video, measured from all of them.
 struct VideoCompression {
   double bits_per_pixel = 0;              // compressed bits of a frame over its pixels
   std::optional<double> bits_per_second;  // absent: the frames have no time stamps

@@ -12,13 +12,13 @@
 namespace thicklens::io {
 
 // Whether the ending of the name is one of a video: .mp4 .m4v .mov .3gp .mkv .webm .avi .ts .m2ts
-// .mts .mjpeg .mjpg .h264 .264 .avc .hevc .h265 .265, in capitals or not.
+// .mts .mjpeg .mjpg .h264 .avc .hevc .h265, in capitals or not.
 THICKLENS_EXPORT bool IsNameOfVideo(const std::string& path);
 // Whether the file is a video, by its content: MP4, MOV, Matroska, WebM, AVI, MPEG-TS or, with
 // their endings, raw streams of Motion JPEG, H.264 and H.265. False for a file that cannot be read.
 THICKLENS_EXPORT bool IsVideoFile(const std::string& path);
 
-// What a pass over all frames of a video found.
+// The findings of a pass over all frames of a video.
 struct VideoSurvey {
   std::vector<model::VideoFrame> frames;  // in the order of display
   ImageFacts facts;                       // of the first frame; `page` is 0
@@ -34,8 +34,8 @@ struct VideoSurvey {
 // they are read. Several threads may read; one of them decodes at a time.
 class THICKLENS_EXPORT VideoFile {
  public:
-  // Opens the file and its first stream of pictures. Throws Error that begins with `path` if it is
-  // no video, is truncated, has no pictures, or if this build reads none.
+  // Opens the file and its first stream of images. Throws Error that begins with `path` if it is
+  // no video, is truncated, has no images, or if this build reads none.
   explicit VideoFile(const std::string& path);
   ~VideoFile();
   VideoFile(VideoFile&&) noexcept;
