@@ -68,9 +68,9 @@ void RequireMemoryOfFrame(double width_px, double height_px, double bytes_per_px
 }  // namespace
 
 bool IsNameOfVideo(const std::string& path) {
-  static const std::set<std::string> kEndings = {
-      ".mp4",  ".m4v", ".mov",   ".3gp",  ".mkv",  ".webm", ".avi",  ".ts",
-      ".m2ts", ".mts", ".mjpeg", ".mjpg", ".h264", ".avc",  ".hevc", ".h265"};
+  static const std::set<std::string> kEndings = {".mp4",  ".m4v",  ".mov",  ".mkv",  ".webm",
+                                                 ".avi",  ".ts",   ".m2ts", ".mts",  ".mjpeg",
+                                                 ".mjpg", ".h264", ".avc",  ".hevc", ".h265"};
   std::string ending = std::filesystem::path(path).extension().string();
   for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   return kEndings.count(ending) > 0;

@@ -11,7 +11,7 @@
 
 namespace thicklens::io {
 
-// Whether the ending of the name is one of a video: .mp4 .m4v .mov .3gp .mkv .webm .avi .ts .m2ts
+// Whether the ending of the name is one of a video: .mp4 .m4v .mov .mkv .webm .avi .ts .m2ts
 // .mts .mjpeg .mjpg .h264 .avc .hevc .h265, in capitals or not.
 THICKLENS_EXPORT bool IsNameOfVideo(const std::string& path);
 // Whether the file is a video, by its content: MP4, MOV, Matroska, WebM, AVI, MPEG-TS or, with
