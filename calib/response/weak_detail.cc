@@ -14,10 +14,10 @@ namespace {
 constexpr double kBand = 0.6;       // inner sigma of the band over that of the blur
 constexpr double kBandWidth = 1.6;  // outer sigma of the band over the inner one
 constexpr double kNeighbours = 2;   // sigma of the contrast's neighbourhood over the inner one
-constexpr double kMinBlurPx = 1.8, kMaxBlurPx = 10;
+constexpr double kMinBlurPx = 1.2, kMaxBlurPx = 10;
 constexpr double kMaxBlurOfSide = 1.0 / 30;
 constexpr double kMinAddedPx2 = 1;
-constexpr std::size_t kDetailFrames = 10;
+constexpr std::size_t kDetailFrames = 12;
 constexpr int kRows = 3, kColumns = 4;  // parts of the field
 constexpr std::size_t kContrasts = 4;   // classes of contrast in each part
 constexpr double kMinIndependent = 40;  // pixels of a part over the square of the inner sigma
@@ -77,7 +77,9 @@ class DetailLoss {
     if (blurred.size() < 3) return std::nullopt;
     first_ = crop_.Read(order_[0]);
     second_ = crop_.Read(order_[1]);
-    for (const std::size_t index : Spread(blurred, kDetailFrames)) AddFrame(index);
+    // Processing shows best where detail is fine.
+    blurred.resize(std::min(blurred.size(), kDetailFrames));
+    for (const std::size_t index : blurred) AddFrame(index);
     return sums_.Slope();
   }
 
