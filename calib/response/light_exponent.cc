@@ -138,10 +138,17 @@ class ExponentFit {
   }
 
   static Eigen::VectorXd At(const cv::Mat& map, const std::vector<cv::Point2f>& places) {
-    cv::Mat values;
-    cv::remap(map, values, cv::Mat(places, false), cv::noArray(), cv::INTER_CUBIC);
+    constexpr std::size_t kMost = 30000;  // OpenCV maps at most 32767 rows at once
     Eigen::VectorXd out(static_cast<Eigen::Index>(places.size()));
-    for (Eigen::Index k = 0; k < out.size(); ++k) out[k] = values.at<float>(static_cast<int>(k));
+    for (std::size_t from = 0; from < places.size(); from += kMost) {
+      const std::vector<cv::Point2f> some(
+          places.begin() + static_cast<std::ptrdiff_t>(from),
+          places.begin() + static_cast<std::ptrdiff_t>(std::min(places.size(), from + kMost)));
+      cv::Mat values;
+      cv::remap(map, values, cv::Mat(some, false), cv::noArray(), cv::INTER_CUBIC);
+      for (int k = 0; k < values.rows; ++k)
+        out[static_cast<Eigen::Index>(from) + k] = values.at<float>(k);
+    }
     return out;
   }
 

@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "calib/registration/target_period.h"
 #include "calib/response/response_sums.h"
 
 namespace thicklens::calib {
@@ -76,6 +77,7 @@ class DetailLoss {
     }
     if (blurred.size() < 3) return std::nullopt;
     first_ = crop_.Read(order_[0]);
+    if (MeasurePeriodPx(first_)) return std::nullopt;
     second_ = crop_.Read(order_[1]);
     // Processing shows best where detail is fine.
     blurred.resize(std::min(blurred.size(), kDetailFrames));

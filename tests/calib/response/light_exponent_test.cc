@@ -80,6 +80,18 @@ TEST(LightExponent, LeavesOutWhatIsClipped) {
   }
 }
 
+// The part of a line sensor is wide and low: it has more windows than OpenCV maps at once.
+TEST(LightExponent, AWideLowPartCanBeMeasured) {
+  ResponseScene scene;
+  scene.width_px = 520;
+  scene.height_px = 100;
+  scene.largest_sigma_px = 5;
+  const auto found = ExponentOf(scene, 1);
+  if (found) {
+    EXPECT_NEAR(found->value, 1, 4 * found->sigma + 0.05);
+  }
+}
+
 TEST(LightExponent, FlatOrFewFramesGiveNothing) {
   std::vector<cv::Mat> light;
   ResponseFrames frames = ResponseScene().Make(&light);
