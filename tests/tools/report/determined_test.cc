@@ -78,6 +78,28 @@ TEST(Determined, ARefusalReportsItToPrograms) {
   EXPECT_TRUE(out["frame_structure"].at("ln_corner_over_centre").is_null());
 }
 
+TEST(Determined, TheCameraResponseIsReported) {
+  MadeUpCalibration made = MakeUpCalibration(31, 300, 8);
+  calib::CameraResponse& response = made.calibration.diagnostics.response;
+  response.measured = true;
+  response.light_exponent = model::Estimate{0.416, 0.002};
+  response.weak_detail_loss = model::Estimate{0.0001, 0.0012};
+  response.block_grid = model::Estimate{3, 0.2};
+  response.better_transfer = "linear";
+  EXPECT_THAT(CalibrationText(made.sweep, made.calibration, nullptr),
+              AllOf(HasSubstr("camera response: the light is the value as read to the power 0.4160 "
+                              "+- 0.0020; weak detail loses +0.01 +- 0.12 % per factor e"),
+                    Not(HasSubstr("contradict"))));
+  const nlohmann::json out = CalibrationJson(made.sweep, made.calibration, nullptr, false);
+  const nlohmann::json& found = out.at("camera_response");
+  EXPECT_EQ(found.at("light_exponent").at("value"), 0.416);
+  EXPECT_EQ(found.at("better_transfer"), "linear");
+  EXPECT_TRUE(found.at("contradicts_transfer").get<bool>());
+  EXPECT_TRUE(found.at("is_compressed").get<bool>());
+  EXPECT_FALSE(found.at("loses_weak_detail").get<bool>());
+  EXPECT_TRUE(found.at("noise_rise").is_null());
+}
+
 // A run that ended before a frame was opened has none of it.
 TEST(Determined, UnmeasuredValuesGiveNoReport) {
   MadeUpCalibration made = MakeUpCalibration(31, 300, 8);
@@ -90,6 +112,7 @@ TEST(Determined, UnmeasuredValuesGiveNoReport) {
   EXPECT_TRUE(out["sharpest_reading"].at("reading_mm").is_null());
   EXPECT_TRUE(out["sharpest_reading"].at("focus_by_blur_mm").is_null());
   EXPECT_TRUE(out.at("frame_structure").is_null());
+  EXPECT_TRUE(out.at("camera_response").is_null());
   EXPECT_TRUE(out.at("diagnoses").empty());
 }
 
