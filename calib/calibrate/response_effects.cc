@@ -19,10 +19,11 @@
 namespace thicklens::calib {
 namespace {
 
-constexpr double kLeastNoiseSteps = 0.6;     // noise that rounding does not hide, steps of the file
-constexpr double kAgrees = 0.1;              // |ln exponent| of a curve that describes the frames
-constexpr double kReachOfLoss = 2;           // standard deviations
-constexpr double kLargestRatioChange = 0.5;  // of kappa
+constexpr double kLeastNoiseSteps = 0.6;  // noise that rounding does not hide, steps of the file
+constexpr double kAgrees = 0.1;           // |ln exponent| of a curve that describes the frames
+constexpr double kReachOfCurve = 3;       // standard deviations within which a usual curve is named
+constexpr double kReachOfLoss = 2;        // standard deviations
+constexpr double kLargestRatioChange = 0.5;   // of kappa
 constexpr double kClippingMargin = 1.0 / 64;  // of full scale, over which a clipped value spreads
 
 BlurTask TaskWith(const BlurTask& task, const FocusSweep& sweep, FrameStore& store) {
@@ -148,7 +149,8 @@ class ResponseCheck {
       if (curve == model::TransferCurve::Linear()) of_linear = exponent;
       if (!exponent || !(exponent->value > 0)) continue;
       const double off = std::abs(std::log(exponent->value));
-      if (off < std::max(kAgrees, 2 * exponent->sigma / exponent->value) && off < least) {
+      if (off < std::max(kAgrees, kReachOfCurve * exponent->sigma / exponent->value) &&
+          off < least) {
         least = off;
         best = curve;
       }

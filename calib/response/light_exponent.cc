@@ -22,8 +22,8 @@ constexpr int kNuisances = 9;
 constexpr Eigen::Index kMinWindows = 60;
 constexpr double kPixelsPerWindow = 4;  // windows are sampled so densely that 4 are one value
 constexpr double kMinChange = 1e-6;     // of the variance over the mean, relative to the mean
-constexpr int kMaxRounds = 8;
-constexpr double kSmallSlope = 0.003;
+constexpr int kMaxRounds = 14;
+constexpr double kSmallSlope = 0.003, kSmallPart = 0.25;  // the part is one of its sigma
 
 // Maps of one frame, shrunk by whole blocks: windowed mean and variance of the values, the clipped
 // share, and the derivatives of the mean per shrunk px.
@@ -60,7 +60,7 @@ class ExponentFit {
       // The slope is -(p - 1)/2 of the raised values, so that 1 - 2 slope is the power that is
       // left.
       exponent *= std::clamp(1 - 2 * slope->value, 0.6, 1.6);
-      if (std::abs(slope->value) < kSmallSlope)
+      if (std::abs(slope->value) < std::max(kSmallSlope, kSmallPart * slope->sigma))
         return model::Estimate{exponent, 2 * slope->sigma * exponent};
     }
     return std::nullopt;
