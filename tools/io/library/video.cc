@@ -4,7 +4,7 @@
 // suffice: it states no time stamps, it finds a frame by multiplying its number with a constant
 // frame rate (of a video with a variable rate it returned an image that no frame has), it converts
 // colours by the coefficients of BT.601 whatever the file states, and it opens files by the ending
-// of their name. OpenCV's videoio has the last three defects as well.
+// of their name. OpenCV's videoio converts each frame to 8 bits of blue, green and red.
 extern "C" {
 #include <libavcodec/avcodec.h>
 #include <libavformat/avformat.h>
