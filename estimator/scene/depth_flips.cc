@@ -7,12 +7,11 @@
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/parallel.h"
 #include "thicklens/estimator/scene_solver.h"
-#include "thicklens/kernels/device.h"
 
 namespace thicklens::estimator {
 namespace {
 
-// The noise that is taken where the photograph does not show it, and the least of 8 bits.
+// The noise where the photograph does not show it, and the least: the rounding of 8 bits.
 constexpr double kMinNoise = 0.29 / 255;
 // Residuals near edges of the depth are above the noise also for the right map.
 constexpr double kMaxOfNoise = 2;
@@ -37,6 +36,23 @@ double ResidualOf(const BlurImage& image, model::DepthFlip flip, const EstimateI
 
 }  // namespace
 
+std::optional<DepthFlipTrial> BetterFlip(const std::vector<DepthFlipTrial>& trials,
+                                         double noise_sigma) {
+  if (trials.size() < 2) return std::nullopt;
+  const auto excess = [&](const DepthFlipTrial& trial) {
+    return trial.residual_rms * trial.residual_rms - noise_sigma * noise_sigma;
+  };
+  const DepthFlipTrial& given = trials.front();
+  if (!(excess(given) > 0)) return std::nullopt;
+  auto best = trials.begin() + 1;
+  for (auto trial = best; trial != trials.end(); ++trial) {
+    if (trial->residual_rms * kAboutAsWell < best->residual_rms) best = trial;
+  }
+  const bool is_better = best->residual_rms <= kMaxOfNoise * noise_sigma &&
+                         excess(*best) <= kMaxOfExcess * excess(given);
+  return is_better ? std::optional(*best) : std::nullopt;
+}
+
 DepthFlipCheck CheckDepthFlips(const EstimateInput& input, const DepthFlipOptions& options) {
   const int threads = ResolveThreads(options.threads);
   const BlurImage image = BlurImageOf(input, options.falloff, threads);
@@ -56,18 +72,7 @@ DepthFlipCheck CheckDepthFlips(const EstimateInput& input, const DepthFlipOption
                                       model::DepthFlip::kColumns, model::DepthFlip::kBoth}) {
     check.trials.push_back({flip, ResidualOf(image, flip, input, run)});
   }
-  const auto excess = [&](const DepthFlipTrial& trial) {
-    return trial.residual_rms * trial.residual_rms - check.noise_sigma * check.noise_sigma;
-  };
-  const DepthFlipTrial& given = check.trials.front();
-  const DepthFlipTrial* best = &check.trials[1];
-  for (const DepthFlipTrial& trial : check.trials) {
-    if (trial.residual_rms * kAboutAsWell < best->residual_rms) best = &trial;
-  }
-  if (best->residual_rms <= kMaxOfNoise * check.noise_sigma &&
-      excess(*best) <= kMaxOfExcess * excess(given)) {
-    check.better = *best;
-  }
+  check.better = BetterFlip(check.trials, check.noise_sigma);
   return check;
 }
 

@@ -330,6 +330,16 @@ DepthFlip DepthFlipFromName(const std::string& name) {
                   PrintableUtf8(name)));
 }
 
+DepthFlip Combined(DepthFlip first, DepthFlip second) {
+  const auto has = [](DepthFlip flip, DepthFlip part) {
+    return flip == part || flip == DepthFlip::kBoth;
+  };
+  const bool rows = has(first, DepthFlip::kRows) != has(second, DepthFlip::kRows);
+  const bool columns = has(first, DepthFlip::kColumns) != has(second, DepthFlip::kColumns);
+  if (rows && columns) return DepthFlip::kBoth;
+  return rows ? DepthFlip::kRows : columns ? DepthFlip::kColumns : DepthFlip::kNone;
+}
+
 void FlipDepth(DepthFlip flip, int width_px, std::vector<float>* values) {
   if (width_px < 1 || values->size() % static_cast<std::size_t>(width_px) != 0) {
     throw Error(fmt::format("flip of a depth map: {} values are no full rows of {} px",

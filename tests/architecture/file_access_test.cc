@@ -38,6 +38,9 @@ const std::set<std::string>& Known() {
       "tools/report/report_folder.cc",          // the head of an output: reading reports an input
       "tools/io/float_tiff.cc",                 // writes a file in an output folder
       "tools/io/array_file.cc",                 // the first bytes of an input; /proc
+      "tools/io/frame_files.cc",                // digests of videos, which may exceed the memory
+      "tools/io/video/video_file.cc",           // the first bytes of an input
+      "tools/io/video/video_kind.cc",           // parts of an input that may exceed the memory
       "tools/io/tiff_pixels.cc",                // libtiff reads and writes in memory
       "tools/system/standard_descriptors.cc",   // the null device
       "kernels/opencl/isolated_subprocess.cc",  // the null device

@@ -89,8 +89,8 @@ OptionNames ExplainOptionNames() {
 // sensor.
 DepthMap DepthOf(const ExplainOptions& options, const model::Sensor& sensor) {
   if (options.depth.kind.empty()) {
-    if (std::optional<DepthMap> inside =
-            ReadEmbeddedDepth(options.depth_path, sensor.width_px, sensor.height_px)) {
+    if (std::optional<DepthMap> inside = ReadEmbeddedDepth(
+            options.depth_path, sensor.width_px, sensor.height_px, DepthFlipOf(options.depth))) {
       RefuseOtherMeaning(options.depth, *inside);
       spdlog::info("{}: {}", PrintableUtf8(options.depth_path),
                    PrintableUtf8(inside->notes.front()));

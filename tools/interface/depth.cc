@@ -30,9 +30,10 @@ std::string LengthUnitName(LengthUnit unit) {
 DepthMap DepthMap::Cropped(const model::PixelRect& rect) const {
   return WithFileContext(source.empty() ? "depth" : source, [&] {
     model::RawDepthMap map = model::CropDepth({width_px, height_px, values, is_integer}, rect);
-    return DepthMap{map.width_px, map.height_px, std::move(map.values), map.integer,
-                    meaning,      source,        largest_of_type,       holes,
-                    notes,        warnings};
+    return DepthMap{map.width_px,    map.height_px, std::move(map.values),
+                    map.integer,     meaning,       source,
+                    largest_of_type, holes,         notes,
+                    warnings,        flip};
   });
 }
 
@@ -80,7 +81,8 @@ DepthMap ReadDepth(const std::string& path, const DepthMeaning& meaning,
                  file.map.largest_of_type,
                  options.holes,
                  std::move(file.notes),
-                 std::move(file.warnings)};
+                 std::move(file.warnings),
+                 options.flip};
   if (!options.near_mm) return depth;
   const double full_scale = depth.largest_of_type.value_or(1);
   const model::InverseScale scale =
@@ -93,7 +95,8 @@ DepthMap ReadDepth(const std::string& path, const DepthMeaning& meaning,
   return depth;
 }
 
-std::optional<DepthMap> ReadEmbeddedDepth(const std::string& path, int width_px, int height_px) {
+std::optional<DepthMap> ReadEmbeddedDepth(const std::string& path, int width_px, int height_px,
+                                          model::DepthFlip flip) {
   if (width_px < 0 || height_px < 0 || (width_px == 0) != (height_px == 0)) {
     throw OptionError("width_px", fmt::format("width_px, height_px: two sides >= 1, or two zeros, "
                                               "are expected, found {} and {}",
@@ -114,6 +117,8 @@ std::optional<DepthMap> ReadEmbeddedDepth(const std::string& path, int width_px,
   map.width_px = depths.width_px;
   map.height_px = depths.height_px;
   map.values = std::move(depths.values);
+  model::FlipDepth(flip, map.width_px, &map.values);
+  map.flip = flip;
   map.meaning.kind = found->kind;
   if (found->kind != DepthKind::kInverse) map.meaning.unit = LengthUnit::kMillimetre;
   map.source = path;

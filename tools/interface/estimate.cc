@@ -163,6 +163,7 @@ void CheckFlips(const PreparedProblem& prepared, const EstimateOptions& options,
 struct DepthFile {
   std::string name;  // in messages
   DepthMeaning meaning;
+  model::DepthFlip flip = model::DepthFlip::kNone;  // by which it was read
 };
 
 std::string WordsOf(model::DepthFlip flip) {
@@ -217,7 +218,9 @@ std::vector<std::string> WarningsOf(const DepthFile& depth, bool has_camera, con
         found.patches.size(), worst.x, worst.x + worst.width_px - 1, worst.y,
         worst.y + worst.height_px - 1, kEightBitLevels * worst.residual_rms, noise_levels));
   }
-  if (found.unexplained_share && *found.unexplained_share > estimator::kMaxUnexplained) {
+  const bool is_reversed = found.depth_flips && found.depth_flips->better;
+  if (found.unexplained_share && *found.unexplained_share > estimator::kMaxUnexplained &&
+      !is_reversed) {
     warnings.push_back(fmt::format(
         "{:.0f} % of the photograph is not explained beyond its noise of {:.1f} grey levels: most "
         "likely it is sharper than depth and aperture predict; {}",
@@ -227,16 +230,18 @@ std::vector<std::string> WarningsOf(const DepthFile& depth, bool has_camera, con
                           run.Option("depth.meaning.disparity_offset_px"))
             : "are the depth's unit, and the camera's aperture and focus, right?"));
   }
-  const bool is_reversed = found.depth_flips && found.depth_flips->better;
   if (is_reversed) {
     const estimator::DepthFlipCheck& flips = *found.depth_flips;
+    const model::DepthFlip flip = model::Combined(depth.flip, flips.better->flip);
     warnings.push_back(fmt::format(
         "{}: {}, the map explains the photograph down to {:.1f} grey levels, as it is only to "
-        "{:.1f} (noise: {:.1f}{}): it is probably stored the other way; {} {} reads it so",
+        "{:.1f} (noise: {:.1f}{}): it is probably stored the other way; {} reads it so",
         depth.name, WordsOf(flips.better->flip), kEightBitLevels * flips.better->residual_rms,
         kEightBitLevels * flips.trials.front().residual_rms, kEightBitLevels * flips.noise_sigma,
         summary.width_px >= 256 && summary.height_px >= 256 ? ", at a reduced size" : "",
-        run.Option("depth.flip"), model::DepthFlipName(flips.better->flip)));
+        flip == model::DepthFlip::kNone
+            ? fmt::format("without {} the program", run.Option("depth.flip"))
+            : fmt::format("{} {}", run.Option("depth.flip"), model::DepthFlipName(flip))));
   }
   if (IsInDoubt(found, kDoubtful) && !found.unexplained_share && !is_reversed) {
     warnings.push_back(fmt::format(
@@ -343,7 +348,8 @@ LightFieldEstimate Estimate(ViewSink* given_sink, Image photo, DepthMap depth,
   RequireValidEstimate(depth, camera, given, control);
   RunScope run(control);
   LightFieldEstimate estimate;
-  const DepthFile depth_file{depth.source.empty() ? "depth" : depth.source, depth.meaning};
+  const DepthFile depth_file{depth.source.empty() ? "depth" : depth.source, depth.meaning,
+                             depth.flip};
   PreparedProblem prepared =
       Prepare(std::move(photo), std::move(depth), camera, given, &estimate.diagnostics, &run);
   ThrowIfCancelled();

@@ -23,6 +23,7 @@
 #include "thicklens/base/input_file.h"
 #include "thicklens/base/memory_available.h"
 #include "thicklens/base/printable_text.h"
+#include "thicklens/base/stopwatch.h"
 #include "tools/io/plugin.h"
 
 namespace thicklens::io {
@@ -32,6 +33,8 @@ constexpr std::size_t kMostContentBytes = std::size_t{1} << 20;
 constexpr std::size_t kMostReasonBytes = 4096;
 // The process ends after so much time of a processor, s. The largest file of 4 GiB needs a tenth.
 constexpr rlim_t kMostSeconds = 600;
+// And it is ended if it sends nothing for so long, s: more than that time of a busy processor.
+constexpr int kMostSilentSeconds = 1800;
 
 const ArrayLibrary& LoadedArrayLibrary() {
   static const ArrayLibrary* const library = [] {
@@ -170,7 +173,9 @@ void LimitThisProcess(std::optional<double> memory_left_mib) {
   };
   limit(RLIMIT_CORE, 0);
   limit(RLIMIT_FSIZE, 0);
-  limit(RLIMIT_CPU, kMostSeconds);
+  // The signal of the soft limit says what happened; that of the hard one does not.
+  const rlimit seconds{kMostSeconds, kMostSeconds + 5};
+  setrlimit(RLIMIT_CPU, &seconds);
   const rlim_t data = DataBytes();
   if (memory_left_mib && data > 0)
     limit(RLIMIT_DATA, data + static_cast<rlim_t>(*memory_left_mib) * (1 << 20));
@@ -186,9 +191,10 @@ void ForgetSignalHandlers() {
   sigprocmask(SIG_SETMASK, &none, nullptr);
 }
 
+// noexcept: an exception ends this process here, and never reaches the caller's stack in it.
 [[noreturn]] void ReadArraysForever(int socket, const ArrayLibrary& library,
                                     const std::string& path, ArrayFormat format,
-                                    std::optional<double> memory_left_mib) {
+                                    std::optional<double> memory_left_mib) noexcept {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   ForgetSignalHandlers();
   // libhdf5 writes its warnings there.
@@ -226,7 +232,6 @@ std::mutex& ForkMutex() {
 }  // namespace
 
 std::optional<ArrayFormat> FormatOfArrays(const std::string& path) {
-  std::error_code ignored;
   RequireRegularFile(path);
   std::ifstream file(path, std::ios::binary);
   std::string start(4096, '\0');
@@ -280,7 +285,7 @@ ArrayFile::ArrayFile(const std::string& path, ArrayFormat format) : path_(path) 
 
 ArrayFile::Process::~Process() {
   if (socket >= 0) close(socket);
-  if (id < 0) return;
+  if (id <= 0) return;
   kill(id, SIGKILL);
   while (waitpid(id, nullptr, 0) < 0 && errno == EINTR) {
   }
@@ -288,8 +293,14 @@ ArrayFile::Process::~Process() {
 
 void ArrayFile::Receive(void* bytes, std::size_t count) {
   char* at = static_cast<char*>(bytes);
+  auto last_news = Clock::now();
   while (count > 0) {
     ThrowIfCancelled();
+    // A file may make the process wait for something that never comes, which costs no processor.
+    if (SecondsSince(last_news) > kMostSilentSeconds) {
+      throw Error(fmt::format("{}: cannot be read: the process that reads it sent nothing for {} s",
+                              path_, kMostSilentSeconds));
+    }
     pollfd ready{process_.socket, POLLIN, 0};
     constexpr int kMostWaitMs = 100;
     if (poll(&ready, 1, kMostWaitMs) <= 0) continue;
@@ -297,6 +308,7 @@ void ArrayFile::Receive(void* bytes, std::size_t count) {
     const ssize_t got = recv(process_.socket, at, std::min(count, kMostAtOnce), 0);
     if (got < 0 && errno == EINTR) continue;
     if (got <= 0) ThrowEnded();
+    last_news = Clock::now();
     at += got;
     count -= static_cast<std::size_t>(got);
   }
@@ -322,12 +334,18 @@ void ArrayFile::ThrowEnded() {
   while (waitpid(process_.id, &status, 0) < 0 && errno == EINTR) {
   }
   process_.id = -1;
-  const bool is_slow = WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU;
-  throw Error(fmt::format("{}: cannot be read, it is damaged: the process that reads it {}", path_,
-                          is_slow ? fmt::format("takes more than {} s", kMostSeconds)
-                          : WIFSIGNALED(status)
-                              ? fmt::format("failed with signal {}", WTERMSIG(status))
-                              : fmt::format("ended early with status {}", WEXITSTATUS(status))));
+  const int number = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
+  // An access outside of the memory is a fault that only the file's content can lead to; the system
+  // and the limits of memory end a process by other ways.
+  const bool is_crash = number == SIGSEGV || number == SIGBUS;
+  throw Error(fmt::format(
+      "{}: cannot be read{}: the process that reads it {}", path_,
+      is_crash ? ", it is damaged" : "",
+      number == SIGXCPU   ? fmt::format("takes more than {} s of a processor", kMostSeconds)
+      : number == SIGABRT ? std::string("gave up; it may need more memory than is left")
+      : number == SIGKILL ? std::string("was ended by the system, which may lack memory")
+      : number != 0       ? fmt::format("failed with signal {}", number)
+                          : fmt::format("ended early with status {}", WEXITSTATUS(status))));
 }
 
 std::vector<unsigned char> ArrayFile::Read(const StoredArray& array) {

@@ -19,8 +19,7 @@ Error NoDepth(const std::string& path) {
   const std::vector<std::string> others = io::ReadEmbeddedDepthFile(path).others;
   return Error(fmt::format(
       "{}: no DEPTH was given, and the photograph's file holds no depth map (looked for: {}{}); "
-      "give "
-      "the depth map of the photograph, with --depth-kind z, range, disparity or inverse",
+      "give the depth map of the photograph, with --depth-kind z, range, disparity or inverse",
       path, io::EmbeddedDepthForms(),
       others.empty() ? "" : fmt::format("; found: {}", fmt::join(others, "; "))));
 }
@@ -43,10 +42,9 @@ std::string CameraRemedy(const std::string& path, model::DepthKind kind, int wid
   if (kind == model::DepthKind::kInverse) {
     text += fmt::format(
         ". Without a camera, `thicklens depth extract {} --enlarge -o inverse.pfm` writes "
-        "dioptres, "
-        "which --depth-kind disparity --disparity-scale S --disparity-offset O takes: S px per "
-        "view "
-        "step and dioptre, O = -S/zf for a distance in focus of zf metres",
+        "dioptres, which --depth-kind disparity --disparity-scale S --disparity-offset O takes: S "
+        "px per "
+        "view step and dioptre, O = -S/zf for a distance in focus of zf metres",
         path);
   }
   return text;
@@ -100,21 +98,20 @@ void RefuseOtherMeaning(const DepthOptions& options, const DepthMap& inside) {
   if (given.empty()) return;
   throw UsageError(
       fmt::format("{}: {}, with its unit; leave the option{} out, or write the map by `thicklens "
-                  "depth extract` "
-                  "and give it as DEPTH",
+                  "depth extract` and give it as DEPTH",
                   fmt::join(given, ", "), file_says, given.size() == 1 ? "" : "s"));
 }
 
 DepthMap DepthInsidePhoto(const EstimateOptions& options, int width_px, int height_px) {
   const std::string& path = options.image_path;
-  std::optional<DepthMap> inside = ReadEmbeddedDepth(path, width_px, height_px);
+  std::optional<DepthMap> inside =
+      ReadEmbeddedDepth(path, width_px, height_px, DepthFlipOf(options.depth));
   if (!inside) throw NoDepth(path);
   RefuseOtherMeaning(options.depth, *inside);
   if (!options.camera_path.empty()) return std::move(*inside);
   throw UsageError(fmt::format(
       "--camera is missing: the depth map inside {} is {}, and how far its points move from view "
-      "to "
-      "view depends on the camera; {}",
+      "to view depends on the camera; {}",
       path, KindInWords(inside->meaning.kind),
       CameraRemedy(path, inside->meaning.kind, width_px, height_px)));
 }

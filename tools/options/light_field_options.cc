@@ -358,13 +358,17 @@ DepthMeaning DepthMeaningOf(const DepthOptions& options) {
   return meaning;
 }
 
+model::DepthFlip DepthFlipOf(const DepthOptions& options) {
+  return options.flip.empty() ? model::DepthFlip::kNone : model::DepthFlipFromName(options.flip);
+}
+
 DepthReadOptions DepthReadOptionsOf(const DepthOptions& options) {
   const model::DepthConvention convention = ConventionOf(options);
   DepthReadOptions reading;
   reading.file.channel = options.channel;
   if (options.pfm_scale == "apply") reading.file.pfm_scale = io::PfmScale::kApplied;
   if (options.pfm_scale == "ignore") reading.file.pfm_scale = io::PfmScale::kIgnored;
-  if (!options.flip.empty()) reading.flip = model::DepthFlipFromName(options.flip);
+  reading.flip = DepthFlipOf(options);
   reading.holes.hole_values = options.hole_values;
   reading.holes.zero_is_value = options.zero_is == "value";
   reading.holes.largest_is_value = options.largest_is == "value";

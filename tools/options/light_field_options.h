@@ -69,6 +69,8 @@ model::DepthConvention ConventionOf(const DepthOptions& options);
 // Likewise in the form of the interface.
 DepthMeaning DepthMeaningOf(const DepthOptions& options);
 // How the map is read. Throws UsageError as ConventionOf does.
+// The value of --depth-flip.
+model::DepthFlip DepthFlipOf(const DepthOptions& options);
 DepthReadOptions DepthReadOptionsOf(const DepthOptions& options);
 
 // The option --aperture-shape.

@@ -65,3 +65,12 @@ with h5py.File("heidelberg.h5", "w") as file:
     for name, value in dict(dH=0.1, focalLength=9.375, shift=1.5, vRes=ROWS, hRes=COLUMNS,
                             yRes=HEIGHT, xRes=WIDTH, channels=3).items():
         file.attrs[name] = value
+
+# Data sets whose numbers are in other files: nobody chose those.
+with h5py.File("external.h5", "w") as file:
+    file.create_dataset("LF", (3, 3, 4, 5, 3), dtype="u1", external=[("elsewhere.bin", 0, 540)])
+with h5py.File("virtual.h5", "w") as file:
+    source = h5py.VirtualSource("elsewhere.h5", "LF", shape=(3, 3, 4, 5, 3), maxshape=(None, 3, 4, 5, 3))
+    layout = h5py.VirtualLayout(shape=(3, 3, 4, 5, 3), dtype="u1", maxshape=(None, 3, 4, 5, 3))
+    layout[0:h5py.h5s.UNLIMITED:1] = source[0:h5py.h5s.UNLIMITED:1]
+    file.create_virtual_dataset("LF", layout)

@@ -62,6 +62,27 @@ TEST(DepthFlips, TheReversedOrderIsFoundAndNoOther) {
   }
 }
 
+TEST(DepthFlips, NoiseDecidesNothing) {
+  using model::DepthFlip;
+  const auto better = [](double given, double rows, double columns, double both) {
+    const auto found = BetterFlip({{DepthFlip::kNone, given},
+                                   {DepthFlip::kRows, rows},
+                                   {DepthFlip::kColumns, columns},
+                                   {DepthFlip::kBoth, both}},
+                                  1);
+    return found ? model::DepthFlipName(found->flip) : "";
+  };
+  EXPECT_EQ(better(0.95, 0.97, 0.97, 0.97), "");
+  EXPECT_EQ(better(0.8, 0.97, 0.97, 0.97), "");
+  EXPECT_EQ(better(1.2, 1.15, 1.16, 1.15), "");
+  EXPECT_EQ(better(5, 4, 4, 4), "");
+  EXPECT_EQ(better(5, 2.5, 4, 4), "");  // far above the noise
+  EXPECT_EQ(better(3, 2.9, 1.2, 2.9), "columns");
+  EXPECT_EQ(better(3, 1.2, 2.9, 1.15), "rows");  // the first that does about as well
+  EXPECT_EQ(better(3, 1.6, 2.9, 1.2), "both");
+  EXPECT_FALSE(BetterFlip({}, 1));
+}
+
 TEST(DepthFlips, TheRightOrderStays) {
   for (unsigned seed = 1; seed <= 4; ++seed) {
     EXPECT_FALSE(CheckDepthFlips(SquareScene(1.5, seed).input, {}).better) << seed;

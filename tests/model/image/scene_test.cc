@@ -437,6 +437,14 @@ TEST(DepthMap, FlipsReverseRowsColumnsOrBoth) {
   EXPECT_EQ(flipped("rows"), (std::vector<float>{4, 5, 6, 1, 2, 3}));
   EXPECT_EQ(flipped("columns"), (std::vector<float>{3, 2, 1, 6, 5, 4}));
   EXPECT_EQ(flipped("both"), (std::vector<float>{6, 5, 4, 3, 2, 1}));
+  for (const char* first : {"none", "rows", "columns", "both"}) {
+    for (const char* second : {"none", "rows", "columns", "both"}) {
+      std::vector<float> values = flipped(first);
+      FlipDepth(DepthFlipFromName(second), 3, &values);
+      const DepthFlip both = Combined(DepthFlipFromName(first), DepthFlipFromName(second));
+      EXPECT_EQ(values, flipped(DepthFlipName(both))) << first << " " << second;
+    }
+  }
   EXPECT_THROW(DepthFlipFromName("rot180"), Error);
   std::vector<float> partial(5);
   EXPECT_THROW(FlipDepth(DepthFlip::kRows, 3, &partial), Error);

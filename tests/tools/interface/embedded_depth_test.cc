@@ -40,6 +40,10 @@ TEST(EmbeddedDepthInterfaceTest, TheMapHasTheMeaningThatTheFileStates) {
   EXPECT_EQ(map->height_px, 24);
   EXPECT_NEAR(map->values.front(), 2.08, 1e-5);
   EXPECT_NEAR(map->values.back(), 0.4, 1e-5);
+  const auto turned =
+      ReadEmbeddedDepth(PathOfPhoto("gdepth_inverse.jpg"), 0, 0, model::DepthFlip::kBoth);
+  ASSERT_TRUE(turned);
+  EXPECT_EQ(turned->values.front(), map->values.back());
   EXPECT_FALSE(map->is_integer);
   EXPECT_THAT(map->notes.front(), StartsWith("The depth map inside is used: GDepth, RangeInverse"));
   const std::optional<DepthMap> range = ReadEmbeddedDepth(PathOfPhoto("gdepth_linear_ray.jpg"));

@@ -70,13 +70,17 @@ hid_t InMemory(StoredNumber number) {
   }
 }
 
-// Numbers in other files, to which a file may refer, are not read: nobody chose those files.
-void RequireNumbersInTheFile(hid_t data_set, const std::string& name) {
-  const hid_t creation = Require(H5Dget_create_plist(data_set), name);
+// Numbers in other files, to which a file may refer, are not read: nobody chose those files. Even
+// the size of such a data set may be found only in the other file, which is then opened.
+bool AreNumbersInTheFile(hid_t data_set) {
+  const hid_t creation = Require(H5Dget_create_plist(data_set), "a data set");
   const H5D_layout_t layout = H5Pget_layout(creation);
-  const bool is_inside = layout == H5D_COMPACT || layout == H5D_CHUNKED ||
-                         (layout == H5D_CONTIGUOUS && H5Pget_external_count(creation) == 0);
-  if (!is_inside) throw ArrayRefusal(name + ": its numbers are in other files");
+  return layout == H5D_COMPACT || layout == H5D_CHUNKED ||
+         (layout == H5D_CONTIGUOUS && H5Pget_external_count(creation) == 0);
+}
+
+void RequireNumbersInTheFile(hid_t data_set, const std::string& name) {
+  if (!AreNumbersInTheFile(data_set)) throw ArrayRefusal(name + ": its numbers are in other files");
 }
 
 // The number of elements of a data set; 0 if it is not known.
@@ -88,6 +92,7 @@ hsize_t CountOf(hid_t data_set) {
 
 // Text of Matlab: integers of 16 bits.
 std::string TextOfSet(hid_t data_set) {
+  if (!AreNumbersInTheFile(data_set)) return "";
   const hsize_t count = CountOf(data_set);
   if (count > kMostLetters || H5Tget_class(H5Dget_type(data_set)) != H5T_INTEGER) return "";
   std::array<std::uint16_t, kMostLetters> letters{};
@@ -101,6 +106,9 @@ std::string TextOfSet(hid_t data_set) {
 class HdfArrays : public ArraySource {
  public:
   explicit HdfArrays(const std::string& path) {
+    H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+    // A file may name a filter that libhdf5 would look for in a folder of libraries.
+    H5PLset_loading_state(0);
     const hid_t access = Require(H5Pcreate(H5P_FILE_ACCESS), "a property");
     // Files on a network may have no locks, and nothing is written.
     H5Pset_file_locking(access, false, true);
@@ -152,6 +160,11 @@ class HdfArrays : public ArraySource {
     array.name = name;
     if (data_set < 0) {
       array.type = "a group";
+      content->arrays.push_back(array);
+      return;
+    }
+    if (!AreNumbersInTheFile(data_set)) {
+      array.type = "numbers in other files";
       content->arrays.push_back(array);
       return;
     }
@@ -231,10 +244,8 @@ class HdfArrays : public ArraySource {
 ArraySource* OpenHdfArrays(const std::string& path) { return new HdfArrays(path); }
 
 void PrepareHdf() {
+  // Nothing else: the program may use libhdf5 itself, and its settings stay.
   H5open();
-  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
-  // A file may name a filter that libhdf5 would look for in a folder of libraries.
-  H5PLset_loading_state(0);
 }
 
 }  // namespace thicklens::io

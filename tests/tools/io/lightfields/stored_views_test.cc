@@ -100,6 +100,14 @@ TEST_F(StoredViews, AViewWithoutWeightIsLeftOut) {
   }
 }
 
+// The other file could be a pipe, which keeps whoever opens it waiting.
+TEST_F(StoredViews, NumbersInOtherFilesAreNotRead) {
+  for (const char* name : {"external.h5", "virtual.h5"}) {
+    EXPECT_THAT(ErrorOf([&] { Read(StoredFilePath(name)); }),
+                AllOf(HasSubstr(name), HasSubstr("in other files")));
+  }
+}
+
 TEST_F(StoredViews, TheHeidelbergSetHasTheRowOfTheViewFirst) {
   ExpectLevels(Read(StoredFilePath("heidelberg.h5")), model::TransferCurve::Srgb());
   EXPECT_THAT(facts_.one_line,

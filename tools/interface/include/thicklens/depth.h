@@ -61,6 +61,7 @@ struct DepthMap {
   model::HoleRules holes = {};  // which values are no depths
   // What the reader found: remarks and doubts, one sentence each.
   std::vector<std::string> notes = {}, warnings = {};
+  model::DepthFlip flip = model::DepthFlip::kNone;  // by which the file's values were reversed
 
   // Returns a rectangle of the map, px. Throws Error if it is empty or not inside.
   THICKLENS_EXPORT DepthMap Cropped(const model::PixelRect& rect) const;
@@ -92,12 +93,14 @@ THICKLENS_EXPORT DepthMap ReadDepth(const std::string& path, const DepthMeaning&
 // Reads the depth map that a phone or a program stored in the photograph's own file, with the
 // meaning that the file states: lengths in mm (kZ, kRange) or dioptres (kInverse), as floats. The
 // forms are those of io::FindEmbeddedDepth. `width_px` and `height_px` are the photograph's size,
-// to which a smaller map of the same aspect ratio is enlarged; 0: the map keeps its size. The first
+// to which a smaller map of the same aspect ratio is enlarged; 0: the map keeps its size. `flip`
+// reverses its rows or columns. The first
 // of its notes describes it in one line. Returns nothing if the file holds no depth. Throws Error
 // that names the file: its fields are wrong, it states no unit, or the map has another aspect
 // ratio.
-THICKLENS_EXPORT std::optional<DepthMap> ReadEmbeddedDepth(const std::string& path,
-                                                           int width_px = 0, int height_px = 0);
+THICKLENS_EXPORT std::optional<DepthMap> ReadEmbeddedDepth(
+    const std::string& path, int width_px = 0, int height_px = 0,
+    model::DepthFlip flip = model::DepthFlip::kNone);
 // The bytes of a PFM file (float, little endian) with the values; the meaning is not part of it.
 THICKLENS_EXPORT std::string EncodeDepth(const DepthMap& depth);
 // Writes that file, completely or not at all.

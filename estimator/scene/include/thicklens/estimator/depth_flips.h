@@ -32,13 +32,18 @@ struct DepthFlipOptions {
   std::optional<double> memory_limit_mib;  // for the whole process
 };
 
+// The order that explains the photograph instead of the first one, if there is one: its residual is
+// at most twice the noise, and its excess variance over the noise at most 0.35 of the first one's.
+// Absent where the first one explains it within the noise, where none does, and for fewer than two
+// trials. Derived here [D121].
+THICKLENS_EXPORT std::optional<DepthFlipTrial> BetterFlip(const std::vector<DepthFlipTrial>& trials,
+                                                          double noise_sigma);
+
 // Checks whether a photograph that its depth map does not explain fits the map in another order of
 // rows or columns, by solving for the scene with each, as EstimateScene does, on the photograph
 // reduced to less than a million pixels. All orders have the same disparities, so that only their
-// place makes the difference: a wrong scale or focus leaves all of them unexplained. An order is
-// better if its residual is near the noise, that is within a factor of two, and has at most 0.35 of
-// the excess variance over the noise that the map as it is leaves. Derived here [D121]. Throws Error for inputs that do
-// not fit.
+// place makes the difference: a wrong scale or focus leaves all of them unexplained. Throws Error
+// for inputs that do not fit.
 THICKLENS_EXPORT DepthFlipCheck CheckDepthFlips(const EstimateInput& input,
                                                 const DepthFlipOptions& options);
 

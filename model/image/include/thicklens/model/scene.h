@@ -80,6 +80,8 @@ enum class DepthFlip {
 THICKLENS_EXPORT std::string DepthFlipName(DepthFlip flip);
 // The flip of that name. Throws Error for any other name.
 THICKLENS_EXPORT DepthFlip DepthFlipFromName(const std::string& name);
+// One flip after the other, in any order.
+THICKLENS_EXPORT DepthFlip Combined(DepthFlip first, DepthFlip second);
 // Reverses the values of a map of width_px columns in place. Throws Error unless they are full
 // rows.
 THICKLENS_EXPORT void FlipDepth(DepthFlip flip, int width_px, std::vector<float>* values);
