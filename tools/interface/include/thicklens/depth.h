@@ -41,7 +41,7 @@ struct DepthMeaning {
   // Only for kInverse: 1/z in dioptres (1/m) = inverse_scale_dpt * value + inverse_offset_dpt. The
   // scale is finite and not 0, the offset finite. The defaults are those of a map of dioptres.
   double inverse_scale_dpt = 1;
-  double inverse_offset_dpt = 0;
+  double inverse_offset_dpt = 0;  // the offset, dioptres
 
   // Returns whether kind, unit, scale and offset are stated and fit each other. Otherwise `why`, if
   // not null, gets the reason.

@@ -26,16 +26,18 @@ struct HoleRules {
 
 // Numbers of values by the reason why they are no depth. Each value is counted once.
 struct DepthHoles {
-  std::size_t pixels = 0;  // of the map
-  std::size_t not_a_number = 0, infinite = 0;
-  std::size_t listed = 0;    // one of HoleRules::hole_values
-  std::size_t zero = 0;      // 0
-  std::size_t negative = 0;  // below 0, in z and range
-  std::size_t largest = 0;   // the largest value of the type, as a mark of "no depth"
+  std::size_t pixels = 0;        // of the map
+  std::size_t not_a_number = 0;  // NaN
+  std::size_t infinite = 0;      // both signs
+  std::size_t listed = 0;        // one of HoleRules::hole_values
+  std::size_t zero = 0;          // 0
+  std::size_t negative = 0;      // below 0, in z and range
+  std::size_t largest = 0;       // the largest value of the type, as a mark of "no depth"
   // The zeros of an integer map of disparity or inverse depth form areas, as the far end of a
   // relative map does, and not scattered pixels and thin lines, as failed measurements do.
   bool zeros_form_areas = false;
 
+  // The sum over all reasons.
   THICKLENS_EXPORT std::size_t total() const;
   // "0: 18.9 %, NaN: 0.1 %"; empty if there are no holes.
   THICKLENS_EXPORT std::string InWords() const;

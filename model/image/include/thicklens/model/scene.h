@@ -105,14 +105,16 @@ struct DepthConvention {
   double aperture_step_mm = 0;     // kDisparity: da, step on Ap between the views of the disparity
   // kInverse: 1/z = scale * value + offset, in dioptres (1/m). The scale is not 0.
   double inverse_scale_dpt = 1;
-  double inverse_offset_dpt = 0;
+  double inverse_offset_dpt = 0;  // kInverse: the offset, dioptres
+};
+// The two numbers of an inverse depth: 1/z = scale_dpt * value + offset_dpt.
+struct InverseScale {
+  double scale_dpt = 1;   // dioptres per unit of the map
+  double offset_dpt = 0;  // of the value 0
 };
 // Scale and offset of a map whose value 0 lies at one depth and whose value `full_scale` lies at
 // another, linear in 1/z: 1/z = 1/z0 + value/full_scale (1/z1 - 1/z0). Either depth may be
 // infinite. Throws Error if a depth is not > 0, both are equal, or full_scale is not > 0.
-struct InverseScale {
-  double scale_dpt = 1, offset_dpt = 0;
-};
 THICKLENS_EXPORT InverseScale InverseScaleBetween(double depth_at_zero_mm,
                                                   double depth_at_full_scale_mm, double full_scale);
 // Millimetres per unit for the name "mm", "cm", "m" or "tum5000" (16-bit PNG of the TUM benchmark,

@@ -16,19 +16,19 @@ enum class PfmScale {
   // Applied, except for 1/255: the disparity maps of the Middlebury benchmark state it, and their
   // values are px already.
   kByRule,
-  kApplied,
-  kIgnored,
+  kApplied,  // always
+  kIgnored,  // never
 };
 
 // Which values of a file are the depth.
 struct DepthReading {
   std::string channel;  // of this name, in a file with named channels; empty: found by rule
-  PfmScale pfm_scale = PfmScale::kByRule;
+  PfmScale pfm_scale = PfmScale::kByRule;  // of a PFM file
 };
 
 // A depth map and what its user should know about the reading.
 struct DepthFile {
-  model::RawDepthMap map;
+  model::RawDepthMap map;             // its values, rows from top to bottom
   std::string description;            // "PNG, 128 x 96 px, unsigned 16-bit integers"
   std::vector<std::string> notes;     // one sentence each, without the file's name
   std::vector<std::string> warnings;  // likewise
@@ -54,7 +54,7 @@ struct EmbeddedDepth {
   // The meaning of offset + scale * number. kZ and kRange: a length in mm, or, if `is_inverse`, its
   // inverse in dioptres (1/m). kInverse: dioptres, and `is_inverse` is true.
   model::DepthKind kind = model::DepthKind::kZ;
-  bool is_inverse = false;
+  bool is_inverse = false;       // see `kind`
   double scale = 1, offset = 0;  // of the numbers, see `kind`
   // Whether the file states the unit of length. If not, scale and offset are those for metres, and
   // the true ones are an unknown multiple of them.

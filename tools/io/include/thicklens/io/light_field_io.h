@@ -26,16 +26,16 @@ struct LightFieldReading {
   // --layout NAME[:UxV]: the layout, one of LightFieldLayouts(); empty: it is recognised. The
   // numbers are views, tiles or pixels of a lenslet across and down; 0: not stated.
   std::string layout;
-  int layout_u = 0, layout_v = 0;
-  std::string name;  // --name: the pattern of names, "view_{v}_{u}.jpg"
+  int layout_u = 0, layout_v = 0;  // the numbers of --layout
+  std::string name;                // --name: the pattern of names, "view_{v}_{u}.jpg"
   // --view-order: exchanges rows and columns, and then counts columns or rows backwards.
   bool swap_uv = false, mirror_u = false, mirror_v = false;
 };
 
 // What was found when a light field was read.
 struct LightFieldFacts {
-  std::string kind;      // "a Stanford folder"
-  bool is_own = false;   // the layout of thicklens, which states everything itself
+  std::string kind;     // "a Stanford folder"
+  bool is_own = false;  // the layout of thicklens, which states everything itself
   // The reading needs no words: the layout of thicklens, or that of HCI with all of its views.
   bool is_plain = false;
   std::string one_line;  // "PATH: read as a Stanford folder: 17 x 17 views of 1024 x 1024 px, ..."

@@ -8,10 +8,10 @@ namespace thicklens::io {
 
 // The facts that a video states about all of its frames.
 struct VideoFacts {
-  std::string container;     // "MP4 or MOV", "Matroska or WebM", "AVI", ..
-  std::string codec;         // "H.264", "Motion JPEG", ..
+  std::string container;     // "MP4 or MOV", "Matroska or WebM", "AVI"
+  std::string codec;         // "H.264", "Motion JPEG"
   std::string pixel_format;  // as FFmpeg names it: "yuv420p", "gray10le"
-  // Whether the codec never loses anything: raw values, FFV1, ..
+  // Whether the codec never loses anything: raw values, FFV1
   bool is_lossless = false;
   // Values of YUV: white is full scale, or 235 of 255 (black 16).
   bool is_full_range = false;
