@@ -8,6 +8,7 @@
 #include <limits>
 #include <random>
 #include <string>
+#include <vector>
 
 #include "support/error_message.h"
 #include "thicklens/base/error.h"
@@ -166,6 +167,83 @@ TEST(EmbeddedDepthTest, OtherImagesAreNamed) {
   const std::string cut = PhotoWithDepth("second_image.jpg");
   EXPECT_THAT(FindEmbeddedDepth(cut.substr(0, cut.size() - 1), "photo.jpg").others,
               ElementsAre(HasSubstr("outside the 894 bytes of the file")));
+}
+
+// The lowest bytes of a number, the highest of them first.
+std::string HighFirst(std::size_t value, int bytes) {
+  std::string text;
+  for (int i = bytes - 1; i >= 0; --i) text += static_cast<char>(value >> (8 * i) & 0xFFU);
+  return text;
+}
+
+std::string Segment(char marker, const std::string& content) {
+  return std::string("\xFF") + marker + HighFirst(content.size() + 2, 2) + content;
+}
+
+// An image with an index that lists a second one `images` times, in each of `entries` entries of
+// its directory. The second one is an empty image or, with `whole`, a copy of the first one.
+std::string WithIndex(std::size_t images, std::size_t entries, bool whole) {
+  constexpr std::size_t kHeader = 8, kEntry = 12, kImage = 16, kBegin = 10;
+  const std::string empty = "\xFF\xD8\xFF\xD9";
+  const std::size_t table = kHeader + 2 + entries * kEntry, end = table + (images + 1) * kImage;
+  const std::size_t listed = whole ? end : end + 2;  // from the header of the index
+  std::string index = "MPF" + HighFirst(0, 1) + "MM" + HighFirst(42, 2) + HighFirst(kHeader, 4) +
+                      HighFirst(entries, 2);
+  for (std::size_t i = 0; i < entries; ++i) {
+    index += HighFirst(0xB002, 2) + HighFirst(7, 2) + HighFirst((images + 1) * kImage, 4) +
+             HighFirst(table, 4);
+  }
+  for (std::size_t i = 0; i <= images; ++i) {
+    index += HighFirst(0, 4) + HighFirst(whole ? kBegin + end : empty.size(), 4) +
+             HighFirst(listed, 4) + HighFirst(0, 4);
+  }
+  const std::string first = "\xFF\xD8" + Segment('\xE2', index);
+  return whole ? first + first : first + "\xFF\xD9" + empty;
+}
+
+TEST(EmbeddedDepthTest, AnIndexIsTakenOnce) {
+  EXPECT_EQ(PartsOfJpeg(WithIndex(200, 3, false), "photo.jpg").images.size(), 200U);
+}
+
+// 65 KB may list thousands of images, each as large as the file.
+TEST(EmbeddedDepthTest, TheImagesOfAnIndexAreLimited) {
+  const std::vector<std::string> many =
+      FindEmbeddedDepth(WithIndex(200, 1, false), "photo.jpg").others;
+  ASSERT_EQ(many.size(), 101U);
+  EXPECT_EQ(many.front(), "a second image of 0 x 0 px that is not stated to be depth");
+  EXPECT_THAT(many.back(), HasSubstr("of 201 images, of which 100 behind"));
+  const std::vector<std::string> large =
+      FindEmbeddedDepth(WithIndex(50, 1, true), "photo.jpg").others;
+  ASSERT_EQ(large.size(), 3U);
+  EXPECT_THAT(large.back(), HasSubstr("together larger than the"));
+}
+
+// Metadata that say nothing of depth may be damaged, in the photograph and in the images behind it.
+TEST(EmbeddedDepthTest, DamagedPacketsWithoutDepthAreNoErrors) {
+  const std::string photo = PhotoWithDepth("apple_disparity.jpg");
+  const std::string xmp_mark("http://ns.adobe.com/xap/1.0/\0", 29);
+  const std::string extension_mark("http://ns.adobe.com/xmp/extension/\0", 35);
+  const std::string guid = "http://ns.apple.com/pixeldatainf";  // a text of the packet behind
+  ASSERT_EQ(guid.size(), 32U);
+  ASSERT_NE(photo.find(guid), std::string::npos);
+  const std::string packet = Segment('\xE1', xmp_mark + "<a>" + guid + "</a>");
+  const std::string cut = Segment(
+      '\xE1', extension_mark + guid + HighFirst(1000, 4) + HighFirst(0, 4) + "<b>http://x/</b>");
+  const std::size_t behind = photo.find("\xFF\xD8\xFF", 1) + 2;
+  const auto with = [&](std::size_t at, const std::string& segments) {
+    return photo.substr(0, at) + segments + photo.substr(at);
+  };
+  // The index states the length of the image behind; without one that image is found as well.
+  const std::string longer = Altered(with(behind, cut), "MPF", "XPF");
+  for (const std::string& bytes :
+       {with(2, Segment('\xE1', xmp_mark + "<a>")), with(2, packet + cut), longer}) {
+    EXPECT_TRUE(FindEmbeddedDepth(bytes, "photo.jpg").depth);
+  }
+  const std::string stated = "<a xmlns:GDepth='http://ns.google.com/photos/1.0/depthmap/'>";
+  EXPECT_THAT(EmbeddedRefusal(with(2, Segment('\xE1', xmp_mark + stated))),
+              HasSubstr("not valid XML"));
+  EXPECT_THAT(EmbeddedRefusal(with(2, Segment('\xE1', xmp_mark + stated + guid + "</a>") + cut)),
+              HasSubstr("extended XMP: 16 of its 1000 bytes"));
 }
 
 TEST(EmbeddedDepthTest, HeicStatesItsMeaningInTheXmpOfTheDepthImage) {

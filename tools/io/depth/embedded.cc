@@ -53,6 +53,20 @@ XmpNode TreeOrNone(const std::string& packet) {
   }
 }
 
+// The packets of the photograph itself. What is damaged there is an error only if it states depth.
+XmpNode TreeOfPhoto(const std::string& packet, const std::string& extended,
+                    const std::string& extended_fault, const std::string& name) {
+  try {
+    if (!extended_fault.empty()) throw Error(extended_fault);
+    return TreeOf(packet, extended, name);
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const Error&) {
+    if (HasGoogleDepthFields(packet) || HasGoogleDepthFields(extended)) throw;
+    return TreeOrNone(packet);
+  }
+}
+
 // A JPEG image behind the picture.
 class FurtherImage {
  public:
@@ -98,15 +112,26 @@ class FurtherImage {
   XmpNode xmp_;
 };
 
+// Cameras store fewer images than this.
+constexpr std::size_t kMaxImages = 100;
+
 // Looks at the images that the index lists, and at the one directly behind the picture.
 void SearchBehindPicture(const std::string& bytes, const std::string& name, const JpegParts& parts,
                          EmbeddedDepthSearch* search) {
   std::vector<MpfImage> images = parts.images;
   if (images.empty() && parts.end < bytes.size())
     images.push_back({kMpfUndefined, parts.end, bytes.size() - parts.end});
+  // Images do not overlap: a file that lists itself again and again is not read as often.
+  std::size_t bytes_left = bytes.size();
   for (std::size_t i = 0; i < images.size(); ++i) {
     ThrowIfCancelled();
     const MpfImage& image = images[i];
+    if (i == kMaxImages) {
+      search->others.push_back(
+          fmt::format("an index (MPF) of {} images, of which {} behind the first one are searched",
+                      images.size() + 1, kMaxImages));
+      break;
+    }
     if (image.type == kMpfSmallPreview || image.type == kMpfLargePreview) continue;
     if (image.begin > bytes.size() || image.size > bytes.size() - image.begin) {
       search->others.push_back(fmt::format(
@@ -116,6 +141,14 @@ void SearchBehindPicture(const std::string& bytes, const std::string& name, cons
           i + 2, image.size, image.begin, bytes.size()));
       continue;
     }
+    if (image.size > bytes_left) {
+      search->others.push_back(
+          fmt::format("an index (MPF) whose images up to number {} are together larger than the {} "
+                      "bytes of the file",
+                      i + 2, bytes.size()));
+      break;
+    }
+    bytes_left -= image.size;
     const std::string part = bytes.substr(image.begin, image.size);
     const FurtherImage further(part, fmt::format("{}: image {} behind the picture", name, i + 2));
     if (!further.is_jpeg() && parts.images.empty()) break;  // a trailer of some program
@@ -133,7 +166,9 @@ void SearchBehindPicture(const std::string& bytes, const std::string& name, cons
 
 void SearchJpeg(const std::string& bytes, const std::string& name, EmbeddedDepthSearch* search) {
   const JpegParts parts = PartsOfJpeg(bytes, name);
-  PhotoParts photo{&bytes, name, TreeOf(parts.xmp, parts.extended_xmp, name), parts.end, true};
+  PhotoParts photo{&bytes, name,
+                   TreeOfPhoto(parts.xmp, parts.extended_xmp, parts.extended_fault, name),
+                   parts.end, true};
   search->depth = GDepthOf(photo);
   if (!search->depth) search->depth = DynamicDepthOf(photo, &search->others);
   if (!search->depth) SearchBehindPicture(bytes, name, parts, search);
@@ -142,7 +177,7 @@ void SearchJpeg(const std::string& bytes, const std::string& name, EmbeddedDepth
 void SearchOther(const std::string& bytes, const std::string& name, const std::string& packet,
                  EmbeddedDepthSearch* search) {
   if (packet.empty()) return;
-  const PhotoParts photo{&bytes, name, TreeOf(packet, "", name), bytes.size(), false};
+  const PhotoParts photo{&bytes, name, TreeOfPhoto(packet, "", "", name), bytes.size(), false};
   search->depth = GDepthOf(photo);
   if (!search->depth) search->depth = DynamicDepthOf(photo, &search->others);
 }

@@ -43,6 +43,8 @@ struct PhotoParts {
   bool is_jpeg = false;  // others have nothing behind the picture
 };
 
+// Whether a packet, which may be damaged, has fields of GDepth or of a DepthMap.
+bool HasGoogleDepthFields(const std::string& packet);
 // Google's GDepth, the map in the XMP itself.
 std::optional<EmbeddedDepth> GDepthOf(const PhotoParts& photo);
 // Google's Dynamic Depth, or a directory whose item states that it is depth: the map is behind the

@@ -215,6 +215,10 @@ void WarnOfArtificialBlur(const XmpNode& xmp, EmbeddedDepth* depth) {
 
 }  // namespace
 
+bool HasGoogleDepthFields(const std::string& packet) {
+  return packet.find(kGDepth) != std::string::npos || packet.find(kDepthMap) != std::string::npos;
+}
+
 std::optional<EmbeddedDepth> GDepthOf(const PhotoParts& photo) {
   const XmpNode& xmp = photo.xmp;
   const bool is_there = xmp.Find(kGDepth, "Format") != nullptr ||

@@ -8,9 +8,6 @@
 #include <map>
 #include <optional>
 
-#include "thicklens/base/error.h"
-#include "thicklens/base/printable_text.h"
-
 namespace thicklens::io {
 namespace {
 
@@ -35,6 +32,7 @@ std::uint32_t NumberAt(const std::string& bytes, std::size_t at, std::size_t cou
 struct Extension {
   std::size_t size = 0;
   std::map<std::size_t, std::string> parts;  // by offset
+  std::string fault;
 };
 
 class JpegScanner {
@@ -97,7 +95,7 @@ class JpegScanner {
   // A GUID of 32 digits, the length of the whole packet, the offset of this part, the part.
   void TakeExtension(std::size_t at, std::size_t size) {
     constexpr std::size_t kGuid = 32, kHeader = kGuid + 8;
-    if (size < kHeader) throw Error(fmt::format("{}: extended XMP: a part that is cut", name_));
+    if (size < kHeader) return;  // it is missing in its packet
     const std::size_t whole = NumberAt(bytes_, at + kGuid, 4);
     const std::size_t offset = NumberAt(bytes_, at + kGuid + 4, 4);
     const std::size_t part = size - kHeader;
@@ -105,10 +103,10 @@ class JpegScanner {
     if (extension.parts.empty()) extension.size = whole;
     if (whole != extension.size || whole > bytes_.size() || offset > whole ||
         part > whole - offset) {
-      throw Error(fmt::format(
+      extension.fault = fmt::format(
           "{}: extended XMP: {} bytes at {} of a packet of {} bytes in a file of {}: a part inside "
           "the packet, and a packet inside the file, are expected",
-          name_, part, offset, whole, bytes_.size()));
+          name_, part, offset, whole, bytes_.size());
     }
     extension.parts.emplace(offset, bytes_.substr(at + kHeader, part));
   }
@@ -121,19 +119,20 @@ class JpegScanner {
       if (parts_.xmp.find(one->first) != std::string::npos) chosen = one;
     }
     if (chosen == extensions_.end()) return;  // an editor left it behind
-    std::string joined;
+    std::string& joined = parts_.extended_xmp;
+    std::string& fault = parts_.extended_fault;
+    fault = chosen->second.fault;
     for (const auto& [offset, part] : chosen->second.parts) {
-      if (offset != joined.size()) {
-        throw Error(fmt::format("{}: extended XMP: a part at {} where {} is expected", name_,
-                                offset, joined.size()));
+      if (offset != joined.size() && fault.empty()) {
+        fault = fmt::format("{}: extended XMP: a part at {} where {} is expected", name_, offset,
+                            joined.size());
       }
       joined += part;
     }
-    if (joined.size() != chosen->second.size) {
-      throw Error(fmt::format("{}: extended XMP: {} of its {} bytes are in the file", name_,
-                              joined.size(), chosen->second.size));
+    if (joined.size() != chosen->second.size && fault.empty()) {
+      fault = fmt::format("{}: extended XMP: {} of its {} bytes are in the file", name_,
+                          joined.size(), chosen->second.size);
     }
-    parts_.extended_xmp = joined;
   }
 
   // A directory as in TIFF; offsets count from its header, and the first image has 0.
@@ -160,6 +159,7 @@ class JpegScanner {
                              at + number(begin + image + 8, 4), number(begin + image + 4, 4)};
         parts_.images.push_back(found);
       }
+      return;  // a directory has one such entry
     }
   }
 

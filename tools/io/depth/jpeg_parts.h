@@ -18,19 +18,21 @@ struct MpfImage {
 struct JpegParts {
   int width_px = 0, height_px = 0;  // of the picture; 0: no frame was found
   std::string xmp;                  // the packet; empty: there is none
-  // The extended packet, put together; empty: there is none.
+  // The extended packet, put together; empty: there is none. With a fault it is what is left of it.
   std::string extended_xmp;
+  // The fault of the extended packet, beginning with the file's name: a wrong length, a gap
+  // or parts on one another; empty: nothing.
+  std::string extended_fault;
   std::vector<MpfImage> images;  // those of the index behind the first one
   // Behind the end-of-image marker of the first picture; the file's size if the marker is missing.
   std::size_t end = 0;
 };
 
-// The types of an MpfImage.
+// Types of an MpfImage.
 constexpr std::uint32_t kMpfUndefined = 0, kMpfSmallPreview = 0x010001, kMpfLargePreview = 0x010002,
-                        kMpfPanorama = 0x020001, kMpfStereo = 0x020002, kMpfAngles = 0x020003;
+                        kMpfStereo = 0x020002;
 
-// Finds them. Throws Error that begins with `name` if the extended packet has a wrong length, a
-// gap or parts on one another.
+// Finds them; `name` is the file's.
 JpegParts PartsOfJpeg(const std::string& bytes, const std::string& name);
 
 }  // namespace thicklens::io
