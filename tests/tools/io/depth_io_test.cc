@@ -303,6 +303,9 @@ TEST_F(DepthFileTest, ABrokenNpyIsRefused) {
   EXPECT_THAT(Refusal(Npy("{'descr': '<f4', " + rows, kBigEndianValues.substr(0, 23))),
               AllOf(HasSubstr("23 bytes"), HasSubstr("24 are expected")));
   EXPECT_THAT(Refusal(Npy("{'descr': '<c8', " + rows, kBigEndianValues)), HasSubstr("'<c8'"));
+  // A byte 0 is no letter of a type.
+  for (const std::string& type : {std::string("\0008", 2), std::string("u\0", 2)})
+    EXPECT_THAT(Refusal(Npy("{'descr': '" + type + "', " + rows, "")), HasSubstr("of the type"));
   EXPECT_THAT(Refusal(Npy("{'descr': [('x', '<f4')], " + rows, kBigEndianValues)),
               HasSubstr("structured"));
   EXPECT_THAT(Refusal(Npy("{" + rows, kBigEndianValues)), HasSubstr("'descr'"));

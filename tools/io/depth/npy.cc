@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <cstring>
 #include <optional>
+#include <string_view>
 #include <vector>
 
 #include "thicklens/base/cancel.h"
@@ -61,12 +62,15 @@ void TakeType(const std::string& text, const std::string& name, NpyHeader* heade
     throw Error(fmt::format("{}: an NPY file of a structured type; {}", name, expected));
   }
   const std::string type = text.substr(1, end - 1);
-  const bool has_order = !type.empty() && std::strchr("<>|=", type[0]) != nullptr;
+  // strchr would find the 0 at the end of its text too.
+  const auto is_one_of = [](char letter, std::string_view letters) {
+    return letters.find(letter) != std::string_view::npos;
+  };
+  const bool has_order = !type.empty() && is_one_of(type[0], "<>|=");
   const std::string rest = type.substr(has_order ? 1 : 0);
   const bool is_known =
-      rest.size() == 2 && (std::strchr("iu", rest[0]) != nullptr
-                               ? std::strchr("1248", rest[1]) != nullptr
-                               : rest[0] == 'f' && std::strchr("248", rest[1]) != nullptr);
+      rest.size() == 2 && (is_one_of(rest[0], "iu") ? is_one_of(rest[1], "1248")
+                                                    : rest[0] == 'f' && is_one_of(rest[1], "248"));
   if (!is_known) {
     throw Error(
         fmt::format("{}: an NPY file of the type '{}'; {}", name, PrintableUtf8(type), expected));
