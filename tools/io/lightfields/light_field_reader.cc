@@ -176,6 +176,13 @@ ViewSource OpenSource(const std::string& path, const LightFieldReading& reading)
   if (!input.is_folder && !fs::exists(path, ignored)) {
     throw Error(fmt::format("{}: does not exist; the folder of a light field is expected", path));
   }
+  if (reading.layout_u < 0 || reading.layout_v < 0 ||
+      (reading.layout_u > 0) != (reading.layout_v > 0)) {
+    throw Error(
+        fmt::format("the option layout: two numbers of at least 1 are expected, across and down, "
+                    "found {} x {}",
+                    reading.layout_u, reading.layout_v));
+  }
   const ViewLayout* layout = reading.layout.empty() ? nullptr : &LayoutNamed(reading.layout);
   // A stated pattern of names is that of a folder, or of the parts of a file.
   if (layout == nullptr && !reading.name.empty())

@@ -114,11 +114,13 @@ ViewGrid GridOfNumbers(const std::string& path, const std::vector<NumberedView>&
   if (least == views.end()) throw Error(fmt::format("{}: no view is in it", path));
   const auto count = static_cast<int>(views.size());
   int row = reading.layout_u > 0 ? reading.layout_u : reading.grid;
+  const bool is_gapless = most->u - least->u == count - 1;
   // The option counts from 0; numbers that begin at 1 are shifted if they form the full rectangle.
-  const int first = row > 0 && least->u > 0 && count % row != 0 ? 0 : least->u;
+  const bool is_full = row > 0 && is_gapless && count % row == 0;
+  const int first = row > 0 && least->u > 0 && !is_full ? 0 : least->u;
   if (row <= 0) {
     row = static_cast<int>(std::lround(std::sqrt(count)));
-    if (row * row != count || most->u - least->u != count - 1) {
+    if (row * row != count || !is_gapless) {
       throw Error(fmt::format(
           "{}: {} views from {} to {} do not form a full square: the option grid must state how "
           "many views the numbering counts per row",

@@ -6,7 +6,6 @@
 #include <cctype>
 #include <cstdlib>
 #include <map>
-#include <set>
 
 #include "thicklens/base/error.h"
 #include "thicklens/base/printable_text.h"
@@ -15,6 +14,7 @@ namespace thicklens::io {
 namespace {
 
 // Digits of a row, a column or a number: an int holds them.
+constexpr std::size_t kMaxDigits = 8;
 constexpr char kWhole[] = "([0-9]{1,8})";
 constexpr char kReal[] = "([-+]?[0-9]{1,12}(?:\\.[0-9]{0,18})?)";
 // Longer names than file systems have are not matched: the time of a match grows with the length.
@@ -143,6 +143,12 @@ std::optional<NameProposal> ProposedPattern(const std::vector<std::string>& name
     }
   }
   if (changing.empty() || changing.size() > 2) return std::nullopt;
+  // The times of photographs, for example, are too long for Match.
+  for (const SplitName& name : group) {
+    for (const std::size_t i : changing) {
+      if (name.numbers[i].size() > kMaxDigits) return std::nullopt;
+    }
+  }
   NameProposal proposal;
   proposal.changing = static_cast<int>(changing.size());
   proposal.names = group.size();

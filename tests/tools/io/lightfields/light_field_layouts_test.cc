@@ -8,6 +8,7 @@
 #include <functional>
 #include <opencv2/imgcodecs.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "support/error_message.h"
@@ -21,6 +22,7 @@ using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 using thicklens::testing::ErrorOf;
 using thicklens::testing::TemporaryFolder;
 
@@ -122,6 +124,46 @@ TEST_F(LightFieldLayouts, OneChangingNumberIsProposedOnly) {
   LightFieldReading reading;
   reading.name = "frame_{n}.png";
   ExpectViews(Read(path, reading));
+}
+
+// The times of photographs have more digits than a row or a column may have.
+TEST_F(LightFieldLayouts, LongNumbersAreNoRowsAndColumns) {
+  const std::string path = Folder(
+      [](int v, int u) {
+        return "2024010112300" + std::to_string(v) + "_" + std::to_string(u) + ".png";
+      },
+      InOrder);
+  EXPECT_THAT(ErrorOf([&] { Read(path); }),
+              AllOf(HasSubstr("not a light field"), Not(HasSubstr("{v}_{u}.png"))));
+}
+
+// Numbers with gaps count from 0, even if there are as many as full rows would have.
+TEST_F(LightFieldLayouts, NumbersWithGapsCountFromZero) {
+  for (const int number : {1, 3, 5, 7, 9, 11})
+    folder_.Put("lf/" + std::to_string(number) + ".png", EncodedTile(View(0, 0)));
+  LightFieldReading reading;
+  reading.name = "{n}.png";
+  reading.grid = 3;
+  reading.sparse = true;
+  const model::LightField light_field = Read(folder_ / "lf", reading);
+  ASSERT_EQ(light_field.u_count, 3);
+  ASSERT_EQ(light_field.v_count, 4);
+  for (int number = 0; number < 12; ++number)
+    EXPECT_EQ(light_field.IsPresent(number % 3, number / 3), number % 2 == 1) << number;
+}
+
+TEST_F(LightFieldLayouts, BothNumbersOfALayoutAreStated) {
+  const std::string path = folder_.Put("one.png", EncodedTile(View(0, 0)));
+  LightFieldReading reading;
+  for (const char* layout : {"tiles", "quilt", "lenslets"}) {
+    reading.layout = layout;
+    for (const auto& [across, down] : {std::pair(2, 0), std::pair(0, 2), std::pair(-2, -2)}) {
+      reading.layout_u = across;
+      reading.layout_v = down;
+      EXPECT_THAT(ErrorOf([&] { Read(path, reading); }), HasSubstr("the option layout: "))
+          << layout << across << down;
+    }
+  }
 }
 
 TEST_F(LightFieldLayouts, StanfordNamesHavePositions) {
