@@ -14,6 +14,7 @@
 #include <cstring>
 #include <limits>
 #include <memory>
+#include <set>
 
 #include "tools/io/arrays/arrays.h"
 
@@ -310,6 +311,7 @@ class MatArrays : public ArraySource {
 
   StoredFile Content() override {
     StoredFile content;
+    std::set<std::string> names;
     Elements elements({bytes_.first + kHeaderBytes, bytes_.count - kHeaderBytes}, is_swapped_);
     while (!elements.AtEnd() && elements_.size() < kMostVariables) {
       const Element element = elements.Next();
@@ -317,6 +319,9 @@ class MatArrays : public ArraySource {
       if (element.data.count == 0) continue;
       std::vector<unsigned char> start;
       const Variable variable = VariableOf(StartOf(element, &start), is_swapped_);
+      // Read finds a variable by its name.
+      if (!names.insert(variable.name).second)
+        throw ArrayRefusal("two of its variables have the name '" + variable.name + "'");
       content.arrays.push_back(
           {variable.name, variable.size, NumberOf(variable), WordsOf(variable)});
       elements_.push_back(element);

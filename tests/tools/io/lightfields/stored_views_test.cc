@@ -159,6 +159,15 @@ TEST_F(StoredViews, LyingSizesAreRefused) {
               HasSubstr("heidelberg.h5"));
 }
 
+// Which of them is meant cannot be known.
+TEST_F(StoredViews, TwoVariablesOfOneNameAreRefused) {
+  const std::string content = ContentOf(StoredFilePath("levels-5.mat"));
+  constexpr std::size_t kHeaderBytes = 128;
+  const std::string path = folder_.Put("two.mat", content + content.substr(kHeaderBytes));
+  EXPECT_THAT(ErrorOf([&] { Read(path); }),
+              AllOf(HasSubstr("two.mat"), HasSubstr("two of its variables have the name 'LF'")));
+}
+
 // libhdf5 fails for some of these files: that must not end this process.
 TEST_F(StoredViews, DamagedFilesAreReadOrRefused) {
   for (const char* name : {"heidelberg.h5", "corrected-7.3.mat", "corrected-5-compressed.mat"}) {
