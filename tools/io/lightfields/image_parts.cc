@@ -91,8 +91,10 @@ std::vector<ExrPart> ExrPartsOf(const std::string& bytes) {
     if (end > bytes.size()) break;
     ExrPart& part = parts.back();
     if (name == "view" && type == "string") part.view = header.Bytes(length);
-    while (name == "multiView" && type == "stringvector" && header.at() + 4 <= end)
-      part.views.push_back(header.Bytes(std::min(header.Length(), end - header.at())));
+    while (name == "multiView" && type == "stringvector" && header.at() + 4 <= end) {
+      const std::size_t letters = header.Length();  // it moves at()
+      part.views.push_back(header.Bytes(std::min(letters, end - header.at())));
+    }
     while (name == "channels" && type == "chlist" && header.at() + 1 < end) {
       part.channels.push_back(header.Text(end));
       header.Bytes(16);
