@@ -283,7 +283,7 @@ void ExamineAttributes(const std::string& path, const StoredFile& content, const
     source->details.push_back(fmt::format("not used: {}", fmt::join(camera, ", ")));
   for (const StoredArray& array : content.arrays) {
     if (array.name.rfind("GT_", 0) == 0)
-      source->details.push_back(fmt::format("{} is in it and not read", array.name));
+      source->details.push_back(fmt::format("{} is in it and not read", PrintableUtf8(array.name)));
   }
 }
 
