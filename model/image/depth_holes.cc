@@ -40,7 +40,8 @@ double MarkOfType(const RawDepthMap& map, const std::vector<double>& listed) {
   return next > 0 && next < kGap * largest ? largest : kNone;
 }
 
-// The share of zeros whose neighbours in the row and in the column are all 0.
+// Whether most zeros, if there are some, have neighbours in the row and in the column that are all
+// 0.
 bool DoZerosFormAreas(const RawDepthMap& map) {
   const auto width = static_cast<std::size_t>(map.width_px);
   const auto height = static_cast<std::size_t>(map.height_px);

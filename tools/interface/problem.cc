@@ -62,14 +62,6 @@ Image Cropped(const Image& photo, const PixelRect& rect) {
                             std::move(part.values), photo.transfer(), photo.source());
 }
 
-DepthMap Cropped(const DepthMap& depth, const PixelRect& rect) {
-  model::RawDepthMap part =
-      model::CropDepth({depth.width_px, depth.height_px, depth.values, depth.is_integer}, rect);
-  return {part.width_px, part.height_px, std::move(part.values), part.integer,
-          depth.meaning, depth.source,   depth.largest_of_type,  depth.holes,
-          depth.notes,   depth.warnings};
-}
-
 // Photograph and depth are cut alike. If only one of them has the crop's size, it was cut before.
 void CutToCrop(const std::optional<PixelRect>& crop, Image* photo, DepthMap* depth, RunScope* run) {
   if (!crop) return;
@@ -90,8 +82,7 @@ void CutToCrop(const std::optional<PixelRect>& crop, Image* photo, DepthMap* dep
                              [&] { return Cropped(*photo, *crop); });
   }
   if (cut_depth) {
-    *depth = WithFileContext(run->Option("crop") + ": " + NameOf(*depth),
-                             [&] { return Cropped(*depth, *crop); });
+    *depth = WithFileContext(run->Option("crop"), [&] { return depth->Cropped(*crop); });
   }
 }
 

@@ -97,8 +97,6 @@ int PitchAcross(const cv::Mat& grey) {
 
 }  // namespace
 
-DecodedImage ReadViewsImage(const std::string& path) { return ReadImageData(path); }
-
 AxisCounts RepetitionsOf(const cv::Mat& pixels) {
   const cv::Mat grey = GreyOf(pixels);
   return {RepetitionsAcross(grey), RepetitionsAcross(grey.t())};

@@ -4,12 +4,7 @@
 #include <opencv2/core/mat.hpp>
 #include <string>
 
-#include "thicklens/io/image_file.h"
-
 namespace thicklens::io {
-
-// Reads the one image of all views. Throws Error, also for several pages.
-DecodedImage ReadViewsImage(const std::string& path);
 
 // Numbers of pixels or of views along both axes; 0: not found.
 struct AxisCounts {

@@ -14,6 +14,7 @@
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/input_file.h"
+#include "thicklens/io/image_file.h"
 #include "tools/io/lightfields/image_tiles.h"
 #include "tools/io/lightfields/layout.h"
 #include "tools/io/lightfields/view_grid.h"
@@ -50,9 +51,8 @@ cv::Mat ViewOfLenslets(const cv::Mat& pixels, AxisCounts lenslet, int k, int l) 
   return view;
 }
 
-// Whether alpha is 0 in all pixels of a view.
-bool IsEmptyByAlpha(const cv::Mat& view, bool has_alpha) {
-  if (!has_alpha) return false;
+// Whether alpha, the last channel, is 0 in all pixels of a view.
+bool IsEmptyByAlpha(const cv::Mat& view) {
   const int channels = view.channels();
   cv::Mat values;
   view.convertTo(values, CV_32F);
@@ -67,12 +67,13 @@ bool IsEmptyByAlpha(const cv::Mat& view, bool has_alpha) {
 
 void LeaveOutEmptyViews(const cv::Mat& pixels, AxisCounts lenslet, ViewSource* source) {
   const bool has_alpha = pixels.channels() == 2 || pixels.channels() == 4;
+  if (!has_alpha) return;
   model::LightField& frame = source->frame;
   std::vector<std::string> empty;
   std::vector<bool> present;
   for (int l = 0; l < frame.v_count; ++l) {
     for (int k = 0; k < frame.u_count; ++k) {
-      const bool is_empty = IsEmptyByAlpha(ViewOfLenslets(pixels, lenslet, k, l), has_alpha);
+      const bool is_empty = IsEmptyByAlpha(ViewOfLenslets(pixels, lenslet, k, l));
       present.push_back(!is_empty);
       if (is_empty) {
         frame.weights(l, k) = 0;
@@ -113,7 +114,7 @@ AxisCounts LensletOf(const LayoutInput& input, const cv::Mat& pixels, std::strin
 std::optional<ViewSource> OpenLensletImage(const LayoutInput& input) {
   if (!input.is_forced && !IsNamedEslf(input.path)) return std::nullopt;
   ReportInput(input.path);
-  const auto image = std::make_shared<const DecodedImage>(ReadViewsImage(input.path));
+  const auto image = std::make_shared<const DecodedImage>(ReadImageData(input.path));
   const cv::Mat& pixels = image->pixels;
   std::string how;
   const AxisCounts lenslet = LensletOf(input, pixels, &how);

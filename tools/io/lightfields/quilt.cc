@@ -13,6 +13,7 @@
 #include "thicklens/base/error.h"
 #include "thicklens/base/input_file.h"
 #include "thicklens/base/printable_text.h"
+#include "thicklens/io/image_file.h"
 #include "tools/io/lightfields/image_tiles.h"
 #include "tools/io/lightfields/layout.h"
 #include "tools/io/lightfields/view_grid.h"
@@ -62,7 +63,7 @@ std::optional<ViewSource> OpenQuilt(const LayoutInput& input) {
                             input.path, kMostColumns, columns, rows));
   }
   ReportInput(input.path);
-  const auto image = std::make_shared<const DecodedImage>(ReadViewsImage(input.path));
+  const auto image = std::make_shared<const DecodedImage>(ReadImageData(input.path));
   const cv::Mat& pixels = image->pixels;
   if (pixels.cols % columns != 0 || pixels.rows % rows != 0) {
     throw Error(fmt::format(

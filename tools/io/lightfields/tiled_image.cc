@@ -5,6 +5,7 @@
 
 #include "thicklens/base/error.h"
 #include "thicklens/base/input_file.h"
+#include "thicklens/io/image_file.h"
 #include "tools/io/lightfields/image_tiles.h"
 #include "tools/io/lightfields/layout.h"
 #include "tools/io/lightfields/view_grid.h"
@@ -14,7 +15,7 @@ namespace thicklens::io {
 
 std::optional<ViewSource> OpenTiledImage(const LayoutInput& input) {
   ReportInput(input.path);
-  const auto image = std::make_shared<const DecodedImage>(ReadViewsImage(input.path));
+  const auto image = std::make_shared<const DecodedImage>(ReadImageData(input.path));
   const cv::Mat& pixels = image->pixels;
   AxisCounts tiles{input.reading->layout_u, input.reading->layout_v};
   const bool is_found = !input.is_forced || tiles.across == 0;

@@ -40,8 +40,8 @@ struct LightFieldReadOptions {
   bool allow_missing_views = false;       // any set of views may be present
   std::optional<ViewCounts> inner_views;  // take only these views in the middle
   std::optional<PixelRect> crop;          // take only this rectangle of each view
-  // The layout (docs/file-formats.md): "thicklens", "hci", "stanford", "names", "quilt", "parts",
-  // "lenslets" or "tiles"; empty: it is recognised.
+  // The layout (docs/file-formats.md): "thicklens", "hci", "stanford", "names", "mat", "hdf5",
+  // "quilt", "parts", "lenslets" or "tiles"; empty: it is recognised.
   std::string layout;
   // Views or tiles across and down, or pixels of a lenslet, each from 1 to 100; needs `layout`.
   std::optional<ViewCounts> layout_counts;
