@@ -257,8 +257,8 @@ DecodedImage DecodePfmImage(const std::string& bytes) {
   header.EndHeader(bytes.size() > header.at() + 1 && bytes.size() - header.at() - 2 == expected);
   const std::size_t at = header.at();
   if (bytes.size() - at != expected) {
-    throw Error(fmt::format("{} bytes of values are expected for {}x{} px, found {}", expected,
-                            format.width_px, format.height_px, bytes.size() - at));
+    throw Error(fmt::format("{} bytes of values for {}x{} px: {} are expected", bytes.size() - at,
+                            format.width_px, format.height_px, expected));
   }
   DecodedImage decoded;
   decoded.pixels.create(format.height_px, format.width_px, CV_32FC(channels));

@@ -25,8 +25,10 @@ namespace thicklens::io {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::StartsWith;
 using thicklens::testing::ErrorOf;
 using thicklens::testing::TemporaryFolder;
@@ -253,6 +255,23 @@ TEST_F(DepthFileTest, TheScaleOfPfmIsAppliedExceptForThatOfMiddlebury) {
   EXPECT_EQ(first("0.003922", PfmScale::kByRule), 4);
   EXPECT_NEAR(first("0.003922", PfmScale::kApplied), 4.0 / 255, 1e-5);
   EXPECT_EQ(first("1", PfmScale::kApplied), 4);
+}
+
+// Three equal channels are one map, and the rule for the scale is that of one channel.
+TEST_F(DepthFileTest, TheScaleOfPfmInColourFollowsTheSameRule) {
+  const std::string one = kBigEndianValues.substr(0, 4);
+  const auto file = [&](const std::string& scale, PfmScale use) {
+    DepthReading reading;
+    reading.pfm_scale = use;
+    return ReadDepthFile(folder_.Put("depth", "PF\n1 1\n" + scale + "\n" + one + one + one),
+                         reading);
+  };
+  const DepthFile applied = file("2", PfmScale::kByRule);
+  EXPECT_THAT(applied.map.values, ElementsAre(2));
+  EXPECT_THAT(applied.notes, Contains("The header's scale 2 is applied to the values."));
+  EXPECT_THAT(applied.description, Not(HasSubstr("not applied")));
+  EXPECT_THAT(file("2", PfmScale::kIgnored).map.values, ElementsAre(1));
+  EXPECT_THAT(file("0.003922", PfmScale::kByRule).map.values, ElementsAre(1));
 }
 
 // LF may be the first byte of a value: the number of bytes decides.

@@ -13,6 +13,11 @@ namespace thicklens::io {
 
 // A PFM file of one channel ("Pf").
 DepthFile DecodePfmDepth(const std::string& bytes, const std::string& name, PfmScale scale);
+// The factor of the values of a PFM file whose header states a scale of this magnitude; `file` gets
+// a note if it is not 1.
+double PfmFactor(double magnitude, PfmScale scale, DepthFile* file);
+// The value of a depth map for a stored one.
+float PfmValue(double factor, float stored);
 
 bool IsNpy(const std::string& bytes);
 DepthFile DecodeNpyDepth(const std::string& bytes, const std::string& name);

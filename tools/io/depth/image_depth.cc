@@ -9,6 +9,7 @@
 #include <limits>
 #include <opencv2/core.hpp>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "thicklens/base/cancel.h"
@@ -234,7 +235,7 @@ DepthFile DecodeImageDepth(const std::string& bytes, const std::string& name,
   }
   ImageReading image_reading;
   image_reading.spread_bits = false;
-  const DecodedImage decoded = DecodeImageFile(bytes, name, image_reading);
+  DecodedImage decoded = DecodeImageFile(bytes, name, image_reading);
   // A PNG of fewer bits is more likely a drawing.
   if (*kind == ImageFileKind::kPng && PngBits(bytes) < 8 && decoded.pixels.channels() == 1) {
     throw Error(fmt::format("{}: {} in one channel, found {} ({} bits in the file)", name,
@@ -246,9 +247,9 @@ DepthFile DecodeImageDepth(const std::string& bytes, const std::string& name,
   cv::Mat values;
   cv::extractChannel(decoded.pixels, values, channel);
   values.convertTo(values, CV_32F);  // exact for 16 bits
-  const double factor = *kind == ImageFileKind::kPfm && reading.pfm_scale == PfmScale::kApplied
-                            ? decoded.facts.value_scale
-                            : 1;
+  // The note says whether it is applied.
+  const double factor =
+      PfmFactor(std::exchange(decoded.facts.value_scale, 1), reading.pfm_scale, &file);
   file.map.width_px = values.cols;
   file.map.height_px = values.rows;
   file.map.integer = decoded.facts.sample_type.find("float") == std::string::npos;
@@ -257,8 +258,7 @@ DepthFile DecodeImageDepth(const std::string& bytes, const std::string& name,
   for (int y = 0; y < values.rows; ++y) {
     ThrowIfCancelled();
     const auto* row = values.ptr<float>(y);
-    for (int x = 0; x < values.cols; ++x)
-      file.map.values.push_back(factor == 1 ? row[x] : static_cast<float>(factor * row[x]));
+    for (int x = 0; x < values.cols; ++x) file.map.values.push_back(PfmValue(factor, row[x]));
   }
   if (chooser.alpha() >= 0) TakeAlpha(decoded.pixels, chooser.alpha(), &file);
   file.description = decoded.facts.OneLine();
