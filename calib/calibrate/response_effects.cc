@@ -73,6 +73,7 @@ class ResponseCheck {
     frames.psf = result_.diagnostics.blur.better_psf;
     frames.tick = task_.tick;
     const model::TransferCurve& curve = task_.sweep.camera.sensor.transfer;
+    const double full_scale = FullScale();
     for (const ScaleSample& sample : task_.scales) {
       const FrameMeasurement& measured = result_.frames[sample.frame];
       if (sample.scale_is_from_reading || !measured.rejection.empty()) continue;
@@ -82,9 +83,11 @@ class ResponseCheck {
       frame.registration.scale = sample.scale;
       frame.variance_px2 = FittedDefocusVariance(evidence_.setup, fit_, measured.depth_mm);
       if (measured.statistics.saturated_fraction > 0)
-        frame.brightest = curve.Decode(measured.statistics.saturation_level - kClippingMargin);
+        frame.brightest =
+            curve.Decode(measured.statistics.saturation_level / full_scale - kClippingMargin);
       if (measured.statistics.black_fraction > 0)
-        frame.darkest = curve.Decode(measured.statistics.black_level + kClippingMargin);
+        frame.darkest =
+            curve.Decode(measured.statistics.black_level / full_scale + kClippingMargin);
       frames.frames.push_back(frame);
     }
     return frames;
@@ -107,11 +110,15 @@ class ResponseCheck {
     return frames;
   }
 
+  // The largest value of the files.
+  double FullScale() const {
+    return task_.store.Stored(task_.scales.front().frame).depth() == CV_8U ? 255 : 65535;
+  }
+
   // Noise in linear light that the rounding of the file does not hide.
   double LeastNoise() {
     const FrameStatistics& typical = result_.frames[frames_.frames.front().frame].statistics;
-    const double step =
-        task_.store.Stored(frames_.frames.front().frame).depth() == CV_8U ? 1.0 / 255 : 1.0 / 65535;
+    const double step = 1 / FullScale();
     const model::TransferCurve& curve = task_.sweep.camera.sensor.transfer;
     return kLeastNoiseSteps *
            (curve.Decode(typical.mean_encoded + step) - curve.Decode(typical.mean_encoded));

@@ -135,6 +135,30 @@ TEST(ResponseEffects, RemovedWeakDetailIsReportedWithItsSize) {
   ExpectCoversRatio(c, s.truth);
 }
 
+// An under-exposed camera cuts off the darkest values, and an over-exposed one the brightest. The
+// exponent would be 1.014 if the bright parts were not left out.
+TEST(ResponseEffects, ClippedFramesAreNotAccused) {
+  for (const bool dark : {true, false}) {
+    SCOPED_TRACE(dark ? "under-exposed" : "over-exposed");
+    SimulatedSweep s = SweepOf("ii", model::TransferCurve::Linear(), 10);
+    const cv::Mat middle = s.stored->at(s.stored->size() / 2);
+    int level = dark ? 0 : 255;
+    for (double share = 0; share < 0.02;) {
+      level += dark ? 1 : -1;
+      share = cv::mean(dark ? middle <= level : middle >= level)[0] / 255;
+    }
+    Process(
+        [&](const cv::Mat& bytes) {
+          return cv::Mat(dark ? bytes - level : bytes * (255.0 / level));
+        },
+        &s);
+    const Calibration c = CalibrateWithoutMap(s);
+    ExpectNotAccused(c);
+    ASSERT_TRUE(c.diagnostics.response.light_exponent && c.diagnostics.response.weak_detail_loss);
+    EXPECT_NEAR(c.diagnostics.response.light_exponent->value, 1, 0.01);
+  }
+}
+
 TEST(ResponseEffects, SharpeningIsReportedAndMovesKappaLittle) {
   SimulatedSweep s = SweepOf("ii", model::TransferCurve::Srgb(), 8);
   Process(
