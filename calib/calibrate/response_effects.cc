@@ -101,8 +101,12 @@ class ResponseCheck {
     ResponseFrames frames = frames_;
     const CameraResponse& response = result_.diagnostics.response;
     if (!response.ContradictsTransfer()) return frames;
-    frames.read_grey = [read = frames_.read_grey,
-                        exponent = response.light_exponent->value](std::size_t frame) {
+    const double exponent = response.light_exponent->value;
+    for (ResponseFrame& frame : frames.frames) {
+      if (frame.darkest >= 0) frame.darkest = std::pow(frame.darkest, exponent);
+      frame.brightest = std::pow(frame.brightest, exponent);
+    }
+    frames.read_grey = [read = frames_.read_grey, exponent](std::size_t frame) {
       cv::Mat light;
       cv::pow(cv::max(read(frame), 0), exponent, light);
       return light;

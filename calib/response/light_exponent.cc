@@ -85,15 +85,13 @@ class ExponentFit {
   WindowMaps MapsOf(const cv::Mat& image, const ResponseFrame& frame, double exponent,
                     double sigma_px, double added_px2) const {
     WindowMaps maps;
-    cv::Mat clipped = (image >= frame.brightest) | (image <= frame.darkest);
-    clipped.convertTo(clipped, CV_32F, 1.0 / 255);
     const cv::Mat values = Raised(image, exponent);
     const auto window = [&](const cv::Mat& of) {
       return Windowed(added_px2 > 0 ? BlurredByShape(of, added_px2, frames_.psf) : of, sigma_px);
     };
     maps.mean = window(values);
     maps.variance = window(values.mul(values)) - maps.mean.mul(maps.mean);
-    maps.clipped = Windowed(clipped, sigma_px);
+    maps.clipped = Windowed(ClippedPixels(image, frame), sigma_px);
     cv::Sobel(maps.mean, maps.by_x, CV_32F, 1, 0, 3, 0.125);
     cv::Sobel(maps.mean, maps.by_y, CV_32F, 0, 1, 3, 0.125);
     cv::Laplacian(maps.mean, maps.laplacian, CV_32F);

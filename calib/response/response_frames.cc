@@ -82,6 +82,12 @@ double ResponseCrop::AddedVariancePx2(std::size_t of, std::size_t than) const {
   return frames_.frames[of].variance_px2 - scale * scale * frames_.frames[than].variance_px2;
 }
 
+cv::Mat ClippedPixels(const cv::Mat& image, const ResponseFrame& frame) {
+  cv::Mat clipped = (image >= frame.brightest) | (image <= frame.darkest);
+  clipped.convertTo(clipped, CV_32F, 1.0 / 255);
+  return clipped;
+}
+
 cv::Mat GaussianOf(const cv::Mat& image, double sigma_px) {
   if (!(sigma_px > 0)) return image;
   cv::Mat blurred;

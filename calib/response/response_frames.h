@@ -53,6 +53,9 @@ class ResponseCrop {
   Eigen::Vector2d centre_;
 };
 
+// 1 where the values of the frame are clipped, 0 where they are not, CV_32F.
+cv::Mat ClippedPixels(const cv::Mat& image, const ResponseFrame& frame);
+
 // Gaussian blur of an image of any number of pixels per sigma; none for sigma 0.
 cv::Mat GaussianOf(const cv::Mat& image, double sigma_px);
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 #include <vector>
 
 #include "calib/registration/target_period.h"
@@ -24,6 +25,7 @@ constexpr std::size_t kContrasts = 4;   // classes of contrast in each part
 constexpr double kMinIndependent = 40;  // pixels of a part over the square of the inner sigma
 constexpr double kSmallestError = 1e-4;
 constexpr double kMinResponse = 0.2;
+constexpr double kMaxClipped = 0.002;  // share of the neighbourhood of a pixel
 
 // Detail in a band of frequencies, relative to the mean.
 cv::Mat Band(const cv::Mat& image, double sigma_px) {
@@ -92,6 +94,19 @@ class DetailLoss {
     return crop_.Seen(BlurredByShape(sharp, added_px2, frames_.psf), of, index);
   }
 
+  // The share of each pixel's neighbourhood that is clipped in one of the three frames that are
+  // compared. Clipping removes the detail of dark or bright places, whatever its contrast.
+  cv::Mat ClippedShare(const cv::Mat& image, std::size_t index, double sigma_px) const {
+    cv::Mat clipped = ClippedPixels(image, frames_.frames[index]);
+    const std::pair<const cv::Mat*, std::size_t> sharp[] = {{&first_, order_[0]},
+                                                            {&second_, order_[1]}};
+    for (const auto& [values, of] : sharp) {
+      const cv::Mat there = ClippedPixels(*values, frames_.frames[of]);
+      if (cv::countNonZero(there) > 0) clipped = cv::max(clipped, Predicted(there, of, index));
+    }
+    return cv::countNonZero(clipped) > 0 ? GaussianOf(clipped, sigma_px) : clipped;
+  }
+
   void AddFrame(std::size_t index) {
     const double sigma_px = std::sqrt(frames_.frames[index].variance_px2);
     const double inner_px = kBand * sigma_px;
@@ -99,10 +114,12 @@ class DetailLoss {
     const cv::Size size = crop_.size();
     if (size.width <= 3 * margin || size.height <= 3 * margin) return;
     const cv::Rect inside(margin, margin, size.width - 2 * margin, size.height - 2 * margin);
-    const cv::Mat seen = Band(crop_.Read(index), inner_px)(inside);
+    const cv::Mat image = crop_.Read(index);
+    const cv::Mat seen = Band(image, inner_px)(inside);
     const cv::Mat predicted = Band(Predicted(first_, order_[0], index), inner_px)(inside);
     const cv::Mat other = Band(Predicted(second_, order_[1], index), inner_px)(inside);
     const cv::Mat contrast = GaussianOf(other.mul(other), kNeighbours * inner_px);
+    const cv::Mat clipped = ClippedShare(image, index, kBandWidth * inner_px)(inside);
     for (int part = 0; part < kRows * kColumns; ++part) {
       const cv::Point from(part % kColumns * inside.width / kColumns,
                            part / kColumns * inside.height / kRows);
@@ -111,6 +128,7 @@ class DetailLoss {
       std::vector<DetailPixel> pixels;
       for (int y = from.y; y < to.y; ++y) {
         for (int x = from.x; x < to.x; ++x) {
+          if (clipped.at<float>(y, x) > kMaxClipped) continue;
           pixels.push_back({contrast.at<float>(y, x), seen.at<float>(y, x),
                             predicted.at<float>(y, x), other.at<float>(y, x)});
         }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgcodecs.hpp>
+#include <utility>
 #include <vector>
 
 #include "calib/response/processing_traces.h"
@@ -110,6 +111,39 @@ TEST(Processing, SmoothingAlikeIsNoProcessing) {
     EXPECT_LT(found.noise_rise->value, 0);
   }
   EXPECT_FALSE(found.LosesWeakDetail() || found.IsSharpened() || found.IsCompressed());
+}
+
+// Frames that are clipped at these values, of which the frames state the levels or not.
+CameraResponse ResponseToClipped(double darkest, double brightest, bool stated) {
+  std::vector<cv::Mat> light;
+  ResponseFrames frames = Noisy().Make(&light);
+  for (cv::Mat& image : light)
+    image = Rounded(cv::max(cv::min(image, brightest), darkest) - darkest, 255);
+  for (ResponseFrame& frame : frames.frames) {
+    if (!stated) continue;
+    frame.darkest = 0.01;
+    frame.brightest = brightest - darkest - 0.01;
+  }
+  ReadFrom(light, &frames);
+  CameraResponse response;
+  response.weak_detail_loss = MeasureWeakDetailLoss(frames, light.front().size());
+  return response;
+}
+
+// Clipping removes the detail of dark or bright places. Where its levels are not stated, this looks
+// like noise reduction.
+TEST(Processing, ClippedPartsAreLeftOut) {
+  for (const auto& [darkest, brightest] : {std::pair(0.2, 1.0), std::pair(0.0, 0.45)}) {
+    SCOPED_TRACE(darkest);
+    const auto not_stated = ResponseToClipped(darkest, brightest, false).weak_detail_loss;
+    ASSERT_TRUE(not_stated);
+    EXPECT_GT(not_stated->value, std::max(0.015, 3 * not_stated->sigma));
+    const CameraResponse stated = ResponseToClipped(darkest, brightest, true);
+    EXPECT_FALSE(stated.LosesWeakDetail());
+    if (stated.weak_detail_loss) {
+      EXPECT_LT(stated.weak_detail_loss->value, 2 * stated.weak_detail_loss->sigma);
+    }
+  }
 }
 
 TEST(Processing, StrongCompressionShowsItsBlocks) {
