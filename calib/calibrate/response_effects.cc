@@ -195,27 +195,29 @@ class ResponseCheck {
         "transfer were right); gain, black level, vignetting and clipping do not explain this",
         task_.sweep.camera.sensor.transfer.Name(), response.light_exponent->value,
         response.light_exponent->sigma);
-    if (better) {
-      response.better_transfer = better->Name();
-      const double before = result_.summary.blur_ratio->value;
-      if (const auto setup = SetupBy(*better)) {
-        const BlurFitResult trial = FitBlur(*setup, &fit_);
-        if (trial.done) {
-          text += fmt::format(
-              "; with transfer {} kappa is {:.4f} instead of {:.4f}, and zf moves "
-              "by {:+.3f} mm",
-              better->Name(), trial.values[kBlurRatio], before,
-              trial.values[kFocusDepth] - fit_.values[kFocusDepth]);
-        }
-        WidenByTrials("sensor.transfer",
-                      fmt::format("state transfer: {} in the camera file", better->Name()),
-                      {*setup}, fit_, &result_);
-      }
+    if (better) response.better_transfer = better->Name();
+    const auto setup = better ? SetupBy(*better) : std::nullopt;
+    const BlurFitResult trial = setup ? FitBlur(*setup, &fit_) : BlurFitResult();
+    if (trial.done) {
       text += fmt::format(
-          ". State transfer: {} in the camera file, or use frames whose transfer is known (a "
-          "camera that changes the contrast of each part of an image by itself looks the same)",
-          better->Name());
+          "; with transfer {} kappa is {:.4f} instead of {:.4f}, and zf moves by {:+.3f} mm",
+          better->Name(), trial.values[kBlurRatio], result_.summary.blur_ratio->value,
+          trial.values[kFocusDepth] - fit_.values[kFocusDepth]);
+      WidenByTrials("sensor.transfer",
+                    fmt::format("state transfer: {} in the camera file", better->Name()), {*setup},
+                    fit_, &result_);
+    } else {
+      text += fmt::format(
+          "; {}, so that the effect on kappa is unknown and the interval of kappa does not "
+          "contain it",
+          better ? "the blur could not be fitted with transfer " + better->Name()
+                 : "no transfer that could be tried describes the frames");
     }
+    text += better ? fmt::format(". State transfer: {} in the camera file, use ", better->Name())
+                   : ". Use ";
+    text +=
+        "frames whose transfer is known (raw), or measure the transfer (a camera that changes "
+        "the contrast of each part of an image by itself looks the same)";
     result_.summary.warnings.push_back(text);
   }
 

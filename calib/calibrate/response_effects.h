@@ -11,9 +11,9 @@ namespace thicklens::calib {
 
 // Measures how the camera made its values from the light, and adds it to the diagnostics. What
 // contradicts an unprocessed camera with the stated transfer is reported in a warning with its
-// effect on kappa, which widens the systematic intervals. `task` has the registered frames;
-// `evidence` and `fit` are those of the results. Frames of a target whose image scale cannot be
-// measured are not examined.
+// effect on kappa, which widens the systematic intervals, or says that this effect is unknown.
+// `task` has the registered frames; `evidence` and `fit` are those of the results. Frames of a
+// target whose image scale cannot be measured are not examined.
 void CheckCameraResponse(const BlurTask& task, const BlurEvidence& evidence,
                          const BlurFitResult& fit, Calibration* calibration);
 

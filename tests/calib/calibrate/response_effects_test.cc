@@ -122,6 +122,22 @@ TEST(ResponseEffects, AnUnusualCurveIsNamedByItsPower) {
   ExpectCoversRatio(c, s.truth);
 }
 
+// A power beyond those of transfer curves: no curve is named, and the effect is not made up.
+TEST(ResponseEffects, ATransferWithoutABetterCurveHasAnUnknownEffect) {
+  SimulatedSweep s = SweepOf("ii", model::TransferCurve::Linear(), 6);
+  for (cv::Mat& frame : *s.stored) {
+    cv::Mat values;
+    frame.convertTo(values, CV_32F, 1.0 / 255);
+    cv::pow(values, 1.0 / 15, values);
+    values.convertTo(frame, CV_16U, 65535);
+  }
+  const Calibration c = CalibrateWithoutMap(s);
+  EXPECT_EQ(c.diagnostics.response.better_transfer, "");
+  EXPECT_THAT(c.summary.warnings,
+              Contains(AllOf(HasSubstr("contradict sensor.transfer"),
+                             HasSubstr("effect on kappa is unknown"), HasSubstr("Use frames"))));
+}
+
 TEST(ResponseEffects, RemovedWeakDetailIsReportedWithItsSize) {
   SimulatedSweep s = SweepOf("ii", model::TransferCurve::Srgb(), 7);
   Process(&Denoised, &s);
