@@ -222,6 +222,16 @@ class ResponseCheck {
   }
 
   // ---- processing ----
+  std::string CauseOfLoss(const std::string& grid) const {
+    const CameraResponse& response = result_.diagnostics.response;
+    if (response.IsCompressed())
+      return "Compression is a cause: " + grid + "; noise reduction may be another";
+    if (response.block_grid)
+      return "Noise reduction has this effect; no blocks of a strong compression are seen";
+    return "Noise reduction and compression have this effect; whether the frames show the blocks "
+           "of a compression could not be measured";
+  }
+
   void ReportProcessing() {
     const CameraResponse& response = result_.diagnostics.response;
     const model::Estimate loss = response.weak_detail_loss.value_or(model::Estimate{0, 0});
@@ -240,20 +250,23 @@ class ResponseCheck {
                   "others, as compression (JPEG) makes them",
                   100 * response.block_grid->value)
             : "";
+    const std::string at_most =
+        bound > kLargestRatioChange
+            ? fmt::format(
+                  "by simulated sweeps, {:.2g} % are possible; the interval of kappa is widened by "
+                  "{:.2g} % only, which is a limit of this program",
+                  100 * bound, 100 * most)
+            : fmt::format(
+                  "at most {:.2g} %, by simulated sweeps, which the interval of kappa contains",
+                  100 * most);
     std::string text;
     if (loses) {
       text = fmt::format(
           "the camera, or a program, removed weak detail: per factor e of contrast, detail loses "
           "{:.2g} +- {:.2g} % beyond what the blur takes, and a lens loses nothing. {}. This makes "
-          "kappa too large, by about {:.2g} % here (at most {:.2g} %, by simulated sweeps), and "
-          "the "
-          "interval of kappa contains it: use frames without noise reduction (raw), in a file "
-          "without loss",
-          100 * loss.value, 100 * loss.sigma,
-          response.IsCompressed()
-              ? "Compression is a cause: " + grid + "; noise reduction may be another"
-              : std::string("Noise reduction has this effect; no blocks of a compression are seen"),
-          100 * usual, 100 * most);
+          "kappa too large, by about {:.2g} % here ({}): use frames without noise reduction "
+          "(raw), in a file without loss",
+          100 * loss.value, 100 * loss.sigma, CauseOfLoss(grid), 100 * usual, at_most);
     } else {
       text = fmt::format(
           "the frames were strongly compressed: {}. Compression removes weak detail and makes "
@@ -261,8 +274,9 @@ class ResponseCheck {
           "too large{}: use files without loss, or of a higher quality",
           grid,
           response.weak_detail_loss
-              ? fmt::format("; by the weak detail of these frames, by at most {:.2g} %", 100 * most)
-              : ", by an amount that this target does not show");
+              ? fmt::format(" (by the weak detail of these frames: {})", at_most)
+              : ", by an amount that this target does not show and that the interval of kappa does "
+                "not contain");
     }
     result_.summary.warnings.push_back(text);
     if (most > 0)

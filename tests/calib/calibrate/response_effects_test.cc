@@ -146,6 +146,7 @@ TEST(ResponseEffects, RemovedWeakDetailIsReportedWithItsSize) {
   EXPECT_GT(c.diagnostics.response.weak_detail_loss->value, 0.02)
       << c.diagnostics.response.weak_detail_loss->sigma;
   EXPECT_THAT(c.summary.warnings, Contains(AllOf(HasSubstr("removed weak detail"),
+                                                 HasSubstr("no blocks of a strong compression"),
                                                  HasSubstr("makes kappa too large"))));
   EXPECT_THAT(c.summary.warnings, Not(Contains(HasSubstr("contradict sensor.transfer"))));
   ExpectCoversRatio(c, s.truth);
