@@ -29,10 +29,35 @@ cv::Mat DiscKernel(double radius_px) {
   return kernel / cv::sum(kernel)[0];
 }
 
-Eigen::Vector2d Turned(const Eigen::Vector2d& d, double angle_rad) {
-  const double c = std::cos(angle_rad), s = std::sin(angle_rad);
-  return {c * d.x() - s * d.y(), s * d.x() + c * d.y()};
-}
+struct Rotation {
+  explicit Rotation(double angle_rad) : c(std::cos(angle_rad)), s(std::sin(angle_rad)) {}
+  Eigen::Vector2d operator()(const Eigen::Vector2d& d) const {
+    return {c * d.x() - s * d.y(), s * d.x() + c * d.y()};
+  }
+  double c, s;
+};
+
+// The place in one frame of what another one shows, for many places.
+class Mapping {
+ public:
+  Mapping(const Registration& from, const Registration& to, const Eigen::Vector2d& centre)
+      : from_(from), to_(to), centre_(centre), back_(-from.rotation_rad), on_(to.rotation_rad) {}
+
+  Eigen::Vector2d operator()(const Eigen::Vector2d& p) const {
+    Eigen::Vector2d d = p - centre_ - from_.shift_px;
+    d *= 1 - from_.cubic * d.squaredNorm();
+    d = back_(d) / from_.scale;
+    d = on_(d) * to_.scale;
+    d *= 1 + to_.cubic * d.squaredNorm();
+    return centre_ + to_.shift_px + d;
+  }
+
+ private:
+  const Registration& from_;
+  const Registration& to_;
+  Eigen::Vector2d centre_;
+  Rotation back_, on_;
+};
 
 }  // namespace
 
@@ -50,22 +75,16 @@ cv::Mat ResponseCrop::Read(std::size_t index) const {
 
 Eigen::Vector2d ResponseCrop::Place(std::size_t from, std::size_t to,
                                     const Eigen::Vector2d& p) const {
-  const Registration& seen = frames_.frames[from].registration;
-  Eigen::Vector2d d = p - centre_ - seen.shift_px;
-  d *= 1 - seen.cubic * d.squaredNorm();
-  d = Turned(d, -seen.rotation_rad) / seen.scale;
-  const Registration& other = frames_.frames[to].registration;
-  d = Turned(d, other.rotation_rad) * other.scale;
-  d *= 1 + other.cubic * d.squaredNorm();
-  return centre_ + other.shift_px + d;
+  return Mapping(frames_.frames[from].registration, frames_.frames[to].registration, centre_)(p);
 }
 
 cv::Mat ResponseCrop::Seen(const cv::Mat& image, std::size_t of, std::size_t as) const {
+  const Mapping mapping(frames_.frames[as].registration, frames_.frames[of].registration, centre_);
   cv::Mat map(part_.size(), CV_32FC2), seen;
   for (int y = 0; y < map.rows; ++y) {
     auto* at = map.ptr<cv::Vec2f>(y);
     for (int x = 0; x < map.cols; ++x) {
-      const Eigen::Vector2d place = Place(as, of, {x, y});
+      const Eigen::Vector2d place = mapping({x, y});
       at[x] = {static_cast<float>(place.x()), static_cast<float>(place.y())};
     }
   }
