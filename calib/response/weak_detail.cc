@@ -126,6 +126,8 @@ class DetailLoss {
       const cv::Point to((part % kColumns + 1) * inside.width / kColumns,
                          (part / kColumns + 1) * inside.height / kRows);
       std::vector<DetailPixel> pixels;
+      pixels.reserve(static_cast<std::size_t>((to - from).x) *
+                     static_cast<std::size_t>((to - from).y));
       for (int y = from.y; y < to.y; ++y) {
         for (int x = from.x; x < to.x; ++x) {
           if (clipped.at<float>(y, x) > kMaxClipped) continue;
@@ -139,9 +141,16 @@ class DetailLoss {
 
   void AddPart(int part, std::size_t index, double inner_px, std::vector<DetailPixel>* pixels) {
     if (static_cast<double>(pixels->size()) < kMinIndependent * inner_px * inner_px) return;
-    std::stable_sort(
-        pixels->begin(), pixels->end(),
-        [](const DetailPixel& a, const DetailPixel& b) { return a.contrast < b.contrast; });
+    // The classes are sorted by contrast, their pixels need not be.
+    auto from = pixels->begin();
+    for (std::size_t c = 1; c < kContrasts; ++c) {
+      const auto to =
+          pixels->begin() + static_cast<std::ptrdiff_t>(c * pixels->size() / kContrasts);
+      std::nth_element(
+          from, to, pixels->end(),
+          [](const DetailPixel& a, const DetailPixel& b) { return a.contrast < b.contrast; });
+      from = to;
+    }
     std::array<ResponseOfContrast, kContrasts> classes;
     double weights = 0, response = 0, log_contrast = 0;
     for (std::size_t c = 0; c < kContrasts; ++c) {
