@@ -91,7 +91,9 @@ class ExponentFit {
     };
     maps.mean = window(values);
     maps.variance = window(values.mul(values)) - maps.mean.mul(maps.mean);
-    maps.clipped = Windowed(ClippedPixels(image, frame), sigma_px);
+    const cv::Mat clipped = ClippedPixels(image, frame);
+    maps.clipped = cv::countNonZero(clipped) > 0 ? Windowed(clipped, sigma_px)
+                                                 : cv::Mat::zeros(maps.mean.size(), CV_32F);
     cv::Sobel(maps.mean, maps.by_x, CV_32F, 1, 0, 3, 0.125);
     cv::Sobel(maps.mean, maps.by_y, CV_32F, 0, 1, 3, 0.125);
     cv::Laplacian(maps.mean, maps.laplacian, CV_32F);

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
-#include <utility>
 #include <vector>
 
 #include "calib/registration/target_period.h"
@@ -81,6 +80,10 @@ class DetailLoss {
     first_ = crop_.Read(order_[0]);
     if (MeasurePeriodPx(first_)) return std::nullopt;
     second_ = crop_.Read(order_[1]);
+    for (std::size_t k = 0; k < sharp_clipped_.size(); ++k) {
+      const cv::Mat clipped = ClippedPixels(k == 0 ? first_ : second_, frames_.frames[order_[k]]);
+      if (cv::countNonZero(clipped) > 0) sharp_clipped_[k] = clipped;
+    }
     // Processing shows best where detail is fine.
     blurred.resize(std::min(blurred.size(), kDetailFrames));
     for (const std::size_t index : blurred) AddFrame(index);
@@ -98,11 +101,9 @@ class DetailLoss {
   // compared. Clipping removes the detail of dark or bright places, whatever its contrast.
   cv::Mat ClippedShare(const cv::Mat& image, std::size_t index, double sigma_px) const {
     cv::Mat clipped = ClippedPixels(image, frames_.frames[index]);
-    const std::pair<const cv::Mat*, std::size_t> sharp[] = {{&first_, order_[0]},
-                                                            {&second_, order_[1]}};
-    for (const auto& [values, of] : sharp) {
-      const cv::Mat there = ClippedPixels(*values, frames_.frames[of]);
-      if (cv::countNonZero(there) > 0) clipped = cv::max(clipped, Predicted(there, of, index));
+    for (std::size_t k = 0; k < sharp_clipped_.size(); ++k) {
+      const cv::Mat& there = sharp_clipped_[k];
+      if (!there.empty()) clipped = cv::max(clipped, Predicted(there, order_[k], index));
     }
     return cv::countNonZero(clipped) > 0 ? GaussianOf(clipped, sigma_px) : clipped;
   }
@@ -146,9 +147,9 @@ class DetailLoss {
     for (std::size_t c = 1; c < kContrasts; ++c) {
       const auto to =
           pixels->begin() + static_cast<std::ptrdiff_t>(c * pixels->size() / kContrasts);
-      std::nth_element(
-          from, to, pixels->end(),
-          [](const DetailPixel& a, const DetailPixel& b) { return a.contrast < b.contrast; });
+      std::nth_element(from, to, pixels->end(), [](const DetailPixel& a, const DetailPixel& b) {
+        return a.contrast < b.contrast;
+      });
       from = to;
     }
     std::array<ResponseOfContrast, kContrasts> classes;
@@ -179,6 +180,7 @@ class DetailLoss {
   ResponseCrop crop_;
   std::vector<std::size_t> order_;
   cv::Mat first_, second_;
+  std::array<cv::Mat, 2> sharp_clipped_;  // of these two; empty if nothing is clipped
   ResponseSums sums_;
 };
 
