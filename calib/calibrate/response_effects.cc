@@ -19,10 +19,10 @@
 namespace thicklens::calib {
 namespace {
 
-constexpr double kLeastNoiseSteps = 0.6;  // noise that rounding does not hide, steps of the file
-constexpr double kAgrees = 0.1;           // |ln exponent| of a curve that describes the frames
-constexpr double kReachOfCurve = 3;       // standard deviations within which a usual curve is named
-constexpr double kReachOfLoss = 2;        // standard deviations
+constexpr double kMinNoiseSteps = 0.6;  // noise that rounding does not hide, steps of the file
+constexpr double kAgrees = 0.1;         // |ln exponent| of a curve that describes the frames
+constexpr double kReachOfCurve = 3;     // standard deviations within which a usual curve is named
+constexpr double kReachOfLoss = 2;      // standard deviations
 constexpr double kLargestRatioChange = 0.5;   // of kappa
 constexpr double kClippingMargin = 1.0 / 64;  // of full scale, over which a clipped value spreads
 
@@ -124,7 +124,7 @@ class ResponseCheck {
     const FrameStatistics& typical = result_.frames[frames_.frames.front().frame].statistics;
     const double step = 1 / FullScale();
     const model::TransferCurve& curve = task_.sweep.camera.sensor.transfer;
-    return kLeastNoiseSteps *
+    return kMinNoiseSteps *
            (curve.Decode(typical.mean_encoded + step) - curve.Decode(typical.mean_encoded));
   }
 

@@ -204,7 +204,7 @@ bool CalibrateOptions::IsValid(std::string* why) const {
 namespace {
 
 bool IsLayout(std::string* why, const LightFieldReadOptions& options) {
-  constexpr int kMostCounts = 100;
+  constexpr int kMaxCounts = 100;
   const std::vector<std::string> names = io::LightFieldLayouts();
   if (!options.layout.empty() &&
       std::find(names.begin(), names.end(), options.layout) == names.end()) {
@@ -214,8 +214,8 @@ bool IsLayout(std::string* why, const LightFieldReadOptions& options) {
   }
   if (!options.layout_counts) return true;
   if (options.layout.empty()) return Fail(why, "layout_counts", "needs a layout");
-  return WholeBetween(why, "layout_counts.u", 1, kMostCounts, options.layout_counts->u) &&
-         WholeBetween(why, "layout_counts.v", 1, kMostCounts, options.layout_counts->v);
+  return WholeBetween(why, "layout_counts.u", 1, kMaxCounts, options.layout_counts->u) &&
+         WholeBetween(why, "layout_counts.v", 1, kMaxCounts, options.layout_counts->v);
 }
 
 }  // namespace

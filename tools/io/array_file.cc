@@ -29,12 +29,12 @@
 namespace thicklens::io {
 namespace {
 
-constexpr std::size_t kMostContentBytes = std::size_t{1} << 20;
-constexpr std::size_t kMostReasonBytes = 4096;
+constexpr std::size_t kMaxContentBytes = std::size_t{1} << 20;
+constexpr std::size_t kMaxReasonBytes = 4096;
 // The process ends after so much time of a processor, s. The largest file of 4 GiB needs a tenth.
-constexpr rlim_t kMostSeconds = 600;
+constexpr rlim_t kMaxSeconds = 600;
 // And it is ended if it sends nothing for so long, s: more than that time of a busy processor.
-constexpr int kMostSilentSeconds = 1800;
+constexpr int kMaxSilentSeconds = 1800;
 
 const ArrayLibrary& LoadedArrayLibrary() {
   static const ArrayLibrary* const library = [] {
@@ -154,7 +154,7 @@ void Send(int socket, const void* bytes, std::size_t count) {
 void SendMessage(int socket, bool is_good, const std::string& message) {
   std::string text;
   PutNumber(is_good ? 1 : 0, &text);
-  PutText(is_good ? message : message.substr(0, kMostReasonBytes), &text);
+  PutText(is_good ? message : message.substr(0, kMaxReasonBytes), &text);
   Send(socket, text.data(), text.size());
 }
 
@@ -174,7 +174,7 @@ void LimitThisProcess(std::optional<double> memory_left_mib) {
   limit(RLIMIT_CORE, 0);
   limit(RLIMIT_FSIZE, 0);
   // The signal of the soft limit says what happened; that of the hard one does not.
-  const rlimit seconds{kMostSeconds, kMostSeconds + 5};
+  const rlimit seconds{kMaxSeconds, kMaxSeconds + 5};
   setrlimit(RLIMIT_CPU, &seconds);
   const rlim_t data = DataBytes();
   if (memory_left_mib && data > 0)
@@ -280,7 +280,7 @@ ArrayFile::ArrayFile(const std::string& path, ArrayFormat format) : path_(path) 
                               std::generic_category().message(failure)));
     }
   }
-  content_ = Unpacked(path, Received(kMostContentBytes));
+  content_ = Unpacked(path, Received(kMaxContentBytes));
 }
 
 ArrayFile::Process::~Process() {
@@ -297,15 +297,15 @@ void ArrayFile::Receive(void* bytes, std::size_t count) {
   while (count > 0) {
     ThrowIfCancelled();
     // A file may make the process wait for something that never comes, which costs no processor.
-    if (SecondsSince(last_news) > kMostSilentSeconds) {
+    if (SecondsSince(last_news) > kMaxSilentSeconds) {
       throw Error(fmt::format("{}: cannot be read: the process that reads it sent nothing for {} s",
-                              path_, kMostSilentSeconds));
+                              path_, kMaxSilentSeconds));
     }
     pollfd ready{process_.socket, POLLIN, 0};
-    constexpr int kMostWaitMs = 100;
-    if (poll(&ready, 1, kMostWaitMs) <= 0) continue;
-    constexpr std::size_t kMostAtOnce = std::size_t{1} << 22;
-    const ssize_t got = recv(process_.socket, at, std::min(count, kMostAtOnce), 0);
+    constexpr int kMaxWaitMs = 100;
+    if (poll(&ready, 1, kMaxWaitMs) <= 0) continue;
+    constexpr std::size_t kMaxAtOnce = std::size_t{1} << 22;
+    const ssize_t got = recv(process_.socket, at, std::min(count, kMaxAtOnce), 0);
     if (got < 0 && errno == EINTR) continue;
     if (got <= 0) ThrowEnded();
     last_news = Clock::now();
@@ -318,7 +318,7 @@ std::string ArrayFile::Received(std::size_t most_bytes) {
   std::array<std::uint64_t, 2> head{};  // whether it is good, and its length
   Receive(head.data(), sizeof head);
   const bool is_good = head[0] == 1;
-  if (head[1] > (is_good ? most_bytes : kMostReasonBytes))
+  if (head[1] > (is_good ? most_bytes : kMaxReasonBytes))
     throw Error(fmt::format("{}: its description is damaged, or it has too many arrays", path_));
   std::string message(static_cast<std::size_t>(head[1]), '\0');
   Receive(message.data(), message.size());
@@ -341,7 +341,7 @@ void ArrayFile::ThrowEnded() {
   throw Error(fmt::format(
       "{}: cannot be read{}: the process that reads it {}", path_,
       is_crash ? ", it is damaged" : "",
-      number == SIGXCPU   ? fmt::format("takes more than {} s of a processor", kMostSeconds)
+      number == SIGXCPU   ? fmt::format("takes more than {} s of a processor", kMaxSeconds)
       : number == SIGABRT ? std::string("gave up; it may need more memory than is left")
       : number == SIGKILL ? std::string("was ended by the system, which may lack memory")
       : number != 0       ? fmt::format("failed with signal {}", number)

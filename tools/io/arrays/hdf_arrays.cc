@@ -14,9 +14,9 @@ namespace thicklens::io {
 namespace {
 
 // More objects in the root of a file are not looked at.
-constexpr hsize_t kMostObjects = 1000;
-constexpr hsize_t kMostTasks = 100;
-constexpr hsize_t kMostLetters = 200;
+constexpr hsize_t kMaxObjects = 1000;
+constexpr hsize_t kMaxTasks = 100;
+constexpr hsize_t kMaxLetters = 200;
 
 // The reason that libhdf5 gives last: that of the function in which it began.
 herr_t InnermostReason(unsigned, const H5E_error2_t* error, void* text) {
@@ -94,8 +94,8 @@ hsize_t CountOf(hid_t data_set) {
 std::string TextOfSet(hid_t data_set) {
   if (!AreNumbersInTheFile(data_set)) return "";
   const hsize_t count = CountOf(data_set);
-  if (count > kMostLetters || H5Tget_class(H5Dget_type(data_set)) != H5T_INTEGER) return "";
-  std::array<std::uint16_t, kMostLetters> letters{};
+  if (count > kMaxLetters || H5Tget_class(H5Dget_type(data_set)) != H5T_INTEGER) return "";
+  std::array<std::uint16_t, kMaxLetters> letters{};
   if (H5Dread(data_set, H5T_NATIVE_UINT16, H5S_ALL, H5S_ALL, H5P_DEFAULT, letters.data()) < 0)
     return "";
   std::string text;
@@ -119,7 +119,7 @@ class HdfArrays : public ArraySource {
     StoredFile content;
     H5G_info_t group{};
     if (H5Gget_info(file_, &group) < 0) Refuse("the root");
-    for (hsize_t i = 0; i < std::min(group.nlinks, kMostObjects); ++i) {
+    for (hsize_t i = 0; i < std::min(group.nlinks, kMaxObjects); ++i) {
       std::array<char, 256> name{};
       H5L_info_t link{};
       const bool is_here = H5Lget_name_by_idx(file_, ".", H5_INDEX_NAME, H5_ITER_INC, i,
@@ -141,9 +141,9 @@ class HdfArrays : public ArraySource {
     const auto count = static_cast<std::size_t>(H5Sget_simple_extent_npoints(space));
     const std::size_t bytes = count * BytesOf(number);
     // Numbers that were never written have no bytes in the file.
-    constexpr std::size_t kMostOfAByte = 1032;
+    constexpr std::size_t kMaxOfAByte = 1032;
     const hsize_t stored = H5Dget_storage_size(data_set);
-    if (bytes / kMostOfAByte > stored || stored == 0) {
+    if (bytes / kMaxOfAByte > stored || stored == 0) {
       throw ArrayRefusal(name + ": the " + std::to_string(bytes) + " bytes of its numbers are " +
                          std::to_string(stored) + " bytes in the file");
     }
@@ -188,7 +188,7 @@ class HdfArrays : public ArraySource {
   static void AddNumbers(hid_t object, StoredFile* content) {
     H5O_info_t info{};
     if (H5Oget_info2(object, &info, H5O_INFO_NUM_ATTRS) < 0) return;
-    for (hsize_t i = 0; i < std::min(info.num_attrs, kMostObjects); ++i) {
+    for (hsize_t i = 0; i < std::min(info.num_attrs, kMaxObjects); ++i) {
       const hid_t attribute =
           H5Aopen_by_idx(object, ".", H5_INDEX_NAME, H5_ITER_INC, i, H5P_DEFAULT, H5P_DEFAULT);
       std::array<char, 256> name{};
@@ -224,9 +224,9 @@ class HdfArrays : public ArraySource {
       content->tasks->push_back(TextOfSet(tasks));
       return;
     }
-    std::array<hobj_ref_t, kMostTasks> references{};
+    std::array<hobj_ref_t, kMaxTasks> references{};
     const hsize_t count = CountOf(tasks);
-    if (count > kMostTasks ||
+    if (count > kMaxTasks ||
         H5Dread(tasks, H5T_STD_REF_OBJ, H5S_ALL, H5S_ALL, H5P_DEFAULT, references.data()) < 0) {
       Refuse(kTasks);
     }

@@ -22,12 +22,12 @@ namespace thicklens::io {
 namespace {
 
 constexpr std::size_t kHeaderBytes = 128;
-constexpr std::size_t kMostVariables = 1000;
-constexpr std::size_t kMostAxes = 32;
-constexpr std::size_t kMostLetters = 200;
+constexpr std::size_t kMaxVariables = 1000;
+constexpr std::size_t kMaxAxes = 32;
+constexpr std::size_t kMaxLetters = 200;
 // Bytes of a variable that are inflated to find its name and size, and those of a structure.
 constexpr std::size_t kStartBytes = 4096;
-constexpr std::size_t kMostOptionsBytes = std::size_t{64} << 20;
+constexpr std::size_t kMaxOptionsBytes = std::size_t{64} << 20;
 
 // Types of elements, and classes of variables.
 enum MatType : std::uint32_t {
@@ -146,7 +146,7 @@ Variable VariableOf(Bytes matrix, bool is_swapped) {
   variable.is_complex = (bits & 0x800U) != 0;
   variable.is_logical = (bits & 0x200U) != 0;
   const Element size = elements.Next(kMiInt32, "size");
-  if (size.data.count / 4 > kMostAxes) throw ArrayRefusal("a variable has too many axes");
+  if (size.data.count / 4 > kMaxAxes) throw ArrayRefusal("a variable has too many axes");
   for (std::size_t i = 0; i + 4 <= size.data.count; i += 4) {
     const auto count = NumberAt<std::int32_t>(size.data.first + i, is_swapped);
     if (count < 0) throw ArrayRefusal("a variable has a negative size");
@@ -154,7 +154,7 @@ Variable VariableOf(Bytes matrix, bool is_swapped) {
   }
   const Element name = elements.Next();
   variable.name.assign(reinterpret_cast<const char*>(name.data.first),
-                       std::min(name.data.count, kMostLetters));
+                       std::min(name.data.count, kMaxLetters));
   return variable;
 }
 
@@ -257,7 +257,7 @@ void PutAs(const Element& element, bool is_swapped, const PutBytes& put) {
 
 std::string TextOf(Bytes matrix, bool is_swapped) {
   Variable text = VariableOf(matrix, is_swapped);
-  if (text.kind != kMxChar || text.Count() > kMostLetters || text.contents.AtEnd()) return "";
+  if (text.kind != kMxChar || text.Count() > kMaxLetters || text.contents.AtEnd()) return "";
   const Element letters = text.contents.Next();
   const std::size_t each = BytesOfType(letters.type);
   std::string result;
@@ -313,7 +313,7 @@ class MatArrays : public ArraySource {
     StoredFile content;
     std::set<std::string> names;
     Elements elements({bytes_.first + kHeaderBytes, bytes_.count - kHeaderBytes}, is_swapped_);
-    while (!elements.AtEnd() && elements_.size() < kMostVariables) {
+    while (!elements.AtEnd() && elements_.size() < kMaxVariables) {
       const Element element = elements.Next();
       if (element.type != kMiCompressed && element.type != kMiMatrix) continue;
       if (element.data.count == 0) continue;
@@ -329,7 +329,7 @@ class MatArrays : public ArraySource {
     for (std::size_t i = 0; i < elements_.size(); ++i) {
       if (content.arrays[i].name != "DecodeOptions") continue;
       std::vector<unsigned char> whole;
-      content.tasks = TasksOf(WholeOf(elements_[i], kMostOptionsBytes, &whole));
+      content.tasks = TasksOf(WholeOf(elements_[i], kMaxOptionsBytes, &whole));
     }
     return content;
   }
@@ -366,11 +366,11 @@ class MatArrays : public ArraySource {
   Bytes WholeOf(const Element& element, std::size_t most_bytes,
                 std::vector<unsigned char>* bytes) const {
     if (element.type == kMiMatrix) return element.data;
-    constexpr std::size_t kTag = 8, kMostOfAByte = 1032;
+    constexpr std::size_t kTag = 8, kMaxOfAByte = 1032;
     const std::vector<unsigned char> tag = Inflated(element.data, kTag);
     if (tag.size() < kTag) throw ArrayRefusal("it ends within a variable");
     const std::size_t length = NumberAt<std::uint32_t>(tag.data() + 4, is_swapped_);
-    if (length > most_bytes || length / kMostOfAByte > element.data.count) {
+    if (length > most_bytes || length / kMaxOfAByte > element.data.count) {
       throw ArrayRefusal(std::to_string(element.data.count) + " bytes cannot hold the " +
                          std::to_string(length) + " bytes of a variable");
     }

@@ -12,12 +12,12 @@
 namespace thicklens::io {
 namespace {
 
-constexpr int kMostTiles = 40;
-constexpr int kLeastTilePx = 8;
+constexpr int kMaxTiles = 40;
+constexpr int kMinTilePx = 8;
 // Views side by side differ by their parallax only. A photograph without repetitions has a ratio
 // near 1.
 constexpr double kRepeats = 0.5;
-constexpr int kMostPitchPx = 20;
+constexpr int kMaxPitchPx = 20;
 // Differences across the edge of a lenslet, relative to those inside.
 constexpr double kEdgeContrast = 1.3;
 // Rows of an image that are compared.
@@ -59,7 +59,7 @@ double DifferenceAt(const cv::Mat& grey, int lag) {
 }
 
 int RepetitionsAcross(const cv::Mat& grey) {
-  for (int count = std::min(kMostTiles, grey.cols / kLeastTilePx); count >= 2; --count) {
+  for (int count = std::min(kMaxTiles, grey.cols / kMinTilePx); count >= 2; --count) {
     if (grey.cols % count != 0) continue;
     ThrowIfCancelled();
     const int lag = grey.cols / count;
@@ -78,7 +78,7 @@ int PitchAcross(const cv::Mat& grey) {
   }
   int best = 0;
   double best_contrast = kEdgeContrast;
-  for (int pitch = 2; pitch <= kMostPitchPx; ++pitch) {
+  for (int pitch = 2; pitch <= kMaxPitchPx; ++pitch) {
     if (grey.cols < 4 * pitch) break;
     double edge = 0, inside = 0, edges = 0, insides = 0;
     for (std::size_t x = 0; x < step.size(); ++x) {
@@ -110,7 +110,7 @@ int LensletPitchOf(const cv::Mat& pixels) {
 
 std::string CommonDivisors(int width_px, int height_px) {
   std::vector<int> divisors;
-  for (int n = 2; n <= kMostTiles; ++n) {
+  for (int n = 2; n <= kMaxTiles; ++n) {
     if (width_px % n == 0 && height_px % n == 0) divisors.push_back(n);
   }
   return divisors.empty() ? "none" : fmt::format("{}", fmt::join(divisors, ", "));

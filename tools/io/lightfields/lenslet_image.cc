@@ -26,7 +26,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kLytroPx = 14;
-constexpr int kMostLensletPx = 100;
+constexpr int kMaxLensletPx = 100;
 
 bool IsNamedEslf(const std::string& path) {
   std::string name = fs::path(path).stem().string();
@@ -118,12 +118,12 @@ std::optional<ViewSource> OpenLensletImage(const LayoutInput& input) {
   const cv::Mat& pixels = image->pixels;
   std::string how;
   const AxisCounts lenslet = LensletOf(input, pixels, &how);
-  if (lenslet.across < 1 || lenslet.down < 1 || lenslet.across > kMostLensletPx ||
-      lenslet.down > kMostLensletPx || lenslet.across > pixels.cols || lenslet.down > pixels.rows) {
+  if (lenslet.across < 1 || lenslet.down < 1 || lenslet.across > kMaxLensletPx ||
+      lenslet.down > kMaxLensletPx || lenslet.across > pixels.cols || lenslet.down > pixels.rows) {
     throw Error(fmt::format(
         "{}: lenslets of 1 to {} px that fit into {} x {} px are expected, "
         "found {} x {}",
-        input.path, kMostLensletPx, pixels.cols, pixels.rows, lenslet.across, lenslet.down));
+        input.path, kMaxLensletPx, pixels.cols, pixels.rows, lenslet.across, lenslet.down));
   }
   ViewSource source;
   source.kind = fmt::format("an image of lenslets of {} x {} px", lenslet.across, lenslet.down);

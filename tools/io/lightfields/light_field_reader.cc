@@ -296,13 +296,13 @@ void ReportOrder(const std::string& path, const ViewSource& source,
 // ---- Black views.
 
 // A value up to this, linear light, is black: 3 levels of 255 in sRGB, the noise of JPEG.
-constexpr float kMostOfBlack = 0.001F;
+constexpr float kMaxOfBlack = 0.001F;
 // A view is black if no more of its values than this share are brighter: hot pixels.
-constexpr double kMostHotShare = 1e-4;
+constexpr double kMaxHotShare = 1e-4;
 // Views are judged where the middle one has at least this share of values above this light. In a
 // dark scene with a lamp, a view that does not see the lamp is black too, and right.
-constexpr float kLeastOfOthers = 0.01F;
-constexpr double kLeastBrightShare = 0.01;
+constexpr float kMinOfOthers = 0.01F;
+constexpr double kMinBrightShare = 0.01;
 // Views with less than this part of the middle mean are reported: they are hardly within the
 // aperture, but they have light.
 constexpr double kDim = 0.1;
@@ -317,8 +317,8 @@ ViewLight LightOf(const model::LightField& light_field, int k, int l) {
   for (int channel = 0; channel < light_field.channels; ++channel) {
     const float* const first = light_field.values.data() + light_field.ViewStart(channel, k, l);
     for (std::size_t i = 0; i < light_field.view_size(); ++i) {
-      light.above_black += first[i] > kMostOfBlack ? 1 : 0;
-      light.bright += first[i] > kLeastOfOthers ? 1 : 0;
+      light.above_black += first[i] > kMaxOfBlack ? 1 : 0;
+      light.bright += first[i] > kMinOfOthers ? 1 : 0;
       light.mean += std::isfinite(first[i]) ? static_cast<double>(first[i]) : 0;
     }
   }
@@ -365,7 +365,7 @@ void ExamineDarkViews(bool is_own, model::LightField* light_field, LightFieldFac
       known.push_back(all[static_cast<std::size_t>(i)]);
   }
   if (known.empty()) return;
-  const bool is_bright = MiddleOf(known, &ViewLight::bright) >= kLeastBrightShare;
+  const bool is_bright = MiddleOf(known, &ViewLight::bright) >= kMinBrightShare;
   const double middle_mean = MiddleOf(known, &ViewLight::mean);
   std::vector<std::string> black, dim;
   const bool leaves_out = is_bright && !is_own;
@@ -374,7 +374,7 @@ void ExamineDarkViews(bool is_own, model::LightField* light_field, LightFieldFac
     const int l = i / light_field->u_count;
     const ViewLight& light = all[static_cast<std::size_t>(i)];
     if (!light_field->IsPresent(k, l)) continue;
-    if (light.above_black <= kMostHotShare) {
+    if (light.above_black <= kMaxHotShare) {
       black.push_back(fmt::format("({}, {})", k, l));
       if (leaves_out) LeaveOut(k, l, light_field);
     } else if (is_bright && light.mean < kDim * middle_mean) {

@@ -24,7 +24,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kMostColumns = 100;
+constexpr int kMaxColumns = 100;
 // A tile may differ this much from the stated aspect ratio: tiles have whole pixels.
 constexpr double kAspectTolerance = 0.02;
 
@@ -58,9 +58,9 @@ std::optional<ViewSource> OpenQuilt(const LayoutInput& input) {
   }
   const int columns = size->columns;
   const int rows = size->rows;
-  if (columns < 1 || rows < 1 || columns > kMostColumns || rows > kMostColumns) {
+  if (columns < 1 || rows < 1 || columns > kMaxColumns || rows > kMaxColumns) {
     throw Error(fmt::format("{}: a quilt has 1 to {} columns and rows, the name states {} x {}",
-                            input.path, kMostColumns, columns, rows));
+                            input.path, kMaxColumns, columns, rows));
   }
   ReportInput(input.path);
   const auto image = std::make_shared<const DecodedImage>(ReadImageData(input.path));

@@ -24,8 +24,8 @@ namespace thicklens::io {
 namespace {
 
 constexpr char kLf[] = "LF";
-constexpr std::uint64_t kMostViewsAlong = 1000;
-constexpr std::uint64_t kMostPx = 65535;
+constexpr std::uint64_t kMaxViewsAlong = 1000;
+constexpr std::uint64_t kMaxPx = 65535;
 
 // The axes of an array: how many elements there are along each, and how far apart they are.
 struct ArrayAxis {
@@ -118,18 +118,18 @@ ViewArray ArrayOf(const std::string& path, const StoredArray& array, ArrayFormat
     *axes[i] = {static_cast<std::size_t>(size[i]), stride};
     stride *= static_cast<std::size_t>(size[i]);
   }
-  const bool has_views = views.row.count >= 1 && views.row.count <= kMostViewsAlong &&
-                         views.column.count >= 1 && views.column.count <= kMostViewsAlong;
-  const bool has_pixels = views.y.count >= 1 && views.y.count <= kMostPx && views.x.count >= 1 &&
-                          views.x.count <= kMostPx;
+  const bool has_views = views.row.count >= 1 && views.row.count <= kMaxViewsAlong &&
+                         views.column.count >= 1 && views.column.count <= kMaxViewsAlong;
+  const bool has_pixels = views.y.count >= 1 && views.y.count <= kMaxPx && views.x.count >= 1 &&
+                          views.x.count <= kMaxPx;
   if (!has_views || !has_pixels || !SetChannels(views.channel.count, &views)) {
     throw Error(fmt::format(
         "{}: {} has {} x {} views of {} x {} px in {} channels ({}, {}); 1 to {} views along each "
         "axis, 1 to {} px and 1, 2, 3, 4 or 6 channels are expected: the axes may have another "
         "order",
         path, PrintableUtf8(array.name), views.column.count, views.row.count, views.x.count,
-        views.y.count, views.channel.count, SizeInWords(array, format), array.type, kMostViewsAlong,
-        kMostPx));
+        views.y.count, views.channel.count, SizeInWords(array, format), array.type, kMaxViewsAlong,
+        kMaxPx));
   }
   return views;
 }

@@ -18,16 +18,16 @@ namespace thicklens::io {
 namespace {
 
 // Views are compared at most at this size, px: finer details tell nothing more.
-constexpr int kMostPx = 320;
+constexpr int kMaxPx = 320;
 // Largest shift that is followed, px of the compared size.
-constexpr int kMostShiftPx = 6;
+constexpr int kMaxShiftPx = 6;
 // Standard deviation of a shift besides the one that noise causes, px: interpolation, occlusions.
 constexpr double kShiftFloorPx = 0.1;
 // A tile counts at most this much: tiles at occlusions fit nothing.
-constexpr double kMostCost = 25;
+constexpr double kMaxCost = 25;
 // A tile shows a shift if no shift at all costs at least this much.
 constexpr double kShows = 9;
-constexpr int kFewestTiles = 3;
+constexpr int kMinTiles = 3;
 // The differences that remain may have at most this part of a tile's variance. Of two views with
 // nothing in common but their noise, it is 1 or more at any shift.
 constexpr double kMatches = 0.5;
@@ -72,7 +72,7 @@ cv::Mat ComparedView(const model::LightField& light_field, int k, int l) {
       row[x] = std::sqrt(sum / static_cast<float>(light_field.channels));
     }
   }
-  const int factor = (std::max(grey.rows, grey.cols) + kMostPx - 1) / kMostPx;
+  const int factor = (std::max(grey.rows, grey.cols) + kMaxPx - 1) / kMaxPx;
   if (factor <= 1) return grey;
   cv::Mat reduced;
   cv::resize(grey, reduced,
@@ -97,7 +97,7 @@ struct Tiling {
   int edge = 0, margin = 0;
   explicit Tiling(const cv::Mat& view) {
     const int side = std::min(view.rows, view.cols);
-    const int most_shift = std::clamp(side / 8, 1, kMostShiftPx);
+    const int most_shift = std::clamp(side / 8, 1, kMaxShiftPx);
     margin = most_shift + 2;
     edge = std::clamp(side / 6, 8, 16);
   }
@@ -242,7 +242,7 @@ double CostOf(const TileShifts& tile, const Vector2& across, const Vector2& down
   const double square = across.dot(tile.across.weight * across) + down.dot(tile.down.weight * down);
   const double cost =
       Square(tile.across) + Square(tile.down) - (square > 0 ? product * product / square : 0);
-  return std::clamp(cost, 0.0, kMostCost);
+  return std::clamp(cost, 0.0, kMaxCost);
 }
 
 struct Fit {
@@ -326,7 +326,7 @@ ViewOrderFinding FindingOf(const model::LightField& light_field, const Triple& t
     finding.why = "the views are too small";
     return finding;
   }
-  if (showing < kFewestTiles) {
+  if (showing < kMinTiles) {
     finding.why = lost > static_cast<int>(tiles.size())
                       ? "the shifts between neighbouring views are too large to be followed"
                       : "the shifts between the views are too small, or the views have no details";
@@ -344,7 +344,7 @@ ViewOrderFinding FindingOf(const model::LightField& light_field, const Triple& t
   for (const TileShifts& tile : tiles) {
     if (Square(tile.across) + Square(tile.down) < kShows) continue;
     const Hypothesis& hypothesis = Hypotheses()[best];
-    if (CostOf(tile, hypothesis.across, fits[best].ratio * hypothesis.down) >= kMostCost)
+    if (CostOf(tile, hypothesis.across, fits[best].ratio * hypothesis.down) >= kMaxCost)
       ++unexplained;
   }
   if (2 * unexplained > showing) {
