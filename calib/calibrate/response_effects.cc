@@ -129,14 +129,14 @@ class ResponseCheck {
   }
 
   // ---- transfer ----
-  FocusSweep ReadBy(const model::TransferCurve& curve) const {
+  FocusSweep AsReadWith(const model::TransferCurve& curve) const {
     FocusSweep sweep = task_.sweep;
     sweep.camera.sensor.transfer = curve;
     return sweep;
   }
 
   std::optional<model::Estimate> ExponentBy(const model::TransferCurve& curve) const {
-    const FocusSweep sweep = ReadBy(curve);
+    const FocusSweep sweep = AsReadWith(curve);
     FrameStore store(sweep);
     ResponseFrames frames = FramesReadBy(store);
     const model::TransferCurve& stated = task_.sweep.camera.sensor.transfer;
@@ -175,7 +175,7 @@ class ResponseCheck {
 
   // The blur of the frames in the light of another curve, with everything else as it was.
   std::optional<BlurFitSetup> SetupBy(const model::TransferCurve& curve) const {
-    const FocusSweep sweep = ReadBy(curve);
+    const FocusSweep sweep = AsReadWith(curve);
     FrameStore store(sweep);
     BlurEvidence evidence = MeasureBlur(TaskWith(task_, sweep, store));
     Calibration scratch = result_;

@@ -58,10 +58,10 @@ bool DoZerosFormAreas(const RawDepthMap& map) {
       if (is_inner) ++inner;
     }
   }
-  constexpr double kMinShare = 0.02, kMostlyInner = 0.8;
+  constexpr double kMinShare = 0.02, kInnerShare = 0.8;
   const auto all = static_cast<double>(map.values.size());
   return static_cast<double>(zeros) >= kMinShare * all &&
-         static_cast<double>(inner) >= kMostlyInner * static_cast<double>(zeros);
+         static_cast<double>(inner) >= kInnerShare * static_cast<double>(zeros);
 }
 
 }  // namespace

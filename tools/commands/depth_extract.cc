@@ -122,7 +122,7 @@ ExtractedDepth AsPngOfInverse(const io::EmbeddedDepth& depth, bool is_enlarged,
   }
   if (has_hole && has_zero) {
     throw Error(fmt::format(
-        "{}: the map has holes and the number 0, which a PNG file cannot tell apart; .pfm is "
+        "{}: the map has holes and the number 0, which a PNG file cannot distinguish; .pfm is "
         "expected",
         path));
   }

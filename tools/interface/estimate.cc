@@ -254,9 +254,10 @@ std::vector<std::string> WarningsOf(const DepthFile& depth, bool has_camera, con
                            *found.unexplained_share > estimator::kMaxUnexplained;
   if (IsInDoubt(found, kUnexplainedAnyway) && !is_reported) {
     warnings.push_back(fmt::format(
-        "the photograph has a residual of {:.1f} grey levels, {:.1f} times its noise, in places "
-        "and near the edges of the depth: depth and photograph do not fit there; are the map's "
-        "edges, its alignment, and the meaning of its values right?",
+        "the photograph has a residual of {:.1f} grey levels, {:.1f} times its noise, in parts of "
+        "it, most often along edges of the depth; edges of the map that lie some px off, another "
+        "alignment or meaning of its values, and compression or sharpening of the photograph have "
+        "this effect",
         kEightBitLevels * *found.residual_rms, *found.residual_rms / *found.noise_sigma));
   }
   if (found.blur_check) {

@@ -181,7 +181,7 @@ void LimitThisProcess(std::optional<double> memory_left_mib) {
     limit(RLIMIT_DATA, data + static_cast<rlim_t>(*memory_left_mib) * (1 << 20));
 }
 
-// What the program does on a signal, such as removing its outputs, is not for this process.
+// The handlers of the program, which remove its outputs for example, are not for this process.
 void ForgetSignalHandlers() {
   for (const int number : {SIGTERM, SIGHUP, SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGXCPU})
     std::signal(number, SIG_DFL);

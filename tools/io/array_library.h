@@ -30,7 +30,7 @@ struct StoredArray {
   std::string type;  // in words, "signed 16-bit integers"
 };
 
-// What a file of arrays holds.
+// The contents of a file of arrays.
 struct StoredFile {
   std::vector<StoredArray> arrays;
   std::vector<std::pair<std::string, double>> numbers;  // attributes of the file that are numbers

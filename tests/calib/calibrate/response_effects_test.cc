@@ -122,7 +122,7 @@ TEST(ResponseEffects, AnUnusualCurveIsNamedByItsPower) {
   ExpectCoversRatio(c, s.truth);
 }
 
-// A power beyond those of transfer curves: no curve is named, and the effect is not made up.
+// A power beyond those of transfer curves: no curve is named, and no effect is stated.
 TEST(ResponseEffects, ATransferWithoutABetterCurveHasAnUnknownEffect) {
   SimulatedSweep s = SweepOf("ii", model::TransferCurve::Linear(), 6);
   for (cv::Mat& frame : *s.stored) {

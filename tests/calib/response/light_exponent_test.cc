@@ -46,7 +46,7 @@ TEST(LightExponent, IsThePowerOfTheValues) {
   }
 }
 
-// What else changes the mean of a window does not look like a power.
+// Other changes of the mean of a window do not look like a power.
 TEST(LightExponent, IsNotMovedByBlackLevelVignettingOrNoise) {
   ResponseScene scene;
   scene.black_level = 0.06;

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """Makes the files of this folder. README.md states what they hold.
 
-JPEG: the pictures are coded by ImageMagick, and exiftool writes the XMP and splits it where it is
+JPEG: the images are coded by ImageMagick, and exiftool writes the XMP and splits it where it is
 longer than a segment. exiftool writes no index of further images (MPF, CIPA DC-007); the one here
-is written by this program, and so is what stands behind the pictures.
+is written by this program, and so is what stands behind the images.
 
-HEIC: the pictures are coded by heif-enc (Debian 12, libheif 1.15.1 with x265). heif-enc writes no
+HEIC: the images are coded by heif-enc (Debian 12, libheif 1.15.1 with x265). heif-enc writes no
 depth image, so that this program puts its two files into one, box by box (ISO/IEC 14496-12,
 23008-12): the photograph, the depth image with the property auxC and the reference auxl, and its
 XMP with the reference cdsc, in the order and with the names that the cameras of Apple use.

@@ -56,7 +56,7 @@ scipy.io.savemat(
      "DecodeOptions": {"Gamma": 0.4166, "OptionalTasks": np.array(["ColourCorrect"], dtype=object)}},
     do_compression=True)
 scipy.io.savemat("signed-5.mat", {"LF": LEVELS.astype(np.int16)}, do_compression=True)
-scipy.io.savemat("picture-5.mat", {"picture": LEVELS[0, 0]}, do_compression=True)
+scipy.io.savemat("image-5.mat", {"image": LEVELS[0, 0]}, do_compression=True)
 write_mat_73("linear-7.3.mat", with_weights(LEVELS.astype(np.uint16) * 257, 65535), [])
 write_mat_73("corrected-7.3.mat", LEVELS, ["ColourCorrect", "Rectify"])
 with h5py.File("heidelberg.h5", "w") as file:

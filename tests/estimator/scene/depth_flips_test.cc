@@ -89,7 +89,7 @@ TEST(DepthFlips, TheRightOrderStays) {
   }
 }
 
-// What else leaves a photograph unexplained is no reversed map.
+// Other causes of an unexplained photograph are no reversed map.
 TEST(DepthFlips, AWrongScaleOrPlaceIsNoReversedMap) {
   SquareScene doubled;
   for (float& value : doubled.input.disparity.disparity) value = value * 2 + 1;

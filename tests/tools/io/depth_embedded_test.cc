@@ -250,7 +250,7 @@ TEST(EmbeddedDepthTest, HeicStatesItsMeaningInTheXmpOfTheDepthImage) {
   if (!HasImageLibrary()) GTEST_SKIP() << "this build reads no HEIF";
   const EmbeddedDepth disparity = DepthInside("apple_disparity.heic");
   EXPECT_EQ(disparity.kind, model::DepthKind::kInverse);
-  // As the pixels are stored, though both images state to be turned.
+  // The pixels come as they are stored, though both images state to be turned.
   EXPECT_EQ(disparity.map.width_px, 128);
   EXPECT_EQ(disparity.map.height_px, 64);
   EXPECT_THAT(HalvesOf(disparity), ElementsAre(AboutDepth(0.9F), AboutDepth(2.5F)));

@@ -183,8 +183,8 @@ TEST_F(DepthFileTest, EqualChannelsAreOneMap) {
   cv::merge(std::vector<cv::Mat>{grey, grey, grey}, rgb);
   const cv::Mat opaque(1, 3, CV_16U, cv::Scalar(65535));
   cv::merge(std::vector<cv::Mat>{grey, grey, grey, opaque}, rgba);
-  for (const cv::Mat& picture : {rgb, rgba}) {
-    const std::string path = folder_.Put("depth", Encoded(picture, ".png"));
+  for (const cv::Mat& image : {rgb, rgba}) {
+    const std::string path = folder_.Put("depth", Encoded(image, ".png"));
     const DepthFile file = ReadDepthFile(path);
     EXPECT_THAT(file.map.values, ElementsAre(7, 0, 65535));
     EXPECT_TRUE(file.map.integer);
@@ -208,7 +208,7 @@ TEST_F(DepthFileTest, TransparentPixelsAreHoles) {
   EXPECT_EQ(map.values[2], 9);
 }
 
-// OpenCV draws the pictures; the reader has tables of the same maps, so that the share of the
+// OpenCV draws the images; the reader has tables of the same maps, so that the share of the
 // pixels on the map tests the decision and not the tables.
 TEST_F(DepthFileTest, APictureInFalseColoursIsNamed) {
   cv::Mat ramp(16, 256, CV_8U);
@@ -221,12 +221,12 @@ TEST_F(DepthFileTest, APictureInFalseColoursIsNamed) {
                                                          {cv::COLORMAP_MAGMA, "'magma'"},
                                                          {cv::COLORMAP_TURBO, "'turbo'"}};
   for (const auto& [code, name] : maps) {
-    cv::Mat picture;
-    cv::applyColorMap(ramp, picture, code);
-    EXPECT_THAT(Refusal(Encoded(picture, ".png")),
-                AllOf(HasSubstr("it is a picture in the colours of the map " + name),
-                      HasSubstr("100.0 %")));
-    EXPECT_THAT(Refusal(Encoded(picture, ".jpg")), HasSubstr(name));
+    cv::Mat image;
+    cv::applyColorMap(ramp, image, code);
+    EXPECT_THAT(
+        Refusal(Encoded(image, ".png")),
+        AllOf(HasSubstr("it is an image in the colours of the map " + name), HasSubstr("100.0 %")));
+    EXPECT_THAT(Refusal(Encoded(image, ".jpg")), HasSubstr(name));
   }
   cv::Mat noise(64, 64, CV_8UC3);
   cv::RNG random(5);

@@ -117,7 +117,7 @@ class Elements {
   bool is_swapped_ = false;
 };
 
-// What begins a variable, and where its contents follow.
+// The head of a variable, and the place where its contents follow.
 struct Variable {
   std::uint32_t kind = 0;
   bool is_complex = false, is_logical = false;

@@ -1,4 +1,4 @@
-// Recognises pictures of depths in false colours.
+// Recognises images of depths in false colours.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -141,8 +141,8 @@ std::string WordsOnColours(const cv::Mat& rgb, bool is_lossy) {
   if (best && best->share >= kLikely) {
     const bool is_sure = best->share >= kSure && best->parts >= kMinParts;
     return fmt::format(
-        "it is {}a picture in the colours of the map '{}' ({:.1f} % of its pixels lie within {} "
-        "levels of them{}): save the depth itself, one channel, instead of its picture",
+        "it is {}an image in the colours of the map '{}' ({:.1f} % of its pixels lie within {} "
+        "levels of them{}): save the depth itself, one channel, instead of its image",
         is_sure ? "" : "probably ", best->name, 100 * best->share, tolerance,
         best->parts >= kMinParts ? "" : ", though it has few colours");
   }

@@ -26,7 +26,7 @@ DepthFile DecodeNpyDepth(const std::string& bytes, const std::string& name);
 DepthFile DecodeImageDepth(const std::string& bytes, const std::string& name,
                            const DepthReading& reading);
 
-// Why a picture of three different channels is no depth map: the colour map on which its colours
+// Why an image of three different channels is no depth map: the colour map on which its colours
 // lie, with the share that does, or that they lie on none.
 std::string WordsOnColours(const cv::Mat& rgb, bool is_lossy);
 

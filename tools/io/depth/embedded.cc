@@ -67,7 +67,7 @@ XmpNode TreeOfPhoto(const std::string& packet, const std::string& extended,
   }
 }
 
-// A JPEG image behind the picture.
+// A JPEG image behind the photograph.
 class FurtherImage {
  public:
   FurtherImage(const std::string& bytes, std::string name) : bytes_(bytes), name_(std::move(name)) {
@@ -88,7 +88,7 @@ class FurtherImage {
 
   // "a second image of 320 x 240 px that is not stated to be depth"
   std::string InWords(std::uint32_t mpf_type) const {
-    if (!is_jpeg_) return "data behind the picture that are no JPEG image";
+    if (!is_jpeg_) return "data behind the photograph that are no JPEG image";
     const std::string size = fmt::format("{} x {} px", parts_.width_px, parts_.height_px);
     const bool is_gain_map = parts_.xmp.find("hdrgainmap") != std::string::npos ||
                              parts_.xmp.find("hdr-gain-map") != std::string::npos;
@@ -115,7 +115,7 @@ class FurtherImage {
 // Cameras store fewer images than this.
 constexpr std::size_t kMaxImages = 100;
 
-// Looks at the images that the index lists, and at the one directly behind the picture.
+// Looks at the images that the index lists, and at the one directly behind the photograph.
 void SearchBehindPicture(const std::string& bytes, const std::string& name, const JpegParts& parts,
                          EmbeddedDepthSearch* search) {
   std::vector<MpfImage> images = parts.images;
@@ -137,7 +137,7 @@ void SearchBehindPicture(const std::string& bytes, const std::string& name, cons
       search->others.push_back(fmt::format(
           "an index (MPF) that puts image {} of {} bytes at {}, outside the {} bytes of the file: "
           "it "
-          "was cut, or saved again by a program that dropped what is behind the picture",
+          "was cut, or saved again by a program that dropped what is behind the photograph",
           i + 2, image.size, image.begin, bytes.size()));
       continue;
     }
@@ -150,7 +150,8 @@ void SearchBehindPicture(const std::string& bytes, const std::string& name, cons
     }
     bytes_left -= image.size;
     const std::string part = bytes.substr(image.begin, image.size);
-    const FurtherImage further(part, fmt::format("{}: image {} behind the picture", name, i + 2));
+    const FurtherImage further(part,
+                               fmt::format("{}: image {} behind the photograph", name, i + 2));
     if (!further.is_jpeg() && parts.images.empty()) break;  // a trailer of some program
     search->depth = further.Depth();
     if (search->depth) return;

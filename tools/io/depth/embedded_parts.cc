@@ -1,4 +1,4 @@
-// What the forms of embedded depth have in common.
+// Functions that the forms of embedded depth have in common.
 #include "tools/io/depth/embedded_parts.h"
 
 #include <fmt/format.h>

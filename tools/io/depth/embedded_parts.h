@@ -34,13 +34,13 @@ std::string DecodeBase64(const std::string& text, const std::string& name);
 EmbeddedDepth OfStoredImage(const std::string& bytes, const std::string& mime,
                             const std::string& name);
 
-// The metadata of a photograph, and the place of what is behind its picture.
+// The metadata of a photograph, and the place of what is behind its photograph.
 struct PhotoParts {
   const std::string* bytes = nullptr;
   std::string name;
   XmpNode xmp;           // the packet, and the extended one below it
-  std::size_t end = 0;   // of the picture in the file
-  bool is_jpeg = false;  // others have nothing behind the picture
+  std::size_t end = 0;   // of the photograph in the file
+  bool is_jpeg = false;  // others have nothing behind the photograph
 };
 
 // Whether a packet, which may be damaged, has fields of GDepth or of a DepthMap.
@@ -48,7 +48,7 @@ bool HasGoogleDepthFields(const std::string& packet);
 // Google's GDepth, the map in the XMP itself.
 std::optional<EmbeddedDepth> GDepthOf(const PhotoParts& photo);
 // Google's Dynamic Depth, or a directory whose item states that it is depth: the map is behind the
-// picture. `others` gets items that look like depth and state no range.
+// photograph. `others` gets items that look like depth and state no range.
 std::optional<EmbeddedDepth> DynamicDepthOf(const PhotoParts& photo,
                                             std::vector<std::string>* others);
 

@@ -115,7 +115,7 @@ class RangeFields {
   const std::string& name_;
 };
 
-// An item of the directory of a container: a file behind the picture.
+// An item of the directory of a container: a file behind the photograph.
 struct ContainerItem {
   std::string mime, semantic, uri;
   std::optional<std::string> length, padding;
@@ -163,7 +163,7 @@ std::vector<ContainerItem> ItemsIn(const XmpNode& xmp) {
   return items;
 }
 
-// The first item is the picture; the others follow it in their order, each with its padding.
+// The first item is the photograph; the others follow it in their order, each with its padding.
 void PlaceItems(const PhotoParts& photo, std::vector<ContainerItem>* items) {
   std::size_t at = photo.end;
   const std::size_t all = photo.bytes->size();
@@ -174,7 +174,8 @@ void PlaceItems(const PhotoParts& photo, std::vector<ContainerItem>* items) {
     if (size > all - at || padding > all - at - size) {
       throw Error(fmt::format(
           "{}: item {} of the container ({}) has {} bytes and a padding of {} at {}: the file ends "
-          "at {}; was it cut, or saved again by a program that dropped what is behind the picture?",
+          "at {}; was it cut, or saved again by a program that dropped what is behind the "
+          "photograph?",
           photo.name, i + 1, PrintableUtf8(item.semantic.empty() ? item.uri : item.semantic), size,
           padding, at, all));
     }
@@ -275,7 +276,7 @@ std::optional<EmbeddedDepth> DynamicDepthOf(const PhotoParts& photo,
   if (item->size == 0) {
     throw Error(fmt::format(
         "{}: Item:Length of the item '{}' of the container is {}: the number of its bytes behind "
-        "the picture is expected",
+        "the photograph is expected",
         photo.name, PrintableUtf8(item->uri.empty() ? item->semantic : item->uri),
         item->length ? "'" + PrintableUtf8(*item->length) + "'" : "missing"));
   }

@@ -14,9 +14,9 @@ struct MpfImage {
   std::size_t begin = 0, size = 0;  // in the file; an old index may point beyond its end
 };
 
-// The parts of a JPEG file that its picture does not need.
+// The parts of a JPEG file that its photograph does not need.
 struct JpegParts {
-  int width_px = 0, height_px = 0;  // of the picture; 0: no frame was found
+  int width_px = 0, height_px = 0;  // of the photograph; 0: no frame was found
   std::string xmp;                  // the packet; empty: there is none
   // The extended packet, put together; empty: there is none. With a fault it is what is left of it.
   std::string extended_xmp;
@@ -24,7 +24,8 @@ struct JpegParts {
   // or parts on one another; empty: nothing.
   std::string extended_fault;
   std::vector<MpfImage> images;  // those of the index behind the first one
-  // Behind the end-of-image marker of the first picture; the file's size if the marker is missing.
+  // Behind the end-of-image marker of the first photograph; the file's size if the marker is
+  // missing.
   std::size_t end = 0;
 };
 

@@ -38,7 +38,7 @@ Error NpyError(const std::string& name, const std::string& what) {
   return Error(fmt::format("{}: broken NPY: {}", name, what));
 }
 
-// What stands behind 'key': in the dictionary, up to the end of the text.
+// The text behind 'key': in the dictionary, up to the end of the text.
 std::string BehindKey(const std::string& text, const std::string& key, const std::string& name) {
   for (const char quote : {'\'', '"'}) {
     const std::string quoted = quote + key + quote;

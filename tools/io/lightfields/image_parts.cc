@@ -22,7 +22,7 @@
 namespace thicklens::io {
 namespace {
 
-// What the header of one part of an EXR file says about views.
+// The views that the header of one part of an EXR file names.
 struct ExrPart {
   std::string view;                // the view that it is
   std::vector<std::string> views;  // those of its channels, that without a prefix first

@@ -134,7 +134,7 @@ const ViewLayout& LayoutNamed(const std::string& name) {
                           NamesOfLayouts(true), NamesOfLayouts(false), PrintableUtf8(name)));
 }
 
-// What is in a folder that has no known layout.
+// The contents of a folder that has no known layout, in words.
 std::string ContentOfFolder(const std::string& folder) {
   const std::vector<std::string> names = ImageNames(folder);
   if (names.empty()) return "found no images";

@@ -257,7 +257,7 @@ void ExamineFloats(const std::string& path, const ViewArray& views, ViewSource* 
   }
 }
 
-// What the attributes of the Heidelberg data set say.
+// The statements of the attributes of the Heidelberg data set.
 void ExamineAttributes(const std::string& path, const StoredFile& content, const ViewArray& views,
                        ViewSource* source) {
   const std::array<std::pair<const char*, std::size_t>, 5> sizes = {

@@ -29,7 +29,7 @@ struct ViewGrid {
 ViewGrid GridOfViews(const std::string& path, const std::vector<NumberedView>& views,
                      const LightFieldReading& reading);
 
-// The same for views in one row of numbers, counted from 0 row by row. The length of a row is that
+// Places views that have one number each, counted from 0 row by row. The length of a row is that
 // of the options layout or grid; otherwise the views must form a full square.
 ViewGrid GridOfNumbers(const std::string& path, const std::vector<NumberedView>& views,
                        const LightFieldReading& reading);

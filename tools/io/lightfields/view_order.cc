@@ -17,7 +17,7 @@
 namespace thicklens::io {
 namespace {
 
-// Views are compared at most at this size, px: finer details tell nothing more.
+// Views are compared at most at this size, px: finer details add nothing.
 constexpr int kMaxPx = 320;
 // Largest shift that is followed, px of the compared size.
 constexpr int kMaxShiftPx = 6;
@@ -38,7 +38,7 @@ constexpr double kSamePattern = 0.25;
 constexpr double kAboveNoise = 3;
 // Tiles overlap by half along both axes: four tiles have the information of one.
 constexpr double kOverlap = 4;
-// By this much an order must be better than another.
+// The margin by which an order must be better than another.
 constexpr double kDecides = 30;
 
 using Vector2 = Eigen::Vector2d;
@@ -353,7 +353,7 @@ ViewOrderFinding FindingOf(const model::LightField& light_field, const Triple& t
   }
   double second = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < fits.size(); ++i) {
-    // Of a single row or column only the axis shows: i / 2.
+    // A single row or column shows only its axis: i / 2.
     if (i != best && (!is_line || i / 2 != best / 2)) second = std::min(second, fits[i].cost);
   }
   if (second - fits[best].cost < kDecides) {

@@ -7,7 +7,7 @@
 
 namespace thicklens::io {
 
-// What the shifts between neighbouring views say about the order of the views. A point at x in the
+// The order of the views, as the shifts between neighbouring views show it. A point at x in the
 // view (k, l) is at x - (d, 0) in the view (k + 1, l) and at x - (0, d) in the view (k, l + 1),
 // with the same disparity d: the first shift is horizontal, the second vertical, and both have one
 // sign all over the image. If rows and columns are exchanged, the first is vertical and the second

@@ -120,8 +120,8 @@ TEST_F(StoredViews, OtherContentsAreNamed) {
   EXPECT_THAT(ErrorOf([&] { Read(StoredFilePath("signed-5.mat")); }),
               AllOf(HasSubstr("signed-5.mat"), HasSubstr("signed 16-bit integers"),
                     HasSubstr("2 x 3 x 6 x 8 x 3")));
-  EXPECT_THAT(ErrorOf([&] { Read(StoredFilePath("picture-5.mat")); }),
-              AllOf(HasSubstr("LF(t, s, v, u, c)"), HasSubstr("picture (6 x 8 x 3")));
+  EXPECT_THAT(ErrorOf([&] { Read(StoredFilePath("image-5.mat")); }),
+              AllOf(HasSubstr("LF(t, s, v, u, c)"), HasSubstr("image (6 x 8 x 3")));
   LightFieldReading reading;
   reading.layout = "hdf5";
   EXPECT_THAT(ErrorOf([&] { ReadLightField(StoredFilePath("levels-5.mat"), reading); }),

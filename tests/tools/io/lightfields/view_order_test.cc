@@ -1,4 +1,4 @@
-// What the shifts between views say about their order, for scenes whose order is known.
+// The order that the shifts between views show, for scenes whose order is known.
 #include "tools/io/lightfields/view_order.h"
 
 #include <gmock/gmock.h>

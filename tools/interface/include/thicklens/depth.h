@@ -59,7 +59,7 @@ struct DepthMap {
   // The largest value that the type of the file holds, if it is an integer type.
   std::optional<double> largest_of_type = std::nullopt;
   model::HoleRules holes = {};  // which values are no depths
-  // What the reader found: remarks and doubts, one sentence each.
+  // Findings of the reader: remarks and doubts, one sentence each.
   std::vector<std::string> notes = {}, warnings = {};
   model::DepthFlip flip = model::DepthFlip::kNone;  // by which the file's values were reversed
 

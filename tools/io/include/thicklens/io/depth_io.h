@@ -38,7 +38,7 @@ struct DepthFile {
 // parts, EXR, WebP and BMP. The rows of the result go top to bottom. Of several channels it takes
 // the one that `reading` names, or the one named Z, depth or disparity, or one of three or more
 // that are equal; pixels of alpha 0 are NaN then. Throws Error that begins with `name` and states
-// what was found and what is expected (for a picture of colours, a colour-mapped picture, a file
+// what was found and what is expected (for an image of colours, a colour-mapped image, a file
 // that is no image, a broken header, missing values).
 THICKLENS_EXPORT DepthFile DecodeDepthFile(const std::string& bytes, const std::string& name,
                                            const DepthReading& reading = {});
@@ -68,7 +68,7 @@ struct EmbeddedDepth {
 // The result of a search for depth in a photograph.
 struct EmbeddedDepthSearch {
   std::optional<EmbeddedDepth> depth;  // absent: there is none
-  // What else the file holds that may be taken for it, in words: "a second image of 320 x 240 px
+  // Other contents of the file that may be taken for it, in words: "a second image of 320 x 240 px
   // that is not stated to be depth".
   std::vector<std::string> others;
 };

@@ -32,7 +32,7 @@ struct LightFieldReading {
   bool swap_uv = false, mirror_u = false, mirror_v = false;
 };
 
-// What was found when a light field was read.
+// The findings while a light field was read.
 struct LightFieldFacts {
   std::string kind;     // "a Stanford folder"
   bool is_own = false;  // the layout of thicklens, which states everything itself
