@@ -51,6 +51,7 @@ class ResponseCheck {
       : task_(task), evidence_(evidence), fit_(fit), result_(*calibration) {}
 
   void Run() {
+    if (task_.scales.empty()) return;
     frames_ = FramesReadBy(task_.store);
     if (frames_.frames.size() < 5) return;
     size_ = task_.store.Grey(frames_.frames.front().frame).size();

@@ -113,7 +113,7 @@ TEST(Processing, SmoothingAlikeIsNoProcessing) {
   EXPECT_FALSE(found.LosesWeakDetail() || found.IsSharpened() || found.IsCompressed());
 }
 
-// Frames that are clipped at these values, of which the frames state the levels or not.
+// Frames that are clipped at these values; the clipping levels are stated or not.
 CameraResponse ResponseToClipped(double darkest, double brightest, bool stated) {
   std::vector<cv::Mat> light;
   ResponseFrames frames = Noisy().Make(&light);
