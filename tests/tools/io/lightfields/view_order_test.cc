@@ -8,7 +8,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
 #include <filesystem>
 #include <functional>
 #include <opencv2/imgcodecs.hpp>
@@ -261,10 +260,8 @@ TEST(ViewOrderOfShifts, AnotherStepDownIsFound) {
 
 // Rendered scenes of the 4D Light Field Benchmark, the inner views of 9 x 9.
 TEST(ViewOrderOfShifts, ScenesOfTheBenchmark) {
-  const char* const data = std::getenv("THICKLENS_DATA");
-  if (data == nullptr) GTEST_SKIP() << "THICKLENS_DATA names no folder of light fields";
   for (const char* name : {"lf_antinous", "lf_backgammon"}) {
-    const std::string folder = std::string(data) + "/" + name;
+    const std::string folder = std::string(THICKLENS_SHARED_DATA_DIR) + "/" + name;
     if (!std::filesystem::exists(folder)) GTEST_SKIP() << "there is no " << folder;
     for (int change = 0; change < 4; ++change) {
       LightFieldReading reading;
