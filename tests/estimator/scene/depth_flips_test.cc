@@ -17,7 +17,7 @@ constexpr int kViews = 5;
 constexpr double kNoise = 1.0 / 255;
 
 // A near square in the upper left quarter of a scene in focus. The photograph is made without the
-// estimator: the square's texture is averaged over its shifts in the views.
+// estimator: views in which the square is shifted before its background are averaged.
 struct SquareScene {
   EstimateInput input;
   explicit SquareScene(double near_px = 1.5, unsigned seed = 1) {
@@ -29,19 +29,18 @@ struct SquareScene {
     input.disparity.width_px = input.disparity.height_px = kSizePx;
     for (int y = 0; y < kSizePx; ++y) {
       for (int x = 0; x < kSizePx; ++x) {
-        const bool is_near = IsNear(x, y);
         double sum = 0;
         for (int view = 0; view < kViews * kViews; ++view) {
-          const double shift = is_near ? near_px : 0;
-          sum += Texture(x + shift * (view % kViews - kViews / 2),
-                         y + shift * (view / kViews - kViews / 2));
+          const double near_x = x + near_px * (view % kViews - kViews / 2);
+          const double near_y = y + near_px * (view / kViews - kViews / 2);
+          sum += IsNear(near_x, near_y) ? Texture(near_x, near_y) : Texture(x + 500, y);
         }
         input.image.values.push_back(static_cast<float>(sum / (kViews * kViews) + noise(random)));
-        input.disparity.disparity.push_back(is_near ? static_cast<float>(near_px) : 0.0F);
+        input.disparity.disparity.push_back(IsNear(x, y) ? static_cast<float>(near_px) : 0.0F);
       }
     }
   }
-  static bool IsNear(int x, int y) { return x >= 16 && x < 64 && y >= 8 && y < 56; }
+  static bool IsNear(double x, double y) { return x >= 16 && x < 64 && y >= 8 && y < 56; }
   static double Texture(double x, double y) {
     return 0.5 + 0.12 * std::sin(1.9 * x) * std::cos(1.3 * y) + 0.1 * std::sin(0.4 * x + 0.7 * y);
   }
