@@ -48,10 +48,9 @@ double GridExcess(const cv::Mat& image) {
       counts[phase] += 1;
     }
   }
-  double all = 0, largest = 0;
+  double largest = 0;
   for (std::size_t phase = 0; phase < sums.size(); ++phase) {
     sums[phase] /= std::max(1.0, counts[phase]);
-    all += sums[phase];
     largest = std::max(largest, sums[phase]);
   }
   // The two neighbours of a step contain half of it.

@@ -19,8 +19,9 @@ cv::Mat DiscKernel(double radius_px) {
     for (int x = 0; x < kernel.cols; ++x) {
       int inside = 0;
       for (int part = 0; part < kSubpixels * kSubpixels; ++part) {
-        const double u = x - reach + (part % kSubpixels + 0.5) / kSubpixels - 0.5;
-        const double v = y - reach + (part / kSubpixels + 0.5) / kSubpixels - 0.5;
+        const int column = part % kSubpixels, row = part / kSubpixels;
+        const double u = x - reach + (column + 0.5) / kSubpixels - 0.5;
+        const double v = y - reach + (row + 0.5) / kSubpixels - 0.5;
         inside += u * u + v * v <= radius_px * radius_px ? 1 : 0;
       }
       kernel.at<float>(y, x) = static_cast<float>(inside);

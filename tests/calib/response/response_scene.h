@@ -57,7 +57,8 @@ struct ResponseScene {
       const double u = 2.0 * i / (frames - 1) - 1;
       calib::ResponseFrame frame;
       frame.frame = static_cast<std::size_t>(i);
-      frame.registration.scale = 1 - scale_step * (i - frames / 2);
+      const int from_middle = i - frames / 2;
+      frame.registration.scale = 1 - scale_step * from_middle;
       frame.registration.shift_px = {random.uniform(-1.5, 1.5), random.uniform(-1.5, 1.5)};
       frame.variance_px2 = std::pow(largest_sigma_px * u, 2);
       light->push_back(Light(texture, frame, &random));

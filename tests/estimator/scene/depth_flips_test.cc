@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <random>
+#include <vector>
 
 #include "thicklens/base/error.h"
 
@@ -31,8 +32,9 @@ struct SquareScene {
       for (int x = 0; x < kSizePx; ++x) {
         double sum = 0;
         for (int view = 0; view < kViews * kViews; ++view) {
-          const double near_x = x + near_px * (view % kViews - kViews / 2);
-          const double near_y = y + near_px * (view / kViews - kViews / 2);
+          const int column = view % kViews - kViews / 2, row = view / kViews - kViews / 2;
+          const double near_x = x + near_px * column;
+          const double near_y = y + near_px * row;
           sum += IsNear(near_x, near_y) ? Texture(near_x, near_y) : Texture(x + 512, y);
         }
         input.image.values.push_back(static_cast<float>(sum / (kViews * kViews) + noise(random)));
@@ -108,12 +110,9 @@ TEST(DepthFlips, AWrongScaleOrPlaceIsNoReversedMap) {
 
 TEST(DepthFlips, ASharpPhotographIsNoReversedMap) {
   SquareScene sharp(0);
-  for (int y = 0; y < kSizePx; ++y) {
-    for (int x = 0; x < kSizePx; ++x) {
-      sharp.input.disparity.disparity[static_cast<std::size_t>(y * kSizePx + x)] =
-          y < kSizePx / 2 ? 1.5F : 0.5F;
-    }
-  }
+  std::vector<float>& disparity = sharp.input.disparity.disparity;
+  for (std::size_t i = 0; i < disparity.size(); ++i)
+    disparity[i] = 2 * i < disparity.size() ? 1.5F : 0.5F;
   EXPECT_FALSE(CheckDepthFlips(sharp.input, {}).better);
 }
 
