@@ -132,7 +132,8 @@ TEST_F(DepthFileTest, IntegerImagesAreReadAsTheyAre) {
 
 TEST_F(DepthFileTest, FloatImagesAreReadAsTheyAre) {
   const cv::Mat depth = (cv::Mat_<float>(2, 2) << 0.1F, -3.0F, 1e-30F, 1e30F);
-  for (const char* format : {".tiff", ".exr"}) {
+  for (const std::string& format : {std::string(".tiff"), std::string(".exr")}) {
+    if (format == ".exr" && !io::HasImageLibrary()) continue;
     const std::string bytes =
         Encoded(depth, format, {cv::IMWRITE_EXR_TYPE, cv::IMWRITE_EXR_TYPE_FLOAT});
     const model::RawDepthMap map = Read(bytes);
@@ -167,8 +168,10 @@ TEST_F(DepthFileTest, WhatIsNoDepthMapIsRefused) {
               AllOf(HasSubstr("16-bit values in 3 channel"), HasSubstr("one channel"),
                     HasSubstr("its channels differ")));
   EXPECT_THAT(Refusal(Encoded(colour, ".tiff")), HasSubstr("3 channel"));
-  EXPECT_THAT(Refusal(Encoded(cv::Mat(2, 2, CV_32FC3, cv::Scalar(1, 2, 3)), ".exr")),
-              HasSubstr("3 channel"));
+  if (io::HasImageLibrary()) {
+    EXPECT_THAT(Refusal(Encoded(cv::Mat(2, 2, CV_32FC3, cv::Scalar(1, 2, 3)), ".exr")),
+                HasSubstr("3 channel"));
+  }
   EXPECT_THAT(Refusal("GIF89a"),
               AllOf(HasSubstr("PFM, NPY, PNG, PGM, TIFF, EXR or JPEG"), HasSubstr("found GIF")));
   EXPECT_THAT(Refusal("a text"), HasSubstr("not a depth map"));

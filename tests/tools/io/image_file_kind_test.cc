@@ -11,6 +11,7 @@
 
 #include "support/error_message.h"
 #include "thicklens/io/image_file.h"
+#include "tools/io/image_library.h"
 #include "tools/support/image_file_bytes.h"
 
 namespace thicklens::io {
@@ -58,6 +59,9 @@ std::string With(std::string bytes, std::size_t at, const std::string& others) {
 TEST(ImageFileKind, EvenImagesCanBeInTheirFiles) {
   for (const Case& c : Cases()) {
     SCOPED_TRACE(c.extension);
+    const bool is_of_library = c.kind == ImageFileKind::kExr || c.kind == ImageFileKind::kWebp ||
+                               c.kind == ImageFileKind::kBmp;
+    if (is_of_library && !HasImageLibrary()) continue;
     for (const int size : {1, 3000}) {
       const std::string bytes = EncodedAs(c, cv::Mat(size, size, CV_8U, cv::Scalar(128)));
       EXPECT_EQ(KindOfImage(bytes), c.kind);
