@@ -7,6 +7,7 @@
 #include <mutex>
 #include <utility>
 
+#include "thicklens/base/memory_available.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/base/parallel.h"
 #include "thicklens/base/stopwatch.h"
@@ -148,7 +149,8 @@ void CheckFlips(const PreparedProblem& prepared, const EstimateOptions& options,
   estimator::DepthFlipOptions check;
   check.falloff = prepared.effects.on.Has(Effect::kFalloff);
   check.threads = run->threads();
-  check.memory_limit_mib = options.memory_limit_mib;
+  check.memory_limit_mib =
+      options.memory_limit_mib ? options.memory_limit_mib : UsualMemoryLimitMib();
   try {
     found.depth_flips = estimator::CheckDepthFlips(*prepared.input, check);
   } catch (const Interrupted&) {
