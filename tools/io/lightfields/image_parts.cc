@@ -135,6 +135,7 @@ std::optional<ViewSource> OpenMultiView(const LayoutInput& input, const std::str
           "the option name states how they are named, e.g. 'view_{{v}}_{{u}}'",
           input.path, part.views.size(), Listed(part.views)));
     }
+    RequireClear(input.path, *proposal);
     text = proposal->pattern;
   }
   std::vector<std::string> others;
@@ -202,6 +203,7 @@ std::optional<ViewSource> OpenImageParts(const LayoutInput& input) {
           "or the option name states how they are named, e.g. 'view_{{v}}_{{u}}'",
           input.path, names.size(), Listed(names)));
     }
+    RequireClear(input.path, *proposal);
     text = proposal->pattern;
   }
   const NamePattern pattern(text);

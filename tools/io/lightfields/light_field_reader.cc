@@ -146,6 +146,10 @@ std::string ContentOfFolder(const std::string& folder) {
         proposal->changing == 1 ? " ({n} counts row by row; the option grid states the length of a "
                                   "row)"
                                 : "");
+    if (proposal->is_sign_unclear) {
+      content += fmt::format(", or '{}' if the '-' is a minus sign",
+                             PrintableUtf8(proposal->other_pattern));
+    }
   } else {
     content += "; the option name states how views are named, e.g. 'view_{v}_{u}.jpg'";
   }

@@ -23,7 +23,10 @@ std::optional<ViewSource> OpenNamedFolder(const LayoutInput& input) {
   std::string text = input.reading->name;
   if (text.empty()) {
     const std::optional<NameProposal> proposal = ProposedPattern(names);
-    if (proposal && proposal->changing == 2) text = proposal->pattern;
+    if (proposal && proposal->changing == 2) {
+      RequireClear(input.path, *proposal);
+      text = proposal->pattern;
+    }
     if (text.empty() && !input.is_forced) return std::nullopt;
     if (text.empty()) {
       throw Error(fmt::format(

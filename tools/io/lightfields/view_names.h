@@ -17,7 +17,7 @@ struct NameNumbers {
 };
 
 // A pattern of names: "view_{v}_{u}.jpg". {v} is the row, {u} the column, {n} a number that counts
-// row by row, {x} and {y} are positions, and * is any text.
+// row by row, {x} and {y} are positions, and * is any text. Numbers may be negative.
 class NamePattern {
  public:
   // Throws Error for a pattern that cannot give each view a place.
@@ -35,13 +35,21 @@ class NamePattern {
   std::regex expression_;
 };
 
-// Patterns that names suggest: each is that of the largest group of names that differ only in
-// numbers.
+// The pattern that names suggest: that of the largest group of names that differ only in numbers.
+// A '-' directly before digits is a sign where other numbers at its place have none.
 struct NameProposal {
   std::string pattern;    // "view_{v}_{u}.png", or "frame_{n}.png" with one changing number
   int changing = 0;       // how many numbers change
   std::size_t names = 0;  // how many names it fits
+  // All numbers at one place have a '-' before them that may separate or be a sign: then `pattern`
+  // has it as text, and `other_pattern` takes it as a sign.
+  bool is_sign_unclear = false;
+  std::string other_pattern;
+  // Fits images that differ from the others in their ending only; empty: there are few or none.
+  std::string other_ending_pattern;
 };
+// Throws Error if a proposal cannot be used without a statement of the user.
+void RequireClear(const std::string& path, const NameProposal& proposal);
 // Returns nothing if no two names differ only in their numbers, or if more than two numbers change.
 std::optional<NameProposal> ProposedPattern(const std::vector<std::string>& names);
 

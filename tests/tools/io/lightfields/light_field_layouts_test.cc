@@ -126,6 +126,57 @@ TEST_F(LightFieldLayouts, OneChangingNumberIsProposedOnly) {
   ExpectViews(Read(path, reading));
 }
 
+// Coordinates around the middle view. Before, the views with a '-' were lost.
+TEST_F(LightFieldLayouts, NamesMayHaveNegativeCoordinates) {
+  const auto name = [](int v, int u) {
+    return "cam_" + std::to_string(v - 1) + "_" + std::to_string(u - 1) + ".png";
+  };
+  const std::string path = Folder(name, InOrder);
+  ExpectViews(Read(path));
+  EXPECT_THAT(facts_.one_line, AllOf(HasSubstr("'cam_{v}_{u}.png'"), Not(HasSubstr("not views"))));
+  LightFieldReading reading;
+  reading.name = "cam_{v}_{u}.png";
+  ExpectViews(Read(path, reading));
+}
+
+// A '-' after a digit or a letter separates, and of "a_-1" alone nobody knows.
+TEST_F(LightFieldLayouts, ADashMaySeparateNumbers) {
+  ExpectViews(Read(Folder(
+      [](int v, int u) { return "IMG-" + std::to_string(v) + "-" + std::to_string(u) + ".png"; },
+      InOrder)));
+  EXPECT_THAT(facts_.one_line, HasSubstr("'IMG-{v}-{u}.png'"));
+  TemporaryFolder unclear;
+  for (int v = 1; v < 4; ++v) {
+    for (int u = 0; u < 3; ++u) {
+      unclear.Put("lf/a_-" + std::to_string(v) + "_" + std::to_string(u) + ".png",
+                  EncodedTile(InOrder(u, v - 1)));
+    }
+  }
+  EXPECT_THAT(ErrorOf([&] { Read(unclear / "lf"); }),
+              AllOf(HasSubstr("'a_-{v}_{u}.png'"), HasSubstr("'a_{v}_{u}.png'")));
+  LightFieldReading reading;
+  reading.name = "a_-{v}_{u}.png";
+  ExpectViews(Read(unclear / "lf", reading));
+}
+
+TEST_F(LightFieldLayouts, ImagesOfTwoEndingsNeedTheOptionName) {
+  const std::string path = Folder(RowAndColumn, InOrder);
+  folder_.Put("lf/view_1_1.jpg", EncodedTile(InOrder(1, 1), ".jpg"));
+  ExpectViews(Read(path));  // a single one is no second light field
+  EXPECT_THAT(facts_.one_line, HasSubstr("not views: view_1_1.jpg"));
+  for (int v = 0; v < 3; ++v) {
+    for (int u = 0; u < 3; ++u) {
+      folder_.Put("lf/view_" + std::to_string(v) + "_" + std::to_string(u) + ".jpg",
+                  EncodedTile(InOrder(u, v), ".jpg"));
+    }
+  }
+  EXPECT_THAT(ErrorOf([&] { Read(path); }),
+              AllOf(HasSubstr("'view_{v}_{u}.png'"), HasSubstr("'view_{v}_{u}.jpg'")));
+  LightFieldReading reading;
+  reading.name = "view_{v}_{u}.png";
+  ExpectViews(Read(path, reading));
+}
+
 // The times of photographs have more digits than a row or a column may have.
 TEST_F(LightFieldLayouts, LongNumbersAreNoRowsAndColumns) {
   const std::string path = Folder(
