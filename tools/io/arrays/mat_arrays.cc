@@ -268,28 +268,37 @@ std::string TextOf(Bytes matrix, bool is_swapped) {
   return result;
 }
 
+enum class Inflate {
+  kStart,  // the first bytes only: they may be damaged
+  kWhole   // to the end of the stream, whose checksum is then right; the bytes beyond are left out
+};
+
 // Inflates at most so many bytes.
-std::vector<unsigned char> Inflated(Bytes compressed, std::size_t most_bytes) {
+std::vector<unsigned char> Inflated(Bytes compressed, std::size_t most_bytes, Inflate part) {
   std::vector<unsigned char> bytes(most_bytes);
+  std::array<unsigned char, 4096> beyond;
   z_stream stream{};
   if (inflateInit(&stream) != Z_OK) throw ArrayRefusal("zlib cannot begin");
   const std::unique_ptr<z_stream, int (*)(z_stream*)> end(&stream, inflateEnd);
   std::size_t in = 0, out = 0;
   int result = Z_OK;
-  while (result == Z_OK && out < bytes.size()) {
+  while (result == Z_OK && (part == Inflate::kWhole || out < bytes.size())) {
     constexpr std::size_t kAtOnce = std::size_t{1} << 28;
+    const bool is_beyond = out == bytes.size();
     const std::size_t in_now = std::min(compressed.count - in, kAtOnce);
-    const std::size_t out_now = std::min(bytes.size() - out, kAtOnce);
+    const std::size_t out_now = is_beyond ? beyond.size() : std::min(bytes.size() - out, kAtOnce);
     stream.next_in = const_cast<unsigned char*>(compressed.first + in);  // NOLINT: zlib reads it
     stream.avail_in = static_cast<uInt>(in_now);
-    stream.next_out = bytes.data() + out;
+    stream.next_out = is_beyond ? beyond.data() : bytes.data() + out;
     stream.avail_out = static_cast<uInt>(out_now);
     result = inflate(&stream, Z_NO_FLUSH);
     in += in_now - stream.avail_in;
-    out += out_now - stream.avail_out;
+    if (!is_beyond) out += out_now - stream.avail_out;
   }
   if (result != Z_OK && result != Z_STREAM_END && result != Z_BUF_ERROR)
     throw ArrayRefusal("the compressed bytes of a variable are damaged");
+  if (part == Inflate::kWhole && result != Z_STREAM_END)
+    throw ArrayRefusal("it ends within the compressed bytes of a variable");
   bytes.resize(out);
   return bytes;
 }
@@ -358,7 +367,7 @@ class MatArrays : public ArraySource {
   // The first bytes of a variable's contents.
   Bytes StartOf(const Element& element, std::vector<unsigned char>* bytes) const {
     if (element.type == kMiMatrix) return element.data;
-    *bytes = Inflated(element.data, kStartBytes);
+    *bytes = Inflated(element.data, kStartBytes, Inflate::kStart);
     return Elements({bytes->data(), bytes->size()}, is_swapped_).Next(true).data;
   }
 
@@ -367,14 +376,14 @@ class MatArrays : public ArraySource {
                 std::vector<unsigned char>* bytes) const {
     if (element.type == kMiMatrix) return element.data;
     constexpr std::size_t kTag = 8, kMaxOfAByte = 1032;
-    const std::vector<unsigned char> tag = Inflated(element.data, kTag);
+    const std::vector<unsigned char> tag = Inflated(element.data, kTag, Inflate::kStart);
     if (tag.size() < kTag) throw ArrayRefusal("it ends within a variable");
     const std::size_t length = NumberAt<std::uint32_t>(tag.data() + 4, is_swapped_);
     if (length > most_bytes || length / kMaxOfAByte > element.data.count) {
       throw ArrayRefusal(std::to_string(element.data.count) + " bytes cannot hold the " +
                          std::to_string(length) + " bytes of a variable");
     }
-    *bytes = Inflated(element.data, kTag + length);
+    *bytes = Inflated(element.data, kTag + length, Inflate::kWhole);
     const Element matrix = Elements({bytes->data(), bytes->size()}, is_swapped_).Next();
     if (matrix.type != kMiMatrix) throw ArrayRefusal("compressed bytes hold no variable");
     return matrix.data;

@@ -142,6 +142,27 @@ TEST_F(StoredViews, TruncatedFilesAreRefused) {
   }
 }
 
+// The last byte of each compressed variable belongs to zlib's checksum of its contents.
+TEST_F(StoredViews, WrongChecksumsAreRefused) {
+  const std::string content = ContentOf(StoredFilePath("corrected-5-compressed.mat"));
+  constexpr std::size_t kHeaderBytes = 128, kTag = 8;
+  int variables = 0;
+  for (std::size_t at = kHeaderBytes; at + kTag < content.size(); ++variables) {
+    std::size_t length = 0;
+    for (std::size_t i = 4; i-- > 0;)
+      length = length << 8U | static_cast<unsigned char>(content[at + 4 + i]);
+    at += kTag + length;
+    ASSERT_LE(at, content.size());
+    std::string damaged = content;
+    damaged[at - 1] = static_cast<char>(damaged[at - 1] ^ 1);
+    const std::string path = folder_.Put("damaged.mat", damaged);
+    EXPECT_THAT(ErrorOf([&] { Read(path); }),
+                AllOf(HasSubstr("damaged.mat"), HasSubstr("variable are damaged")))
+        << variables;
+  }
+  EXPECT_EQ(variables, 3);
+}
+
 TEST_F(StoredViews, LyingSizesAreRefused) {
   using namespace std::string_literals;
   // The number of channels in levels-5.mat, after the four other sizes.
