@@ -24,6 +24,9 @@ struct ViewSource {
   std::vector<std::string> details;  // clauses for the line that says what was read
   std::vector<std::string> notices;  // sentences
   std::string mirrored;              // a clause: which direction files of this layout mirror
+  // The disparity that views of neighbouring pixels of a plain image have, px; 0: there are none.
+  double plain_disparity_px = 0;
+  std::string doubt;  // a clause: what speaks against the stated numbers of views; empty: nothing
 };
 
 // A file or a folder that may be a light field.

@@ -129,6 +129,14 @@ std::optional<ViewSource> OpenLensletImage(const LayoutInput& input) {
   source.kind = fmt::format("an image of lenslets of {} x {} px", lenslet.across, lenslet.down);
   source.frame = FullFrame(lenslet.across, lenslet.down);
   if (!how.empty()) source.details.push_back(how);
+  const int edge = std::max(lenslet.across, lenslet.down);
+  if (edge > 1) source.plain_disparity_px = 1.0 / edge;
+  const int pitch = how.empty() ? LensletPitchOf(pixels) : 0;
+  if (pitch > 0 && pitch != lenslet.across) {
+    source.doubt =
+        fmt::format("the image has steps at every {} px, as lenslets of {} x {} px have them",
+                    pitch, pitch, pitch);
+  }
   const int rest_x = pixels.cols % lenslet.across;
   const int rest_y = pixels.rows % lenslet.down;
   if (rest_x > 0 || rest_y > 0) {

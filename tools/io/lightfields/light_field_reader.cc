@@ -248,10 +248,27 @@ void Reorder(const LightFieldReading& reading, ViewSource* source) {
       fmt::format("{} as the option view-order states", fmt::join(changes, " and ")));
 }
 
+// Whether the views are those of an image that is no light field: every N-th pixel of it, so that
+// all shifts between them are about 1/N px.
+bool IsPlainImage(const ViewSource& source, const ViewOrderFinding& finding) {
+  constexpr double kNear = 0.5;
+  const double px = source.plain_disparity_px;
+  return px > 0 && finding.least_px > (1 - kNear) * px && finding.most_px < (1 + kNear) * px;
+}
+
 // States what the shifts between the views say about their order.
 void ReportOrder(const std::string& path, const ViewSource& source,
                  const model::LightField& light_field, LightFieldFacts* facts) {
-  const ViewOrderFinding finding = FindViewOrder(light_field);
+  ViewOrderFinding finding = FindViewOrder(light_field);
+  if (finding.order == ViewOrder::kAsStated && IsPlainImage(source, finding)) {
+    finding = {};
+    finding.why = fmt::format(
+        "the shifts between the views are those between neighbouring pixels of one image ({:.2g} "
+        "px everywhere): the size of the lenslets may be wrong",
+        source.plain_disparity_px);
+  }
+  if (finding.order == ViewOrder::kUndecided && !source.doubt.empty())
+    finding.why += "; " + source.doubt;
   const std::string mirrored =
       source.mirrored.empty()
           ? "the shifts do not say which of both counts backwards: in the right order near things "
@@ -263,7 +280,13 @@ void ReportOrder(const std::string& path, const ViewSource& source,
           fmt::format("; whether rows and columns are in order cannot be decided: {}", finding.why);
       break;
     case ViewOrder::kAsStated:
-      facts->one_line += "; the shifts between the views agree with their order";
+      // The shifts of a scene whose depths are reversed are the same.
+      facts->one_line +=
+          finding.is_line
+              ? "; the shifts between the views agree with their direction; whether they count "
+                "backwards cannot be decided: they are in one line"
+              : "; the shifts between the views agree with their order (or with that of both rows "
+                "and columns backwards, which has the same shifts)";
       break;
     case ViewOrder::kSwapped:
       facts->notices.push_back(fmt::format(

@@ -1,18 +1,23 @@
 #include "tools/io/lightfields/view_order.h"
 
+#include <fmt/format.h>
+
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
+#include <map>
 #include <opencv2/imgproc.hpp>
 #include <optional>
 #include <utility>
 #include <vector>
 
 #include "thicklens/base/cancel.h"
+#include "tools/io/lightfields/view_grid.h"
 
 namespace thicklens::io {
 namespace {
@@ -40,6 +45,13 @@ constexpr double kAboveNoise = 3;
 constexpr double kOverlap = 4;
 // The margin by which an order must be better than another.
 constexpr double kDecides = 30;
+// Tiles of a view that are followed where only the consistency of a step is tested.
+constexpr std::size_t kCheckedTiles = 64;
+// A step does not show the same scene if more than the first share of its tiles have no match,
+// where no more than the second share have none in the middle.
+constexpr double kUnlike = 0.75, kUsuallyUnlike = 0.5;
+// Single views may differ for other reasons, as dark corners do: this share may not fit.
+constexpr double kMayNotFit = 0.05;
 
 using Vector2 = Eigen::Vector2d;
 using Matrix2 = Eigen::Matrix2d;
@@ -48,6 +60,7 @@ using Matrix2 = Eigen::Matrix2d;
 struct Shift {
   Vector2 px{0, 0};
   Matrix2 weight = Matrix2::Zero();
+  bool is_match = true;  // false: the other view has nothing like the tile there
 };
 // The shifts of a tile to the neighbour across and to that below.
 struct TileShifts {
@@ -204,7 +217,11 @@ std::optional<Shift> ShiftOf(const cv::Mat& from, const cv::Mat& to, int x0, int
   }
   const int count = tiling.edge * tiling.edge;
   // Noise alone has a best shift too, which says nothing: no weight.
-  if (squares > kMatches * details.variance) return Shift{};
+  if (squares > kMatches * details.variance) {
+    Shift none;
+    none.is_match = false;
+    return none;
+  }
   const double variance = squares / (count - 2) + kSmall;
   // A tile without details has no weight; along an edge only its normal has. The noise of the
   // differences is that of two values, and a gradient has a quarter of it.
@@ -217,7 +234,7 @@ std::optional<Shift> ShiftOf(const cv::Mat& from, const cv::Mat& to, int x0, int
     const Vector2 axis = axes.eigenvectors().col(i);
     weight += axis * axis.transpose() / (variance / information + kShiftFloorPx * kShiftFloorPx);
   }
-  return Shift{shift, weight};
+  return Shift{shift, weight, true};
 }
 
 // The directions, up to one common sign, of the shifts across and down in an order of views.
@@ -297,6 +314,33 @@ std::optional<Triple> TripleInTheMiddle(const model::LightField& light_field, in
   return best;
 }
 
+// Sets the range of the disparities of the tiles that show one, with views of `compared_px`
+// columns.
+void SetDisparities(const model::LightField& light_field, const Triple& triple,
+                    const std::vector<TileShifts>& tiles, double ratio, int compared_px,
+                    ViewOrderFinding* finding) {
+  const auto hypothesis =
+      std::find_if(Hypotheses().begin(), Hypotheses().end(),
+                   [&](const Hypothesis& one) { return one.order == finding->order; });
+  const Vector2& across = hypothesis->across;
+  const Vector2 down = ratio * hypothesis->down;
+  const double px_of_view = static_cast<double>(light_field.s_count) / compared_px;
+  std::vector<double> disparities;
+  for (const TileShifts& tile : tiles) {
+    if (Square(tile.across) + Square(tile.down) < kShows) continue;
+    const double product =
+        across.dot(tile.across.weight * tile.across.px) + down.dot(tile.down.weight * tile.down.px);
+    const double square =
+        across.dot(tile.across.weight * across) + down.dot(tile.down.weight * down);
+    // A point at x is at x - d in the next view.
+    if (square > 0) disparities.push_back(-product / square * px_of_view / triple.step);
+  }
+  if (disparities.empty()) return;
+  std::sort(disparities.begin(), disparities.end());
+  finding->least_px = disparities[disparities.size() / 10];
+  finding->most_px = disparities[disparities.size() - 1 - disparities.size() / 10];
+}
+
 ViewOrderFinding FindingOf(const model::LightField& light_field, const Triple& triple) {
   const cv::Mat from = ComparedView(light_field, triple.k, triple.l);
   const cv::Mat across =
@@ -362,7 +406,173 @@ ViewOrderFinding FindingOf(const model::LightField& light_field, const Triple& t
   }
   finding.order = Hypotheses()[best].order;
   finding.step_ratio = fits[best].ratio;
+  finding.is_line = is_line;
+  SetDisparities(light_field, triple, tiles, fits[best].ratio, from.cols, &finding);
   return finding;
+}
+
+// ---- All steps.
+
+// Some tiles from all over a view.
+std::vector<cv::Point> CheckedTiles(const cv::Mat& view, const Tiling& tiling) {
+  std::vector<cv::Point> all, tiles;
+  for (int y = tiling.margin; y + tiling.edge + tiling.margin <= view.rows; y += tiling.edge) {
+    for (int x = tiling.margin; x + tiling.edge + tiling.margin <= view.cols; x += tiling.edge)
+      all.emplace_back(x, y);
+  }
+  const std::size_t stride = (all.size() + kCheckedTiles - 1) / kCheckedTiles;
+  for (std::size_t i = 0; i < all.size(); i += stride) tiles.push_back(all[i]);
+  return tiles;
+}
+
+// The tiles of a view in another; absent: lost.
+std::vector<std::optional<Shift>> ShiftsOf(const cv::Mat& from, const cv::Mat& to,
+                                           const std::vector<cv::Point>& tiles,
+                                           const Tiling& tiling) {
+  std::vector<std::optional<Shift>> shifts;
+  for (const cv::Point& tile : tiles) {
+    ThrowIfCancelled();
+    shifts.push_back(ShiftOf(from, to, tile.x, tile.y, tiling));
+  }
+  return shifts;
+}
+
+double ShareWithoutMatch(const std::vector<std::optional<Shift>>& shifts) {
+  if (shifts.empty()) return 0;
+  const auto count = std::count_if(shifts.begin(), shifts.end(),
+                                   [](const auto& shift) { return !shift || !shift->is_match; });
+  return static_cast<double>(count) / static_cast<double>(shifts.size());
+}
+
+// Whether the shifts of tiles along two steps contradict one disparity for both. The directions are
+// those of the order that the middle shows.
+bool Contradicts(const std::vector<std::optional<Shift>>& first, const Vector2& along_first,
+                 const std::vector<std::optional<Shift>>& second, const Vector2& along_second) {
+  double cost = 0, flipped = 0, unexplained = 0;
+  int showing = 0;
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    if (!first[i] || !second[i]) continue;
+    const TileShifts tile{*first[i], *second[i]};
+    if (Square(tile.across) + Square(tile.down) < kShows) continue;
+    ++showing;
+    const double cost_of_tile = CostOf(tile, along_first, along_second);
+    cost += cost_of_tile / kOverlap;
+    flipped += CostOf(tile, along_first, -along_second) / kOverlap;
+    if (cost_of_tile >= kMaxCost) ++unexplained;
+  }
+  return showing >= kMinTiles && (2 * unexplained > showing || flipped + kDecides < cost);
+}
+
+// Tests whether every view and its neighbours have the order that was found in the middle.
+class StepCheck {
+ public:
+  StepCheck(const model::LightField& light_field, const Triple& middle, const Hypothesis& order,
+            double ratio)
+      : light_field_(light_field),
+        step_(middle.step),
+        across_(order.across),
+        down_(ratio * order.down) {
+    const cv::Mat from = ComparedView(light_field, middle.k, middle.l);
+    const Tiling tiling(from);
+    const std::vector<cv::Point> tiles = CheckedTiles(from, tiling);
+    std::vector<std::vector<std::optional<Shift>>> shifts;
+    for (const bool is_across : {true, false}) {
+      if (!(is_across ? middle.has_across : middle.has_down)) continue;
+      const cv::Mat to = ComparedView(light_field, middle.k + (is_across ? step_ : 0),
+                                      middle.l + (is_across ? 0 : step_));
+      shifts.push_back(ShiftsOf(from, to, tiles, tiling));
+      usually_unlike_ = std::max(usually_unlike_, ShareWithoutMatch(shifts.back()));
+    }
+    // Fewer tiles are compared than those that decided: they may not suffice.
+    usually_contradicts_ = shifts.size() == 2 && Contradicts(shifts[0], across_, shifts[1], down_);
+  }
+
+  // Whether the steps from this view fit the order.
+  bool Fits(int k, int l) {
+    const cv::Mat& from = ViewAt(k, l);
+    const Tiling tiling(from);
+    const std::vector<cv::Point> tiles = CheckedTiles(from, tiling);
+    // The next view of each axis, or at its end the one before; of a single row or column both.
+    std::vector<Vector2> directions;
+    std::vector<std::vector<std::optional<Shift>>> shifts;
+    const bool is_line = light_field_.u_count == 1 || light_field_.v_count == 1;
+    for (const bool is_across : {true, false}) {
+      bool has_one = false;
+      for (const int sign : {1, -1}) {
+        const int distance = sign * step_;
+        const int to_k = k + (is_across ? distance : 0), to_l = l + (is_across ? 0 : distance);
+        if ((has_one && !is_line) || !IsThere(to_k, to_l)) continue;
+        has_one = true;
+        shifts.push_back(ShiftsOf(from, ViewAt(to_k, to_l), tiles, tiling));
+        directions.emplace_back(sign * (is_across ? across_ : down_));
+        const bool is_unlike =
+            ShareWithoutMatch(shifts.back()) > kUnlike && usually_unlike_ <= kUsuallyUnlike;
+        if (is_unlike) return false;
+      }
+      // Farther views than the neighbour decided: the neighbour shows the same scene too.
+      const int next_k = k + (is_across ? 1 : 0), next_l = l + (is_across ? 0 : 1);
+      if (step_ > 1 && usually_unlike_ <= kUsuallyUnlike && IsThere(next_k, next_l) &&
+          ShareWithoutMatch(ShiftsOf(from, ViewAt(next_k, next_l), tiles, tiling)) > kUnlike) {
+        return false;
+      }
+    }
+    return shifts.size() < 2 || usually_contradicts_ ||
+           !Contradicts(shifts[0], directions[0], shifts[1], directions[1]);
+  }
+
+  // Forgets the views above this row that are not needed any more.
+  void ForgetAbove(int row) {
+    for (auto view = views_.begin(); view != views_.end();)
+      view = view->first.first < row - step_ ? views_.erase(view) : std::next(view);
+  }
+
+ private:
+  bool IsThere(int k, int l) const {
+    return k >= 0 && l >= 0 && k < light_field_.u_count && l < light_field_.v_count &&
+           light_field_.IsPresent(k, l);
+  }
+  const cv::Mat& ViewAt(int k, int l) {
+    cv::Mat& view = views_[{l, k}];
+    if (view.empty()) view = ComparedView(light_field_, k, l);
+    return view;
+  }
+
+  const model::LightField& light_field_;
+  int step_ = 1;
+  Vector2 across_, down_;
+  double usually_unlike_ = 0;  // the largest share of tiles without a match in the middle
+  bool usually_contradicts_ = false;
+  std::map<std::pair<int, int>, cv::Mat> views_;
+};
+
+// An order that the other steps do not have is undecided.
+ViewOrderFinding Checked(const model::LightField& light_field, const Triple& middle,
+                         const ViewOrderFinding& finding) {
+  const auto order =
+      std::find_if(Hypotheses().begin(), Hypotheses().end(), [&](const Hypothesis& hypothesis) {
+        // Of a single row or column only the axis was decided.
+        return hypothesis.order == finding.order;
+      });
+  if (order == Hypotheses().end()) return finding;
+  StepCheck check(light_field, middle, *order, finding.step_ratio);
+  std::vector<std::string> wrong;
+  int tested = 0;
+  for (int l = 0; l < light_field.v_count; ++l) {
+    check.ForgetAbove(l);
+    for (int k = 0; k < light_field.u_count; ++k) {
+      if (!light_field.IsPresent(k, l)) continue;
+      ++tested;
+      if (!check.Fits(k, l)) wrong.push_back(fmt::format("({}, {})", k, l));
+    }
+  }
+  if (static_cast<double>(wrong.size()) < std::max(2.0, kMayNotFit * tested)) return finding;
+  ViewOrderFinding undecided;
+  undecided.is_line = finding.is_line;
+  undecided.why = fmt::format(
+      "{} of {} views do not fit their neighbours as those in the middle do: {}; they may be in "
+      "another order, or there may be another number of views",
+      wrong.size(), tested, Listed(wrong));
+  return undecided;
 }
 
 }  // namespace
@@ -380,7 +590,7 @@ ViewOrderFinding FindViewOrder(const model::LightField& light_field) {
     if (next.order != ViewOrder::kUndecided) {
       // Large shifts between distant views look irregular.
       if (next.order == ViewOrder::kIrregular && step > 1) return finding;
-      return next;
+      return Checked(light_field, *triple, next);
     }
     finding = next;
   }

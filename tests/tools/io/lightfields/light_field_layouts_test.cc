@@ -372,6 +372,46 @@ TEST_F(LightFieldLayouts, ViewsSideBySideAndLenslets) {
   EXPECT_THAT(facts_.one_line, HasSubstr("lenslets of 3 x 3 px"));
 }
 
+// Another number of tiles or of pixels in a lenslet than that of the image.
+TEST_F(LightFieldLayouts, WrongNumbersOfViewsAreNotConfirmed) {
+  constexpr int kSide = 4;
+  cv::Mat tiles(kSide * kViewHeightPx, kSide * kViewWidthPx, CV_8UC3),
+      lenslets(kSide * kViewHeightPx, kSide * kViewWidthPx, CV_8UC3);
+  for (int l = 0; l < kSide; ++l) {
+    for (int k = 0; k < kSide; ++k) {
+      const cv::Mat view = View(k, l);
+      view.copyTo(
+          tiles(cv::Rect(k * kViewWidthPx, l * kViewHeightPx, kViewWidthPx, kViewHeightPx)));
+      for (int y = 0; y < kViewHeightPx; ++y) {
+        for (int x = 0; x < kViewWidthPx; ++x)
+          lenslets.at<cv::Vec3b>(kSide * y + l, kSide * x + k) = view.at<cv::Vec3b>(y, x);
+      }
+    }
+  }
+  LightFieldReading reading;
+  reading.layout = "tiles";
+  reading.layout_u = reading.layout_v = 8;
+  Read(folder_.Put("tiles.png", EncodedTile(tiles)), reading);
+  EXPECT_THAT(facts_.one_line, Not(HasSubstr("agree with")));
+  reading.layout = "lenslets";
+  reading.layout_u = reading.layout_v = 3;
+  Read(folder_.Put("lenslets.png", EncodedTile(lenslets)), reading);
+  EXPECT_THAT(facts_.one_line, Not(HasSubstr("agree with")));
+  // Every third pixel of a photograph.
+  Read(folder_.Put("photo.png", EncodedTile(View(0, 0))), reading);
+  EXPECT_THAT(facts_.one_line, Not(HasSubstr("agree with")));
+}
+
+TEST_F(LightFieldLayouts, OneRowDoesNotShowItsDirection) {
+  for (int u = 0; u < 5; ++u)
+    folder_.Put("lf/v_0_" + std::to_string(u) + ".png", EncodedTile(View(u - 2, 0)));
+  LightFieldReading reading;
+  reading.name = "v_{v}_{u}.png";
+  Read(folder_ / "lf", reading);
+  EXPECT_THAT(facts_.one_line, HasSubstr("whether they count backwards cannot be decided"));
+  EXPECT_THAT(facts_.notices, IsEmpty());
+}
+
 TEST_F(LightFieldLayouts, WhatDoesNotFitIsNamed) {
   const std::string path = Folder(RowAndColumn, InOrder);
   LightFieldReading reading;

@@ -13,6 +13,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "thicklens/io/light_field_io.h"
@@ -247,6 +248,56 @@ TEST(ViewOrderOfShifts, ShuffledViewsAreNotInAnyOrder) {
         return std::array<int, 2>{shuffled % 4, shuffled / 4};
       }));
   EXPECT_THAT(finding.order, AnyOf(ViewOrder::kIrregular, ViewOrder::kUndecided));
+}
+
+// The views in the middle are in order, others are not.
+TEST(ViewOrderOfShifts, AnOrderThatOnlySomeViewsHaveIsUndecided) {
+  const std::vector<std::pair<const char*, OrderPlace>> orders = {
+      {"the first row backwards",
+       [](int k, int l) {
+         return std::array<int, 2>{l == 0 ? 4 - k : k, l};
+       }},
+      {"the last row backwards",
+       [](int k, int l) {
+         return std::array<int, 2>{l == 4 ? 4 - k : k, l};
+       }},
+      {"two rows exchanged",
+       [](int k, int l) {
+         return std::array<int, 2>{k, l == 0 ? 1 : l == 1 ? 0 : l};
+       }},
+      {"two columns exchanged", [](int k, int l) {
+         return std::array<int, 2>{k == 0 ? 4 : k == 4 ? 0 : k, l};
+       }}};
+  for (const OrderScene& scene :
+       {OrderScene{RichTexture, {1, 0.5, -1}, 0.01}, OrderScene{RichTexture, {0.4, 0.4, 0.4}}}) {
+    for (const auto& [name, place] : orders) {
+      const ViewOrderFinding finding = FindViewOrder(OrderedLightField(scene, 5, 5, place));
+      EXPECT_THAT(finding.order, AnyOf(ViewOrder::kUndecided, ViewOrder::kIrregular)) << name;
+      EXPECT_TRUE(finding.order == ViewOrder::kIrregular || finding.why != "") << name;
+    }
+  }
+}
+
+TEST(ViewOrderOfShifts, FiveByFiveViewsOfEveryOrder) {
+  ExpectEveryOrder({RichTexture, {1, 0.5, -1}, 0.02}, 5, 5);
+  ExpectEveryOrder({RichTexture, {0.3, 0.4, -0.3}, 0.01}, 5, 5);
+}
+
+// A quilt whose rows of tiles are read from the top: within a row the views are in order.
+TEST(ViewOrderOfShifts, JumpsWithinOneRowAreUndecided) {
+  const ViewOrderFinding finding =
+      FindViewOrder(OrderedLightField({RichTexture, {1, 0.5, -1}, 0.01}, 12, 1, [](int k, int l) {
+        return std::array<int, 2>{4 * (2 - k / 4) + k % 4, l};
+      }));
+  EXPECT_THAT(finding.order, AnyOf(ViewOrder::kUndecided, ViewOrder::kIrregular));
+}
+
+TEST(ViewOrderOfShifts, DisparitiesAreThoseOfTheScene) {
+  const ViewOrderFinding finding = FindViewOrder(
+      OrderedLightField({RichTexture, {0.5, 0.5, 0.5}}, 3, 3, KnownOrders()[0].place));
+  EXPECT_NEAR(finding.least_px, 0.5, 0.1);
+  EXPECT_NEAR(finding.most_px, 0.5, 0.1);
+  EXPECT_FALSE(finding.is_line);
 }
 
 TEST(ViewOrderOfShifts, AnotherStepDownIsFound) {
