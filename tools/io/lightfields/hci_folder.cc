@@ -92,7 +92,9 @@ int InferredRowLength(const std::string& folder, const HciViews& views) {
   const std::vector<int>& numbers = views.numbers;
   const auto count = static_cast<int>(numbers.size());
   const auto edge = static_cast<int>(std::lround(std::sqrt(count)));
-  if (edge * edge == count && numbers.back() == count - 1) return edge;
+  // Copies of the benchmark may count from 1.
+  const bool is_gapless = numbers.front() <= 1 && numbers.back() - numbers.front() == count - 1;
+  if (edge * edge == count && is_gapless) return edge;
   throw Error(
       fmt::format("{}: {} views from {} to {} do not form a full square, and there is no {}: "
                   "the option grid must state how many views the numbering counts per row",
@@ -117,13 +119,14 @@ std::optional<ViewSource> OpenHciFolder(const LayoutInput& input) {
     ReportInput((fs::path(folder) / HciFile(number, views.ending)).string());
   const int stated = input.reading->grid > 0 ? input.reading->grid : input.reading->layout_u;
   const int row = stated > 0 ? stated : InferredRowLength(folder, views);
+  const int first = FirstOfNumbering(numbers, row);
   int first_u = row, last_u = 0;
   for (const int number : numbers) {
-    first_u = std::min(first_u, number % row);
-    last_u = std::max(last_u, number % row);
+    first_u = std::min(first_u, (number - first) % row);
+    last_u = std::max(last_u, (number - first) % row);
   }
-  const int first_v = numbers.front() / row;
-  const int last_v = numbers.back() / row;
+  const int first_v = (numbers.front() - first) / row;
+  const int last_v = (numbers.back() - first) / row;
 
   ViewSource source;
   source.kind = "a folder in the HCI layout";
@@ -131,8 +134,14 @@ std::optional<ViewSource> OpenHciFolder(const LayoutInput& input) {
   model::LightField& frame = source.frame;
   frame.u_count = last_u - first_u + 1;
   frame.v_count = last_v - first_v + 1;
-  const auto number_of = [row, first_u, first_v](int k, int l) {
-    return (first_v + l) * row + first_u + k;
+  if (first > 0) {
+    source.notices.push_back(fmt::format(
+        "{}: its views are numbered from {}, not from 0 as in the benchmark: {} is taken as the "
+        "first view of the first row",
+        folder, first, HciFile(first, views.ending)));
+  }
+  const auto number_of = [row, first, first_u, first_v](int k, int l) {
+    return first + (first_v + l) * row + first_u + k;
   };
   frame.weights = Eigen::ArrayXXd::Zero(frame.v_count, frame.u_count);
   std::vector<std::string> missing;
@@ -147,7 +156,7 @@ std::optional<ViewSource> OpenHciFolder(const LayoutInput& input) {
   if (missing.empty()) frame.present.clear();
   if (!missing.empty() && !input.reading->sparse) ThrowMissingViews(folder, missing);
   if (!missing.empty()) source.details.push_back(fmt::format("missing: {}", Listed(missing)));
-  source.is_plain = source.details.empty();
+  source.is_plain = source.details.empty() && first == 0;
   frame.origin.method = "imported";
   source.read = [folder, number_of, ending = views.ending](int k, int l) {
     const std::string path = (fs::path(folder) / HciFile(number_of(k, l), ending)).string();

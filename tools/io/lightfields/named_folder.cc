@@ -44,8 +44,9 @@ std::optional<ViewSource> OpenNamedFolder(const LayoutInput& input) {
   ViewSource source;
   source.kind = fmt::format("a folder of views named '{}'", PrintableUtf8(text));
   source.frame = grid.frame;
-  source.details.push_back(pattern.HasRowAndColumn() ? "{v} is the row, {u} the column"
-                                                     : "{n} counts row by row");
+  source.details.push_back(pattern.HasRowAndColumn()
+                               ? "{v} is the row, {u} the column"
+                               : fmt::format("{{n}} counts row by row from {}", grid.first_number));
   if (!others.empty()) source.details.push_back(fmt::format("not views: {}", Listed(others)));
   for (const std::string& file : grid.files) {
     if (!file.empty()) ReportInput((fs::path(input.path) / file).string());

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstdlib>
 #include <numeric>
 
@@ -107,6 +108,24 @@ ViewGrid GridOfViews(const std::string& path, const std::vector<NumberedView>& v
   return grid;
 }
 
+int FirstOfNumbering(const std::vector<int>& numbers, int row) {
+  if (numbers.empty() || numbers.front() < 1) return 0;
+  const bool may_be_one =
+      numbers.front() == 1 || static_cast<std::int64_t>(row) * row == numbers.back();
+  if (!may_be_one) return 0;
+  // All rectangles hold the same views: the smaller one has fewer missing.
+  const auto places_from = [&](int first) {
+    int least = row, most = 0;
+    for (const int number : numbers) {
+      least = std::min(least, (number - first) % row);
+      most = std::max(most, (number - first) % row);
+    }
+    const std::int64_t rows = (numbers.back() - first) / row - (numbers.front() - first) / row + 1;
+    return rows * (most - least + 1);
+  };
+  return places_from(1) < places_from(0) ? 1 : 0;
+}
+
 ViewGrid GridOfNumbers(const std::string& path, const std::vector<NumberedView>& views,
                        const LightFieldReading& reading) {
   const auto [least, most] = std::minmax_element(
@@ -115,9 +134,15 @@ ViewGrid GridOfNumbers(const std::string& path, const std::vector<NumberedView>&
   const auto count = static_cast<int>(views.size());
   int row = reading.layout_u > 0 ? reading.layout_u : reading.grid;
   const bool is_gapless = most->u - least->u == count - 1;
-  // The option counts from 0; numbers that begin at 1 are shifted if they form the full rectangle.
+  // Numbers with any start may form the full rectangle; others count from 0 or 1.
   const bool is_full = row > 0 && is_gapless && count % row == 0;
-  const int first = row > 0 && least->u > 0 && !is_full ? 0 : least->u;
+  int first = least->u;
+  if (row > 0 && least->u > 0 && !is_full) {
+    std::vector<int> numbers;
+    for (const NumberedView& view : views) numbers.push_back(view.u);
+    std::sort(numbers.begin(), numbers.end());
+    first = FirstOfNumbering(numbers, row);
+  }
   if (row <= 0) {
     row = static_cast<int>(std::lround(std::sqrt(count)));
     if (row * row != count || !is_gapless) {
@@ -130,7 +155,9 @@ ViewGrid GridOfNumbers(const std::string& path, const std::vector<NumberedView>&
   std::vector<NumberedView> placed;
   for (const NumberedView& view : views)
     placed.push_back({(view.u - first) % row, (view.u - first) / row, view.file});
-  return GridOfViews(path, placed, reading);
+  ViewGrid grid = GridOfViews(path, placed, reading);
+  grid.first_number = first;
+  return grid;
 }
 
 }  // namespace thicklens::io

@@ -20,6 +20,7 @@ struct NumberedView {
 struct ViewGrid {
   model::LightField frame;         // counts, weights and present views
   std::vector<std::string> files;  // index l * U + k; empty: the view is missing
+  int first_number = 0;            // of GridOfNumbers: the number of the first view of a row
   const std::string& At(int k, int l) const {
     return files[static_cast<std::size_t>(l * frame.u_count + k)];
   }
@@ -29,8 +30,13 @@ struct ViewGrid {
 ViewGrid GridOfViews(const std::string& path, const std::vector<NumberedView>& views,
                      const LightFieldReading& reading);
 
-// Places views that have one number each, counted from 0 row by row. The length of a row is that
-// of the options layout or grid; otherwise the views must form a full square.
+// The number of the first view in a row-by-row numbering with rows of `row` views: 0, or 1 if 0 is
+// not among the sorted numbers, the first or the last view of a square from 1 is, and fewer views
+// are missing then within the rectangle of those that are there.
+int FirstOfNumbering(const std::vector<int>& numbers, int row);
+// Places views that have one number each, counted row by row from 0, from 1 (FirstOfNumbering), or
+// from another number if they form a full rectangle. The length of a row is that of the options
+// layout or grid; otherwise the views must form a full square.
 ViewGrid GridOfNumbers(const std::string& path, const std::vector<NumberedView>& views,
                        const LightFieldReading& reading);
 

@@ -237,6 +237,30 @@ TEST_F(LightFieldLayouts, HciNamesMayBeOfJpegFiles) {
   EXPECT_NEAR(LevelAt(light_field, 2, 0, 30, 20), View(1, -1).at<cv::Vec3b>(20, 30)[0], 4);
 }
 
+TEST_F(LightFieldLayouts, HciNumbersMayBeginAtOne) {
+  const std::string path = Folder(
+      [](int v, int u) { return "input_Cam00" + std::to_string(3 * v + u + 1) + ".png"; }, InOrder);
+  LightFieldReading reading;
+  for (const bool is_stated : {false, true}) {
+    reading.grid = is_stated ? 3 : 0;
+    reading.sparse = is_stated;
+    ExpectViews(Read(path, reading));
+    EXPECT_THAT(facts_.notices,
+                ElementsAre(AllOf(HasSubstr("from 1"), HasSubstr("input_Cam001.png"))));
+  }
+  std::remove((path + "/input_Cam005.png").c_str());
+  const model::LightField light_field = Read(path, reading);
+  ASSERT_EQ(light_field.u_count, 3);
+  ASSERT_EQ(light_field.v_count, 3);
+  EXPECT_FALSE(light_field.IsPresent(1, 1));
+  EXPECT_EQ(LevelAt(light_field, 2, 2, 30, 20), View(1, 1).at<cv::Vec3b>(20, 30)[0]);
+  reading.name = "input_Cam{n}.png";
+  const model::LightField named = Read(path, reading);
+  ASSERT_EQ(named.v_count, 3);
+  EXPECT_FALSE(named.IsPresent(1, 1));
+  EXPECT_THAT(facts_.one_line, HasSubstr("row by row from 1"));
+}
+
 TEST_F(LightFieldLayouts, BlackViewsAreNamedAndLeftOut) {
   const model::LightField light_field = Read(Folder(RowAndColumn, [](int u, int v) {
     return u == 2 && v == 0 ? cv::Mat(kViewHeightPx, kViewWidthPx, CV_8UC3, cv::Scalar(0, 1, 0))
