@@ -3,11 +3,9 @@
 
 #include <fmt/format.h>
 
-#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
-#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -16,9 +14,11 @@
 #include "thicklens/depth.h"
 #include "thicklens/image.h"
 #include "thicklens/io/files_read.h"
+#include "thicklens/io/light_field_io.h"
 #include "thicklens/light_field.h"
 #include "tools/commands/commands.h"
 #include "tools/options/command_frame.h"
+#include "tools/options/compared_inputs.h"
 #include "tools/options/interface_options.h"
 #include "tools/options/light_field_options.h"
 #include "tools/options/option_values.h"
@@ -29,7 +29,6 @@
 namespace thicklens::tools {
 namespace {
 
-namespace fs = std::filesystem;
 using Rect = std::optional<model::PixelRect>;
 
 constexpr int kMaxBorderPx = 100000;
@@ -39,18 +38,11 @@ struct CompareOptions {
   std::string reference_path, other_path;
   int border_px = 0;
   ReadingOptions reading;
+  OtherReadingOptions other_reading;
   std::vector<std::string> dibr_paths;  // empty, or the photograph and its depth map
   DepthOptions depth;
   std::vector<std::string> without;  // effects that the photograph of --dibr lacks
 };
-
-bool IsFolder(const std::string& path) {
-  std::error_code failure;
-  const fs::file_status status = fs::status(path, failure);
-  if (!fs::exists(status))
-    throw Error(fmt::format("{}: there is no such file or folder", PrintableUtf8(path)));
-  return fs::is_directory(status);
-}
 
 // Returns false for an image that has the rectangle's size already: it was cropped before.
 bool IsToCrop(const Rect& crop, int width_px, int height_px) {
@@ -73,11 +65,22 @@ OptionNames CompareOptionNames() {
 
 CommandResult CompareImageFiles(const CompareOptions& options) {
   const LightFieldReadOptions reading = LightFieldReadOptionsOf(options.reading);
+  const OtherReadingOptions& replaced = options.other_reading;
   if (reading.hci_grid > 0 || reading.allow_missing_views || reading.inner_views ||
+      !options.reading.view_order.empty() || replaced.grid > 0 || !replaced.view_order.empty() ||
       !options.dibr_paths.empty()) {
-    throw UsageError(
-        fmt::format("--grid, --sparse, --views and --dibr are for light fields, but {} is an image",
-                    PrintableUtf8(options.reference_path)));
+    throw UsageError(fmt::format(
+        "--grid, --sparse, --views, --view-order and --dibr are for light fields, but {} is an "
+        "image; --layout states that it is one",
+        PrintableUtf8(options.reference_path)));
+  }
+  for (const std::string& path : {options.reference_path, options.other_path}) {
+    const std::string layout = io::LayoutThatIsStated(path);
+    if (layout.empty()) continue;
+    ReportNotice({Notice::Level::kWarning,
+                  fmt::format("{}: its name is that of a light field, but two images are compared; "
+                              "--layout {} compares two light fields",
+                              PrintableUtf8(path), layout)});
   }
   Image reference = thicklens::ReadImage(options.reference_path);
   const auto reference_facts = reference.facts();
@@ -120,11 +123,35 @@ Baseline ReadBaseline(const CompareOptions& options, const Rect& crop, bool has_
   return baseline;
 }
 
-LightFieldScores ScoresOf(const CompareOptions& options, const RunControl& run) {
-  LightFieldReadOptions reading = LightFieldReadOptionsOf(options.reading);
-  LightField reference = ReadLightField(options.reference_path, reading, run);
-  const Rect crop = std::exchange(reading.crop, std::nullopt);
-  LightField other = ReadLightField(options.other_path, reading, run);
+// Reads one of both light fields. If one is a folder and the other a file, what is wrong with one
+// may be that the user meant another pair.
+LightField ReadCompared(const ComparedInput& input, const ComparedInput& partner,
+                        const LightFieldReadOptions& reading, const RunControl& run) {
+  try {
+    return ReadLightField(input.path, reading, run);
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const OptionError&) {
+    throw;
+  } catch (const Error& error) {
+    if (input.is_folder == partner.is_folder) throw;
+    throw Error(
+        fmt::format("{} (two images or two light fields are expected, found the {} {} and "
+                    "the {} {})",
+                    error.what(), input.is_folder ? "folder" : "file", PrintableUtf8(input.path),
+                    partner.is_folder ? "folder" : "file", PrintableUtf8(partner.path)));
+  }
+}
+
+LightFieldScores ScoresOf(const CompareOptions& options, const ComparedInput& reference_input,
+                          const ComparedInput& other_input, const RunControl& run) {
+  const ComparedReadings readings =
+      ReadingsOf(options.reading, options.other_reading, reference_input, other_input);
+  const LightFieldReadOptions reference_reading = LightFieldReadOptionsOf(readings.reference);
+  LightFieldReadOptions other_reading = LightFieldReadOptionsOf(readings.other);
+  LightField reference = ReadCompared(reference_input, other_input, reference_reading, run);
+  const Rect crop = std::exchange(other_reading.crop, std::nullopt);
+  LightField other = ReadCompared(other_input, reference_input, other_reading, run);
   if (IsToCrop(crop, other.s_count, other.t_count))
     other = WithFileContext(options.other_path, [&] { return model::CropViews(other, *crop); });
   thicklens::CompareOptions asked;
@@ -135,28 +162,34 @@ LightFieldScores ScoresOf(const CompareOptions& options, const RunControl& run) 
   return CompareLightFields(std::move(reference), std::move(other), std::move(asked), run);
 }
 
-CommandResult CompareFolders(const CompareOptions& options) {
+CommandResult CompareTwoLightFields(const CompareOptions& options, const ComparedInput& reference,
+                                    const ComparedInput& other) {
   const CommandRun run(options.common, CompareOptionNames());
-  const LightFieldScores scores =
-      WithOptionNames(run.names(), [&] { return ScoresOf(options, run.control()); });
+  const LightFieldScores scores = WithOptionNames(
+      run.names(), [&] { return ScoresOf(options, reference, other, run.control()); });
   PrintResult(options.common,
               LightFieldScoresText(scores, options.border_px, options.common.verbose));
   return {LightFieldScoresJson(scores, options.border_px), ""};
 }
 
+// Whether an input can only be a light field: a folder, or a file of arrays.
+bool IsSurelyLightField(const ComparedInput& input) {
+  if (input.is_folder) return true;
+  const std::string layout = io::LayoutThatIsStated(input.path);
+  return layout == "mat" || layout == "hdf5";
+}
+
 CommandResult Compare(const CompareOptions& options) {
-  const bool is_folder = IsFolder(options.reference_path);
-  if (is_folder != IsFolder(options.other_path)) {
-    const std::string& folder = is_folder ? options.reference_path : options.other_path;
-    const std::string& file = is_folder ? options.other_path : options.reference_path;
-    throw Error(
-        fmt::format("two images or two folders with light fields are expected, found the "
-                    "folder {} and the file {}",
-                    PrintableUtf8(folder), PrintableUtf8(file)));
-  }
-  // A file is a light field only if the options say so.
-  const bool is_light_field = is_folder || !options.reading.layout.empty();
-  return is_light_field ? CompareFolders(options) : CompareImageFiles(options);
+  const ComparedInput reference = ComparedInputOf(options.reference_path);
+  const ComparedInput other = ComparedInputOf(options.other_path);
+  // Two image files are light fields only if the options say so.
+  const bool is_stated = !options.reading.layout.empty() || !options.reading.name.empty() ||
+                         !options.other_reading.layout.empty() ||
+                         !options.other_reading.name.empty();
+  const bool is_light_field =
+      is_stated || IsSurelyLightField(reference) || IsSurelyLightField(other);
+  return is_light_field ? CompareTwoLightFields(options, reference, other)
+                        : CompareImageFiles(options);
 }
 
 // ---- The command line.
@@ -202,6 +235,7 @@ void AddCompareCommand(CLI::App* program, CommandAction* action) {
       ->capture_default_str()
       ->type_name("PX");
   AddReadingOptions(command, &options->reading);
+  AddOtherReadingOptions(command, &options->other_reading);
   AddDibrOptions(command, options.get());
   AddCommonOptions(command, &options->common);
   command->callback([options, action] {

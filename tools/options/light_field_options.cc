@@ -83,7 +83,7 @@ LayoutRequest LayoutOf(const std::string& text) {
 
 ViewOrderChange ViewOrderOf(const std::string& text) {
   ViewOrderChange change;
-  if (text.empty()) return change;
+  if (text.empty() || text == "none") return change;
   for (std::size_t begin = 0; begin <= text.size();) {
     const std::size_t end = std::min(text.find(',', begin), text.size());
     const std::string word = text.substr(begin, end - begin);
@@ -93,8 +93,8 @@ ViewOrderChange ViewOrderOf(const std::string& text) {
                                             : nullptr;
     if (flag == nullptr || *flag) {
       throw UsageError(fmt::format(
-          "--view-order: swap, mirror-u and mirror-v, each once, with commas between them are "
-          "expected, found '{}'",
+          "--view-order: swap, mirror-u and mirror-v, each once, with commas between them, or "
+          "none are expected, found '{}'",
           text));
     }
     *flag = true;

@@ -460,8 +460,9 @@ TEST_F(CompareProgram, MismatchesAreReportedInOneLine) {
   const std::string missing = folder_ / "missing.png";
   EXPECT_THAT(Failure({image, missing}), AllOf(HasSubstr("missing.png"), HasSubstr("no such")));
   EXPECT_THAT(Failure({missing, folder}), AllOf(HasSubstr("missing.png"), HasSubstr("no such")));
-  EXPECT_THAT(Failure({image, folder}), AllOf(HasSubstr("a.png"), HasSubstr("truth")));
-  EXPECT_THAT(Failure({folder, image}), AllOf(HasSubstr("a.png"), HasSubstr("truth")));
+  const std::string noise = PutImage("noise.png", Noisy(View(0, 0), 255, 3));
+  EXPECT_THAT(Failure({noise, folder}), AllOf(HasSubstr("noise.png"), HasSubstr("truth")));
+  EXPECT_THAT(Failure({folder, noise}), AllOf(HasSubstr("noise.png"), HasSubstr("truth")));
   EXPECT_THAT(Failure({image, small}), AllOf(HasSubstr("44x36"), HasSubstr("20x20")));
   EXPECT_THAT(Failure({image, grey}), HasSubstr("channel"));
   EXPECT_THAT(Failure({image, image, "--border", "18"}), HasSubstr("0 to 17"));
@@ -477,6 +478,36 @@ TEST_F(CompareProgram, MismatchesAreReportedInOneLine) {
   EXPECT_THAT(with_dibr(grey, depth), HasSubstr("grey.png"));
   EXPECT_THAT(with_dibr(image, PutDepth("small.pfm", 1, 20, 20)),
               AllOf(HasSubstr("small.pfm"), HasSubstr("20x20")));
+}
+
+// Views side by side, and a quilt's name.
+TEST_F(CompareProgram, AFileOfViewsIsComparedWithAFolder) {
+  model::EncodedImage tiles{3 * kWide, 3 * kHigh, 3, 8, {}};
+  for (int y = 0; y < tiles.height_px; ++y) {
+    for (int x = 0; x < tiles.width_px; ++x) {
+      for (int channel = 0; channel < 3; ++channel) {
+        const int a = x / kWide - 1, b = y / kHigh - 1;
+        tiles.values.push_back(static_cast<std::uint16_t>(std::lround(
+            Texture(x % kWide + a * kDisparityPx, y % kHigh + b * kDisparityPx, channel))));
+      }
+    }
+  }
+  const std::string folder = PutHci("truth", 3, 0);
+  const std::string file = PutImage("tiles_qs3x3.png", tiles);
+  for (const Arguments& inputs : {Arguments{folder, file}, Arguments{file, folder}}) {
+    const Json json = Summary({inputs[0], inputs[1], "--grid", "7", "--layout", "tiles:3x3"});
+    EXPECT_EQ(json["views"], Json({3, 3}));
+    EXPECT_EQ(json["identical_views"], 9);
+  }
+  const Json by_other = Summary({folder, file, "--grid", "7", "--other-layout", "tiles:3x3"});
+  EXPECT_EQ(by_other["identical_views"], 9);
+  EXPECT_THAT(Failure({folder, file, "--grid", "7", "--view-order", "swap"}, 2),
+              HasSubstr("--other-view-order"));
+  // Two such files are images, and a notice says that they may be more.
+  const ProgramResult result = Run({file, file});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.err, HasSubstr("--layout quilt"));
+  EXPECT_THAT(result.out, HasSubstr("identical"));
 }
 
 TEST_F(CompareProgram, RefusesWrongUsage) {

@@ -93,7 +93,8 @@ int InferredRowLength(const std::string& folder, const HciViews& views) {
   const auto count = static_cast<int>(numbers.size());
   const auto edge = static_cast<int>(std::lround(std::sqrt(count)));
   // Copies of the benchmark may count from 1.
-  const bool is_gapless = numbers.front() <= 1 && numbers.back() - numbers.front() == count - 1;
+  const bool is_first = numbers.front() == 0 || (numbers.front() == 1 && count > 1);
+  const bool is_gapless = is_first && numbers.back() - numbers.front() == count - 1;
   if (edge * edge == count && is_gapless) return edge;
   throw Error(
       fmt::format("{}: {} views from {} to {} do not form a full square, and there is no {}: "

@@ -60,6 +60,9 @@ std::optional<ViewSource> OpenImageParts(const LayoutInput& input);
 std::optional<ViewSource> OpenMatFile(const LayoutInput& input);
 std::optional<ViewSource> OpenHdf5File(const LayoutInput& input);
 
+// Whether the name of a file is that of a quilt, or of an image of lenslets.
+bool IsNamedQuilt(const std::string& path);
+bool IsNamedEslf(const std::string& path);
 // Whether it is a MAT or HDF5 file, which no other reader can read.
 bool IsFileOfArrays(const std::string& path);
 

@@ -21,12 +21,8 @@
 #include "tools/io/lightfields/view_pixels.h"
 
 namespace thicklens::io {
-namespace {
 
 namespace fs = std::filesystem;
-
-constexpr int kLytroPx = 14;
-constexpr int kMaxLensletPx = 100;
 
 bool IsNamedEslf(const std::string& path) {
   std::string name = fs::path(path).stem().string();
@@ -34,6 +30,11 @@ bool IsNamedEslf(const std::string& path) {
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return name.find("eslf") != std::string::npos;
 }
+
+namespace {
+
+constexpr int kLytroPx = 14;
+constexpr int kMaxLensletPx = 100;
 
 // The pixels (k, l) of all lenslets.
 cv::Mat ViewOfLenslets(const cv::Mat& pixels, AxisCounts lenslet, int k, int l) {

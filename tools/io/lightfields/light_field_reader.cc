@@ -15,6 +15,7 @@
 #include "thicklens/base/parallel.h"
 #include "thicklens/base/printable_text.h"
 #include "thicklens/io/light_field_io.h"
+#include "tools/io/array_file.h"
 #include "tools/io/image_file_kind.h"
 #include "tools/io/image_names.h"
 #include "tools/io/lightfields/layout.h"
@@ -446,6 +447,15 @@ std::vector<std::string> LightFieldLayouts() {
   std::vector<std::string> names;
   for (const ViewLayout& layout : kLayouts) names.emplace_back(layout.name);
   return names;
+}
+
+bool IsLayoutOfFolders(const std::string& layout) { return LayoutNamed(layout).is_of_folders; }
+
+std::string LayoutThatIsStated(const std::string& file) {
+  if (const std::optional<ArrayFormat> format = FormatOfArrays(file))
+    return *format == ArrayFormat::kMat ? "mat" : "hdf5";
+  if (IsNamedQuilt(file)) return "quilt";
+  return IsNamedEslf(file) ? "lenslets" : "";
 }
 
 model::LightField ReadLightField(const std::string& folder, const LightFieldReading& reading) {

@@ -45,6 +45,10 @@ std::optional<QuiltSize> SizeInName(const std::string& name) {
 
 }  // namespace
 
+bool IsNamedQuilt(const std::string& path) {
+  return SizeInName(fs::path(path).filename().string()).has_value();
+}
+
 std::optional<ViewSource> OpenQuilt(const LayoutInput& input) {
   std::optional<QuiltSize> size = SizeInName(fs::path(input.path).filename().string());
   if (input.reading->layout_u > 0 && input.is_forced)

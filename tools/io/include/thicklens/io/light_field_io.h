@@ -46,6 +46,11 @@ struct LightFieldFacts {
 // Names of the layouts: "thicklens", "hci", "stanford", "names" (folders); "mat", "hdf5", "quilt",
 // "parts", "lenslets", "tiles" (files).
 THICKLENS_EXPORT std::vector<std::string> LightFieldLayouts();
+// Whether one of these is the layout of a folder.
+THICKLENS_EXPORT bool IsLayoutOfFolders(const std::string& layout);
+// The layout of a file that its contents or its name state for certain: "mat", "hdf5", "quilt" or
+// "lenslets"; otherwise empty.
+THICKLENS_EXPORT std::string LayoutThatIsStated(const std::string& file);
 
 // Reads a light field in one of these layouts (docs/file-formats.md), then takes the inner views
 // and the crop. All but our own are relative, sRGB unless the files state linear light, with
