@@ -74,3 +74,9 @@ with h5py.File("virtual.h5", "w") as file:
     layout = h5py.VirtualLayout(shape=(3, 3, 4, 5, 3), dtype="u1", maxshape=(None, 3, 4, 5, 3))
     layout[0:h5py.h5s.UNLIMITED:1] = source[0:h5py.h5s.UNLIMITED:1]
     file.create_virtual_dataset("LF", layout)
+
+# Views in one axis, row by row.
+with h5py.File("numbered.h5", "w") as file:
+    file.create_dataset("LF", data=LEVELS.reshape(ROWS * COLUMNS, HEIGHT, WIDTH, 3))
+scipy.io.savemat("numbered-5.mat", {"LF": LEVELS.reshape(ROWS * COLUMNS, HEIGHT, WIDTH, 3)},
+                 do_compression=True)

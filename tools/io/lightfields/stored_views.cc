@@ -16,6 +16,7 @@
 #include "thicklens/base/error.h"
 #include "thicklens/base/printable_text.h"
 #include "tools/io/array_file.h"
+#include "tools/io/lightfields/image_tiles.h"
 #include "tools/io/lightfields/layout.h"
 #include "tools/io/lightfields/view_grid.h"
 #include "tools/io/lightfields/view_pixels.h"
@@ -102,16 +103,50 @@ bool SetChannels(std::uint64_t channels, ViewArray* views) {
   }
 }
 
-ViewArray ArrayOf(const std::string& path, const StoredArray& array, ArrayFormat format) {
+// Views that are this narrow are colours: an array of four axes is then (n, y, x, c).
+constexpr std::uint64_t kMaxColours = 4;
+
+// Throws Error about an array of four axes whose last one is that of the colours.
+[[noreturn]] void ThrowViewsInOneAxis(const std::string& path, const StoredArray& array,
+                                      ArrayFormat format, std::uint64_t count) {
+  const auto edge = static_cast<std::uint64_t>(std::llround(std::sqrt(static_cast<double>(count))));
+  const bool is_square = edge * edge == count;
+  throw Error(fmt::format(
+      "{}: {} has four axes, {}, of which the last would be views {} px wide; if it is that of the "
+      "colours and {} views count row by row along the first, the option layout states how many "
+      "there are across and down: {}:{}",
+      path, PrintableUtf8(array.name), SizeInWords(array, format),
+      format == ArrayFormat::kHdf5 ? array.size.front() : array.size.back(), count,
+      format == ArrayFormat::kMat ? "mat" : "hdf5",
+      is_square ? fmt::format("{}x{}", edge, edge) : "UxV"));
+}
+
+// The views of an array; the options may state how many there are across and down.
+ViewArray ArrayOf(const std::string& path, const StoredArray& array, ArrayFormat format,
+                  AxisCounts stated) {
   std::vector<std::uint64_t> size = array.size;
   ViewArray views;
   views.number = array.number;
   std::array<ArrayAxis*, 5> axes = {&views.row, &views.column, &views.y, &views.x, &views.channel};
-  if (format == ArrayFormat::kHdf5) {
+  const bool is_hdf = format == ArrayFormat::kHdf5;
+  const bool has_four = size.size() == 4;
+  const std::uint64_t first = is_hdf ? size.back() : size.front();
+  const auto across = static_cast<std::uint64_t>(stated.across);
+  const auto down = static_cast<std::uint64_t>(stated.down);
+  const bool is_colour = (is_hdf ? size.front() : size.back()) <= kMaxColours;
+  const bool is_split = has_four && across > 0 && first == across * down && is_colour;
+  if (is_split) {
+    // (n, y, x, c): the column counts fastest.
+    (is_hdf ? size.back() : size.front()) = across;
+    size.insert(is_hdf ? size.end() : size.begin() + 1, down);
+    if (!is_hdf) std::swap(axes[0], axes[1]);
+  } else if (has_four && is_colour) {
+    ThrowViewsInOneAxis(path, array, format, first);
+  } else if (has_four && is_hdf) {
     // Grey images have no last axis, which is the first here.
-    if (size.size() == 4) size.insert(size.begin(), 1);
-    std::reverse(axes.begin(), axes.end());
+    size.insert(size.begin(), 1);
   }
+  if (is_hdf) std::reverse(axes.begin(), axes.end());
   size.resize(axes.size(), 1);
   std::size_t stride = 1;
   for (std::size_t i = 0; i < axes.size(); ++i) {
@@ -130,6 +165,11 @@ ViewArray ArrayOf(const std::string& path, const StoredArray& array, ArrayFormat
         path, PrintableUtf8(array.name), views.column.count, views.row.count, views.x.count,
         views.y.count, views.channel.count, SizeInWords(array, format), array.type, kMaxViewsAlong,
         kMaxPx));
+  }
+  if (across > 0 && (across != views.column.count || down != views.row.count)) {
+    throw Error(fmt::format("{}: the option layout states {} x {} views, but {} ({}) has {} x {}",
+                            path, across, down, PrintableUtf8(array.name),
+                            SizeInWords(array, format), views.column.count, views.row.count));
   }
   return views;
 }
@@ -299,7 +339,10 @@ std::optional<ViewSource> OpenArrays(const LayoutInput& input, ArrayFormat forma
   ArrayFile file(input.path, format);
   const StoredFile& content = file.content();
   const StoredArray& array = LightFieldOf(input.path, content, format);
-  const auto views = std::make_shared<ViewArray>(ArrayOf(input.path, array, format));
+  const auto views = std::make_shared<ViewArray>(
+      ArrayOf(input.path, array, format,
+              input.is_forced ? AxisCounts{input.reading->layout_u, input.reading->layout_v}
+                              : AxisCounts{}));
   views->bytes = file.Read(array);
   ViewSource source;
   source.kind =

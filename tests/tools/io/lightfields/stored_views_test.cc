@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "support/error_message.h"
 #include "support/temporary_folder.h"
@@ -128,6 +129,29 @@ TEST_F(StoredViews, OtherContentsAreNamed) {
               HasSubstr("the layout mat"));
   EXPECT_THAT(ErrorOf([&] { ReadLightField(StoredFilePath("README.md"), reading); }),
               HasSubstr("neither"));
+}
+
+// Taken as (v, u, y, x), they would be views that are 3 px wide.
+TEST_F(StoredViews, ViewsInOneAxisNeedTheirNumbers) {
+  for (const auto& [name, layout] :
+       {std::pair("numbered.h5", "hdf5"), std::pair("numbered-5.mat", "mat")}) {
+    EXPECT_THAT(ErrorOf([&] { Read(StoredFilePath(name)); }),
+                AllOf(HasSubstr(name), HasSubstr("6 x 6 x 8 x 3"), HasSubstr("3 px wide"),
+                      HasSubstr(std::string(layout) + ":UxV")));
+    LightFieldReading reading;
+    reading.layout = layout;
+    reading.layout_u = 3;
+    reading.layout_v = 2;
+    ExpectLevels(ReadLightField(StoredFilePath(name), reading), model::TransferCurve::Srgb());
+    reading.layout_u = 2;
+    EXPECT_THAT(ErrorOf([&] { ReadLightField(StoredFilePath(name), reading); }),
+                AllOf(HasSubstr(name), HasSubstr("3 px wide")));
+  }
+  LightFieldReading reading;
+  reading.layout = "mat";
+  reading.layout_u = reading.layout_v = 2;
+  EXPECT_THAT(ErrorOf([&] { ReadLightField(StoredFilePath("levels-5.mat"), reading); }),
+              HasSubstr("states 2 x 2 views, but LF (2 x 3 x 6 x 8 x 3) has 3 x 2"));
 }
 
 TEST_F(StoredViews, TruncatedFilesAreRefused) {
