@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <set>
 
@@ -187,7 +188,14 @@ std::optional<ViewSource> OpenImageParts(const LayoutInput& input) {
   if (parts.size() == 1 && parts[0].views.size() > 1) {
     return OpenMultiView(input, bytes, parts[0]);
   }
-  if (!input.is_forced && !IsMultiPartExr(bytes)) return std::nullopt;
+  if (!input.is_forced && !IsMultiPartExr(bytes)) {
+    const int pages = PagesOfImage(bytes, input.path);
+    if (pages < 2) return std::nullopt;
+    const auto edge = static_cast<int>(std::lround(std::sqrt(pages)));
+    throw Error(fmt::format(
+        "{}: it has {} pages; if they are views, row by row, the option layout states it: parts:{}",
+        input.path, pages, edge * edge == pages ? fmt::format("{}x{}", edge, edge) : "UxV"));
+  }
   const auto pages =
       std::make_shared<const std::vector<DecodedImage>>(DecodeImagePages(bytes, input.path));
   const std::vector<std::string> names = NamesOfParts(*pages, parts);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "thicklens/base/cancel.h"
@@ -58,14 +59,47 @@ double DifferenceAt(const cv::Mat& grey, int lag) {
   return count > 0 ? sum / count : 0;
 }
 
+bool RepeatsAcross(const cv::Mat& grey, int count) {
+  if (count < 2 || grey.cols % count != 0) return count == 1;
+  ThrowIfCancelled();
+  const int lag = grey.cols / count;
+  return DifferenceAt(grey, lag) < kRepeats * DifferenceAt(grey, lag / 2);
+}
+
 int RepetitionsAcross(const cv::Mat& grey) {
   for (int count = std::min(kMaxTiles, grey.cols / kMinTilePx); count >= 2; --count) {
-    if (grey.cols % count != 0) continue;
-    ThrowIfCancelled();
-    const int lag = grey.cols / count;
-    if (DifferenceAt(grey, lag) < kRepeats * DifferenceAt(grey, lag / 2)) return count;
+    if (RepeatsAcross(grey, count)) return count;
   }
   return 1;
+}
+
+// Tiles along one axis and the columns of one colour between them.
+struct AxisBorders {
+  int count = 1, gap_px = 0, tile_px = 0;
+};
+std::optional<AxisBorders> BordersAcross(const cv::Mat& grey) {
+  std::vector<std::pair<int, int>> gaps;  // first column and number of columns
+  for (int x = 0; x < grey.cols; ++x) {
+    const float first = grey.at<float>(0, x);
+    bool is_flat = true;
+    for (int y = 1; y < grey.rows && is_flat; ++y) is_flat = grey.at<float>(y, x) == first;
+    if (!is_flat) continue;
+    if (!gaps.empty() && gaps.back().first + gaps.back().second == x) {
+      ++gaps.back().second;
+    } else {
+      gaps.emplace_back(x, 1);
+    }
+  }
+  if (gaps.empty() || gaps.size() >= static_cast<std::size_t>(kMaxTiles)) return std::nullopt;
+  const int count = static_cast<int>(gaps.size()) + 1;
+  const AxisBorders borders{count, gaps.front().second, gaps.front().first};
+  const int step = borders.tile_px + borders.gap_px;
+  if (borders.tile_px < kMinTilePx || borders.gap_px >= borders.tile_px) return std::nullopt;
+  for (int i = 1; i < count; ++i) {
+    const auto& [at, width] = gaps[static_cast<std::size_t>(i - 1)];
+    if (width != borders.gap_px || at != i * step - borders.gap_px) return std::nullopt;
+  }
+  return count * step - borders.gap_px == grey.cols ? std::optional(borders) : std::nullopt;
 }
 
 int PitchAcross(const cv::Mat& grey) {
@@ -100,6 +134,22 @@ int PitchAcross(const cv::Mat& grey) {
 AxisCounts RepetitionsOf(const cv::Mat& pixels) {
   const cv::Mat grey = GreyOf(pixels);
   return {RepetitionsAcross(grey), RepetitionsAcross(grey.t())};
+}
+
+bool Repeats(const cv::Mat& pixels, AxisCounts counts) {
+  const cv::Mat grey = GreyOf(pixels);
+  return RepeatsAcross(grey, counts.across) && RepeatsAcross(grey.t(), counts.down);
+}
+
+std::optional<BorderedTiles> BorderedTilesOf(const cv::Mat& pixels) {
+  const cv::Mat grey = GreyOf(pixels);
+  const std::optional<AxisBorders> across = BordersAcross(grey);
+  if (!across) return std::nullopt;
+  const std::optional<AxisBorders> down = BordersAcross(grey.t());
+  if (!down) return std::nullopt;
+  return BorderedTiles{{across->count, down->count},
+                       {across->gap_px, down->gap_px},
+                       {across->tile_px, down->tile_px}};
 }
 
 int LensletPitchOf(const cv::Mat& pixels) {

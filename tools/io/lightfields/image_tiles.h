@@ -2,6 +2,7 @@
 #define THICKLENS_TOOLS_IO_LIGHTFIELDS_IMAGE_TILES_H_
 
 #include <opencv2/core/mat.hpp>
+#include <optional>
 #include <string>
 
 namespace thicklens::io {
@@ -13,6 +14,14 @@ struct AxisCounts {
 // How often an image repeats itself across and down, as views side by side do: the differences at
 // the distance of one view are much smaller than at half of it. At most 40; 1: it does not repeat.
 AxisCounts RepetitionsOf(const cv::Mat& pixels);
+// Whether it repeats itself so often; 1 along an axis: that axis is not asked.
+bool Repeats(const cv::Mat& pixels, AxisCounts counts);
+// Tiles of one size with lines of one colour between them, but not around them.
+struct BorderedTiles {
+  AxisCounts tiles;
+  AxisCounts gap_px, tile_px;
+};
+std::optional<BorderedTiles> BorderedTilesOf(const cv::Mat& pixels);
 // The period of the differences between neighbouring pixels, as the edges of square lenslets have
 // it: 2 to 20 px; 0: there is none, or the axes differ.
 int LensletPitchOf(const cv::Mat& pixels);

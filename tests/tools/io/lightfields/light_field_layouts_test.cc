@@ -436,6 +436,67 @@ TEST_F(LightFieldLayouts, OneRowDoesNotShowItsDirection) {
   EXPECT_THAT(facts_.notices, IsEmpty());
 }
 
+// As our own mosaics are: lines between the views, but not around them.
+TEST_F(LightFieldLayouts, LinesBetweenTheViewsAreLeftOut) {
+  constexpr int kGapPx = 4;
+  cv::Mat mosaic(3 * (kViewHeightPx + kGapPx) - kGapPx, 3 * (kViewWidthPx + kGapPx) - kGapPx,
+                 CV_8UC3, cv::Scalar::all(0));
+  for (int l = 0; l < 3; ++l) {
+    for (int k = 0; k < 3; ++k) {
+      InOrder(k, l).copyTo(mosaic(cv::Rect(
+          k * (kViewWidthPx + kGapPx), l * (kViewHeightPx + kGapPx), kViewWidthPx, kViewHeightPx)));
+    }
+  }
+  const std::string path = folder_.Put("mosaic.png", EncodedTile(mosaic));
+  LightFieldReading reading;
+  ExpectViews(Read(path, reading));
+  EXPECT_THAT(facts_.one_line, HasSubstr("lines of 4 x 4 px"));
+  reading.layout = "tiles";
+  ExpectViews(Read(path, reading));
+  reading.layout_u = reading.layout_v = 3;
+  ExpectViews(Read(path, reading));
+  reading.layout_v = 2;
+  EXPECT_THAT(ErrorOf([&] { Read(path, reading); }),
+              AllOf(HasSubstr("states 3 x 2 views"), HasSubstr("tiles:3x3")));
+}
+
+TEST_F(LightFieldLayouts, AnotherNumberOfTilesIsNamed) {
+  constexpr int kSide = 4;
+  cv::Mat tiles(kSide * kViewHeightPx, kSide * kViewWidthPx, CV_8UC3);
+  for (int l = 0; l < kSide; ++l) {
+    for (int k = 0; k < kSide; ++k) {
+      View(k, l, 0.2).copyTo(
+          tiles(cv::Rect(k * kViewWidthPx, l * kViewHeightPx, kViewWidthPx, kViewHeightPx)));
+    }
+  }
+  const std::string path = folder_.Put("tiles.png", EncodedTile(tiles));
+  LightFieldReading reading;
+  reading.layout = "tiles";
+  reading.layout_u = reading.layout_v = 8;
+  Read(path, reading);
+  EXPECT_THAT(facts_.notices,
+              ::testing::Contains(AllOf(HasSubstr("states 8 x 8 views"), HasSubstr("tiles:4x4"))));
+  reading.layout_u = reading.layout_v = 4;
+  Read(path, reading);
+  EXPECT_THAT(facts_.notices, IsEmpty());
+  reading.layout_u = 5;
+  EXPECT_THAT(ErrorOf([&] { Read(path, reading); }), HasSubstr("tiles:4x4"));
+}
+
+TEST_F(LightFieldLayouts, PagesMayBeViews) {
+  std::vector<cv::Mat> pages;
+  for (int i = 0; i < 9; ++i) pages.push_back(InOrder(i % 3, i / 3));
+  folder_.Put("other", "");
+  const std::string path = folder_ / "pages.tif";
+  ASSERT_TRUE(cv::imwritemulti(path, pages));
+  EXPECT_THAT(ErrorOf([&] { Read(path); }),
+              AllOf(HasSubstr("it has 9 pages"), HasSubstr("parts:3x3")));
+  LightFieldReading reading;
+  reading.layout = "parts";
+  reading.layout_u = reading.layout_v = 3;
+  ExpectViews(Read(path, reading));
+}
+
 TEST_F(LightFieldLayouts, WhatDoesNotFitIsNamed) {
   const std::string path = Folder(RowAndColumn, InOrder);
   LightFieldReading reading;
