@@ -17,3 +17,5 @@ exrmultipart -combine -i "${parts[@]}" -o parts.exr
 exrmultiview "${views[@]}" multiview.exr
 exrmultipart -convert -i multiview.exr -o multiview-parts.exr
 oiiotool --nosoftwareattrib "$folder"/view_0_0.exr "$folder"/view_0_1.exr --siappend -o unnamed-parts.exr
+exrmultiview left "$folder"/view_0_0.exr right "$folder"/view_0_1.exr stereo.exr
+exrmultipart -convert -i stereo.exr -o stereo-parts.exr

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <memory>
 #include <set>
@@ -22,6 +23,8 @@
 
 namespace thicklens::io {
 namespace {
+
+constexpr char kStereo[] = "an EXR file of a left and a right view";
 
 // The views that the header of one part of an EXR file names.
 struct ExrPart {
@@ -122,14 +125,30 @@ std::vector<std::string> ChannelsOfView(const ExrPart& part, std::size_t view) {
   return {};
 }
 
+// A left and a right view, which are those of two places in one row; absent: the names are others.
+std::optional<ViewGrid> StereoGrid(const std::string& path, const std::vector<std::string>& names,
+                                   const LightFieldReading& reading) {
+  if (names.size() != 2 || !reading.name.empty()) return std::nullopt;
+  std::vector<NumberedView> views;
+  for (const std::string& name : names) {
+    std::string word = name;
+    std::transform(word.begin(), word.end(), word.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    if (word == "left" || word == "right") views.push_back({word == "left" ? 0 : 1, 0, name});
+  }
+  if (views.size() != 2 || views[0].u == views[1].u) return std::nullopt;
+  return GridOfViews(path, views, reading);
+}
+
 // The views of a file whose only part has the channels of several.
 std::optional<ViewSource> OpenMultiView(const LayoutInput& input, const std::string& bytes,
                                         const ExrPart& part) {
   std::string text = input.reading->name;
-  if (text.empty()) {
+  const std::optional<ViewGrid> stereo = StereoGrid(input.path, part.views, *input.reading);
+  if (text.empty() && !stereo) {
     const std::optional<NameProposal> proposal = ProposedPattern(part.views);
     if (!proposal) {
-      // Files of a left and a right view are no light fields.
+      // Other views, such as those of two eyes with other names, are no light field.
       if (!input.is_forced) return std::nullopt;
       throw Error(fmt::format(
           "{}: it has {} views: {}; views whose names hold the row and the column are expected, or "
@@ -141,10 +160,12 @@ std::optional<ViewSource> OpenMultiView(const LayoutInput& input, const std::str
   }
   std::vector<std::string> others;
   const ViewGrid grid =
-      GridOfNames(input.path, NamePattern(text), part.views, *input.reading, &others);
+      stereo ? *stereo
+             : GridOfNames(input.path, NamePattern(text), part.views, *input.reading, &others);
   ViewSource source;
-  source.kind = fmt::format("an EXR file of {} views named '{}'", part.views.size() - others.size(),
-                            PrintableUtf8(text));
+  source.kind = stereo ? kStereo
+                       : fmt::format("an EXR file of {} views named '{}'",
+                                     part.views.size() - others.size(), PrintableUtf8(text));
   source.frame = grid.frame;
   if (!others.empty()) source.details.push_back(fmt::format("not used: {}", Listed(others)));
   source.read = [file = std::make_shared<const std::string>(bytes), part, grid, path = input.path](
@@ -203,7 +224,8 @@ std::optional<ViewSource> OpenImageParts(const LayoutInput& input) {
     throw Error(fmt::format("{}: two parts have one name: {}", input.path, Listed(names)));
   }
   std::string text = input.reading->name;
-  if (text.empty()) {
+  const std::optional<ViewGrid> stereo = StereoGrid(input.path, names, *input.reading);
+  if (text.empty() && !stereo) {
     const std::optional<NameProposal> proposal = ProposedPattern(names);
     if (!proposal) {
       throw Error(fmt::format(
@@ -214,12 +236,13 @@ std::optional<ViewSource> OpenImageParts(const LayoutInput& input) {
     RequireClear(input.path, *proposal);
     text = proposal->pattern;
   }
-  const NamePattern pattern(text);
   std::vector<std::string> others;
-  const ViewGrid grid = GridOfNames(input.path, pattern, names, *input.reading, &others);
+  const ViewGrid grid =
+      stereo ? *stereo : GridOfNames(input.path, NamePattern(text), names, *input.reading, &others);
   ViewSource source;
-  source.kind = fmt::format("a file of {} parts named '{}'", names.size() - others.size(),
-                            PrintableUtf8(text));
+  source.kind = stereo ? kStereo
+                       : fmt::format("a file of {} parts named '{}'", names.size() - others.size(),
+                                     PrintableUtf8(text));
   source.frame = grid.frame;
   if (!others.empty()) source.details.push_back(fmt::format("not views: {}", Listed(others)));
   source.read = [pages, names, grid, path = input.path](int k, int l) {

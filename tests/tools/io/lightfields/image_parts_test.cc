@@ -67,6 +67,17 @@ TEST_F(ExrLightFields, ViewsOfOnePartAreItsChannels) {
   EXPECT_THAT(facts_.one_line, HasSubstr("an EXR file of 6 views named 'r{v}c{u}'"));
 }
 
+TEST_F(ExrLightFields, ALeftAndARightViewAreInOneRow) {
+  for (const char* name : {"stereo.exr", "stereo-parts.exr"}) {
+    const model::LightField light_field = ReadLightField(ExrPartsPath(name), {}, &facts_);
+    ASSERT_EQ(light_field.u_count, 2) << name;
+    ASSERT_EQ(light_field.v_count, 1) << name;
+    for (int k = 0; k < 2; ++k)
+      EXPECT_NEAR(model::ViewImage(light_field, k, 0).at(3, 2, 0), 0.1 * (k + 1), 1e-3) << name;
+    EXPECT_THAT(facts_.one_line, HasSubstr("a left and a right view"));
+  }
+}
+
 TEST_F(ExrLightFields, OtherPartsAreNamed) {
   EXPECT_THAT(ErrorOf([&] { ReadLightField(ExrPartsPath("unnamed-parts.exr"), {}); }),
               AllOf(HasSubstr("unnamed-parts.exr"), HasSubstr("2")));
