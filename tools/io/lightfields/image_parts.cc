@@ -168,6 +168,8 @@ std::optional<ViewSource> OpenMultiView(const LayoutInput& input, const std::str
                                      part.views.size() - others.size(), PrintableUtf8(text));
   source.frame = grid.frame;
   if (!others.empty()) source.details.push_back(fmt::format("not used: {}", Listed(others)));
+  if (!grid.missing.empty())
+    source.details.push_back(fmt::format("missing: {}", Listed(grid.missing)));
   source.read = [file = std::make_shared<const std::string>(bytes), part, grid, path = input.path](
                     int k, int l) {
     const std::string& view = grid.At(k, l);
@@ -245,6 +247,8 @@ std::optional<ViewSource> OpenImageParts(const LayoutInput& input) {
                                      PrintableUtf8(text));
   source.frame = grid.frame;
   if (!others.empty()) source.details.push_back(fmt::format("not views: {}", Listed(others)));
+  if (!grid.missing.empty())
+    source.details.push_back(fmt::format("missing: {}", Listed(grid.missing)));
   source.read = [pages, names, grid, path = input.path](int k, int l) {
     const auto at = std::find(names.begin(), names.end(), grid.At(k, l)) - names.begin();
     const DecodedImage& page = (*pages)[static_cast<std::size_t>(at)];

@@ -48,6 +48,8 @@ std::optional<ViewSource> OpenNamedFolder(const LayoutInput& input) {
                                ? "{v} is the row, {u} the column"
                                : fmt::format("{{n}} counts row by row from {}", grid.first_number));
   if (!others.empty()) source.details.push_back(fmt::format("not views: {}", Listed(others)));
+  if (!grid.missing.empty())
+    source.details.push_back(fmt::format("missing: {}", Listed(grid.missing)));
   for (const std::string& file : grid.files) {
     if (!file.empty()) ReportInput((fs::path(input.path) / file).string());
   }

@@ -118,6 +118,8 @@ std::optional<ViewSource> OpenStanfordFolder(const LayoutInput& input) {
   source.kind = "a Stanford folder";
   source.frame = grid.frame;
   if (!others.empty()) source.details.push_back(fmt::format("not views: {}", Listed(others)));
+  if (!grid.missing.empty())
+    source.details.push_back(fmt::format("missing: {}", Listed(grid.missing)));
   DescribePositions(input.path, pattern, grid, &source);
   for (const std::string& file : grid.files) {
     if (!file.empty()) ReportInput((fs::path(input.path) / file).string());

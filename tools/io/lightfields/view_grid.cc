@@ -105,6 +105,7 @@ ViewGrid GridOfViews(const std::string& path, const std::vector<NumberedView>& v
   }
   if (missing.empty()) grid.frame.present.clear();
   if (!missing.empty() && !reading.sparse) ThrowMissingViews(path, missing);
+  grid.missing = missing;
   return grid;
 }
 

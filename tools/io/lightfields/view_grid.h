@@ -18,9 +18,10 @@ struct NumberedView {
 // The smallest rectangle of views that holds the given ones. Numbers may have any start and any
 // constant step.
 struct ViewGrid {
-  model::LightField frame;         // counts, weights and present views
-  std::vector<std::string> files;  // index l * U + k; empty: the view is missing
-  int first_number = 0;            // of GridOfNumbers: the number of the first view of a row
+  model::LightField frame;           // counts, weights and present views
+  std::vector<std::string> files;    // index l * U + k; empty: the view is missing
+  std::vector<std::string> missing;  // "the view in row 1, column 2"
+  int first_number = 0;              // of GridOfNumbers: the number of the first view of a row
   const std::string& At(int k, int l) const {
     return files[static_cast<std::size_t>(l * frame.u_count + k)];
   }

@@ -507,6 +507,10 @@ TEST_F(LightFieldLayouts, WhatDoesNotFitIsNamed) {
   std::remove((path + "/view_1_1.png").c_str());
   EXPECT_THAT(ErrorOf([&] { Read(path); }),
               AllOf(HasSubstr("row 1, column 1"), HasSubstr("sparse")));
+  reading = {};
+  reading.sparse = true;
+  EXPECT_FALSE(Read(path, reading).IsPresent(1, 1));
+  EXPECT_THAT(facts_.one_line, HasSubstr("missing: the view in row 1, column 1"));
   folder_.Put("lf/view_999999_7.png", EncodedTile(View(0, 0)));
   EXPECT_THAT(ErrorOf([&] { Read(path); }), HasSubstr("at most"));
   EXPECT_THAT(
