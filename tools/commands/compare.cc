@@ -57,8 +57,11 @@ Image ReadCroppedImage(const std::string& path, const Rect& crop,
 }
 
 OptionNames CompareOptionNames() {
-  return {
-      {"border_px", "--border"}, {"baseline", "--dibr"}, {"depth.meaning.kind", "--depth-kind"}};
+  return {{"hci_grid", "--grid"},     {"allow_missing_views", "--sparse"},
+          {"inner_views", "--views"}, {"layout", "--layout"},
+          {"view_name", "--name"},    {"view_order", "--view-order"},
+          {"crop", "--crop"},         {"border_px", "--border"},
+          {"baseline", "--dibr"},     {"depth.meaning.kind", "--depth-kind"}};
 }
 
 // ---- Two images.

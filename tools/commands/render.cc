@@ -165,7 +165,14 @@ struct Rendering {
 };
 
 OptionNames RenderOptionNames() {
-  return {{"aperture", "--aperture and --aperture-shape"},
+  return {{"hci_grid", "--grid"},
+          {"allow_missing_views", "--sparse"},
+          {"inner_views", "--views"},
+          {"layout", "--layout"},
+          {"view_name", "--name"},
+          {"view_order", "--view-order"},
+          {"crop", "--crop"},
+          {"aperture", "--aperture and --aperture-shape"},
           {"aperture.shape", "--aperture-shape"},
           {"aperture.radius", "--aperture"},
           {"effects", "--effects"},

@@ -2,6 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <array>
+#include <cctype>
+#include <cstddef>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -38,6 +42,33 @@ io::LightFieldReading ReadingOf(const LightFieldReadOptions& options) {
   return reading;
 }
 
+// A message of tools/io with the options as the program's user types them: "the option sparse"
+// becomes "the option --sparse". Without such names it stays as it is.
+std::string WithTypedOptions(const RunScope& scope, std::string text) {
+  constexpr std::array<std::pair<const char*, const char*>, 7> kFields = {
+      {{"sparse", "allow_missing_views"},
+       {"grid", "hci_grid"},
+       {"layout", "layout"},
+       {"name", "view_name"},
+       {"view-order", "view_order"},
+       {"views", "inner_views"},
+       {"crop", "crop"}}};
+  const std::string before = "the option ";
+  for (const auto& [word, field] : kFields) {
+    const std::string typed = scope.Option(field);
+    if (typed == field) continue;
+    const std::string searched = before + word;
+    for (std::size_t at = text.find(searched); at != std::string::npos;
+         at = text.find(searched, at + 1)) {
+      const std::size_t end = at + searched.size();
+      const bool is_whole =
+          end >= text.size() || std::isalpha(static_cast<unsigned char>(text[end])) == 0;
+      if (is_whole) text.replace(at, searched.size(), before + typed);
+    }
+  }
+  return text;
+}
+
 ChannelOrder OrderOf(const model::LinearImage& image) {
   if (image.channels == 1) return ChannelOrder::kGrey;
   if (image.channels == 3) return ChannelOrder::kRgb;
@@ -72,9 +103,16 @@ LightField ReadLightField(const std::string& folder, const LightFieldReadOptions
   checks::RequireValid(options);
   RunScope scope(run);
   io::LightFieldFacts facts;
-  LightField light_field = io::ReadLightField(folder, ReadingOf(options), &facts);
-  if (!facts.is_plain) scope.Inform(facts.one_line);
-  for (const std::string& notice : facts.notices) scope.Warn(notice);
+  LightField light_field;
+  try {
+    light_field = io::ReadLightField(folder, ReadingOf(options), &facts);
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const Error& error) {
+    throw Error(WithTypedOptions(scope, error.what()));
+  }
+  if (!facts.is_plain) scope.Inform(WithTypedOptions(scope, facts.one_line));
+  for (const std::string& notice : facts.notices) scope.Warn(WithTypedOptions(scope, notice));
   return light_field;
 }
 

@@ -88,6 +88,9 @@ std::optional<SensorOrigin> SensorOriginOf(const std::string& text) {
 OptionNames EstimateOptionNames() {
   return {{"views", "--views"},
           {"crop", "--crop"},
+          {"hci_grid", "--grid"},
+          {"allow_missing_views", "--sparse"},
+          {"inner_views", "--views"},
           {"camera", "--camera"},
           {"sensor_origin", "--sensor-origin"},
           {"exif", "--ignore-exif"},

@@ -438,7 +438,8 @@ TEST_F(CompareProgram, MissingViewsAreAcceptedOnRequest) {
   const std::string truth = PutHci("truth", 3, 0);
   const std::string estimate = PutHci("estimate", 3, 4);
   std::remove((estimate + "/input_Cam017.png").c_str());
-  EXPECT_THAT(Failure({truth, estimate, "--grid", "7"}), HasSubstr("input_Cam017.png"));
+  EXPECT_THAT(Failure({truth, estimate, "--grid", "7"}),
+              AllOf(HasSubstr("input_Cam017.png"), HasSubstr("the option --sparse")));
   const Json json = Summary({truth, estimate, "--grid", "7", "--sparse"});
   EXPECT_EQ(json["per_view"].size(), 8U);
 }

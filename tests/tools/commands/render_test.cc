@@ -526,7 +526,7 @@ TEST_F(RenderTest, ABrokenOrMissingViewLeavesTheOlderOutput) {
   EXPECT_EQ(io::ReadLightField(folder, {}).u_count, 3) << "the older light field is still there";
   fs::remove(view);
   EXPECT_THAT(Failure({folder_ / "hci", "--mosaic"}),
-              AllOf(HasSubstr("input_Cam005.png"), HasSubstr("the option sparse")));
+              AllOf(HasSubstr("input_Cam005.png"), HasSubstr("the option --sparse")));
   EXPECT_THAT(Failure({folder_ / "hci", "--view", "2,1", "--sparse"}), HasSubstr("no such view"));
   EXPECT_EQ(Rendered({folder_ / "hci", "--mosaic", "--sparse"}).bits, 8);
 }
