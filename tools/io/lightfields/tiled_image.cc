@@ -58,7 +58,7 @@ std::optional<ViewSource> OpenTiledImage(const LayoutInput& input) {
   ReportInput(input.path);
   const auto image = std::make_shared<const DecodedImage>(ReadImageData(input.path));
   const cv::Mat& pixels = image->pixels;
-  // A picture with two such lines may be anything, so that more are needed unless the layout is
+  // An image with two such lines may show anything, so that more are needed unless the layout is
   // stated.
   const std::optional<BorderedTiles> bordered = BorderedTilesOf(pixels);
   if (bordered && (input.is_forced || bordered->tiles.across * bordered->tiles.down >= 9))

@@ -509,12 +509,7 @@ class StepCheck {
             ShareWithoutMatch(shifts.back()) > kUnlike && usually_unlike_ <= kUsuallyUnlike;
         if (is_unlike) return false;
       }
-      // Farther views than the neighbour decided: the neighbour shows the same scene too.
-      const int next_k = k + (is_across ? 1 : 0), next_l = l + (is_across ? 0 : 1);
-      if (step_ > 1 && usually_unlike_ <= kUsuallyUnlike && IsThere(next_k, next_l) &&
-          ShareWithoutMatch(ShiftsOf(from, ViewAt(next_k, next_l), tiles, tiling)) > kUnlike) {
-        return false;
-      }
+      if (step_ > 1 && has_one && !NearerFits(from, k, l, is_across, tiles)) return false;
     }
     return shifts.size() < 2 || usually_contradicts_ ||
            !Contradicts(shifts[0], directions[0], shifts[1], directions[1]);
@@ -530,6 +525,21 @@ class StepCheck {
   bool IsThere(int k, int l) const {
     return k >= 0 && l >= 0 && k < light_field_.u_count && l < light_field_.v_count &&
            light_field_.IsPresent(k, l);
+  }
+  // Where farther views than the neighbour decided: the neighbour shows the same scene, with a part
+  // of the shift.
+  bool NearerFits(const cv::Mat& from, int k, int l, bool is_across,
+                  const std::vector<cv::Point>& tiles) {
+    const int near_k = k + (is_across ? 1 : 0), near_l = l + (is_across ? 0 : 1);
+    const int far_k = k + (is_across ? step_ : 0), far_l = l + (is_across ? 0 : step_);
+    if (!IsThere(near_k, near_l)) return true;
+    const Tiling tiling(from);
+    const auto near = ShiftsOf(from, ViewAt(near_k, near_l), tiles, tiling);
+    if (ShareWithoutMatch(near) > kUnlike && usually_unlike_ <= kUsuallyUnlike) return false;
+    if (!IsThere(far_k, far_l)) return true;
+    const auto far = ShiftsOf(from, ViewAt(far_k, far_l), tiles, tiling);
+    const Vector2& direction = is_across ? across_ : down_;
+    return !Contradicts(near, direction / step_, far, direction);
   }
   const cv::Mat& ViewAt(int k, int l) {
     cv::Mat& view = views_[{l, k}];
@@ -549,10 +559,8 @@ class StepCheck {
 ViewOrderFinding Checked(const model::LightField& light_field, const Triple& middle,
                          const ViewOrderFinding& finding) {
   const auto order =
-      std::find_if(Hypotheses().begin(), Hypotheses().end(), [&](const Hypothesis& hypothesis) {
-        // Of a single row or column only the axis was decided.
-        return hypothesis.order == finding.order;
-      });
+      std::find_if(Hypotheses().begin(), Hypotheses().end(),
+                   [&](const Hypothesis& hypothesis) { return hypothesis.order == finding.order; });
   if (order == Hypotheses().end()) return finding;
   StepCheck check(light_field, middle, *order, finding.step_ratio);
   std::vector<std::string> wrong;

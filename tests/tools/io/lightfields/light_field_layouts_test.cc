@@ -436,7 +436,7 @@ TEST_F(LightFieldLayouts, OneRowDoesNotShowItsDirection) {
   EXPECT_THAT(facts_.notices, IsEmpty());
 }
 
-// As our own mosaics are: lines between the views, but not around them.
+// Our own mosaics have lines between the views, but not around them.
 TEST_F(LightFieldLayouts, LinesBetweenTheViewsAreLeftOut) {
   constexpr int kGapPx = 4;
   cv::Mat mosaic(3 * (kViewHeightPx + kGapPx) - kGapPx, 3 * (kViewWidthPx + kGapPx) - kGapPx,
