@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
+#include <vector>
 
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
@@ -38,6 +40,84 @@ double MarkOfType(const RawDepthMap& map, const std::vector<double>& listed) {
     if (value < largest && !is_hole) next = std::max<double>(next, value);
   }
   return next > 0 && next < kGap * largest ? largest : kNone;
+}
+
+// Whether programs use a number of this magnitude as a mark of "no depth".
+// `largest_of_type`: if it may be one.
+bool IsUsualMark(double magnitude, const std::optional<double>& largest_of_type) {
+  constexpr double kLargestOf15Bits = 32767, kLargestOf16Bits = 65535;
+  if (magnitude == kLargestOf15Bits || magnitude == kLargestOf16Bits ||
+      magnitude == kLargestOf16Bits - 1) {
+    return true;
+  }
+  if (largest_of_type) {
+    // Values are floats, in which the largest of 32 bits is rounded.
+    const double largest = static_cast<float>(*largest_of_type);
+    if (magnitude == largest || magnitude == largest - 1) return true;
+  }
+  constexpr double kLeastPower = 1e4, kMostNines = 1e7;  // floats hold whole numbers up to 1.6e7
+  for (double power = 1e3; power <= kMostNines; power *= 10) {
+    if (magnitude == power - 1) return true;
+  }
+  for (double power = kLeastPower; power < std::numeric_limits<float>::max(); power *= 10) {
+    if (magnitude == static_cast<double>(static_cast<float>(power))) return true;
+  }
+  return magnitude == static_cast<double>(std::numeric_limits<float>::max());
+}
+
+// Finds them among the values that are left, in which NaN marks the holes.
+std::vector<SuspectedMark> SuspectsOf(DepthKind kind, const HoleRules& rules,
+                                      const RawDepthMap& map) {
+  // The largest magnitudes, the largest first; several marks may lie side by side, 65534 and 65535.
+  constexpr std::size_t kMostMarks = 3;
+  std::vector<SuspectedMark> largest;
+  std::size_t valid = 0;
+  for (const float stored : map.values) {
+    if (std::isnan(stored)) continue;
+    ++valid;
+    const double value = stored;
+    auto at = largest.begin();
+    while (at != largest.end() && at->value != value && std::abs(at->value) >= std::abs(value))
+      ++at;
+    if (at != largest.end() && at->value == value) {
+      ++at->pixels;
+    } else if (at != largest.end() || largest.size() <= kMostMarks) {
+      largest.insert(at, {value, 1});
+      if (largest.size() > kMostMarks + 1) largest.pop_back();
+    }
+  }
+  constexpr double kLeastShare = 1e-3, kLeastOthers = 0.01;
+  constexpr std::size_t kLeastPixels = 8;
+  const auto least_pixels =
+      std::max<double>(kLeastPixels, kLeastShare * static_cast<double>(map.values.size()));
+  // Two planes at disparities of 0 and 5 are a scene: of disparity and inverse depth only usual
+  // marks are suspected, and only beside two others. Relative maps of 8 bits are scaled to reach
+  // 255.
+  const bool lengths = HasLengths(kind);
+  const double usual_gap = lengths ? 0.8 : 0.5, any_gap = lengths ? 0.01 : 0;
+  const std::size_t least_distinct = lengths ? 1 : 2;
+  constexpr double kLargestOfByte = 255;
+  std::optional<double> largest_of_type = map.largest_of_type;
+  if (!lengths && largest_of_type && *largest_of_type <= kLargestOfByte) largest_of_type.reset();
+  std::size_t marked = 0, pixels = 0;
+  for (std::size_t i = 0; i + 1 < largest.size(); ++i) {
+    const double magnitude = std::abs(largest[i].value), next = std::abs(largest[i + 1].value);
+    if (static_cast<double>(largest[i].pixels) < least_pixels) break;
+    if (rules.largest_is_value && map.largest_of_type && largest[i].value == *map.largest_of_type)
+      break;
+    pixels += largest[i].pixels;
+    const bool is_usual = IsUsualMark(magnitude, largest_of_type);
+    // Without other depths there is no scale to compare with.
+    const double others = static_cast<double>(valid - pixels) / static_cast<double>(valid);
+    if (next < (is_usual ? usual_gap : any_gap) * magnitude && others >= kLeastOthers &&
+        i + least_distinct < largest.size()) {
+      marked = i + 1;
+    } else if (!is_usual) {
+      break;
+    }
+  }
+  largest.resize(marked);
+  return largest;
 }
 
 // Whether most zeros, if there are some, have neighbours in the row and in the column that are all
@@ -143,6 +223,7 @@ DepthHoles MarkHoles(DepthKind kind, const HoleRules& rules, RawDepthMap* map) {
     ++*reason;
     value = std::numeric_limits<float>::quiet_NaN();
   }
+  holes.suspects = SuspectsOf(kind, rules, *map);
   if (!zero_is_hole) map->integer = false;
   return holes;
 }

@@ -282,12 +282,16 @@ void CheckScaleIsGiven(const DepthMap& map, const estimator::DisparityMap& dispa
       run.Option("depth.meaning.disparity_offset_px")));
 }
 
-// Reports what the reader of the map found, and which of its values are taken as holes for a reason
-// that the user may see differently.
-void ReportDepth(const DepthMap& map, const model::DepthHoles& holes, RunScope* run) {
+// Reports what the reader of the map found.
+void ReportReading(const DepthMap& map, RunScope* run) {
   for (const std::string& note : map.notes) run->Inform(fmt::format("{}: {}", NameOf(map), note));
   for (const std::string& warning : map.warnings)
     run->Warn(fmt::format("{}: {}", NameOf(map), warning));
+}
+
+// Reports which values of the map are taken as holes, or as depths, for a reason that the user may
+// see differently.
+void ReportHoles(const DepthMap& map, const model::DepthHoles& holes, RunScope* run) {
   const auto percent = [&](std::size_t count) {
     return 100 * static_cast<double>(count) / static_cast<double>(holes.pixels);
   };
@@ -307,6 +311,15 @@ void ReportDepth(const DepthMap& map, const model::DepthHoles& holes, RunScope* 
   if (holes.negative > 0) {
     run->Warn(fmt::format("{}: {:.1f} % of its values are negative and taken as 'no depth'",
                           NameOf(map), percent(holes.negative)));
+  }
+  for (const model::SuspectedMark& mark : holes.suspects) {
+    // As many digits as the float has.
+    const auto value = static_cast<float>(mark.value);
+    run->Warn(fmt::format(
+        "{}: {} pixels ({:.1f} %) have exactly the value {}, far beyond all others: if it means "
+        "'no "
+        "depth', state it by {} {}",
+        NameOf(map), mark.pixels, percent(mark.pixels), value, run->Option("depth.holes"), value));
   }
 }
 
@@ -408,6 +421,7 @@ PreparedProblem Prepare(Image photo, DepthMap map, const std::optional<Camera>& 
     input.grid = GridFor(options, *input.camera, input.weights, *run);
     WarnOfOtherSteps(options, aperture, *input.grid, *input.camera, run);
   }
+  ReportReading(map, run);  // also where the map is refused
   PreparedDepth prepared_depth =
       PrepareDepth(map, input.image, known, input.grid ? &*input.grid : nullptr);
   input.disparity = std::move(prepared_depth.disparity);
@@ -415,7 +429,7 @@ PreparedProblem Prepare(Image photo, DepthMap map, const std::optional<Camera>& 
   diagnostics->depth = prepared_depth.depth;
   diagnostics->holes_filled = prepared_depth.holes;
   diagnostics->holes = prepared_depth.found_holes;
-  ReportDepth(map, prepared_depth.found_holes, run);
+  ReportHoles(map, prepared_depth.found_holes, run);
   diagnostics->holes_share = static_cast<double>(prepared_depth.holes) /
                              static_cast<double>(input.disparity.disparity.size());
   if (prepared_depth.depth && map.meaning.kind != DepthKind::kDisparity) {

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -114,6 +115,67 @@ TEST(DepthHoles, AreasOfZerosDifferFromScatteredOnes) {
   }
   EXPECT_TRUE(MarkHoles(DepthKind::kDisparity, {}, &area).zeros_form_areas);
   EXPECT_FALSE(MarkHoles(DepthKind::kDisparity, {}, &scattered).zeros_form_areas);
+}
+
+// A ramp of 90 depths in front of `count` pixels that have one value.
+RawDepthMap RampAnd(float near, float far, std::vector<float> marks, bool integer = false,
+                    std::optional<double> largest = std::nullopt, int count = 10) {
+  std::vector<float> values;
+  for (int i = 0; i < 90; ++i) values.push_back(near + (far - near) * static_cast<float>(i) / 89);
+  for (const float mark : marks) values.insert(values.end(), static_cast<std::size_t>(count), mark);
+  return RowOf(std::move(values), integer, largest);
+}
+
+std::vector<double> SuspectsIn(DepthKind kind, RawDepthMap map, const HoleRules& rules = {}) {
+  std::vector<double> suspects;
+  for (const SuspectedMark& mark : MarkHoles(kind, rules, &map).suspects) {
+    EXPECT_EQ(mark.pixels, 10U);
+    suspects.push_back(mark.value);
+  }
+  return suspects;
+}
+
+TEST(DepthHoles, AMarkThatNobodyStatedIsSuspected) {
+  using ::testing::ElementsAre;
+  constexpr auto kZ = DepthKind::kZ;
+  EXPECT_THAT(SuspectsIn(kZ, RampAnd(500, 1200, {9999})), ElementsAre(9999));
+  EXPECT_THAT(SuspectsIn(kZ, RampAnd(500, 1200, {10000}, true, 65535)), ElementsAre(10000));
+  EXPECT_THAT(SuspectsIn(kZ, RampAnd(500, 1200, {1e10F})), ElementsAre(1e10F));
+  EXPECT_THAT(SuspectsIn(kZ, RampAnd(500, 1200, {65535})), ElementsAre(65535));
+  EXPECT_THAT(SuspectsIn(kZ, RampAnd(500, 1200, {65534}, true, 65535)), ElementsAre(65534));
+  EXPECT_THAT(SuspectsIn(kZ, RampAnd(50, 120, {255}, true, 255)), ElementsAre(255));
+  EXPECT_THAT(SuspectsIn(kZ, RampAnd(0.5, 1.2F, {777})), ElementsAre(777));
+  EXPECT_THAT(SuspectsIn(kZ, RampAnd(500, 1200, {65534, 65535})), ElementsAre(65535, 65534));
+  EXPECT_THAT(SuspectsIn(DepthKind::kDisparity, RampAnd(2000, 9000, {65535}, true, 65535)),
+              ElementsAre(65535));
+  EXPECT_THAT(SuspectsIn(DepthKind::kDisparity, RampAnd(-2, 9, {-9999})), ElementsAre(-9999));
+}
+
+TEST(DepthHoles, AWallOrASkyIsNoSuspectedMark) {
+  using ::testing::IsEmpty;
+  constexpr auto kZ = DepthKind::kZ;
+  EXPECT_THAT(SuspectsIn(kZ, RampAnd(500, 1200, {3000})), IsEmpty());
+  EXPECT_THAT(SuspectsIn(kZ, RampAnd(500, 1200, {50000}, true, 65535)), IsEmpty());
+  EXPECT_THAT(SuspectsIn(kZ, RampAnd(0.5, 12, {100})), IsEmpty());
+  EXPECT_THAT(SuspectsIn(kZ, RampAnd(500, 9000, {9999})), IsEmpty());  // the ramp goes on
+  // The near end of relative maps, and two planes.
+  EXPECT_THAT(SuspectsIn(DepthKind::kInverse, RampAnd(20, 90, {255}, true, 255)), IsEmpty());
+  EXPECT_THAT(SuspectsIn(DepthKind::kDisparity, RampAnd(0, 0, {5})), IsEmpty());
+  EXPECT_THAT(SuspectsIn(DepthKind::kDisparity, RampAnd(0, 0, {65535})), IsEmpty());
+  // A few pixels are noise, and a map of one value has no scale.
+  RawDepthMap few = RampAnd(500, 1200, {9999}, false, std::nullopt, 3);
+  EXPECT_THAT(MarkHoles(kZ, {}, &few).suspects, IsEmpty());
+  RawDepthMap one = RowOf(std::vector<float>(100, 9999));
+  EXPECT_THAT(MarkHoles(kZ, {}, &one).suspects, IsEmpty());
+}
+
+TEST(DepthHoles, AStatedMarkIsNoSuspect) {
+  HoleRules rules;
+  rules.hole_values = {9999};
+  EXPECT_TRUE(SuspectsIn(DepthKind::kZ, RampAnd(500, 1200, {9999}), rules).empty());
+  HoleRules value;
+  value.largest_is_value = true;
+  EXPECT_TRUE(SuspectsIn(DepthKind::kZ, RampAnd(50, 120, {255}, true, 255), value).empty());
 }
 
 TEST(DepthHoles, WrongRulesAndSizesAreRefused) {

@@ -135,6 +135,29 @@ TEST(EstimateLightField, NamesOptionsAsTheProgramAsks) {
   EXPECT_THAT(notices, ::testing::Contains(StartsWith("<views>: one view along u")));
 }
 
+// The warnings about a map are given also where it is refused.
+TEST(EstimateLightField, ReportsAMarkThatNobodyStated) {
+  DepthMap map = Disparity();
+  for (int i = 0; i < 40; ++i) map.values[static_cast<std::size_t>(3 * i)] = 9999;
+  map.warnings = {"The reader is in doubt."};
+  RunControl run;
+  run.option_name = [](const std::string& field) { return "<" + field + ">"; };
+  std::vector<std::string> notices;
+  run.notice = [&](const Notice& notice) { notices.push_back(notice.text); };
+  EXPECT_THAT(
+      ErrorOf([&] { EstimateLightField(Photo(), map, std::nullopt, With(SceneSolver()), run); }),
+      HasSubstr("disparities from"));
+  EXPECT_THAT(notices, ::testing::Contains("ramp: The reader is in doubt."));
+  EXPECT_THAT(notices,
+              ::testing::Contains(
+                  "ramp: 40 pixels (14.3 %) have exactly the value 9999, far beyond all others: if "
+                  "it means 'no depth', state it by <depth.holes> 9999"));
+  notices.clear();
+  map.holes.hole_values = {9999};
+  EstimateLightField(Photo(), map, std::nullopt, With(SceneSolver()), run);
+  EXPECT_THAT(notices, ::testing::Not(::testing::Contains(HasSubstr("exactly the value"))));
+}
+
 TEST(EstimateLightField, RefusesANullSinkAndOneView) {
   EXPECT_THAT(ErrorOf([] {
                 EstimateLightFieldTo(nullptr, Photo(), Disparity(), std::nullopt,

@@ -24,6 +24,13 @@ struct HoleRules {
   THICKLENS_EXPORT bool IsValid(DepthKind kind, std::string* why) const;
 };
 
+// A number that many pixels have exactly and that lies far beyond all others: it may be a mark of
+// "no depth" that the file does not state.
+struct SuspectedMark {
+  double value = 0;        // as stored
+  std::size_t pixels = 0;  // how many have it
+};
+
 // Numbers of values by the reason why they are no depth. Each value is counted once.
 struct DepthHoles {
   std::size_t pixels = 0;        // of the map
@@ -36,6 +43,9 @@ struct DepthHoles {
   // The zeros of an integer map of disparity or inverse depth form areas, as the far end of a
   // relative map does, and not scattered pixels and thin lines, as failed measurements do.
   bool zeros_form_areas = false;
+  // Values that look like marks and are depths nevertheless, because nobody stated them; the
+  // largest magnitude comes first.
+  std::vector<SuspectedMark> suspects;
 
   // The sum over all reasons.
   THICKLENS_EXPORT std::size_t total() const;
@@ -52,6 +62,11 @@ struct DepthHoles {
 //     other value comes within 10 % of it, because a scene that reaches the end of the type has
 //     values below it.
 //   disparity, inverse: the largest value is a value, since relative maps are scaled to reach it.
+// A value that remains is suspected if at least 0.1 % of the pixels have it exactly and the next
+// magnitude is far below. For a number that programs use as a mark (the largest of the type or one
+// less, 999, 9999, .., 32767, 65534, 65535, powers of ten from 10000 on) that is below 0.8 of it,
+// or 0.5 in maps of disparity and inverse depth, where the largest of 8 bits is no mark. For other
+// numbers in z and range it is below 1/100: a wall or a sky is nearer to its scene than that.
 THICKLENS_EXPORT DepthHoles MarkHoles(DepthKind kind, const HoleRules& rules, RawDepthMap* map);
 
 }  // namespace thicklens::model
