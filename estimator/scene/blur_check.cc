@@ -156,6 +156,7 @@ std::string MessageOf(const BlurCheck& check) {
 
 bool BlurCheckOptions::IsValid(std::string* why) const {
   return IsAtLeast(0, "threads", threads, why) &&
+         IsNonNegative("compression_sigma", compression_sigma, why) &&
          IsPositive("memory_limit_mib", memory_limit_mib, why);
 }
 
@@ -175,7 +176,9 @@ BlurCheck CheckBlur(const EstimateInput& input, const BlurCheckOptions& options)
   BlurImage looked = BlurImageOf(input, options.falloff, threads);
   check.halvings = looked.halvings;
   const std::optional<double> noise = EncodedNoiseSigma(looked.image, input.transfer);
-  check.noise_sigma = std::max(noise.value_or(kDefaultNoise), kMinNoise);
+  // The mean of four pixels has half of an error that is white.
+  check.noise_sigma = std::hypot(std::max(noise.value_or(kDefaultNoise), kMinNoise),
+                                 std::ldexp(options.compression_sigma, -looked.halvings));
   if (!noise) {
     check.message = "no part of the photograph shows its noise: the blur cannot be checked";
     check.seconds = SecondsSince(start);

@@ -1,6 +1,7 @@
 #include "thicklens/estimator/depth_flips.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "estimator/scene/blur_image.h"
@@ -57,8 +58,11 @@ DepthFlipCheck CheckDepthFlips(const EstimateInput& input, const DepthFlipOption
   const int threads = ResolveThreads(options.threads);
   const BlurImage image = BlurImageOf(input, options.falloff, threads);
   DepthFlipCheck check;
-  check.noise_sigma =
+  const double noise_sigma =
       std::max(EncodedNoiseSigma(image.image, input.transfer).value_or(0), kMinNoise);
+  // The mean of four pixels has half of an error that is white.
+  check.noise_sigma =
+      std::hypot(noise_sigma, std::ldexp(options.compression_sigma, -image.halvings));
   SceneViewSink sink;  // only the residual is wanted
   sink.take = [](int, int, const model::LinearImage&, const std::vector<Confidence>&) {
     ThrowIfCancelled();

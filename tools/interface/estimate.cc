@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <mutex>
 #include <utility>
 
@@ -120,7 +121,7 @@ void CheckResult(const PreparedProblem& prepared, const Solved& solved,
   found.largest_step_px = steps.largest_px;
   found.coarse_share = steps.share;
   if (!solved.maps) return;
-  const double noise_sigma = found.noise_sigma.value_or(0);
+  const double noise_sigma = found.DoubtSigmaOfMean().value_or(0);
   for (const estimator::ResidualPatch& patch :
        estimator::ResidualPatches(solved.maps->residual, solved.maps->occluded_fraction,
                                   disparity.width_px, disparity.height_px, noise_sigma)) {
@@ -136,8 +137,8 @@ void CheckResult(const PreparedProblem& prepared, const Solved& solved,
 constexpr double kDoubtful = 1.5, kUnexplainedAnyway = 2;
 
 bool IsInDoubt(const EstimateDiagnostics& found, double limit) {
-  return found.residual_rms && found.noise_sigma &&
-         *found.residual_rms > limit * *found.noise_sigma;
+  const std::optional<double> noise_sigma = found.DoubtSigma();
+  return found.residual_rms && noise_sigma && *found.residual_rms > limit * *noise_sigma;
 }
 
 // A photograph in doubt may have a map whose rows or columns are stored the other way.
@@ -148,6 +149,7 @@ void CheckFlips(const PreparedProblem& prepared, const EstimateOptions& options,
   const auto start = Clock::now();
   estimator::DepthFlipOptions check;
   check.falloff = prepared.effects.on.Has(Effect::kFalloff);
+  check.compression_sigma = found.compression_sigma.value_or(0);
   check.threads = run->threads();
   check.memory_limit_mib =
       options.memory_limit_mib ? options.memory_limit_mib : UsualMemoryLimitMib();
@@ -211,26 +213,36 @@ std::vector<std::string> WarningsOf(const DepthFile& depth, bool has_camera, con
             : fmt::format("{} decides whether it is smoothed", run.Option("smooth_depth"))));
   }
   if (!summary.partial_reason.empty()) warnings.push_back(summary.partial_reason);
-  const double noise_levels = kEightBitLevels * found.noise_sigma.value_or(0);
+  const double noise_levels = kEightBitLevels * found.DoubtSigma().value_or(0);
+  const double noise_of_mean_levels = kEightBitLevels * found.DoubtSigmaOfMean().value_or(0);
+  const bool is_jpeg = found.compression_sigma.has_value();
+  const std::string noise = is_jpeg ? "noise and JPEG compression" : "noise";
+  // Its measure does not know of every cause.
+  const std::string jpeg_cause =
+      is_jpeg ? "; the photograph is a JPEG file: stronger compression before, halved colours and "
+                "sharpening have this effect too"
+              : "";
   if (!found.patches.empty()) {
     const UnexplainedPatch& worst = found.patches.front();
     warnings.push_back(fmt::format(
         "{} patch(es) of the photograph are not explained, the worst at x {} .. {}, y {} .. {} px "
-        "with a residual of {:.1f} grey levels (noise: {:.1f}): the depth is probably wrong there",
+        "with a residual of {:.1f} grey levels ({}: {:.1f}): the depth is probably wrong there{}",
         found.patches.size(), worst.x, worst.x + worst.width_px - 1, worst.y,
-        worst.y + worst.height_px - 1, kEightBitLevels * worst.residual_rms, noise_levels));
+        worst.y + worst.height_px - 1, kEightBitLevels * worst.residual_rms, noise,
+        noise_of_mean_levels, jpeg_cause));
   }
   const bool is_reversed = found.depth_flips && found.depth_flips->better;
   if (found.unexplained_share && *found.unexplained_share > estimator::kMaxUnexplained &&
       !is_reversed) {
     warnings.push_back(fmt::format(
-        "{:.0f} % of the photograph is not explained beyond its noise of {:.1f} grey levels: most "
-        "likely it is sharper than depth and aperture predict; {}",
-        100 * *found.unexplained_share, noise_levels,
+        "{:.0f} % of the photograph is not explained beyond its {} of {:.1f} grey levels: most "
+        "likely it is sharper than depth and aperture predict; {}{}",
+        100 * *found.unexplained_share, noise, noise_of_mean_levels,
         depth.meaning.kind == DepthKind::kDisparity
             ? fmt::format("are {} and {} right?", run.Option("depth.meaning.disparity_scale"),
                           run.Option("depth.meaning.disparity_offset_px"))
-            : "are the depth's unit, and the camera's aperture and focus, right?"));
+            : "are the depth's unit, and the camera's aperture and focus, right?",
+        jpeg_cause));
   }
   if (is_reversed) {
     const estimator::DepthFlipCheck& flips = *found.depth_flips;
@@ -247,25 +259,26 @@ std::vector<std::string> WarningsOf(const DepthFile& depth, bool has_camera, con
   }
   if (IsInDoubt(found, kDoubtful) && !found.unexplained_share && !is_reversed) {
     warnings.push_back(fmt::format(
-        "the photograph has a residual of {:.1f} grey levels (noise: {:.1f}), and nearly "
+        "the photograph has a residual of {:.1f} grey levels ({}: {:.1f}), and nearly "
         "everywhere it receives light from points that the centre view does not show: check the "
-        "depth, its unit and the aperture, which may also be too wide for an image of {} x {} px",
-        kEightBitLevels * *found.residual_rms, noise_levels, summary.width_px, summary.height_px));
+        "depth, its unit and the aperture, which may also be too wide for an image of {} x {} px{}",
+        kEightBitLevels * *found.residual_rms, noise, noise_levels, summary.width_px,
+        summary.height_px, jpeg_cause));
   }
   const bool is_reported = is_reversed || !found.patches.empty() || !found.unexplained_share ||
                            *found.unexplained_share > estimator::kMaxUnexplained;
   if (IsInDoubt(found, kUnexplainedAnyway) && !is_reported) {
     warnings.push_back(fmt::format(
-        "the photograph has a residual of {:.1f} grey levels, {:.1f} times its noise, in parts of "
+        "the photograph has a residual of {:.1f} grey levels, {:.1f} times its {}, in parts of "
         "it, most often along edges of the depth; edges of the map that lie some px off, another "
         "alignment or meaning of its values, and compression or sharpening of the photograph have "
         "this effect",
-        kEightBitLevels * *found.residual_rms, *found.residual_rms / *found.noise_sigma));
+        kEightBitLevels * *found.residual_rms, *found.residual_rms / *found.DoubtSigma(), noise));
   }
   if (found.blur_check) {
     const std::string blur =
         BlurWarning(*found.blur_check, found.blur_proposal, estimate.problem->input(), run);
-    if (!blur.empty()) warnings.push_back(blur);
+    if (!blur.empty()) warnings.push_back(blur + jpeg_cause);
   }
   return warnings;
 }
@@ -417,6 +430,17 @@ LightFieldEstimate Estimate(ViewSink* given_sink, Image photo, DepthMap depth,
 }
 
 }  // namespace
+
+// Rounding is part of the noise that is found, unless it hides it; compression is not.
+std::optional<double> EstimateDiagnostics::DoubtSigma() const {
+  if (!noise_sigma) return std::nullopt;
+  return std::hypot(std::max(*noise_sigma, rounding_sigma), compression_sigma.value_or(0));
+}
+
+std::optional<double> EstimateDiagnostics::DoubtSigmaOfMean() const {
+  if (!noise_sigma) return std::nullopt;
+  return std::hypot(std::max(*noise_sigma, rounding_sigma), compression_sigma_of_mean.value_or(0));
+}
 
 ViewSink::~ViewSink() = default;
 double ViewSink::BytesForView(double /*values*/) const { return 0; }

@@ -15,8 +15,9 @@ namespace thicklens {
 struct PreparedProblem {
   std::shared_ptr<estimator::EstimateInput> input;
   model::EffectSelection effects;
-  std::vector<bool> was_hole;  // per pixel of the depth map
-  std::string colour_profile;  // of the photograph, if its curve is that of the input
+  std::vector<bool> was_hole;    // per pixel of the depth map
+  std::string colour_profile;    // of the photograph, if its curve is that of the input
+  double compression_sigma = 0;  // EstimateDiagnostics::compression_sigma; 0: none
 };
 
 // The steps of PrepareProblem. The options are valid.

@@ -206,6 +206,7 @@ void CompleteRun(const SceneSolver& solver, const PreparedProblem& prepared,
   if (solver.check_blur) {
     estimator::BlurCheckOptions check;
     check.falloff = prepared.effects.on.Has(Effect::kFalloff);
+    check.compression_sigma = prepared.compression_sigma;
     check.threads = run->threads();
     check.memory_limit_mib = memory_limit_mib;
     check.progress = run->ProgressOf("checking the blur");

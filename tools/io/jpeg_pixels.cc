@@ -8,10 +8,14 @@
 // clang-format on
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <csetjmp>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
+#include <iterator>
+#include <limits>
 #include <opencv2/core.hpp>
 
 #include "thicklens/base/cancel.h"
@@ -115,6 +119,50 @@ bool Finish(Decompression* jpeg) {
   return true;
 }
 
+bool ReadCoefficients(Decompression* jpeg, jvirt_barray_ptr** planes) {
+  if (setjmp(jpeg->failures.back) != 0) return false;  // NOLINT
+  *planes = jpeg_read_coefficients(&jpeg->info);
+  return true;
+}
+
+constexpr std::size_t kCoefficients = DCTSIZE2;
+
+// One row of blocks; counts how often each coefficient is not 0.
+bool CountRow(Decompression* jpeg, jvirt_barray_ptr plane, JDIMENSION row, JDIMENSION blocks,
+              std::array<double, kCoefficients>* counts) {
+  if (setjmp(jpeg->failures.back) != 0) return false;              // NOLINT
+  auto* const info = reinterpret_cast<j_common_ptr>(&jpeg->info);  // NOLINT: as libjpeg does
+  JBLOCKARRAY rows = jpeg->info.mem->access_virt_barray(info, plane, row, 1, FALSE);
+  for (JDIMENSION block = 0; block < blocks; ++block) {
+    for (std::size_t k = 0; k < kCoefficients; ++k) {
+      if (rows[0][block][k] != 0) ++(*counts)[k];  // NOLINT: libjpeg's arrays
+    }
+  }
+  return true;
+}
+
+// Variance of the error that quantising the coefficients leaves in a pixel of the component, by
+// [D126]. `counts`: how many of `blocks` blocks have the coefficient other than 0.
+double QuantisationVariance(const std::array<double, kCoefficients>& steps,
+                            const std::array<double, kCoefficients>& counts, double blocks) {
+  constexpr double kCoarse = 0.3;  // b > 1.7 steps: as if the coefficients were uniform
+  std::array<double, kCoefficients> errors{};
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < kCoefficients; ++k) {
+    const double q = steps[k];
+    const double share = std::clamp(counts[k] / blocks, 0.5 / blocks, 1 - 0.5 / blocks);
+    const double a = -std::log(share);  // q/(2 b)
+    const double b = q / (2 * a);
+    const double of_zeros = 2 * b * b - share * (q * q / 4 + q * b + 2 * b * b);
+    errors[k] = a < kCoarse ? q * q / 12 : of_zeros + counts[k] / blocks * q * q / 12;
+    least = std::min(least, 2 * b * b);
+  }
+  double sum = 0;
+  for (std::size_t k = 0; k < kCoefficients; ++k)
+    sum += counts[k] == 0 ? std::min(errors[k], least) : errors[k];
+  return sum / kCoefficients;
+}
+
 bool Begin(const cv::Mat& pixels, const ImageWriting& writing, Compression* jpeg) {
   if (setjmp(jpeg->failures.back) != 0) return false;  // NOLINT
   jpeg_mem_dest(&jpeg->info, &jpeg->file, &jpeg->size);
@@ -192,6 +240,44 @@ DecodedImage DecodeJpeg(const std::string& bytes) {
   }
   require(Finish(&jpeg));  // frees the markers
   return image;
+}
+
+std::optional<JpegError> MeasureJpegError(const std::string& bytes) {
+  Decompression jpeg;
+  jvirt_barray_ptr* planes = nullptr;
+  if (!ReadHeader(bytes, &jpeg)) return std::nullopt;
+  const bool is_grey = jpeg.info.num_components == 1;
+  const bool is_rgb = jpeg.info.jpeg_color_space == JCS_RGB;
+  if (!is_grey && !is_rgb && jpeg.info.jpeg_color_space != JCS_YCbCr) return std::nullopt;
+  if (!ReadCoefficients(&jpeg, &planes)) return std::nullopt;
+  // The mean over red, green and blue of the variance that a unit variance of Y, Cb or Cr makes:
+  // JFIF has R = Y + 1.402 Cr, G = Y - 0.344 Cb - 0.714 Cr, B = Y + 1.772 Cb. Their mean has the
+  // error of Y and little of the others.
+  constexpr std::array<double, 3> kOfYcc = {1, 1.086, 0.825};
+  constexpr double kRounding = 1.0 / 12;
+  double luma = 0, all = 0;
+  for (int c = 0; c < jpeg.info.num_components; ++c) {
+    const jpeg_component_info& component = jpeg.info.comp_info[c];  // NOLINT: libjpeg's array
+    if (component.quant_table == nullptr) return std::nullopt;
+    std::array<double, kCoefficients> steps{}, counts{};
+    std::copy(std::begin(component.quant_table->quantval),
+              std::end(component.quant_table->quantval), steps.begin());
+    for (JDIMENSION row = 0; row < component.height_in_blocks; ++row) {
+      ThrowIfCancelled();
+      if (!CountRow(&jpeg, planes[c], row, component.width_in_blocks, &counts))  // NOLINT
+        return std::nullopt;
+    }
+    const double blocks = static_cast<double>(component.height_in_blocks) *
+                          static_cast<double>(component.width_in_blocks);
+    const double variance = QuantisationVariance(steps, counts, blocks);
+    all += is_rgb ? variance / 3 : kOfYcc[static_cast<std::size_t>(c)] * variance;
+    if (is_rgb) {
+      luma += variance / 9;
+    } else if (c == 0) {
+      luma = variance;
+    }
+  }
+  return JpegError{std::sqrt(luma + kRounding), std::sqrt(all + kRounding)};
 }
 
 std::string EncodeJpeg(const cv::Mat& pixels, const ImageWriting& writing) {

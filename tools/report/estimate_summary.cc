@@ -132,6 +132,7 @@ void AddScene(const LightFieldEstimate& estimate, json* out) {
                {"prior", estimate.summary.prior},
                {"strength_rule", NameOf(found.strength_rule.value_or(StrengthRule::kAuto))},
                {"noise_sigma", OrNull(found.noise_sigma)},
+               {"compression_sigma", OrNull(found.compression_sigma)},
                {"bands", found.bands},
                {"reweightings", found.reweightings},
                {"residual_patches", PatchesJson(found.patches)},
@@ -182,9 +183,13 @@ std::string SolverText(const LightFieldEstimate& estimate) {
   }
   std::string text = fmt::format("solver       {}: {}\n", summary.solver, summary.message);
   if (found.noise_sigma && found.residual_rms) {
-    text +=
-        fmt::format("photograph   noise {:.2f} grey levels, residual {:.2f} (rms)\n",
-                    kEightBitLevels * *found.noise_sigma, kEightBitLevels * *found.residual_rms);
+    const std::string compression = found.compression_sigma
+                                        ? fmt::format(", error of JPEG compression {:.2f}",
+                                                      kEightBitLevels * *found.compression_sigma)
+                                        : "";
+    text += fmt::format("photograph   noise {:.2f} grey levels{}, residual {:.2f} (rms)\n",
+                        kEightBitLevels * *found.noise_sigma, compression,
+                        kEightBitLevels * *found.residual_rms);
   }
   return text;
 }

@@ -251,6 +251,9 @@ TEST(BlurCheck, RefusesOptionsThatAreNone) {
   options = {};
   options.memory_limit_mib = 0;
   EXPECT_THAT(ErrorOf([&] { CheckBlur(Plane(), options); }), HasSubstr("memory_limit_mib is 0"));
+  options = {};
+  options.compression_sigma = -0.5;
+  EXPECT_THAT(ErrorOf([&] { CheckBlur(Plane(), options); }), HasSubstr("compression_sigma is -0.5"));
 }
 
 }  // namespace

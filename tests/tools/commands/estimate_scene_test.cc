@@ -12,6 +12,7 @@
 #include <functional>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
 #include <random>
 #include <string>
 #include <thread>
@@ -20,6 +21,7 @@
 #include "support/temporary_folder.h"
 #include "support/test_cameras.h"
 #include "thicklens/io/depth_io.h"
+#include "thicklens/io/image_file.h"
 #include "thicklens/io/image_io.h"
 #include "thicklens/io/light_field_io.h"
 #include "thicklens/model/camera_file.h"
@@ -433,6 +435,34 @@ TEST_F(EstimateSceneTest, APhotographSharperThanItsDepthAllowsIsReported) {
   const json right = Summary(arguments);
   EXPECT_LT(right["unexplained_share"], 0.05);
   EXPECT_THAT(right["warnings"], IsEmpty());
+}
+
+// Compression removes noise and adds its own error: a photograph with the right depth is not in
+// doubt because of it, and where it is in doubt, compression is named.
+TEST_F(EstimateSceneTest, TheErrorOfJpegCompressionIsPartOfTheNoise) {
+  const model::EncodedImage bars = Bars(128, 96);
+  cv::Mat stored(bars.height_px, bars.width_px, CV_8UC(bars.channels));
+  std::copy(bars.values.begin(), bars.values.end(), stored.ptr());
+  io::ImageWriting writing;
+  writing.jpeg_quality = 90;
+  const std::string jpeg = io::EncodeImageFile(stored, io::ImageFormat::kJpeg, writing);
+  const model::RawDepthMap map{128, 96, std::vector<float>(128 * 96, -0.9F), false};
+  Arguments arguments = {folder_.Put("bars.jpg", jpeg),
+                         folder_.Put("bars.pfm", io::EncodePfm(map)),
+                         "--depth-kind",
+                         "disparity",
+                         "--views",
+                         "5x5"};
+  const json summary = Summary(arguments);
+  EXPECT_GT(summary["compression_sigma"].get<double>(), 0.28 / 255);
+  EXPECT_THAT(summary["warnings"].dump(),
+              AllOf(HasSubstr("of the photograph is not explained beyond its noise and JPEG "
+                              "compression of"),
+                    HasSubstr("is a JPEG file")));
+  arguments.insert(arguments.end(), {"--disparity-scale", "0.01"});
+  EXPECT_THAT(Summary(arguments)["warnings"], IsEmpty());
+  arguments[0] = folder_.Put("bars.png", io::EncodePng(bars));
+  EXPECT_TRUE(Summary(arguments)["compression_sigma"].is_null());
 }
 
 TEST_F(EstimateSceneTest, HolesAreReportedWithTheirShare) {

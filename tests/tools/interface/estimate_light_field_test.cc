@@ -158,6 +158,20 @@ TEST(EstimateLightField, ReportsAMarkThatNobodyStated) {
   EXPECT_THAT(notices, ::testing::Not(::testing::Contains(HasSubstr("exactly the value"))));
 }
 
+// Rounding is in the noise that is found, unless it hides it.
+TEST(EstimateDiagnosticsTest, DoubtsBeginAboveWhatStoringDid) {
+  EstimateDiagnostics found;
+  EXPECT_FALSE(found.DoubtSigma());
+  found.noise_sigma = 0.08 / 255;
+  found.rounding_sigma = 0.29 / 255;
+  EXPECT_DOUBLE_EQ(found.DoubtSigma().value(), 0.29 / 255);
+  found.noise_sigma = 3.0 / 255;
+  EXPECT_DOUBLE_EQ(found.DoubtSigma().value(), 3.0 / 255);
+  found.compression_sigma = 4.0 / 255;
+  EXPECT_DOUBLE_EQ(found.DoubtSigma().value(), 5.0 / 255);
+  EXPECT_DOUBLE_EQ(found.DoubtSigmaOfMean().value(), 3.0 / 255);
+}
+
 TEST(EstimateLightField, RefusesANullSinkAndOneView) {
   EXPECT_THAT(ErrorOf([] {
                 EstimateLightFieldTo(nullptr, Photo(), Disparity(), std::nullopt,

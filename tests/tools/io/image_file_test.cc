@@ -10,6 +10,8 @@
 #include <filesystem>
 #include <functional>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+#include <optional>
 #include <random>
 #include <string>
 #include <thread>
@@ -625,6 +627,63 @@ TEST(ImageFormat, WritesJpegNearly) {
   EXPECT_EQ(cv::norm(DecodeImageFile(EncodeImageFile(grey, ImageFormat::kJpeg), "m").pixels, grey,
                      cv::NORM_INF),
             0);
+}
+
+// Blurred noise of 35 levels, with white noise of one level, before compression.
+cv::Mat GreyTexture(double blur_px) {
+  constexpr int kSize = 256;
+  cv::RNG random(7);
+  cv::Mat texture(kSize, kSize, CV_32F), noise(kSize, kSize, CV_32F);
+  random.fill(texture, cv::RNG::NORMAL, 0, 1);
+  random.fill(noise, cv::RNG::NORMAL, 0, 1);
+  cv::GaussianBlur(texture, texture, {0, 0}, blur_px);
+  cv::Scalar mean, deviation;
+  cv::meanStdDev(texture, mean, deviation);
+  cv::Mat stored;
+  cv::Mat(128 + (texture - mean[0]) * (35 / deviation[0]) + noise).convertTo(stored, CV_8U);
+  return stored;
+}
+
+double RmsDifference(const cv::Mat& a, const cv::Mat& b) {
+  cv::Mat difference;
+  cv::subtract(a, b, difference, cv::noArray(), CV_32F);
+  return cv::norm(difference) / std::sqrt(static_cast<double>(difference.total()));
+}
+
+// The oracle is the difference from the pixels before compression.
+TEST(JpegError, IsThatOfThePixels) {
+  for (const double blur_px : {1.0, 3.0}) {
+    const cv::Mat stored = GreyTexture(blur_px);
+    for (const int quality : {75, 90, 95}) {
+      SCOPED_TRACE(std::to_string(blur_px) + " px, quality " + std::to_string(quality));
+      ImageWriting writing;
+      writing.jpeg_quality = quality;
+      const std::string bytes = EncodeImageFile(stored, ImageFormat::kJpeg, writing);
+      const double error = RmsDifference(DecodeImageFile(bytes, "memory").pixels, stored);
+      const std::optional<JpegError> found = MeasureJpegError(bytes);
+      ASSERT_TRUE(found);
+      EXPECT_LT(found->rms_levels, 1.5 * error);
+      EXPECT_GT(found->rms_levels, error / 1.5);
+      EXPECT_DOUBLE_EQ(found->mean_levels, found->rms_levels);  // it has one channel
+    }
+  }
+}
+
+TEST(JpegError, IsRoundingAloneWhereNothingIsLost) {
+  const cv::Mat flat(64, 64, CV_8UC1, cv::Scalar(77));
+  ImageWriting writing;
+  writing.jpeg_quality = 100;
+  const auto found = MeasureJpegError(EncodeImageFile(flat, ImageFormat::kJpeg, writing));
+  ASSERT_TRUE(found);
+  EXPECT_NEAR(found->rms_levels, 0.3, 0.2);
+}
+
+TEST(JpegError, IsUnknownForOtherFiles) {
+  const cv::Mat stored = GreyTexture(1);
+  EXPECT_FALSE(MeasureJpegError(EncodeImageFile(stored, ImageFormat::kPng)));
+  EXPECT_FALSE(MeasureJpegError(""));
+  const std::string bytes = EncodeImageFile(stored, ImageFormat::kJpeg);
+  EXPECT_FALSE(MeasureJpegError(bytes.substr(0, bytes.size() / 2)));
 }
 
 TEST(ImageFormat, RefusesWhatAKindDoesNotHold) {

@@ -178,6 +178,16 @@ struct EstimateDiagnostics {
   double largest_step_px = 0;  // displacement between neighbouring views
   double coarse_share = 0;     // share of the pixels whose step is above 3 px
   std::optional<double> strength, noise_sigma, residual_rms;  // noise, residual in encoded values
+  // What storing did to the photograph, in encoded values: rounding to its bits and, for a JPEG
+  // file, compression, over all channels and for their mean (io::JpegError). Compression removes
+  // noise and leaves its own error, so that both together are what a residual is compared with; the
+  // solver uses `noise_sigma` alone.
+  double rounding_sigma = 0;
+  std::optional<double> compression_sigma, compression_sigma_of_mean;
+  // The noise and what storing did, for a residual over all channels; absent without noise_sigma.
+  THICKLENS_EXPORT std::optional<double> DoubtSigma() const;
+  // Likewise for the mean of the channels.
+  THICKLENS_EXPORT std::optional<double> DoubtSigmaOfMean() const;
   // Shares of SceneSolver: pixels with a row of their own in H, rays past edges, blocks that stay
   // unexplained.
   std::optional<double> row_share, occluded_fraction, unexplained_share;

@@ -42,6 +42,8 @@ struct BlurTrial {
 struct BlurCheckOptions {
   bool falloff = true;  // use the irradiance of [S12] if there is a camera
   int threads = 0;      // 0: one per core
+  // Error of the photograph's compression, in its encoded values, which its noise does not show.
+  double compression_sigma = 0;
   // Limit for the whole process. Where the image needs more, only rows in its middle are checked.
   std::optional<double> memory_limit_mib;
   ProgressFunction progress;  // called for each trial and repeatedly between trials
@@ -53,10 +55,11 @@ struct BlurCheckOptions {
 // What CheckBlur found.
 struct BlurCheck {
   std::string message = "not run";  // how it ended, one line
-  double noise_sigma = 0;           // of encoded values, in the image that was checked
-  int blocks = 0;                   // number of informative blocks
-  int unexplained_blocks = 0;       // number of these that the given blur leaves unexplained
-  std::vector<BlurTrial> trials;    // the blurs and planes of focus that were tested
+  // Of encoded values, in the image that was checked, with BlurCheckOptions::compression_sigma.
+  double noise_sigma = 0;
+  int blocks = 0;                 // number of informative blocks
+  int unexplained_blocks = 0;     // number of these that the given blur leaves unexplained
+  std::vector<BlurTrial> trials;  // the blurs and planes of focus that were tested
   // The widest blur and the smallest offset of the trials that do about as well as the best. If
   // both are set, the photograph does not decide between them.
   std::optional<BlurTrial> narrower_blur, other_focus;

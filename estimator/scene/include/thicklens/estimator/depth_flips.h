@@ -18,7 +18,8 @@ struct DepthFlipTrial {
 
 // What CheckDepthFlips found.
 struct DepthFlipCheck {
-  double noise_sigma = 0;              // of encoded values, in the image that was checked
+  // Of encoded values, in the image that was checked, with DepthFlipOptions::compression_sigma.
+  double noise_sigma = 0;
   std::vector<DepthFlipTrial> trials;  // the map as it is first, then reversed
   // The order that explains the photograph instead. Absent if the map as it is does, or if none
   // does.
@@ -27,7 +28,9 @@ struct DepthFlipCheck {
 
 // How CheckDepthFlips is run.
 struct DepthFlipOptions {
-  bool falloff = true;                     // use the irradiance of [S12] if there is a camera
+  bool falloff = true;  // use the irradiance of [S12] if there is a camera
+  // Error of the photograph's compression, in its encoded values, which its noise does not show.
+  double compression_sigma = 0;
   int threads = 0;                         // 0: one per core
   std::optional<double> memory_limit_mib;  // for the whole process
 };

@@ -157,6 +157,17 @@ THICKLENS_EXPORT int PagesOfImage(const std::string& bytes, const std::string& n
 THICKLENS_EXPORT DecodedImage ReadImageData(const std::string& path,
                                             const ImageReading& reading = {});
 
+// What compression did to the pixels of a JPEG file, with the rounding to 8 bits: rms errors in
+// grey levels. Derived here [D126]. Halved colours add an error that the file does not show.
+struct JpegError {
+  double mean_levels = 0;  // of the mean of red, green and blue
+  double rms_levels = 0;   // over all channels
+};
+// Estimates it from the quantisation tables and from how many coefficients are 0: compression
+// removes noise and fine details, so that the pixels show less noise than their error. Returns
+// nothing for files that are no JPEG, damaged, or neither grey, RGB nor YCbCr.
+THICKLENS_EXPORT std::optional<JpegError> MeasureJpegError(const std::string& bytes);
+
 // Which numbers an image of integers has. `set_bits` is 0 for an image of zeros.
 struct UsedBits {
   std::uint32_t highest = 0;   // the highest value
