@@ -33,7 +33,8 @@ DepthMap DepthMap::Cropped(const model::PixelRect& rect) const {
     return DepthMap{map.width_px,    map.height_px, std::move(map.values),
                     map.integer,     meaning,       source,
                     largest_of_type, holes,         notes,
-                    warnings,        flip};
+                    warnings,        flip,          is_lossy,
+                    near_value};
   });
 }
 
@@ -82,11 +83,13 @@ DepthMap ReadDepth(const std::string& path, const DepthMeaning& meaning,
                  options.holes,
                  std::move(file.notes),
                  std::move(file.warnings),
-                 options.flip};
+                 options.flip,
+                 file.is_lossy};
   if (!options.near_mm) return depth;
   const double full_scale = depth.largest_of_type.value_or(1);
   const model::InverseScale scale =
       model::InverseScaleBetween(*options.far_mm, *options.near_mm, full_scale);
+  depth.near_value = full_scale;
   depth.meaning.inverse_scale_dpt = scale.scale_dpt;
   depth.meaning.inverse_offset_dpt = scale.offset_dpt;
   depth.notes.push_back(

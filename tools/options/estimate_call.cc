@@ -111,6 +111,8 @@ OptionNames EstimateOptionNames() {
           {"depth.flip", "--depth-flip"},
           {"depth.meaning.inverse_scale_dpt", "--inverse-scale"},
           {"depth.meaning.inverse_offset_dpt", "--inverse-offset"},
+          {"depth.near_mm", "--depth-near"},
+          {"depth.far_mm", "--depth-far"},
           {"depth.holes", "--hole-value"},
           {"depth.holes.zero_is_value", "--zero-is value"},
           {"depth.holes.largest_is_value", "--largest-is value"},

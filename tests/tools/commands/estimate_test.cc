@@ -243,6 +243,12 @@ TEST_F(EstimateTest, DepthThatCannotBe) {
               AllOf(HasSubstr("depth.pfm"), HasSubstr("check the unit")));
   EXPECT_THAT(Refusal(as_z(Depth([](int, int) { return 0.8; }), "mm")),
               AllOf(HasSubstr("depth.pfm"), HasSubstr("check the unit")));
+  // The reasons that lie in the map, with their remedies.
+  EXPECT_THAT(Refusal(as_z(Depth([](int, int) { return -800; }), "mm")),
+              AllOf(HasSubstr("must not be negative"), HasSubstr("multiply the values by -1")));
+  EXPECT_THAT(Refusal(as_z(Depth([](int x, int) { return x / (kWidth - 1.0); }), "mm")),
+              AllOf(HasSubstr("check the unit"), HasSubstr("relative map"),
+                    HasSubstr("--depth-kind inverse with --depth-near and --depth-far")));
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THAT(Refusal(AsDisparity(image, Depth([](int, int) { return kNan; }))),
               AllOf(HasSubstr("depth.pfm"), HasSubstr("holes")));

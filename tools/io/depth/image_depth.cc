@@ -262,7 +262,8 @@ DepthFile DecodeImageDepth(const std::string& bytes, const std::string& name,
   }
   if (chooser.alpha() >= 0) TakeAlpha(decoded.pixels, chooser.alpha(), &file);
   file.description = decoded.facts.OneLine();
-  if (*kind == ImageFileKind::kJpeg) {
+  file.is_lossy = *kind == ImageFileKind::kJpeg;
+  if (file.is_lossy) {
     file.warnings.emplace_back(
         "A depth map in a JPEG file: compression blurs its edges and changes its values by some "
         "levels, also those that mean 'no depth'; use PNG, TIFF or PFM if the program that made it "

@@ -62,6 +62,9 @@ struct DepthMap {
   // Findings of the reader: remarks and doubts, one sentence each.
   std::vector<std::string> notes = {}, warnings = {};
   model::DepthFlip flip = model::DepthFlip::kNone;  // by which the file's values were reversed
+  bool is_lossy = false;  // the file is compressed with losses, as JPEG is
+  // The value that lies at DepthReadOptions::near_mm, if that was given.
+  std::optional<double> near_value = std::nullopt;
 
   // Returns a rectangle of the map, px. Throws Error if it is empty or not inside.
   THICKLENS_EXPORT DepthMap Cropped(const model::PixelRect& rect) const;

@@ -32,6 +32,7 @@ struct DepthFile {
   std::string description;            // "PNG, 128 x 96 px, unsigned 16-bit integers"
   std::vector<std::string> notes;     // one sentence each, without the file's name
   std::vector<std::string> warnings;  // likewise
+  bool is_lossy = false;  // compressed with losses: the values are changed by some levels
 };
 
 // Decodes a depth map: PFM, NPY, PNG, PGM and PPM, TIFF, JPEG, and, unless the build has no GPL
