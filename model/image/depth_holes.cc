@@ -55,11 +55,11 @@ bool IsUsualMark(double magnitude, const std::optional<double>& largest_of_type)
     const double largest = static_cast<float>(*largest_of_type);
     if (magnitude == largest || magnitude == largest - 1) return true;
   }
-  constexpr double kLeastPower = 1e4, kMostNines = 1e7;  // floats hold whole numbers up to 1.6e7
-  for (double power = 1e3; power <= kMostNines; power *= 10) {
+  constexpr double kMinPower = 1e4, kMaxNines = 1e7;  // floats hold whole numbers up to 1.6e7
+  for (double power = 1e3; power <= kMaxNines; power *= 10) {
     if (magnitude == power - 1) return true;
   }
-  for (double power = kLeastPower; power < std::numeric_limits<float>::max(); power *= 10) {
+  for (double power = kMinPower; power < std::numeric_limits<float>::max(); power *= 10) {
     if (magnitude == static_cast<double>(static_cast<float>(power))) return true;
   }
   return magnitude == static_cast<double>(std::numeric_limits<float>::max());
@@ -69,7 +69,7 @@ bool IsUsualMark(double magnitude, const std::optional<double>& largest_of_type)
 std::vector<SuspectedMark> SuspectsOf(DepthKind kind, const HoleRules& rules,
                                       const RawDepthMap& map) {
   // The largest magnitudes, the largest first; several marks may lie side by side, 65534 and 65535.
-  constexpr std::size_t kMostMarks = 3;
+  constexpr std::size_t kMaxMarks = 3;
   std::vector<SuspectedMark> largest;
   std::size_t valid = 0;
   for (const float stored : map.values) {
@@ -81,15 +81,15 @@ std::vector<SuspectedMark> SuspectsOf(DepthKind kind, const HoleRules& rules,
       ++at;
     if (at != largest.end() && at->value == value) {
       ++at->pixels;
-    } else if (at != largest.end() || largest.size() <= kMostMarks) {
+    } else if (at != largest.end() || largest.size() <= kMaxMarks) {
       largest.insert(at, {value, 1});
-      if (largest.size() > kMostMarks + 1) largest.pop_back();
+      if (largest.size() > kMaxMarks + 1) largest.pop_back();
     }
   }
-  constexpr double kLeastShare = 1e-3, kLeastOthers = 0.01;
-  constexpr std::size_t kLeastPixels = 8;
+  constexpr double kMinShareOfMark = 1e-3, kMinOthers = 0.01;
+  constexpr std::size_t kMinPixels = 8;
   const auto least_pixels =
-      std::max<double>(kLeastPixels, kLeastShare * static_cast<double>(map.values.size()));
+      std::max<double>(kMinPixels, kMinShareOfMark * static_cast<double>(map.values.size()));
   // Two planes at disparities of 0 and 5 are a scene: of disparity and inverse depth only usual
   // marks are suspected, and only beside two others. Relative maps of 8 bits are scaled to reach
   // 255.
@@ -109,7 +109,7 @@ std::vector<SuspectedMark> SuspectsOf(DepthKind kind, const HoleRules& rules,
     const bool is_usual = IsUsualMark(magnitude, largest_of_type);
     // Without other depths there is no scale to compare with.
     const double others = static_cast<double>(valid - pixels) / static_cast<double>(valid);
-    if (next < (is_usual ? usual_gap : any_gap) * magnitude && others >= kLeastOthers &&
+    if (next < (is_usual ? usual_gap : any_gap) * magnitude && others >= kMinOthers &&
         i + least_distinct < largest.size()) {
       marked = i + 1;
     } else if (!is_usual) {

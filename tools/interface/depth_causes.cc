@@ -17,7 +17,7 @@ struct ValueRange {
   std::size_t negative = 0, positive = 0, zero = 0;
 };
 
-// Of the values that are numbers and no stated holes.
+// The range of the values that are numbers and no stated holes.
 ValueRange RangeOf(const DepthMap& map) {
   ValueRange range;
   for (const float value : map.values) {

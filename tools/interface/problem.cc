@@ -331,7 +331,7 @@ void ReportHoles(const DepthMap& map, const model::DepthHoles& holes, RunScope* 
                           NameOf(map), percent(holes.negative)));
   }
   for (const model::SuspectedMark& mark : holes.suspects) {
-    // As many digits as the float has.
+    // The float is printed with as many digits as it has.
     const auto value = static_cast<float>(mark.value);
     run->Warn(fmt::format(
         "{}: {} pixels ({:.1f} %) have exactly the value {}, far beyond all others: if it means "

@@ -1,4 +1,4 @@
-// What a message says about a map whose depths are impossible.
+// Tests the causes that are named for a map whose depths are impossible.
 #include "tools/interface/depth_causes.h"
 
 #include <gmock/gmock.h>

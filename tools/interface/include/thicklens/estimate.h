@@ -178,7 +178,7 @@ struct EstimateDiagnostics {
   double largest_step_px = 0;  // displacement between neighbouring views
   double coarse_share = 0;     // share of the pixels whose step is above 3 px
   std::optional<double> strength, noise_sigma, residual_rms;  // noise, residual in encoded values
-  // What storing did to the photograph, in encoded values: rounding to its bits and, for a JPEG
+  // The errors of storing the photograph, in encoded values: rounding to its bits and, for a JPEG
   // file, compression, over all channels and for their mean (io::JpegError). Compression removes
   // noise and leaves its own error, so that both together are what a residual is compared with; the
   // solver uses `noise_sigma` alone.

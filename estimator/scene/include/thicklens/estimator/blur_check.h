@@ -55,7 +55,8 @@ struct BlurCheckOptions {
 // What CheckBlur found.
 struct BlurCheck {
   std::string message = "not run";  // how it ended, one line
-  // Of encoded values, in the image that was checked, with BlurCheckOptions::compression_sigma.
+  // The noise of encoded values in the image that was checked, with
+  // BlurCheckOptions::compression_sigma.
   double noise_sigma = 0;
   int blocks = 0;                 // number of informative blocks
   int unexplained_blocks = 0;     // number of these that the given blur leaves unexplained

@@ -18,7 +18,8 @@ struct DepthFlipTrial {
 
 // What CheckDepthFlips found.
 struct DepthFlipCheck {
-  // Of encoded values, in the image that was checked, with DepthFlipOptions::compression_sigma.
+  // The noise of encoded values in the image that was checked, with
+  // DepthFlipOptions::compression_sigma.
   double noise_sigma = 0;
   std::vector<DepthFlipTrial> trials;  // the map as it is first, then reversed
   // The order that explains the photograph instead. Absent if the map as it is does, or if none

@@ -157,8 +157,8 @@ THICKLENS_EXPORT int PagesOfImage(const std::string& bytes, const std::string& n
 THICKLENS_EXPORT DecodedImage ReadImageData(const std::string& path,
                                             const ImageReading& reading = {});
 
-// What compression did to the pixels of a JPEG file, with the rounding to 8 bits: rms errors in
-// grey levels. Derived here [D126]. Halved colours add an error that the file does not show.
+// The errors that compression left in the pixels of a JPEG file, with the rounding to 8 bits: rms
+// in grey levels. Derived here [D126]. Halved colours add an error that the file does not show.
 struct JpegError {
   double mean_levels = 0;  // of the mean of red, green and blue
   double rms_levels = 0;   // over all channels
