@@ -220,6 +220,7 @@ exr('window.exr', {'Z': depth}, window=(2, -1), display=(0, 0, 7, 5))
 exr('left.exr', {'Y': depth}, attributes=[('name', 'string', b'left')])
 exr('right.exr', {'Y': depth + 1}, attributes=[('name', 'string', b'right')])
 run('exrmultipart', '-combine', '-i', 'left.exr', 'right.exr', '-o', 'parts.exr', '-override', '1')
+run('exrmultipart', '-combine', '-i', 'rgb_half.exr', 'z.exr', '-o', 'rgb_and_z.exr')
 os.remove('left.exr')
 os.remove('right.exr')
 

@@ -237,6 +237,123 @@ TEST_F(DepthFileTest, APictureInFalseColoursIsNamed) {
   EXPECT_THAT(Refusal(Encoded(noise, ".png")), HasSubstr("no known colour map"));
 }
 
+struct ColoursOfMap {
+  std::string name;
+  std::vector<cv::Vec3b> colours;  // red first
+};
+
+// The colours are those of matplotlib 3.6.3, get_cmap(NAME)(i) for i = 5, 25, .., 245.
+TEST_F(DepthFileTest, MapsOfMatplotlibAreNamed) {
+  const std::vector<ColoursOfMap> maps = {{"Spectral",
+                                           {{169, 13, 69},
+                                            {212, 61, 79},
+                                            {237, 98, 70},
+                                            {249, 145, 83},
+                                            {253, 191, 111},
+                                            {254, 228, 145},
+                                            {255, 252, 186},
+                                            {238, 248, 164},
+                                            {202, 234, 158},
+                                            {153, 214, 164},
+                                            {100, 192, 166},
+                                            {59, 146, 185},
+                                            {77, 101, 173}}},
+                                          {"Blues",
+                                           {{243, 248, 254},
+                                            {227, 238, 249},
+                                            {212, 228, 244},
+                                            {196, 218, 238},
+                                            {171, 208, 230},
+                                            {143, 194, 222},
+                                            {111, 176, 215},
+                                            {84, 159, 205},
+                                            {60, 140, 195},
+                                            {39, 119, 184},
+                                            {22, 99, 170},
+                                            {8, 79, 153},
+                                            {8, 58, 122}}},
+                                          {"coolwarm",
+                                           {{64, 85, 200},
+                                            {89, 119, 227},
+                                            {115, 150, 245},
+                                            {143, 177, 254},
+                                            {170, 199, 253},
+                                            {196, 213, 243},
+                                            {218, 220, 224},
+                                            {237, 210, 195},
+                                            {246, 190, 164},
+                                            {246, 163, 133},
+                                            {237, 131, 102},
+                                            {220, 93, 74},
+                                            {195, 46, 49}}},
+                                          {"nipy_spectral",
+                                           {{47, 0, 53},
+                                            {135, 0, 152},
+                                            {0, 0, 197},
+                                            {0, 122, 221},
+                                            {0, 164, 187},
+                                            {0, 166, 104},
+                                            {0, 180, 0},
+                                            {0, 234, 0},
+                                            {176, 255, 0},
+                                            {247, 221, 0},
+                                            {255, 141, 0},
+                                            {233, 0, 0},
+                                            {204, 44, 44}}},
+                                          {"rainbow of matplotlib",
+                                           {{118, 16, 255},
+                                            {78, 77, 252},
+                                            {38, 134, 245},
+                                            {2, 183, 235},
+                                            {42, 221, 221},
+                                            {82, 245, 203},
+                                            {122, 255, 183},
+                                            {162, 249, 160},
+                                            {203, 228, 134},
+                                            {242, 194, 107},
+                                            {255, 147, 77},
+                                            {255, 92, 47},
+                                            {255, 31, 16}}}};
+  for (const ColoursOfMap& map : maps) {
+    cv::Mat image(16, 8 * static_cast<int>(map.colours.size()), CV_8UC3);
+    for (int x = 0; x < image.cols; ++x) {
+      const cv::Vec3b& colour = map.colours[static_cast<std::size_t>(x / 8)];
+      image.col(x).setTo(cv::Scalar(colour[2], colour[1], colour[0]));
+    }
+    EXPECT_THAT(
+        Refusal(Encoded(image, ".png")),
+        AllOf(HasSubstr("in the colours of the map '" + map.name + "'"), HasSubstr("100.0 %")));
+  }
+}
+
+// A grey ramp with a tint of `levels` in blue.
+cv::Mat TintedRamp(int levels) {
+  cv::Mat image(64, 128, CV_8UC3);
+  for (int x = 0; x < image.cols; ++x)
+    image.col(x).setTo(cv::Scalar(x + 40 + levels, x + 40, x + 40));
+  return image;
+}
+
+TEST_F(DepthFileTest, NearlyGreyIsNoColourMap) {
+  EXPECT_THAT(Refusal(Encoded(TintedRamp(6), ".png")),
+              AllOf(HasSubstr("its channels differ, but by little"), HasSubstr("at most 6 of 255"),
+                    Not(HasSubstr("colours of the map"))));
+}
+
+TEST_F(DepthFileTest, ALossyWebpIsReadAsAJpegIs) {
+  if (!io::HasImageLibrary()) GTEST_SKIP() << "no WebP in this build";
+  for (const int quality : {60, 101}) {  // 101: without losses
+    const std::string bytes =
+        Encoded(TintedRamp(quality > 100 ? 0 : 3), ".webp", {cv::IMWRITE_WEBP_QUALITY, quality});
+    const DepthFile file = ReadDepthFile(folder_.Put("depth", bytes));
+    EXPECT_NEAR(file.map.values[10], 50, 12);
+    EXPECT_EQ(file.is_lossy, quality <= 100);
+    ASSERT_EQ(file.warnings.size(), quality > 100 ? 0U : 1U);
+    if (quality > 100) continue;
+    EXPECT_THAT(file.warnings.front(), HasSubstr("lossy WebP"));
+  }
+}
+
 TEST_F(DepthFileTest, AJpegIsReadWithAWarning) {
   const std::string path =
       folder_.Put("depth", Encoded(cv::Mat(8, 8, CV_8U, cv::Scalar(9)), ".jpg"));
@@ -320,6 +437,49 @@ TEST_F(DepthFileTest, NpyOfAnyTypeAndOrderIsRead) {
               ElementsAre(1, -2, 5.9604644775390625e-8F, std::numeric_limits<float>::infinity()));
 }
 
+TEST_F(DepthFileTest, NpyWithEqualChannelsIsRead) {
+  const auto shape = [](const std::string& sides, const std::string& order = "False") {
+    return "{'descr': '|u1', 'fortran_order': " + order + ", 'shape': (" + sides + "), }";
+  };
+  EXPECT_THAT(Read(Npy(shape("2, 2, 3"), "\1\1\1\2\2\2\3\3\3\4\4\4")).values,
+              ElementsAre(1, 2, 3, 4));
+  EXPECT_THAT(Read(Npy(shape("3, 2, 2"), "\1\2\3\4\1\2\3\4\1\2\3\4")).values,
+              ElementsAre(1, 2, 3, 4));
+  // In Fortran order the first index runs fastest.
+  EXPECT_THAT(Read(Npy(shape("2, 2, 3", "True"), "\1\3\2\4\1\3\2\4\1\3\2\4")).values,
+              ElementsAre(1, 2, 3, 4));
+  const std::string path =
+      folder_.Put("depth", Npy(shape("2, 2, 4"), "\1\1\1\7\2\2\2\7\3\3\3\7\4\4\4\7"));
+  const DepthFile file = ReadDepthFile(path);
+  EXPECT_THAT(file.map.values, ElementsAre(1, 2, 3, 4));
+  EXPECT_THAT(file.notes,
+              Contains(HasSubstr("3 channels are equal: they are one map. The fourth")));
+  EXPECT_THAT(Refusal(Npy(shape("2, 2, 3"), "\1\1\1\2\2\2\3\3\3\4\4\5")),
+              AllOf(HasSubstr("whose channels differ: 4 and 5 at pixel (1, 1)"),
+                    HasSubstr("save one of them")));
+  EXPECT_THAT(Refusal(Npy(shape("2, 2, 3"), "\1\1\1")), HasSubstr("2x2 px in 3 channels"));
+}
+
+// The entries of a ZIP archive's directory, with zeros where this reader looks at nothing.
+std::string ZipDirectory(const std::vector<std::string>& entries) {
+  std::string bytes("PK\x03\x04");
+  for (const std::string& entry : entries) {
+    bytes += "PK\x01\x02" + std::string(24, '\0');
+    bytes += static_cast<char>(entry.size());
+    bytes += std::string(17, '\0') + entry;
+  }
+  return bytes;
+}
+
+TEST_F(DepthFileTest, AnNpzArchiveIsRefusedWithTheRemedy) {
+  const std::string two = ZipDirectory({"depth.npy", "mask.npy", "readme.txt"});
+  EXPECT_THAT(Refusal(two),
+              AllOf(HasSubstr("found an NPZ archive of the arrays depth, mask: save"),
+                    HasSubstr("numpy.save('depth.npy', numpy.load('"), HasSubstr("')['depth'])")));
+  EXPECT_THAT(Refusal(two.substr(0, 40)), HasSubstr("found a ZIP archive"));
+  EXPECT_THAT(Refusal(ZipDirectory({"a.txt"})), HasSubstr("found a ZIP archive"));
+}
+
 TEST_F(DepthFileTest, ABrokenNpyIsRefused) {
   const std::string rows = "'fortran_order': False, 'shape': (2, 3), }";
   EXPECT_THAT(Refusal(Npy("{'descr': '<f4', " + rows, kBigEndianValues.substr(0, 23))),
@@ -351,6 +511,24 @@ TEST_F(DepthFileTest, AChannelIsTakenByItsName) {
   DepthReading reading;
   reading.channel = "Z";
   EXPECT_EQ(ReadDepthFile(path, reading).map.values.front(), 102.5F);
+  // RGB and Z in separate parts: one part has Z.
+  const std::string parts = std::string(THICKLENS_SOURCE_DIR) + "/tests/data/images/rgb_and_z.exr";
+  for (const char* const channel : {"", "Z"}) {
+    DepthReading of_part;
+    of_part.channel = channel;
+    const DepthFile file = ReadDepthFile(parts, of_part);
+    EXPECT_EQ(file.map.values.front(), 102.5F);
+    ASSERT_FALSE(file.notes.empty());
+    EXPECT_THAT(file.notes.front(), AllOf(HasSubstr("The part "), HasSubstr("(Z) of 2 is taken")));
+  }
+  DepthReading of_none;
+  of_none.channel = "nothing";
+  EXPECT_THAT(ErrorOf([&] { ReadDepthFile(parts, of_none); }),
+              HasSubstr("none of its 2 parts has the channel 'nothing'"));
+  EXPECT_THAT(ErrorOf([] {
+                ReadDepthFile(std::string(THICKLENS_SOURCE_DIR) + "/tests/data/images/parts.exr");
+              }),
+              HasSubstr("none of its 2 parts has a channel named Z, depth or disparity: 'left' ("));
   reading.channel = "nothing";
   EXPECT_THAT(ErrorOf([&] { ReadDepthFile(path, reading); }),
               AllOf(HasSubstr("no channel 'nothing'"), HasSubstr("Z")));
@@ -360,7 +538,7 @@ TEST_F(DepthFileTest, AChannelIsTakenByItsName) {
 TEST_F(DepthFileTest, APngWhoseNumbersWouldBeChangedIsRefused) {
   const cv::Mat bits = (cv::Mat_<unsigned char>(2, 2) << 0, 255, 255, 0);
   EXPECT_THAT(Refusal(Encoded(bits, ".png", {cv::IMWRITE_PNG_BILEVEL, 1})),
-              HasSubstr("1 bits in the file"));
+              HasSubstr("8- or 16-bit values in one channel, found values of 1 bit, as of a mask"));
 }
 
 TEST_F(DepthFileTest, ABrokenImageIsRefused) {

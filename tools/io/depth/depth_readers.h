@@ -19,6 +19,10 @@ double PfmFactor(double magnitude, PfmScale scale, DepthFile* file);
 // The value of a depth map for a stored one.
 float PfmValue(double factor, float stored);
 
+bool IsZip(const std::string& bytes);
+// The kind of the archive, and how one array is saved if it is an NPZ file, an archive of NPY
+// files.
+std::string WordsOnZip(const std::string& bytes, const std::string& name);
 bool IsNpy(const std::string& bytes);
 DepthFile DecodeNpyDepth(const std::string& bytes, const std::string& name);
 

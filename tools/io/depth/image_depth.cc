@@ -105,11 +105,31 @@ double LargestDifference(const cv::Mat& pixels, const std::vector<int>& channels
   return largest;
 }
 
+// Whether the file is compressed with losses: JPEG, and WebP with a chunk "VP8 ".
+bool IsLossy(const std::string& bytes, ImageFileKind kind) {
+  if (kind != ImageFileKind::kWebp) return kind == ImageFileKind::kJpeg;
+  constexpr std::size_t kHeaderBytes = 12, kNameBytes = 4, kChunkBytes = 8;
+  std::size_t at = kHeaderBytes;
+  while (at + kChunkBytes <= bytes.size()) {
+    if (bytes.compare(at, kNameBytes, "VP8 ") == 0) return true;
+    std::size_t size = 0;
+    for (std::size_t i = kChunkBytes; i > kNameBytes; --i)
+      size = size << 8 | static_cast<unsigned char>(bytes[at + i - 1]);
+    at += kChunkBytes + size + size % 2;  // chunks have an even size
+  }
+  return false;
+}
+
 // Chooses the channel of the depth.
 class DepthChannel {
  public:
-  DepthChannel(const DecodedImage& image, ImageFileKind kind, const std::string& name)
-      : pixels_(image.pixels), names_(image.facts.channels), kind_(kind), name_(name) {}
+  DepthChannel(const DecodedImage& image, ImageFileKind kind, bool is_lossy,
+               const std::string& name)
+      : pixels_(image.pixels),
+        names_(image.facts.channels),
+        kind_(kind),
+        is_lossy_(is_lossy),
+        name_(name) {}
 
   int Choose(const std::string& wanted, DepthFile* file) {
     if (!wanted.empty()) return OfName(wanted);
@@ -121,8 +141,10 @@ class DepthChannel {
       return named[0];
     }
     if (named.size() > 1) {
-      throw Error(fmt::format("{}: {} channels may be the depth: name one of {}", name_,
-                              named.size(), Listed(names_)));
+      std::vector<std::string> names;
+      for (const int channel : named) names.push_back(names_[static_cast<std::size_t>(channel)]);
+      throw Error(fmt::format("{}: {} channels may be the depth: name one of {} by --depth-channel",
+                              name_, named.size(), Listed(names)));
     }
     return OfEqualOnes(file);
   }
@@ -155,8 +177,10 @@ class DepthChannel {
     }
     if (colours.size() == 1) return colours[0];
     // The colours of a grey JPEG file that was stored as a colour one differ by rounding.
-    constexpr double kJpegLevels = 3;
-    const double allowed = kind_ == ImageFileKind::kJpeg ? kJpegLevels : 0;
+    constexpr double kJpegLevels = 3, kWebpLevels = 10;
+    const double allowed = !is_lossy_                      ? 0
+                           : kind_ == ImageFileKind::kWebp ? kWebpLevels
+                                                           : kJpegLevels;
     const double difference = LargestDifference(pixels_, colours);
     if (colours.size() < 3 || difference > allowed) ThrowOfColours(colours);
     std::vector<std::string> names;
@@ -164,7 +188,8 @@ class DepthChannel {
     file->notes.push_back(fmt::format("Its {} channels ({}) {}: they are one map.", colours.size(),
                                       Listed(names),
                                       difference == 0 ? "are equal" : "are equal up to rounding"));
-    return colours[0];
+    // Green is nearest to the luminance, which WebP stores.
+    return is_lossy_ && kind_ == ImageFileKind::kWebp && difference > 0 ? colours[1] : colours[0];
   }
 
   [[noreturn]] void ThrowOfColours(const std::vector<int>& colours) const {
@@ -177,7 +202,7 @@ class DepthChannel {
         from_to.push_back(i);
       }
       cv::mixChannels(&pixels_, 1, &rgb, 1, from_to.data(), 3);
-      words = WordsOnColours(rgb, kind_ == ImageFileKind::kJpeg);
+      words = WordsOnColours(rgb, is_lossy_);
     }
     throw Error(
         fmt::format("{}: {} in one channel, or in three channels that are equal, found {} ({}); {}",
@@ -187,6 +212,7 @@ class DepthChannel {
   const cv::Mat& pixels_;
   const std::vector<std::string>& names_;
   const ImageFileKind kind_;
+  const bool is_lossy_;
   const std::string& name_;
   int alpha_ = -1;
 };
@@ -197,6 +223,46 @@ std::optional<double> LargestOfType(const ImageFacts& facts) {
   if (facts.container_bits < 1 || facts.container_bits > 64) return std::nullopt;
   const bool is_unsigned = facts.sample_type.find("unsigned") != std::string::npos;
   return std::ldexp(1.0, facts.container_bits - (is_unsigned ? 0 : 1)) - 1;
+}
+
+// Decodes the image, or the part of an EXR file of several parts that has the depth.
+DecodedImage DecodedDepth(const std::string& bytes, const std::string& name, ImageFileKind kind,
+                          const std::string& wanted, DepthFile* file) {
+  ImageReading reading;
+  reading.spread_bits = false;
+  const int parts = kind == ImageFileKind::kExr ? PagesOfImage(bytes, name) : 1;
+  if (parts == 1) return DecodeImageFile(bytes, name, reading);
+  std::optional<DecodedImage> chosen;
+  std::vector<std::string> all, found;
+  for (int i = 0; i < parts; ++i) {
+    ThrowIfCancelled();
+    reading.page = i;
+    DecodedImage part = DecodeImageFile(bytes, name, reading);
+    const std::vector<std::string>& names = part.facts.channels;
+    const std::string shown =
+        fmt::format("'{}' ({})", PrintableUtf8(part.facts.part), Listed(names));
+    all.push_back(shown);
+    const bool has_depth = wanted.empty()
+                               ? !NamedDepth(names).empty()
+                               : std::find(names.begin(), names.end(), wanted) != names.end();
+    if (!has_depth) continue;
+    found.push_back(shown);
+    if (!chosen) chosen = std::move(part);
+  }
+  const std::string channel = wanted.empty() ? "a channel named Z, depth or disparity"
+                                             : "the channel '" + PrintableUtf8(wanted) + "'";
+  if (found.empty()) {
+    throw Error(fmt::format("{}: none of its {} parts has {}: {}", name, parts, channel,
+                            fmt::join(all, ", ")));
+  }
+  if (found.size() > 1) {
+    throw Error(fmt::format(
+        "{}: {} of its {} parts have {}: {}; {}extract the part that is meant into a file", name,
+        found.size(), parts, channel, fmt::join(found, ", "),
+        wanted.empty() ? "name the channel by --depth-channel, or " : ""));
+  }
+  file->notes.push_back(fmt::format("The part {} of {} is taken.", found[0], parts));
+  return std::move(*chosen);
 }
 
 // Transparent pixels are holes; a channel that is transparent everywhere says nothing.
@@ -233,16 +299,17 @@ DepthFile DecodeImageDepth(const std::string& bytes, const std::string& name,
                     "expected{}",
                     name, other.empty() ? "" : fmt::format(", found {}", other)));
   }
-  ImageReading image_reading;
-  image_reading.spread_bits = false;
-  DecodedImage decoded = DecodeImageFile(bytes, name, image_reading);
+  DepthFile file;
+  DecodedImage decoded = DecodedDepth(bytes, name, *kind, reading.channel, &file);
   // A PNG of fewer bits is more likely a drawing.
   if (*kind == ImageFileKind::kPng && PngBits(bytes) < 8 && decoded.pixels.channels() == 1) {
-    throw Error(fmt::format("{}: {} in one channel, found {} ({} bits in the file)", name,
-                            ExpectedOf(*kind), TypeName(decoded.pixels), PngBits(bytes)));
+    const int bits = PngBits(bytes);
+    throw Error(fmt::format("{}: {} in one channel, found values of {} bit{}, as of a {}", name,
+                            ExpectedOf(*kind), bits, bits == 1 ? "" : "s",
+                            bits == 1 ? "mask" : "drawing"));
   }
-  DepthFile file;
-  DepthChannel chooser(decoded, *kind, name);
+  file.is_lossy = IsLossy(bytes, *kind);
+  DepthChannel chooser(decoded, *kind, file.is_lossy, name);
   const int channel = chooser.Choose(reading.channel, &file);
   cv::Mat values;
   cv::extractChannel(decoded.pixels, values, channel);
@@ -262,12 +329,12 @@ DepthFile DecodeImageDepth(const std::string& bytes, const std::string& name,
   }
   if (chooser.alpha() >= 0) TakeAlpha(decoded.pixels, chooser.alpha(), &file);
   file.description = decoded.facts.OneLine();
-  file.is_lossy = *kind == ImageFileKind::kJpeg;
   if (file.is_lossy) {
-    file.warnings.emplace_back(
-        "A depth map in a JPEG file: compression blurs its edges and changes its values by some "
+    file.warnings.push_back(fmt::format(
+        "A depth map in a {} file: compression blurs its edges and changes its values by some "
         "levels, also those that mean 'no depth'; use PNG, TIFF or PFM if the program that made it "
-        "can write them.");
+        "can write them.",
+        *kind == ImageFileKind::kWebp ? "lossy WebP" : "JPEG"));
   }
   if (decoded.facts.orientation != 1) {
     file.notes.push_back(fmt::format(

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstddef>
@@ -143,6 +144,39 @@ float NpyValue(const char* bytes, const NpyHeader& header) {
   return static_cast<float>(value);
 }
 
+// Where the values of a map are in the file, in values and not in bytes.
+struct NpyLayout {
+  std::size_t width = 0, height = 0, channels = 1;
+  std::size_t x_step = 0, y_step = 0, channel_step = 0;
+};
+
+// The layout of (height, width), or of channels in front of or behind them; none for other shapes.
+std::optional<NpyLayout> LayoutOf(const NpyHeader& header) {
+  // Axes of length 1 do not change the order of the values: (1, 480, 640), (480, 640, 1).
+  std::vector<std::size_t> sides;
+  for (const std::size_t side : header.shape) {
+    if (side != 1) sides.push_back(side);
+  }
+  if (sides.size() < 2 && header.shape.size() == 2) sides = header.shape;
+  if (sides.size() != 2 && sides.size() != 3) return std::nullopt;
+  std::vector<std::size_t> steps(sides.size(), 1);
+  for (std::size_t i = 1; i < sides.size(); ++i) {
+    if (header.is_fortran_order) {
+      steps[i] = steps[i - 1] * sides[i - 1];
+    } else {
+      const std::size_t axis = sides.size() - 1 - i;
+      steps[axis] = steps[axis + 1] * sides[axis + 1];
+    }
+  }
+  if (sides.size() == 2) return NpyLayout{sides[1], sides[0], 1, steps[1], steps[0], 0};
+  const auto is_colours = [](std::size_t side) { return side == 3 || side == 4; };
+  if (is_colours(sides[2]))
+    return NpyLayout{sides[1], sides[0], sides[2], steps[1], steps[0], steps[2]};
+  if (is_colours(sides[0]))
+    return NpyLayout{sides[2], sides[1], sides[0], steps[2], steps[1], steps[0]};
+  return std::nullopt;
+}
+
 NpyHeader ReadNpyHeader(const std::string& bytes, const std::string& name, std::size_t* at) {
   const std::size_t length_bytes =
       bytes.size() > kNpyMagicBytes && bytes[kNpyMagicBytes] == '\1' ? 2 : 4;
@@ -164,48 +198,93 @@ NpyHeader ReadNpyHeader(const std::string& bytes, const std::string& name, std::
 
 }  // namespace
 
+bool IsZip(const std::string& bytes) { return bytes.compare(0, 4, "PK\x03\x04") == 0; }
+
+std::string WordsOnZip(const std::string& bytes, const std::string& name) {
+  constexpr std::size_t kNameLengthAt = 28, kHeaderBytes = 46, kMaxShown = 6;
+  const std::string ending = ".npy";
+  std::vector<std::string> arrays;
+  // The entries of the directory at its end begin with this mark.
+  for (std::size_t at = bytes.find("PK\x01\x02"); at != std::string::npos;
+       at = bytes.find("PK\x01\x02", at + 4)) {
+    if (at + kHeaderBytes > bytes.size()) break;
+    const auto length =
+        static_cast<std::size_t>(BitsAt(bytes.data() + at + kNameLengthAt, 2, false));
+    if (at + kHeaderBytes + length > bytes.size()) break;
+    const std::string entry = bytes.substr(at + kHeaderBytes, length);
+    if (entry.size() <= ending.size() ||
+        entry.compare(entry.size() - ending.size(), ending.size(), ending) != 0) {
+      continue;
+    }
+    if (arrays.size() < kMaxShown)
+      arrays.push_back(PrintableUtf8(entry.substr(0, entry.size() - ending.size())));
+  }
+  if (arrays.empty()) return "a ZIP archive";
+  return fmt::format(
+      "an NPZ archive of the arrays {}: save the depth alone, in Python "
+      "numpy.save('depth.npy', numpy.load('{}')['{}'])",
+      fmt::join(arrays, ", "), PrintableUtf8(name.substr(name.find_last_of('/') + 1)), arrays[0]);
+}
+
 bool IsNpy(const std::string& bytes) { return bytes.compare(0, kNpyMagicBytes, kNpyMagic) == 0; }
 
 DepthFile DecodeNpyDepth(const std::string& bytes, const std::string& name) {
   std::size_t at = 0;
   const NpyHeader header = ReadNpyHeader(bytes, name, &at);
-  // Axes of length 1 do not change the order of the values: (1, 480, 640), (480, 640, 1).
-  std::vector<std::size_t> sides;
-  for (const std::size_t side : header.shape) {
-    if (side != 1) sides.push_back(side);
-  }
-  if (sides.size() < 2 && header.shape.size() == 2) sides = header.shape;
-  if (sides.size() != 2) {
+  const std::optional<NpyLayout> layout = LayoutOf(header);
+  if (!layout) {
     throw Error(fmt::format(
         "{}: an NPY file of the shape ({}); (height, width) is expected, one value per pixel", name,
         fmt::join(header.shape, ", ")));
   }
-  if (sides[0] < 1 || sides[1] < 1 || sides[0] > kMaxNpySidePx || sides[1] > kMaxNpySidePx) {
-    throw NpyError(name, fmt::format("its shape is ({}, {})", sides[0], sides[1]));
+  const std::size_t width = layout->width, height = layout->height;
+  if (height < 1 || width < 1 || height > kMaxNpySidePx || width > kMaxNpySidePx) {
+    throw NpyError(name, fmt::format("its shape is ({}, {})", height, width));
   }
-  const std::size_t expected = sides[0] * sides[1] * header.bytes_per_value;
+  const std::size_t expected = width * height * layout->channels * header.bytes_per_value;
   if (bytes.size() - at != expected) {
-    throw NpyError(name, fmt::format("{} bytes of values for {}x{} px: {} are expected",
-                                     bytes.size() - at, sides[1], sides[0], expected));
+    throw NpyError(
+        name,
+        fmt::format("{} bytes of values for {}x{} px{}: {} are expected", bytes.size() - at, width,
+                    height,
+                    layout->channels == 1 ? "" : fmt::format(" in {} channels", layout->channels),
+                    expected));
   }
   DepthFile file;
-  file.map.width_px = static_cast<int>(sides[1]);
-  file.map.height_px = static_cast<int>(sides[0]);
+  file.map.width_px = static_cast<int>(width);
+  file.map.height_px = static_cast<int>(height);
   file.map.integer = header.kind != 'f';
   const auto bits = static_cast<int>(8 * header.bytes_per_value);
   if (file.map.integer)
     file.map.largest_of_type = std::ldexp(1.0, header.kind == 'i' ? bits - 1 : bits) - 1;
-  file.map.values.reserve(sides[0] * sides[1]);
-  for (std::size_t y = 0; y < sides[0]; ++y) {
+  file.map.values.reserve(width * height);
+  const std::size_t colours = std::min<std::size_t>(layout->channels, 3);
+  for (std::size_t y = 0; y < height; ++y) {
     ThrowIfCancelled();
-    for (std::size_t x = 0; x < sides[1]; ++x) {
-      const std::size_t place = header.is_fortran_order ? x * sides[0] + y : y * sides[1] + x;
-      file.map.values.push_back(
-          NpyValue(bytes.data() + at + place * header.bytes_per_value, header));
+    for (std::size_t x = 0; x < width; ++x) {
+      const auto value_of = [&](std::size_t channel) {
+        const std::size_t place =
+            y * layout->y_step + x * layout->x_step + channel * layout->channel_step;
+        return NpyValue(bytes.data() + at + place * header.bytes_per_value, header);
+      };
+      const float value = value_of(0);
+      for (std::size_t channel = 1; channel < colours; ++channel) {
+        const float other = value_of(channel);
+        if (other == value || (std::isnan(other) && std::isnan(value))) continue;
+        throw Error(fmt::format(
+            "{}: an NPY file of the shape ({}) whose channels differ: {} and {} at pixel ({}, {}); "
+            "(height, width) is expected, or equal channels: save one of them",
+            name, fmt::join(header.shape, ", "), value, other, x, y));
+      }
+      file.map.values.push_back(value);
     }
   }
+  if (layout->channels > 1) {
+    file.notes.push_back(fmt::format("Its {} channels are equal: they are one map.{}", colours,
+                                     layout->channels == 4 ? " The fourth one is ignored." : ""));
+  }
   file.description = fmt::format(
-      "NPY, {} x {} px, {}", sides[1], sides[0],
+      "NPY, {} x {} px, {}", width, height,
       header.kind == 'f'
           ? fmt::format("{}-bit floats", bits)
           : fmt::format("{} {}-bit integers", header.kind == 'i' ? "signed" : "unsigned", bits));
