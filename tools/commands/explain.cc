@@ -68,8 +68,12 @@ DepthRange ParseDepthRange(const std::string& text) {
 OptionNames ExplainOptionNames() {
   return {{"depth_range", "--depth-range"},
           {"depth", "--depth"},
+          {"depth.near_mm", "--depth-near"},
+          {"depth.far_mm", "--depth-far"},
           {"depth.meaning.kind", "--depth-kind"},
           {"depth.meaning.unit", "--depth-unit"},
+          {"depth.meaning.inverse_scale_dpt", "--inverse-scale"},
+          {"depth.meaning.inverse_offset_dpt", "--inverse-offset"},
           {"depth_count", "--steps"},
           {"effects", "--effects"},
           {"effects.without", "--without"},

@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "thicklens/base/error.h"
 #include "thicklens/depth.h"
 #include "tools/interface/run_scope.h"
 
@@ -16,6 +17,23 @@ std::string CauseInMap(const DepthMap& map, const RunScope& run);
 // Returns what is wrong with values beyond the one that DepthReadOptions::near_mm belongs to, and
 // the scale that is probably meant; empty if there are none.
 std::string ValuesBeyondNear(const DepthMap& map, const RunScope& run);
+
+// Runs `work`; the Error by which it refuses the map also names the cause in the map, if there is
+// one.
+template <typename Work>
+auto NamingCauseInMap(const DepthMap& map, const RunScope& run, const Work& work) {
+  try {
+    return work();
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const OptionError&) {
+    throw;
+  } catch (const Error& error) {
+    const std::string cause = CauseInMap(map, run);
+    if (cause.empty()) throw;
+    throw Error(std::string(error.what()) + "; " + cause);
+  }
+}
 
 }  // namespace thicklens
 

@@ -8,6 +8,7 @@
 
 #include "thicklens/base/error.h"
 #include "thicklens/model/depth_places.h"
+#include "tools/interface/depth_causes.h"
 #include "tools/interface/effects_choice.h"
 #include "tools/interface/run_scope.h"
 #include "tools/interface/validation.h"
@@ -22,7 +23,7 @@ struct ExplainedScene {
   std::vector<model::EffectSite> places;
 };
 
-ExplainedScene SceneOfMap(DepthMap depth, const Camera& camera) {
+ExplainedScene SceneOfMap(const DepthMap& depth, const Camera& camera, const RunScope& run) {
   const std::string name = depth.source.empty() ? "depth" : depth.source;
   const model::Sensor& sensor = camera.sensor;
   if (depth.width_px != sensor.width_px || depth.height_px != sensor.height_px) {
@@ -36,20 +37,22 @@ ExplainedScene SceneOfMap(DepthMap depth, const Camera& camera) {
     convention.unit_mm = model::DepthUnitMm(LengthUnitName(depth.meaning.unit));
   convention.inverse_scale_dpt = depth.meaning.inverse_scale_dpt;
   convention.inverse_offset_dpt = depth.meaning.inverse_offset_dpt;
-  model::RawDepthMap map{depth.width_px, depth.height_px, std::move(depth.values), depth.is_integer,
+  model::RawDepthMap map{depth.width_px, depth.height_px, depth.values, depth.is_integer,
                          depth.largest_of_type};
   WithFileContext(name, [&] { return model::MarkHoles(convention.kind, depth.holes, &map); });
   model::LinearImage empty{map.width_px, map.height_px, 1, {}};
   empty.values.assign(map.values.size(), 0.0F);
-  const model::Scene scene = model::MakeScene(camera, std::move(empty), map, convention, name);
+  const model::Scene scene = NamingCauseInMap(depth, run, [&] {
+    return model::MakeScene(camera, std::move(empty), map, convention, name);
+  });
   return {{scene.depth.min_mm, scene.depth.max_mm}, model::PlacesOfDepth(camera, scene)};
 }
 
-ExplainedScene SceneOf(ExplainOptions* options, const Camera& camera) {
-  if (options->depth) return SceneOfMap(std::move(*options->depth), camera);
-  const DepthRange range = *options->depth_range;
+ExplainedScene SceneOf(const ExplainOptions& options, const Camera& camera, const RunScope& run) {
+  if (options.depth) return SceneOfMap(*options.depth, camera, run);
+  const DepthRange range = *options.depth_range;
   return {range,
-          model::PlacesBetween(camera, range.near_mm, range.far_mm, !options->bench.has_value())};
+          model::PlacesBetween(camera, range.near_mm, range.far_mm, !options.bench.has_value())};
 }
 
 model::EffectSelection EffectsOf(const ExplainOptions& options, const Camera& camera,
@@ -97,7 +100,7 @@ CameraExplanation ExplainCamera(const Camera& camera, ExplainOptions options,
   checks::RequireValidCamera(camera);
   RunScope run(control);
   for (const std::string& notice : NoticesOf(camera)) run.Warn(notice);
-  const ExplainedScene scene = SceneOf(&options, camera);
+  const ExplainedScene scene = SceneOf(options, camera, run);
   CameraExplanation explanation;
   explanation.depth_range = scene.range;
   explanation.camera = model::ExplainCamera(camera, scene.range, options.depth_count);

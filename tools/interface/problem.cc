@@ -341,22 +341,6 @@ void ReportHoles(const DepthMap& map, const model::DepthHoles& holes, RunScope* 
   }
 }
 
-// PrepareDepth, whose refusal also names what in the map may be the reason.
-PreparedDepth PrepareOrNameCause(const DepthMap& map, const estimator::EstimateInput& input,
-                                 const Camera* camera, RunScope* run) {
-  try {
-    return PrepareDepth(map, input.image, camera, input.grid ? &*input.grid : nullptr);
-  } catch (const Interrupted&) {
-    throw;
-  } catch (const OptionError&) {
-    throw;
-  } catch (const Error& error) {
-    const std::string cause = CauseInMap(map, *run);
-    if (cause.empty()) throw;
-    throw Error(fmt::format("{}; {}", error.what(), cause));
-  }
-}
-
 void SmoothNoisyDepth(const EstimateOptions& options, estimator::DisparityMap* disparity,
                       EstimateDiagnostics* diagnostics, int threads) {
   diagnostics->depth_noise_px = estimator::DepthNoisePx(*disparity);
@@ -458,7 +442,9 @@ PreparedProblem Prepare(Image photo, DepthMap map, const std::optional<Camera>& 
     WarnOfOtherSteps(options, aperture, *input.grid, *input.camera, run);
   }
   ReportReading(map, run);  // also where the map is refused
-  PreparedDepth prepared_depth = PrepareOrNameCause(map, input, known, run);
+  PreparedDepth prepared_depth = NamingCauseInMap(map, *run, [&] {
+    return PrepareDepth(map, input.image, known, input.grid ? &*input.grid : nullptr);
+  });
   const std::string beyond = ValuesBeyondNear(map, *run);
   if (!beyond.empty()) run->Warn(fmt::format("{}: {}", NameOf(map), beyond));
   input.disparity = std::move(prepared_depth.disparity);

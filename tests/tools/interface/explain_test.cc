@@ -234,6 +234,10 @@ TEST(ExplainInterfaceTest, AMapThatDoesNotFitIsNamed) {
                 ExplainCamera(CameraOfThickLens(2, 1), OfMap(2, 1, {0, 0}, metres));
               }),
               StartsWith("depth.pfm: "));
+  EXPECT_THAT(ErrorOf([&] {
+                ExplainCamera(CameraOfThickLens(2, 1), OfMap(2, 1, {-1, -2}, metres));
+              }),
+              AllOf(StartsWith("depth.pfm: "), HasSubstr("multiply the values by -1")));
 }
 
 TEST(ExplainInterfaceTest, ACancelledTokenEndsTheCall) {
