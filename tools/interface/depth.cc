@@ -40,6 +40,23 @@ DepthMap DepthMap::Cropped(const model::PixelRect& rect) const {
 
 namespace {
 
+io::DepthReading FileReading(const DepthReadOptions& options) {
+  io::DepthReading reading;
+  reading.channel = options.channel;
+  switch (options.pfm_scale) {
+    case PfmScale::kByRule:
+      reading.pfm_scale = io::PfmScale::kByRule;
+      break;
+    case PfmScale::kApplied:
+      reading.pfm_scale = io::PfmScale::kApplied;
+      break;
+    case PfmScale::kIgnored:
+      reading.pfm_scale = io::PfmScale::kIgnored;
+      break;
+  }
+  return reading;
+}
+
 // A photograph in the place of its depth map is refused; one with a map inside says so.
 io::DepthFile ReadFileOrSayWhatIsInside(const std::string& path, const io::DepthReading& reading) {
   try {
@@ -71,7 +88,7 @@ DepthMap ReadDepth(const std::string& path, const DepthMeaning& meaning,
   checks::RequireValid(meaning);
   std::string why;
   if (!options.IsValid(meaning, &why)) throw OptionError(why.substr(0, why.find(':')), why);
-  io::DepthFile file = ReadFileOrSayWhatIsInside(path, options.file);
+  io::DepthFile file = ReadFileOrSayWhatIsInside(path, FileReading(options));
   model::FlipDepth(options.flip, file.map.width_px, &file.map.values);
   DepthMap depth{file.map.width_px,
                  file.map.height_px,

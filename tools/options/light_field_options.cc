@@ -365,9 +365,9 @@ model::DepthFlip DepthFlipOf(const DepthOptions& options) {
 DepthReadOptions DepthReadOptionsOf(const DepthOptions& options) {
   const model::DepthConvention convention = ConventionOf(options);
   DepthReadOptions reading;
-  reading.file.channel = options.channel;
-  if (options.pfm_scale == "apply") reading.file.pfm_scale = io::PfmScale::kApplied;
-  if (options.pfm_scale == "ignore") reading.file.pfm_scale = io::PfmScale::kIgnored;
+  reading.channel = options.channel;
+  if (options.pfm_scale == "apply") reading.pfm_scale = PfmScale::kApplied;
+  if (options.pfm_scale == "ignore") reading.pfm_scale = PfmScale::kIgnored;
   reading.flip = DepthFlipOf(options);
   reading.holes.hole_values = options.hole_values;
   reading.holes.zero_is_value = options.zero_is == "value";

@@ -253,7 +253,8 @@ TEST(BlurCheck, RefusesOptionsThatAreNone) {
   EXPECT_THAT(ErrorOf([&] { CheckBlur(Plane(), options); }), HasSubstr("memory_limit_mib is 0"));
   options = {};
   options.compression_sigma = -0.5;
-  EXPECT_THAT(ErrorOf([&] { CheckBlur(Plane(), options); }), HasSubstr("compression_sigma is -0.5"));
+  EXPECT_THAT(ErrorOf([&] { CheckBlur(Plane(), options); }),
+              HasSubstr("compression_sigma is -0.5"));
 }
 
 }  // namespace

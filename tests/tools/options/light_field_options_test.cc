@@ -149,7 +149,7 @@ TEST(DepthOptions, NearAndFarAreHandedOnInMm) {
   EXPECT_TRUE(reading.holes.zero_is_value);
   EXPECT_THAT(reading.holes.hole_values, ::testing::ElementsAre(-1));
   EXPECT_EQ(reading.flip, model::DepthFlip::kRows);
-  EXPECT_EQ(reading.file.pfm_scale, io::PfmScale::kIgnored);
+  EXPECT_EQ(reading.pfm_scale, PfmScale::kIgnored);
   EXPECT_EQ(DepthMeaningOf(options).kind, DepthKind::kInverse);
   EXPECT_EQ(DepthMeaningOf(options).unit, LengthUnit::kNone);
 }

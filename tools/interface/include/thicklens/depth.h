@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "thicklens/base/export.h"
-#include "thicklens/io/depth_io.h"
 #include "thicklens/model/depth_holes.h"
 #include "thicklens/model/light_field.h"
 #include "thicklens/model/scene.h"
@@ -73,10 +72,20 @@ struct DepthMap {
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 
+// Whether the values of a PFM file are multiplied by the magnitude of the scale in its header.
+enum class PfmScale {
+  kByRule,   // applied, except for the 1/255 of the Middlebury benchmark, whose values are px
+  kApplied,  // always
+  kIgnored,  // never, as most programs do
+};
+
 // How a depth map is read.
 struct DepthReadOptions {
-  io::DepthReading file;   // which of its values are the depth
-  model::HoleRules holes;  // which of them are no depths
+  // The name of the channel that is the depth, in a file with named channels; empty: the one named
+  // Z, depth or disparity, or one of three or more that are equal.
+  std::string channel;
+  PfmScale pfm_scale = PfmScale::kByRule;  // of a PFM file
+  model::HoleRules holes;                  // which of the values are no depths
   // Reverses rows or columns, for a file that stores them in another order than its format says.
   model::DepthFlip flip = model::DepthFlip::kNone;
   // kInverse: the depths, mm, of the largest value of the file's integer type, or of 1 in a map of
