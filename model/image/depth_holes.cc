@@ -43,18 +43,16 @@ double MarkOfType(const RawDepthMap& map, const std::vector<double>& listed) {
 }
 
 // Whether programs use a number of this magnitude as a mark of "no depth".
-// `largest_of_type`: if it may be one.
-bool IsUsualMark(double magnitude, const std::optional<double>& largest_of_type) {
+// `largest_of_type`: the largest value of the file's type, if it may be one; otherwise NaN.
+bool IsUsualMark(double magnitude, double largest_of_type) {
   constexpr double kLargestOf15Bits = 32767, kLargestOf16Bits = 65535;
   if (magnitude == kLargestOf15Bits || magnitude == kLargestOf16Bits ||
       magnitude == kLargestOf16Bits - 1) {
     return true;
   }
-  if (largest_of_type) {
-    // Values are floats, in which the largest of 32 bits is rounded.
-    const double largest = static_cast<float>(*largest_of_type);
-    if (magnitude == largest || magnitude == largest - 1) return true;
-  }
+  // Values are floats, in which the largest of 32 bits is rounded.
+  const double largest = static_cast<float>(largest_of_type);
+  if (magnitude == largest || magnitude == largest - 1) return true;
   constexpr double kMinPower = 1e4, kMaxNines = 1e7;  // floats hold whole numbers up to 1.6e7
   for (double power = 1e3; power <= kMaxNines; power *= 10) {
     if (magnitude == power - 1) return true;
@@ -97,8 +95,10 @@ std::vector<SuspectedMark> SuspectsOf(DepthKind kind, const HoleRules& rules,
   const double usual_gap = lengths ? 0.8 : 0.5, any_gap = lengths ? 0.01 : 0;
   const std::size_t least_distinct = lengths ? 1 : 2;
   constexpr double kLargestOfByte = 255;
-  std::optional<double> largest_of_type = map.largest_of_type;
-  if (!lengths && largest_of_type && *largest_of_type <= kLargestOfByte) largest_of_type.reset();
+  double largest_of_type = map.largest_of_type.value_or(std::numeric_limits<double>::quiet_NaN());
+  if (!lengths && largest_of_type <= kLargestOfByte) {
+    largest_of_type = std::numeric_limits<double>::quiet_NaN();
+  }
   std::size_t marked = 0, pixels = 0;
   for (std::size_t i = 0; i + 1 < largest.size(); ++i) {
     const double magnitude = std::abs(largest[i].value), next = std::abs(largest[i + 1].value);
