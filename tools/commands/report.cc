@@ -19,9 +19,9 @@
 #include "thicklens/base/output_file.h"
 #include "thicklens/base/printable_text.h"
 #include "thicklens/base/utc_time.h"
+#include "thicklens/depth.h"
 #include "thicklens/estimator/disparity_map.h"
 #include "thicklens/io/aperture_statement.h"
-#include "thicklens/io/depth_io.h"
 #include "thicklens/io/frame_files.h"
 #include "thicklens/io/image_io.h"
 #include "thicklens/io/light_field_io.h"
@@ -139,23 +139,24 @@ model::LinearImage ReadPhoto(const ReportOptions& options, const model::LightFie
 }
 
 // The depths of a light field are in mm if it has a camera; otherwise they are disparities.
-PageDepth ReadDepth(const ReportOptions& options, const model::LightField& light_field) {
+PageDepth ReadPageDepth(const ReportOptions& options, const model::LightField& light_field) {
   model::DepthConvention convention = ConventionOf(options.depth);
   if (convention.kind != model::DepthKind::kDisparity && !light_field.camera) {
     throw UsageError(
         fmt::format("--depth-kind {}: {} has no camera, so its depth map must be a disparity",
                     options.depth.kind, options.light_field_path));
   }
-  const DepthReadOptions reading = DepthReadOptionsOf(options.depth);
-  model::RawDepthMap map = io::ReadDepthFile(options.depth_path, reading.file).map;
-  if (reading.near_mm) {
-    const model::InverseScale scale = model::InverseScaleBetween(*reading.far_mm, *reading.near_mm,
-                                                                 map.largest_of_type.value_or(1));
-    convention.inverse_scale_dpt = scale.scale_dpt;
-    convention.inverse_offset_dpt = scale.offset_dpt;
+  const DepthMap read = ReadDepth(options.depth_path, DepthMeaningOf(options.depth),
+                                  DepthReadOptionsOf(options.depth));
+  for (const std::string& warning : read.warnings) {
+    spdlog::warn("{}: {}", options.depth_path, warning);
   }
+  convention.inverse_scale_dpt = read.meaning.inverse_scale_dpt;
+  convention.inverse_offset_dpt = read.meaning.inverse_offset_dpt;
+  model::RawDepthMap map{read.width_px, read.height_px, read.values, read.is_integer,
+                         read.largest_of_type};
   WithFileContext(options.depth_path,
-                  [&] { return model::MarkHoles(convention.kind, reading.holes, &map); });
+                  [&] { return model::MarkHoles(convention.kind, read.holes, &map); });
   const auto crop = CropRect(options.reading.crop);
   if (NeedsCrop(crop, map.width_px, map.height_px)) {
     map = WithFileContext(options.depth_path, [&] { return model::CropDepth(map, *crop); });
@@ -319,7 +320,7 @@ CommandResult Report(const ReportOptions& options) {
   std::optional<model::LinearImage> photo;
   if (!options.photo_path.empty()) photo = ReadPhoto(options, light_field);
   input.photo = photo ? &*photo : nullptr;
-  if (!options.depth_path.empty()) input.depth = ReadDepth(options, light_field);
+  if (!options.depth_path.empty()) input.depth = ReadPageDepth(options, light_field);
   if (!options.sweep_path.empty()) {
     input.sweep = ReadSweepStrip(options.sweep_path, light_field.camera);
   }

@@ -9,6 +9,7 @@
 
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
+#include "thicklens/io/depth_io.h"
 #include "thicklens/io/exif.h"
 #include "tools/options/option_values.h"
 
