@@ -268,8 +268,14 @@ void ReportOrder(const std::string& path, const ViewSource& source,
         "px everywhere): the size of the lenslets may be wrong",
         source.plain_disparity_px);
   }
-  if (finding.order == ViewOrder::kUndecided && !source.doubt.empty())
+  if (finding.order == ViewOrder::kAsStated && !source.doubt.empty()) {
+    // Pixels of one lenslet under another number are neighbours in the image, whose shifts have an
+    // order too.
+    finding = {};
+    finding.why = source.doubt;
+  } else if (finding.order == ViewOrder::kUndecided && !source.doubt.empty()) {
     finding.why += "; " + source.doubt;
+  }
   const std::string mirrored =
       source.mirrored.empty()
           ? "the shifts do not say which of both counts backwards: in the right order near things "

@@ -178,12 +178,13 @@ struct EstimateDiagnostics {
   double largest_step_px = 0;  // displacement between neighbouring views
   double coarse_share = 0;     // share of the pixels whose step is above 3 px
   std::optional<double> strength, noise_sigma, residual_rms;  // noise, residual in encoded values
-  // The errors of storing the photograph, in encoded values: rounding to its bits and, for a JPEG
-  // file, compression, over all channels and for their mean (io::JpegError). Compression removes
-  // noise and leaves its own error, so that both together are what a residual is compared with; the
-  // solver uses `noise_sigma` alone.
+  // The error of rounding the photograph to its bits, in encoded values. Storing removes noise and
+  // leaves its own errors, so that both together are what a residual is compared with; the solver
+  // uses `noise_sigma` alone.
   double rounding_sigma = 0;
-  std::optional<double> compression_sigma, compression_sigma_of_mean;
+  // The error of the compression of a JPEG file, in encoded values, over all channels.
+  std::optional<double> compression_sigma;
+  std::optional<double> compression_sigma_of_mean;  // likewise for the mean of the channels
   // The noise and what storing did, for a residual over all channels; absent without noise_sigma.
   THICKLENS_EXPORT std::optional<double> DoubtSigma() const;
   // Likewise for the mean of the channels.
