@@ -1,6 +1,7 @@
 // The layout of the 4D Light Field Benchmark (Honauer et al., ACCV 2016): input_CamNNN.png, row by
 // row, and parameters.cfg. Copies of it with JPEG or other files have the same names.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -31,9 +32,11 @@ constexpr char kPng[] = ".png";
 struct HciViews {
   std::vector<int> numbers;
   std::string ending = kPng;
+  std::vector<std::string>
+      others;  // "25 files of .jpg": views of other endings, which are not read
 };
 
-// Prefers PNG files: they are the benchmark's own.
+// The files of the ending that has the most views; of equally many, PNG, the benchmark's own.
 HciViews HciViewsOf(const std::string& folder) {
   std::map<std::string, std::vector<int>> numbers_by_ending;
   std::error_code failure;
@@ -47,12 +50,13 @@ HciViews HciViewsOf(const std::string& folder) {
   }
   if (failure) throw Error(fmt::format("{}: cannot be read: {}", folder, failure.message()));
   HciViews views;
-  if (numbers_by_ending.count(kPng) == 0) {
-    for (const auto& [ending, numbers] : numbers_by_ending) {
-      if (numbers.size() > views.numbers.size()) views = {numbers, ending};
-    }
-  } else {
-    views.numbers = numbers_by_ending[kPng];
+  views.numbers = numbers_by_ending[kPng];
+  for (const auto& [ending, numbers] : numbers_by_ending) {
+    if (numbers.size() > views.numbers.size()) views = {numbers, ending, {}};
+  }
+  for (const auto& [ending, numbers] : numbers_by_ending) {
+    if (ending != views.ending && !numbers.empty())
+      views.others.push_back(fmt::format("{} file(s) of {}", numbers.size(), ending));
   }
   std::sort(views.numbers.begin(), views.numbers.end());
   return views;
@@ -132,6 +136,11 @@ std::optional<ViewSource> OpenHciFolder(const LayoutInput& input) {
   ViewSource source;
   source.kind = "a folder in the HCI layout";
   if (views.ending != kPng) source.details.push_back(fmt::format("{} files", views.ending));
+  if (!views.others.empty()) {
+    source.notices.push_back(fmt::format("{}: its views are the {} files of {}; not read: {}",
+                                         folder, numbers.size(), views.ending,
+                                         fmt::join(views.others, ", ")));
+  }
   model::LightField& frame = source.frame;
   frame.u_count = last_u - first_u + 1;
   frame.v_count = last_v - first_v + 1;

@@ -237,6 +237,21 @@ TEST_F(LightFieldLayouts, HciNamesMayBeOfJpegFiles) {
   EXPECT_NEAR(LevelAt(light_field, 2, 0, 30, 20), View(1, -1).at<cv::Vec3b>(20, 30)[0], 4);
 }
 
+TEST_F(LightFieldLayouts, HciViewsOfTwoKindsOfFilesAreNamed) {
+  const auto name = [](int v, int u) { return "input_Cam00" + std::to_string(3 * v + u); };
+  const std::string path =
+      Folder([&](int v, int u) { return name(v, u) + ".jpg"; }, InOrder, ".jpg");
+  // A stray PNG file is not preferred to a full set.
+  folder_.Put("lf/" + name(1, 1) + ".png", EncodedTile(InOrder(1, 1)));
+  EXPECT_EQ(Read(path).u_count, 3);
+  EXPECT_THAT(facts_.notices, ElementsAre(AllOf(HasSubstr("9 files of .jpg"),
+                                                HasSubstr("not read: 1 file(s) of .png"))));
+  Folder([&](int v, int u) { return name(v, u) + ".png"; }, InOrder);
+  ExpectViews(Read(path));
+  EXPECT_THAT(facts_.notices, ElementsAre(AllOf(HasSubstr("9 files of .png"),
+                                                HasSubstr("not read: 9 file(s) of .jpg"))));
+}
+
 TEST_F(LightFieldLayouts, HciNumbersMayBeginAtOne) {
   const std::string path = Folder(
       [](int v, int u) { return "input_Cam00" + std::to_string(3 * v + u + 1) + ".png"; }, InOrder);
