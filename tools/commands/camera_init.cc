@@ -127,6 +127,22 @@ void ParseTexts(CameraInitOptions* options) {
   options->camera.principal_point_px = Eigen::Vector2d(point[0], point[1]);
 }
 
+// LibRaw reads raw files whose metadata Exiv2 does not: what is missing must then be given.
+io::PhotoExif ReadExifOf(const std::string& path, const Eigen::Vector2i& size_px,
+                         const io::ImageFacts& facts) {
+  if (!facts.raw) return io::ReadPhotoExif(path, size_px.x(), size_px.y());
+  std::string why;
+  io::PhotoExif photo = io::ReadExifIfAny(path, size_px.x(), size_px.y(), &why, &*facts.raw);
+  if (!why.empty()) {
+    spdlog::warn("{}", PrintableUtf8(why));
+    photo.why_no_pitch = "its metadata cannot be read";
+  } else if (!photo.pixel_pitch_mm && photo.why_no_pitch.empty()) {
+    photo.why_no_pitch = "Exiv2 does not read the metadata of this kind of raw file";
+  }
+  if (photo.model.empty()) photo.model = facts.raw->camera;
+  return photo;
+}
+
 CommandResult InitCamera(const CameraInitOptions& options) {
   std::optional<OutputFile> output;
   if (!options.output.empty()) output.emplace(options.output);
@@ -138,11 +154,13 @@ CommandResult InitCamera(const CameraInitOptions& options) {
     spdlog::info("{}: {}", PrintableUtf8(options.photo_path), PrintableUtf8(facts->OneLine()));
     photo_size_px = Eigen::Vector2i(image.cols, image.rows);
     const Eigen::Vector2i size_px = options.camera.size_px.value_or(*photo_size_px);
-    photo = io::ReadPhotoExif(options.photo_path, size_px.x(), size_px.y());
+    photo = ReadExifOf(options.photo_path, size_px, *facts);
   }
   const model::Camera camera =
       DescribedCamera(options.camera, photo, photo_size_px, facts ? &*facts : nullptr);
-  const std::string yaml = model::CameraToYaml(camera);
+  const SensorSources sources = SourcesOf(options.camera, photo, facts ? &*facts : nullptr);
+  const std::string yaml =
+      (photo ? SourcesComment(sources) : std::string()) + model::CameraToYaml(camera);
   if (output) output->Commit(yaml);
   PrintResult(options.common, output ? WrittenText({options.output}) : yaml);
   ReportAssumedFields(camera);
@@ -157,7 +175,9 @@ CommandResult InitCamera(const CameraInitOptions& options) {
                     {"aperture_radius_mm", camera.lens.aperture_radius_mm},
                     {"width_px", camera.sensor.width_px},
                     {"height_px", camera.sensor.height_px},
+                    {"size_source", sources.size},
                     {"pixel_pitch_mm", camera.sensor.pixel_pitch_mm},
+                    {"pixel_pitch_source", sources.pixel_pitch},
                     {"principal_point_px",
                      {camera.sensor.principal_point_px.x(), camera.sensor.principal_point_px.y()}},
                     {"transfer", camera.sensor.transfer.Name()},
@@ -192,11 +212,17 @@ void AddLensOptions(CLI::App* command, CameraDescription* camera) {
 
 void AddSensorOptions(CLI::App* command, CameraInitOptions* options) {
   CameraDescription& camera = options->camera;
-  command->add_option("--pitch-um", camera.pixel_pitch_um, "Distance between neighbouring pixels")
+  command
+      ->add_option(
+          "--pitch-um", camera.pixel_pitch_um,
+          "Distance between neighbouring pixels; default: what EXIF or TIFF/EP states, if it "
+          "is about the pixels of the photograph")
       ->check(Between(0, kMaxPitchUm, "micrometres"))
       ->type_name("UM");
   command
-      ->add_option("--size", options->size, "Size of the images; default: that of the photograph")
+      ->add_option("--size", options->size,
+                   "Size of the images; default: that of the photograph, which is the active area "
+                   "of the sensor for a raw file")
       ->type_name("WIDTHxHEIGHT");
   command
       ->add_option("--principal-point", options->principal_point,
@@ -253,6 +279,31 @@ model::Camera DescribedCamera(const CameraDescription& description,
   std::string why;
   if (!camera.IsValid(&why)) throw Error(why);
   return camera;
+}
+
+SensorSources SourcesOf(const CameraDescription& description,
+                        const std::optional<io::PhotoExif>& photo, const io::ImageFacts* facts) {
+  SensorSources sources;
+  const io::RawFacts* const raw = facts != nullptr && facts->raw ? &*facts->raw : nullptr;
+  if (description.size_px) {
+    sources.size = "given";
+  } else if (raw != nullptr && !raw->why_resampled.empty()) {
+    sources.size = "the image of the raw file, whose pixels are not those of the sensor: " +
+                   raw->why_resampled;
+  } else if (raw != nullptr) {
+    sources.size = fmt::format(
+        "the active area of the raw file's sensor, which has {} x {} px; it begins at ({}, {})",
+        raw->sensor_width_px, raw->sensor_height_px, raw->active_left_px, raw->active_top_px);
+  } else {
+    sources.size = "the photograph";
+  }
+  sources.pixel_pitch = description.pixel_pitch_um ? "given" : photo ? photo->pitch_source : "";
+  return sources;
+}
+
+std::string SourcesComment(const SensorSources& sources) {
+  return fmt::format("# width_px, height_px: {}\n# pixel_pitch_mm: {}\n", sources.size,
+                     sources.pixel_pitch);
 }
 
 void AddCameraCommand(CLI::App* program, CommandAction* action) {

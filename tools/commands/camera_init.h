@@ -34,6 +34,17 @@ model::Camera DescribedCamera(const CameraDescription& description,
                               const std::optional<Eigen::Vector2i>& photo_size_px,
                               const io::ImageFacts* facts = nullptr);
 
+// Where two values of the camera come from, in words.
+struct SensorSources {
+  std::string size;         // of width_px and height_px
+  std::string pixel_pitch;  // of pixel_pitch_mm
+};
+// The arguments are those that DescribedCamera made a camera of.
+SensorSources SourcesOf(const CameraDescription& description,
+                        const std::optional<io::PhotoExif>& photo, const io::ImageFacts* facts);
+// The lines of comment that state the sources in a camera file.
+std::string SourcesComment(const SensorSources& sources);
+
 }  // namespace thicklens::tools
 
 #endif  // THICKLENS_TOOLS_COMMANDS_CAMERA_INIT_H_

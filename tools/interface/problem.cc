@@ -35,8 +35,9 @@ std::string NameOf(const Camera& camera) {
 
 // The photograph as a file; what remains of it once its pixels have been taken.
 struct PhotoFile {
-  std::string name;  // in messages
-  std::string path;  // empty: it is not from a file
+  std::string name;                   // in messages
+  std::string path;                   // empty: it is not from a file
+  const io::RawFacts* raw = nullptr;  // null: it is not a raw file
 };
 
 // Says what a user should know about the orientation that the file states; empty: nothing.
@@ -94,8 +95,8 @@ void CheckExif(const PhotoFile& photo, const Camera& camera, const PhotoSize& si
                EstimateDiagnostics* diagnostics, RunScope* run) {
   if (photo.path.empty()) return;
   std::string damaged;
-  const io::PhotoExif exif =
-      io::ReadExifIfAny(photo.path, camera.sensor.width_px, camera.sensor.height_px, &damaged);
+  const io::PhotoExif exif = io::ReadExifIfAny(photo.path, camera.sensor.width_px,
+                                               camera.sensor.height_px, &damaged, photo.raw);
   if (!damaged.empty()) {
     run->Warn(damaged + "; it is not compared with the camera file");
     return;
@@ -400,8 +401,9 @@ model::EffectSelection SelectEffects(const EstimateOptions& options,
 PreparedProblem Prepare(Image photo, DepthMap map, const std::optional<Camera>& camera,
                         const EstimateOptions& options, EstimateDiagnostics* diagnostics,
                         RunScope* run) {
-  const PhotoFile file{NameOf(photo), photo.is_from_file() ? photo.source() : ""};
   const std::shared_ptr<const io::ImageFacts> facts = photo.facts();
+  const PhotoFile file{NameOf(photo), photo.is_from_file() ? photo.source() : "",
+                       facts != nullptr && facts->raw ? &*facts->raw : nullptr};
   const std::string turned = OrientationRemark(facts.get(), *run);
   // If there is a camera, the comparison with EXIF says it.
   if (!turned.empty() && !camera) run->Warn(file.name + ": " + turned);

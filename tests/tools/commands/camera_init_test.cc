@@ -4,13 +4,20 @@
 #include <gtest/gtest.h>
 
 #include <exiv2/exiv2.hpp>
+#include <nlohmann/json.hpp>
 #include <opencv2/core/mat.hpp>
 #include <string>
+#include <utility>
+#include <vector>
 
+#include "support/temporary_folder.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/io/image_io.h"
 #include "thicklens/model/camera_file.h"
+#include "tools/io/image_library.h"
+#include "tools/support/child_process.h"
+#include "tools/support/dng_tags.h"
 
 namespace thicklens::tools {
 namespace {
@@ -20,6 +27,8 @@ using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using thicklens::testing::ContentOf;
+using thicklens::testing::TemporaryFolder;
 
 CameraDescription DataSheet() {
   CameraDescription camera;
@@ -185,6 +194,175 @@ TEST(ReadPhotoExif, KnowsNothingOfAnImageWithoutExif) {
   const io::PhotoExif photo = io::ReadPhotoExif(WritePhoto("bare.png", Exiv2::ExifData()), 32, 24);
   EXPECT_FALSE(photo.focal_length_mm || photo.f_number || photo.pixel_pitch_mm);
   EXPECT_THAT(photo.why_no_pitch, HasSubstr("FocalPlaneXResolution"));
+}
+
+// ---- Raw files.
+
+constexpr char kMosaic[] = THICKLENS_SOURCE_DIR "/tests/data/images/mosaic.dng";
+
+// A sensor of 40 x 30 px, of which 32 x 24 saw light.
+io::RawFacts SmallSensor() {
+  io::RawFacts raw;
+  raw.sensor_width_px = 40;
+  raw.sensor_height_px = 30;
+  raw.active_left_px = 6;
+  raw.active_top_px = 4;
+  raw.active_width_px = 32;
+  raw.active_height_px = 24;
+  return raw;
+}
+
+// EXIF for a raw file, which states the size of an image.
+Exiv2::ExifData ExifOfSize(std::uint32_t width_px, std::uint32_t height_px) {
+  Exiv2::ExifData exif = TypicalExif();
+  exif["Exif.Photo.PixelXDimension"] = width_px;
+  exif["Exif.Photo.PixelYDimension"] = height_px;
+  return exif;
+}
+
+io::PhotoExif ReadOfRaw(const Exiv2::ExifData& exif, const io::RawFacts& raw = SmallSensor()) {
+  return io::ReadPhotoExif(WritePhoto("of_raw.png", exif), 32, 24, &raw);
+}
+
+TEST(ReadPhotoExif, TakesThePitchOfARawFileFromTheSizeOfTheCamerasOwnImage) {
+  for (const auto& [width_px, height_px] :
+       {std::pair{32, 24}, {31, 23}, {23, 31}, {34, 26}, {40, 30}}) {
+    const io::PhotoExif photo = ReadOfRaw(
+        ExifOfSize(static_cast<std::uint32_t>(width_px), static_cast<std::uint32_t>(height_px)));
+    ASSERT_TRUE(photo.pixel_pitch_mm) << width_px << " x " << height_px << photo.why_no_pitch;
+    EXPECT_NEAR(*photo.pixel_pitch_mm, 0.005, 1e-9);
+    EXPECT_EQ(photo.pitch_source, "EXIF FocalPlaneXResolution");
+    EXPECT_FALSE(photo.made_width_px || photo.made_height_px);  // not about these pixels
+  }
+  EXPECT_TRUE(ReadOfRaw(TypicalExif()).pixel_pitch_mm);  // no size is stated
+}
+
+TEST(ReadPhotoExif, TakesNoPitchForOtherPixelsThanThoseOfTheSensor) {
+  // A small JPEG, a sensor of twice the pixels (half-size raw), an image cut to 16:9.
+  for (const auto& [width_px, height_px] : {std::pair{16, 12}, {64, 48}, {32, 18}}) {
+    const io::PhotoExif photo = ReadOfRaw(
+        ExifOfSize(static_cast<std::uint32_t>(width_px), static_cast<std::uint32_t>(height_px)));
+    EXPECT_FALSE(photo.pixel_pitch_mm);
+    EXPECT_THAT(photo.why_no_pitch,
+                AllOf(HasSubstr(std::to_string(width_px) + " x " + std::to_string(height_px)),
+                      HasSubstr("32 x 24 px"), HasSubstr("is not stated")));
+  }
+  io::RawFacts small = SmallSensor();
+  small.why_resampled = "it holds interpolated colours";
+  EXPECT_THAT(ReadOfRaw(TypicalExif(), small).why_no_pitch,
+              HasSubstr("is not stated: it holds interpolated colours"));
+  const io::RawFacts raw = SmallSensor();
+  const io::PhotoExif developed =
+      io::ReadPhotoExif(WritePhoto("developed.png", TypicalExif()), 16, 12, &raw);
+  EXPECT_THAT(developed.why_no_pitch, AllOf(HasSubstr("16 x 12"), HasSubstr("scaled or cropped")));
+  EXPECT_THAT(ReadOfRaw(Exiv2::ExifData()).why_no_pitch,
+              AllOf(HasSubstr("FocalPlaneXResolution"), HasSubstr("TIFF/EP")));
+  Exiv2::ExifData narrow = TypicalExif();
+  narrow["Exif.Photo.FocalPlaneYResolution"] = Exiv2::Rational(1000, 1);
+  EXPECT_THAT(ReadOfRaw(narrow).why_no_pitch, HasSubstr("not square"));
+}
+
+// 32 x 24 px of 5 um have a diagonal of 0.2 mm.
+TEST(ReadPhotoExif, TakesNoPitchThatTheEquivalentFocalLengthContradicts) {
+  const auto of_equivalent_mm = [](int mm) {
+    Exiv2::ExifData exif = TypicalExif();
+    exif["Exif.Photo.FocalLengthIn35mmFilm"] = static_cast<std::uint16_t>(mm);
+    return ReadOfRaw(exif);
+  };
+  EXPECT_TRUE(of_equivalent_mm(5408).pixel_pitch_mm);  // 25 mm * 43.267/0.2
+  EXPECT_TRUE(of_equivalent_mm(4600).pixel_pitch_mm);
+  // Pixels twice as large, as binning makes them, and half of them.
+  for (const int mm : {2704, 10816}) {
+    EXPECT_THAT(of_equivalent_mm(mm).why_no_pitch,
+                AllOf(HasSubstr("5 um"), HasSubstr("0.2 mm"), HasSubstr("25 mm")));
+  }
+}
+
+TEST(ReadPhotoExif, TakesThePitchOfTiffEpWithItsUnits) {
+  const TemporaryFolder folder;
+  io::RawFacts raw;
+  raw.sensor_width_px = raw.active_width_px = 64;
+  raw.sensor_height_px = raw.active_height_px = 48;
+  const auto pitch_mm = [&](bool in_main, std::uint32_t per_unit, std::uint32_t unit) {
+    const std::vector<TiffTag> fields = {{0x920E, TiffTag::kRational, {per_unit, 1}},
+                                         {0x920F, TiffTag::kRational, {per_unit, 1}},
+                                         {0x9210, TiffTag::kShort, {unit}}};
+    DngTags tags;
+    (in_main ? tags.main : tags.sensor) = fields;
+    const std::string path = folder.Put("a.dng", DngEdit(ContentOf(kMosaic)).With(tags));
+    const io::PhotoExif photo = io::ReadPhotoExif(path, 64, 48, &raw);
+    EXPECT_EQ(photo.pitch_source, "TIFF/EP FocalPlaneXResolution") << photo.why_no_pitch;
+    return photo.pixel_pitch_mm.value_or(0);
+  };
+  EXPECT_NEAR(pitch_mm(true, 5080, 1), 0.005, 1e-9);    // inch
+  EXPECT_NEAR(pitch_mm(true, 5080, 2), 0.005, 1e-9);    // inch, as in EXIF
+  EXPECT_NEAR(pitch_mm(true, 200000, 2), 0.005, 1e-9);  // metre
+  EXPECT_NEAR(pitch_mm(true, 2000, 3), 0.005, 1e-9);    // cm
+  EXPECT_NEAR(pitch_mm(true, 200, 4), 0.005, 1e-9);     // mm
+  EXPECT_NEAR(pitch_mm(false, 2000, 3), 0.005, 1e-9);
+}
+
+TEST(SourcesOf, NamesTheFieldsOfARawFile) {
+  io::ImageFacts facts;
+  facts.raw = SmallSensor();
+  io::PhotoExif photo;
+  photo.pitch_source = "EXIF FocalPlaneXResolution";
+  const std::string comment = SourcesComment(SourcesOf({}, photo, &facts));
+  EXPECT_EQ(comment,
+            "# width_px, height_px: the active area of the raw file's sensor, which has 40 x 30 "
+            "px; it begins at (6, 4)\n"
+            "# pixel_pitch_mm: EXIF FocalPlaneXResolution\n");
+  EXPECT_THAT(SourcesComment(SourcesOf(DataSheet(), photo, &facts)),
+              AllOf(HasSubstr("height_px: given\n"), HasSubstr("pitch_mm: given\n")));
+}
+
+// The mosaic of tests/data/images/README.md, as a camera writes it: a few pixels are masked, and
+// EXIF states the size of a JPEG that is a little smaller still.
+std::string RawPhoto(const TemporaryFolder& folder, std::uint32_t made_width_px) {
+  constexpr std::uint16_t kActiveArea = 50829;
+  DngTags tags;
+  tags.sensor = {{kActiveArea, TiffTag::kLong, {2, 4, 46, 62}}};
+  tags.exif = {{0x829D, TiffTag::kRational, {28, 10}},
+               {0x920A, TiffTag::kRational, {250, 10}},
+               {0xA002, TiffTag::kLong, {made_width_px}},
+               {0xA003, TiffTag::kLong, {42}},
+               {0xA20E, TiffTag::kRational, {2000, 1}},
+               {0xA20F, TiffTag::kRational, {2000, 1}},
+               {0xA210, TiffTag::kShort, {3}}};
+  return folder.Put("a.dng", DngEdit(ContentOf(kMosaic)).With(tags));
+}
+
+TEST(CameraInit, DescribesTheSensorOfARawFile) {
+  if (!io::HasImageLibrary()) GTEST_SKIP() << "a build without GPL parts";
+  const TemporaryFolder folder;
+  const std::vector<std::string> arguments = {
+      "camera",          "init",   "--from-exif",    RawPhoto(folder, 56), "-o",
+      folder / "c.yaml", "--json", folder / "c.json"};
+  const ProgramResult result = ChildProgram(arguments, folder.path(), 0).Wait();
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const model::Camera camera = model::ReadCamera(folder / "c.yaml");
+  EXPECT_EQ(camera.sensor.width_px, 58);
+  EXPECT_EQ(camera.sensor.height_px, 44);
+  EXPECT_NEAR(camera.sensor.pixel_pitch_mm, 0.005, 1e-9);
+  EXPECT_EQ(camera.sensor.transfer.Name(), "linear");
+  EXPECT_THAT(ContentOf(folder / "c.yaml"),
+              AllOf(HasSubstr("# width_px, height_px: the active area of the raw file's sensor, "
+                              "which has 64 x 48 px; it begins at (4, 2)\n"),
+                    HasSubstr("# pixel_pitch_mm: EXIF FocalPlaneXResolution\n")));
+  const auto json = nlohmann::json::parse(ContentOf(folder / "c.json"));
+  EXPECT_EQ(json.at("pixel_pitch_source"), "EXIF FocalPlaneXResolution");
+  EXPECT_THAT(json.at("size_source").get<std::string>(), HasSubstr("64 x 48 px"));
+}
+
+TEST(CameraInit, AsksForThePitchOfARawFileThatDoesNotStateIt) {
+  if (!io::HasImageLibrary()) GTEST_SKIP() << "a build without GPL parts";
+  const TemporaryFolder folder;
+  const ProgramResult result =
+      ChildProgram({"camera", "init", "--from-exif", RawPhoto(folder, 28)}, folder.path(), 0)
+          .Wait();
+  EXPECT_NE(result.exit_code, 0);
+  EXPECT_THAT(result.err, AllOf(HasSubstr("--pitch-um UM (its FocalPlaneXResolution counts"),
+                                HasSubstr("28 x 42"), HasSubstr("58 x 44")));
 }
 
 TEST(ReadPhotoExif, UsesNoZeroDenominator) {

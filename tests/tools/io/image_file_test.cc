@@ -21,6 +21,7 @@
 #include "thicklens/base/output_file.h"
 #include "thicklens/io/image_io.h"
 #include "tools/io/image_library.h"
+#include "tools/support/dng_tags.h"
 
 namespace thicklens::io {
 namespace {
@@ -456,6 +457,44 @@ TEST(ImageFile, ReadsTheSensorOfARawFileAndNeverItsPreview) {
                                 65535;
                        }),
             1e-6);
+}
+
+// The mosaic of 64 x 48 px with other tags.
+RawFacts FactsOfDng(const std::vector<tools::TiffTag>& sensor) {
+  tools::DngTags tags;
+  tags.sensor = sensor;
+  const std::string dng = tools::DngEdit(ReadWholeFile(PathOf("mosaic.dng"))).With(tags);
+  return DecodeImageFile(dng, "a.dng").facts.raw.value();
+}
+
+TEST(ImageFile, SaysWhichPixelsOfTheSensorARawFileHas) {
+  SKIP_WITHOUT_LIBRARY();
+  using tools::TiffTag;
+  constexpr std::uint16_t kActiveArea = 50829, kDefaultScale = 50718;
+  EXPECT_EQ(Read("mosaic.dng").facts.raw->why_resampled, "");
+  const RawFacts cut = FactsOfDng({{kActiveArea, TiffTag::kLong, {2, 4, 46, 62}}});
+  EXPECT_EQ(cut.why_resampled, "");
+  EXPECT_EQ(cut.sensor_width_px, 64);
+  EXPECT_EQ(cut.sensor_height_px, 48);
+  EXPECT_EQ(cut.active_left_px, 4);
+  EXPECT_EQ(cut.active_top_px, 2);
+  EXPECT_EQ(cut.active_width_px, 58);
+  EXPECT_EQ(cut.active_height_px, 44);
+  EXPECT_THAT(FactsOfDng({{kDefaultScale, TiffTag::kRational, {2, 1, 1, 1}}}).why_resampled,
+              HasSubstr("2 times as wide as high"));
+  // The bytes of the mosaic are now interpolated colours of 32 x 32 px.
+  EXPECT_THAT(FactsOfDng({{256, TiffTag::kLong, {32}},
+                          {257, TiffTag::kLong, {32}},
+                          {258, TiffTag::kShort, {16, 16, 16}},
+                          {262, TiffTag::kShort, {34892}},
+                          {277, TiffTag::kShort, {3}},
+                          {278, TiffTag::kLong, {32}},
+                          {50714, TiffTag::kShort, {256, 256, 256}},
+                          {33421, TiffTag::kShort, {}},
+                          {33422, TiffTag::kShort, {}},
+                          {50717, TiffTag::kShort, {4095, 4095, 4095}}})
+                  .why_resampled,
+              HasSubstr("interpolated colours"));
 }
 
 TEST(ImageFile, SaysOnOneLineWhatWasRead) {

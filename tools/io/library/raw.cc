@@ -11,6 +11,7 @@
 #include <cstring>
 #include <memory>
 #include <opencv2/core.hpp>
+#include <sstream>
 
 #include "tools/io/library/decoders.h"
 
@@ -63,11 +64,29 @@ std::string Mosaic(LibRaw* raw) {
   return mosaic;
 }
 
+// sRAW and linear DNG files hold colours that were interpolated, often at another sampling. LibRaw
+// turns and stretches the demosaiced images of sensors whose pixels are not upright squares.
+std::string WhyResampled(LibRaw* raw) {
+  const libraw_data_t& data = raw->imgdata;
+  const bool is_interpolated = data.idata.filters == 0 && data.idata.colors > 1;
+  if (data.rawdata.raw_image == nullptr || is_interpolated)
+    return "it holds interpolated colours (sRAW, mRAW, linear DNG), not the pixels of a sensor";
+  if (raw->is_fuji_rotated() != 0) return "the rows of its sensor are turned by 45 degrees";
+  // As LibRaw decides.
+  constexpr double kNarrow = 0.995, kWide = 1.005;
+  const double aspect = data.sizes.pixel_aspect;
+  if (aspect >= kNarrow && aspect <= kWide) return "";
+  std::ostringstream text;
+  text << "its pixels are " << aspect << " times as wide as high, and LibRaw makes them square";
+  return text.str();
+}
+
 RawFacts FactsOf(LibRaw* raw) {
   const libraw_data_t& data = raw->imgdata;
   RawFacts facts;
   facts.camera = Joined(data.idata.make, data.idata.model);
   facts.mosaic = Mosaic(raw);
+  facts.why_resampled = WhyResampled(raw);
   facts.sensor_width_px = data.sizes.raw_width;
   facts.sensor_height_px = data.sizes.raw_height;
   facts.active_left_px = data.sizes.left_margin;

@@ -47,6 +47,9 @@ struct RawFacts {
   int active_left_px = 0, active_top_px = 0;
   int active_width_px = 0, active_height_px = 0;  // the pixels that saw light
   std::string treatment;                          // how `pixels` came from the mosaic, in words
+  // Why the pixels of the file, or of the demosaiced image, are not those of the sensor one by one;
+  // empty: they are.
+  std::string why_resampled;
   // Pixels of the sensor per pixel of the image: 1, or 2 for planes of the mosaic, whose pixel
   // pitch is twice that of the sensor.
   int sensor_px_per_px = 1;
