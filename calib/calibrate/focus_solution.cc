@@ -37,7 +37,8 @@ class Solution {
     if (const auto reason = RejectOutliers(sweep_.direction, &evidence_, &result_))
       return Refuse(*reason);
     CompareChoices(sweep_.camera.psf, &evidence_);
-    const FloorChoice choice = ChooseFloor(sweep_.floor, evidence_, &result_.summary.warnings);
+    const FloorChoice choice =
+        ChooseFloor(sweep_.floor, evidence_, &result_.summary.warnings, sweep_.sensor_px_per_px);
     evidence_.setup.floor_variance_px2 = choice.variance_px2;
     fit_ = FitBlur(evidence_.setup);
     if (fit_.done && TakeTails(sweep_.camera.psf, fit_, &evidence_))
@@ -73,7 +74,7 @@ class Solution {
   std::string StatedFloor() const {
     if (!sweep_.floor.given_px) return "";
     return fmt::format(" (blur_floor_px is stated as {:.3g}, which may be too large)",
-                       sweep_.floor.given_px->value);
+                       sweep_.sensor_px_per_px * sweep_.floor.given_px->value);
   }
 
   FrameMeasurement& Frame(std::size_t fit_frame) {

@@ -82,6 +82,8 @@ bool FocusSweep::IsValid(std::string* why) const {
   if (!camera.lens.IsValid(&inner)) return Fail(why, "camera: lens: " + inner);
   if (!camera.sensor.IsValid(&inner)) return Fail(why, "camera: sensor: " + inner);
   if (!read_frame) return Fail(why, "read_frame is not set");
+  if (sensor_px_per_px < 1)
+    return Fail(why, fmt::format("sensor_px_per_px must be >= 1, found {}", sensor_px_per_px));
   if (!(reading_sigma_mm >= 0) || !std::isfinite(reading_sigma_mm)) {
     return Fail(
         why, fmt::format("reading_sigma_mm must be finite and >= 0, found {}", reading_sigma_mm));

@@ -178,12 +178,13 @@ int RegionSidePx(const FocusSweep& sweep) {
 
 std::string RegionAdvice(const FocusSweep& sweep) {
   if (RegionSidePx(sweep) >= kSmallestTextureRegionPx) return "";
-  const cv::Size size = RegionSize(sweep);
+  const cv::Size size = RegionSize(sweep) * sweep.sensor_px_per_px;
   return fmt::format(
       "the {} has {} x {} px: an edge requires at least {} px on each side, a texture at least {} "
       "px, and {} px or more are better",
       sweep.roi.width > 0 ? "region of interest (roi_px)" : "image", size.width, size.height,
-      kSmallestRegionPx, kSmallestTextureRegionPx, kAmpleRegionPx);
+      sweep.sensor_px_per_px * kSmallestRegionPx, sweep.sensor_px_per_px * kSmallestTextureRegionPx,
+      sweep.sensor_px_per_px * kAmpleRegionPx);
 }
 
 }  // namespace thicklens::calib

@@ -12,8 +12,9 @@
 namespace thicklens::calib {
 namespace {
 
-// Interval of a blur floor that was not measured, px: from a perfect lens to a soft one. If the
-// target does not exclude it, the interval extends to the softest lens that gives a sharp image.
+// Interval of a blur floor that was not measured, px of the sensor: from a perfect lens to a soft
+// one. If the target does not exclude it, the interval extends to the softest lens that gives a
+// sharp image.
 constexpr double kUnknownFloorFromPx = 0;
 constexpr double kUnknownFloorToPx = 1.0;
 constexpr double kSoftestLensPx = 3.0;
@@ -27,7 +28,7 @@ constexpr int kMinModes = 8;  // per ring
 
 // Returns sigma^2 of the target's edges in the plane of focus, of lens and ink together, if it has
 // edges.
-std::optional<double> EdgeSoftness(const BlurEvidence& evidence) {
+std::optional<double> EdgeSoftness(const BlurEvidence& evidence, int sensor_px_per_px) {
   BlurFitSetup setup = evidence.setup;
   if (evidence.edges >= 0) {
     setup.estimators = {setup.estimators[static_cast<std::size_t>(evidence.edges)]};
@@ -38,7 +39,8 @@ std::optional<double> EdgeSoftness(const BlurEvidence& evidence) {
     return fit.values[kFloorVariance];
   }
   if (!evidence.unstated_edges) return std::nullopt;
-  setup.floor_variance_px2 = model::Estimate{kUnknownFloorToPx * kUnknownFloorToPx / 2, 0};
+  const double unknown_to_px = kUnknownFloorToPx / sensor_px_per_px;
+  setup.floor_variance_px2 = model::Estimate{unknown_to_px * unknown_to_px / 2, 0};
   const BlurFitResult fit = FitBlur(setup);
   if (!fit.done) return std::nullopt;
   const double sign = model::DirectionSign(setup.direction);
@@ -55,20 +57,22 @@ std::optional<double> EdgeSoftness(const BlurEvidence& evidence) {
   return softness > 0 ? std::optional<double>(softness) : std::nullopt;
 }
 
-Eigen::Vector2d UnknownFloor(const BlurEvidence& evidence, std::vector<std::string>* warnings) {
-  if (const std::optional<double> softness_px2 = EdgeSoftness(evidence)) {
+Eigen::Vector2d UnknownFloor(const BlurEvidence& evidence, std::vector<std::string>* warnings,
+                             int sensor_px_per_px) {
+  if (const auto softness_px2 = EdgeSoftness(evidence, sensor_px_per_px)) {
     // The interval is from none of the edge's softness to all of it.
     warnings->push_back(fmt::format(
         "the edges have a blur of {:.2f} px at focus; the shares of the lens and of the target in "
         "it are not known: photograph a knife edge, or state blur_floor_px",
-        std::sqrt(*softness_px2)));
+        sensor_px_per_px * std::sqrt(*softness_px2)));
     return {0, *softness_px2};
   }
   double to_px = kUnknownFloorToPx;
   std::string why = "but not those of a softer lens";
   if (evidence.spectrum >= 0) {
     const std::optional<double> bound = LargestBlurVariance(evidence.spectral, evidence.region);
-    const double bound_px = bound ? std::sqrt(std::max(0.0, *bound)) : kSoftestLensPx;
+    const double bound_px =
+        bound ? sensor_px_per_px * std::sqrt(std::max(0.0, *bound)) : kSoftestLensPx;
     if (bound_px > to_px) {
       to_px = std::min(bound_px, kSoftestLensPx);
       why = "because the texture, which shows little fine detail, does not exclude so soft a lens";
@@ -78,7 +82,8 @@ Eigen::Vector2d UnknownFloor(const BlurEvidence& evidence, std::vector<std::stri
       fmt::format("this target does not determine the blur floor; values from {} to {:.1f} px are "
                   "allowed for, {}: measure the floor on a knife edge, or state blur_floor_px",
                   kUnknownFloorFromPx, to_px, why));
-  return {kUnknownFloorFromPx * kUnknownFloorFromPx, to_px * to_px};
+  const Eigen::Vector2d frame_px = Eigen::Vector2d(kUnknownFloorFromPx, to_px) / sensor_px_per_px;
+  return frame_px.cwiseProduct(frame_px);
 }
 
 struct Ring {
@@ -139,7 +144,7 @@ std::vector<Ring> MeasureRings(const SpectralEstimatorSetup& estimator,
 }  // namespace
 
 FloorChoice ChooseFloor(const model::FloorKnowledge& known, const BlurEvidence& evidence,
-                        std::vector<std::string>* warnings) {
+                        std::vector<std::string>* warnings, int sensor_px_per_px) {
   FloorChoice choice;
   const std::vector<BlurSamples>& estimators = evidence.setup.estimators;
   if (known.given_px) {
@@ -156,7 +161,7 @@ FloorChoice ChooseFloor(const model::FloorKnowledge& known, const BlurEvidence& 
              })) {
     choice.is_measured = true;
   } else {
-    choice.interval_px2 = UnknownFloor(evidence, warnings);
+    choice.interval_px2 = UnknownFloor(evidence, warnings, sensor_px_per_px);
   }
   if (choice.interval_px2) choice.variance_px2 = model::Estimate{choice.interval_px2->mean(), 0};
   return choice;

@@ -20,9 +20,11 @@ struct FloorChoice {
 // Chooses the floor's constraint. In one sweep only knowledge of the target separates the lens
 // floor from the softness of the target: a knife edge has none, and a print may have all of it. On
 // a texture the floor cannot be found at all, but the spectrum gives an upper limit. Adds a warning
-// where only an interval is known.
+// where only an interval is known. The interval that is assumed of a lens, and the warning, have
+// pixels of the sensor, of which `sensor_px_per_px` are one pixel of the frames; all other values
+// have pixels of the frames.
 FloorChoice ChooseFloor(const model::FloorKnowledge& known, const BlurEvidence& evidence,
-                        std::vector<std::string>* warnings);
+                        std::vector<std::string>* warnings, int sensor_px_per_px = 1);
 
 // Returns the largest blur (variance, px^2) of the region's reference image if the scene's own
 // power nowhere rises with |nu|. It is the minimum of

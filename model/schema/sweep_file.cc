@@ -83,6 +83,8 @@ double DirectionSign(BenchDirection direction) {
   return direction == BenchDirection::kAway ? 1 : -1;
 }
 
+std::string SweepRawName(SweepRaw raw) { return raw == SweepRaw::kGreen ? "green" : "demosaiced"; }
+
 std::string SweepTargetName(SweepTarget target) {
   switch (target) {
     case SweepTarget::kTexture:
@@ -115,6 +117,7 @@ SweepFile ReadSweep(const std::string& path, const SweepReading& reading,
                     "blur_floor_px",
                     "roi_px",
                     "full_scale",
+                    "raw",
                     "frames",
                     "frames_csv",
                     "frames_dir",
@@ -157,6 +160,10 @@ SweepFile ReadSweep(const std::string& path, const SweepReading& reading,
   if (const auto white = root.Find("full_scale")) {
     constexpr int kMaxValue = 65535;
     sweep.full_scale = white->Integer(1, kMaxValue);
+  }
+  if (const auto raw = root.Find("raw")) {
+    sweep.raw =
+        raw->OneOf({"demosaiced", "green"}) == "green" ? SweepRaw::kGreen : SweepRaw::kDemosaiced;
   }
   ReadSweepFrames(root, reading, &sweep, notices);
   NoteOrderAndRepeats(sweep, notices);
@@ -219,6 +226,7 @@ std::string SweepToYaml(const SweepFile& sweep) {
                         std::to_string(sweep.roi.width), std::to_string(sweep.roi.height)});
   }
   if (sweep.full_scale) out.Number("full_scale", *sweep.full_scale);
+  if (sweep.raw != SweepRaw::kDemosaiced) out.Text("raw", SweepRawName(sweep.raw));
   out.BeginList("frames");
   for (const SweepFrame& frame : sweep.frames) {
     out.BeginMapInLine();

@@ -187,6 +187,10 @@ bool SweepOverrides::IsValid(std::string* why) const {
                  }) &&
          IfGiven(full_scale,
                  [why](int white) { return WholeBetween(why, "full_scale", 1, 65535, white); }) &&
+         IfGiven(raw,
+                 [why](model::SweepRaw given) {
+                   return OneOf(why, "raw", model::SweepRaw::kGreen, given);
+                 }) &&
          IfGiven(direction,
                  [why](model::BenchDirection given) {
                    return OneOf(why, "direction", model::BenchDirection::kToward, given);

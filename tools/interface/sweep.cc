@@ -55,6 +55,7 @@ void ApplyOverrides(const SweepOverrides& overrides, const RunScope& run, model:
   }
   if (overrides.roi) file->roi = *overrides.roi;
   if (overrides.full_scale) file->full_scale = overrides.full_scale;
+  if (overrides.raw) file->raw = *overrides.raw;
   if (overrides.reading_sigma_mm) {
     file->reading_sigma_mm = *overrides.reading_sigma_mm;
     file->reading_sigma_stated = true;
@@ -309,6 +310,14 @@ void TakeFullScale(const io::FullScaleFinding& finding, const RunScope& run, Swe
                   finding.reason, sweep->camera.sensor.transfer.Name(), remedy));
 }
 
+OptionError NotRaw(const std::string& frame, const RunScope& run) {
+  return OptionError(
+      "raw",
+      fmt::format("raw: the green sites of a mosaic are in raw files only; {} is none, leave "
+                  "{} out",
+                  frame, run.Option("raw")));
+}
+
 }  // namespace
 
 FrameSource::~FrameSource() = default;
@@ -407,6 +416,7 @@ Sweep ExamineFrames(Sweep sweep, const RunControl& control) {
         path, sweep.camera.source.empty() ? "the camera" : sweep.camera.source,
         sweep.camera.sensor.transfer.Name()));
   }
+  if (!facts.raw && sweep.description.raw == model::SweepRaw::kGreen) throw NotRaw(path, run);
   const std::string contradiction = TransferContradiction(facts, sweep.camera);
   if (!contradiction.empty()) sweep.notices.push_back(fmt::format("{}: {}", path, contradiction));
   const bool is_noted =

@@ -16,9 +16,11 @@
 
 namespace thicklens::io {
 
-FrameFiles::FrameFiles(std::vector<model::SweepFrame> frames, std::optional<int> full_scale)
+FrameFiles::FrameFiles(std::vector<model::SweepFrame> frames, std::optional<int> full_scale,
+                       RawTreatment raw)
     : frames_(std::move(frames)),
       full_scale_(full_scale),
+      raw_(raw),
       digests_(frames_.size()),
       facts_(frames_.size()) {}
 
@@ -30,6 +32,26 @@ void RequireNumber(const model::SweepFrame& frame) {
   throw Error(fmt::format(
       "{}: a video has many frames: 'page' states the number of the one that is meant, from 0",
       frame.image));
+}
+
+// The green plane of a raw file in 16 bits. Values beyond white and black are clipped, as in a
+// demosaiced image.
+cv::Mat GreenPlane(const std::string& bytes, const std::string& name, const ImageReading& reading,
+                   ImageFacts* facts) {
+  DecodedImage image = DecodeImageFile(bytes, name, reading);
+  if (!image.facts.raw) {
+    throw Error(
+        fmt::format("{}: a raw file is expected, of which the green sites are measured, "
+                    "found {}",
+                    name, image.facts.file_kind));
+  }
+  const std::string& why = image.facts.raw->why_resampled;
+  if (!why.empty()) throw Error(fmt::format("{}: its green sites are not measured: {}", name, why));
+  constexpr double kWhite = 65535;
+  cv::Mat plane;
+  image.pixels.convertTo(plane, CV_16U, kWhite);
+  *facts = std::move(image.facts);
+  return plane;
 }
 
 std::string DigestOfFile(const std::string& path) {
@@ -126,13 +148,20 @@ cv::Mat FrameFiles::ReadVideo(VideoFile* video, std::size_t index) {
 cv::Mat FrameFiles::Read(std::size_t index) {
   const model::SweepFrame& frame = frames_.at(index);
   RequireNumber(frame);
-  if (VideoFile* const video = VideoOf(index)) return ReadVideo(video, index);
+  const bool is_green = raw_ == RawTreatment::kMosaicGreen;
+  if (VideoFile* const video = VideoOf(index)) {
+    if (is_green) throw Error(fmt::format("{}: a video has no green sites", frame.Name()));
+    return ReadVideo(video, index);
+  }
   ImageReading reading;
   reading.page = frame.page;
   // A full scale that the caller states refers to the values as the file has them.
   reading.spread_bits = !full_scale_;
+  reading.raw = raw_;
+  const Bytes bytes = ReadAndDigest(index);
   ImageFacts facts;
-  const cv::Mat image = DecodeImage(*ReadAndDigest(index), frame.Name(), reading, &facts);
+  const cv::Mat image = is_green ? GreenPlane(*bytes, frame.Name(), reading, &facts)
+                                 : DecodeImage(*bytes, frame.Name(), reading, &facts);
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     facts_[index] = std::move(facts);

@@ -144,6 +144,9 @@ SweepOverrides SweepOverridesOf(const SweepArguments& arguments) {
   TakeRoi(arguments.roi, &overrides);
   overrides.reading_sigma_mm = arguments.reading_sigma_mm;
   overrides.full_scale = arguments.full_scale;
+  for (const auto raw : {model::SweepRaw::kDemosaiced, model::SweepRaw::kGreen}) {
+    if (arguments.raw == model::SweepRawName(raw)) overrides.raw = raw;
+  }
   overrides.readings = arguments.readings;
   overrides.video = arguments.video;
   for (const auto direction : {model::BenchDirection::kAway, model::BenchDirection::kToward}) {
@@ -170,6 +173,7 @@ OptionNames SweepOptionNames() {
           {"target", "--target"},
           {"roi", "--roi"},
           {"full_scale", "--full-scale"},
+          {"raw", "--raw"},
           {"readings", "--readings"},
           {"readings.column", "--column"},
           {"readings.file_column", "--file-column"},

@@ -26,6 +26,7 @@ struct SweepArguments {
   std::string target;
   std::string roi;  // x,y,width,height
   std::optional<int> full_scale;
+  std::string raw;  // "demosaiced" or "green"
   model::ReadingOptions readings;
   model::VideoSelection video;
 

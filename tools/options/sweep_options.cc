@@ -136,6 +136,13 @@ void AddSweepStatements(CLI::App* command, SweepArguments* sweep) {
                        instead)
       ->check(CLI::Range(1, kMaxValue))
       ->type_name("N");
+  command
+      ->add_option("--raw", sweep->raw,
+                   "Raw files: demosaiced (default) measures the interpolated colours, green the "
+                   "mean of the two green sites of each 2 x 2 px, which no interpolation changes" +
+                       instead)
+      ->check(CLI::IsMember({"demosaiced", "green"}))
+      ->type_name("KIND");
 }
 
 }  // namespace thicklens::tools

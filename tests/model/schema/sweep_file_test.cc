@@ -199,6 +199,12 @@ TEST_F(SweepFolder, FullScaleIsAValueOfTheContainer) {
   EXPECT_THAT(ErrorWith(frames_ + "full_scale: 0\n"), HasSubstr("full_scale"));
   EXPECT_THAT(ErrorWith(frames_ + "full_scale: 65536\n"), HasSubstr("full_scale"));
   EXPECT_THAT(ErrorWith(frames_ + "full_scale: white\n"), HasSubstr("full_scale"));
+  EXPECT_EQ(sweep.raw, SweepRaw::kDemosaiced);
+  EXPECT_THAT(SweepToYaml(sweep), Not(HasSubstr("raw:")));
+  sweep = Read(frames_ + "raw: green\n");
+  EXPECT_EQ(sweep.raw, SweepRaw::kGreen);
+  EXPECT_THAT(SweepToYaml(sweep), HasSubstr("raw: green\n"));
+  EXPECT_THAT(ErrorWith(frames_ + "raw: red\n"), HasSubstr("raw"));
 }
 
 TEST_F(SweepFolder, YamlComesBack) {

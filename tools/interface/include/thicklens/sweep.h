@@ -65,6 +65,7 @@ struct SweepOverrides {
   std::optional<model::RegionOfInterest> roi;  // px, inside the sensor
   // The value in the files that stands for white, 1 to 65535, e.g. 1023 for values of 10 bits.
   std::optional<int> full_scale;
+  std::optional<model::SweepRaw> raw;  // what is measured of raw files
   // Which readings are read, and in which unit (thicklens/model/readings.h).
   model::ReadingOptions readings;
   // Which frames of a video are used, and its constant speed; only for ReadSweepFolder of a video.

@@ -31,6 +31,10 @@ struct FocusSweep {
   model::FloorKnowledge floor;                            // what is known of the blur floor, px
   std::optional<double> target_period_mm;                 // period of a periodic target
   model::RegionOfInterest roi;                            // the part of the frames that is measured
+  // Pixels of the sensor per pixel of the frames: 2 for the green plane of a mosaic. Camera, floor,
+  // region and results have the pixels of the frames. Messages have those of the sensor, and so has
+  // the interval of a floor that is not stated.
+  int sensor_px_per_px = 1;
 
   // True if a calibration can be attempted: the camera and the values are possible. Otherwise `why`
   // (unless it is null) receives the reason.

@@ -29,6 +29,14 @@ enum class SweepTarget {
 // Name of the kind: "auto", "texture", "printed-edge" or "knife-edge".
 THICKLENS_EXPORT std::string SweepTargetName(SweepTarget target);
 
+// What is measured of the frames of raw files.
+enum class SweepRaw {
+  kDemosaiced,  // the light of the interpolated colours, at the sensor's sampling
+  kGreen,       // the mean of the two green sites of each 2 x 2 px, not interpolated
+};
+// Name of the choice: "demosaiced" or "green".
+THICKLENS_EXPORT std::string SweepRawName(SweepRaw raw);
+
 // Prior knowledge of the blur floor, px: nothing, a value, or an interval.
 struct FloorKnowledge {
   std::optional<Estimate> given_px;      // a value and its standard deviation, px
@@ -77,6 +85,7 @@ struct SweepFile {
   // The value in the files that stands for white, 1 to 65535; absent: that of their container, the
   // one that they state, or the one that their values show.
   std::optional<int> full_scale;
+  SweepRaw raw = SweepRaw::kDemosaiced;  // what is measured of raw files
   std::vector<SweepFrame> frames;  // in the order of the file
   // Describes in one line which readings were read, and in which unit; empty: the file lists them.
   std::string readings;

@@ -12,6 +12,7 @@
 
 #include "thicklens/base/export.h"
 #include "thicklens/io/files_read.h"
+#include "thicklens/io/image_file.h"
 #include "thicklens/io/video_file.h"
 #include "thicklens/model/sweep_file.h"
 
@@ -26,8 +27,10 @@ class THICKLENS_EXPORT FrameFiles {
  public:
   // Takes the paths of the frames; opens none. `full_scale` is the value in the files that stands
   // for white; absent: that of their container, or the one that they state.
+  // `raw` is what is made of raw files; kMosaicGreen, with white at 65535, is refused for others.
   explicit FrameFiles(std::vector<model::SweepFrame> frames,
-                      std::optional<int> full_scale = std::nullopt);
+                      std::optional<int> full_scale = std::nullopt,
+                      RawTreatment raw = RawTreatment::kDemosaiced);
 
   // Returns a frame whose white is the full scale of its type. Throws Error that names the file.
   cv::Mat Read(std::size_t index);
@@ -50,6 +53,7 @@ class THICKLENS_EXPORT FrameFiles {
 
   std::vector<model::SweepFrame> frames_;
   std::optional<int> full_scale_;
+  RawTreatment raw_ = RawTreatment::kDemosaiced;
   std::vector<std::string> digests_;              // empty: not read yet
   std::vector<std::optional<ImageFacts>> facts_;  // absent: not read yet
   // The file that was read last, kept for its other pages.
