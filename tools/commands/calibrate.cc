@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -152,9 +153,20 @@ std::string FramesLines(const Sweep& sweep, const Calibration& calibration) {
   if (calibration.frames_read && !calibration.frames_read->empty())
     lines =
         fmt::format("frames     {}\n", PrintableUtf8(io::FilesReadLine(*calibration.frames_read)));
+  if (sweep.description.raw == model::SweepRaw::kGreen)
+    lines += "raw        measured on the green sites of each 2 x 2 px; px below are the sensor's\n";
   if (sweep.description.full_scale)
     lines += fmt::format("full scale {}\n", PrintableUtf8(sweep.full_scale_reason));
   return lines;
+}
+
+// Name of the choice for raw files; null: the frames are none.
+nlohmann::json RawMethod(const Sweep& sweep, const Calibration& calibration) {
+  const bool has_raw =
+      calibration.frames_read != nullptr &&
+      std::any_of(calibration.frames_read->begin(), calibration.frames_read->end(),
+                  [](const io::FilesRead& group) { return group.facts.raw.has_value(); });
+  return has_raw ? nlohmann::json(model::SweepRawName(sweep.description.raw)) : nlohmann::json();
 }
 
 CommandResult RunCalibration(const CalibrateOptions& options, const Sweep& sweep) {
@@ -185,6 +197,7 @@ CommandResult RunCalibration(const CalibrateOptions& options, const Sweep& sweep
   result.summary["readings"] = PrintableUtf8(sweep.description.readings);
   result.summary["read"] = FilesReadJson(calibration.frames_read ? *calibration.frames_read
                                                                  : std::vector<io::FilesRead>());
+  result.summary["raw"] = RawMethod(sweep, calibration);
   const auto& white = sweep.description.full_scale;
   result.summary["full_scale"] = {{"value", white ? nlohmann::json(*white) : nlohmann::json()},
                                   {"reason", PrintableUtf8(sweep.full_scale_reason)}};

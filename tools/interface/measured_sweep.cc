@@ -55,6 +55,8 @@ MeasuredSweep MeasureSweep(const Sweep& given, bool map_field, RunScope* run) {
   settings.threads = run->threads();
   settings.progress = run->ProgressOf("measuring");
   if (is_green) {
+    std::string why;  // in pixels of the sensor
+    if (!measured.sweep.IsValid(&why)) throw Error("sweep: " + why);
     calib::FocusSweep green = GreenPlaneSweep(measured.sweep);
     green.read_frame = [files = measured.files, &green,
                         &sensor = measured.sweep.camera.sensor](std::size_t i) {

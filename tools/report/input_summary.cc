@@ -104,7 +104,10 @@ std::string UnderstandingText(const Sweep& sweep, const Understanding& found,
       ReadingsLine(sweep), BenchText(sweep, found), CameraText(sweep.camera),
       roi.width > 0 ? fmt::format("{} x {} px from ({}, {})", roi.width, roi.height, roi.x, roi.y)
                     : "the whole field",
-      model::SweepTargetName(sweep.description.target), FloorText(sweep.description.floor), method,
+      model::SweepTargetName(sweep.description.target), FloorText(sweep.description.floor),
+      sweep.description.raw == model::SweepRaw::kGreen
+          ? method + ", on the green sites of raw files"
+          : method,
       outputs);
 }
 
@@ -128,6 +131,7 @@ nlohmann::json UnderstandingJson(const Sweep& sweep, const Understanding& found,
                          {"reading_sigma_mm", sweep.description.reading_sigma_mm},
                          {"direction", model::BenchDirectionName(sweep.description.direction)},
                          {"target", model::SweepTargetName(sweep.description.target)},
+                         {"raw", model::SweepRawName(sweep.description.raw)},
                          {"offset_mm", nullptr},
                          {"depth_range_mm", nullptr}};
   if (sweep.description.offset_mm) {

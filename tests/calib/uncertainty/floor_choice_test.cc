@@ -94,6 +94,19 @@ TEST(ChooseFloor, TakesWhatIsStated) {
   EXPECT_TRUE(warnings.empty());
 }
 
+// The interval that is assumed of a lens is in pixels of the sensor, of which a frame may have
+// half.
+TEST(ChooseFloor, AnUnstatedFloorIsInPixelsOfTheSensor) {
+  const BlurEvidence evidence;
+  std::vector<std::string> warnings;
+  const FloorChoice whole = ChooseFloor({}, evidence, &warnings);
+  const FloorChoice half = ChooseFloor({}, evidence, &warnings, 2);
+  ASSERT_TRUE(whole.interval_px2 && half.interval_px2);
+  EXPECT_DOUBLE_EQ((*half.interval_px2)[1], (*whole.interval_px2)[1] / 4);
+  ASSERT_EQ(warnings.size(), 2U);
+  EXPECT_EQ(warnings[0], warnings[1]);
+}
+
 TEST(ChooseFloor, ASofterLensThanUsualIsAllowedForWhereTheTextureDoesNotExcludeIt) {
   for (const double floor_px : {0.5, 1.7}) {
     model::SweepSimulationOptions options = testing::SweepCase("iv", 128, 32);

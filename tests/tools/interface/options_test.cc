@@ -126,6 +126,9 @@ TEST(InterfaceOptionsTest, SweepStatementsAreFinite) {
   SweepOverrides roi;
   roi.roi = model::RegionOfInterest{0, 0, 0, 10};
   ExpectRefused(roi, "roi.width");
+  SweepOverrides raw;
+  raw.raw = static_cast<model::SweepRaw>(2);
+  ExpectRefused(raw, "raw");
 }
 
 TEST(InterfaceOptionsTest, SweepStatementsDoNotContradictEachOther) {

@@ -192,6 +192,11 @@ TEST_F(SweepInputTest, ReadingsOfOtherSourcesComeThrough) {
 TEST_F(SweepInputTest, ThePeriodOfTheTargetComesThrough) {
   Sweep("target_period_mm: 5\n");
   EXPECT_EQ(ReadSweepInput(arguments_).description.target_period_mm.value(), 5);
+  EXPECT_EQ(ReadSweepInput(arguments_).description.raw, model::SweepRaw::kDemosaiced);
+  Sweep("raw: green\n");
+  EXPECT_EQ(ReadSweepInput(arguments_).description.raw, model::SweepRaw::kGreen);
+  arguments_.raw = "demosaiced";
+  EXPECT_EQ(ReadSweepInput(arguments_).description.raw, model::SweepRaw::kDemosaiced);
 }
 
 // Numbers of the camera that affect a result and have no stated tolerance are reported once.

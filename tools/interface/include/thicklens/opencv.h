@@ -38,7 +38,8 @@ THICKLENS_EXPORT DepthMap DepthMapFromMat(const cv::Mat& mat, const DepthMeaning
 THICKLENS_EXPORT cv::Mat MatFromDepthMap(const DepthMap& depth);
 
 // The sweep as the library thicklens::calib measures it, with a reader of its frames. Throws Error
-// if the description takes its floor from the calibration of another camera.
+// if the description takes its floor from the calibration of another camera. Raw files are
+// demosaiced, so that the frames have the sensor's pixels, whatever the description states of them.
 THICKLENS_EXPORT calib::FocusSweep FocusSweepOf(const Sweep& sweep);
 
 }  // namespace thicklens

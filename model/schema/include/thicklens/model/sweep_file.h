@@ -29,7 +29,7 @@ enum class SweepTarget {
 // Name of the kind: "auto", "texture", "printed-edge" or "knife-edge".
 THICKLENS_EXPORT std::string SweepTargetName(SweepTarget target);
 
-// What is measured of the frames of raw files.
+// Choice of the light that is measured of raw files.
 enum class SweepRaw {
   kDemosaiced,  // the light of the interpolated colours, at the sensor's sampling
   kGreen,       // the mean of the two green sites of each 2 x 2 px, not interpolated
@@ -86,7 +86,7 @@ struct SweepFile {
   // one that they state, or the one that their values show.
   std::optional<int> full_scale;
   SweepRaw raw = SweepRaw::kDemosaiced;  // what is measured of raw files
-  std::vector<SweepFrame> frames;  // in the order of the file
+  std::vector<SweepFrame> frames;        // in the order of the file
   // Describes in one line which readings were read, and in which unit; empty: the file lists them.
   std::string readings;
 };
