@@ -106,8 +106,11 @@ Calibration Measure(const CalibrateOptions& options, const Sweep& sweep) {
 CalibrationReport Report(const CalibrateOptions& options, const Sweep& sweep,
                          const calib::FocusSweep& focus_sweep, const Calibration& calibration) {
   const auto& calibrated = calibration.camera.calibration;
+  std::vector<std::string> notices = sweep.notices;
+  if (sweep.description.raw == model::SweepRaw::kGreen)
+    notices.emplace_back("measured on the green sites of raw files; px are those of the sensor");
   const ReportOrigin origin{options.sweep.input, Version(),
-                            calibrated ? calibrated->evidence.date : NowIso8601(), sweep.notices,
+                            calibrated ? calibrated->evidence.date : NowIso8601(), notices,
                             sweep.description.reading_sigma_stated};
   return MakeCalibrationReport(focus_sweep, calibration, TruthOf(sweep), origin,
                                focus_sweep.read_frame);

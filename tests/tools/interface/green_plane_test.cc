@@ -65,7 +65,7 @@ TEST(GreenPlaneSweep, HasThePixelsOfTheGreenPlane) {
   EXPECT_DOUBLE_EQ(green.floor.given_px->sigma, 0.01);
   EXPECT_DOUBLE_EQ(*green.floor.from_px, 0.1);
   EXPECT_DOUBLE_EQ(*green.floor.to_px, 0.4);
-  // Those of its pixels that lie inside: columns 12 to 49 and rows 20 to 49 of the sensor.
+  // Its pixels that lie inside have the columns 12 to 49 and the rows 20 to 49 of the sensor.
   EXPECT_EQ(green.roi.x, 6);
   EXPECT_EQ(green.roi.y, 10);
   EXPECT_EQ(green.roi.width, 19);

@@ -107,8 +107,8 @@ enum class RawTreatment {
   // at 0. The image has half of the sensor's sides, and its pixel pitch is twice the sensor's.
   // Pixel (x, y) is centred at (2 x + 0.5, 2 y + 0.5) of the active area. The two sites are half a
   // diagonal away from that centre, which adds a variance of 1/4 sensor pixel^2 per axis, 1/16
-  // pixel^2 of this image, to the blur. Together with the box of a sensor pixel, 1/12 of its square,
-  // this is the variance of the box of one pixel of this image.
+  // pixel^2 of this image, to the blur. With the box of a sensor pixel, 1/12 pixel^2, this
+  // is the variance of the box of one pixel of this image.
   kMosaicGreen,
   // Each of the four sites of 2 x 2 px by itself, as four channels named by colour ("R", "G1",
   // "G2", "B"), as float likewise. They are sampled at sites 1 sensor pixel apart.
