@@ -122,12 +122,15 @@ SweepFile ReadSweep(const std::string& path, const SweepReading& reading,
                     "frames_csv",
                     "frames_dir",
                     "frames_glob",
+                    "video",
                     "readings_column",
                     "readings_file_column",
                     "readings_scale_mm",
                     "readings_decimal",
                     "readings_from",
-                    "readings_from_name"});
+                    "readings_from_name",
+                    "readings_time_column",
+                    "readings_time_unit"});
   SweepFile sweep;
   sweep.source = path;
   const YamlNode camera = root.At("camera");

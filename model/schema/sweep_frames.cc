@@ -12,6 +12,7 @@
 #include <system_error>
 
 #include "model/schema/frame_pairing.h"
+#include "model/schema/sweep_video.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/input_file.h"
 #include "thicklens/model/readings.h"
@@ -97,9 +98,10 @@ void Replace(const std::string& stated, std::string* value) {
   if (!stated.empty()) *value = stated;
 }
 
-constexpr std::array<const char*, 7> kReadingKeys = {
-    "readings_unit",    "readings_column", "readings_file_column", "readings_scale_mm",
-    "readings_decimal", "readings_from",   "readings_from_name"};
+constexpr std::array<const char*, 9> kReadingKeys = {
+    "readings_unit",      "readings_column",      "readings_file_column",
+    "readings_scale_mm",  "readings_decimal",     "readings_from",
+    "readings_from_name", "readings_time_column", "readings_time_unit"};
 
 ReadingOptions OptionsOf(const YamlNode& root, const ReadingOptions& replacements) {
   ReadingOptions options;
@@ -113,6 +115,9 @@ ReadingOptions OptionsOf(const YamlNode& root, const ReadingOptions& replacement
   if (const auto source = root.Find("readings_from"))
     options.source = source->OneOf({"exif", "sidecar", "ome"});
   if (const auto pattern = root.Find("readings_from_name")) options.name_pattern = pattern->Text();
+  if (const auto column = root.Find("readings_time_column")) options.time_column = column->Text();
+  if (const auto unit = root.Find("readings_time_unit"))
+    options.time_unit = unit->OneOf({"s", "ms", "us", "ns", "min", "h"});
   std::string why;
   if (!options.IsValid(&why)) throw root.ErrorHere("readings: " + why);
   if (replacements.IsWithoutTable()) {
@@ -124,8 +129,29 @@ ReadingOptions OptionsOf(const YamlNode& root, const ReadingOptions& replacement
   Replace(replacements.column, &options.column);
   Replace(replacements.file_column, &options.file_column);
   Replace(replacements.decimal, &options.decimal);
+  Replace(replacements.time_column, &options.time_column);
+  Replace(replacements.time_unit, &options.time_unit);
   if (replacements.scale_mm) options.scale_mm = replacements.scale_mm;
   return options;
+}
+
+// The frames of a video are neither images of a folder nor a list.
+void RequireNoImages(const YamlNode& root) {
+  for (const char* key :
+       {"frames", "frames_dir", "frames_glob", "readings_from", "readings_from_name"}) {
+    if (const auto extra = root.Find(key)) {
+      throw extra->ErrorHere(
+          "this key is for images, and 'video' states the frames; one of them is expected");
+    }
+  }
+}
+
+// Only the frames of a video have times.
+void RequireNoTimes(const YamlNode& root) {
+  for (const char* key : {"readings_time_column", "readings_time_unit"}) {
+    if (const auto extra = root.Find(key))
+      throw extra->ErrorHere("this key applies only to a 'video'");
+  }
 }
 
 // A camera may save each photograph as raw and as JPEG. Without a table, nothing says which is
@@ -220,11 +246,16 @@ bool IsNameOfImage(const std::string& path) {
 
 void ReadSweepFrames(const YamlNode& root, const SweepReading& reading, SweepFile* sweep,
                      std::vector<std::string>* notices) {
+  if (const auto video = root.Find("video")) {
+    RequireNoImages(root);
+    ReadSweepVideo(root, *video, OptionsOf(root, reading.readings), reading, sweep, notices);
+    return;
+  }
   const bool is_from_files = root.Has("readings_from") || root.Has("readings_from_name");
   if (root.Has("frames") + (root.Has("frames_csv") || is_from_files) != 1 ||
       (root.Has("frames_csv") && is_from_files)) {
     throw root.ErrorHere(
-        "either 'frames' (a list of image and reading_mm), 'frames_csv' (a table) or "
+        "either 'frames' (a list of image and reading_mm), 'frames_csv' (a table), 'video', or "
         "'readings_from' or 'readings_from_name' (the files themselves) is expected");
   }
   if (root.Has("frames")) {
@@ -237,6 +268,7 @@ void ReadSweepFrames(const YamlNode& root, const SweepReading& reading, SweepFil
     ReadListedFrames(root, sweep);
     return;
   }
+  RequireNoTimes(root);
   const ReadingOptions options = OptionsOf(root, reading.readings);
   std::string table;
   std::string folder = fs::path(root.source()).parent_path().string();

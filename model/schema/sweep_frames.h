@@ -12,8 +12,8 @@ namespace thicklens::model {
 // The images of a sweep, each with its reading. Every reading must have its image and every image
 // its reading; one without a partner throws Error with its place.
 
-// Reads the frames from the key `frames` of the file, or from `frames_csv` or `readings_from` with
-// `frames_dir` or `frames_glob`, into `sweep`. `notices` may be null.
+// Reads the frames from the key `frames` of the file, from `video`, or from `frames_csv` or
+// `readings_from` with `frames_dir` or `frames_glob`, into `sweep`. `notices` may be null.
 void ReadSweepFrames(const YamlNode& root, const SweepReading& reading, SweepFile* sweep,
                      std::vector<std::string>* notices);
 

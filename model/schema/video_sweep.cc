@@ -6,11 +6,14 @@
 #include <cmath>
 #include <cstddef>
 #include <map>
+#include <string>
 #include <utility>
 
 #include "model/schema/frame_pairing.h"
 #include "model/schema/sweep_frames.h"
+#include "model/schema/sweep_video.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/input_file.h"
 
 namespace thicklens::model {
 namespace {
@@ -39,10 +42,15 @@ class VideoSweep {
  public:
   VideoSweep(const std::string& path, const std::vector<VideoFrame>& frames,
              const VideoTable& table, const VideoSelection& selection,
-             const ReadingOptions& options)
-      : path_(path), frames_(frames), table_(table), selection_(selection), options_(options) {}
+             const ReadingOptions& options, VideoStatements statements)
+      : path_(path),
+        frames_(frames),
+        table_(table),
+        selection_(selection),
+        options_(options),
+        statements_(statements) {}
 
-  SweepFile Make(const std::string& camera_path, std::vector<std::string>* notices) {
+  SweepFile Make(std::vector<std::string>* notices) {
     if (frames_.empty()) throw Error(path_ + ": it has no frames");
     RequireOneSource();
     if (NeedsTimes()) RequireTimes();
@@ -58,7 +66,6 @@ class VideoSweep {
     Thin(&read);
     SweepFile sweep;
     sweep.source = path_;
-    sweep.camera_path = camera_path;
     for (const ReadFrameOfVideo& frame : read)
       sweep.frames.push_back({path_, frame.reading_mm, frame.number});
     sweep.readings = description_;
@@ -67,6 +74,13 @@ class VideoSweep {
   }
 
  private:
+  // The name of a statement in messages.
+  std::string Name(const std::string& option, const std::string& key) const {
+    return statements_ == VideoStatements::kOptions ? option : fmt::format("{} ({})", key, option);
+  }
+  std::string TableName() const {
+    return statements_ == VideoStatements::kOptions ? "--readings" : "frames_csv";
+  }
   bool HasSpeed() const { return selection_.reading_start.has_value(); }
   bool NeedsTimes() const {
     return !table_.by_frame || selection_.time_start_s || selection_.time_end_s;
@@ -90,8 +104,8 @@ class VideoSweep {
           path_));
     }
     if (!table_.by_time && !selection_.time_offset.empty()) {
-      throw Error(
-          fmt::format("{}: --time-offset is for a table by time, which is not given", path_));
+      throw Error(fmt::format("{}: {} is for a table by time, which is not given", path_,
+                              Name("--time-offset", "video.time_offset")));
     }
   }
 
@@ -100,18 +114,16 @@ class VideoSweep {
       if (!frames_[i].time_s) {
         throw Error(fmt::format(
             "{}: frame {} (counted from 0) has no time stamp, and readings by time need the time "
-            "of "
-            "each frame; give a table by frame (--readings with the columns frame and reading), or "
-            "put the stream into a container with its frame rate (ffmpeg -r RATE -i FILE -c copy "
+            "of each frame; give a table by frame ({} with the columns frame and reading), or put "
+            "the stream into a container with its frame rate (ffmpeg -r RATE -i FILE -c copy "
             "NEW.mp4)",
-            path_, i));
+            path_, i, TableName()));
       }
       if (i > 0 && !(*frames_[i].time_s > *frames_[i - 1].time_s)) {
         throw Error(
             fmt::format("{}: the time stamps do not rise: frame {} is at {:.6g} s, frame {} at "
-                        "{:.6g} s; give a "
-                        "table by frame (--readings with the columns frame and reading)",
-                        path_, i - 1, *frames_[i - 1].time_s, i, *frames_[i].time_s));
+                        "{:.6g} s; give a table by frame ({} with the columns frame and reading)",
+                        path_, i - 1, *frames_[i - 1].time_s, i, *frames_[i].time_s, TableName()));
       }
     }
   }
@@ -136,9 +148,10 @@ class VideoSweep {
   }
 
   std::vector<ReadFrameOfVideo> ByConstantSpeed() {
-    const double start_mm =
-        ReadingInMm(*selection_.reading_start, "", options_, "--reading-start: ");
-    const double end_mm = ReadingInMm(*selection_.reading_end, "", options_, "--reading-end: ");
+    const double start_mm = ReadingInMm(*selection_.reading_start, "", options_,
+                                        Name("--reading-start", "video.reading_start") + ": ");
+    const double end_mm = ReadingInMm(*selection_.reading_end, "", options_,
+                                      Name("--reading-end", "video.reading_end") + ": ");
     const double from = selection_.time_start_s.value_or(0);
     const double to = selection_.time_end_s.value_or(LastTime());
     if (!(to > from)) {
@@ -151,8 +164,8 @@ class VideoSweep {
     const double last_shown =
         LastTime() + LastTime() / static_cast<double>(std::max<std::size_t>(frames_.size() - 1, 1));
     if (to > last_shown + kSameTimeS) {  // a mistake in the unit would stay unnoticed
-      throw Error(fmt::format("{}: --time-end is {:.6g} s, but the last frame is at {:.6g} s",
-                              path_, to, LastTime()));
+      throw Error(fmt::format("{}: {} is {:.6g} s, but the last frame is at {:.6g} s", path_,
+                              Name("--time-end", "video.time_end_s"), to, LastTime()));
     }
     std::vector<ReadFrameOfVideo> read;
     for (const int number : usable_) {
@@ -170,9 +183,8 @@ class VideoSweep {
     const auto offset = SecondsOfTime(selection_.time_offset);
     if (!offset) {
       throw Error(fmt::format(
-          "--time-offset: a time is expected (seconds, hh:mm:ss.f, or a date and a time), found "
-          "'{}'",
-          selection_.time_offset));
+          "{}: a time is expected (seconds, hh:mm:ss.f, or a date and a time), found '{}'",
+          Name("--time-offset", "video.time_offset"), selection_.time_offset));
     }
     return *offset;
   }
@@ -209,8 +221,9 @@ class VideoSweep {
     if (first > LastTime() || last < 0) {
       throw Error(fmt::format(
           "{}: its times run from {:.6f} s to {:.6f} s, those of the frames of {} from 0 to {:.6f} "
-          "s: state by --time-offset which time of the table is that of the first frame{}",
-          source, first, last, path_, LastTime(), UnitHint()));
+          "s: state by {} which time of the table is that of the first frame{}",
+          source, first, last, path_, LastTime(), Name("--time-offset", "video.time_offset"),
+          UnitHint()));
     }
     // If milliseconds are taken for seconds, nearly all of the table lies behind the end of the
     // video.
@@ -220,13 +233,16 @@ class VideoSweep {
     if (is_suspect) {
       throw Error(fmt::format(
           "{}: its times have no unit; as seconds they last {:.6g} s, and {} lasts {:.6g} s: state "
-          "their unit by --time-unit (ms, or s if it is right)",
-          source, last - first, path_, LastTime()));
+          "their unit by {} (ms, or s if it is right)",
+          source, last - first, path_, LastTime(), UnitName()));
     }
   }
   std::string UnitHint() const {
-    return table_.by_time->is_time_unit_stated ? "" : ", and by --time-unit what they count";
+    return table_.by_time->is_time_unit_stated
+               ? ""
+               : fmt::format(", and by {} what they count", UnitName());
   }
+  std::string UnitName() const { return Name("--time-unit", "readings_time_unit"); }
 
   std::vector<ReadFrameOfVideo> ByFrame() {
     const auto row_of =
@@ -289,9 +305,10 @@ class VideoSweep {
                                      frames_.size() - usable, frames_.size(), left_out));
     }
     if (used < usable) {
-      notices->push_back(fmt::format(
-          "{}: {} of {} usable frames are used{}; --every and --frames choose", path_, used, usable,
-          step_ > 1 ? fmt::format(", one of {}", step_) : ", evenly chosen"));
+      notices->push_back(
+          fmt::format("{}: {} of {} usable frames are used{}; {} and {} choose", path_, used,
+                      usable, step_ > 1 ? fmt::format(", one of {}", step_) : ", evenly chosen",
+                      Name("--every", "video.every"), Name("--frames", "video.frames")));
     }
     const std::vector<std::string>* of_table = table_.by_time    ? &table_.by_time->notices
                                                : table_.by_frame ? &table_.by_frame->notices
@@ -305,6 +322,7 @@ class VideoSweep {
   const VideoTable& table_;
   const VideoSelection& selection_;
   const ReadingOptions& options_;
+  const VideoStatements statements_;
   std::vector<int> usable_, damaged_, repeated_;
   int outside_ = 0, without_reading_ = 0;
   std::size_t step_ = 1;
@@ -315,6 +333,12 @@ class VideoSweep {
 bool FailWith(std::string* why, const std::string& text) {
   if (why != nullptr) *why = text;
   return false;
+}
+
+// A table of text, not JSON or XML, which name frames by their own rules.
+bool IsTextTable(const std::string& text) {
+  const std::size_t begin = text.find_first_not_of("\xEF\xBB\xBF \t\r\n");
+  return begin == std::string::npos || std::string("{[<").find(text[begin]) == std::string::npos;
 }
 
 }  // namespace
@@ -360,13 +384,35 @@ bool VideoSelection::IsValid(std::string* why) const {
   return true;
 }
 
+VideoTable ReadVideoTable(const std::string& table, const std::string& path,
+                          const ReadingOptions& options, const ReadingReader& reader) {
+  VideoTable readings;
+  const std::string text = ReadTextFile(table);
+  if (IsTextTable(text) && HasTimes(text, table, options)) {
+    readings.by_time = TimedReadingsOfTable(text, table, options);
+  } else {
+    readings.by_frame =
+        reader ? reader(table, {path}, options) : ReadTextReadings(table, {path}, options);
+  }
+  return readings;
+}
+
+SweepFile FramesFromVideo(const std::string& path, const std::vector<VideoFrame>& frames,
+                          const VideoTable& table, const VideoSelection& selection,
+                          const ReadingOptions& options, VideoStatements statements,
+                          std::vector<std::string>* notices) {
+  std::string why;
+  if (!selection.IsValid(&why)) throw Error(why);
+  return VideoSweep(path, frames, table, selection, options, statements).Make(notices);
+}
+
 SweepFile SweepFromVideo(const std::string& path, const std::vector<VideoFrame>& frames,
                          const VideoTable& table, const VideoSelection& selection,
                          const ReadingOptions& options, const std::string& camera_path,
                          std::vector<std::string>* notices) {
-  std::string why;
-  if (!selection.IsValid(&why)) throw Error(why);
-  SweepFile sweep = VideoSweep(path, frames, table, selection, options).Make(camera_path, notices);
+  SweepFile sweep =
+      FramesFromVideo(path, frames, table, selection, options, VideoStatements::kOptions, notices);
+  sweep.camera_path = camera_path;
   NoteOrderAndRepeats(sweep, notices);
   return sweep;
 }

@@ -99,7 +99,11 @@ const std::vector<FuzzedReader>& FuzzedReaders() {
       OfFile("sweep-yaml", "sweep.yaml",
              [](const std::string& path) {
                std::vector<std::string> notices;
-               model::ReadSweep(path, &notices);
+               model::SweepReading reading;
+               reading.video_reader = [](const std::string&, std::vector<std::string>*) {
+                 return std::vector<model::VideoFrame>{{0.0}, {0.5}, {1.0}};
+               };
+               model::ReadSweep(path, reading, &notices);
              }),
       OfFile("readings-csv", "frames/readings.csv",
              [](const std::string& path) {

@@ -25,6 +25,7 @@
 #include "thicklens/io/frame_files.h"
 #include "thicklens/io/image_io.h"
 #include "thicklens/io/light_field_io.h"
+#include "thicklens/io/video_file.h"
 #include "thicklens/model/depth_holes.h"
 #include "thicklens/model/light_field.h"
 #include "thicklens/model/light_field_grid.h"
@@ -247,7 +248,11 @@ SweepStrip ReadSweepStrip(const std::string& path, const std::optional<model::Ca
   const std::string yaml =
       fs::is_directory(path, failure) ? (fs::path(path) / kSweepName).string() : path;
   std::vector<std::string> notices;
-  model::SweepFile sweep = model::ReadSweep(yaml, &notices);
+  model::SweepReading reading;
+  reading.video_reader = [](const std::string& video, std::vector<std::string>* /*notices*/) {
+    return io::VideoFile(video).Survey().frames;
+  };
+  model::SweepFile sweep = model::ReadSweep(yaml, reading, &notices);
   for (const std::string& notice : notices) spdlog::debug("{}", notice);
   std::stable_sort(sweep.frames.begin(), sweep.frames.end(),
                    [&](const model::SweepFrame& a, const model::SweepFrame& b) {

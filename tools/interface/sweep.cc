@@ -14,6 +14,7 @@
 #include "thicklens/base/error.h"
 #include "thicklens/base/input_file.h"
 #include "thicklens/base/output_file.h"
+#include "thicklens/base/yaml_reader.h"
 #include "thicklens/calib/focus_sweep.h"
 #include "thicklens/io/frame_files.h"
 #include "thicklens/io/full_scale.h"
@@ -103,10 +104,6 @@ std::optional<model::SweepTruth> ReadTruth(const std::string& truth_path,
   }
 }
 
-model::SweepReading ReadingOf(const SweepOverrides& overrides) {
-  return {overrides.readings, io::ReadReadings};
-}
-
 // A sweep whose frames are the pages of one file; `table` is empty if its OME-XML has the readings.
 model::SweepFile SweepOfStack(const std::string& path, const std::string& table,
                               const SweepOverrides& overrides, std::vector<std::string>* notices) {
@@ -130,12 +127,6 @@ model::SweepFile SweepOfStack(const std::string& path, const std::string& table,
                                           path, options)
                     : io::ReadReadings(table, {path}, options);
   return model::SweepFromPages(path, pages, readings, overrides.camera_path, notices);
-}
-
-// A table of text, not JSON or XML, which name frames by their own rules.
-bool IsTextTable(const std::string& text) {
-  const std::size_t begin = text.find_first_not_of("\xEF\xBB\xBF \t\r\n");
-  return begin == std::string::npos || std::string("{[<").find(text[begin]) == std::string::npos;
 }
 
 std::string BitRateText(double bits_per_second) {
@@ -180,10 +171,25 @@ void NoteVideo(const std::string& path, const io::VideoSurvey& survey,
   }
 }
 
+// The frames of a video, which is decoded once.
+std::vector<model::VideoFrame> FramesOfVideo(const std::string& path,
+                                             std::vector<std::string>* notices) {
+  io::VideoSurvey survey = io::VideoFile(path).Survey();
+  if (notices != nullptr) NoteVideo(path, survey, notices);
+  return std::move(survey.frames);
+}
+
+model::SweepReading ReadingOf(const SweepOverrides& overrides) {
+  return {overrides.readings, io::ReadReadings, overrides.video, FramesOfVideo};
+}
+
+bool HasVideoOptions(const SweepOverrides& overrides) {
+  return overrides.video.IsGiven() || !overrides.readings.time_column.empty() ||
+         !overrides.readings.time_unit.empty();
+}
+
 void RequireNoVideoOptions(const std::string& path, const SweepOverrides& overrides) {
-  const model::ReadingOptions& readings = overrides.readings;
-  if (!overrides.video.IsGiven() && readings.time_column.empty() && readings.time_unit.empty())
-    return;
+  if (!HasVideoOptions(overrides)) return;
   throw OptionError(
       "video", fmt::format("video: times, a constant speed and a choice of frames are for a video; "
                            "{} is none",
@@ -208,18 +214,9 @@ model::SweepFile SweepOfVideo(const std::string& path, const std::string& table,
                     path));
   }
   model::VideoTable readings;
-  if (!table.empty()) {
-    const std::string text = ReadTextFile(table);
-    if (IsTextTable(text) && model::HasTimes(text, table, options)) {
-      readings.by_time = model::TimedReadingsOfTable(text, table, options);
-    } else {
-      readings.by_frame = io::ReadReadings(table, {path}, options);
-    }
-  }
-  const io::VideoSurvey survey = io::VideoFile(path).Survey();
-  NoteVideo(path, survey, notices);
-  return model::SweepFromVideo(path, survey.frames, readings, overrides.video, options,
-                               overrides.camera_path, notices);
+  if (!table.empty()) readings = model::ReadVideoTable(table, path, options, io::ReadReadings);
+  return model::SweepFromVideo(path, FramesOfVideo(path, notices), readings, overrides.video,
+                               options, overrides.camera_path, notices);
 }
 
 // Whether the input is taken for a video: by its content, or by its name, so that a broken one is
@@ -356,7 +353,9 @@ Sweep ReadSweep(const std::string& path, const SweepOverrides& overrides,
     }
     yaml = inside.string();
   }
-  RequireNoVideoOptions(path, overrides);
+  // The options for a video complete the statements of a sweep file that has one.
+  if (HasVideoOptions(overrides) && !YamlNode::LoadFile(yaml).Has("video"))
+    RequireNoVideoOptions(path, overrides);
   Sweep sweep;
   model::SweepFile file = model::ReadSweep(yaml, ReadingOf(overrides), &sweep.notices);
   if (!overrides.camera_path.empty()) file.camera_path = overrides.camera_path;

@@ -68,7 +68,8 @@ struct SweepOverrides {
   std::optional<model::SweepRaw> raw;  // what is measured of raw files
   // Which readings are read, and in which unit (thicklens/model/readings.h).
   model::ReadingOptions readings;
-  // Which frames of a video are used, and its constant speed; only for ReadSweepFolder of a video.
+  // Which frames of a video are used, and its constant speed: for ReadSweepFolder of a video, and
+  // for a sweep file with a video, whose statements they complete and may not contradict.
   model::VideoSelection video;
 
   // Returns whether all statements are in their range and do not contradict each other. Otherwise
@@ -77,8 +78,8 @@ struct SweepOverrides {
 };
 
 // Reads a sweep's description (schema thicklens/sweep/1), or the sweep.yaml of a folder, and its
-// camera; checks that the frames exist and opens none. Throws OptionError, and Error with
-// file:line:column.
+// camera; checks that the frames exist and opens none, except that a video is decoded once. Throws
+// OptionError, and Error with file:line:column.
 THICKLENS_EXPORT Sweep ReadSweep(const std::string& path, const SweepOverrides& overrides = {},
                                  const RunControl& run = {});
 // Reads a folder of frames with a table of their readings (docs/file-formats.md), or one file (or a

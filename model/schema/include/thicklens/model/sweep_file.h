@@ -9,6 +9,7 @@
 #include "thicklens/model/camera.h"
 #include "thicklens/model/effect_selection.h"
 #include "thicklens/model/readings.h"
+#include "thicklens/model/video_selection.h"
 
 namespace thicklens::model {
 
@@ -96,12 +97,16 @@ struct SweepReading {
   ReadingOptions readings;  // each value that is given replaces that of the sweep's file
   // Reads the readings; empty: ReadTextReadings, which reads tables of text and names of files.
   ReadingReader reader;
+  // Completes what the sweep's file states of its video; a value that both state must be equal.
+  VideoSelection video;
+  VideoFramesReader video_reader;  // empty: a sweep file with a video is refused
 };
 
-// Reads the YAML file and, with `frames_csv`, the table. Throws Error with file:line:column for
-// invalid content, also for a row without a file, an image in `frames_dir` (or of `frames_glob`)
-// without a row, duplicate rows and readings that are no numbers. Assumptions about missing or
-// unusual content are added to `notices`, which may be null.
+// Reads the YAML file and, with `frames_csv`, the table; with `video`, also the times of its
+// frames, by SweepReading::video_reader. Throws Error with file:line:column for invalid content,
+// also for a row without a file, an image in `frames_dir` (or of `frames_glob`) without a row,
+// duplicate rows and readings that are no numbers. Assumptions about missing or unusual content are
+// added to `notices`, which may be null.
 THICKLENS_EXPORT SweepFile ReadSweep(const std::string& path, std::vector<std::string>* notices);
 THICKLENS_EXPORT SweepFile ReadSweep(const std::string& path, const SweepReading& reading,
                                      std::vector<std::string>* notices);
