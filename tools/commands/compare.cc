@@ -19,6 +19,7 @@
 #include "tools/commands/commands.h"
 #include "tools/options/command_frame.h"
 #include "tools/options/compared_inputs.h"
+#include "tools/options/embedded_depth.h"
 #include "tools/options/interface_options.h"
 #include "tools/options/light_field_options.h"
 #include "tools/options/option_values.h"
@@ -118,8 +119,8 @@ Baseline ReadBaseline(const CompareOptions& options, const Rect& crop, bool has_
   if (depth.kind.empty() && !has_camera) depth.kind = "disparity";
   Baseline baseline;
   baseline.photo = ReadCroppedImage(options.dibr_paths.front(), crop);
-  baseline.depth =
-      ReadDepth(options.dibr_paths.back(), DepthMeaningOf(depth), DepthReadOptionsOf(depth));
+  baseline.depth = ReadDepth(options.dibr_paths.back(), DepthMeaningOf(depth),
+                             DepthReadOptionsOf(depth), DepthRun());
   if (IsToCrop(crop, baseline.depth.width_px, baseline.depth.height_px))
     baseline.depth = baseline.depth.Cropped(*crop);
   baseline.remove_falloff = options.without.empty();

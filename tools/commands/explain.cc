@@ -93,8 +93,9 @@ OptionNames ExplainOptionNames() {
 // sensor.
 DepthMap DepthOf(const ExplainOptions& options, const model::Sensor& sensor) {
   if (options.depth.kind.empty()) {
-    if (std::optional<DepthMap> inside = ReadEmbeddedDepth(
-            options.depth_path, sensor.width_px, sensor.height_px, DepthFlipOf(options.depth))) {
+    if (std::optional<DepthMap> inside =
+            ReadEmbeddedDepth(options.depth_path, sensor.width_px, sensor.height_px,
+                              DepthFlipOf(options.depth), DepthRun())) {
       RefuseOtherMeaning(options.depth, *inside);
       spdlog::info("{}: {}", PrintableUtf8(options.depth_path),
                    PrintableUtf8(inside->notes.front()));
@@ -102,7 +103,8 @@ DepthMap DepthOf(const ExplainOptions& options, const model::Sensor& sensor) {
     }
   }
   return ReadDepth(options.depth_path, DepthMeaningOf(options.depth),
-                   DepthReadOptionsOf(options.depth));
+                   DepthReadOptionsOf(options.depth),
+                   DepthRun("the same command without --depth-kind"));
 }
 
 // Its progress line ends with it.

@@ -32,6 +32,7 @@
 #include "thicklens/model/sweep_file.h"
 #include "tools/commands/commands.h"
 #include "tools/options/command_frame.h"
+#include "tools/options/embedded_depth.h"
 #include "tools/options/light_field_options.h"
 #include "tools/options/option_values.h"
 #include "tools/options/with_file_context.h"
@@ -148,7 +149,7 @@ PageDepth ReadPageDepth(const ReportOptions& options, const model::LightField& l
                     options.depth.kind, options.light_field_path));
   }
   const DepthMap read = ReadDepth(options.depth_path, DepthMeaningOf(options.depth),
-                                  DepthReadOptionsOf(options.depth));
+                                  DepthReadOptionsOf(options.depth), DepthRun());
   for (const std::string& warning : read.warnings) {
     spdlog::warn("{}: {}", options.depth_path, warning);
   }

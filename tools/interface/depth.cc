@@ -6,6 +6,7 @@
 
 #include "thicklens/base/output_file.h"
 #include "thicklens/io/depth_io.h"
+#include "tools/interface/run_scope.h"
 #include "tools/interface/validation.h"
 #include "tools/interface/with_file_context.h"
 
@@ -58,7 +59,8 @@ io::DepthReading FileReading(const DepthReadOptions& options) {
 }
 
 // A photograph in the place of its depth map is refused; one with a map inside says so.
-io::DepthFile ReadFileOrSayWhatIsInside(const std::string& path, const io::DepthReading& reading) {
+io::DepthFile ReadFileOrSayWhatIsInside(const std::string& path, const io::DepthReading& reading,
+                                        const RunScope& run) {
   try {
     return io::ReadDepthFile(path, reading);
   } catch (const Interrupted&) {
@@ -75,20 +77,21 @@ io::DepthFile ReadFileOrSayWhatIsInside(const std::string& path, const io::Depth
     }
     if (inside.empty()) throw;
     throw Error(fmt::format(
-        "{}; the file is a photograph with a depth map inside ({}): without a depth map of its own "
-        "it is used, and `thicklens depth extract` writes it",
-        error.what(), inside));
+        "{}; the file is a photograph with a depth map inside ({}): take it from there by {}",
+        error.what(), inside, run.Option("ReadEmbeddedDepth")));
   }
 }
 
 }  // namespace
 
 DepthMap ReadDepth(const std::string& path, const DepthMeaning& meaning,
-                   const DepthReadOptions& options) {
+                   const DepthReadOptions& options, const RunControl& control) {
+  checks::RequireValid(control);
   checks::RequireValid(meaning);
   std::string why;
   if (!options.IsValid(meaning, &why)) throw OptionError(why.substr(0, why.find(':')), why);
-  io::DepthFile file = ReadFileOrSayWhatIsInside(path, FileReading(options));
+  const RunScope run(control);
+  io::DepthFile file = ReadFileOrSayWhatIsInside(path, FileReading(options), run);
   model::FlipDepth(options.flip, file.map.width_px, &file.map.values);
   DepthMap depth{file.map.width_px,
                  file.map.height_px,
@@ -116,20 +119,21 @@ DepthMap ReadDepth(const std::string& path, const DepthMeaning& meaning,
 }
 
 std::optional<DepthMap> ReadEmbeddedDepth(const std::string& path, int width_px, int height_px,
-                                          model::DepthFlip flip) {
+                                          model::DepthFlip flip, const RunControl& control) {
+  checks::RequireValid(control);
   if (width_px < 0 || height_px < 0 || (width_px == 0) != (height_px == 0)) {
     throw OptionError("width_px", fmt::format("width_px, height_px: two sides >= 1, or two zeros, "
                                               "are expected, found {} and {}",
                                               width_px, height_px));
   }
+  const RunScope run(control);
   std::optional<io::EmbeddedDepth> found = std::move(io::ReadEmbeddedDepthFile(path).depth);
   if (!found) return std::nullopt;
   if (!found->has_unit) {
     throw Error(fmt::format(
         "{}: the depth map inside has no unit of length ({}): its depths are known up to a factor "
-        "only; write it by `thicklens depth extract`, scale it, and give it as a depth map of its "
-        "own",
-        path, found->description));
+        "only; take it from there by {}, scale it, and give it as a depth map of its own",
+        path, found->description, run.Option("io::ReadEmbeddedDepthFile")));
   }
   if (width_px > 0) found = io::Enlarged(*found, width_px, height_px, path);
   model::RawDepthMap depths = io::DepthsOf(*found);

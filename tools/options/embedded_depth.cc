@@ -11,6 +11,7 @@
 #include "thicklens/base/error.h"
 #include "thicklens/io/depth_io.h"
 #include "thicklens/io/exif.h"
+#include "tools/options/interface_options.h"
 #include "tools/options/option_values.h"
 
 namespace thicklens::tools {
@@ -103,10 +104,19 @@ void RefuseOtherMeaning(const DepthOptions& options, const DepthMap& inside) {
                   fmt::join(given, ", "), file_says, given.size() == 1 ? "" : "s"));
 }
 
+RunControl DepthRun(const std::string& other_way) {
+  const std::string command = "`thicklens depth extract`";
+  RunControl run;
+  run.option_name = OptionNames{
+      {"ReadEmbeddedDepth", other_way.empty() ? command : other_way + ", or by " + command},
+      {"io::ReadEmbeddedDepthFile", command}};
+  return run;
+}
+
 DepthMap DepthInsidePhoto(const EstimateOptions& options, int width_px, int height_px) {
   const std::string& path = options.image_path;
   std::optional<DepthMap> inside =
-      ReadEmbeddedDepth(path, width_px, height_px, DepthFlipOf(options.depth));
+      ReadEmbeddedDepth(path, width_px, height_px, DepthFlipOf(options.depth), DepthRun());
   if (!inside) throw NoDepth(path);
   RefuseOtherMeaning(options.depth, *inside);
   if (!options.camera_path.empty()) return std::move(*inside);

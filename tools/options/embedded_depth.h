@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "thicklens/depth.h"
+#include "thicklens/run.h"
 #include "tools/options/estimate_options.h"
 #include "tools/options/light_field_options.h"
 
@@ -19,6 +20,11 @@ void RefuseOtherMeaning(const DepthOptions& options, const DepthMap& inside);
 
 // The kind of a map in words: "inverse depth (1/z)".
 std::string KindInWords(model::DepthKind kind);
+
+// Names the command that takes a depth map out of a photograph in the messages of ReadDepth and
+// ReadEmbeddedDepth. `other_way` is what else the user of this command can do to use the map
+// inside: "DEPTH left out"; empty: nothing.
+RunControl DepthRun(const std::string& other_way = "");
 
 // Returns the depth map inside the photograph of `estimate`, in the photograph's size. Throws Error
 // if there is none, with what was looked for and found, and UsageError if the options contradict it

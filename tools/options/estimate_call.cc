@@ -185,7 +185,8 @@ EstimateCall ReadEstimateCall(const EstimateOptions& options, const RunControl& 
   call.depth = options.depth_path.empty()
                    ? DepthInsidePhoto(options, call.photo.width_px(), call.photo.height_px())
                    : ReadDepth(options.depth_path, DepthMeaningOf(options.depth),
-                               DepthReadOptionsOf(options.depth));
+                               DepthReadOptionsOf(options.depth),
+                               DepthRun("the same command without a depth map"));
   if (!options.camera_path.empty()) call.camera = ReadCamera(options.camera_path);
   if (options.aperture_of.empty()) return call;
   LightFieldReadOptions reading;

@@ -109,6 +109,17 @@ TEST_F(DepthInsideTest, WithoutACameraTheRemedyIsNamed) {
               AllOf(HasSubstr("z (along the optical axis)"), Not(HasSubstr("inverse.pfm"))));
 }
 
+// The photograph in the place of its depth map: the commands name what their user can do.
+TEST_F(DepthInsideTest, APhotographAsItsDepthMapIsRefusedWithTheWayToTheMap) {
+  const std::string photo = Photo("gdepth_inverse.jpg");
+  EXPECT_THAT(
+      Refused(
+          Estimate(photo, {photo, "--camera", camera_, "--depth-kind", "z", "--depth-unit", "mm"}),
+          1)
+          .err,
+      HasSubstr("by the same command without a depth map, or by `thicklens depth extract`"));
+}
+
 TEST_F(DepthInsideTest, APhotographWithoutOneIsRefusedWithWhatWasLookedFor) {
   EXPECT_THAT(Refused(Estimate(Photo("second_image.jpg"), {}), 1).err,
               AllOf(HasSubstr("no DEPTH was given"), HasSubstr("GDepth and Dynamic Depth"),

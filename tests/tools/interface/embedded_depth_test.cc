@@ -21,6 +21,7 @@ using testing::ContentOf;
 using testing::ErrorOf;
 using testing::FieldOfOptionError;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::StartsWith;
 using testing::TemporaryFolder;
 
@@ -75,7 +76,8 @@ TEST(EmbeddedDepthInterfaceTest, AMapWithoutAUnitIsRefused) {
   bytes.replace(bytes.find("Meters"), 6, "  None");
   const std::string path = folder.Put("photo.jpg", bytes);
   EXPECT_THAT(ErrorOf([&] { ReadEmbeddedDepth(path); }),
-              AllOf(StartsWith(path), HasSubstr("no unit of length")));
+              AllOf(StartsWith(path), HasSubstr("no unit of length"),
+                    HasSubstr("by io::ReadEmbeddedDepthFile"), Not(HasSubstr("thicklens depth"))));
 }
 
 // The photograph in the place of its depth map is refused with the way to the map.
@@ -85,7 +87,14 @@ TEST(EmbeddedDepthInterfaceTest, APhotographIsNoDepthMapButHoldsOne) {
                 ReadDepth(path, {DepthKind::kZ, LengthUnit::kMillimetre});
               }),
               AllOf(StartsWith(path), HasSubstr("with a depth map inside (GDepth"),
-                    HasSubstr("thicklens depth extract")));
+                    HasSubstr("by ReadEmbeddedDepth"), Not(HasSubstr("thicklens depth"))));
+  // A program says how its user gets the map.
+  RunControl run;
+  run.option_name = [](const std::string& name) { return "[" + name + "]"; };
+  EXPECT_THAT(ErrorOf([&] {
+                ReadDepth(path, {DepthKind::kZ, LengthUnit::kMillimetre}, {}, run);
+              }),
+              HasSubstr("by [ReadEmbeddedDepth]"));
 }
 
 }  // namespace

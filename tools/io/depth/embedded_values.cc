@@ -73,10 +73,8 @@ EmbeddedDepth Enlarged(const EmbeddedDepth& depth, int width_px, int height_px,
   if (!HasAspectOf(small, width_px, height_px)) {
     throw Error(fmt::format(
         "{}: the depth map inside is {} x {} px, the photograph {} x {} px: an equal aspect ratio "
-        "is "
-        "expected, otherwise it is unknown which part of the photograph the map shows; write the "
-        "map "
-        "by `thicklens depth extract`, bring it to the photograph's pixels, and give it as DEPTH",
+        "is expected, otherwise it is unknown which part of the photograph the map shows; take the "
+        "map as it is, bring it to the photograph's pixels, and give it as a depth map of its own",
         name, small.width_px, small.height_px, width_px, height_px));
   }
   if (small.width_px > width_px || small.height_px > height_px) {

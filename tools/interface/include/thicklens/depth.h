@@ -9,6 +9,7 @@
 #include "thicklens/model/depth_holes.h"
 #include "thicklens/model/light_field.h"
 #include "thicklens/model/scene.h"
+#include "thicklens/run.h"
 
 namespace thicklens {
 
@@ -101,18 +102,18 @@ struct DepthReadOptions {
 // Throws OptionError if the meaning or the options are not valid, before the file is opened, and
 // Error that names the file.
 THICKLENS_EXPORT DepthMap ReadDepth(const std::string& path, const DepthMeaning& meaning,
-                                    const DepthReadOptions& options = {});
+                                    const DepthReadOptions& options = {},
+                                    const RunControl& run = {});
 // Reads the depth map that a phone or a program stored in the photograph's own file, with the
 // meaning that the file states: lengths in mm (kZ, kRange) or dioptres (kInverse), as floats. The
 // forms are those of io::FindEmbeddedDepth. `width_px` and `height_px` are the photograph's size,
 // to which a smaller map of the same aspect ratio is enlarged; 0: the map keeps its size. `flip`
-// reverses its rows or columns. The first
-// of its notes describes it in one line. Returns nothing if the file holds no depth. Throws Error
-// that names the file: its fields are wrong, it states no unit, or the map has another aspect
-// ratio.
+// reverses its rows or columns. The first of its notes describes it in one line. Returns nothing if
+// the file holds no depth. Throws Error that names the file: its fields are wrong, it states no
+// unit, or the map has another aspect ratio.
 THICKLENS_EXPORT std::optional<DepthMap> ReadEmbeddedDepth(
     const std::string& path, int width_px = 0, int height_px = 0,
-    model::DepthFlip flip = model::DepthFlip::kNone);
+    model::DepthFlip flip = model::DepthFlip::kNone, const RunControl& run = {});
 // The bytes of a PFM file (float, little endian) with the values; the meaning is not part of it.
 THICKLENS_EXPORT std::string EncodeDepth(const DepthMap& depth);
 // Writes that file, completely or not at all.

@@ -12,6 +12,7 @@
 // How a long call is run: the one protocol for threads, cancellation, progress and notices. It
 // never changes a result. The functions that may take long have a RunControl parameter. Those that
 // read, write or compare single images have none; they take up to some seconds for a large image.
+// Reading a depth map has one because its errors name another way to read it.
 // Calibrating, verifying, estimating, simulating and explaining report their progress; the other
 // functions report none.
 namespace thicklens {
@@ -69,7 +70,9 @@ struct RunControl {
   std::function<void(const Notice&)> notice;
   // How errors and notices name an option: it gets the path of the member ("sensor_origin",
   // "depth.meaning.unit") and returns the name that the program's user knows ("--sensor-origin").
-  // Empty: the path itself. OptionError::field() is always the path.
+  // Where another function of the interface is the remedy, it gets the name of the function
+  // ("ReadEmbeddedDepth") and returns what the user would do. Empty: the path or the name itself.
+  // OptionError::field() is always the path.
   std::function<std::string(const std::string& field)> option_name;
 
   // Returns true if `threads` is in its range. Otherwise `why`, if not null, gets the reason.
