@@ -14,6 +14,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "benchmarks/accuracy/fault_study.h"
+#include "benchmarks/accuracy/processing_study.h"
 #include "benchmarks/accuracy/pupil_law_study.h"
 #include "benchmarks/accuracy/tables.h"
 #include "thicklens/base/error.h"
@@ -41,6 +42,7 @@ struct Arguments {
   std::string json_path;
   bool faults = false;
   bool pupil_laws = false;
+  bool processing = false;
 };
 
 std::vector<std::string> TargetNames() {
@@ -98,6 +100,9 @@ void AddOptions(CLI::App* app, Arguments* arguments) {
   app->add_flag("--pupil-laws", arguments->pupil_laws,
                 "instead: sweeps under each law of the pupil, with a given and an unknown bench "
                 "offset: whether the intervals hold the truth");
+  app->add_flag("--processing", arguments->processing,
+                "instead: sweeps whose frames were read with a wrong transfer curve, or denoised, "
+                "compressed or sharpened: the change of kappa, and what is reported");
   app->add_option("--json", arguments->json_path, "write the tables to a file");
 }
 
@@ -159,6 +164,9 @@ void RunStudy(Arguments arguments) {
   } else if (arguments.pupil_laws) {
     json["pupil_laws"] =
         RunPupilLawStudy(arguments.cases, arguments.settings, arguments.sweeps, arguments.threads);
+  } else if (arguments.processing) {
+    json["processing"] =
+        RunProcessingStudy(arguments.settings, arguments.sweeps, arguments.threads);
   } else {
     Run run;
     run.settings = arguments.settings;
