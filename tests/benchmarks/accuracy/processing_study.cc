@@ -26,7 +26,7 @@ using testing::SimulatedSweep;
 
 constexpr double kFocalLengthMm = 50;  // of case ii
 
-// What is photographed, and through which aperture.
+// The target that is photographed, and the aperture.
 struct Scene {
   std::string name;
   model::TargetKind target;
@@ -209,7 +209,7 @@ struct Cell {
            (refused > 0 ? fmt::format(" %, {} refused", refused) : " %");
   }
 
-  // What was reported, each with the number of sweeps unless it is all of them.
+  // The findings that were reported, each with the number of sweeps unless it is all of them.
   std::string Reported() const {
     std::string text;
     const auto add = [&](int count, const std::string& what) {
