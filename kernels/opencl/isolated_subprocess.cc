@@ -3,8 +3,6 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <poll.h>
-#include <sys/prctl.h>
-#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -18,6 +16,7 @@
 
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/forked_process.h"
 
 namespace thicklens::kernels {
 namespace {
@@ -82,23 +81,14 @@ void WriteAll(int descriptor, const std::string& text) {
   }
 }
 
-// Runs as the child. The parent's signal handlers and atexit functions must not run in it.
+// Runs as the child. The parent's atexit functions must not run in it. Ctrl-C is sent to the whole
+// process group of the terminal, and the stop of a service to all of its processes. These signals
+// are meant for the parent, which then ends the child.
 [[noreturn]] void BeChild(const std::function<void(const SubprocessReport&)>& work, pid_t parent,
                           int reported, int chatter) {
-  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-  if (::getppid() != parent) ::_exit(1);
-  // Ctrl-C is sent to the whole process group of the terminal, and the stop of a service to all of
-  // its processes. These signals are meant for the parent, which then ends the child.
+  BeginForkedProcess(parent, {SIGQUIT, SIGPIPE, SIGALRM, SIGCHLD, SIGXFSZ, SIGXCPU},
+                     {SIGINT, SIGTERM, SIGHUP});
   ::setpgid(0, 0);
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) ::signal(signal, SIG_IGN);
-  for (const int signal : {SIGQUIT, SIGPIPE, SIGALRM, SIGCHLD, SIGXFSZ, SIGXCPU}) {
-    ::signal(signal, SIG_DFL);
-  }
-  sigset_t all;
-  ::sigfillset(&all);
-  ::sigprocmask(SIG_UNBLOCK, &all, nullptr);
-  const rlimit no_core{0, 0};
-  ::setrlimit(RLIMIT_CORE, &no_core);
   // If the parent has closed its standard streams, the pipes have their numbers.
   reported = ::fcntl(reported, F_DUPFD_CLOEXEC, STDERR_FILENO + 1);
   chatter = ::fcntl(chatter, F_DUPFD_CLOEXEC, STDERR_FILENO + 1);
@@ -143,8 +133,7 @@ class Child {
   void Kill() {
     ::kill(-pid_, SIGKILL);
     ::kill(pid_, SIGKILL);
-    while (::waitpid(pid_, &status_, 0) < 0 && errno == EINTR) {
-    }
+    status_ = StatusAtEnd(pid_);
     ended_ = true;
   }
   int status() const { return status_; }

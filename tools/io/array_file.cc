@@ -3,7 +3,6 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <poll.h>
-#include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
@@ -20,6 +19,7 @@
 
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/forked_process.h"
 #include "thicklens/base/input_file.h"
 #include "thicklens/base/memory_available.h"
 #include "thicklens/base/printable_text.h"
@@ -171,7 +171,6 @@ void LimitThisProcess(std::optional<double> memory_left_mib) {
     const rlimit both{most, most};
     setrlimit(what, &both);
   };
-  limit(RLIMIT_CORE, 0);
   limit(RLIMIT_FSIZE, 0);
   // The signal of the soft limit says what happened; that of the hard one does not.
   const rlimit seconds{kMaxSeconds, kMaxSeconds + 5};
@@ -181,22 +180,12 @@ void LimitThisProcess(std::optional<double> memory_left_mib) {
     limit(RLIMIT_DATA, data + static_cast<rlim_t>(*memory_left_mib) * (1 << 20));
 }
 
-// The handlers of the program, which remove its outputs for example, are not for this process.
-void ForgetSignalHandlers() {
-  for (const int number : {SIGTERM, SIGHUP, SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGXCPU})
-    std::signal(number, SIG_DFL);
-  for (const int number : {SIGINT, SIGQUIT, SIGXFSZ}) std::signal(number, SIG_IGN);
-  sigset_t none;
-  sigemptyset(&none);
-  sigprocmask(SIG_SETMASK, &none, nullptr);
-}
-
 // noexcept: an exception ends this process here, and never reaches the caller's stack in it.
 [[noreturn]] void ReadArraysForever(int socket, const ArrayLibrary& library,
                                     const std::string& path, ArrayFormat format,
-                                    std::optional<double> memory_left_mib) noexcept {
-  prctl(PR_SET_PDEATHSIG, SIGKILL);
-  ForgetSignalHandlers();
+                                    std::optional<double> memory_left_mib, pid_t parent) noexcept {
+  BeginForkedProcess(parent, {SIGTERM, SIGHUP, SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGXCPU},
+                     {SIGINT, SIGQUIT, SIGXFSZ});
   // libhdf5 writes its warnings there.
   const int nowhere = open("/dev/null", O_RDWR | O_CLOEXEC);
   if (nowhere < 0) _exit(1);
@@ -266,10 +255,11 @@ ArrayFile::ArrayFile(const std::string& path, ArrayFormat format) : path_(path) 
     sigset_t all, before;
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, &all, &before);
+    const pid_t parent = getpid();
     process_.id = fork();
     if (process_.id == 0) {
       close(ends[0]);
-      ReadArraysForever(ends[1], library, path, format, memory_left_mib);
+      ReadArraysForever(ends[1], library, path, format, memory_left_mib, parent);
     }
     const int failure = errno;
     pthread_sigmask(SIG_SETMASK, &before, nullptr);
@@ -287,8 +277,7 @@ ArrayFile::Process::~Process() {
   if (socket >= 0) close(socket);
   if (id <= 0) return;
   kill(id, SIGKILL);
-  while (waitpid(id, nullptr, 0) < 0 && errno == EINTR) {
-  }
+  StatusAtEnd(id);
 }
 
 void ArrayFile::Receive(void* bytes, std::size_t count) {
@@ -330,9 +319,7 @@ std::string ArrayFile::Received(std::size_t most_bytes) {
 }
 
 void ArrayFile::ThrowEnded() {
-  int status = 0;
-  while (waitpid(process_.id, &status, 0) < 0 && errno == EINTR) {
-  }
+  const int status = StatusAtEnd(process_.id);
   process_.id = -1;
   const int number = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
   // An access outside of the memory is a fault that only the file's content can lead to; the system
