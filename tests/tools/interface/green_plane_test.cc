@@ -241,11 +241,11 @@ TEST_F(GreenPlaneTest, AFloorThatIsNotStatedHasTheSameInterval) {
     sweep.description.floor = {};
     const calib::CalibrationSummary found = Calibrate(sweep, Fast()).summary;
     EXPECT_THAT(found.warnings, ::testing::Contains(HasSubstr("values from 0 to ")));
-    // 1 px of the sensor, or a little more, as the texture allows it.
+    // 1 px of the sensor, or more where the texture does not exclude it, but not 1 px of the plane.
     ASSERT_TRUE(found.blur_floor_px && found.blur_floor_px->systematic);
     EXPECT_EQ(found.blur_floor_px->systematic->x(), 0);
     EXPECT_GE(found.blur_floor_px->systematic->y(), 0.999);
-    EXPECT_LT(found.blur_floor_px->systematic->y(), 1.6);
+    EXPECT_LT(found.blur_floor_px->systematic->y(), 2);
   }
 }
 
