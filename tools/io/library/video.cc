@@ -23,6 +23,7 @@ extern "C" {
 #include <cstdio>
 #include <cstring>
 #include <exception>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <utility>
@@ -98,6 +99,7 @@ class VideoBytes {
   VideoBytes& operator=(const VideoBytes&) = delete;
 
   AVIOContext* context() { return context_; }
+  std::int64_t size() const { return size_; }
 
  private:
   static int Read(void* self, std::uint8_t* to, int bytes) {
@@ -123,6 +125,22 @@ class VideoBytes {
   int file_;
   std::int64_t size_ = 0, at_ = 0;
   AVIOContext* context_ = nullptr;
+};
+
+// While it lives, FFmpeg allocates no larger piece of memory than the tables of a container may
+// need: some dozens of bytes for each frame, which has at least one byte in the file. A header that
+// lies about its numbers would get gigabytes.
+class AllocationLimit {
+ public:
+  explicit AllocationLimit(std::int64_t file_bytes) {
+    constexpr std::int64_t kLeastBytes = 64 << 20, kBytesPerByte = 64;
+    constexpr std::int64_t kMost = std::numeric_limits<int>::max();  // FFmpeg's own limit
+    const std::int64_t table = std::min(file_bytes, kMost / kBytesPerByte) * kBytesPerByte;
+    av_max_alloc(static_cast<std::size_t>(std::min(kMost, kLeastBytes + table)));
+  }
+  ~AllocationLimit() { av_max_alloc(std::numeric_limits<int>::max()); }
+  AllocationLimit(const AllocationLimit&) = delete;
+  AllocationLimit& operator=(const AllocationLimit&) = delete;
 };
 
 struct CloseFormat {
@@ -278,8 +296,11 @@ class FfmpegVideo : public VideoDecoder {
       avformat_free_context(format);
       throw Refusal(std::string("this FFmpeg does not read ") + NameOfContainer(opening_.kind));
     }
-    // Frees the context if it fails.
-    const int code = avformat_open_input(&format, "", demuxer, nullptr);
+    const auto open = [&] {
+      const AllocationLimit limit(bytes_.size());
+      return avformat_open_input(&format, "", demuxer, nullptr);  // frees the context if it fails
+    };
+    const int code = open();
     if (code < 0) throw Refusal("it cannot be opened: " + ReasonOf(code));
     format_.reset(format);
     // A header that lies would make FFmpeg allocate memory for its size when it looks for more.
