@@ -12,6 +12,7 @@
 #include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/io/image_file.h"
+#include "tools/io/metadata_image.h"
 
 namespace thicklens::io {
 namespace {
@@ -243,13 +244,8 @@ PhotoExif ReadPhotoExif(const std::string& path, int width_px, int height_px, co
   Exiv2::LogMsg::setLevel(Exiv2::LogMsg::mute);
   PhotoExif photo;
   try {
-    // The file is not opened by its name, which Exiv2 may take for a network address or for
-    // standard input.
     const std::string bytes = ReadWholeFile(path);
-    const auto image = Exiv2::ImageFactory::open(
-        reinterpret_cast<const Exiv2::byte*>(bytes.data()),  // NOLINT: bytes
-        static_cast<long>(bytes.size()));
-    image->readMetadata();
+    const auto image = ReadMetadata(bytes);
     const Exiv2::ExifData& exif = image->exifData();
     photo.focal_length_mm = PositiveValue(exif, "Exif.Photo.FocalLength");
     photo.f_number = PositiveValue(exif, "Exif.Photo.FNumber");
@@ -275,7 +271,7 @@ PhotoExif ReadExifIfAny(const std::string& path, int width_px, int height_px, st
   Exiv2::LogMsg::setLevel(Exiv2::LogMsg::mute);
   why->clear();
   try {
-    if (Exiv2::ImageFactory::getType(path) == Exiv2::ImageType::none) return {};
+    if (!CanHoldMetadata(ReadWholeFile(path))) return {};
     return ReadPhotoExif(path, width_px, height_px, raw);
   } catch (const std::exception& error) {
     *why = error.what();

@@ -2,26 +2,14 @@
 
 #include <fmt/format.h>
 
-#include <exiv2/exiv2.hpp>
-
 #include "thicklens/base/error.h"
+#include "tools/io/metadata_image.h"
 
 namespace thicklens::io {
-namespace {
-
-Exiv2::Image::AutoPtr Opened(const std::string& png) {
-  auto image =
-      Exiv2::ImageFactory::open(reinterpret_cast<const Exiv2::byte*>(png.data()),  // NOLINT: bytes
-                                static_cast<long>(png.size()));
-  image->readMetadata();
-  return image;
-}
-
-}  // namespace
 
 std::string WithDescription(const std::string& png, const std::string& text) {
   try {
-    const auto image = Opened(png);
+    const auto image = ReadMetadata(png);
     image->setComment(text);
     image->writeMetadata();
     Exiv2::BasicIo& file = image->io();
@@ -36,7 +24,7 @@ std::string WithDescription(const std::string& png, const std::string& text) {
 
 std::string DescriptionOf(const std::string& png, const std::string& name) {
   try {
-    return Opened(png)->comment();
+    return ReadMetadata(png)->comment();
   } catch (const Exiv2::AnyError& error) {
     throw Error(fmt::format("{}: {}", name, error.what()));
   }

@@ -10,6 +10,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <map>
 #include <utility>
 #include <vector>
 
@@ -129,7 +130,7 @@ std::optional<StatedSize> SizeOfTiff(const std::string& bytes) {
 }
 
 struct ExrAttribute {
-  std::string name;
+  std::string name, type;
   double size = 0;  // size of its value as stated: it may be negative, or end beyond the file
   std::size_t value_at = 0;
 
@@ -144,7 +145,8 @@ std::optional<ExrAttribute> ExrAttributeAt(const std::string& bytes, std::size_t
   attribute.name = bytes.c_str() + at;
   const std::size_t type_at = at + attribute.name.size() + 1;
   if (type_at >= bytes.size()) return std::nullopt;
-  const std::size_t size_at = type_at + std::strlen(bytes.c_str() + type_at) + 1;
+  attribute.type = bytes.c_str() + type_at;
+  const std::size_t size_at = type_at + attribute.type.size() + 1;
   attribute.value_at = size_at + 4;
   if (attribute.value_at > bytes.size()) return std::nullopt;
   attribute.size = LittleEndian(bytes, size_at);
@@ -170,8 +172,63 @@ std::optional<StatedSize> SizeOfExr(const std::string& bytes) {
   return std::nullopt;
 }
 
+// Returns how many bytes OpenEXR reads as the value, whatever size is stated; none if it reads the
+// stated size.
+std::optional<double> BytesOfExrValue(const std::string& bytes, const ExrAttribute& attribute) {
+  static const std::map<std::string, double> kOfType = {{"box2f", 16},
+                                                        {"box2i", 16},
+                                                        {"chromaticities", 32},
+                                                        {"compression", 1},
+                                                        {"deepImageState", 1},
+                                                        {"double", 8},
+                                                        {"envmap", 1},
+                                                        {"float", 4},
+                                                        {"int", 4},
+                                                        {"keycode", 28},
+                                                        {"lineOrder", 1},
+                                                        {"m33d", 72},
+                                                        {"m33f", 36},
+                                                        {"m44d", 128},
+                                                        {"m44f", 64},
+                                                        {"rational", 8},
+                                                        {"tiledesc", 9},
+                                                        {"timecode", 8},
+                                                        {"v2d", 16},
+                                                        {"v2f", 8},
+                                                        {"v2i", 8},
+                                                        {"v3d", 24},
+                                                        {"v3f", 12},
+                                                        {"v3i", 12}};
+  const auto fixed = kOfType.find(attribute.type);
+  if (fixed != kOfType.end()) return fixed->second;
+  const std::size_t begin = attribute.value_at;
+  if (attribute.type == "preview") {  // two sides and that many pixels of four bytes
+    constexpr double kSides = 8, kBytesPerPixel = 4;
+    return kSides + kBytesPerPixel * LittleEndian(bytes, begin) * LittleEndian(bytes, begin + 4);
+  }
+  if (attribute.type == "chlist") {  // names, each with 16 bytes, up to an empty name
+    constexpr std::size_t kBytesPerChannel = 16;
+    std::size_t at = begin;
+    while (at < bytes.size() && bytes[at] != '\0')
+      at += std::strlen(bytes.c_str() + at) + 1 + kBytesPerChannel;
+    return static_cast<double>(at + 1 - begin);
+  }
+  if (attribute.type == "stringvector") {  // each with its length before it
+    double read = 0;
+    while (read < attribute.size) {
+      const double length = LittleEndian(bytes, begin + static_cast<std::size_t>(read));
+      constexpr double kLength = 4;
+      if (length < 0) return length;
+      read += kLength + length;
+    }
+    return read;
+  }
+  return std::nullopt;
+}
+
 // Checks the sizes of attributes, because OpenEXR allocates memory for an attribute before it reads
-// it. A file of several parts has one header per part, one after the other.
+// it. Of some types it reads another number of bytes than is stated, and what follows would be
+// taken for something else. A file of several parts has one header per part, one after the other.
 void RequirePossibleExrHeaders(const std::string& bytes, const std::string& name) {
   std::size_t at = kExrHeaderAt;
   while (at < bytes.size()) {
@@ -179,6 +236,12 @@ void RequirePossibleExrHeaders(const std::string& bytes, const std::string& name
     if (attribute && (attribute->size < 0 || attribute->end() > bytes.size())) {
       throw Error(fmt::format("{}: a broken image: {:.0f} bytes of '{}' do not fit into {} bytes",
                               name, attribute->size, PrintableUtf8(attribute->name), bytes.size()));
+    }
+    const auto read = attribute ? BytesOfExrValue(bytes, *attribute) : std::nullopt;
+    if (read && *read != attribute->size) {
+      throw Error(fmt::format(
+          "{}: a broken image: '{}' of type {} states {:.0f} bytes and has {:.0f}", name,
+          PrintableUtf8(attribute->name), PrintableUtf8(attribute->type), attribute->size, *read));
     }
     constexpr std::size_t kFlagsAt = 5;  // the second byte of the version
     constexpr char kSeveralParts = 0x10;

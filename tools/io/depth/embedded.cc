@@ -15,6 +15,7 @@
 #include "tools/io/depth/jpeg_parts.h"
 #include "tools/io/image_file_kind.h"
 #include "tools/io/image_library.h"
+#include "tools/io/metadata_image.h"
 
 namespace thicklens::io {
 namespace {
@@ -24,12 +25,7 @@ namespace {
 std::string PacketOf(const std::string& bytes) {
   Exiv2::LogMsg::setLevel(Exiv2::LogMsg::mute);
   try {
-    const auto image = Exiv2::ImageFactory::open(
-        reinterpret_cast<const Exiv2::byte*>(bytes.data()),  // NOLINT: bytes
-        static_cast<long>(bytes.size()));
-    if (image.get() == nullptr) return "";
-    image->readMetadata();
-    return image->xmpPacket();
+    return ReadMetadata(bytes)->xmpPacket();
   } catch (const Exiv2::AnyError&) {
     return "";
   }

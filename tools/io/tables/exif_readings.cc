@@ -10,6 +10,7 @@
 
 #include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
+#include "tools/io/metadata_image.h"
 #include "tools/io/tables/metadata_fields.h"
 #include "tools/io/tables/reading_sources.h"
 
@@ -145,12 +146,7 @@ auto WithMetadata(const std::string& path, const Take& take) {
   Exiv2::LogMsg::setLevel(Exiv2::LogMsg::mute);
   const std::string bytes = ReadWholeFile(path);
   try {
-    // The file is not opened by its name, which Exiv2 may take for a network address.
-    const auto image = Exiv2::ImageFactory::open(
-        reinterpret_cast<const Exiv2::byte*>(bytes.data()),  // NOLINT: bytes
-        static_cast<long>(bytes.size()));
-    image->readMetadata();
-    return take(*image);
+    return take(*ReadMetadata(bytes));
   } catch (const Exiv2::AnyError& error) {
     throw Error(fmt::format("{}: its metadata cannot be read: {}", path, error.what()));
   } catch (const std::bad_alloc&) {
