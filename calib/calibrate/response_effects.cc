@@ -223,6 +223,28 @@ class ResponseCheck {
   }
 
   // ---- processing ----
+  // Whether the frames exclude that light was read by another one of the usual curves, whose powers
+  // are about 2.2 and its inverse. If they contradict the stated one, the light was corrected.
+  bool IsTransferDecided() const {
+    constexpr double kNearestUsual = 0.6;  // |ln power|, a little less than that of gamma-1.8
+    const CameraResponse& response = result_.diagnostics.response;
+    if (response.ContradictsTransfer()) return true;
+    const auto& power = response.light_exponent;
+    return power && power->value > 0 &&
+           std::abs(std::log(power->value)) + 2 * power->sigma / power->value < kNearestUsual;
+  }
+
+  // What a loss may be besides; empty: nothing.
+  std::string OtherCauseOfLoss() const {
+    if (IsTransferDecided()) return "";
+    const auto& power = result_.diagnostics.response.light_exponent;
+    return fmt::format(
+        " A wrong sensor.transfer has this effect as well, and moves kappa in either direction; "
+        "these frames do not exclude it ({}): state the transfer that is known of the camera",
+        power ? fmt::format("power {:.2g} +- {:.2g}", power->value, power->sigma)
+              : "its power could not be measured");
+  }
+
   std::string CauseOfLoss(const std::string& grid) const {
     const CameraResponse& response = result_.diagnostics.response;
     if (response.IsCompressed())
@@ -266,8 +288,9 @@ class ResponseCheck {
           "the camera, or a program, removed weak detail: per factor e of contrast, detail loses "
           "{:.2g} +- {:.2g} % beyond what the blur takes, and a lens loses nothing. {}. This makes "
           "kappa too large, by about {:.2g} % here ({}): use frames without noise reduction "
-          "(raw), in a file without loss",
-          100 * loss.value, 100 * loss.sigma, CauseOfLoss(grid), 100 * usual, at_most);
+          "(raw), in a file without loss.{}",
+          100 * loss.value, 100 * loss.sigma, CauseOfLoss(grid), 100 * usual, at_most,
+          OtherCauseOfLoss());
     } else {
       text = fmt::format(
           "the frames were strongly compressed: {}. Compression removes weak detail and makes "
@@ -281,7 +304,8 @@ class ResponseCheck {
     }
     result_.summary.warnings.push_back(text);
     if (most > 0)
-      WidenRatio("removed weak detail", {-most * kappa, 0},
+      WidenRatio("removed weak detail",
+                 {-most * kappa, loses && !IsTransferDecided() ? most * kappa : 0},
                  "use frames without noise reduction and compression", &result_);
   }
 

@@ -66,11 +66,29 @@ class FileInMemory {
   int file_;
 };
 
+// OpenImageIO's reader of memory, version 2.4, copies from before the memory if a file states a
+// negative place of its pixels.
+class MemoryReader : public OIIO::Filesystem::IOMemReader {
+ public:
+  explicit MemoryReader(const std::string& bytes)
+      : IOMemReader(bytes.data(), bytes.size()), bytes_(bytes.size()) {}
+  std::size_t pread(void* to, std::size_t size, std::int64_t offset) override {
+    if (offset < 0 || static_cast<std::uint64_t>(offset) >= bytes_) {
+      error("a place that is not in the file");
+      return 0;
+    }
+    return IOMemReader::pread(to, std::min(size, bytes_ - static_cast<std::size_t>(offset)),
+                              offset);
+  }
+
+ private:
+  std::size_t bytes_;
+};
+
 // An open file. Errors are always fetched: those that nobody fetches are printed.
 class Input {
  public:
-  Input(const std::string& bytes, ImageFileKind kind)
-      : proxy_(const_cast<char*>(bytes.data()), bytes.size()) {  // NOLINT: only read
+  Input(const std::string& bytes, ImageFileKind kind) : proxy_(bytes) {
     SetUp();
     input_ = OIIO::ImageInput::create(NameOfFormat(kind));
     if (!input_) throw Refusal(OIIO::geterror());
@@ -113,7 +131,7 @@ class Input {
   }
 
  private:
-  OIIO::Filesystem::IOMemReader proxy_;
+  MemoryReader proxy_;
   std::unique_ptr<FileInMemory> file_;
   std::unique_ptr<OIIO::ImageInput> input_;
 };
@@ -199,6 +217,17 @@ void FitDisplayWindow(const OIIO::ImageSpec& spec, DecodedImage* image) {
   const cv::Rect data(spec.x, spec.y, spec.width, spec.height);
   const cv::Rect display(spec.full_x, spec.full_y, spec.full_width, spec.full_height);
   if (data == display || display.area() <= 0) return;
+  // Nothing in the file stands for the pixels beside the data.
+  constexpr double kMostTimes = 64, kAlwaysBytes = 5e8;
+  const double px = static_cast<double>(display.width) * display.height;
+  const double data_px = static_cast<double>(data.width) * data.height;
+  if (px > kMostTimes * data_px &&
+      px * static_cast<double>(image->pixels.elemSize()) > kAlwaysBytes) {
+    throw Refusal("its display window of " + std::to_string(display.width) + " x " +
+                  std::to_string(display.height) + " px holds a data window of " +
+                  std::to_string(data.width) + " x " + std::to_string(data.height) +
+                  " px only: cut it to the data window");
+  }
   cv::Mat shown = cv::Mat::zeros(display.size(), image->pixels.type());
   const cv::Rect both = data & display;
   if (both.area() > 0) image->pixels(both - data.tl()).copyTo(shown(both - display.tl()));
