@@ -2,7 +2,6 @@
 #include "thicklens/explain.h"
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include <limits>
 #include <memory>
@@ -13,7 +12,6 @@
 
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/output_file.h"
-#include "thicklens/base/printable_text.h"
 #include "thicklens/camera.h"
 #include "thicklens/depth.h"
 #include "tools/commands/commands.h"
@@ -74,6 +72,9 @@ OptionNames ExplainOptionNames() {
           {"depth.meaning.unit", "--depth-unit"},
           {"depth.meaning.inverse_scale_dpt", "--inverse-scale"},
           {"depth.meaning.inverse_offset_dpt", "--inverse-offset"},
+          {"depth.holes", "--hole-value"},
+          {"depth.holes.zero_is_value", "--zero-is value"},
+          {"depth.holes.largest_is_value", "--largest-is value"},
           {"depth_count", "--steps"},
           {"effects", "--effects"},
           {"effects.without", "--without"},
@@ -97,8 +98,6 @@ DepthMap DepthOf(const ExplainOptions& options, const model::Sensor& sensor) {
             ReadEmbeddedDepth(options.depth_path, sensor.width_px, sensor.height_px,
                               DepthFlipOf(options.depth), DepthRun())) {
       RefuseOtherMeaning(options.depth, *inside);
-      spdlog::info("{}: {}", PrintableUtf8(options.depth_path),
-                   PrintableUtf8(inside->notes.front()));
       return std::move(*inside);
     }
   }

@@ -26,13 +26,13 @@
 #include "thicklens/io/image_io.h"
 #include "thicklens/io/light_field_io.h"
 #include "thicklens/io/video_file.h"
-#include "thicklens/model/depth_holes.h"
 #include "thicklens/model/light_field.h"
 #include "thicklens/model/light_field_grid.h"
 #include "thicklens/model/sweep_file.h"
 #include "tools/commands/commands.h"
 #include "tools/options/command_frame.h"
 #include "tools/options/embedded_depth.h"
+#include "tools/options/interface_options.h"
 #include "tools/options/light_field_options.h"
 #include "tools/options/option_values.h"
 #include "tools/options/with_file_context.h"
@@ -150,15 +150,14 @@ PageDepth ReadPageDepth(const ReportOptions& options, const model::LightField& l
   }
   const DepthMap read = ReadDepth(options.depth_path, DepthMeaningOf(options.depth),
                                   DepthReadOptionsOf(options.depth), DepthRun());
-  for (const std::string& warning : read.warnings) {
-    spdlog::warn("{}: {}", options.depth_path, warning);
-  }
   convention.inverse_scale_dpt = read.meaning.inverse_scale_dpt;
   convention.inverse_offset_dpt = read.meaning.inverse_offset_dpt;
-  model::RawDepthMap map{read.width_px, read.height_px, read.values, read.is_integer,
-                         read.largest_of_type};
-  WithFileContext(options.depth_path,
-                  [&] { return model::MarkHoles(convention.kind, read.holes, &map); });
+  RunControl run = DepthRun();
+  run.notice = ReportNotice;
+  run.option_name = OptionNames{{"depth.holes", "--hole-value"},
+                                {"depth.holes.zero_is_value", "--zero-is value"},
+                                {"depth.holes.largest_is_value", "--largest-is value"}};
+  model::RawDepthMap map = MarkedDepth(read, run);
   const auto crop = CropRect(options.reading.crop);
   if (NeedsCrop(crop, map.width_px, map.height_px)) {
     map = WithFileContext(options.depth_path, [&] { return model::CropDepth(map, *crop); });

@@ -68,7 +68,7 @@ estimator::DibrInput DibrOf(Baseline baseline, const LightField& reference, RunS
   }
   PreparedDepth prepared =
       PrepareDepth(baseline.depth, dibr.photograph, reference.camera ? &*reference.camera : nullptr,
-                   reference.grid ? &*reference.grid : nullptr);
+                   reference.grid ? &*reference.grid : nullptr, run);
   if (prepared.holes > 0) {
     run->Warn(fmt::format("{}: {} holes are filled from the surfaces beside them",
                           NameOr(baseline.depth.source, "depth"), prepared.holes));

@@ -6,6 +6,7 @@
 
 #include "thicklens/base/output_file.h"
 #include "thicklens/io/depth_io.h"
+#include "tools/interface/depth_reports.h"
 #include "tools/interface/run_scope.h"
 #include "tools/interface/validation.h"
 #include "tools/interface/with_file_context.h"
@@ -151,6 +152,14 @@ std::optional<DepthMap> ReadEmbeddedDepth(const std::string& path, int width_px,
                    fmt::format("The depth map inside is used: {}.", found->description));
   map.warnings = std::move(found->warnings);
   return map;
+}
+
+model::RawDepthMap MarkedDepth(const DepthMap& depth, const RunControl& control) {
+  checks::RequireValid(control);
+  checks::RequireValid(depth);
+  RunScope run(control);
+  ReportReading(depth, &run);
+  return MarkedMap(depth, &run);
 }
 
 std::string EncodeDepth(const DepthMap& depth) {

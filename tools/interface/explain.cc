@@ -9,10 +9,10 @@
 #include "thicklens/base/error.h"
 #include "thicklens/model/depth_places.h"
 #include "tools/interface/depth_causes.h"
+#include "tools/interface/depth_reports.h"
 #include "tools/interface/effects_choice.h"
 #include "tools/interface/run_scope.h"
 #include "tools/interface/validation.h"
-#include "tools/interface/with_file_context.h"
 
 namespace thicklens {
 namespace {
@@ -23,7 +23,7 @@ struct ExplainedScene {
   std::vector<model::EffectSite> places;
 };
 
-ExplainedScene SceneOfMap(const DepthMap& depth, const Camera& camera, const RunScope& run) {
+ExplainedScene SceneOfMap(const DepthMap& depth, const Camera& camera, RunScope* run) {
   const std::string name = depth.source.empty() ? "depth" : depth.source;
   const model::Sensor& sensor = camera.sensor;
   if (depth.width_px != sensor.width_px || depth.height_px != sensor.height_px) {
@@ -37,18 +37,17 @@ ExplainedScene SceneOfMap(const DepthMap& depth, const Camera& camera, const Run
     convention.unit_mm = model::DepthUnitMm(LengthUnitName(depth.meaning.unit));
   convention.inverse_scale_dpt = depth.meaning.inverse_scale_dpt;
   convention.inverse_offset_dpt = depth.meaning.inverse_offset_dpt;
-  model::RawDepthMap map{depth.width_px, depth.height_px, depth.values, depth.is_integer,
-                         depth.largest_of_type};
-  WithFileContext(name, [&] { return model::MarkHoles(convention.kind, depth.holes, &map); });
+  ReportReading(depth, run);
+  const model::RawDepthMap map = MarkedMap(depth, run);
   model::LinearImage empty{map.width_px, map.height_px, 1, {}};
   empty.values.assign(map.values.size(), 0.0F);
-  const model::Scene scene = NamingCauseInMap(depth, run, [&] {
+  const model::Scene scene = NamingCauseInMap(depth, *run, [&] {
     return model::MakeScene(camera, std::move(empty), map, convention, name);
   });
   return {{scene.depth.min_mm, scene.depth.max_mm}, model::PlacesOfDepth(camera, scene)};
 }
 
-ExplainedScene SceneOf(const ExplainOptions& options, const Camera& camera, const RunScope& run) {
+ExplainedScene SceneOf(const ExplainOptions& options, const Camera& camera, RunScope* run) {
   if (options.depth) return SceneOfMap(*options.depth, camera, run);
   const DepthRange range = *options.depth_range;
   return {range,
@@ -100,7 +99,7 @@ CameraExplanation ExplainCamera(const Camera& camera, ExplainOptions options,
   checks::RequireValidCamera(camera);
   RunScope run(control);
   for (const std::string& notice : NoticesOf(camera)) run.Warn(notice);
-  const ExplainedScene scene = SceneOf(options, camera, run);
+  const ExplainedScene scene = SceneOf(options, camera, &run);
   CameraExplanation explanation;
   explanation.depth_range = scene.range;
   explanation.camera = model::ExplainCamera(camera, scene.range, options.depth_count);

@@ -6,6 +6,8 @@
 #include <utility>
 
 #include "thicklens/estimator/fill_holes.h"
+#include "tools/interface/depth_causes.h"
+#include "tools/interface/depth_reports.h"
 #include "tools/interface/problem.h"
 #include "tools/interface/validation.h"
 #include "tools/interface/with_file_context.h"
@@ -14,10 +16,6 @@ namespace thicklens {
 namespace {
 
 std::string NameOf(const DepthMap& map) { return map.source.empty() ? "depth" : map.source; }
-
-model::RawDepthMap RawOf(const DepthMap& map) {
-  return {map.width_px, map.height_px, map.values, map.is_integer, map.largest_of_type};
-}
 
 double UnitMm(LengthUnit unit) {
   return unit == LengthUnit::kNone ? 1 : model::DepthUnitMm(LengthUnitName(unit));
@@ -39,7 +37,7 @@ estimator::DisparityMap WithoutHoles(const estimator::DisparityMap& map,
 // `raw` has the map's values, in which NaN marks the holes.
 PreparedDepth PrepareByCamera(const DepthMap& map, const model::RawDepthMap& raw,
                               const model::LinearImage& image, const Camera& camera,
-                              const model::LightFieldGrid& grid) {
+                              const model::LightFieldGrid& grid, RunScope* run) {
   model::DepthConvention convention;
   convention.kind = map.meaning.kind;
   convention.unit_mm = UnitMm(map.meaning.unit);
@@ -53,8 +51,10 @@ PreparedDepth PrepareByCamera(const DepthMap& map, const model::RawDepthMap& raw
   // Only the size of the image matters here.
   model::LinearImage empty{map.width_px, map.height_px, 1, {}};
   empty.values.assign(map.values.size(), 0.0F);
-  const model::Scene scene =
-      model::MakeScene(camera, std::move(empty), raw, convention, NameOf(map));
+  const auto make = [&] {
+    return model::MakeScene(camera, std::move(empty), raw, convention, NameOf(map));
+  };
+  const model::Scene scene = run == nullptr ? make() : NamingCauseInMap(map, *run, make);
   PreparedDepth prepared;
   prepared.depth = scene.depth;
   prepared.disparity = WithFileContext(NameOf(map), [&] {
@@ -68,17 +68,16 @@ PreparedDepth PrepareByCamera(const DepthMap& map, const model::RawDepthMap& raw
 }  // namespace
 
 PreparedDepth PrepareDepth(const DepthMap& map, const model::LinearImage& image,
-                           const Camera* camera, const model::LightFieldGrid* grid) {
+                           const Camera* camera, const model::LightFieldGrid* grid, RunScope* run) {
   if (map.width_px != image.width_px || map.height_px != image.height_px) {
     throw Error(fmt::format("{}: it is {}x{} px, the image is {}x{} px: the sizes must be equal",
                             NameOf(map), map.width_px, map.height_px, image.width_px,
                             image.height_px));
   }
-  model::RawDepthMap raw = RawOf(map);
-  const model::DepthHoles found = WithFileContext(
-      NameOf(map), [&] { return model::MarkHoles(map.meaning.kind, map.holes, &raw); });
+  model::DepthHoles found;
+  const model::RawDepthMap raw = MarkedMap(map, run, &found);
   if (camera != nullptr) {
-    PreparedDepth prepared = PrepareByCamera(map, raw, image, *camera, *grid);
+    PreparedDepth prepared = PrepareByCamera(map, raw, image, *camera, *grid, run);
     prepared.found_holes = found;
     return prepared;
   }

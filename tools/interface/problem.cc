@@ -17,6 +17,7 @@
 #include "thicklens/io/image_file.h"
 #include "thicklens/model/effect_impact.h"
 #include "tools/interface/depth_causes.h"
+#include "tools/interface/depth_reports.h"
 #include "tools/interface/effects_choice.h"
 #include "tools/interface/exif_comparison.h"
 #include "tools/interface/prepare_aperture.h"
@@ -240,9 +241,11 @@ void WarnOfUnlikelyDepth(const DepthMap& map, const Camera& camera,
       depth.median_mm >= focus_depth_mm / kDefault) {
     return;
   }
+  const std::string cause = CauseInMap(map, *run);
   run->Warn(fmt::format(
-      "{}: the median depth is {:.6g} mm, but the camera is focused at {:.6g} mm; is {} right?",
-      NameOf(map), depth.median_mm, focus_depth_mm, run->Option("depth.meaning.unit")));
+      "{}: the median depth is {:.6g} mm, but the camera is focused at {:.6g} mm; is {} right?{}",
+      NameOf(map), depth.median_mm, focus_depth_mm, run->Option("depth.meaning.unit"),
+      cause.empty() ? "" : " Or: " + cause));
 }
 
 std::pair<double, double> DisparityRangePx(const estimator::DisparityMap& map) {
@@ -299,47 +302,6 @@ void CheckScaleIsGiven(const DepthMap& map, const estimator::DisparityMap& dispa
       NameOf(map), median_px, median_px * steps, size_px,
       run.Option("depth.meaning.disparity_scale"),
       run.Option("depth.meaning.disparity_offset_px")));
-}
-
-// Reports what the reader of the map found.
-void ReportReading(const DepthMap& map, RunScope* run) {
-  for (const std::string& note : map.notes) run->Inform(fmt::format("{}: {}", NameOf(map), note));
-  for (const std::string& warning : map.warnings)
-    run->Warn(fmt::format("{}: {}", NameOf(map), warning));
-}
-
-// Reports which values of the map are taken as holes, or as depths, for a reason that the user may
-// see differently.
-void ReportHoles(const DepthMap& map, const model::DepthHoles& holes, RunScope* run) {
-  const auto percent = [&](std::size_t count) {
-    return 100 * static_cast<double>(count) / static_cast<double>(holes.pixels);
-  };
-  if (holes.zeros_form_areas) {
-    run->Warn(fmt::format(
-        "{}: {:.1f} % of its values are 0 and taken as 'no depth', but they form whole areas, like "
-        "the far end of a relative map: if 0 is a value there, state it by {}",
-        NameOf(map), percent(holes.zero), run->Option("depth.holes.zero_is_value")));
-  }
-  if (holes.largest > 0) {
-    run->Warn(fmt::format(
-        "{}: {:.1f} % of its values are {:g}, the largest of its type, far above all others: they "
-        "are taken as 'no depth'; if they are depths, state it by {}",
-        NameOf(map), percent(holes.largest), map.largest_of_type.value_or(0),
-        run->Option("depth.holes.largest_is_value")));
-  }
-  if (holes.negative > 0) {
-    run->Warn(fmt::format("{}: {:.1f} % of its values are negative and taken as 'no depth'",
-                          NameOf(map), percent(holes.negative)));
-  }
-  for (const model::SuspectedMark& mark : holes.suspects) {
-    // The float is printed with as many digits as it has.
-    const auto value = static_cast<float>(mark.value);
-    run->Warn(fmt::format(
-        "{}: {} pixels ({:.1f} %) have exactly the value {}, far beyond all others: if it means "
-        "'no "
-        "depth', state it by {} {}",
-        NameOf(map), mark.pixels, percent(mark.pixels), value, run->Option("depth.holes"), value));
-  }
 }
 
 void SmoothNoisyDepth(const EstimateOptions& options, estimator::DisparityMap* disparity,
@@ -444,9 +406,8 @@ PreparedProblem Prepare(Image photo, DepthMap map, const std::optional<Camera>& 
     WarnOfOtherSteps(options, aperture, *input.grid, *input.camera, run);
   }
   ReportReading(map, run);  // also where the map is refused
-  PreparedDepth prepared_depth = NamingCauseInMap(map, *run, [&] {
-    return PrepareDepth(map, input.image, known, input.grid ? &*input.grid : nullptr);
-  });
+  PreparedDepth prepared_depth =
+      PrepareDepth(map, input.image, known, input.grid ? &*input.grid : nullptr, run);
   const std::string beyond = ValuesBeyondNear(map, *run);
   if (!beyond.empty()) run->Warn(fmt::format("{}: {}", NameOf(map), beyond));
   input.disparity = std::move(prepared_depth.disparity);
@@ -454,7 +415,6 @@ PreparedProblem Prepare(Image photo, DepthMap map, const std::optional<Camera>& 
   diagnostics->depth = prepared_depth.depth;
   diagnostics->holes_filled = prepared_depth.holes;
   diagnostics->holes = prepared_depth.found_holes;
-  ReportHoles(map, prepared_depth.found_holes, run);
   diagnostics->holes_share = static_cast<double>(prepared_depth.holes) /
                              static_cast<double>(input.disparity.disparity.size());
   if (prepared_depth.depth && map.meaning.kind != DepthKind::kDisparity) {

@@ -251,5 +251,20 @@ TEST(ExplainInterfaceTest, ACancelledTokenEndsTheCall) {
                Interrupted);
 }
 
+TEST(ExplainInterfaceTest, ReportsWhatIsFoundInADepthMap) {
+  ExplainOptions options = OfMap(64, 48, std::vector<float>(64 * 48, 900),
+                                 DepthMeaning{DepthKind::kZ, LengthUnit::kMillimetre});
+  for (std::size_t i = 0; i < 64; ++i) options.depth->values[i] = 9999;
+  for (std::size_t i = 64; i < 70; ++i) options.depth->values[i] = -1;
+  options.depth->warnings = {"A warning of its reader."};
+  std::string notices;
+  RunControl run;
+  run.notice = [&](const Notice& notice) { notices += notice.text + "\n"; };
+  ExplainCamera(CameraOfThickLens(), options, run);
+  EXPECT_THAT(notices, AllOf(HasSubstr("A warning of its reader."),
+                             HasSubstr("64 pixels (2.1 %) have exactly the value 9999"),
+                             HasSubstr("are negative and taken as 'no depth'")));
+}
+
 }  // namespace
 }  // namespace thicklens

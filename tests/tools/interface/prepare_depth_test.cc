@@ -20,6 +20,7 @@ namespace {
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::StartsWith;
 using thicklens::testing::ErrorOf;
 
@@ -93,6 +94,43 @@ TEST(PrepareDepth, TheLargestValueOfTheTypeIsNoDepth) {
   EXPECT_EQ(prepared.found_holes.largest, 1U);
   ASSERT_TRUE(prepared.depth);
   EXPECT_EQ(prepared.depth->max_mm, 800);
+}
+
+// The mark is why the map is refused: a depth of 9999000 mm beside others of 0.5 m.
+TEST(PrepareDepth, HolesAndMarksAreReportedWhereTheMapIsRefused) {
+  const model::Camera camera = thicklens::testing::SmallCamera(8, 8, {1, 0.5});
+  const model::LightFieldGrid grid = model::DefaultGrid(camera, 3, 3);
+  DepthMap map;
+  map.width_px = map.height_px = 8;
+  for (int i = 0; i < 64; ++i)
+    map.values.push_back(i < 32 ? 9999 : 1 + 0.01F * static_cast<float>(i));
+  map.values[63] = -1;
+  map.meaning = KindAndUnit("z", "mm");
+  map.source = "d.npy";
+  const RunControl control;
+  RunScope run(control);
+  const model::LinearImage image{8, 8, 1, std::vector<float>(64)};
+  EXPECT_THAT(ErrorOf([&] { PrepareDepth(map, image, &camera, &grid, &run); }),
+              StartsWith("d.npy"));
+  std::string notices;
+  for (const Notice& notice : run.notices()) notices += notice.text + "\n";
+  EXPECT_THAT(notices, AllOf(HasSubstr("32 pixels (50.0 %) have exactly the value 9999"),
+                             HasSubstr("are negative and taken as 'no depth'")));
+}
+
+// A cause in the map is no reason for an error of another step.
+TEST(PrepareDepth, OnlyImpossibleDepthsNameACauseInTheMap) {
+  DepthMap map{
+      kMapWidth, kMapHeight, {0, 0.01F, 0.5F, 0.7F, 0.9F, 1}, false, KindAndUnit("z", "mm"),
+      "d.npy"};
+  const model::Camera camera = MapCamera();
+  const model::LightFieldGrid grid = model::DefaultGrid(camera, 3, 3);
+  const RunControl control;
+  RunScope run(control);
+  EXPECT_THAT(ErrorOf([&] { PrepareDepth(map, GreyImage(), &camera, &grid, &run); }),
+              HasSubstr("relative map"));
+  EXPECT_THAT(ErrorOf([&] { PrepareDepth(map, GreyImage(5), &camera, &grid, &run); }),
+              AllOf(HasSubstr("the sizes must be equal"), Not(HasSubstr("relative map"))));
 }
 
 TEST(PrepareDepth, InverseDepthIsThatOfItsDepth) {

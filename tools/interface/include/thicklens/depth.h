@@ -114,6 +114,10 @@ THICKLENS_EXPORT DepthMap ReadDepth(const std::string& path, const DepthMeaning&
 THICKLENS_EXPORT std::optional<DepthMap> ReadEmbeddedDepth(
     const std::string& path, int width_px = 0, int height_px = 0,
     model::DepthFlip flip = model::DepthFlip::kNone, const RunControl& run = {});
+// Returns the values of the map, in which NaN marks the holes (model::MarkHoles). `run` gets what
+// the reader of the map found, which values are holes, and which look like marks of "no depth".
+// Throws Error that names the map's source.
+THICKLENS_EXPORT model::RawDepthMap MarkedDepth(const DepthMap& depth, const RunControl& run = {});
 // The bytes of a PFM file (float, little endian) with the values; the meaning is not part of it.
 THICKLENS_EXPORT std::string EncodeDepth(const DepthMap& depth);
 // Writes that file, completely or not at all.
