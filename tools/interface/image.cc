@@ -268,6 +268,7 @@ Image ReadImage(const std::string& path, const ImageReadOptions& options) {
   io::ImageReading reading;
   if (options.orientation == Orientation::kDisplayed)
     reading.orientation = io::ImageOrientation::kDisplayed;
+  reading.measures_compression = true;  // of these bytes: the file may change later
   Image image;
   io::ImageFacts facts;
   image.pixels_ = io::ToEncodedImage(io::DecodeImage(ReadWholeFile(path), path, reading, &facts));

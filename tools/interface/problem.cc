@@ -9,7 +9,6 @@
 #include <memory>
 #include <utility>
 
-#include "thicklens/base/output_file.h"
 #include "thicklens/estimator/aperture_blur.h"
 #include "thicklens/estimator/depth_noise.h"
 #include "thicklens/estimator/estimate_checks.h"
@@ -182,19 +181,17 @@ TransferCurve TransferFor(const Image& photo, const io::ImageFacts* facts,
 }
 
 // Measures what storing did to the photograph. `facts` may be null.
-void FindStorageErrors(const PhotoFile& file, const Image& photo, const io::ImageFacts* facts,
+void FindStorageErrors(const Image& photo, const io::ImageFacts* facts,
                        EstimateDiagnostics* diagnostics) {
   if (photo.is_linear()) return;
   int bits = photo.encoded().bits;
   if (facts != nullptr && facts->significant_bits)
     bits = std::clamp(*facts->significant_bits, 1, bits);
   diagnostics->rounding_sigma = 1 / (std::sqrt(12.0) * (std::ldexp(1.0, bits) - 1));
-  if (facts == nullptr || facts->file_kind != "JPEG" || file.path.empty()) return;
-  const std::optional<io::JpegError> error = io::MeasureJpegError(ReadWholeFile(file.path));
-  if (!error) return;
+  if (facts == nullptr || !facts->jpeg_error) return;
   constexpr double kLevels = 255;
-  diagnostics->compression_sigma = error->rms_levels / kLevels;
-  diagnostics->compression_sigma_of_mean = error->mean_levels / kLevels;
+  diagnostics->compression_sigma = facts->jpeg_error->rms_levels / kLevels;
+  diagnostics->compression_sigma_of_mean = facts->jpeg_error->mean_levels / kLevels;
 }
 
 // ---- 3. The grid of the light field.
@@ -371,7 +368,7 @@ PreparedProblem Prepare(Image photo, DepthMap map, const std::optional<Camera>& 
   if (!turned.empty() && !camera) run->Warn(file.name + ": " + turned);
   if (photo.channels() == 4) run->Warn(file.name + ": its alpha channel is ignored");
   Image part = photo.channels() == 4 ? photo.WithoutAlpha() : std::move(photo);
-  FindStorageErrors(file, part, facts.get(), diagnostics);
+  FindStorageErrors(part, facts.get(), diagnostics);
   const int full_width_px = std::max(part.width_px(), map.width_px);
   const int full_height_px = std::max(part.height_px(), map.height_px);
   CutToCrop(options.crop, &part, &map, run);

@@ -294,8 +294,11 @@ class ImageFile {
       case ImageFileKind::kTiff:
         return DecodeTiff(bytes_, tiff_pages_[static_cast<std::size_t>(page)],
                           reading_.spread_bits);
-      case ImageFileKind::kJpeg:
-        return DecodeJpeg(bytes_);
+      case ImageFileKind::kJpeg: {
+        DecodedImage image = DecodeJpeg(bytes_);
+        if (reading_.measures_compression) image.facts.jpeg_error = MeasureJpegError(bytes_);
+        return image;
+      }
       case ImageFileKind::kPnm:
         return DecodePnm(bytes_, reading_.spread_bits);
       case ImageFileKind::kPfm:

@@ -127,39 +127,100 @@ bool ReadCoefficients(Decompression* jpeg, jvirt_barray_ptr** planes) {
 
 constexpr std::size_t kCoefficients = DCTSIZE2;
 
-// One row of blocks; counts how often each coefficient is not 0.
+// In how many blocks each coefficient is quantised to other than 0, and to other than -1, 0, 1.
+struct LevelCounts {
+  std::array<double, kCoefficients> not_zero{}, beyond_one{};
+};
+
+// Counts one row of blocks.
 bool CountRow(Decompression* jpeg, jvirt_barray_ptr plane, JDIMENSION row, JDIMENSION blocks,
-              std::array<double, kCoefficients>* counts) {
+              LevelCounts* counts) {
   if (setjmp(jpeg->failures.back) != 0) return false;              // NOLINT
   auto* const info = reinterpret_cast<j_common_ptr>(&jpeg->info);  // NOLINT: as libjpeg does
   JBLOCKARRAY rows = jpeg->info.mem->access_virt_barray(info, plane, row, 1, FALSE);
   for (JDIMENSION block = 0; block < blocks; ++block) {
     for (std::size_t k = 0; k < kCoefficients; ++k) {
-      if (rows[0][block][k] != 0) ++(*counts)[k];  // NOLINT: libjpeg's arrays
+      const int level = std::abs(rows[0][block][k]);  // NOLINT: libjpeg's arrays
+      if (level > 0) ++counts->not_zero[k];
+      if (level > 1) ++counts->beyond_one[k];
     }
   }
   return true;
 }
 
-// Variance of the error that quantising the coefficients leaves in a pixel of the component, by
-// [D126]. `counts`: how many of `blocks` blocks have the coefficient other than 0.
-double QuantisationVariance(const std::array<double, kCoefficients>& steps,
-                            const std::array<double, kCoefficients>& counts, double blocks) {
-  constexpr double kCoarse = 0.3;  // b > 1.7 steps: as if the coefficients were uniform
-  std::array<double, kCoefficients> errors{};
-  double least = std::numeric_limits<double>::infinity();
-  for (std::size_t k = 0; k < kCoefficients; ++k) {
-    const double q = steps[k];
-    const double share = std::clamp(counts[k] / blocks, 0.5 / blocks, 1 - 0.5 / blocks);
-    const double a = -std::log(share);  // q/(2 b)
-    const double b = q / (2 * a);
-    const double of_zeros = 2 * b * b - share * (q * q / 4 + q * b + 2 * b * b);
-    errors[k] = a < kCoarse ? q * q / 12 : of_zeros + counts[k] / blocks * q * q / 12;
-    least = std::min(least, 2 * b * b);
+// What the coefficients of a component probably were before they were quantised: in a share
+// `active` of the blocks they have Laplace distributions of the scale b = scale/f^fall at the
+// frequency f = hypot(u, v), and in the others nothing. Edges are in few blocks.
+struct Spectrum {
+  double active = 1, scale = 1, fall = 1;
+};
+
+double Frequency(std::size_t k) {
+  return std::hypot(static_cast<double>(k / DCTSIZE), static_cast<double>(k % DCTSIZE));
+}
+
+// Finds the spectrum by the likelihood of the counts. Coefficients that are often other than 0 are
+// many draws of one spectrum that is no exact power: each counts as a few of them.
+Spectrum SpectrumOf(const std::array<double, kCoefficients>& steps, const LevelCounts& counts,
+                    double blocks) {
+  constexpr double kMaxDraws = 10, kLeastShare = 1e-12;
+  constexpr int kScales = 48, kFalls = 13;
+  constexpr double kLeastScale = 0.2, kMostScale = 400, kFallStep = 1.0 / 3;
+  Spectrum best;
+  double most = -std::numeric_limits<double>::infinity();
+  for (const double active : {0.02, 0.04, 0.08, 0.15, 0.3, 0.6, 1.0}) {
+    ThrowIfCancelled();
+    for (int i = 0; i < kScales; ++i) {
+      const double scale = kLeastScale * std::pow(kMostScale / kLeastScale, i / (kScales - 1.0));
+      for (int j = 0; j < kFalls; ++j) {
+        double likelihood = 0;
+        for (std::size_t k = 1; k < kCoefficients && likelihood > most; ++k) {
+          const double half_steps = steps[k] / (2 * scale) * std::pow(Frequency(k), kFallStep * j);
+          const double outside = std::exp(-half_steps);
+          const double first = active * outside, second = first * outside * outside;
+          const double sum =
+              (blocks - counts.not_zero[k]) * std::log(std::max(1 - first, kLeastShare)) +
+              (counts.not_zero[k] - counts.beyond_one[k]) *
+                  std::log(std::max(first - second, std::numeric_limits<double>::min())) +
+              counts.beyond_one[k] * std::log(std::max(second, std::numeric_limits<double>::min()));
+          likelihood += sum * std::min(1.0, kMaxDraws / std::max(counts.not_zero[k], 1.0));
+        }
+        if (!(likelihood > most)) continue;
+        most = likelihood;
+        best = {active, scale, kFallStep * j};
+      }
+    }
   }
+  return best;
+}
+
+// The part of the variance of a Laplace distribution of the scale b that is within q/2 of 0: what
+// the coefficients lose that become 0.
+double VarianceOfZeros(double b, double q) {
+  return 2 * b * b - std::exp(-q / (2 * b)) * (q * q / 4 + q * b + 2 * b * b);
+}
+
+// Variance of the error that quantising the coefficients leaves in a pixel of the component, by
+// [D126].
+double QuantisationVariance(const std::array<double, kCoefficients>& steps,
+                            const LevelCounts& counts, double blocks) {
+  constexpr double kCoarse = 0.75;  // of the blocks: as if the coefficients were uniform
+  constexpr double kMinDraws = 8;   // for a scale of its own
+  constexpr double kNearlyAll = 1e-9;
+  const Spectrum spectrum = SpectrumOf(steps, counts, blocks);
   double sum = 0;
-  for (std::size_t k = 0; k < kCoefficients; ++k)
-    sum += counts[k] == 0 ? std::min(errors[k], least) : errors[k];
+  for (std::size_t k = 0; k < kCoefficients; ++k) {
+    const double q = steps[k], uniform = q * q / 12;
+    const double share = counts.not_zero[k] / blocks;
+    // The mean of a block follows no power of the frequency 0.
+    const bool has_own = k == 0 || counts.not_zero[k] >= kMinDraws;
+    const double active = k == 0 ? 1 : has_own ? std::max(spectrum.active, share) : spectrum.active;
+    const double b =
+        has_own ? q / (-2 * std::log(std::clamp(share / active, 0.5 / blocks, 1 - kNearlyAll)))
+                : spectrum.scale / std::pow(Frequency(k), spectrum.fall);
+    const double error = active * VarianceOfZeros(b, q) + share * uniform;
+    sum += share > kCoarse ? uniform : std::min(error, uniform);
+  }
   return sum / kCoefficients;
 }
 
@@ -250,16 +311,16 @@ std::optional<JpegError> MeasureJpegError(const std::string& bytes) {
   const bool is_rgb = jpeg.info.jpeg_color_space == JCS_RGB;
   if (!is_grey && !is_rgb && jpeg.info.jpeg_color_space != JCS_YCbCr) return std::nullopt;
   if (!ReadCoefficients(&jpeg, &planes)) return std::nullopt;
-  // The mean over red, green and blue of the variance that a unit variance of Y, Cb or Cr makes:
-  // JFIF has R = Y + 1.402 Cr, G = Y - 0.344 Cb - 0.714 Cr, B = Y + 1.772 Cb. Their mean has the
-  // error of Y and little of the others.
-  constexpr std::array<double, 3> kOfYcc = {1, 1.086, 0.825};
-  constexpr double kRounding = 1.0 / 12;
-  double luma = 0, all = 0;
+  // JFIF has R = Y + 1.402 Cr, G = Y - 0.344 Cb - 0.714 Cr, B = Y + 1.772 Cb. The first are the
+  // means over red, green and blue of the variance that a unit variance of Y, Cb or Cr makes, the
+  // others the variances of their mean, Y + 0.476 Cb + 0.229 Cr.
+  constexpr std::array<double, 3> kOfYcc = {1, 1.086, 0.825}, kMeanOfYcc = {1, 0.2266, 0.0526};
+  double mean = 0, all = 0;
   for (int c = 0; c < jpeg.info.num_components; ++c) {
     const jpeg_component_info& component = jpeg.info.comp_info[c];  // NOLINT: libjpeg's array
     if (component.quant_table == nullptr) return std::nullopt;
-    std::array<double, kCoefficients> steps{}, counts{};
+    std::array<double, kCoefficients> steps{};
+    LevelCounts counts;
     std::copy(std::begin(component.quant_table->quantval),
               std::end(component.quant_table->quantval), steps.begin());
     for (JDIMENSION row = 0; row < component.height_in_blocks; ++row) {
@@ -270,14 +331,11 @@ std::optional<JpegError> MeasureJpegError(const std::string& bytes) {
     const double blocks = static_cast<double>(component.height_in_blocks) *
                           static_cast<double>(component.width_in_blocks);
     const double variance = QuantisationVariance(steps, counts, blocks);
-    all += is_rgb ? variance / 3 : kOfYcc[static_cast<std::size_t>(c)] * variance;
-    if (is_rgb) {
-      luma += variance / 9;
-    } else if (c == 0) {
-      luma = variance;
-    }
+    const auto which = static_cast<std::size_t>(c);
+    all += is_rgb ? variance / 3 : kOfYcc[which] * variance;
+    mean += is_rgb ? variance / 9 : kMeanOfYcc[which] * variance;
   }
-  return JpegError{std::sqrt(luma + kRounding), std::sqrt(all + kRounding)};
+  return JpegError{std::sqrt(mean), std::sqrt(all)};
 }
 
 std::string EncodeJpeg(const cv::Mat& pixels, const ImageWriting& writing) {

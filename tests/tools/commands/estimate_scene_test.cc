@@ -454,7 +454,10 @@ TEST_F(EstimateSceneTest, TheErrorOfJpegCompressionIsPartOfTheNoise) {
                          "--views",
                          "5x5"};
   const json summary = Summary(arguments);
-  EXPECT_GT(summary["compression_sigma"].get<double>(), 0.28 / 255);
+  const std::optional<io::JpegError> error = io::MeasureJpegError(jpeg);
+  ASSERT_TRUE(error);
+  EXPECT_NEAR(summary["compression_sigma"].get<double>(), error->rms_levels / 255, 1e-6);
+  EXPECT_GT(error->rms_levels, 0.1);
   EXPECT_THAT(summary["warnings"].dump(),
               AllOf(HasSubstr("of the photograph is not explained beyond its noise and JPEG "
                               "compression of"),

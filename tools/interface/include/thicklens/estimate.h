@@ -182,7 +182,8 @@ struct EstimateDiagnostics {
   // leaves its own errors, so that both together are what a residual is compared with; the solver
   // uses `noise_sigma` alone.
   double rounding_sigma = 0;
-  // The error of the compression of a JPEG file, in encoded values, over all channels.
+  // The error of the compression of a JPEG file, in encoded values, over all channels, without the
+  // rounding. It is measured when the file is read.
   std::optional<double> compression_sigma;
   std::optional<double> compression_sigma_of_mean;  // likewise for the mean of the channels
   // The noise and what storing did, for a residual over all channels; absent without noise_sigma.

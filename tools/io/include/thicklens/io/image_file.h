@@ -55,6 +55,14 @@ struct RawFacts {
   int sensor_px_per_px = 1;
 };
 
+// The errors that compression left in the values of a JPEG file, without their rounding to 8 bits:
+// rms in grey levels. Derived here [D126]. Halved colours lose fine details besides, which the file
+// does not show.
+struct JpegError {
+  double mean_levels = 0;  // of the mean of red, green and blue
+  double rms_levels = 0;   // over all channels
+};
+
 // The facts that a file states about the image that was read from it.
 struct ImageFacts {
   std::string file_kind;         // "PNG", "TIFF", "raw"
@@ -89,6 +97,8 @@ struct ImageFacts {
   std::string description;               // the file's own text, e.g. OME-XML
   std::optional<RawFacts> raw;           // absent: it is not a raw file
   std::optional<VideoFacts> video;       // absent: it is not a frame of a video
+  // ImageReading::measures_compression; absent: not asked for, or unknown.
+  std::optional<JpegError> jpeg_error;
   // Everything else that a user should know about this reading, one sentence each.
   std::vector<std::string> notes;
 
@@ -134,6 +144,8 @@ struct ImageReading {
   // Values of 1 to 7 and 9 to 15 bits are spread over 8 or 16 bits, so that white is the full scale
   // of the container; false: they keep their values, and `full_scale` says what white is.
   bool spread_bits = true;
+  // JPEG: MeasureJpegError is part of the facts. It reads the file a second time.
+  bool measures_compression = false;
 };
 
 // The values of a file, and the facts that it states.
@@ -161,15 +173,9 @@ THICKLENS_EXPORT int PagesOfImage(const std::string& bytes, const std::string& n
 THICKLENS_EXPORT DecodedImage ReadImageData(const std::string& path,
                                             const ImageReading& reading = {});
 
-// The errors that compression left in the pixels of a JPEG file, with the rounding to 8 bits: rms
-// in grey levels. Derived here [D126]. Halved colours add an error that the file does not show.
-struct JpegError {
-  double mean_levels = 0;  // of the mean of red, green and blue
-  double rms_levels = 0;   // over all channels
-};
-// Estimates it from the quantisation tables and from how many coefficients are 0: compression
-// removes noise and fine details, so that the pixels show less noise than their error. Returns
-// nothing for files that are no JPEG, damaged, or neither grey, RGB nor YCbCr.
+// Estimates the error of a JPEG file from its quantisation tables and from how many coefficients
+// are 0: compression removes noise and fine details, so that the pixels show less noise than their
+// error. Returns nothing for files that are no JPEG, damaged, or neither grey, RGB nor YCbCr.
 THICKLENS_EXPORT std::optional<JpegError> MeasureJpegError(const std::string& bytes);
 
 // Which numbers an image of integers has. `set_bits` is 0 for an image of zeros.
