@@ -217,8 +217,8 @@ std::vector<std::string> WarningsOf(const DepthFile& depth, bool has_camera, con
   const double noise_of_mean_levels = kEightBitLevels * found.DoubtSigmaOfMean().value_or(0);
   const bool is_jpeg = found.compression_sigma.has_value();
   const std::string noise = is_jpeg ? "noise and JPEG compression" : "noise";
-  // Its measure does not know of every cause.
-  const std::string jpeg_cause =
+  // Its measure does not know of every cause. The first warning names them.
+  std::string jpeg_cause =
       is_jpeg ? "; the photograph is a JPEG file: stronger compression before, halved colours and "
                 "sharpening have this effect too"
               : "";
@@ -229,7 +229,7 @@ std::vector<std::string> WarningsOf(const DepthFile& depth, bool has_camera, con
         "with a residual of {:.1f} grey levels ({}: {:.1f}): the depth is probably wrong there{}",
         found.patches.size(), worst.x, worst.x + worst.width_px - 1, worst.y,
         worst.y + worst.height_px - 1, kEightBitLevels * worst.residual_rms, noise,
-        noise_of_mean_levels, jpeg_cause));
+        noise_of_mean_levels, std::exchange(jpeg_cause, "")));
   }
   const bool is_reversed = found.depth_flips && found.depth_flips->better;
   if (found.unexplained_share && *found.unexplained_share > estimator::kMaxUnexplained &&
@@ -242,7 +242,7 @@ std::vector<std::string> WarningsOf(const DepthFile& depth, bool has_camera, con
             ? fmt::format("are {} and {} right?", run.Option("depth.meaning.disparity_scale"),
                           run.Option("depth.meaning.disparity_offset_px"))
             : "are the depth's unit, and the camera's aperture and focus, right?",
-        jpeg_cause));
+        std::exchange(jpeg_cause, "")));
   }
   if (is_reversed) {
     const estimator::DepthFlipCheck& flips = *found.depth_flips;
@@ -263,7 +263,7 @@ std::vector<std::string> WarningsOf(const DepthFile& depth, bool has_camera, con
         "everywhere it receives light from points that the centre view does not show: check the "
         "depth, its unit and the aperture, which may also be too wide for an image of {} x {} px{}",
         kEightBitLevels * *found.residual_rms, noise, noise_levels, summary.width_px,
-        summary.height_px, jpeg_cause));
+        summary.height_px, std::exchange(jpeg_cause, "")));
   }
   const bool is_reported = is_reversed || !found.patches.empty() || !found.unexplained_share ||
                            *found.unexplained_share > estimator::kMaxUnexplained;
