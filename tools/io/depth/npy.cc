@@ -201,29 +201,46 @@ NpyHeader ReadNpyHeader(const std::string& bytes, const std::string& name, std::
 bool IsZip(const std::string& bytes) { return bytes.compare(0, 4, "PK\x03\x04") == 0; }
 
 std::string WordsOnZip(const std::string& bytes, const std::string& name) {
-  constexpr std::size_t kNameLengthAt = 28, kHeaderBytes = 46, kMaxShown = 6;
+  constexpr std::size_t kLengthsAt = 28, kHeaderBytes = 46, kMaxShown = 6;
+  constexpr std::size_t kDirectoryAt = 16, kEndBytes = 22;
   const std::string ending = ".npy";
+  const auto number_at = [&](std::size_t at, std::size_t count) {
+    return static_cast<std::size_t>(BitsAt(bytes.data() + at, count, false));
+  };
+  // The record at the end states where the directory begins. The values in front of it may look
+  // like entries.
+  std::size_t begin = 0;
+  const std::size_t end = bytes.rfind("PK\x05\x06");
+  if (end != std::string::npos && end + kEndBytes <= bytes.size()) {
+    const std::size_t stated = number_at(end + kDirectoryAt, 4);
+    if (stated < end) begin = stated;
+  }
   std::vector<std::string> arrays;
-  // The entries of the directory at its end begin with this mark.
-  for (std::size_t at = bytes.find("PK\x01\x02"); at != std::string::npos;
-       at = bytes.find("PK\x01\x02", at + 4)) {
+  bool is_left_out = false;
+  std::size_t next = 0;
+  for (std::size_t at = bytes.find("PK\x01\x02", begin); at != std::string::npos;
+       at = bytes.find("PK\x01\x02", next)) {
+    ThrowIfCancelled();
     if (at + kHeaderBytes > bytes.size()) break;
-    const auto length =
-        static_cast<std::size_t>(BitsAt(bytes.data() + at + kNameLengthAt, 2, false));
-    if (at + kHeaderBytes + length > bytes.size()) break;
-    const std::string entry = bytes.substr(at + kHeaderBytes, length);
-    if (entry.size() <= ending.size() ||
-        entry.compare(entry.size() - ending.size(), ending.size(), ending) != 0) {
+    const std::size_t length = number_at(at + kLengthsAt, 2);
+    const std::size_t behind_name = at + kHeaderBytes + length;
+    // Extra fields and a comment follow the name.
+    next = behind_name + number_at(at + kLengthsAt + 2, 2) + number_at(at + kLengthsAt + 4, 2);
+    if (behind_name > bytes.size()) break;
+    if (length <= ending.size() ||
+        bytes.compare(behind_name - ending.size(), ending.size(), ending) != 0) {
       continue;
     }
-    if (arrays.size() < kMaxShown)
-      arrays.push_back(PrintableUtf8(entry.substr(0, entry.size() - ending.size())));
+    is_left_out = arrays.size() == kMaxShown;
+    if (is_left_out) break;
+    arrays.push_back(PrintableUtf8(bytes.substr(at + kHeaderBytes, length - ending.size())));
   }
   if (arrays.empty()) return "a ZIP archive";
   return fmt::format(
-      "an NPZ archive of the arrays {}: save the depth alone, in Python "
+      "an NPZ archive of the arrays {}{}: save the depth alone, in Python "
       "numpy.save('depth.npy', numpy.load('{}')['{}'])",
-      fmt::join(arrays, ", "), PrintableUtf8(name.substr(name.find_last_of('/') + 1)), arrays[0]);
+      fmt::join(arrays, ", "), is_left_out ? ", .." : "",
+      PrintableUtf8(name.substr(name.find_last_of('/') + 1)), arrays[0]);
 }
 
 bool IsNpy(const std::string& bytes) { return bytes.compare(0, kNpyMagicBytes, kNpyMagic) == 0; }
