@@ -4,6 +4,7 @@
 #include <tiffio.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <cstdarg>
 #include <cstddef>
@@ -15,6 +16,8 @@
 #include <limits>
 #include <memory>
 #include <opencv2/core.hpp>
+#include <optional>
+#include <system_error>
 #include <utility>
 
 #include "thicklens/base/cancel.h"
@@ -475,6 +478,25 @@ int ImageJImages(const std::string& description) {
   return at == std::string::npos ? 1 : std::atoi(description.c_str() + at + 7);
 }
 
+// The number in the tag GDAL_NODATA, a text that libtiff does not know by itself.
+std::optional<double> NoData(TIFF* tiff) {
+  constexpr std::uint32_t kTagNoData = 42113, kMaxLength = 100;
+  const TIFFField* const field = TIFFFindField(tiff, kTagNoData, TIFF_ASCII);
+  if (field == nullptr || TIFFFieldPassCount(field) == 0 ||
+      TIFFFieldReadCount(field) != TIFF_VARIABLE2) {
+    return std::nullopt;
+  }
+  std::uint32_t count = 0;
+  const char* text = nullptr;
+  if (TIFFGetField(tiff, kTagNoData, &count, &text) != 1 || text == nullptr || count > kMaxLength)
+    return std::nullopt;
+  const char* const end = std::find(text, text + count, '\0');
+  while (text != end && *text == ' ') ++text;
+  double number = 0;
+  return std::from_chars(text, end, number).ec == std::errc() ? std::optional(number)
+                                                              : std::nullopt;
+}
+
 }  // namespace
 
 std::vector<TiffPage> TiffPages(const std::string& bytes) {
@@ -548,6 +570,7 @@ DecodedImage DecodeTiff(const std::string& bytes, const TiffPage& page, bool spr
   facts.sample_type = TypeName(layout);
   facts.container_bits = static_cast<int>(8 * ContainerBytes(layout.bits));
   facts.description = Text(tiff, TIFFTAG_IMAGEDESCRIPTION);
+  facts.no_data = NoData(tiff);
   const auto orientation = Field<std::uint16_t>(tiff, TIFFTAG_ORIENTATION, 1);
   if (orientation >= 1 && orientation <= 8) facts.orientation = orientation;
   std::uint32_t profile_bytes = 0;
@@ -575,7 +598,8 @@ DecodedImage DecodeTiff(const std::string& bytes, const TiffPage& page, bool spr
     facts.full_scale = pixels.depth() == CV_8U ? 255 : 65535;
     facts.notes.emplace_back("The colours of its palette are taken.");
   } else if (is_unsigned) {
-    if (layout.photometric == PHOTOMETRIC_MINISWHITE) Invert(layout, &pixels);
+    facts.is_inverted = layout.photometric == PHOTOMETRIC_MINISWHITE;
+    if (facts.is_inverted) Invert(layout, &pixels);
     facts.full_scale = std::ldexp(1.0, layout.bits) - 1;
     if (layout.bits < 16 && layout.bits != 8) {
       facts.significant_bits = layout.bits;

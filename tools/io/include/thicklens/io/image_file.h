@@ -80,6 +80,10 @@ struct ImageFacts {
   std::optional<int> significant_bits;
   // The value of `pixels` that stands for white; absent for floats and signed integers.
   std::optional<double> full_scale;
+  // TIFF: the file states that 0 is white, and `pixels` are full_scale less the stored values.
+  bool is_inverted = false;
+  // TIFF: the value without data that the tag GDAL_NODATA states. Nothing is changed there.
+  std::optional<double> no_data;
   // PFM: the magnitude of the header's scale, which is not applied to the values.
   double value_scale = 1;
   StatedTransfer transfer = StatedTransfer::kAbsent;  // what the file, or its profile, states
