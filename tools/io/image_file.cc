@@ -230,6 +230,7 @@ class ImageFile {
   }
 
   int pages() const { return static_cast<int>(sizes_.size()); }
+  const std::vector<LibraryPage>& parts() const { return sizes_; }
 
   // The page that the reading selects. Throws Error that lists the pages if it selects none of
   // several.
@@ -267,7 +268,7 @@ class ImageFile {
     if (kind_ == ImageFileKind::kTiff) {
       tiff_pages_ = TiffPages(bytes_);
       for (const TiffPage& page : tiff_pages_)
-        sizes_.push_back({page.width_px, page.height_px, ""});
+        sizes_.push_back({page.width_px, page.height_px, "", {}, false});
     } else if (IsByLibrary()) {
       std::string why;
       if (!LoadedImageLibrary().pages(bytes_, ForLibrary(0), &sizes_, &why)) throw Error(why);
@@ -449,6 +450,11 @@ std::vector<DecodedImage> DecodeImagePages(const std::string& bytes, const std::
   std::vector<DecodedImage> pages;
   for (int i = 0; i < file.pages(); ++i) pages.push_back(file.Decode(i));
   return pages;
+}
+
+std::vector<LibraryPage> PartsOfImage(const std::string& bytes, const std::string& name) {
+  const ImageReading reading;
+  return ImageFile(bytes, name, reading).parts();
 }
 
 int PagesOfImage(const std::string& bytes, const std::string& name) {

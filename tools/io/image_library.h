@@ -26,6 +26,8 @@ struct LibraryReading {
 struct LibraryPage {
   int width_px = 0, height_px = 0;
   std::string name;
+  std::vector<std::string> channels;  // EXR: the names of the part's channels
+  bool is_deep = false;               // EXR: it has any number of values per pixel
 };
 
 // The depth image of a HEIF file, and what belongs to it.
@@ -66,6 +68,10 @@ struct ImageLibrary {
 const ImageLibrary& LoadedImageLibrary();
 // Whether the build has the library.
 bool HasImageLibrary();
+
+// The pages or parts of the file with these bytes, as its headers state them. Throws Error that
+// begins with `name`.
+std::vector<LibraryPage> PartsOfImage(const std::string& bytes, const std::string& name);
 
 }  // namespace thicklens::io
 

@@ -1,8 +1,8 @@
 #!/usr/bin/python3
 """Writes the files of this folder with programs that share no code with thicklens (see README.md).
 
-Needs Debian's python3-tifffile, python3-pil, imagemagick, libtiff-tools, libheif-examples, openexr
-and libimage-exiftool-perl.
+Needs Debian's python3-tifffile, python3-pil, imagemagick, libtiff-tools, libheif-examples, openexr,
+openimageio-tools and libimage-exiftool-perl.
 """
 import os
 import struct
@@ -221,6 +221,15 @@ exr('left.exr', {'Y': depth}, attributes=[('name', 'string', b'left')])
 exr('right.exr', {'Y': depth + 1}, attributes=[('name', 'string', b'right')])
 run('exrmultipart', '-combine', '-i', 'left.exr', 'right.exr', '-o', 'parts.exr', '-override', '1')
 run('exrmultipart', '-combine', '-i', 'rgb_half.exr', 'z.exr', '-o', 'rgb_and_z.exr')
+exr('left.exr', {'Z': depth}, attributes=[('name', 'string', b'left')])
+exr('right.exr', {'Z': depth + 1}, attributes=[('name', 'string', b'right')])
+run('exrmultipart', '-combine', '-i', 'left.exr', 'right.exr', '-o', 'stereo_z.exr', '-override', '1')
+exr('left.exr', {'Y': depth}, attributes=[('name', 'string', b'depth')])
+run('exrmultipart', '-combine', '-i', 'rgb_half.exr', 'left.exr', '-o', 'named_part.exr')
+run('oiiotool', 'z.exr', '--deepen', '-o', 'right.exr')
+run('exrmultipart', '-combine', '-i', 'right.exr', 'z.exr', '-o', 'deep_and_z.exr', '-override', '1')
+exr('mist.exr', {'R': depth.astype('f2'), 'G': (depth + 1).astype('f2'),
+                 'B': (depth + 2).astype('f2'), 'Mist': depth})
 os.remove('left.exr')
 os.remove('right.exr')
 

@@ -63,6 +63,64 @@ class DepthFileTest : public ::testing::Test {
   TemporaryFolder folder_;
 };
 
+// A TIFF file of 3 x 2 px of 16 bits, little endian: `photometric` 0 is MINISWHITE, 1 MINISBLACK;
+// `no_data` is the text of the tag GDAL_NODATA, absent if it is empty.
+std::string SmallTiff(int photometric, std::string no_data) {
+  const auto number = [](std::size_t value, int bytes) {
+    std::string text;
+    for (int i = 0; i < bytes; ++i, value >>= 8) text += static_cast<char>(value & 0xFF);
+    return text;
+  };
+  constexpr std::size_t kShort = 3, kLong = 4, kAscii = 2;
+  if (!no_data.empty()) no_data += '\0';
+  while (!no_data.empty() && no_data.size() < 6) no_data += '\0';  // longer than an entry holds
+  struct Entry {
+    std::size_t tag, type, count, value;
+  };
+  std::vector<Entry> entries = {{256, kShort, 1, 3},
+                                {257, kShort, 1, 2},
+                                {258, kShort, 1, 16},
+                                {259, kShort, 1, 1},
+                                {262, kShort, 1, static_cast<std::size_t>(photometric)},
+                                {273, kLong, 1, 8},
+                                {277, kShort, 1, 1},
+                                {278, kShort, 1, 2},
+                                {279, kLong, 1, 12}};
+  if (!no_data.empty()) entries.push_back({42113, kAscii, no_data.size(), 20});
+  std::string values;
+  for (const std::size_t value : {885U, 900U, 1000U, 1100U, 1152U, 9999U})
+    values += number(value, 2);
+  const std::size_t directory = 8 + values.size() + no_data.size();
+  std::string bytes =
+      "II" + number(42, 2) + number(directory, 4) + values + no_data + number(entries.size(), 2);
+  for (const Entry& entry : entries)
+    bytes += number(entry.tag, 2) + number(entry.type, 2) + number(entry.count, 4) +
+             number(entry.value, 4);
+  return bytes + number(0, 4);
+}
+
+TEST_F(DepthFileTest, ATiffWhoseZeroIsWhiteIsReadAsStored) {
+  for (const int photometric : {0, 1}) {
+    const DepthFile file = ReadDepthFile(folder_.Put("d.tif", SmallTiff(photometric, "")));
+    EXPECT_THAT(file.map.values, ElementsAre(885, 900, 1000, 1100, 1152, 9999));
+    if (photometric == 0) {
+      EXPECT_THAT(file.notes, ElementsAre(HasSubstr("MINISWHITE")));
+    } else {
+      EXPECT_THAT(file.notes, ElementsAre());
+    }
+  }
+}
+
+TEST_F(DepthFileTest, AStatedValueWithoutDataIsAHole) {
+  const DepthFile file = ReadDepthFile(folder_.Put("d.tif", SmallTiff(1, "9999")));
+  EXPECT_EQ(file.map.values[4], 1152);
+  EXPECT_TRUE(std::isnan(file.map.values[5]));
+  EXPECT_THAT(file.notes, ElementsAre(HasSubstr("states 9999 as its value without data")));
+  for (const char* other : {"none", "nan", "0", "-32768"})
+    EXPECT_EQ(ReadDepthFile(folder_.Put("d.tif", SmallTiff(1, other))).map.values[5], 9999)
+        << other;
+}
+
 TEST_F(DepthFileTest, PfmOfEitherByteOrderHasItsRowsBottomUp) {
   for (const std::string& bytes :
        {"Pf\n3 2\n1.0\n" + kBigEndianValues, "Pf\n3 2\n-1.0\n" + Swapped(kBigEndianValues),
@@ -477,6 +535,10 @@ TEST_F(DepthFileTest, AnNpzArchiveIsRefusedWithTheRemedy) {
               AllOf(HasSubstr("found an NPZ archive of the arrays depth, mask: save"),
                     HasSubstr("numpy.save('depth.npy', numpy.load('"), HasSubstr("')['depth'])")));
   EXPECT_THAT(Refusal(two.substr(0, 40)), HasSubstr("found a ZIP archive"));
+  // Names that are not shown are mentioned.
+  const std::string many =
+      ZipDirectory({"1.npy", "2.npy", "3.npy", "4.npy", "5.npy", "6.npy", "7.npy"});
+  EXPECT_THAT(Refusal(many), HasSubstr("arrays 1, 2, 3, 4, 5, 6, ..: save"));
   EXPECT_THAT(Refusal(ZipDirectory({"a.txt"})), HasSubstr("found a ZIP archive"));
 }
 
@@ -532,6 +594,40 @@ TEST_F(DepthFileTest, AChannelIsTakenByItsName) {
   reading.channel = "nothing";
   EXPECT_THAT(ErrorOf([&] { ReadDepthFile(path, reading); }),
               AllOf(HasSubstr("no channel 'nothing'"), HasSubstr("Z")));
+}
+
+TEST_F(DepthFileTest, ThePartOfAnExrFileIsChosenByItsHeader) {
+  if (!io::HasImageLibrary()) GTEST_SKIP() << "no EXR in this build";
+  const std::string images = std::string(THICKLENS_SOURCE_DIR) + "/tests/data/images/";
+  // A deep part is not decoded beside a plain one, and a part may have the name of a depth.
+  for (const char* const name : {"deep_and_z.exr", "named_part.exr"}) {
+    SCOPED_TRACE(name);
+    const DepthFile file = ReadDepthFile(images + name);
+    EXPECT_EQ(file.map.values.front(), 102.5F);
+    EXPECT_THAT(file.notes, Contains(HasSubstr("of 2 is taken")));
+  }
+  // A channel's name that two parts have does not choose between them.
+  for (const char* const channel : {"", "Z"}) {
+    DepthReading reading;
+    reading.channel = channel;
+    EXPECT_THAT(ErrorOf([&] { ReadDepthFile(images + "stereo_z.exr", reading); }),
+                AllOf(HasSubstr("'left' (Z), 'right' (Z); extract the part"),
+                      Not(HasSubstr("--depth-channel"))));
+  }
+  EXPECT_THAT(ErrorOf([&] { ReadDepthFile(images + "parts.exr"); }),
+              HasSubstr("name the channel that is the depth by --depth-channel"));
+}
+
+TEST_F(DepthFileTest, AChannelThatIsNoColourMayBeNamed) {
+  if (!io::HasImageLibrary()) GTEST_SKIP() << "no EXR in this build";
+  const std::string path = std::string(THICKLENS_SOURCE_DIR) + "/tests/data/images/mist.exr";
+  EXPECT_THAT(ErrorOf([&] { ReadDepthFile(path); }),
+              HasSubstr("if one of them is the depth, name it by --depth-channel"));
+  DepthReading reading;
+  reading.channel = "Mist";
+  EXPECT_EQ(ReadDepthFile(path, reading).map.values.front(), 102.5F);
+  const std::string colours = std::string(THICKLENS_SOURCE_DIR) + "/tests/data/images/rgb_half.exr";
+  EXPECT_THAT(ErrorOf([&] { ReadDepthFile(colours); }), Not(HasSubstr("--depth-channel")));
 }
 
 // One bit a pixel: decoding spreads 0 and 1 to 0 and 255.

@@ -81,6 +81,20 @@ std::vector<int> NamedDepth(const std::vector<std::string>& names) {
   return by_end.empty() ? by_part : by_end;
 }
 
+// "'left' (R, G, B, Z)".
+std::string ShownPart(const LibraryPage& part) {
+  return fmt::format("'{}' ({}{})", PrintableUtf8(part.name), Listed(part.channels),
+                     part.is_deep ? "; deep" : "");
+}
+
+// Whether the names are those of an image without other channels: Y, or R, G and B, in any layer.
+bool AreColourNames(const std::vector<std::string>& names) {
+  return std::all_of(names.begin(), names.end(), [](const std::string& name) {
+    const std::string last = PartsOf(name).back();
+    return last == "r" || last == "g" || last == "b" || last == "a" || last == "y";
+  });
+}
+
 // The largest difference between the channels of a pixel, as far as they are finite; infinite where
 // only some of them are.
 double LargestDifference(const cv::Mat& pixels, const std::vector<int>& channels) {
@@ -176,9 +190,9 @@ class DepthChannel {
       }
     }
     if (colours.size() == 1) return colours[0];
-    // The colours of a grey JPEG file that was stored as a colour one differ by rounding. WebP leaves
-    // one level in a grey image, but an image of those 3 levels, a JPEG that was converted, gets up
-    // to 10 at the quality of 75 that programs use by themselves (measured).
+    // The colours of a grey JPEG file that was stored as a colour one differ by rounding. WebP
+    // leaves one level in a grey image, but an image of those 3 levels, a JPEG that was converted,
+    // gets up to 10 at the quality of 75 that programs use by themselves (measured).
     constexpr double kJpegLevels = 3, kWebpLevels = 10;
     const double allowed = !is_lossy_                      ? 0
                            : kind_ == ImageFileKind::kWebp ? kWebpLevels
@@ -206,9 +220,12 @@ class DepthChannel {
       cv::mixChannels(&pixels_, 1, &rgb, 1, from_to.data(), 3);
       words = WordsOnColours(rgb, is_lossy_);
     }
-    throw Error(
-        fmt::format("{}: {} in one channel, or in three channels that are equal, found {} ({}); {}",
-                    name_, ExpectedOf(kind_), TypeName(pixels_), Listed(names_), words));
+    throw Error(fmt::format(
+        "{}: {} in one channel, or in three channels that are equal, found {} ({}); {}{}", name_,
+        ExpectedOf(kind_), TypeName(pixels_), Listed(names_), words,
+        colours.size() == 3 && AreColourNames(names_)
+            ? ""
+            : "; if one of them is the depth, name it by --depth-channel"));
   }
 
   const cv::Mat& pixels_;
@@ -227,44 +244,76 @@ std::optional<double> LargestOfType(const ImageFacts& facts) {
   return std::ldexp(1.0, facts.container_bits - (is_unsigned ? 0 : 1)) - 1;
 }
 
+// A part of an EXR file that may have the depth.
+struct DepthPart {
+  int index = 0;
+  std::string shown;    // "'left' (R, G, B, Z)"
+  std::string channel;  // that is the depth; empty: the part has the name of a depth
+};
+
+// The parts with the channel `wanted`, or, if that is empty, with a channel whose name says that it
+// is a depth; if there are none, those whose own name says so. Deep parts only if there are no
+// others.
+std::vector<DepthPart> PartsWithDepth(const std::vector<LibraryPage>& parts,
+                                      const std::string& wanted) {
+  std::vector<DepthPart> named, deep, by_part;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    const std::vector<std::string>& names = parts[i].channels;
+    DepthPart part{static_cast<int>(i), ShownPart(parts[i]), ""};
+    if (!wanted.empty()) {
+      if (std::find(names.begin(), names.end(), wanted) != names.end()) part.channel = wanted;
+    } else if (const std::vector<int> found = NamedDepth(names); !found.empty()) {
+      part.channel = names[static_cast<std::size_t>(found[0])];
+    }
+    if (!part.channel.empty()) {
+      (parts[i].is_deep ? deep : named).push_back(part);
+    } else if (wanted.empty() && !parts[i].is_deep && !NamedDepth({parts[i].name}).empty()) {
+      by_part.push_back(part);
+    }
+  }
+  if (!named.empty()) return named;
+  return by_part.empty() ? deep : by_part;
+}
+
 // Decodes the image, or the part of an EXR file of several parts that has the depth.
 DecodedImage DecodedDepth(const std::string& bytes, const std::string& name, ImageFileKind kind,
                           const std::string& wanted, DepthFile* file) {
   ImageReading reading;
   reading.spread_bits = false;
-  const int parts = kind == ImageFileKind::kExr ? PagesOfImage(bytes, name) : 1;
-  if (parts == 1) return DecodeImageFile(bytes, name, reading);
-  std::optional<DecodedImage> chosen;
-  std::vector<std::string> all, found;
-  for (int i = 0; i < parts; ++i) {
-    ThrowIfCancelled();
-    reading.page = i;
-    DecodedImage part = DecodeImageFile(bytes, name, reading);
-    const std::vector<std::string>& names = part.facts.channels;
-    const std::string shown =
-        fmt::format("'{}' ({})", PrintableUtf8(part.facts.part), Listed(names));
-    all.push_back(shown);
-    const bool has_depth = wanted.empty()
-                               ? !NamedDepth(names).empty()
-                               : std::find(names.begin(), names.end(), wanted) != names.end();
-    if (!has_depth) continue;
-    found.push_back(shown);
-    if (!chosen) chosen = std::move(part);
-  }
+  if (kind != ImageFileKind::kExr) return DecodeImageFile(bytes, name, reading);
+  const std::vector<LibraryPage> parts = PartsOfImage(bytes, name);
+  if (parts.size() == 1) return DecodeImageFile(bytes, name, reading);
+  const std::vector<DepthPart> found = PartsWithDepth(parts, wanted);
   const std::string channel = wanted.empty() ? "a channel named Z, depth or disparity"
                                              : "the channel '" + PrintableUtf8(wanted) + "'";
   if (found.empty()) {
-    throw Error(fmt::format("{}: none of its {} parts has {}: {}", name, parts, channel,
-                            fmt::join(all, ", ")));
+    std::vector<std::string> all;
+    for (const LibraryPage& part : parts) all.push_back(ShownPart(part));
+    throw Error(
+        fmt::format("{}: none of its {} parts has {}: {}; name the channel that is the "
+                    "depth by --depth-channel",
+                    name, parts.size(), channel, fmt::join(all, ", ")));
   }
   if (found.size() > 1) {
+    std::vector<std::string> shown, channels;
+    for (const DepthPart& part : found) {
+      shown.push_back(part.shown);
+      channels.push_back(part.channel);
+    }
+    std::sort(channels.begin(), channels.end());
+    // A name chooses a part only if no other one has it.
+    const bool do_names_differ =
+        std::adjacent_find(channels.begin(), channels.end()) == channels.end();
     throw Error(fmt::format(
-        "{}: {} of its {} parts have {}: {}; {}extract the part that is meant into a file", name,
-        found.size(), parts, channel, fmt::join(found, ", "),
-        wanted.empty() ? "name the channel by --depth-channel, or " : ""));
+        "{}: {} of its {} parts have {}: {}; {}extract the part that is meant "
+        "into a file",
+        name, found.size(), parts.size(),
+        found[0].channel.empty() ? "the name of a depth" : channel, fmt::join(shown, ", "),
+        do_names_differ ? "name the channel by --depth-channel, or " : ""));
   }
-  file->notes.push_back(fmt::format("The part {} of {} is taken.", found[0], parts));
-  return std::move(*chosen);
+  reading.page = found[0].index;
+  file->notes.push_back(fmt::format("The part {} of {} is taken.", found[0].shown, parts.size()));
+  return DecodeImageFile(bytes, name, reading);
 }
 
 // Transparent pixels are holes; a channel that is transparent everywhere says nothing.
@@ -287,6 +336,22 @@ void TakeAlpha(const cv::Mat& pixels, int channel, DepthFile* file) {
   for (const std::size_t hole : transparent)
     file->map.values[hole] = std::numeric_limits<float>::quiet_NaN();
   file->notes.push_back(fmt::format("{} transparent pixels are holes (NaN).", transparent.size()));
+}
+
+// The values that the file states as holes. Whether 0 is one in a map of integers is for the rules
+// of holes to say.
+void TakeNoData(double no_data, DepthFile* file) {
+  if (std::isnan(no_data) || (no_data == 0 && file->map.integer)) return;
+  const auto mark = static_cast<float>(no_data);
+  std::size_t holes = 0;
+  for (float& value : file->map.values) {
+    if (value != mark) continue;
+    value = std::numeric_limits<float>::quiet_NaN();
+    ++holes;
+  }
+  file->notes.push_back(fmt::format(
+      "It states {} as its value without data (GDAL_NODATA): {} pixels are holes (NaN).", mark,
+      holes));
 }
 
 }  // namespace
@@ -315,10 +380,18 @@ DepthFile DecodeImageDepth(const std::string& bytes, const std::string& name,
   const int channel = chooser.Choose(reading.channel, &file);
   cv::Mat values;
   cv::extractChannel(decoded.pixels, values, channel);
-  values.convertTo(values, CV_32F);  // exact for 16 bits
   // The note says whether it is applied.
   const double factor =
       PfmFactor(std::exchange(decoded.facts.value_scale, 1), reading.pfm_scale, &file);
+  if (decoded.facts.is_inverted && decoded.facts.full_scale) {
+    // The photometric interpretation is about light. Data has it by mistake more often than not.
+    cv::subtract(cv::Scalar(*decoded.facts.full_scale), values, values, cv::noArray(), CV_64F);
+    file.notes.emplace_back(
+        "The file states that 0 is white (MINISWHITE): that is about images, and the values are "
+        "read "
+        "as they are stored, not inverted.");
+  }
+  values.convertTo(values, CV_32F);  // exact for 16 bits
   file.map.width_px = values.cols;
   file.map.height_px = values.rows;
   file.map.integer = decoded.facts.sample_type.find("float") == std::string::npos;
@@ -329,6 +402,7 @@ DepthFile DecodeImageDepth(const std::string& bytes, const std::string& name,
     const auto* row = values.ptr<float>(y);
     for (int x = 0; x < values.cols; ++x) file.map.values.push_back(PfmValue(factor, row[x]));
   }
+  if (decoded.facts.no_data) TakeNoData(*decoded.facts.no_data, &file);
   if (chooser.alpha() >= 0) TakeAlpha(decoded.pixels, chooser.alpha(), &file);
   file.description = decoded.facts.OneLine();
   if (file.is_lossy) {

@@ -260,7 +260,8 @@ std::vector<LibraryPage> OiioPages(const std::string& bytes, ImageFileKind kind)
     const OIIO::ImageSpec whole = kind == ImageFileKind::kExr ? input->spec(i) : spec;
     pages.push_back({spec.full_width, spec.full_height,
                      std::string(whole.get_string_attribute(
-                         "name", whole.get_string_attribute("oiio:subimagename")))});
+                         "name", whole.get_string_attribute("oiio:subimagename"))),
+                     whole.channelnames, whole.deep});
   }
   input->geterror();
   if (pages.empty()) throw Refusal("it has no image");
