@@ -148,9 +148,9 @@ bool CountRow(Decompression* jpeg, jvirt_barray_ptr plane, JDIMENSION row, JDIME
   return true;
 }
 
-// What the coefficients of a component probably were before they were quantised: in a share
-// `active` of the blocks they have Laplace distributions of the scale b = scale/f^fall at the
-// frequency f = hypot(u, v), and in the others nothing. Edges are in few blocks.
+// The distributions that the coefficients of a component probably had before they were quantised:
+// in a share `active` of the blocks Laplace ones of the scale b = scale/f^fall at the frequency f =
+// hypot(u, v), and in the others 0. Edges are in few blocks.
 struct Spectrum {
   double active = 1, scale = 1, fall = 1;
 };
@@ -163,15 +163,15 @@ double Frequency(std::size_t k) {
 // many draws of one spectrum that is no exact power: each counts as a few of them.
 Spectrum SpectrumOf(const std::array<double, kCoefficients>& steps, const LevelCounts& counts,
                     double blocks) {
-  constexpr double kMaxDraws = 10, kLeastShare = 1e-12;
+  constexpr double kMaxDraws = 10, kMinShare = 1e-12;
   constexpr int kScales = 48, kFalls = 13;
-  constexpr double kLeastScale = 0.2, kMostScale = 400, kFallStep = 1.0 / 3;
+  constexpr double kMinScale = 0.2, kMaxScale = 400, kFallStep = 1.0 / 3;
   Spectrum best;
   double most = -std::numeric_limits<double>::infinity();
   for (const double active : {0.02, 0.04, 0.08, 0.15, 0.3, 0.6, 1.0}) {
     ThrowIfCancelled();
     for (int i = 0; i < kScales; ++i) {
-      const double scale = kLeastScale * std::pow(kMostScale / kLeastScale, i / (kScales - 1.0));
+      const double scale = kMinScale * std::pow(kMaxScale / kMinScale, i / (kScales - 1.0));
       for (int j = 0; j < kFalls; ++j) {
         double likelihood = 0;
         for (std::size_t k = 1; k < kCoefficients && likelihood > most; ++k) {
@@ -179,7 +179,7 @@ Spectrum SpectrumOf(const std::array<double, kCoefficients>& steps, const LevelC
           const double outside = std::exp(-half_steps);
           const double first = active * outside, second = first * outside * outside;
           const double sum =
-              (blocks - counts.not_zero[k]) * std::log(std::max(1 - first, kLeastShare)) +
+              (blocks - counts.not_zero[k]) * std::log(std::max(1 - first, kMinShare)) +
               (counts.not_zero[k] - counts.beyond_one[k]) *
                   std::log(std::max(first - second, std::numeric_limits<double>::min())) +
               counts.beyond_one[k] * std::log(std::max(second, std::numeric_limits<double>::min()));
