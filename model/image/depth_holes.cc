@@ -45,10 +45,12 @@ double MarkOfType(const RawDepthMap& map, const std::vector<double>& listed) {
 // Whether programs use a number of this magnitude as a mark of "no depth".
 // `largest_of_type`: the largest value of the file's type, if it may be one; otherwise NaN.
 bool IsUsualMark(double magnitude, double largest_of_type) {
-  constexpr double kLargestOf15Bits = 32767, kLargestOf16Bits = 65535;
-  if (magnitude == kLargestOf15Bits || magnitude == kLargestOf16Bits ||
-      magnitude == kLargestOf16Bits - 1) {
-    return true;
+  constexpr double kLargestOf16Bits = 65535;
+  if (magnitude == kLargestOf16Bits - 1) return true;
+  // The largest value of a sensor of 12 to 16 bits.
+  for (double largest_of_bits = 4095; largest_of_bits <= kLargestOf16Bits;
+       largest_of_bits = 2 * largest_of_bits + 1) {
+    if (magnitude == largest_of_bits) return true;
   }
   // Values are floats, in which the largest of 32 bits is rounded.
   const double largest = static_cast<float>(largest_of_type);
@@ -61,6 +63,28 @@ bool IsUsualMark(double magnitude, double largest_of_type) {
     if (magnitude == static_cast<double>(static_cast<float>(power))) return true;
   }
   return magnitude == static_cast<double>(std::numeric_limits<float>::max());
+}
+
+// The mark of OpenCV's stereo matchers for pixels without a match, the least disparity less 1: -1,
+// or -16 in 1/16 px. It is suspected where no other value is below 0, beside more
+// than two others: two planes are a scene.
+std::optional<SuspectedMark> UnmatchedMark(const RawDepthMap& map, double least_pixels) {
+  SuspectedMark mark;
+  std::vector<float> others;
+  for (const float value : map.values) {
+    if (!(value < 0)) {
+      const bool is_new = !std::isnan(value) && others.size() < 3 &&
+                          std::find(others.begin(), others.end(), value) == others.end();
+      if (is_new) others.push_back(value);
+      continue;
+    }
+    if (value != -1 && value != -16) return std::nullopt;
+    if (mark.pixels > 0 && value != mark.value) return std::nullopt;
+    mark.value = value;
+    ++mark.pixels;
+  }
+  const auto pixels = static_cast<double>(mark.pixels);
+  return pixels >= least_pixels && others.size() > 2 ? std::optional(mark) : std::nullopt;
 }
 
 // Finds them among the values that are left, in which NaN marks the holes.
@@ -117,6 +141,14 @@ std::vector<SuspectedMark> SuspectsOf(DepthKind kind, const HoleRules& rules,
     }
   }
   largest.resize(marked);
+  if (kind == DepthKind::kDisparity) {
+    const std::optional<SuspectedMark> unmatched = UnmatchedMark(map, least_pixels);
+    const bool is_listed =
+        unmatched && std::any_of(largest.begin(), largest.end(), [&](const SuspectedMark& mark) {
+          return mark.value == unmatched->value;
+        });
+    if (unmatched && !is_listed) largest.push_back(*unmatched);
+  }
   return largest;
 }
 

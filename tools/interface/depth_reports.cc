@@ -44,10 +44,15 @@ void ReportHoles(const DepthMap& map, const model::DepthHoles& holes, RunScope* 
   for (const model::SuspectedMark& mark : holes.suspects) {
     // The float is printed with as many digits as it has.
     const auto value = static_cast<float>(mark.value);
-    run->Warn(fmt::format(
-        "{}: {} pixels ({:.1f} %) have exactly the value {}, far beyond all others: if it means "
-        "'no depth', state it by {} {}",
-        NameOf(map), mark.pixels, percent(mark.pixels), value, run->Option("depth.holes"), value));
+    run->Warn(
+        fmt::format("{}: {} pixels ({:.1f} %) have exactly the value {}, {}: if it means 'no "
+                    "depth', state it by "
+                    "{} {}",
+                    NameOf(map), mark.pixels, percent(mark.pixels), value,
+                    map.meaning.kind == DepthKind::kDisparity && (value == -1 || value == -16)
+                        ? "and no other value is below 0, as where a stereo matcher found nothing"
+                        : "far beyond all others",
+                    run->Option("depth.holes"), value));
   }
 }
 

@@ -149,6 +149,12 @@ TEST(DepthHoles, AMarkThatNobodyStatedIsSuspected) {
   EXPECT_THAT(SuspectsIn(DepthKind::kDisparity, RampAnd(2000, 9000, {65535}, true, 65535)),
               ElementsAre(65535));
   EXPECT_THAT(SuspectsIn(DepthKind::kDisparity, RampAnd(-2, 9, {-9999})), ElementsAre(-9999));
+  for (const float bits : {4095.0F, 8191.0F, 16383.0F, 32767.0F})
+    EXPECT_THAT(SuspectsIn(kZ, RampAnd(500, 1200, {bits}, true, 65535)), ElementsAre(bits));
+  for (const float unmatched : {-1.0F, -16.0F}) {
+    EXPECT_THAT(SuspectsIn(DepthKind::kDisparity, RampAnd(2, 60, {unmatched})),
+                ElementsAre(unmatched));
+  }
 }
 
 TEST(DepthHoles, AWallOrASkyIsNoSuspectedMark) {
@@ -158,6 +164,10 @@ TEST(DepthHoles, AWallOrASkyIsNoSuspectedMark) {
   EXPECT_THAT(SuspectsIn(kZ, RampAnd(500, 1200, {50000}, true, 65535)), IsEmpty());
   EXPECT_THAT(SuspectsIn(kZ, RampAnd(0.5, 12, {100})), IsEmpty());
   EXPECT_THAT(SuspectsIn(kZ, RampAnd(500, 9000, {9999})), IsEmpty());  // the ramp goes on
+  // Other values are below 0, and a disparity of its own.
+  EXPECT_THAT(SuspectsIn(DepthKind::kDisparity, RampAnd(-3, 9, {-1})), IsEmpty());
+  EXPECT_THAT(SuspectsIn(DepthKind::kDisparity, RampAnd(2, 9, {-2})), IsEmpty());
+  EXPECT_THAT(SuspectsIn(DepthKind::kDisparity, RampAnd(2, 2, {-1})), IsEmpty());
   // The near end of relative maps, and two planes.
   EXPECT_THAT(SuspectsIn(DepthKind::kInverse, RampAnd(20, 90, {255}, true, 255)), IsEmpty());
   EXPECT_THAT(SuspectsIn(DepthKind::kDisparity, RampAnd(0, 0, {5})), IsEmpty());

@@ -24,8 +24,8 @@ struct HoleRules {
   THICKLENS_EXPORT bool IsValid(DepthKind kind, std::string* why) const;
 };
 
-// A number that many pixels have exactly and that lies far beyond all others: it may be a mark of
-// "no depth" that the file does not state.
+// A number that many pixels have exactly and that lies far beyond all others, or alone below 0: it
+// may be a mark of "no depth" that the file does not state.
 struct SuspectedMark {
   double value = 0;        // as stored
   std::size_t pixels = 0;  // how many have it
@@ -64,9 +64,11 @@ struct DepthHoles {
 //   disparity, inverse: the largest value is a value, since relative maps are scaled to reach it.
 // A value that remains is suspected if at least 0.1 % of the pixels have it exactly and the next
 // magnitude is far below. For a number that programs use as a mark (the largest of the type or one
-// less, 999, 9999, .., 32767, 65534, 65535, powers of ten from 10000 on) that is below 0.8 of it,
-// or 0.5 in maps of disparity and inverse depth, where the largest of 8 bits is no mark. For other
-// numbers in z and range it is below 1/100: a wall or a sky is nearer to its scene than that.
+// less, 999, 9999, .., 4095, 8191, .., 65535, 65534, powers of ten from 10000 on) that is below 0.8
+// of it, or 0.5 in maps of disparity and inverse depth, where the largest of 8 bits is no mark. For
+// other numbers in z and range it is below 1/100: a wall or a sky is nearer to its scene than that.
+// In a map of disparity -1 and -16 are suspected, OpenCV's marks of pixels without a match, where
+// no other value is below 0.
 THICKLENS_EXPORT DepthHoles MarkHoles(DepthKind kind, const HoleRules& rules, RawDepthMap* map);
 
 }  // namespace thicklens::model
