@@ -542,6 +542,23 @@ TEST_F(DepthFileTest, AnNpzArchiveIsRefusedWithTheRemedy) {
   EXPECT_THAT(Refusal(ZipDirectory({"a.txt"})), HasSubstr("found a ZIP archive"));
 }
 
+TEST_F(DepthFileTest, OtherFilesOfDepthAreRefusedWithTheRemedy) {
+  const std::string size("PIEH\3\0\0\0\2\0\0\0", 12);
+  const std::pair<std::string, std::string> files[] = {
+      {size + kBigEndianValues, "numpy.fromfile('depth', '<f4')[3:].reshape(2, 3))"},
+      {size + kBigEndianValues + kBigEndianValues, "[3:].reshape(2, 3, 2)[..., 0])"},
+      {"ply\nformat ascii 1.0\n", "project them into the photograph"},
+      {"3&2&1&" + kBigEndianValues, "numpy.fromfile('depth', '<f4', offset=6).reshape(2, 3))"},
+      {"1.5,2,3\n4,nan,6\n", "numpy.loadtxt('depth', delimiter=',')"},
+      {"1 2 3\n4 5 6\n", "numpy.loadtxt('depth'))"},
+      {"MATLAB 5.0 MAT-file", "scipy.io.loadmat('depth')['NAME']"},
+      {"MATLAB 7.3 MAT-file", "h5py.File('depth')['NAME'][()].T"},
+      {"\x89HDF\r\n\x1a\n", "h5py.File('depth')['NAME'][()])"}};
+  for (const auto& [bytes, remedy] : files) EXPECT_THAT(Refusal(bytes), HasSubstr(remedy));
+  EXPECT_THAT(Refusal("some text"), Not(HasSubstr("loadtxt")));
+  EXPECT_THAT(Refusal(size + kBigEndianValues.substr(1)), Not(HasSubstr("fromfile")));
+}
+
 TEST_F(DepthFileTest, ABrokenNpyIsRefused) {
   const std::string rows = "'fortran_order': False, 'shape': (2, 3), }";
   EXPECT_THAT(Refusal(Npy("{'descr': '<f4', " + rows, kBigEndianValues.substr(0, 23))),
