@@ -258,4 +258,10 @@ std::string CauseInMap(const DepthMap& map, const RunScope& run) {
   return span + "; or, if 0 means 'no depth', " + compression;
 }
 
+std::string WithCause(const DepthMap& map, const std::string& error, const std::string& cause) {
+  const std::string name = (map.source.empty() ? "depth" : map.source) + ": ";
+  if (!map.is_lossy || error.compare(0, name.size(), name) != 0) return error + "; " + cause;
+  return name + cause + "; " + error.substr(name.size());
+}
+
 }  // namespace thicklens

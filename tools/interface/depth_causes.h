@@ -18,6 +18,11 @@ std::string CauseInMap(const DepthMap& map, const RunScope& run);
 // the scale that is probably meant; empty if there are none.
 std::string ValuesBeyondNear(const DepthMap& map, const RunScope& run);
 
+// Returns the text of an error with its cause: behind it, but in front of it, behind the map's
+// name, if the map is compressed with losses, since the unit that the error doubts is then the less
+// likely cause.
+std::string WithCause(const DepthMap& map, const std::string& error, const std::string& cause);
+
 // Runs `work`; the Error by which it refuses the map also names the cause in the map, if there is
 // one.
 template <typename Work>
@@ -31,7 +36,7 @@ auto NamingCauseInMap(const DepthMap& map, const RunScope& run, const Work& work
   } catch (const Error& error) {
     const std::string cause = CauseInMap(map, run);
     if (cause.empty()) throw;
-    throw Error(std::string(error.what()) + "; " + cause);
+    throw Error(WithCause(map, error.what(), cause));
   }
 }
 

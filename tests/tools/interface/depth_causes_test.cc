@@ -115,6 +115,17 @@ TEST(DepthCauses, NamesCompressionOnlyBesideZeros) {
   EXPECT_THAT(CauseOf(map), IsEmpty());
 }
 
+TEST(DepthCauses, CompressionIsNamedBeforeTheUnit) {
+  DepthMap map = MapWith({0, 2, 100});
+  map.source = "d.jpg";
+  EXPECT_EQ(WithCause(map, "d.jpg: too near; check the unit", "a cause"),
+            "d.jpg: too near; check the unit; a cause");
+  map.is_lossy = true;
+  EXPECT_EQ(WithCause(map, "d.jpg: too near; check the unit", "a cause"),
+            "d.jpg: a cause; too near; check the unit");
+  EXPECT_EQ(WithCause(map, "too near", "a cause"), "too near; a cause");
+}
+
 TEST(DepthCauses, NamesValuesBeyondTheOneOfTheNearDepth) {
   DepthMeaning meaning{DepthKind::kInverse};
   meaning.inverse_scale_dpt = 1.53;  // per 1

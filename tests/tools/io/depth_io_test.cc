@@ -292,7 +292,8 @@ TEST_F(DepthFileTest, APictureInFalseColoursIsNamed) {
   cv::Mat noise(64, 64, CV_8UC3);
   cv::RNG random(5);
   random.fill(noise, cv::RNG::UNIFORM, 0, 256);
-  EXPECT_THAT(Refusal(Encoded(noise, ".png")), HasSubstr("no known colour map"));
+  EXPECT_THAT(Refusal(Encoded(noise, ".png")),
+              AllOf(HasSubstr("no known colour map"), HasSubstr("R + 256.0*G + 65536.0*B")));
 }
 
 struct ColoursOfMap {

@@ -239,7 +239,15 @@ std::string WordsOnColours(const cv::Mat& rgb, bool is_lossy) {
         is_sure ? "" : "probably ", best->name, 100 * best->share, tolerance,
         best->parts >= kMinParts ? "" : ", though it has few colours");
   }
-  return "its channels differ, and its colours lie on no known colour map: it is not a depth map";
+  std::string words =
+      "its channels differ, and its colours lie on no known colour map: it is not a depth map";
+  if (rgb.depth() == CV_8U && !is_lossy) {
+    words +=
+        ", unless the three bytes of a pixel are one number, as CARLA stores depth: then save it "
+        "as "
+        "NPY, in Python numpy.save('depth.npy', 1000*(R + 256.0*G + 65536.0*B)/(2**24 - 1)), in m";
+  }
+  return words;
 }
 
 }  // namespace thicklens::io
