@@ -238,7 +238,8 @@ void WarnOfUnlikelyDepth(const DepthMap& map, const Camera& camera,
       depth.median_mm >= focus_depth_mm / kDefault) {
     return;
   }
-  const std::string cause = CauseInMap(map, *run);
+  // Values beyond the near depth are reported in any case.
+  const std::string cause = map.meaning.kind == DepthKind::kInverse ? "" : CauseInMap(map, *run);
   run->Warn(fmt::format(
       "{}: the median depth is {:.6g} mm, but the camera is focused at {:.6g} mm; is {} right?{}",
       NameOf(map), depth.median_mm, focus_depth_mm, run->Option("depth.meaning.unit"),

@@ -36,7 +36,7 @@ std::string CauseOf(const DepthMap& map) {
 }
 
 // `count` values that go evenly from `first` to `last`.
-std::vector<float> Ramp(float first, float last, int count) {
+std::vector<float> DepthRamp(float first, float last, int count) {
   std::vector<float> values;
   for (int i = 0; i < count; ++i)
     values.push_back(first +
@@ -44,7 +44,7 @@ std::vector<float> Ramp(float first, float last, int count) {
   return values;
 }
 
-std::vector<float> With(std::vector<float> values, int count, float mark) {
+std::vector<float> WithMark(std::vector<float> values, int count, float mark) {
   values.insert(values.end(), static_cast<std::size_t>(count), mark);
   return values;
 }
@@ -64,13 +64,13 @@ TEST(DepthCauses, NamesARelativeMapOfEachScale) {
 // 0 and the largest of the type mean "no depth" and span nothing; neither does a mark that nobody
 // stated.
 TEST(DepthCauses, HolesAndMarksDoNotSpanARelativeMap) {
-  DepthMap map = MapWith(With(With(Ramp(860, 3920, 50), 9, 0), 9, 65535));
+  DepthMap map = MapWith(WithMark(WithMark(DepthRamp(860, 3920, 50), 9, 0), 9, 65535));
   map.is_integer = true;
   map.largest_of_type = 65535;
   EXPECT_THAT(CauseOf(map), IsEmpty());
   map.largest_of_type.reset();
   EXPECT_THAT(CauseOf(map), IsEmpty());
-  map.values = With(Ramp(20, 120, 50), 18, 250);
+  map.values = WithMark(DepthRamp(20, 120, 50), 18, 250);
   map.holes.hole_values = {250};
   EXPECT_THAT(CauseOf(map), IsEmpty());
 }
@@ -85,12 +85,12 @@ TEST(DepthCauses, NamesAnotherSignAndItsRemedy) {
 
 TEST(DepthCauses, NegativeMarksAreNoOtherSign) {
   for (const float mark : {-1.0F, -9999.0F}) {
-    EXPECT_THAT(CauseOf(MapWith(With(Ramp(800, 1040, 38), 62, mark))),
+    EXPECT_THAT(CauseOf(MapWith(WithMark(DepthRamp(800, 1040, 38), 62, mark))),
                 AllOf(HasSubstr("62 of its values are negative and 38 positive"),
                       HasSubstr(mark == -1 ? "<depth.holes> -1" : "<depth.holes> -9999"),
                       Not(HasSubstr("-depth"))));
   }
-  EXPECT_THAT(CauseOf(MapWith(With(With(Ramp(800, 1040, 38), 40, -1), 22, -2))),
+  EXPECT_THAT(CauseOf(MapWith(WithMark(WithMark(DepthRamp(800, 1040, 38), 40, -1), 22, -2))),
               HasSubstr("<depth.holes> -1 <depth.holes> -2"));
 }
 
@@ -111,7 +111,7 @@ TEST(DepthCauses, NamesCompressionOnlyBesideZeros) {
               AllOf(StartsWith("the file is compressed with losses"), HasSubstr("does not help")));
   map.values = {0, 0, 60, 2, 100, 120};
   EXPECT_THAT(CauseOf(map), IsEmpty());
-  map.values = {50, 60, 120};
+  map.values = {50, 60, 120, 130, 140, 150};
   EXPECT_THAT(CauseOf(map), IsEmpty());
 }
 
@@ -155,19 +155,20 @@ TEST(DepthCauses, ValuesWithoutAFullScaleAreScaledByTheirOwnRange) {
       AllOf(HasSubstr("by (v - -200)/(2800 - -200)"), HasSubstr("inverse_scale_dpt> 0.00051"),
             HasSubstr("inverse_offset_dpt> 0.352"), Not(HasSubstr("divide"))));
   // Below 0 is beyond the far depth.
-  map.values = {-0.5F, 0.1F, 0.5F};
+  map.values = {-0.5F, 0.1F, 0.3F, 0.5F};
   EXPECT_THAT(CauseOf(map), HasSubstr("go from -0.5 to 0.5"));
 }
 
 TEST(DepthCauses, AMarkIsNoFullScale) {
-  DepthMap map = MapWith(With(Ramp(0, 1, 50), 10, 9999), DepthMeaning{DepthKind::kInverse});
+  DepthMap map =
+      MapWith(WithMark(DepthRamp(0, 1, 50), 10, 9999), DepthMeaning{DepthKind::kInverse});
   map.near_value = 1;
   EXPECT_THAT(CauseOf(map),
               AllOf(HasSubstr("9999 (10 pixels; <depth.holes> 9999)"), Not(HasSubstr("divide"))));
   map.holes.hole_values = {9999};
   EXPECT_THAT(CauseOf(map), IsEmpty());
   map.holes.hole_values = {};
-  map.values = With(Ramp(0, 255, 52), 10, 9999);
+  map.values = WithMark(DepthRamp(0, 255, 50), 10, 9999);
   EXPECT_THAT(CauseOf(map), HasSubstr("divide the values by 255"));
 }
 
