@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -163,6 +164,29 @@ TEST(DepthInterfaceTest, AFileThatCannotBeReadIsNamed) {
   const std::string bytes = EncodeDepth(MapOfSpecialValues());
   const std::string cut = folder.Put("cut.pfm", bytes.substr(0, bytes.size() - 1));
   EXPECT_THAT(ErrorOf([&] { ReadDepth(cut, kDepthInMm); }), HasSubstr(cut));
+}
+
+TEST(MarkedDepthTest, MarksHolesAndReportsWhatIsFound) {
+  DepthMap map;
+  map.width_px = 10;
+  map.height_px = 3;
+  map.values.assign(30, 800);
+  for (std::size_t i = 0; i < 10; ++i) map.values[i] = 9999;
+  map.values[29] = -1;
+  map.meaning = {DepthKind::kZ, LengthUnit::kMillimetre};
+  map.source = "d.npy";
+  map.warnings = {"A doubt."};
+  std::string notices;
+  RunControl run;
+  run.notice = [&](const Notice& notice) { notices += notice.text + "\n"; };
+  const model::RawDepthMap marked = MarkedDepth(map, run);
+  EXPECT_EQ(marked.values[28], 800);
+  EXPECT_TRUE(std::isnan(marked.values[29]));
+  EXPECT_EQ(notices,
+            "d.npy: A doubt.\n"
+            "d.npy: 3.3 % of its values are negative and taken as 'no depth'\n"
+            "d.npy: 10 pixels (33.3 %) have exactly the value 9999, far beyond all others: if it "
+            "means 'no depth', state it by depth.holes 9999\n");
 }
 
 }  // namespace
