@@ -143,38 +143,119 @@ struct ColumnName {
   std::optional<ReadingUnit> known;  // the unit, if it is known
 };
 
+// Words of names that describe a value or a device and are no unit: "z (absolute)", "Z stage".
+const Words& PlainWords() {
+  static const Words words = {
+      "abs",      "absolute",    "absolut",    "rel",    "relative",   "relativ",   "raw",
+      "corr",     "corrected",   "cal",        "calib",  "calibrated", "nominal",   "actual",
+      "target",   "set",         "setpoint",   "cmd",    "command",    "commanded", "meas",
+      "measured", "measurement", "true",       "real",   "avg",        "average",   "median",
+      "value",    "values",      "val",        "wert",   "valeur",     "valor",     "start",
+      "end",      "begin",       "first",      "last",   "before",     "after",     "max",
+      "new",      "old",         "current",    "final",  "initial",    "ist",       "soll",
+      "aktuell",  "motor",       "drive",      "piezo",  "axis",       "achse",     "axe",
+      "lens",     "camera",      "cam",        "slide",  "table",      "tisch",     "bench",
+      "bank",     "mount",       "controller", "device", "carriage",   "gauge",     "ruler",
+      "caliper",  "sensor",      "lateral",    "axial",  "optical",    "linear",    "near",
+      "far",      "offset",      "shift",      "slice",  "slices",     "row",       "unit",
+      "units",    "in",          "of",         "the",    "from",       "to",        "by",
+      "at",       "and",         "per",        "de",     "du",         "des",       "del",
+      "la",       "le",          "au",         "der",    "die",        "das",       "point",
+      "punkt",    "text",        "float",      "double", "int",        "number",    "n",
+      "i",        "left",        "right",      "up",     "down",       "main",      "auto",
+      "manual"};
+  return words;
+}
+
+std::string Trimmed(const std::string& text) {
+  const std::size_t begin = text.find_first_not_of(" \t\n");
+  if (begin == std::string::npos) return "";
+  return text.substr(begin, text.find_last_not_of(" \t\n") - begin + 1);
+}
+
+bool IsDigits(const std::string& word) {
+  return std::all_of(word.begin(), word.end(),
+                     [](char c) { return std::isdigit(static_cast<unsigned char>(c)) != 0; });
+}
+
+// Whether the word is known and no unit.
+bool IsPlain(const std::string& word) {
+  return PlainWords().count(word) > 0 || ReadingWords().count(word) > 0 ||
+         FileWords().count(word) > 0 || OtherWords().count(word) > 0 || TimeWords().count(word) > 0;
+}
+
+// The unit that brackets in a name state; empty: none, as in "(abs)" and "(stage)". A text that is
+// neither known as a unit nor as anything else is returned, too: it may be a unit.
+std::string UnitInBrackets(const std::string& inside) {
+  if (FindUnit(inside)) return inside;
+  const std::vector<std::string> words = WordsOf(inside);
+  if (words.empty()) return Trimmed(inside);  // "(')"
+  std::string unit;
+  bool is_plain = true;
+  for (const std::string& word : words) {
+    if (IsPlain(word)) continue;
+    is_plain = is_plain && unit.empty() && FindUnit(word).has_value();
+    unit = word;
+  }
+  return is_plain ? unit : inside;
+}
+
+// Takes the unit behind the other words: "z_um", "z um (stage)", "z mu m".
+void TakeUnitOfWords(ColumnName* name) {
+  std::vector<std::string>& words = name->words;
+  std::size_t end = words.size();
+  // Words behind the unit: "z_um_corrected". "in" is a unit only at the end.
+  const auto is_behind = [&](const std::string& word) {
+    return word == "in" ? end < words.size() : IsPlain(word) && !FindUnit(word);
+  };
+  while (end > 1 && is_behind(words[end - 1])) --end;
+  if (end == 0) return;
+  static const Words prefixes = {"mu", "micro", "milli", "nano", "centi", "pico", "deci"};
+  if (end > 2 && prefixes.count(words[end - 2]) > 0) {
+    const std::string joined = words[end - 2] + words[end - 1];
+    if (const auto unit = FindUnit(joined)) {
+      name->unit = joined;
+      name->known = unit;
+      words.erase(words.begin() + static_cast<std::ptrdiff_t>(end - 2),
+                  words.begin() + static_cast<std::ptrdiff_t>(end));
+      return;
+    }
+  }
+  const std::string& last = words[end - 1];
+  const auto unit = FindUnit(last);
+  // A name of one word is a unit only if it is no name: "m" and "in" alone say nothing.
+  const bool may_be_unit =
+      unit &&
+      (end > 1 || (unit->kind == ReadingUnit::Kind::kLength && last != "m" && last != "in") ||
+       unit->kind == ReadingUnit::Kind::kOther);
+  // An unknown word behind a known one may be a unit that is not known.
+  const bool is_unknown =
+      !unit && end > 1 && end == words.size() && !IsPlain(last) && !IsDigits(last);
+  if (!may_be_unit && !is_unknown) return;
+  name->unit = last;
+  name->known = unit;
+  words.erase(words.begin() + static_cast<std::ptrdiff_t>(end - 1));
+}
+
 // "Position [µm]", "z (mm)", "z / mm", "z_um".
 ColumnName NameOf(const std::string& cell) {
   constexpr std::size_t kLongest = 200;
   std::string text = cell.substr(0, kLongest);
   ColumnName name;
-  const std::size_t close = text.find_last_of("])}");
-  const std::size_t open = close == std::string::npos ? close : text.find_last_of("[({", close);
-  if (open != std::string::npos) {
+  for (;;) {
+    const std::size_t close = text.find_last_of("])}");
+    const std::size_t open = close == std::string::npos ? close : text.find_last_of("[({", close);
+    if (open == std::string::npos) break;
     const std::string inside = text.substr(open + 1, close - open - 1);
-    const bool is_word =
-        inside.size() >= 3 && std::all_of(inside.begin(), inside.end(), [](char c) {
-          return std::isalpha(static_cast<unsigned char>(c)) != 0 || c == ' ';
-        });
-    name.known = FindUnit(inside);
-    if (name.known || !is_word) name.unit = inside;  // "(abs)" and "(stage)" are no unit
-    text.replace(open, close - open + 1, name.unit.empty() ? " " + inside + " " : " ");
+    const std::string unit = UnitInBrackets(inside);
+    text.replace(open, close - open + 1, unit.empty() ? " " + inside + " " : " ");
+    if (unit.empty()) continue;
+    // Two units are none that is known.
+    name.unit = name.unit.empty() ? unit : unit + " " + name.unit;
+    name.known = FindUnit(name.unit);
   }
   name.words = WordsOf(text);
-  if (name.unit.empty() && !name.words.empty()) {
-    // A name of one word is a unit only if it is no name: "m" and "in" alone say nothing.
-    const std::string& last = name.words.back();
-    const auto unit = FindUnit(last);
-    const bool may_be_unit =
-        unit && (name.words.size() > 1 ||
-                 (unit->kind == ReadingUnit::Kind::kLength && last != "m" && last != "in") ||
-                 unit->kind == ReadingUnit::Kind::kOther);
-    if (may_be_unit) {
-      name.unit = last;
-      name.known = unit;
-      name.words.pop_back();
-    }
-  }
+  if (name.unit.empty()) TakeUnitOfWords(&name);
   if (name.unit.empty() && name.words.size() > 1 && name.words.front() == "t") {
     name.words.front() = "time";
   }
@@ -182,12 +263,6 @@ ColumnName NameOf(const std::string& cell) {
 }
 
 std::string Quoted(const std::string& text) { return "'" + Shown(text) + "'"; }
-
-std::string Trimmed(const std::string& text) {
-  const std::size_t begin = text.find_first_not_of(" \t\n");
-  if (begin == std::string::npos) return "";
-  return text.substr(begin, text.find_last_not_of(" \t\n") - begin + 1);
-}
 
 class Finder {
  public:
@@ -219,6 +294,8 @@ class Finder {
     found_.file = FindFile();
     found_.reading = FindReading();
     if (!found_.header.cells.empty()) found_.unit = NameOf(CellOf(found_.reading)).unit;
+    found_.unit_column = FindUnitColumn();
+    RefuseDoubtfulUnits();
     return found_;
   }
 
@@ -344,8 +421,9 @@ class Finder {
       }
       if (found.empty()) {
         const auto words = WordsOf(name);
-        found = matches(
-            [&](const std::string& cell) { return !words.empty() && NameOf(cell).words == words; });
+        found = matches([&](const std::string& cell) {
+          return !words.empty() && (NameOf(cell).words == words || WordsOf(cell) == words);
+        });
       }
     }
     if (found.empty()) {
@@ -440,7 +518,10 @@ class Finder {
       if (rank > 0 && rank >= best) candidates.push_back(column);
       best = std::max(best, rank);
     }
-    if (candidates.size() == 1) return candidates.front();
+    if (candidates.size() == 1) {
+      if (IsCount(candidates.front())) RefuseCount(candidates.front(), numbers);
+      return candidates.front();
+    }
     if (candidates.size() > 1) RefuseSeveral(candidates);
     if (!numbers.empty()) {
       throw Error(fmt::format(
@@ -454,6 +535,111 @@ class Finder {
     if (found_.width <= 2) return others.empty() ? 1 : others.front();
     throw Error(fmt::format("{}no column has numbers in most rows; the table has {}", Place(),
                             List(All())));
+  }
+
+  // Whether a column only counts the rows: by its name, and by whole numbers one after the other.
+  bool IsCount(std::size_t column) const {
+    static const Words counts = {"frame",  "frames", "slice",  "slices", "index", "idx",  "id",
+                                 "row",    "rows",   "line",   "n",      "i",     "no",   "nr",
+                                 "number", "num",    "nummer", "image",  "img",   "bild", "page",
+                                 "shot",   "photo",  "sample", "record", "count"};
+    if (!HasHeader()) return false;
+    const ColumnName name = NameOf(CellOf(column));
+    const bool is_of_pandas = !name.words.empty() && name.words.front() == "unnamed";
+    const bool may_count =
+        name.words.empty() || is_of_pandas || counts.count(name.words.back()) > 0;
+    if (!name.unit.empty() || !may_count) return false;
+    std::optional<double> before;
+    for (std::size_t i = found_.first_row; i < table_.rows.size(); ++i) {
+      const auto& cells = table_.rows[i].cells;
+      if (column >= cells.size() || cells[column].empty()) continue;
+      const auto value = ToNumber(Trimmed(cells[column]), '.');
+      if (!value || (before && *value != *before + 1)) return false;
+      before = value;
+    }
+    return before && *before == static_cast<double>(static_cast<long long>(*before));
+  }
+
+  [[noreturn]] void RefuseCount(std::size_t column, const std::vector<std::size_t>& numbers) const {
+    throw Error(fmt::format(
+        "{}{} only counts the rows, and no other column is named as a position or has a unit of "
+        "length; the numbers are in {}; --column selects the readings by name or number, and "
+        "--unit states their unit",
+        Place(), ColumnText(found_, column), List(numbers)));
+  }
+
+  // The column that states the unit of the readings in each row. One that is named so belongs to
+  // the column that it also names ("z unit"), or to the numbers before it.
+  std::optional<std::size_t> FindUnitColumn() const {
+    std::optional<std::size_t> found;
+    for (std::size_t column = 0; column < found_.width; ++column) {
+      if (column == found_.file || column == found_.reading || !IsUnits(column)) continue;
+      if (OwnerOf(column) != found_.reading) continue;
+      if (found) {
+        throw Error(fmt::format("{}{} and {} may be the unit of {}; state it by --unit", Place(),
+                                ColumnText(found_, *found), ColumnText(found_, column),
+                                ColumnText(found_, found_.reading)));
+      }
+      found = column;
+    }
+    return options_.unit.empty() ? found : std::nullopt;
+  }
+
+  static bool IsUnitWord(const std::string& word) {
+    static const Words words = {
+        "unit",     "units",    "einheit", "einheiten", "unité",   "unite", "unités",
+        "unidad",   "unidades", "unidade", "unità",     "eenheid", "enhet", "jednostka",
+        "jednotka", "единица",  "единицы", "单位",      "單位",    "単位",  "단위"};
+    return words.count(word) > 0;
+  }
+
+  // Whether the cells are units: by the name of the column or, without a header, by all of them.
+  bool IsUnits(std::size_t column) const {
+    const std::vector<std::string> words = WordsOf(CellOf(column));
+    if (std::any_of(words.begin(), words.end(), IsUnitWord)) return IsMost(texts_[column]);
+    if (HasHeader() && !words.empty()) return false;
+    return HasOnlyUnits(column);
+  }
+
+  bool HasOnlyUnits(std::size_t column) const {
+    if (!IsMost(texts_[column]) || numbers_[column] > 0) return false;
+    for (std::size_t i = found_.first_row; i < table_.rows.size(); ++i) {
+      const auto& cells = table_.rows[i].cells;
+      if (column >= cells.size() || cells[column].empty()) continue;
+      const auto unit = FindUnit(cells[column]);
+      if (!unit || unit->kind == ReadingUnit::Kind::kOther) return false;
+    }
+    return true;
+  }
+
+  // A column of another name with nothing but units may be theirs, or may mean anything ("in").
+  void RefuseDoubtfulUnits() const {
+    if (!options_.unit.empty() || !found_.unit.empty() || found_.unit_column) return;
+    for (std::size_t column = 0; column < found_.width; ++column) {
+      if (column == found_.file || column == found_.reading || !HasOnlyUnits(column)) continue;
+      if (OwnerOf(column) != found_.reading) continue;
+      throw Error(
+          fmt::format("{}{} has nothing but units, and {} states none: name that column 'unit' if "
+                      "it is theirs, "
+                      "or state the unit of the readings by --unit",
+                      Place(), ColumnText(found_, column), ColumnText(found_, found_.reading)));
+    }
+  }
+
+  std::size_t OwnerOf(std::size_t column) const {
+    std::vector<std::string> words = WordsOf(CellOf(column));
+    words.erase(std::remove_if(words.begin(), words.end(), IsUnitWord), words.end());
+    for (std::size_t other = 0; other < found_.width && !words.empty(); ++other) {
+      if (other != column && NameOf(CellOf(other)).words == words) return other;
+    }
+    for (std::size_t other = column; other-- > 0;) {
+      const bool is_name = other == found_.file && options_.time_column.empty();
+      if (IsMost(numbers_[other]) && !is_name) return other;
+    }
+    for (std::size_t other = column + 1; other < found_.width; ++other) {
+      if (IsMost(numbers_[other]) && other != found_.file) return other;
+    }
+    return column;
   }
 
   std::size_t RequireOther(std::size_t column) const {

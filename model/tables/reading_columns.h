@@ -2,6 +2,7 @@
 #define THICKLENS_MODEL_TABLES_READING_COLUMNS_H_
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,11 +14,12 @@ namespace thicklens::model {
 // The columns of a table that are used; all indices begin with 0.
 struct ReadingColumns {
   std::size_t file = 0, reading = 1;
-  TableRow header;                    // without cells: the table has none
-  std::size_t first_row = 0;          // of the rows with data
-  std::size_t last_skipped_line = 0;  // before the table; 0: none
-  std::size_t width = 0;              // number of columns: of the header, or of the first row
-  std::string unit;                   // that the header states; empty: none
+  TableRow header;                         // without cells: the table has none
+  std::size_t first_row = 0;               // of the rows with data
+  std::size_t last_skipped_line = 0;       // before the table; 0: none
+  std::size_t width = 0;                   // number of columns: of the header, or of the first row
+  std::string unit;                        // that the header states; empty: none
+  std::optional<std::size_t> unit_column;  // has the unit of each reading
 };
 
 // Finds the columns of the file and of the reading by the options, by the names in the header, and

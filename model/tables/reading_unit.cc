@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <map>
 #include <set>
+#include <vector>
 
 #include "model/tables/table_text.h"
 #include "thicklens/base/error.h"
@@ -22,24 +23,37 @@ struct Spellings {
   const char* words;  // separated by spaces
 };
 
-// The first word is the name. Case does not matter, and both micro signs are written as u.
+// The first word is the name. Case does not matter, both micro signs are written as u, and the
+// marks of TeX are left out ("$\\mu$m").
 const Spellings kUnits[] = {
     {{"mm", Kind::kLength, 1},
      "mm millimeter millimeters millimetre millimetres millimètre millimètres milimetro milimetros "
      "мм 毫米"},
     {{"um", Kind::kLength, 1e-3},
-     "um micron microns micrometer micrometers micrometre micrometres mikrometer micromètre "
+     "um micron microns microm mum micrometer micrometers micrometre micrometres mikrometer "
+     "micromètre "
      "micromètres мкм 微米"},
     {{"nm", Kind::kLength, 1e-6}, "nm nanometer nanometers nanometre nanometres нм 纳米"},
     {{"cm", Kind::kLength, 10}, "cm centimeter centimeters centimetre centimetres см 厘米"},
     {{"m", Kind::kLength, 1000}, "m meter meters metre metres"},
+    {{"dm", Kind::kLength, 100}, "dm decimeter decimeters decimetre decimetres"},
+    {{"pm", Kind::kLength, 1e-9}, "pm picometer picometers picometre picometres"},
+    {{"angstrom", Kind::kLength, 1e-7},
+     "angstrom angstroms \xC3\xA5ngstr\xC3\xB6m \xC3\x85ngstr\xC3\xB6m \xC3\xA5 \xC3\x85 "
+     "\xE2\x84\xAB"},
+    {{"mil", Kind::kLength, 0.0254}, "mil mils thou thous"},
+    {{"ft", Kind::kLength, 304.8}, "ft foot feet"},
+    {{"yd", Kind::kLength, 914.4}, "yd yds yard yards"},
     {{"in", Kind::kLength, 25.4}, "in inch inches zoll pouce pouces pulgada pulgadas \""},
     {{"dpt", Kind::kDioptre, 0},
      "dpt diopter diopters dioptre dioptres dioptrie dioptrien dioptrías 1/m m^-1 m-1"},
     {{"steps", Kind::kScaled, 0},
      "steps step stp microsteps microstep usteps ustep schritte schritt pasos passi"},
     {{"counts", Kind::kScaled, 0},
-     "counts count cts ticks tick pulses pulse impulse impulses enc adu lsb"},
+     "counts count cts ticks tick pulses pulse impulse impulses enc encoder adu lsb clicks click "
+     "div divs division divisions"},
+    {{"turns", Kind::kScaled, 0},
+     "turns turn rev revs revolution revolutions rotations rotation umdrehung umdrehungen tours"},
     {{"s", Kind::kOther, 0}, "s sec secs second seconds sekunde sekunden ms us ns min h hr hours"},
     {{"deg", Kind::kOther, 0}, "deg degs degree degrees ° rad mrad urad arcsec arcmin grad"},
     {{"C", Kind::kOther, 0}, "c degc °c k °f celsius kelvin"},
@@ -56,7 +70,7 @@ std::string Normalised(const std::string& text) {
     if (is_micro) {
       normal += 'u';
       ++i;
-    } else if (text[i] != ' ' && text[i] != '\t') {
+    } else if (text[i] != ' ' && text[i] != '\t' && text[i] != '$' && text[i] != '\\') {
       normal += static_cast<char>(std::tolower(static_cast<unsigned char>(text[i])));
     }
   }
@@ -80,7 +94,8 @@ std::map<std::string, ReadingUnit> UnitsByWord() {
 
 }  // namespace
 
-const char kUnitNames[] = "mm, um, nm, cm, m, in, dpt, steps or counts";
+const char kUnitNames[] =
+    "mm, um, nm, pm, angstrom, cm, dm, m, mil, in, ft, yd, dpt, steps, counts or turns";
 
 std::optional<ReadingUnit> FindUnit(const std::string& text) {
   static const std::map<std::string, ReadingUnit> units = UnitsByWord();
@@ -89,6 +104,50 @@ std::optional<ReadingUnit> FindUnit(const std::string& text) {
   const auto found = units.find(Normalised(text));
   if (found == units.end()) return std::nullopt;
   return found->second;
+}
+
+std::string UnitStatedIn(const std::string& line) {
+  constexpr std::size_t kLongest = 400;
+  static const std::set<std::string> names = {"unit",   "units",  "einheit", "einheiten", "unité",
+                                              "unités", "unidad", "unidade", "unità",     "eenheid",
+                                              "单位",   "単位",   "단위"};
+  std::vector<std::string> words(1);
+  bool has_mark = false;  // behind the word for a unit
+  std::size_t name_at = 0;
+  bool has_name = false;
+  for (const char c : line.substr(0, kLongest) + " ") {
+    const bool is_mark = std::string(":=,;\t|").find(c) != std::string::npos;
+    const bool is_of_comment = c == '/' && words.back().empty();
+    if (!is_mark && !is_of_comment && std::string(" \n#%[](){}\"'").find(c) == std::string::npos) {
+      words.back() += c;
+      continue;
+    }
+    if (!words.back().empty()) {
+      if (!has_name && names.count(Normalised(words.back())) > 0) {
+        has_name = true;
+        name_at = words.size() - 1;
+      }
+      words.emplace_back();
+    }
+    if (has_name && is_mark && words.size() == name_at + 2) has_mark = true;
+  }
+  words.pop_back();
+  if (!has_name) return "";
+  std::string stated, other;
+  bool is_known = false;
+  for (std::size_t i = name_at + 1; i < words.size(); ++i) {
+    const auto unit = FindUnit(words[i]);
+    if (!unit) continue;
+    is_known = true;
+    if (unit->kind == Kind::kOther && unit->name != "s") other = words[i];
+    if (unit->kind == Kind::kOther || stated == words[i]) continue;
+    stated += (stated.empty() ? "" : " ") + words[i];
+  }
+  const bool is_alone = name_at == 0 && has_mark && words.size() > 1;
+  if (!stated.empty() || !is_alone) return stated;
+  if (is_known) return other;
+  for (std::size_t i = 1; i < words.size(); ++i) stated += (i > 1 ? " " : "") + words[i];
+  return stated;
 }
 
 std::string ReadingUnitName(const std::string& stated, const ReadingOptions& options) {
@@ -105,9 +164,14 @@ double ReadingInMm(double value, const std::string& stated, const ReadingOptions
   if (!unit || unit->kind == Kind::kOther) {
     if (unit && options.scale_mm) return value * *options.scale_mm;  // the output of a sensor
     throw Error(fmt::format(
-        "{}the unit '{}' is no unit of length; state the unit by --unit ({}), or the length of one "
-        "of it by --reading-scale",
-        place, Shown(name), kUnitNames));
+        "{}{}; state the unit by --unit ({}), or the length of one of it by --reading-scale with "
+        "--unit steps",
+        place,
+        unit
+            ? fmt::format("the unit '{}' is no unit of length", Shown(name))
+            : fmt::format("'{}' is no known unit, and no other word that is known beside a reading",
+                          Shown(name)),
+        kUnitNames));
   }
   if (unit->kind == Kind::kScaled) {
     if (!options.scale_mm) {

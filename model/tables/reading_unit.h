@@ -22,6 +22,12 @@ struct ReadingUnit {
 // The unit with this name or a usual spelling of it ("µm", "Microns", "inch"), or nothing.
 std::optional<ReadingUnit> FindUnit(const std::string& text);
 
+// The unit that a line of text states by a word for it: "Unit: um", "# units = um", "z unit,um".
+// Units of no reading (seconds, degrees) are none. A text behind "unit" alone is returned even if
+// it is no known unit. Several are joined by a space, which is no unit. Empty: the line states
+// none.
+std::string UnitStatedIn(const std::string& line);
+
 // The units that ReadingOptions::unit may name, for messages.
 extern const char kUnitNames[];
 

@@ -86,8 +86,24 @@ class Reader {
                                 Shown(cell.file), known->second));
       }
       cell.number = *number;
+      TakeUnitOfRow(row, &cell);
       cells_.push_back(std::move(cell));
     }
+  }
+
+  // The unit in a column of its own.
+  void TakeUnitOfRow(const TableRow& row, ReadingCell* cell) const {
+    if (!columns_.unit_column || *columns_.unit_column >= row.cells.size()) return;
+    std::string unit = row.cells[*columns_.unit_column];
+    unit.erase(0, std::min(unit.find_first_not_of(" \t"), unit.size()));
+    unit.erase(unit.find_last_not_of(" \t") + 1);
+    if (unit.empty()) return;
+    if (!cell->number.unit.empty() && NameOf(cell->number.unit) != NameOf(unit)) {
+      throw Error(fmt::format("{}the reading '{}' has {}, but {} states '{}'; state it by --unit",
+                              Place(cell->line), Shown(cell->text), UnitText(cell->number.unit),
+                              ColumnText(columns_, *columns_.unit_column), Shown(unit)));
+    }
+    cell->number.unit = unit;
   }
 
   void RequireWidth(const TableRow& row) const {
@@ -167,6 +183,11 @@ class Reader {
     const ReadingCell& first = cells_.front();
     for (const ReadingCell& cell : cells_) {
       if (!cell.number.unit.empty() && !FindUnit(cell.number.unit)) {
+        if (columns_.unit_column) {
+          throw Error(fmt::format("{}'{}' in {} is no known unit; state the unit by --unit ({})",
+                                  Place(cell.line), Shown(cell.number.unit),
+                                  ColumnText(columns_, *columns_.unit_column), kUnitNames));
+        }
         throw Error(fmt::format(
             "{}the reading of '{}' must be a number, found '{}' in {}: '{}' is no known unit ({})",
             Place(cell.line), Shown(cell.file), Shown(cell.text),
@@ -181,14 +202,49 @@ class Reader {
       }
     }
     unit_ = columns_.unit;
-    if (first.number.unit.empty()) return;
-    if (!unit_.empty() && options_.unit.empty() && NameOf(unit_) != NameOf(first.number.unit)) {
+    if (!unit_.empty() && !first.number.unit.empty() && options_.unit.empty() &&
+        NameOf(unit_) != NameOf(first.number.unit)) {
       throw Error(fmt::format(
           "{}the header of {} states '{}', but the reading '{}' has {}; state the unit by --unit",
           Place(first.line), ColumnText(columns_, columns_.reading), Shown(unit_),
           Shown(first.text), UnitText(first.number.unit)));
     }
-    unit_ = first.number.unit;
+    if (!first.number.unit.empty()) unit_ = first.number.unit;
+    TakeUnitOfOtherLines();
+  }
+
+  // Comments and the lines before the table: "# unit: um", "Units,um". What the header says and
+  // they contradict is refused.
+  void TakeUnitOfOtherLines() {
+    if (!options_.unit.empty()) return;
+    std::vector<std::pair<std::size_t, std::string>> lines = table_.comments;
+    for (const TableRow& row : table_.rows) {
+      if (row.line > columns_.last_skipped_line) break;
+      std::string line;
+      for (const std::string& cell : row.cells) line += (line.empty() ? "" : ",") + cell;
+      lines.emplace_back(row.line, line);
+    }
+    for (const auto& [line, text] : lines) {
+      if (columns_.header.line == line) continue;
+      const std::string stated = UnitStatedIn(text);
+      if (stated.empty() || (!unit_.empty() && NameOf(unit_) == NameOf(stated))) continue;
+      if (!unit_.empty()) {
+        throw Error(
+            fmt::format("{}this line states the unit '{}', but {} '{}'; state the unit of "
+                        "the readings by --unit",
+                        Place(line), Shown(stated),
+                        unit_place_.empty() ? ColumnText(columns_, columns_.reading) : unit_place_,
+                        Shown(unit_)));
+      }
+      unit_ = stated;
+      unit_place_ = fmt::format("line {}", line);
+      if (!FindUnit(unit_)) {
+        throw Error(
+            fmt::format("{}this line states the unit '{}', which is not one of {}; state "
+                        "the unit of the readings by --unit",
+                        Place(line), Shown(stated), kUnitNames));
+      }
+    }
   }
 
   static std::string NameOf(const std::string& unit) {
@@ -217,6 +273,7 @@ class Reader {
   void Describe(const std::string& encoding, ReadingSet* set) const {
     const std::string name = ReadingUnitName(unit_, options_);
     std::string unit = name;
+    if (!unit_place_.empty()) unit += fmt::format(" (as {} states)", unit_place_);
     const bool is_stated = !unit_.empty() || !options_.unit.empty() || options_.scale_mm;
     if (!is_stated) unit += " (no unit is stated)";
     if (options_.scale_mm) unit += fmt::format(" of {} mm", *options_.scale_mm);
@@ -246,7 +303,8 @@ class Reader {
   TableCells table_;
   ReadingColumns columns_;
   std::vector<ReadingCell> cells_;
-  std::string unit_;  // that the table states
+  std::string unit_;        // that the table states
+  std::string unit_place_;  // the line that states it; empty: a header or the cells
   char mark_ = '.';
   bool is_comma_seen_ = false;
 };

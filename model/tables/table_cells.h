@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace thicklens::model {
@@ -19,6 +20,8 @@ struct TableCells {
   std::vector<TableRow> rows;
   // The last comment before the first row, as a row: some programs write the header there.
   TableRow comment;
+  // The texts of the first comments, with their lines.
+  std::vector<std::pair<std::size_t, std::string>> comments;
 };
 
 // The name of a separator for messages: "commas", "semicolons", "tabs" or "spaces".

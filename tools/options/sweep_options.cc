@@ -23,10 +23,12 @@ void AddReadingOptions(CLI::App* command, SweepArguments* sweep) {
   command
       ->add_option(
           "--unit", readings->unit,
-          "Unit of the readings: mm, um, nm, cm, m, in, dpt, steps or counts; replaces the "
-          "one in the table")
+          "Unit of the readings: mm, um, nm, cm, m, in, mil, ft, dpt, steps, counts or turns; "
+          "replaces the one in the table")
       ->type_name("UNIT");
-  command->add_option("--reading-scale", readings->scale_mm, "Length of one step or count, in mm")
+  command
+      ->add_option("--reading-scale", readings->scale_mm,
+                   "Length of one step, count or turn, in mm")
       ->type_name("MM");
   command
       ->add_option("--decimal", readings->decimal,
@@ -60,7 +62,8 @@ void AddVideoOptions(CLI::App* command, SweepArguments* sweep) {
       ->type_name("UNIT");
   command
       ->add_option("--time-offset", video->time_offset,
-                   "Video: the time of the first frame on the clock of the table; default 0")
+                   "Video: the time of the first frame on the clock of the table, in seconds, as "
+                   "hh:mm:ss.f, or as a date and a time; default 0")
       ->type_name("TIME");
   command
       ->add_option("--reading-start", video->reading_start,

@@ -213,6 +213,94 @@ TEST(ReadingsTable, UnitsThatAreRefused) {
   EXPECT_THAT(Refusal("file,focus_dpt\na.png,0\n"), HasSubstr("0 is infinity"));
 }
 
+TEST(ReadingsTable, MoreUnitsOfHeaders) {
+  const auto of_header = [](const std::string& name) {
+    return ValuesOf("file," + name + "\na.png,2\n").at(0);
+  };
+  for (const char* name : {"z (mil)", "z_mil", "z [thou]", "z_thou", "z (mils, corrected)"})
+    EXPECT_DOUBLE_EQ(of_header("\"" + std::string(name) + "\""), 0.0508) << name;
+  for (const char* name : {"z (feet)", "z_ft", "Position / ft"})
+    EXPECT_DOUBLE_EQ(of_header(name), 609.6) << name;
+  for (const char* name : {"z (microm)", "z (mu m)", "z mu m", "z [$\\mu$m]", "z_um_corrected",
+                           "z [um] (stage)", "z (stage) [um]", "z um (abs)"})
+    EXPECT_DOUBLE_EQ(of_header(name), 0.002) << name;
+  EXPECT_DOUBLE_EQ(of_header("z (angstrom)"), 2e-7);
+  EXPECT_DOUBLE_EQ(of_header("z [\xC3\x85]"), 2e-7);
+  EXPECT_DOUBLE_EQ(of_header("z (dm)"), 200);
+  EXPECT_DOUBLE_EQ(of_header("z (pm)"), 2e-9);
+  for (const char* name : {"z (stage)", "Position (Z)", "z absolute", "Z stage", "focus motor"})
+    EXPECT_DOUBLE_EQ(of_header(name), 2) << name;
+  for (const char* name :
+       {"z (turns)", "z_rev", "z (encoder)", "z_encoder", "z (counts)", "z [revolutions]"}) {
+    EXPECT_THAT(Refusal("file," + std::string(name) + "\na.png,2\n"),
+                AllOf(HasSubstr(name), HasSubstr("--reading-scale")));
+  }
+  for (const char* name :
+       {"z (furlong)", "z_furlong", "z [1/10 mm]", "z (arb)", "z_10um", "z (')", "z (mm) (um)"}) {
+    EXPECT_THAT(Refusal("file," + std::string(name) + "\na.png,2\n"), HasSubstr("--unit")) << name;
+    EXPECT_THAT(ValuesOf("file," + std::string(name) + "\na.png,2\n", WithUnit("mm")),
+                ElementsAre(2))
+        << name;
+  }
+}
+
+TEST(ReadingsTable, UnitsInTheirOwnColumn) {
+  for (const char* header :
+       {"file,value,unit", "file,Position,Unit", "file,z,Einheit", "file,z,z unit"}) {
+    EXPECT_THAT(ValuesOf(std::string(header) + "\na.png,290000,um\nb.png,290100,um\n"),
+                ElementsAre(290, DoubleNear(290.1, 1e-9)))
+        << header;
+  }
+  EXPECT_THAT(ValuesOf("a.png,290000,um\n"), ElementsAre(290));
+  // It belongs to the numbers before it.
+  EXPECT_THAT(ValuesOf("file,temperature,unit,z\na.png,20,C,3\n"), ElementsAre(3));
+  EXPECT_THAT(Refusal("file,z,unit\na.png,1,um\nb.png,2,mm\n"), HasSubstr("one unit"));
+  EXPECT_THAT(Refusal("file,z,unit\na.png,1,parsec\n"),
+              AllOf(HasSubstr("'parsec'"), HasSubstr("column 3 'unit'"), HasSubstr("--unit")));
+  EXPECT_THAT(Refusal("file,z_mm,unit\na.png,1,um\n"),
+              AllOf(HasSubstr("'mm'"), HasSubstr("'um'"), HasSubstr("--unit")));
+  EXPECT_THAT(Refusal("file,z,u\na.png,1,um\n"),
+              AllOf(HasSubstr("column 3 'u'"), HasSubstr("--unit")));
+  EXPECT_THAT(ValuesOf("file,z,unit\na.png,1,um\n", WithUnit("cm")), ElementsAre(10));
+}
+
+TEST(ReadingsTable, UnitsInOtherLines) {
+  for (const char* line : {"# unit: um", "# units = um", "% Unit um", "//unit: um", "Units,um",
+                           "Unit: um", "# time unit: s; position unit: um"}) {
+    const ReadingSet set = Read(std::string(line) + "\nfile,z\na.png,290000\n");
+    EXPECT_THAT(Values(set), ElementsAre(290)) << line;
+    EXPECT_THAT(set.description, HasSubstr("line 1")) << line;
+  }
+  EXPECT_THAT(ValuesOf("# unit: um\nfile,z_um\na.png,290000\n"), ElementsAre(290));
+  EXPECT_THAT(ValuesOf("# unit of time: s\nfile,z\na.png,290\n"), ElementsAre(290));
+  EXPECT_THAT(Refusal("# unit: um\nfile,z_mm\na.png,2\n"),
+              AllOf(StartsWith("bench/t.csv:1: "), HasSubstr("'um'"), HasSubstr("'mm'"),
+                    HasSubstr("--unit")));
+  EXPECT_THAT(Refusal("# unit: um\nfile,z\na.png,2 mm\n"), HasSubstr("--unit"));
+  EXPECT_THAT(Refusal("# unit: parsec\nfile,z\na.png,2\n"),
+              AllOf(HasSubstr("'parsec'"), HasSubstr("--unit")));
+  EXPECT_THAT(Refusal("# unit: um\n# unit: mm\nfile,z\na.png,2\n"),
+              AllOf(StartsWith("bench/t.csv:2: "), HasSubstr("line 1")));
+  EXPECT_THAT(ValuesOf("# unit: parsec\nfile,z\na.png,2\n", WithUnit("mm")), ElementsAre(2));
+}
+
+TEST(ReadingsTable, ACountOfRowsIsNoReading) {
+  EXPECT_THAT(Refusal(" ,Label,Mean,StdDev\n1,a.png,120,4\n2,b.png,130,5\n"),
+              AllOf(HasSubstr("only counts the rows"), HasSubstr("column 3 'Mean'"),
+                    HasSubstr("--column")));
+  for (const char* name : {"Frame", "Slice", "\"#\"", "z_slice", "Unnamed: 0"}) {
+    EXPECT_THAT(
+        Refusal(std::string(name) + ",file\n0,a.png\n1,b.png\n2,c.png\n"),
+        AllOf(HasSubstr("only counts the rows"), HasSubstr("column 1 '"), HasSubstr("--column")))
+        << name;
+  }
+  ReadingOptions options;
+  options.column = "Frame";
+  EXPECT_THAT(ValuesOf("Frame,file\n0,a.png\n1,b.png\n", options), ElementsAre(0, 1));
+  EXPECT_THAT(ValuesOf("z,file\n0,a.png\n1,b.png\n"), ElementsAre(0, 1));
+  EXPECT_THAT(ValuesOf("frame,z\n0,5\n1,7\n"), ElementsAre(5, 7));
+}
+
 TEST(ReadingsTable, DecimalMarks) {
   EXPECT_THAT(ValuesOf("a.png;95,5\nb.png;96\n"), ElementsAre(95.5, 96));
   EXPECT_THAT(ValuesOf("a.png;95,500\nb.png;96,000\n"), ElementsAre(95.5, 96));

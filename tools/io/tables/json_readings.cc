@@ -84,13 +84,51 @@ std::string List(const std::vector<Field>& fields) {
   return text;
 }
 
+// The unit that a text beside the number states: "unit", or "z_unit" for "z". Empty: none.
+std::string UnitBeside(const json& frame, const std::string& name) {
+  const json* object = &frame;
+  std::string key = name;
+  // A name of several parts may be a key with points, or objects in each other.
+  while (object->is_object() && object->find(key) == object->end()) {
+    const std::size_t dot = key.find('.');
+    const auto inner = dot == std::string::npos ? object->end() : object->find(key.substr(0, dot));
+    if (inner == object->end()) return "";
+    object = &*inner;
+    key.erase(0, dot + 1);
+  }
+  if (!object->is_object()) return "";
+  for (const std::string& of_unit :
+       {key + "_unit", key + "_units", key + "Unit", std::string("unit"), std::string("units"),
+        std::string("Unit"), std::string("Units")}) {
+    const auto found = object->find(of_unit);
+    if (found != object->end() && found->is_string()) return found->get<std::string>();
+  }
+  return "";
+}
+
+// The units by their names: "microns" and "um" are one.
+bool AreOneUnit(const std::string& one, const std::string& other) {
+  return model::ReadingUnitName(one, {}) == model::ReadingUnitName(other, {});
+}
+
+void TakeUnit(const std::string& beside, const std::string& place,
+              const model::ReadingOptions& options, Choice* choice) {
+  if (beside.empty() || !options.unit.empty()) return;
+  if (!choice->unit.empty() && !AreOneUnit(choice->unit, beside)) {
+    throw Error(fmt::format("{}the unit '{}' is stated, but '{}' is in {}; state it by --unit",
+                            place, Shown(beside), Shown(choice->name), Shown(choice->unit)));
+  }
+  choice->unit = beside;
+}
+
 bool IsFrameOfPymmcore(const json& frame) {
   const auto format = frame.find("format");
   return format != frame.end() && format->is_string() &&
          format->get_ref<const std::string&>() == "frame-dict";
 }
 
-Choice Choose(const json& frame, const std::string& place, const model::ReadingOptions& options) {
+Choice ChooseByName(const json& frame, const std::string& place,
+                    const model::ReadingOptions& options) {
   std::vector<Field> fields;
   Collect(frame, "", 0, &fields);
   const auto find = [&](const std::string& name) {
@@ -130,6 +168,12 @@ Choice Choose(const json& frame, const std::string& place, const model::ReadingO
       place, fields.empty() ? "none" : List(fields)));
 }
 
+Choice Choose(const json& frame, const std::string& place, const model::ReadingOptions& options) {
+  Choice choice = ChooseByName(frame, place, options);
+  TakeUnit(UnitBeside(frame, choice.name), place, options, &choice);
+  return choice;
+}
+
 double ReadingOf(const json& frame, const Choice& choice, const std::string& place,
                  const model::ReadingOptions& options) {
   std::vector<Field> fields;
@@ -142,6 +186,13 @@ double ReadingOf(const json& frame, const Choice& choice, const std::string& pla
   if (!(found->value >= -kMaxMagnitude && found->value <= kMaxMagnitude)) {
     throw Error(fmt::format("{}'{}' must be a number of at most 1e30, found {}", place,
                             Shown(choice.name), found->value));
+  }
+  const std::string beside = UnitBeside(frame, choice.name);
+  if (!beside.empty() && options.unit.empty() && !AreOneUnit(beside, choice.unit)) {
+    throw Error(
+        fmt::format("{}the unit '{}' is stated, but the readings before are in {}; state "
+                    "it by --unit",
+                    place, Shown(beside), model::ReadingUnitName(choice.unit, {})));
   }
   return model::ReadingInMm(found->value, choice.unit, options, place);
 }
@@ -265,7 +316,13 @@ model::ReadingSet ReadingsOfJson(const std::string& text, const std::string& pat
   std::map<std::string, std::string> known;
   for (const Frame& frame : frames) {
     const std::string place = fmt::format("{}: {}: ", path, frame.name);
-    if (!choice) choice = Choose(*frame.metadata, place, options);
+    if (!choice) {
+      choice = Choose(*frame.metadata, place, options);
+      for (const char* key : {"unit", "units", "Unit", "Units"}) {
+        const bool has_text = parsed.is_object() && parsed.contains(key) && parsed[key].is_string();
+        if (has_text) TakeUnit(parsed[key].get<std::string>(), path + ": ", options, &*choice);
+      }
+    }
     const auto [other, added] = known.emplace(frame.file, frame.name);
     if (!added) {
       throw Error(fmt::format(

@@ -143,6 +143,23 @@ TEST_F(Readings, OfAListOfObjects) {
               AllOf(HasSubstr("no number is named as a position"), HasSubstr("'gain'")));
 }
 
+TEST_F(Readings, UnitsBesideTheNumbersOfJson) {
+  EXPECT_THAT(Values(Table("l.json", R"([{"file": "a.png", "z": 290000, "unit": "um"},
+                                         {"file": "b.png", "z": 290100, "unit": "microns"}])")),
+              ElementsAre(DoubleEq(290), DoubleEq(290.1)));
+  EXPECT_THAT(Values(Table("l.json", R"([{"file": "a.png", "z": 2, "z_unit": "cm"}])")),
+              ElementsAre(DoubleEq(20)));
+  EXPECT_THAT(Values(Table("l.json", R"({"unit": "um", "a.png": {"z": 5}, "b.png": {"z": 6}})")),
+              ElementsAre(DoubleEq(0.005), DoubleEq(0.006)));
+  EXPECT_THAT(Refusal("l.json", R"([{"file": "a.png", "z_mm": 2, "unit": "um"}])"),
+              AllOf(HasSubstr("'um'"), HasSubstr("mm"), HasSubstr("--unit")));
+  EXPECT_THAT(Refusal("l.json", R"([{"file": "a.png", "z": 2, "unit": "um"},
+                                    {"file": "b.png", "z": 3, "unit": "mm"}])"),
+              AllOf(HasSubstr("'mm'"), HasSubstr("um"), HasSubstr("--unit")));
+  EXPECT_THAT(Refusal("l.json", R"([{"file": "a.png", "z": 2, "unit": "parsec"}])"),
+              AllOf(HasSubstr("'parsec'"), HasSubstr("--unit")));
+}
+
 TEST_F(Readings, OfTextAsBefore) {
   EXPECT_THAT(Values(Table("t.csv", "file,z\na.png,1\nb.png,2\n")), ElementsAre(1, 2));
   options_.name_pattern = "z{reading}um";

@@ -15,10 +15,11 @@ namespace thicklens::model {
 struct ReadingOptions {
   std::string column;       // column of the readings: its name, or its number from 1
   std::string file_column;  // column of the files, likewise
-  // Unit of the readings: mm, um, nm, cm, m, in, dpt (dioptres: the reading is 1000 mm over it), or
-  // steps or counts, which need a scale. It replaces a unit that the table states.
+  // Unit of the readings: mm, um, nm, pm, angstrom, cm, dm, m, mil, in, ft, yd, dpt (dioptres: the
+  // reading is 1000 mm over it), or steps, counts or turns, which need a scale. It replaces a unit
+  // that the table states.
   std::string unit;
-  std::optional<double> scale_mm;  // mm per step or count; finite, not 0
+  std::optional<double> scale_mm;  // mm per step, count or turn; finite, not 0
   std::string decimal;             // decimal mark of the readings: "comma" or "point"
   // The reading in the names of the files, for example "z{reading}um"; instead of a table.
   std::string name_pattern;
