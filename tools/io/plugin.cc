@@ -55,19 +55,33 @@ std::string LibraryPath(const std::string& file) {
 
 }  // namespace
 
-const void* LoadPlugin(const Plugin& plugin) {
+const void* LoadPluginAt(const std::string& path, const Plugin& plugin) {
   // The library is never closed: the libraries that OpenCV loads do not support unloading.
-  const std::string path = LibraryPath(plugin.file);
   void* const library = path.empty() ? nullptr : dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
   using Entry = const void* (*)();
+  using Identity = const char* (*)();
   const auto entry =
       library == nullptr ? nullptr : reinterpret_cast<Entry>(dlsym(library, plugin.entry));
-  if (entry != nullptr) return entry();
-  const char* const why = path.empty() ? "it is in no folder of the search path" : dlerror();
-  throw Error(fmt::format(
-      "the library that {}, {}, cannot be loaded{}{}: it must be in the build folder "
-      "or where thicklens was installed",
-      plugin.purpose, plugin.file, why == nullptr ? "" : ": ", why == nullptr ? "" : why));
+  if (entry == nullptr) {
+    const char* const why = path.empty() ? "it is in no folder of the search path" : dlerror();
+    throw Error(fmt::format(
+        "the library that {}, {}, cannot be loaded{}{}: it must be in the build folder "
+        "or where thicklens was installed",
+        plugin.purpose, plugin.file, why == nullptr ? "" : ": ", why == nullptr ? "" : why));
+  }
+  const auto identity = reinterpret_cast<Identity>(dlsym(library, "ThicklensPluginIdentity"));
+  const std::string found = identity == nullptr ? "none" : identity();
+  if (found != THICKLENS_PLUGIN_IDENTITY) {
+    throw Error(fmt::format(
+        "the library that {}, {}, belongs to another build of thicklens (its identity is {}, and "
+        "{} is needed): build or install the program and its libraries again, together",
+        plugin.purpose, path, found, THICKLENS_PLUGIN_IDENTITY));
+  }
+  return entry();
+}
+
+const void* LoadPlugin(const Plugin& plugin) {
+  return LoadPluginAt(LibraryPath(plugin.file), plugin);
 }
 
 }  // namespace thicklens::io

@@ -3,6 +3,13 @@
 
 #include <string>
 
+// In the file of a library that defines its entry: the identity of its build, which LoadPlugin
+// compares with its own before it calls the entry.
+#define THICKLENS_STATE_PLUGIN_IDENTITY()                                                   \
+  extern "C" __attribute__((visibility("default"))) const char* ThicklensPluginIdentity() { \
+    return THICKLENS_PLUGIN_IDENTITY;                                                       \
+  }
+
 namespace thicklens::io {
 
 // A library that is loaded when a file first needs it.
@@ -14,8 +21,12 @@ struct Plugin {
 
 // Loads the library, which is never closed, and returns what its entry returns. It is looked for
 // beside the program and where the program is installed, never in the current folder. Throws Error
-// if it is missing or cannot be loaded.
+// if it is missing, cannot be loaded, or belongs to another build, whose objects may have another
+// layout.
 const void* LoadPlugin(const Plugin& plugin);
+
+// The same for a library at a path.
+const void* LoadPluginAt(const std::string& path, const Plugin& plugin);
 
 }  // namespace thicklens::io
 

@@ -2,6 +2,7 @@
 #include <exception>
 
 #include "tools/io/arrays/arrays.h"
+#include "tools/io/plugin.h"
 
 namespace thicklens::io {
 namespace {
@@ -35,6 +36,8 @@ bool ReadArray(void* file, const std::string& name, const PutBytes& put, std::st
 
 }  // namespace
 }  // namespace thicklens::io
+
+THICKLENS_STATE_PLUGIN_IDENTITY()
 
 extern "C" __attribute__((visibility("default"))) const void* ThicklensArrayLibrary() {
   static const thicklens::io::ArrayLibrary library{

@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "tools/io/library/decoders.h"
+#include "tools/io/plugin.h"
 
 namespace thicklens::io {
 namespace {
@@ -72,6 +73,8 @@ bool OpenVideoFile(const std::string& path, const VideoOpening& opening,
 
 }  // namespace
 }  // namespace thicklens::io
+
+THICKLENS_STATE_PLUGIN_IDENTITY()
 
 extern "C" __attribute__((visibility("default"))) const thicklens::io::ImageLibrary*
 ThicklensImageLibrary() {
