@@ -53,6 +53,7 @@ class VideoSweep {
   SweepFile Make(std::vector<std::string>* notices) {
     if (frames_.empty()) throw Error(path_ + ": it has no frames");
     RequireOneSource();
+    RequireKnownNumbers();
     if (NeedsTimes()) RequireTimes();
     TakeUsableFrames();
     std::vector<ReadFrameOfVideo> read = table_.by_frame  ? ByFrame()
@@ -109,6 +110,50 @@ class VideoSweep {
     }
   }
 
+  // "1 frame after frame 6 and 2 frames after frame 9", of those that cannot be decoded; empty:
+  // none.
+  std::string Lost() const {
+    std::string text;
+    const auto add = [&](int count, std::size_t after) {
+      if (count == 0) return;
+      text += (text.empty() ? "" : " and ") +
+              fmt::format("{} frame{} after frame {}", count, count == 1 ? "" : "s", after);
+    };
+    for (std::size_t i = 1; i < frames_.size(); ++i) add(frames_[i].lost_before, i - 1);
+    add(frames_.back().lost_after, frames_.size() - 1);
+    return text;
+  }
+
+  // Frames are counted as they are decoded. Where one is lost, another program may count it.
+  void RequireKnownNumbers() const {
+    if (const int lost = frames_.front().lost_before; lost > 0) {
+      throw Error(fmt::format(
+          "{}: the video is damaged: {} frame{} before the first one that can be decoded {} lost, "
+          "and which frame is the first, at 0 s, is not certain; copy it again, or write what can "
+          "be decoded into a new file (ffmpeg -i FILE -c:v ffv1 NEW.mkv)",
+          path_, lost, lost == 1 ? "" : "s", lost == 1 ? "is" : "are"));
+    }
+    if (!table_.by_frame) return;
+    const std::string lost = Lost();
+    if (lost.empty() && !frames_.back().is_count_doubtful) return;
+    throw Error(fmt::format(
+        "{}: the video is damaged: {}, and the numbers of the frames behind, by which {} "
+        "states the readings, are not certain; copy the video again, or give a table by time or a "
+        "constant speed",
+        path_, lost.empty() ? "frames of it may be lost" : lost + " cannot be decoded",
+        table_.by_frame->source));
+  }
+
+  // The reason why the last frame may not be the end of the recording; empty: none.
+  std::string DoubtOfEnd() const {
+    const VideoFrame& last = frames_.back();
+    const std::size_t number = frames_.size() - 1;
+    if (last.lost_after > 0)
+      return fmt::format("{} behind frame {} cannot be decoded", last.lost_after, number);
+    if (last.is_damaged) return fmt::format("its last frame, {}, is damaged", number);
+    return last.may_be_cut ? fmt::format("its last frame, {}, may be incomplete", number) : "";
+  }
+
   void RequireTimes() const {
     for (std::size_t i = 0; i < frames_.size(); ++i) {
       if (!frames_[i].time_s) {
@@ -154,6 +199,15 @@ class VideoSweep {
                                       Name("--reading-end", "video.reading_end") + ": ");
     const double from = selection_.time_start_s.value_or(0);
     const double to = selection_.time_end_s.value_or(LastTime());
+    if (const std::string doubt = DoubtOfEnd(); !doubt.empty() && !selection_.time_end_s) {
+      throw Error(fmt::format(
+          "{}: {}: the recording may have been longer, and then {} is not the reading at {:.6g} s; "
+          "state a time and its reading by {} and {}, or give a table by time ({}), or copy the "
+          "video again",
+          path_, doubt, Name("--reading-end", "video.reading_end"), LastTime(),
+          Name("--time-end", "video.time_end_s"), Name("--reading-end", "video.reading_end"),
+          TableName()));
+    }
     if (!(to > from)) {
       throw Error(
           fmt::format("{}: the motion is stated from {:.6g} s to {:.6g} s, but the video "
@@ -303,6 +357,11 @@ class VideoSweep {
     if (!left_out.empty()) {
       notices->push_back(fmt::format("{}: {} of {} frames are left out: {}", path_,
                                      frames_.size() - usable, frames_.size(), left_out));
+    }
+    if (const std::string lost = Lost(); !lost.empty()) {
+      notices->push_back(fmt::format(
+          "{}: the video is damaged: {} cannot be decoded; the frames are numbered without them",
+          path_, lost));
     }
     if (used < usable) {
       notices->push_back(

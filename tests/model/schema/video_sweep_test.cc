@@ -150,6 +150,45 @@ TEST(VideoSweep, RepeatedAndDamagedFramesAreLeftOutByName) {
                                       HasSubstr("2 repeat the frame before (frames 2, 3)"))));
 }
 
+// Another program may count the frames that cannot be decoded here.
+TEST(VideoSweep, LostFramesMakeNumbersUncertain) {
+  std::vector<VideoFrame> frames = FramesOfVideo(5);
+  frames[3].lost_before = 1;
+  const std::string by_frame = "frame,z\n0,10\n1,11\n2,12\n3,13\n4,14\n";
+  EXPECT_THAT(ErrorOf([&] { SweepOf(frames, TableOf(by_frame)); }),
+              AllOf(HasSubstr("a/v.mp4"), HasSubstr("1 frame after frame 2"), HasSubstr("t.csv"),
+                    HasSubstr("a table by time")));
+  std::vector<std::string> notices;
+  EXPECT_THAT(NumbersOf(SweepOf(frames, {}, Speed(10, 14), &notices)), ElementsAre(0, 1, 2, 3, 4));
+  EXPECT_THAT(notices, Contains(HasSubstr("1 frame after frame 2 cannot be decoded")));
+  EXPECT_EQ(SweepOf(frames, TableOf("t_s,z\n0,10\n1,11\n")).frames.size(), 5U);
+  frames = FramesOfVideo(5);
+  frames.back().is_count_doubtful = true;
+  EXPECT_THAT(ErrorOf([&] { SweepOf(frames, TableOf(by_frame)); }), HasSubstr("may be lost"));
+  frames = FramesOfVideo(5);
+  frames.front().lost_before = 2;
+  EXPECT_THAT(ErrorOf([&] { SweepOf(frames, {}, Speed(10, 14)); }),
+              HasSubstr("2 frames before the first one"));
+}
+
+// A file that was cut off ends at another time than the motion.
+TEST(VideoSweep, ADamagedEndIsNotTheEndOfTheMotion) {
+  for (const int kind : {0, 1, 2}) {
+    std::vector<VideoFrame> frames = FramesOfVideo(5);
+    if (kind == 0) frames.back().is_damaged = true;
+    if (kind == 1) frames.back().may_be_cut = true;
+    if (kind == 2) frames.back().lost_after = 1;
+    EXPECT_THAT(ErrorOf([&] { SweepOf(frames, {}, Speed(10, 14)); }),
+                AllOf(HasSubstr("may have been longer"), HasSubstr("--time-end"),
+                      HasSubstr("a table by time")))
+        << kind;
+    VideoSelection stated = Speed(10, 13);
+    stated.time_end_s = 0.3;
+    EXPECT_EQ(SweepOf(frames, {}, stated).frames.size(), 4U) << kind;
+    EXPECT_GE(SweepOf(frames, TableOf("t_s,z\n0,10\n1,11\n")).frames.size(), 4U) << kind;
+  }
+}
+
 TEST(VideoSweep, ManyFramesAreThinnedOut) {
   std::vector<std::string> notices;
   const SweepFile sweep = SweepOf(FramesOfVideo(1000), {}, Speed(0, 5), &notices);

@@ -242,6 +242,46 @@ TEST_F(BrokenVideoTest, TruncatedFiles) {
   }
 }
 
+// Nothing in MPEG-TS states its length.
+TEST_F(BrokenVideoTest, TruncatedTransportStreams) {
+  SKIP_WITHOUT_VIDEO();
+  const std::string whole = ContentOf(VideoPath("stream.ts"));
+  constexpr std::size_t kPacket = 188;
+  ASSERT_EQ(whole.size() % kPacket, 0U);
+  EXPECT_THAT(Refusal(folder_.Put("part.ts", whole.substr(0, whole.size() - 100))),
+              AllOf(HasSubstr("part.ts"), HasSubstr("truncated"), HasSubstr("188")));
+  EXPECT_FALSE(VideoFile(VideoPath("stream.ts")).Survey().frames.back().may_be_cut);
+  // The first packet of a frame, which needs more of them, has the time and no stuffing.
+  std::string first(kPacket, '\x11');
+  first.replace(0, 19, std::string("\x47\x41\x00\x30\x07\x10\0\0\0\0\0\0\0\0\x01\xE0\0\0\x80", 19));
+  EXPECT_TRUE(VideoFile(folder_.Put("cut.ts", whole + first)).Survey().frames.back().may_be_cut);
+  // One that states 4096 bytes is known to be incomplete.
+  first.replace(16, 2, std::string("\x10\0", 2));
+  EXPECT_THAT(Refusal(folder_.Put("stated.ts", whole + first)),
+              AllOf(HasSubstr("truncated"), HasSubstr("4102 bytes")));
+}
+
+// The frames of a damaged file that cannot be decoded are counted where they are missing.
+TEST_F(BrokenVideoTest, LostFramesArePlaced) {
+  SKIP_WITHOUT_VIDEO();
+  for (const std::string name : {"motion_jpeg.avi", "constant.mp4"}) {
+    EXPECT_EQ(VideoFile(VideoPath(name)).Survey().frames.back().lost_after, 0) << name;
+  }
+  // One frame has zeros in place of its tables and its bits.
+  std::string content = ContentOf(VideoPath("motion_jpeg.avi"));
+  std::size_t at = 0;
+  for (int i = 0; i < 6; ++i) at = content.find("\xFF\xD8", at + 1);
+  ASSERT_NE(at, std::string::npos);
+  const std::size_t end = content.find("\xFF\xD9", at);
+  ASSERT_NE(end, std::string::npos);
+  content.replace(at, end - at, std::string(end - at, '\0'));
+  const VideoSurvey survey = VideoFile(folder_.Put("lost.avi", content)).Survey();
+  std::size_t present = survey.frames.size();
+  for (const model::VideoFrame& frame : survey.frames)
+    present += static_cast<std::size_t>(frame.lost_before + frame.lost_after);
+  EXPECT_EQ(present, 12U);
+}
+
 TEST_F(BrokenVideoTest, FilesThatAreNoVideo) {
   const std::string text = folder_.Put("text.mp4", "this is a text, not a video\n");
   EXPECT_THAT(Refusal(text), AllOf(StartsWith(text), HasSubstr("a video is expected")));

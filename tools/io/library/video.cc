@@ -26,6 +26,7 @@ extern "C" {
 #include <limits>
 #include <memory>
 #include <mutex>
+#include <set>
 #include <utility>
 
 #include "tools/io/library/decoders.h"
@@ -273,6 +274,16 @@ class FfmpegVideo : public VideoDecoder {
     return false;
   }
 
+  // Some packets have no image of their own, such as the hidden frames of VP8: without an error
+  // none is lost.
+  VideoLosses Losses() const override {
+    VideoLosses losses;
+    if (!is_broken_) return losses;
+    losses.stamps.assign(pending_.begin(), pending_.end());
+    losses.without_stamp = std::max(pending_without_stamp_, 0);
+    return losses;
+  }
+
   bool Seek(std::int64_t stamp, std::string* why) override {
     const int code = av_seek_frame(format_.get(), stream_->index, stamp, AVSEEK_FLAG_BACKWARD);
     if (code < 0) {
@@ -282,6 +293,8 @@ class FfmpegVideo : public VideoDecoder {
     avcodec_flush_buffers(codec_.get());
     is_draining_ = false;
     lost_packet_ = false;
+    pending_.clear();
+    pending_without_stamp_ = 0;
     return true;
   }
 
@@ -410,6 +423,7 @@ class FfmpegVideo : public VideoDecoder {
         Feed();
       } else if (code == AVERROR_INVALIDDATA) {
         lost_packet_ = true;
+        is_broken_ = true;
       } else {
         throw Refusal("the decoder fails: " + ReasonOf(code));
       }
@@ -431,13 +445,30 @@ class FfmpegVideo : public VideoDecoder {
       }
       const bool is_meant = packet_->stream_index == stream_->index;
       const int sent = is_meant ? avcodec_send_packet(codec_.get(), packet_.get()) : 0;
+      if (is_meant && (packet_->flags & AV_PKT_FLAG_DISCARD) == 0) Expect(packet_->pts);
       av_packet_unref(packet_.get());
       if (sent == AVERROR(ENOMEM)) throw Refusal("no memory for its frames");
       // A packet that the decoder refuses: its frame is lost, and the next ones may depend on it.
-      if (sent < 0) lost_packet_ = true;
+      if (sent < 0) lost_packet_ = is_broken_ = true;
       if (is_meant && sent == 0) return;
     }
     throw Refusal("the decoder asks for data behind the end");
+  }
+
+  // A packet was given to the decoder, which returns its frame some packets later.
+  void Expect(std::int64_t stamp) {
+    if (stamp == AV_NOPTS_VALUE) {
+      ++pending_without_stamp_;
+    } else {
+      pending_.insert(stamp);
+    }
+  }
+  void TakeExpected(std::int64_t stamp) {
+    if (stamp == AV_NOPTS_VALUE) {
+      --pending_without_stamp_;
+    } else if (const auto found = pending_.find(stamp); found != pending_.end()) {
+      pending_.erase(found);
+    }
   }
 
   // All frames of a sweep are of one camera in one mode.
@@ -470,6 +501,8 @@ class FfmpegVideo : public VideoDecoder {
     stamp.is_damaged = (frame_->flags & AV_FRAME_FLAG_CORRUPT) != 0 ||
                        frame_->decode_error_flags != 0 || (lost_packet_ && !stamp.is_key);
     if (stamp.is_key) lost_packet_ = false;
+    is_broken_ = is_broken_ || stamp.is_damaged;
+    TakeExpected(frame_->pts);
     stamp.bytes = std::max(frame_->pkt_size, 0);
     stamp.digest = DigestOfPixels(*frame_);
     return stamp;
@@ -489,6 +522,11 @@ class FfmpegVideo : public VideoDecoder {
   bool is_draining_ = false;
   // Since the last key frame a packet was refused.
   bool lost_packet_ = false;
+  // The decoder has found an error anywhere.
+  bool is_broken_ = false;
+  // The stamps of packets whose frames have not come yet, and how many others have none.
+  std::multiset<std::int64_t> pending_;
+  int pending_without_stamp_ = 0;
 };
 
 }  // namespace

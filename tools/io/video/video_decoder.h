@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
 #include <string>
+#include <vector>
 
 #include "thicklens/io/image_file.h"
 
@@ -32,6 +33,12 @@ struct VideoStamp {
   std::uint64_t digest = 0;    // hash of all its decoded values
 };
 
+// The frames of which the file has bits and the decoder gave no image, because they are damaged.
+struct VideoLosses {
+  std::vector<std::int64_t> stamps;  // of those that have one, as VideoStamp::stamp
+  int without_stamp = 0;             // further ones
+};
+
 // The request that opens a video.
 struct VideoOpening {
   VideoKind kind = VideoKind::kIsoMedia;
@@ -53,6 +60,8 @@ class VideoDecoder {
   virtual Step Next(VideoStamp* stamp, std::string* why) = 0;
   // The pixels of that frame: CV_8U or CV_16U, grey or RGB.
   virtual bool Pixels(cv::Mat* pixels, std::string* why) = 0;
+  // The frames that were lost on the way from the first to the last one, without a jump.
+  virtual VideoLosses Losses() const = 0;
   // Goes to the key frame of that stamp. Next then returns frames that are shown at this time or
   // around it; the caller compares their stamps and digests.
   virtual bool Seek(std::int64_t stamp, std::string* why) = 0;

@@ -116,6 +116,7 @@ class VideoFile::Reader {
       frame.is_damaged = stamps_[i].is_damaged;
       survey.frames.push_back(frame);
     }
+    PlaceLosses(decoder_->Losses(), &survey.frames);
     survey.facts = FactsOf(0);
     const double frames = static_cast<double>(stamps_.size());
     survey.compression.bits_per_pixel = 8 * bytes /
@@ -125,6 +126,29 @@ class VideoFile::Reader {
     if (last && *last > 0)  // the last frame lasts as long as the others in the mean
       survey.compression.bits_per_second = 8 * bytes / (*last * frames / (frames - 1));
     return survey;
+  }
+
+  void PlaceLosses(const VideoLosses& losses, std::vector<model::VideoFrame>* frames) const {
+    for (const std::int64_t lost : losses.stamps) {
+      const auto next =
+          std::find_if(stamps_.begin(), stamps_.end(),
+                       [lost](const VideoStamp& stamp) { return stamp.stamp > lost; });
+      if (next == stamps_.end()) {
+        ++frames->back().lost_after;
+      } else {
+        ++(*frames)[static_cast<std::size_t>(next - stamps_.begin())].lost_before;
+      }
+    }
+    // Containers with an index have all packets, also damaged ones. In a stream, damage may hide
+    // whole frames.
+    const bool is_stream = kind_ == VideoKind::kTransportStream || kind_ == VideoKind::kRawMjpeg ||
+                           kind_ == VideoKind::kRawH264 || kind_ == VideoKind::kRawHevc;
+    const bool is_damaged_inside =
+        !losses.stamps.empty() ||
+        std::any_of(stamps_.begin(), stamps_.end() - 1,
+                    [](const VideoStamp& stamp) { return stamp.is_damaged; });
+    frames->back().is_count_doubtful = losses.without_stamp > 0 || (is_stream && is_damaged_inside);
+    frames->back().may_be_cut = MayBeCut(path_, kind_);
   }
 
   void Expect(const std::vector<int>& frames) {

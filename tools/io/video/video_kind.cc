@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <map>
 
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
@@ -128,6 +129,80 @@ void RequireWholeRiff(const std::string& path) {
   if (size + 8 > file.size()) RefuseTruncated(path, file.size(), "RIFF", size + 8);
 }
 
+constexpr std::size_t kTsPacket = 188;
+
+// The end of an elementary stream in MPEG-TS (ISO/IEC 13818-1).
+struct StreamEnd {
+  std::uint64_t stated = 0, found = 0;  // bytes of its last PES packet; 0: none is stated
+  bool is_filled_up = false;            // its last packet of 188 bytes has stuffing
+};
+
+// Whether an adaptation field, given from its length on, has stuffing: it fills up the last packet
+// of a frame.
+bool HasStuffing(const std::string& field) {
+  const std::size_t length = static_cast<std::uint8_t>(field[0]);
+  if (length == 0 || field.size() < 2) return true;
+  const unsigned flags = static_cast<std::uint8_t>(field[1]);
+  std::size_t used = 1;
+  if ((flags & 0x10U) != 0) used += 6;          // PCR
+  if ((flags & 0x08U) != 0) used += 6;          // OPCR
+  if ((flags & 0x04U) != 0) used += 1;          // splice countdown
+  for (const unsigned flag : {0x02U, 0x01U}) {  // private data, extension: with their lengths
+    if ((flags & flag) != 0 && used + 1 < field.size())
+      used += 1U + static_cast<std::uint8_t>(field[used + 1]);
+  }
+  return used == 1 || length > used;
+}
+
+// The ends of the streams of images, by their packet identifiers.
+std::map<unsigned, StreamEnd> EndsOfTransportStream(Peek* file) {
+  constexpr std::uint64_t kEnd = std::uint64_t{16} << 20;  // a frame is smaller
+  const std::uint64_t length = std::min(file->size(), kEnd) / kTsPacket * kTsPacket;
+  const std::uint64_t begin = (file->size() - length) / kTsPacket * kTsPacket;
+  const std::string bytes = file->Bytes(begin, static_cast<std::size_t>(length));
+  std::map<unsigned, StreamEnd> ends;
+  for (std::size_t at = 0; at + kTsPacket <= bytes.size(); at += kTsPacket) {
+    const auto byte = [&](std::size_t i) { return static_cast<std::uint8_t>(bytes[at + i]); };
+    if (byte(0) != 'G') continue;
+    const unsigned id = (byte(1) & 0x1FU) << 8 | byte(2);
+    const bool has_fill = (byte(3) & 0x20U) != 0, has_payload = (byte(3) & 0x10U) != 0;
+    const std::size_t payload = has_fill ? 5U + byte(4) : 4U;
+    if (!has_payload || payload >= kTsPacket) continue;
+    const bool begins = (byte(1) & 0x40U) != 0;
+    constexpr std::size_t kPesHeader = 6;
+    const bool is_video = begins && payload + kPesHeader <= kTsPacket &&
+                          Big(bytes, at + payload, 3) == 1 && (byte(payload + 3) & 0xF0U) == 0xE0;
+    if (is_video) {
+      ends[id] = {};
+      const std::uint64_t stated = Big(bytes, at + payload + 4, 2);
+      if (stated > 0) ends[id].stated = stated + kPesHeader;
+    }
+    const auto end = ends.find(id);
+    if (end == ends.end()) continue;
+    end->second.found += kTsPacket - payload;
+    end->second.is_filled_up = has_fill && HasStuffing(bytes.substr(at + 4, payload - 4));
+  }
+  return ends;
+}
+
+void RequireWholeTransportStream(const std::string& path) {
+  Peek file(path);
+  if (file.size() % kTsPacket != 0) {
+    throw Error(fmt::format(
+        "{}: the video is truncated: the file has {} bytes, and MPEG-TS has packets of {} bytes; "
+        "copy it again",
+        path, file.size(), kTsPacket));
+  }
+  for (const auto& [id, end] : EndsOfTransportStream(&file)) {
+    if (end.found >= end.stated) continue;
+    throw Error(
+        fmt::format("{}: the video is truncated: its last frame has {} bytes, and {} of them are "
+                    "there; copy it "
+                    "again",
+                    path, end.stated, end.found));
+  }
+}
+
 // A number of EBML: the leading zeros of its first byte say how many bytes follow. `is_size` keeps
 // the marker out of the value. Nothing for "unknown".
 std::optional<std::uint64_t> EbmlNumber(const std::string& bytes, std::size_t* at, bool is_size) {
@@ -187,6 +262,16 @@ void RequireWholeVideo(const std::string& path, VideoKind kind) {
   if (kind == VideoKind::kIsoMedia) RequireWholeBoxes(path);
   if (kind == VideoKind::kAvi) RequireWholeRiff(path);
   if (kind == VideoKind::kMatroska) RequireWholeSegment(path);
+  if (kind == VideoKind::kTransportStream) RequireWholeTransportStream(path);
+}
+
+bool MayBeCut(const std::string& path, VideoKind kind) {
+  if (kind != VideoKind::kTransportStream) return false;
+  Peek file(path);
+  const auto ends = EndsOfTransportStream(&file);
+  return std::any_of(ends.begin(), ends.end(), [](const auto& end) {
+    return end.second.stated == 0 && !end.second.is_filled_up;
+  });
 }
 
 }  // namespace thicklens::io

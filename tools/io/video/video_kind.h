@@ -17,6 +17,9 @@ constexpr int kVideoStart = 4096;
 // Throws Error that begins with `path` if the container states to be longer than the file, or has
 // no index because its recording was not finished.
 void RequireWholeVideo(const std::string& path, VideoKind kind);
+// Whether the file may end in the middle of a frame although nothing in it states its length:
+// MPEG-TS whose last packet is not filled up, as it is behind nearly all frames.
+bool MayBeCut(const std::string& path, VideoKind kind);
 
 }  // namespace thicklens::io
 

@@ -15,6 +15,13 @@ struct VideoFrame {
   std::optional<double> time_s;   // since the first frame; absent: the video states no times
   bool repeats_previous = false;  // its values are those of the frame before
   bool is_damaged = false;        // its bits contradict the codec
+  // Frames of which the file has bits but that cannot be decoded, shown before this one (since the
+  // one before) and, of the last frame, after it. They have no numbers.
+  int lost_before = 0, lost_after = 0;
+  // Of the last frame: the file may have had more frames, in places that are not known.
+  bool is_count_doubtful = false;
+  // Of the last frame: the file may end in the middle of one, and have been longer.
+  bool may_be_cut = false;
 };
 
 // Which frames of a video are used, and how the bench moved if no table says it.
