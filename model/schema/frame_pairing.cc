@@ -26,10 +26,28 @@ std::string Shortened(const std::string& text) {
   return text.size() <= kMost ? text : text.substr(0, kMost) + "...";
 }
 
+// With ASCII letters in lower case.
+std::string LowerCase(std::string text) {
+  for (char& c : text) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  return text;
+}
+
 // The last part of a path of any system.
 std::string NameIn(const std::string& path) {
   const std::size_t slash = path.find_last_of("/\\");
   return slash == std::string::npos ? path : path.substr(slash + 1);
+}
+
+std::optional<int> WholeNumber(const std::string& text) {
+  int value = 0;
+  const auto [end, status] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (status != std::errc() || end != text.data() + text.size() || value < 0) return std::nullopt;
+  return value;
+}
+
+bool HasOtherCapitals(const std::string& name, const std::string& image) {
+  const fs::path file = fs::path(image).filename();
+  return name != file.string() && name != file.stem().string();
 }
 
 class Images {
@@ -41,11 +59,13 @@ class Images {
       const fs::path name = fs::path(files[i]).filename();
       by_name_[name.string()].push_back(i);
       by_stem_[name.stem().string()].push_back(i);
+      by_lower_name_[LowerCase(name.string())].push_back(i);
+      by_lower_stem_[LowerCase(name.stem().string())].push_back(i);
     }
   }
 
   // Returns the image of the row. `is_by_name` is set if the row has a path that leads nowhere, and
-  // only its last part names an image.
+  // only its last part names an image, also with capitals and small letters exchanged.
   std::string Find(const FileReading& row, const std::string& table_folder, bool* is_by_name) {
     std::vector<std::string> paths = {(fs::path(table_folder) / row.file).string()};
     if (table_folder != folder_) paths.push_back((fs::path(folder_) / row.file).string());
@@ -99,17 +119,36 @@ class Images {
       found = &same->second;
     } else if (const auto stem = by_stem_.find(name); stem != by_stem_.end()) {
       found = &stem->second;  // the table leaves out the ending
+    } else if (const auto lower = by_lower_name_.find(LowerCase(name));
+               lower != by_lower_name_.end()) {
+      found = &lower->second;
+    } else if (const auto lower_stem = by_lower_stem_.find(LowerCase(name));
+               lower_stem != by_lower_stem_.end()) {
+      found = &lower_stem->second;
+    }
+    if (found == nullptr && WholeNumber(row.file)) {
+      throw Error(fmt::format(
+          "{}'{}' names no file in {}: numbers of frames are for a video or for the pages of one "
+          "file; the frames of a folder need the names of their files, in a column that "
+          "--file-column selects",
+          row.place, Shortened(row.file), folder_.empty() ? "." : folder_));
     }
     if (found == nullptr) {
       throw Error(fmt::format("{}the file '{}' is not in {}", row.place, Shortened(row.file),
                               folder_.empty() ? "." : folder_));
     }
     if (found->size() > 1) {
-      throw Error(fmt::format("{}'{}' may be {} or {}; write the name of its folder, too",
-                              row.place, Shortened(row.file), files_[(*found)[0]],
-                              files_[(*found)[1]]));
+      const std::string &one = files_[(*found)[0]], &other = files_[(*found)[1]];
+      const bool is_one_folder = fs::path(one).parent_path() == fs::path(other).parent_path();
+      const bool differs_by_case =
+          is_one_folder && LowerCase(NameIn(one)) == LowerCase(NameIn(other));
+      throw Error(fmt::format("{}'{}' may be {} or {}; write {}", row.place, Shortened(row.file),
+                              one, other,
+                              differs_by_case ? "its name with the capitals of the file"
+                              : is_one_folder ? "its ending, too"
+                                              : "the name of its folder, too"));
     }
-    *is_by_name = name != row.file;
+    *is_by_name = name != row.file || HasOtherCapitals(name, files_[found->front()]);
     return Normal(files_[found->front()]);
   }
 
@@ -118,6 +157,7 @@ class Images {
   fs::path here_;
   std::map<std::string, std::size_t> by_path_, canonical_;
   std::map<std::string, std::vector<std::size_t>> by_name_, by_stem_;
+  std::map<std::string, std::vector<std::size_t>> by_lower_name_, by_lower_stem_;
 };
 
 // The path without its ending.
@@ -128,13 +168,6 @@ struct RowPage {
   int number = 0;
   bool is_index = false;  // "stack.tif[3]"
 };
-
-std::optional<int> WholeNumber(const std::string& text) {
-  int value = 0;
-  const auto [end, status] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (status != std::errc() || end != text.data() + text.size() || value < 0) return std::nullopt;
-  return value;
-}
 
 // Nothing if the row names no page of the file `name`.
 std::optional<RowPage> FindPageOfRow(const FileReading& row, const std::string& name) {
@@ -176,6 +209,7 @@ std::vector<SweepFrame> PairFrames(const ReadingSet& readings,
   std::map<std::string, const FileReading*> row_of;
   std::size_t by_name = 0;
   const FileReading* first_by_name = nullptr;
+  std::string first_image;
   for (const FileReading& row : readings.rows) {
     if (frames.size() % 4096 == 0) ThrowIfCancelled();
     bool is_by_name = false;
@@ -187,7 +221,10 @@ std::vector<SweepFrame> PairFrames(const ReadingSet& readings,
                               Shortened(row.file),
                               known->second->place.substr(0, known->second->place.size() - 2)));
     }
-    if (is_by_name && by_name++ == 0) first_by_name = &row;
+    if (is_by_name && by_name++ == 0) {
+      first_by_name = &row;
+      first_image = path;
+    }
     frames.push_back({path, row.reading_mm});
   }
   std::set<std::string> stems;
@@ -209,9 +246,10 @@ std::vector<SweepFrame> PairFrames(const ReadingSet& readings,
   }
   if (by_name > 0 && notices != nullptr) {
     notices->push_back(fmt::format(
-        "{}'{}' does not exist{}; the image of the same name in {} is used", first_by_name->place,
+        "{}'{}' does not exist{}; the image of the same name{} in {} is used", first_by_name->place,
         Shortened(first_by_name->file),
         by_name > 1 ? fmt::format(", nor do the paths of {} more rows", by_name - 1) : "",
+        HasOtherCapitals(NameIn(first_by_name->file), first_image) ? " with other capitals" : "",
         folder.empty() ? "." : folder));
   }
   if (!of_other_kind.empty() && notices != nullptr) {

@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <filesystem>
+#include <fstream>
+#include <map>
 #include <system_error>
 #include <utility>
 
@@ -65,18 +67,24 @@ void ApplyOverrides(const SweepOverrides& overrides, const RunScope& run, model:
   if (overrides.target) file->target = *overrides.target;
 }
 
+// By its content: a name may be wrong, and a stream of Motion JPEG begins as its first frame does.
 bool IsJpeg(const std::string& path) {
-  std::string ending = fs::path(path).extension().string();
-  for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return ending == ".jpg" || ending == ".jpeg";
+  std::ifstream file(path, std::ios::binary);
+  std::array<char, 3> start{};
+  file.read(start.data(), start.size());
+  return file && start == std::array<char, 3>{'\xFF', '\xD8', '\xFF'} && !io::IsVideoFile(path);
 }
 
 // Compression removes fine detail, which looks like blur, and a fit of the frames alone cannot
 // separate the two: on a simulated sweep with 1 px of blur, quality 90 changes kappa by 1 %.
 void NoteCompression(const std::vector<model::SweepFrame>& frames,
                      std::vector<std::string>* notices) {
+  std::map<std::string, bool> is_jpeg;  // a file may have many frames
+  for (const model::SweepFrame& frame : frames) {
+    if (is_jpeg.count(frame.image) == 0) is_jpeg.emplace(frame.image, IsJpeg(frame.image));
+  }
   const auto jpegs = std::count_if(frames.begin(), frames.end(),
-                                   [](const auto& frame) { return IsJpeg(frame.image); });
+                                   [&](const auto& frame) { return is_jpeg.at(frame.image); });
   if (jpegs == 0) return;
   notices->push_back(
       fmt::format("{} of {} frames are JPEG files: compression removes fine detail as blur does, "

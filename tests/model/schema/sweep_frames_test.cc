@@ -222,6 +222,29 @@ TEST_F(SweepFolder, FieldsThatSelectTheColumns) {
               AllOf(HasSubstr("s.yaml:3:"), HasSubstr("--column")));
 }
 
+TEST_F(SweepFolder, NamesWithOtherCapitalsAndWithoutEndings) {
+  folder_.Put("k/FRAME_0.PNG");
+  folder_.Put("k/Frame_1.png");
+  folder_.Put("k.csv", "file,z\nframe_0.png,1\nframe_1,2\n");
+  const SweepFile sweep = Read("frames_dir: k\nframes_csv: k.csv\n");
+  ASSERT_THAT(sweep.frames, SizeIs(2));
+  EXPECT_EQ(sweep.frames[0].image, folder_ / "k/FRAME_0.PNG");
+  EXPECT_EQ(sweep.frames[1].image, folder_ / "k/Frame_1.png");
+  EXPECT_THAT(notices_, Contains(HasSubstr("of the same name with other capitals")));
+  folder_.Put("k/FRAME_1.png");
+  EXPECT_THAT(ErrorWith("frames_dir: k\nframes_csv: k.csv\n"),
+              AllOf(HasSubstr("'frame_1' may be"), HasSubstr("capitals")));
+  // A camera that saves each photograph twice.
+  folder_.Put("p/a.CR2");
+  folder_.Put("p/a.JPG");
+  folder_.Put("p.csv", "file,z\na,1\n");
+  EXPECT_THAT(ErrorWith("frames_dir: p\nframes_csv: p.csv\n"),
+              AllOf(HasSubstr("write its ending, too")));
+  folder_.Put("p.csv", "frame,z\n0,1\n");
+  EXPECT_THAT(ErrorWith("frames_dir: p\nframes_csv: p.csv\n"),
+              AllOf(HasSubstr("'0' names no file"), HasSubstr("numbers of frames")));
+}
+
 TEST_F(SweepFolder, ReadingsFromTheNames) {
   folder_.Put("n/z-10um.png");
   folder_.Put("n/z10um.png");

@@ -76,13 +76,16 @@ TEST_F(SweepInputTest, FloorFromAnUnfitCameraIsRefused) {
 
 TEST_F(SweepInputTest, CompressedFramesAreReported) {
   EXPECT_THAT(ReadSweepInput(arguments_).notices, Not(Contains(HasSubstr("JPEG"))));
-  folder_.Put("b.JPG");
-  folder_.Put("c.jpeg");
+  folder_.Put("b.JPG", "\xFF\xD8\xFF");
+  folder_.Put("c.jpeg", "\xFF\xD8\xFF");
   folder_.Put("sweep.yaml",
               "schema: thicklens/sweep/1\ncamera: camera.yaml\nframes: [{image: a.png, reading_mm: "
               "1}, {image: b.JPG, reading_mm: 2}, {image: c.jpeg, reading_mm: 3}]\n");
   EXPECT_THAT(ReadSweepInput(arguments_).notices,
               Contains(StartsWith("2 of 3 frames are JPEG files")));
+  folder_.Put("b.JPG", "\x89PNG");  // a name says nothing
+  EXPECT_THAT(ReadSweepInput(arguments_).notices,
+              Contains(StartsWith("1 of 3 frames are JPEG files")));
 }
 
 // The file may leave it out where the command line states it.
