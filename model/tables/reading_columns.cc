@@ -179,7 +179,8 @@ bool IsDigits(const std::string& word) {
 }
 
 // Whether the word is known and no unit.
-bool IsPlain(const std::string& word) {
+bool IsPlain(const std::string& text) {
+  const std::string word = text.substr(0, text.find_last_not_of("0123456789") + 1);  // "z1"
   return PlainWords().count(word) > 0 || ReadingWords().count(word) > 0 ||
          FileWords().count(word) > 0 || OtherWords().count(word) > 0 || TimeWords().count(word) > 0;
 }
@@ -479,7 +480,8 @@ class Finder {
       throw Error(fmt::format("{}several columns name files: {}; --file-column selects one",
                               Place(), List(named.empty() ? files : named)));
     }
-    const auto texts = Select(All(), [&](std::size_t column) { return IsMost(texts_[column]); });
+    const auto texts = Select(
+        All(), [&](std::size_t column) { return IsMost(texts_[column]) && !IsUnits(column); });
     auto named = Select(texts, has_file_name);
     if (named.size() == 1) return named.front();
     if (texts.size() == 1 && named.empty()) return texts.front();
@@ -487,10 +489,12 @@ class Finder {
     named = Select(All(), has_file_name);
     if (named.size() == 1) return named.front();
     if (found_.width <= 2) return 0;
-    throw Error(
-        fmt::format("{}no column names the files of the images; --file-column selects one of "
-                    "{}",
-                    Place(), List(All())));
+    throw Error(fmt::format(
+        "{}no column names the files of the images; the table has {}; {}", Place(), List(All()),
+        texts.empty()
+            ? "a column with their names is needed (a table by time, or by the numbers of "
+              "frames, is for a video)"
+            : "--file-column selects one of them"));
   }
 
   // How likely the column is the reading: 0 the least likely.

@@ -162,10 +162,17 @@ Choice ChooseByName(const json& frame, const std::string& place,
     throw Error(
         fmt::format("{}which is the reading, {}? --column selects it", place, List(readings)));
   }
+  std::string texts;
+  for (const auto& [key, value] : frame.items()) {
+    if (value.is_string() && model::UnitOfReadingName(key)) {
+      texts = fmt::format("'{}' is the text \"{}\": write a number without quotation marks; ",
+                          Shown(key), Shown(value.get<std::string>()));
+    }
+  }
   throw Error(fmt::format(
-      "{}no number is named as a position (ZPositionUm, LensPosition, z, position, focus ...); "
+      "{}{}no number is named as a position (ZPositionUm, LensPosition, z, position, focus ...); "
       "--column selects one of {}",
-      place, fields.empty() ? "none" : List(fields)));
+      place, texts, fields.empty() ? "none" : List(fields)));
 }
 
 Choice Choose(const json& frame, const std::string& place, const model::ReadingOptions& options) {
@@ -264,6 +271,57 @@ std::vector<Frame> FramesOfList(const json& list, const std::string& path,
   return frames;
 }
 
+// {"frames": [{"file": .., "z": ..}, ..]}: the only list of objects that name files. Null: there is
+// none.
+const json* ListIn(const json& object, const std::string& path,
+                   const model::ReadingOptions& options) {
+  const json* found = nullptr;
+  std::string name;
+  const auto has_file = [&](const json& one) {
+    const auto fields = one.items();
+    return one.is_object() && std::any_of(fields.begin(), fields.end(), [&](const auto& field) {
+             return field.value().is_string() &&
+                    (options.file_column.empty() ? model::IsNameOfFiles(field.key())
+                                                 : field.key() == options.file_column);
+           });
+  };
+  for (const auto& [key, value] : object.items()) {
+    if (!value.is_array() || value.empty() || !has_file(value.front())) continue;
+    if (found != nullptr) {
+      throw Error(fmt::format("{}: the lists '{}' and '{}' may have the frames; write one of them",
+                              path, Shown(name), Shown(key)));
+    }
+    found = &value;
+    name = key;
+  }
+  return found;
+}
+
+// {"a.png": 95.5, ..} as a list of objects.
+json ListOfPairs(const json& object) {
+  json list = json::array();
+  for (const auto& [key, value] : object.items()) {
+    if (value.is_number() && fs::path(key).extension().string().size() > 1)
+      list.push_back({{"file", key}, {"reading", value}});
+  }
+  return list;
+}
+
+// Whether every line that is not empty is an object (JSON Lines); they become a list.
+bool ParseLines(const std::string& text, json* list) {
+  *list = json::array();
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    const std::string line = text.substr(begin, end - begin);
+    begin = end + 1;
+    if (line.find_first_not_of(" \t\r") == std::string::npos) continue;
+    json one = json::parse(line, nullptr, false);
+    if (!one.is_object()) return false;
+    list->push_back(std::move(one));
+  }
+  return list->size() > 1;
+}
+
 [[noreturn]] void RefuseJson(const std::string& text, std::size_t at, const std::string& path,
                              const json::exception& error) {
   // "[json.exception.parse_error.101] parse error at line 1, column 2: WHY"
@@ -281,6 +339,8 @@ json Parsed(const std::string& text, const std::string& path, model::ReadingSet*
   try {
     return json::parse(text);
   } catch (const json::parse_error& error) {
+    json lines;
+    if (ParseLines(text, &lines)) return lines;
     const json completed = json::parse(text + "}", nullptr, false);
     if (completed.is_discarded()) RefuseJson(text, error.byte, path, error);
     set->notices.push_back(path + ": the last brace is missing (the recording was aborted?)");
@@ -301,8 +361,14 @@ model::ReadingSet ReadingsOfJson(const std::string& text, const std::string& pat
   set.source = path;
   set.folder = fs::path(path).parent_path().string();
   const json parsed = Parsed(text, path, &set);
-  const std::vector<Frame> frames =
+  std::vector<Frame> frames =
       parsed.is_array() ? FramesOfList(parsed, path, options) : FramesOfObject(parsed, path);
+  json pairs;  // the frames point into it
+  if (frames.empty() && parsed.is_object()) {
+    pairs = ListOfPairs(parsed);
+    const json* const list = pairs.empty() ? ListIn(parsed, path, options) : &pairs;
+    if (list != nullptr) frames = FramesOfList(*list, path, options);
+  }
   if (frames.empty()) {
     const bool is_plan = parsed.is_object() && parsed.contains("z_plan");
     throw Error(fmt::format(

@@ -143,6 +143,20 @@ TEST_F(Readings, OfAListOfObjects) {
               AllOf(HasSubstr("no number is named as a position"), HasSubstr("'gain'")));
 }
 
+TEST_F(Readings, OtherLayoutsOfJson) {
+  const auto expected = ElementsAre(DoubleEq(0.005), DoubleEq(0.006));
+  EXPECT_THAT(Values(Table("l.json",
+                           "{\"file\": \"a.png\", \"z_um\": 5}\n"
+                           "{\"file\": \"b.png\", \"z_um\": 6}\n")),
+              expected);
+  EXPECT_THAT(Values(Table("l.json", R"({"lens": "x", "frames": [{"file": "a.png", "z_um": 5},
+                                                                 {"file": "b.png", "z_um": 6}]})")),
+              expected);
+  EXPECT_THAT(Values(Table("l.json", R"({"a.png": 5, "b.png": 6, "unit": "um"})")), expected);
+  EXPECT_THAT(Refusal("l.json", R"([{"file": "a.png", "z_um": "5,5"}])"),
+              AllOf(HasSubstr("'z_um' is the text"), HasSubstr("5,5")));
+}
+
 TEST_F(Readings, UnitsBesideTheNumbersOfJson) {
   EXPECT_THAT(Values(Table("l.json", R"([{"file": "a.png", "z": 290000, "unit": "um"},
                                          {"file": "b.png", "z": 290100, "unit": "microns"}])")),
