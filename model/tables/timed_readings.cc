@@ -70,8 +70,24 @@ std::optional<std::int64_t> DigitsIn(const std::string& text) {
   return value;
 }
 
-// "10:20:30.5", "20:30.5" (minutes and seconds), with a point or a comma.
-std::optional<double> SecondsOfClock(const std::string& text) {
+// "AM" or "PM" at the end, which is removed; 0 without one.
+char TakeHalfOfDay(std::string* clock) {
+  std::string end;
+  std::size_t at = clock->size();
+  while (at > 0 && clock->size() - at < 6 &&
+         std::isdigit(static_cast<unsigned char>((*clock)[at - 1])) == 0) {
+    const char c = (*clock)[--at];
+    if (c != '.' && c != ' ') end += static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+  }
+  if (end != "MA" && end != "MP") return 0;  // from its end
+  clock->erase(at);
+  return end[1];
+}
+
+// "10:20:30.5", "20:30.5" (minutes and seconds), "10:20:30 PM", with a point or a comma.
+std::optional<double> SecondsOfClock(std::string text) {
+  const char half = TakeHalfOfDay(&text);
+  if (half != 0 && std::count(text.begin(), text.end(), ':') == 1) text += ":00";  // "10:20 PM"
   std::vector<std::string> parts(1);
   for (const char c : text) {
     if (c == ':') {
@@ -85,7 +101,10 @@ std::optional<double> SecondsOfClock(const std::string& text) {
   for (std::size_t i = 0; i + 1 < parts.size(); ++i) {
     const auto whole = DigitsIn(parts[i]);
     if (!whole || (i > 0 && *whole > 59)) return std::nullopt;
-    seconds = 60 * (seconds + static_cast<double>(*whole));
+    if (half != 0 && i == 0 && (*whole < 1 || *whole > 12)) return std::nullopt;
+    const bool is_hour = half != 0 && i == 0;
+    const std::int64_t number = !is_hour ? *whole : *whole % 12 + (half == 'P' ? 12 : 0);
+    seconds = 60 * (seconds + static_cast<double>(number));
   }
   const std::string& last = parts.back();
   const bool begins_with_digit =
@@ -114,9 +133,26 @@ std::optional<double> TakeZone(std::string* clock) {
   return way * static_cast<double>(hours * 3600 + minutes * 60);
 }
 
-// "2026-11-27T10:20:30.5+01:00"
-std::optional<double> SecondsOfDate(const std::string& text) {
+// "27.11.2026 10:20:30,5" with the date as "2026-11-27"; other texts as they are. Between slashes
+// the day and the month may be exchanged.
+std::string WithIsoDate(const std::string& text) {
+  const std::size_t first = text.find('.');
+  const std::size_t second = first == std::string::npos ? first : text.find('.', first + 1);
+  if (second == std::string::npos || first == 0 || first > 2 || second - first < 2 ||
+      second - first > 3 || second + 5 >= text.size() || text[second + 5] != ' ') {
+    return text;
+  }
+  const auto two = [](const std::string& digits) {
+    return digits.size() < 2 ? "0" + digits : digits;
+  };
+  return text.substr(second + 1, 4) + "-" + two(text.substr(first + 1, second - first - 1)) + "-" +
+         two(text.substr(0, first)) + text.substr(second + 5);
+}
+
+// "2026-11-27T10:20:30.5+01:00", "27.11.2026 10:20:30"
+std::optional<double> SecondsOfDate(const std::string& stated) {
   constexpr std::size_t kDate = 10;
+  const std::string text = WithIsoDate(stated);
   if (text.size() <= kDate || text[4] != text[7]) return std::nullopt;
   if (text[4] != '-' && text[4] != '/') return std::nullopt;
   if (text[kDate] != 'T' && text[kDate] != ' ' && text[kDate] != 't') return std::nullopt;
@@ -149,6 +185,27 @@ std::optional<double> Seconds(const std::string& cell, char mark, double seconds
   if (!unit) return std::nullopt;
   *is_stated = true;
   return *value * *unit;
+}
+
+// What is wrong with times of usual layouts that are not read; empty: nothing is known of it.
+std::string WhyNoTime(const std::string& cell) {
+  const auto count = [&](const char* marks) {
+    return std::count_if(cell.begin(), cell.end(),
+                         [&](char c) { return std::string(marks).find(c) != std::string::npos; });
+  };
+  const bool begins_with_digit =
+      !cell.empty() && std::isdigit(static_cast<unsigned char>(cell[0])) != 0;
+  const std::size_t space = cell.find_first_of(" T");
+  if (count(":") == 3 || (count(":") == 2 && count(";") == 1)) {
+    return ": a time code counts frames behind its last mark; write seconds with a fraction "
+           "(hh:mm:ss.f)";
+  }
+  const std::string date = cell.substr(0, space);
+  const auto dashes =
+      std::count(date.begin(), date.end(), '/') + std::count(date.begin(), date.end(), '-');
+  if (begins_with_digit && dashes == 2 && date.find_first_of("/-") < 3)
+    return ": its day and its month may be exchanged; write the year first (2026-11-27)";
+  return "";
 }
 
 std::string List(const ReadingColumns& columns, const std::vector<std::size_t>& of) {
@@ -235,8 +292,8 @@ TimedReadingSet TimedReadingsOfTable(const std::string& bytes, const std::string
     if (!seconds) {
       throw Error(fmt::format(
           "{}a time is expected (a number, mm:ss.f, hh:mm:ss.f, or a date and a time such as "
-          "2026-11-27T10:20:30.5), found '{}'",
-          row.place, Shown(row.file)));
+          "2026-11-27T10:20:30.5), found '{}'{}",
+          row.place, Shown(row.file), WhyNoTime(row.file)));
     }
     set.rows.push_back({*seconds, row.reading_mm, row.place});
   }

@@ -76,6 +76,21 @@ TEST(TimedReadings, ClocksAndDates) {
   }
 }
 
+TEST(TimedReadings, OtherClocksAndDates) {
+  EXPECT_THAT(SecondsOfTime("12:00:01 AM"), Optional(DoubleEq(1)));
+  EXPECT_THAT(SecondsOfTime("1:20:30.5 pm"), Optional(DoubleEq(48030.5)));
+  EXPECT_THAT(SecondsOfTime("12:30 p.m."), Optional(DoubleEq(45000)));
+  EXPECT_THAT(SecondsOfTime("02.01.1970 00:00:01,5"), Optional(DoubleEq(86401.5)));
+  EXPECT_THAT(SecondsOfTime("2.1.1970 1:00:00 PM"), Optional(DoubleEq(86400.0 + 46800)));
+  for (const std::string wrong :
+       {"13:00:00 PM", "0:10:00 AM", "10:20:30 XM", "01/02/2026 10:20:30", "32.01.2026 10:00:00"}) {
+    EXPECT_FALSE(SecondsOfTime(wrong)) << wrong;
+  }
+  EXPECT_THAT(ErrorOf([] { TimesOf("time,z_mm\n01/02/2026 10:20:30,1\n"); }),
+              HasSubstr("may be exchanged"));
+  EXPECT_THAT(ErrorOf([] { TimesOf("time,z_mm\n10:20:30:05,1\n"); }), HasSubstr("time code"));
+}
+
 TEST(TimedReadings, SeveralColumnsAreChosenByOptions) {
   const std::string both = "frame,time_s,z_mm\n0,0,1\n1,0.1,2\n";
   EXPECT_THAT(ErrorOf([&] { HasTimes(both, "t.csv", {}); }),

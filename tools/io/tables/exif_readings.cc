@@ -183,8 +183,11 @@ model::ReadingSet ReadingsOfExif(const std::vector<std::string>& files,
       throw Error(fmt::format(
           "{}{}; a focus distance in EXIF or XMP ({}) is expected, or the key that --column names",
           place,
-          key.empty() ? "EXIF and XMP state no finite focus distance"
-                      : fmt::format("{} is missing, which {} has", key, files.front()),
+          key.empty()
+              ? "EXIF and XMP state no finite focus distance"
+              : fmt::format("{} has no finite number here (it is missing or infinite), and {} "
+                            "has one",
+                            key, files.front()),
           "SubjectDistance, ApproximateFocusDistance, LensPosition"));
     }
     if (!value) {
