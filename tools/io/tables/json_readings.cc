@@ -297,6 +297,30 @@ const json* ListIn(const json& object, const std::string& path,
   return found;
 }
 
+// By the values of the numbers in them: FrameKey-0-0-2 is before FrameKey-0-0-10, in which order
+// they were recorded.
+bool IsNaturallyBefore(const std::string& one, const std::string& other) {
+  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
+  std::size_t i = 0, k = 0;
+  while (i < one.size() && k < other.size()) {
+    if (!is_digit(one[i]) || !is_digit(other[k])) {
+      if (one[i] != other[k]) return one[i] < other[k];
+      ++i, ++k;
+      continue;
+    }
+    const auto number = [&](const std::string& text, std::size_t* at) {
+      const std::size_t begin = std::min(text.find_first_not_of('0', *at), text.size());
+      *at = begin;
+      while (*at < text.size() && is_digit(text[*at])) ++*at;
+      return text.substr(begin, *at - begin);
+    };
+    const std::string left = number(one, &i), right = number(other, &k);
+    if (left.size() != right.size()) return left.size() < right.size();
+    if (left != right) return left < right;
+  }
+  return one.size() - i < other.size() - k;
+}
+
 // {"a.png": 95.5, ..} as a list of objects.
 json ListOfPairs(const json& object) {
   json list = json::array();
@@ -304,6 +328,9 @@ json ListOfPairs(const json& object) {
     if (value.is_number() && fs::path(key).extension().string().size() > 1)
       list.push_back({{"file", key}, {"reading", value}});
   }
+  std::sort(list.begin(), list.end(), [](const json& one, const json& other) {
+    return IsNaturallyBefore(one["file"], other["file"]);
+  });
   return list;
 }
 
@@ -377,6 +404,11 @@ model::ReadingSet ReadingsOfJson(const std::string& text, const std::string& pat
                   "has what was recorded"
                 : "keys FrameKey-... or Metadata-... (Micro-Manager), names of files, or a list of "
                   "objects with 'file' are expected"));
+  }
+  if (parsed.is_object() && pairs.is_null()) {
+    std::stable_sort(frames.begin(), frames.end(), [](const Frame& one, const Frame& other) {
+      return IsNaturallyBefore(one.name, other.name);
+    });
   }
   std::optional<Choice> choice;
   std::map<std::string, std::string> known;

@@ -157,6 +157,19 @@ TEST_F(Readings, OtherLayoutsOfJson) {
               AllOf(HasSubstr("'z_um' is the text"), HasSubstr("5,5")));
 }
 
+// Objects of JSON have no order: the numbers in their names give it.
+TEST_F(Readings, FramesOfObjectsAreInTheOrderOfTheirNumbers) {
+  std::string text = "{";
+  for (const int i : {9, 10, 11, 100}) {
+    text += (text.size() > 1 ? ", " : "") + std::string("\"FrameKey-0-0-") + std::to_string(i) +
+            "\": {\"FileName\": \"a" + std::to_string(i) +
+            ".tif\", \"ZPositionUm\": " + std::to_string(i) + "}";
+  }
+  EXPECT_THAT(Values(Table("metadata.txt", text + "}")),
+              ElementsAre(DoubleEq(0.009), DoubleEq(0.01), DoubleEq(0.011), DoubleEq(0.1)));
+  EXPECT_THAT(Values(Table("l.json", R"({"z10.png": 3, "z9.png": 2})")), ElementsAre(2, 3));
+}
+
 TEST_F(Readings, UnitsBesideTheNumbersOfJson) {
   EXPECT_THAT(Values(Table("l.json", R"([{"file": "a.png", "z": 290000, "unit": "um"},
                                          {"file": "b.png", "z": 290100, "unit": "microns"}])")),
