@@ -179,10 +179,26 @@ class Reader {
   }
 
   // The unit behind the numbers must be the same in all rows, and that of the header if both exist.
+  // "11 1/2", as tapes in inches have it.
+  static bool HasFraction(const std::string& text) {
+    const std::size_t slash = text.find('/');
+    return slash != std::string::npos && slash > 0 && slash + 1 < text.size() &&
+           std::isdigit(static_cast<unsigned char>(text[slash - 1])) != 0 &&
+           std::isdigit(static_cast<unsigned char>(text[slash + 1])) != 0;
+  }
+
   void FindUnitOfCells() {
     const ReadingCell& first = cells_.front();
     for (const ReadingCell& cell : cells_) {
       if (!cell.number.unit.empty() && !FindUnit(cell.number.unit)) {
+        if (HasFraction(cell.text)) {
+          throw Error(
+              fmt::format("{}the reading of '{}' must be a decimal number, found the fraction '{}' "
+                          "in {}; write "
+                          "11.5 and not 11 1/2",
+                          Place(cell.line), Shown(cell.file), Shown(cell.text),
+                          ColumnText(columns_, columns_.reading)));
+        }
         if (columns_.unit_column) {
           throw Error(fmt::format("{}'{}' in {} is no known unit; state the unit by --unit ({})",
                                   Place(cell.line), Shown(cell.number.unit),

@@ -244,6 +244,14 @@ TEST(ReadingsTable, MoreUnitsOfHeaders) {
   }
 }
 
+TEST(ReadingsTable, FractionsAreNamed) {
+  for (const char* text : {"11 1/2", "11-1/2 in", "1/2"}) {
+    EXPECT_THAT(Refusal("file,z\na.png," + std::string(text) + "\n"),
+                AllOf(StartsWith("bench/t.csv:2: "), HasSubstr("the fraction"), HasSubstr(text)))
+        << text;
+  }
+}
+
 TEST(ReadingsTable, UnitsInTheirOwnColumn) {
   for (const char* header :
        {"file,value,unit", "file,Position,Unit", "file,z,Einheit", "file,z,z unit"}) {

@@ -288,6 +288,12 @@ TEST_F(BrokenVideoTest, FilesThatAreNoVideo) {
   fs::copy_file(std::string(THICKLENS_SOURCE_DIR) + "/tests/data/images/srgb.png",
                 folder_ / "image.mp4");
   EXPECT_THAT(Refusal(folder_ / "image.mp4"), HasSubstr("it is a file of the kind PNG"));
+  EXPECT_THAT(Refusal(folder_.Put("v.y4m", "YUV4MPEG2 W48 H32 F10:1\nFRAME\n")),
+              AllOf(HasSubstr("YUV4MPEG2"), HasSubstr("ffv1")));
+  EXPECT_THAT(Refusal(folder_.Put("v.yuv", std::string(4608, '\x80'))), HasSubstr("-video_size"));
+  EXPECT_THAT(Refusal(folder_.Put("v.gif", "GIF89a")), HasSubstr("256 colours"));
+  for (const char* name : {"a.y4m", "a.YUV", "a.gif", "a.264", "a.265"})
+    EXPECT_TRUE(IsNameOfVideo(name)) << name;
   EXPECT_THAT(Refusal(folder_.Put("empty.mp4")), HasSubstr("empty"));
   EXPECT_NE(Refusal(folder_ / "missing.mp4"), "(no error)");
   EXPECT_NE(Refusal(folder_.path()), "(no error)");

@@ -44,12 +44,36 @@ std::string StartOf(const std::string& path) {
   return start;
 }
 
+std::string LowerCaseEnding(const std::string& path) {
+  std::string ending = std::filesystem::path(path).extension().string();
+  for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return ending;
+}
+
+// How a kind of video that is not read becomes one that is, without loss; empty: it is no such
+// kind.
+std::string ConversionOf(const std::string& start, const std::string& path) {
+  if (start.rfind("YUV4MPEG2 ", 0) == 0)
+    return "it is a YUV4MPEG2 file (y4m); write it as ffmpeg -i FILE -c:v ffv1 NEW.mkv does";
+  if (start.rfind("GIF8", 0) == 0) {
+    return "it is a GIF file, whose frames have at most 256 colours; use the recording that it was "
+           "made from";
+  }
+  if (LowerCaseEnding(path) == ".yuv") {
+    return "values alone do not state their size and kind; state them to ffmpeg (-f rawvideo "
+           "-pixel_format .. -video_size .. -framerate .. -i FILE -c:v ffv1 NEW.mkv)";
+  }
+  return "";
+}
+
 VideoKind RequireVideoKind(const std::string& path) {
   ReportInput(path);
   RequireRegularFile(path);
   const std::string start = StartOf(path);
   if (start.empty()) throw Error(fmt::format("{}: the video is empty or cannot be read", path));
   if (const auto kind = KindOfVideo(start, path)) return *kind;
+  if (const std::string conversion = ConversionOf(start, path); !conversion.empty())
+    throw Error(fmt::format("{}: this kind of video is not read: {}", path, conversion));
   const auto image = KindOfImage(start);
   const std::string other = image ? NameOf(*image) : NameOfOtherKind(start);
   throw Error(fmt::format(
@@ -68,12 +92,10 @@ void RequireMemoryOfFrame(double width_px, double height_px, double bytes_per_px
 }  // namespace
 
 bool IsNameOfVideo(const std::string& path) {
-  static const std::set<std::string> kEndings = {".mp4",  ".m4v",  ".mov",  ".mkv",  ".webm",
-                                                 ".avi",  ".ts",   ".m2ts", ".mts",  ".mjpeg",
-                                                 ".mjpg", ".h264", ".avc",  ".hevc", ".h265"};
-  std::string ending = std::filesystem::path(path).extension().string();
-  for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return kEndings.count(ending) > 0;
+  static const std::set<std::string> kEndings = {
+      ".mp4",  ".m4v",  ".mov", ".mkv", ".webm", ".avi",  ".ts",  ".m2ts", ".mts", ".mjpeg",
+      ".mjpg", ".h264", ".avc", ".264", ".hevc", ".h265", ".265", ".y4m",  ".yuv", ".gif"};
+  return kEndings.count(LowerCaseEnding(path)) > 0;
 }
 
 bool IsVideoFile(const std::string& path) {

@@ -242,8 +242,8 @@ void RequireWholeSegment(const std::string& path) {
 std::optional<VideoKind> KindOfVideo(const std::string& start, const std::string& path) {
   const std::string ending = LowerEnding(path);
   static const std::array<const char*, 2> kMjpeg = {".mjpeg", ".mjpg"};
-  static const std::array<const char*, 2> kH264 = {".h264", ".avc"};
-  static const std::array<const char*, 2> kHevc = {".hevc", ".h265"};
+  static const std::array<const char*, 3> kH264 = {".h264", ".avc", ".264"};
+  static const std::array<const char*, 3> kHevc = {".hevc", ".h265", ".265"};
   if (HasTextAt(start, 0, "\xFF\xD8\xFF") && IsOneOf(ending, kMjpeg)) return VideoKind::kRawMjpeg;
   if (KindOfImage(start)) return std::nullopt;  // HEIF has the boxes of MP4
   if (IsIsoVideo(start)) return VideoKind::kIsoMedia;
