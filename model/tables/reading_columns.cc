@@ -146,24 +146,23 @@ struct ColumnName {
 // Words of names that describe a value or a device and are no unit: "z (absolute)", "Z stage".
 const Words& PlainWords() {
   static const Words words = {
-      "abs",      "absolute",    "absolut",    "rel",    "relative",   "relativ",   "raw",
-      "corr",     "corrected",   "cal",        "calib",  "calibrated", "nominal",   "actual",
-      "target",   "set",         "setpoint",   "cmd",    "command",    "commanded", "meas",
-      "measured", "measurement", "true",       "real",   "avg",        "average",   "median",
-      "value",    "values",      "val",        "wert",   "valeur",     "valor",     "start",
-      "end",      "begin",       "first",      "last",   "before",     "after",     "max",
-      "new",      "old",         "current",    "final",  "initial",    "ist",       "soll",
-      "aktuell",  "motor",       "drive",      "piezo",  "axis",       "achse",     "axe",
-      "lens",     "camera",      "cam",        "slide",  "table",      "tisch",     "bench",
-      "bank",     "mount",       "controller", "device", "carriage",   "gauge",     "ruler",
-      "caliper",  "sensor",      "lateral",    "axial",  "optical",    "linear",    "near",
-      "far",      "offset",      "shift",      "slice",  "slices",     "row",       "unit",
-      "units",    "in",          "of",         "the",    "from",       "to",        "by",
-      "at",       "and",         "per",        "de",     "du",         "des",       "del",
-      "la",       "le",          "au",         "der",    "die",        "das",       "point",
-      "punkt",    "text",        "float",      "double", "int",        "number",    "n",
-      "i",        "left",        "right",      "up",     "down",       "main",      "auto",
-      "manual"};
+      "abs",      "absolute", "rel",        "relative",  "raw",     "corr",     "corrected",
+      "cal",      "calib",    "calibrated", "nominal",   "actual",  "target",   "set",
+      "setpoint", "cmd",      "command",    "commanded", "meas",    "measured", "measurement",
+      "true",     "real",     "avg",        "average",   "median",  "value",    "values",
+      "val",      "wert",     "valeur",     "valor",     "start",   "end",      "begin",
+      "first",    "last",     "before",     "after",     "max",     "new",      "old",
+      "current",  "final",    "initial",    "soll",      "aktuell", "motor",    "drive",
+      "piezo",    "axis",     "achse",      "axe",       "lens",    "camera",   "cam",
+      "slide",    "table",    "tisch",      "bench",     "bank",    "mount",    "controller",
+      "device",   "carriage", "gauge",      "ruler",     "caliper", "sensor",   "lateral",
+      "axial",    "optical",  "linear",     "near",      "far",     "offset",   "shift",
+      "slice",    "slices",   "row",        "unit",      "units",   "in",       "of",
+      "the",      "from",     "to",         "by",        "at",      "and",      "per",
+      "de",       "du",       "des",        "del",       "la",      "le",       "au",
+      "der",      "die",      "das",        "point",     "punkt",   "text",     "float",
+      "double",   "int",      "number",     "n",         "i",       "left",     "right",
+      "up",       "down",     "main",       "auto",      "manual"};
   return words;
 }
 

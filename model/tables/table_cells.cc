@@ -110,8 +110,8 @@ std::size_t ParseWith(char separator, const std::string& text, std::size_t begin
     std::string line = text.substr(begin, end - begin);
     begin = end;
     if (!is_quoted && IsComment(line, 0, line.size())) {
-      constexpr std::size_t kMostComments = 1000;
-      if (table->comments.size() < kMostComments) table->comments.emplace_back(number, line);
+      constexpr std::size_t kMaxComments = 1000;
+      if (table->comments.size() < kMaxComments) table->comments.emplace_back(number, line);
       if (table->rows.empty()) {
         const std::size_t words = line.find_first_not_of("#%/ \t");
         TableCells comment;

@@ -187,7 +187,7 @@ std::optional<double> Seconds(const std::string& cell, char mark, double seconds
   return *value * *unit;
 }
 
-// What is wrong with times of usual layouts that are not read; empty: nothing is known of it.
+// The reason why a time of a usual layout is not read; empty: none is known.
 std::string WhyNoTime(const std::string& cell) {
   const auto count = [&](const char* marks) {
     return std::count_if(cell.begin(), cell.end(),

@@ -67,7 +67,8 @@ void ApplyOverrides(const SweepOverrides& overrides, const RunScope& run, model:
   if (overrides.target) file->target = *overrides.target;
 }
 
-// By its content: a name may be wrong, and a stream of Motion JPEG begins as its first frame does.
+// Whether the content is a JPEG image: a name may be wrong. A stream of Motion JPEG begins like
+// one.
 bool IsJpeg(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   std::array<char, 3> start{};

@@ -25,7 +25,7 @@ struct Plugin {
 // layout.
 const void* LoadPlugin(const Plugin& plugin);
 
-// The same for a library at a path.
+// Loads the library at a path, as LoadPlugin does.
 const void* LoadPluginAt(const std::string& path, const Plugin& plugin);
 
 }  // namespace thicklens::io

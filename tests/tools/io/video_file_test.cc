@@ -292,7 +292,7 @@ TEST_F(BrokenVideoTest, FilesThatAreNoVideo) {
               AllOf(HasSubstr("YUV4MPEG2"), HasSubstr("ffv1")));
   EXPECT_THAT(Refusal(folder_.Put("v.yuv", std::string(4608, '\x80'))), HasSubstr("-video_size"));
   EXPECT_THAT(Refusal(folder_.Put("v.gif", "GIF89a")), HasSubstr("256 colours"));
-  for (const char* name : {"a.y4m", "a.YUV", "a.gif", "a.264", "a.265"})
+  for (const char* name : {"a.y4m", "a.YUV", "a.gif", "a.264", "a.265", "a.h264"})
     EXPECT_TRUE(IsNameOfVideo(name)) << name;
   EXPECT_THAT(Refusal(folder_.Put("empty.mp4")), HasSubstr("empty"));
   EXPECT_NE(Refusal(folder_ / "missing.mp4"), "(no error)");

@@ -297,8 +297,8 @@ const json* ListIn(const json& object, const std::string& path,
   return found;
 }
 
-// By the values of the numbers in them: FrameKey-0-0-2 is before FrameKey-0-0-10, in which order
-// they were recorded.
+// Whether a name comes first if the numbers in both are compared by their values: FrameKey-0-0-2 is
+// before FrameKey-0-0-10, in which order they were recorded.
 bool IsNaturallyBefore(const std::string& one, const std::string& other) {
   const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
   std::size_t i = 0, k = 0;

@@ -44,10 +44,11 @@ std::string StartOf(const std::string& path) {
   return start;
 }
 
+// The ending without its point.
 std::string LowerCaseEnding(const std::string& path) {
   std::string ending = std::filesystem::path(path).extension().string();
   for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return ending;
+  return ending.empty() ? ending : ending.substr(1);
 }
 
 // How a kind of video that is not read becomes one that is, without loss; empty: it is no such
@@ -59,7 +60,7 @@ std::string ConversionOf(const std::string& start, const std::string& path) {
     return "it is a GIF file, whose frames have at most 256 colours; use the recording that it was "
            "made from";
   }
-  if (LowerCaseEnding(path) == ".yuv") {
+  if (LowerCaseEnding(path) == "yuv") {
     return "values alone do not state their size and kind; state them to ffmpeg (-f rawvideo "
            "-pixel_format .. -video_size .. -framerate .. -i FILE -c:v ffv1 NEW.mkv)";
   }
@@ -93,8 +94,8 @@ void RequireMemoryOfFrame(double width_px, double height_px, double bytes_per_px
 
 bool IsNameOfVideo(const std::string& path) {
   static const std::set<std::string> kEndings = {
-      ".mp4",  ".m4v",  ".mov", ".mkv", ".webm", ".avi",  ".ts",  ".m2ts", ".mts", ".mjpeg",
-      ".mjpg", ".h264", ".avc", ".264", ".hevc", ".h265", ".265", ".y4m",  ".yuv", ".gif"};
+      "mp4",  "m4v",  "mov", "mkv", "webm", "avi",  "ts",  "m2ts", "mts", "mjpeg",
+      "mjpg", "h264", "avc", "264", "hevc", "h265", "265", "y4m",  "yuv", "gif"};
   return kEndings.count(LowerCaseEnding(path)) > 0;
 }
 

@@ -23,10 +23,11 @@ bool HasTextAt(const std::string& bytes, std::size_t at, const std::string& text
   return bytes.size() >= at && bytes.compare(at, text.size(), text) == 0;
 }
 
+// The ending without its point.
 std::string LowerEnding(const std::string& path) {
   std::string ending = std::filesystem::path(path).extension().string();
   for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return ending;
+  return ending.empty() ? ending : ending.substr(1);
 }
 
 template <std::size_t kCount>
@@ -241,9 +242,9 @@ void RequireWholeSegment(const std::string& path) {
 
 std::optional<VideoKind> KindOfVideo(const std::string& start, const std::string& path) {
   const std::string ending = LowerEnding(path);
-  static const std::array<const char*, 2> kMjpeg = {".mjpeg", ".mjpg"};
-  static const std::array<const char*, 3> kH264 = {".h264", ".avc", ".264"};
-  static const std::array<const char*, 3> kHevc = {".hevc", ".h265", ".265"};
+  static const std::array<const char*, 2> kMjpeg = {"mjpeg", "mjpg"};
+  static const std::array<const char*, 3> kH264 = {"h264", "avc", "264"};
+  static const std::array<const char*, 3> kHevc = {"hevc", "h265", "265"};
   if (HasTextAt(start, 0, "\xFF\xD8\xFF") && IsOneOf(ending, kMjpeg)) return VideoKind::kRawMjpeg;
   if (KindOfImage(start)) return std::nullopt;  // HEIF has the boxes of MP4
   if (IsIsoVideo(start)) return VideoKind::kIsoMedia;

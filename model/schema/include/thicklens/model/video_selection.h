@@ -18,9 +18,9 @@ struct VideoFrame {
   // Frames of which the file has bits but that cannot be decoded, shown before this one (since the
   // one before) and, of the last frame, after it. They have no numbers.
   int lost_before = 0, lost_after = 0;
-  // Of the last frame: the file may have had more frames, in places that are not known.
+  // Whether, of the last frame, the file may have had more frames, in places that are not known.
   bool is_count_doubtful = false;
-  // Of the last frame: the file may end in the middle of one, and have been longer.
+  // Whether, of the last frame, the file may end in the middle of one, and have been longer.
   bool may_be_cut = false;
 };
 

@@ -95,9 +95,9 @@ THICKLENS_EXPORT ReadingSet ReadingsOfTable(const std::string& bytes, const std:
 THICKLENS_EXPORT bool HasTimes(const std::string& bytes, const std::string& path,
                                const ReadingOptions& options);
 // Reads a table of times and readings. A time is a number, "mm:ss.f", "hh:mm:ss.f" (also with AM or
-// PM), or a date and a time ("2026-11-27T10:20:30.5", "27.11.2026 10:20:30,5"), which becomes seconds
-// since 1970. Throws Error as ReadingsOfTable
-// does, also for times that do not rise or fall from row to row.
+// PM), or a date and a time ("2026-11-27T10:20:30.5", "27.11.2026 10:20:30,5"), which becomes
+// seconds since 1970. Throws Error as ReadingsOfTable does, also for times that do not rise or fall
+// from row to row.
 THICKLENS_EXPORT TimedReadingSet TimedReadingsOfTable(const std::string& bytes,
                                                       const std::string& path,
                                                       const ReadingOptions& options);

@@ -11,9 +11,9 @@
 
 namespace thicklens::io {
 
-// Whether the ending of the name is one of a video, in capitals or not: .mp4 .m4v .mov .mkv .webm
-// .avi .ts .m2ts .mts .mjpeg .mjpg .h264 .avc .264 .hevc .h265 .265, or one of a video that
-// VideoFile refuses by its kind: .y4m .yuv .gif.
+// Whether the ending of the name is one of a video, in capitals or not: mp4, m4v, mov, mkv, webm,
+// avi, ts, m2ts, mts, mjpeg, mjpg, h264, avc, 264, hevc, h265, 265, or one of a video that
+// VideoFile refuses by its kind: y4m, yuv, gif.
 THICKLENS_EXPORT bool IsNameOfVideo(const std::string& path);
 // Whether the file is a video, by its content: MP4, MOV, Matroska, WebM, AVI, MPEG-TS or, with
 // their endings, raw streams of Motion JPEG, H.264 and H.265. False for a file that cannot be read.
