@@ -167,10 +167,8 @@ double ReadingInMm(double value, const std::string& stated, const ReadingOptions
         "{}{}; state the unit by --unit ({}), or the length of one of it by --reading-scale with "
         "--unit steps",
         place,
-        unit
-            ? fmt::format("the unit '{}' is no unit of length", Shown(name))
-            : fmt::format("'{}' is no known unit, and no other word that is known beside a reading",
-                          Shown(name)),
+        unit ? fmt::format("the unit '{}' is no unit of length", Shown(name))
+             : fmt::format("'{}' is taken for a unit, and none of that name is known", Shown(name)),
         kUnitNames));
   }
   if (unit->kind == Kind::kScaled) {
