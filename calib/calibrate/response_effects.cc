@@ -234,7 +234,7 @@ class ResponseCheck {
            std::abs(std::log(power->value)) + 2 * power->sigma / power->value < kNearestUsual;
   }
 
-  // What a loss may be besides; empty: nothing.
+  // Names another cause that a loss may have; empty: there is none.
   std::string OtherCauseOfLoss() const {
     if (IsTransferDecided()) return "";
     const auto& power = result_.diagnostics.response.light_exponent;

@@ -227,8 +227,9 @@ std::optional<double> BytesOfExrValue(const std::string& bytes, const ExrAttribu
 }
 
 // Checks the sizes of attributes, because OpenEXR allocates memory for an attribute before it reads
-// it. Of some types it reads another number of bytes than is stated, and what follows would be
-// taken for something else. A file of several parts has one header per part, one after the other.
+// it. Of some types it reads another number of bytes than is stated, and would take what follows
+// for the name of the next attribute. A file of several parts has one header per part, one after
+// the other.
 void RequirePossibleExrHeaders(const std::string& bytes, const std::string& name) {
   std::size_t at = kExrHeaderAt;
   while (at < bytes.size()) {

@@ -218,10 +218,10 @@ void FitDisplayWindow(const OIIO::ImageSpec& spec, DecodedImage* image) {
   const cv::Rect display(spec.full_x, spec.full_y, spec.full_width, spec.full_height);
   if (data == display || display.area() <= 0) return;
   // Nothing in the file stands for the pixels beside the data.
-  constexpr double kMostTimes = 64, kAlwaysBytes = 5e8;
+  constexpr double kMaxTimes = 64, kAlwaysBytes = 5e8;
   const double px = static_cast<double>(display.width) * display.height;
   const double data_px = static_cast<double>(data.width) * data.height;
-  if (px > kMostTimes * data_px &&
+  if (px > kMaxTimes * data_px &&
       px * static_cast<double>(image->pixels.elemSize()) > kAlwaysBytes) {
     throw Refusal("its display window of " + std::to_string(display.width) + " x " +
                   std::to_string(display.height) + " px holds a data window of " +

@@ -134,10 +134,10 @@ class VideoBytes {
 class AllocationLimit {
  public:
   explicit AllocationLimit(std::int64_t file_bytes) {
-    constexpr std::int64_t kLeastBytes = 64 << 20, kBytesPerByte = 64;
-    constexpr std::int64_t kMost = std::numeric_limits<int>::max();  // FFmpeg's own limit
-    const std::int64_t table = std::min(file_bytes, kMost / kBytesPerByte) * kBytesPerByte;
-    av_max_alloc(static_cast<std::size_t>(std::min(kMost, kLeastBytes + table)));
+    constexpr std::int64_t kMinBytes = 64 << 20, kBytesPerByte = 64;
+    constexpr std::int64_t kMaxBytes = std::numeric_limits<int>::max();  // FFmpeg's own limit
+    const std::int64_t table = std::min(file_bytes, kMaxBytes / kBytesPerByte) * kBytesPerByte;
+    av_max_alloc(static_cast<std::size_t>(std::min(kMaxBytes, kMinBytes + table)));
   }
   ~AllocationLimit() { av_max_alloc(std::numeric_limits<int>::max()); }
   AllocationLimit(const AllocationLimit&) = delete;
