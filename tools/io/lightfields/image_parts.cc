@@ -145,8 +145,9 @@ std::optional<ViewSource> OpenMultiView(const LayoutInput& input, const std::str
                                         const ExrPart& part) {
   std::string text = input.reading->name;
   const std::optional<ViewGrid> stereo = StereoGrid(input.path, part.views, *input.reading);
+  std::optional<NameProposal> proposal;
   if (text.empty() && !stereo) {
-    const std::optional<NameProposal> proposal = ProposedPattern(part.views);
+    proposal = ProposedPattern(part.views);
     if (!proposal) {
       // Other views, such as those of two eyes with other names, are no light field.
       if (!input.is_forced) return std::nullopt;
@@ -168,6 +169,7 @@ std::optional<ViewSource> OpenMultiView(const LayoutInput& input, const std::str
                                      part.views.size() - others.size(), PrintableUtf8(text));
   source.frame = grid.frame;
   if (!others.empty()) source.details.push_back(fmt::format("not used: {}", Listed(others)));
+  if (!stereo) AddWarningsOfNames(input.path, NamePattern(text), proposal, others, &source);
   if (!grid.missing.empty())
     source.details.push_back(fmt::format("missing: {}", Listed(grid.missing)));
   source.read = [file = std::make_shared<const std::string>(bytes), part, grid, path = input.path](
@@ -227,8 +229,9 @@ std::optional<ViewSource> OpenImageParts(const LayoutInput& input) {
   }
   std::string text = input.reading->name;
   const std::optional<ViewGrid> stereo = StereoGrid(input.path, names, *input.reading);
+  std::optional<NameProposal> proposal;
   if (text.empty() && !stereo) {
-    const std::optional<NameProposal> proposal = ProposedPattern(names);
+    proposal = ProposedPattern(names);
     if (!proposal) {
       throw Error(fmt::format(
           "{}: it has {} part(s): {}; parts whose names hold the row and the column are expected, "
@@ -247,6 +250,7 @@ std::optional<ViewSource> OpenImageParts(const LayoutInput& input) {
                                      PrintableUtf8(text));
   source.frame = grid.frame;
   if (!others.empty()) source.details.push_back(fmt::format("not views: {}", Listed(others)));
+  if (!stereo) AddWarningsOfNames(input.path, NamePattern(text), proposal, others, &source);
   if (!grid.missing.empty())
     source.details.push_back(fmt::format("missing: {}", Listed(grid.missing)));
   source.read = [pages, names, grid, path = input.path](int k, int l) {

@@ -21,8 +21,9 @@ namespace fs = std::filesystem;
 std::optional<ViewSource> OpenNamedFolder(const LayoutInput& input) {
   const std::vector<std::string> names = ImageNames(input.path);
   std::string text = input.reading->name;
+  std::optional<NameProposal> proposal;
   if (text.empty()) {
-    const std::optional<NameProposal> proposal = ProposedPattern(names);
+    proposal = ProposedPattern(names);
     if (proposal && proposal->changing == 2) {
       RequireClear(input.path, *proposal);
       text = proposal->pattern;
@@ -50,6 +51,7 @@ std::optional<ViewSource> OpenNamedFolder(const LayoutInput& input) {
   if (!others.empty()) source.details.push_back(fmt::format("not views: {}", Listed(others)));
   if (!grid.missing.empty())
     source.details.push_back(fmt::format("missing: {}", Listed(grid.missing)));
+  AddWarningsOfNames(input.path, pattern, proposal, others, &source);
   for (const std::string& file : grid.files) {
     if (!file.empty()) ReportInput((fs::path(input.path) / file).string());
   }

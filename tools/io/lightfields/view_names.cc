@@ -6,6 +6,8 @@
 #include <cctype>
 #include <cstdlib>
 #include <map>
+#include <set>
+#include <utility>
 
 #include "thicklens/base/error.h"
 #include "thicklens/base/printable_text.h"
@@ -15,8 +17,10 @@ namespace {
 
 // Digits of a row, a column or a number, which may be negative: an int holds them.
 constexpr std::size_t kMaxDigits = 8;
-constexpr char kWhole[] = "(-?[0-9]{1,8})";
+constexpr char kWhole[] = "([-+]?[0-9]{1,8})";
 constexpr char kReal[] = "([-+]?[0-9]{1,12}(?:\\.[0-9]{0,18})?)";
+// A number with any sign, or with letters that may stand for one.
+constexpr char kAnySign[] = "(?:[-+mnpMNP]|neg|pos|minus|plus)?[0-9]{1,8}";
 // Longer names than file systems have are not matched: the time of a match grows with the length.
 constexpr std::size_t kMaxName = 255;
 
@@ -26,24 +30,34 @@ std::size_t CountOf(const std::string& text, char c) {
   return static_cast<std::size_t>(std::count(text.begin(), text.end(), c));
 }
 
-// Whether the character begins a number: a '-' before digits may be its sign, but between digits it
-// separates two numbers.
-bool IsSign(const std::string& name, std::size_t i) {
-  return name[i] == '-' && i + 1 < name.size() && IsDigit(name[i + 1]) &&
-         (i == 0 || !IsDigit(name[i - 1]));
+bool IsLetter(char c) { return std::isalpha(static_cast<unsigned char>(c)) != 0; }
+
+// Whether the character begins a number: a '-' or a '+' before digits may be its sign, but a '-'
+// between digits separates two numbers, unless other names have a '+' between digits.
+bool IsSign(const std::string& name, std::size_t i, bool may_follow_digit) {
+  return (name[i] == '-' || name[i] == '+') && i + 1 < name.size() && IsDigit(name[i + 1]) &&
+         (i == 0 || !IsDigit(name[i - 1]) || may_follow_digit);
 }
-bool IsSigned(const std::string& number) { return number.front() == '-'; }
+bool IsSigned(const std::string& number) { return number.front() == '-' || number.front() == '+'; }
+
+// Whether a '+' is between digits of a name, as in "cam-2+1.png": names of "%+d%+d".
+bool HasSignAfterDigit(const std::string& name) {
+  for (std::size_t i = 1; i + 1 < name.size(); ++i) {
+    if (name[i] == '+' && IsDigit(name[i - 1]) && IsDigit(name[i + 1])) return true;
+  }
+  return false;
+}
 
 // A name as text and numbers in turn: text[0] number[0] text[1] ...
 struct SplitName {
   std::vector<std::string> text, numbers;
 };
 
-SplitName Split(const std::string& name) {
+SplitName Split(const std::string& name, bool may_follow_digit) {
   SplitName split;
   split.text.emplace_back();
   for (std::size_t i = 0; i < name.size();) {
-    if (!IsDigit(name[i]) && !IsSign(name, i)) {
+    if (!IsDigit(name[i]) && !IsSign(name, i, may_follow_digit)) {
       split.text.back() += name[i++];
       continue;
     }
@@ -55,45 +69,140 @@ SplitName Split(const std::string& name) {
   return split;
 }
 
-// The meaning of the '-' before the numbers at one place of the names.
+// The meaning of the '-' or '+' before the numbers at one place of the names.
 enum class Dash {
-  kSign,   // some numbers have it and others do not
-  kText,   // there is none, or it follows a letter as in "IMG-1"
+  kSign,   // numbers differ in it
+  kText,   // there is none, or all have a '+', or a '-' that follows a letter as in "IMG-1"
   kEither  // all numbers have it after a separator: they count down, or it separates too
 };
 Dash DashAt(const std::vector<SplitName>& group, std::size_t place) {
-  const auto count = static_cast<std::size_t>(
-      std::count_if(group.begin(), group.end(),
-                    [&](const SplitName& name) { return IsSigned(name.numbers[place]); }));
-  if (count == 0) return Dash::kText;
-  if (count < group.size()) return Dash::kSign;
+  const auto count_of = [&](char sign) {
+    return static_cast<std::size_t>(
+        std::count_if(group.begin(), group.end(),
+                      [&](const SplitName& name) { return name.numbers[place].front() == sign; }));
+  };
+  const std::size_t minus = count_of('-'), plus = count_of('+');
+  if (minus == 0 && (plus == 0 || plus == group.size())) return Dash::kText;
+  if (minus < group.size()) return Dash::kSign;
   const std::string& before = group.front().text[place];
   const bool is_after_letter =
       !before.empty() && std::isalnum(static_cast<unsigned char>(before.back())) != 0;
   return is_after_letter ? Dash::kText : Dash::kEither;
 }
 
-// The group of names whose texts are these except the ending of the file, if there is one of at
-// least half the size.
-std::string OtherEnding(const std::map<std::vector<std::string>, std::vector<SplitName>>& groups,
-                        const std::vector<std::string>& text, std::size_t size) {
-  const auto without_ending = [](std::vector<std::string> texts) {
-    texts.back() = texts.back().substr(0, texts.back().rfind('.'));
-    return texts;
-  };
-  for (const auto& [other, names] : groups) {
-    if (other != text && other.back().find('.') != std::string::npos && 2 * names.size() >= size &&
-        without_ending(other) == without_ending(text)) {
-      return other.back();
+// Places of the numbers that are not equal in all names.
+std::vector<std::size_t> ChangingPlaces(const std::vector<SplitName>& group) {
+  std::vector<std::size_t> changing;
+  for (std::size_t i = 0; i < group.front().numbers.size(); ++i) {
+    if (std::any_of(group.begin(), group.end(), [&](const SplitName& name) {
+          return name.numbers[i] != group.front().numbers[i];
+        })) {
+      changing.push_back(i);
     }
   }
-  return "";
+  return changing;
+}
+
+// Whether one or two numbers change. The times of photographs, for example, are too long for Match.
+bool MayBePlaces(const std::vector<SplitName>& group, const std::vector<std::size_t>& changing) {
+  if (changing.empty() || changing.size() > 2) return false;
+  for (const SplitName& name : group) {
+    for (const std::size_t i : changing) {
+      if (name.numbers[i].size() - (IsSigned(name.numbers[i]) ? 1 : 0) > kMaxDigits) return false;
+    }
+  }
+  return true;
+}
+
+// Whether two numbers change and every row has every column.
+bool IsFullGrid(const std::vector<SplitName>& group, const std::vector<std::size_t>& changing) {
+  if (changing.size() != 2) return false;
+  std::set<int> rows, columns;
+  std::set<std::pair<int, int>> places;
+  for (const SplitName& name : group) {
+    const int row = std::atoi(name.numbers[changing[0]].c_str());
+    const int column = std::atoi(name.numbers[changing[1]].c_str());
+    rows.insert(row);
+    columns.insert(column);
+    places.emplace(row, column);
+  }
+  return rows.size() > 1 && columns.size() > 1 && places.size() == group.size() &&
+         rows.size() * columns.size() == group.size();
+}
+
+// The pattern of a group of names with these texts between the numbers.
+NameProposal ProposalOf(const std::vector<std::string>& text, const std::vector<SplitName>& group,
+                        const std::vector<std::size_t>& changing) {
+  NameProposal proposal;
+  proposal.changing = static_cast<int>(changing.size());
+  proposal.names = group.size();
+  const char* const places[] = {proposal.changing == 1 ? "{n}" : "{v}", "{u}"};
+  std::string with_signs;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    proposal.pattern += text[i];
+    with_signs += text[i];
+    if (i >= group.front().numbers.size()) break;
+    const std::string& first = group.front().numbers[i];
+    const auto place = std::find(changing.begin(), changing.end(), i);
+    std::string number = first;
+    if (place != changing.end()) {
+      const Dash dash = DashAt(group, i);
+      number = places[place - changing.begin()];
+      const std::string with_text = IsSigned(first) ? first.substr(0, 1) + number : number;
+      with_signs += dash == Dash::kText ? with_text : number;
+      if (dash == Dash::kEither) proposal.is_sign_unclear = true;
+      if (dash != Dash::kSign) number = with_text;
+    } else {
+      with_signs += number;
+    }
+    proposal.pattern += number;
+  }
+  if (proposal.is_sign_unclear) proposal.other_pattern = with_signs;
+  return proposal;
+}
+
+// Names that fit the pattern but for signs.
+std::vector<std::string> OfOtherSigns(const NamePattern& pattern,
+                                      const std::vector<std::string>& names) {
+  std::vector<std::string> found;
+  for (const std::string& name : names) {
+    if (!pattern.Match(name) && pattern.MatchesUpToSigns(name)) found.push_back(name);
+  }
+  return found;
+}
+
+// Appends text to a regular expression.
+void AppendText(const std::string& text, std::string* expression) {
+  for (const char c : text) {
+    if (std::string("\\^$.|?+()[]{}/").find(c) != std::string::npos) *expression += '\\';
+    *expression += c;
+  }
+}
+
+// Takes a sign, or letters that may stand for one, off the end of the text before a number.
+std::string WithoutSign(const std::string& text) {
+  for (const char* sign : {"minus", "plus", "neg", "pos", "m", "n", "p", "M", "N", "P", "-", "+"}) {
+    const std::string word = sign;
+    if (text.size() < word.size() ||
+        text.compare(text.size() - word.size(), word.size(), word) != 0) {
+      continue;
+    }
+    const std::string rest = text.substr(0, text.size() - word.size());
+    // "cam1" has no sign.
+    if (!IsLetter(word.front()) || rest.empty() || !IsLetter(rest.back())) return rest;
+  }
+  return text;
 }
 
 }  // namespace
 
 NamePattern::NamePattern(const std::string& pattern) : text_(pattern) {
-  std::string expression;
+  std::string expression, any_signs, text;  // `text` is what follows the last place or star
+  const auto end_text = [&](const std::string& kept) {
+    AppendText(text, &expression);
+    AppendText(kept, &any_signs);
+    text.clear();
+  };
   for (std::size_t i = 0; i < pattern.size(); ++i) {
     const char c = pattern[i];
     if (c == '{' && i + 2 < pattern.size() && pattern[i + 2] == '}') {
@@ -104,16 +213,28 @@ NamePattern::NamePattern(const std::string& pattern) : text_(pattern) {
             "{{y}} (position) are expected, found {{{}}} in '{}'",
             PrintableUtf8(std::string(1, place)), PrintableUtf8(pattern)));
       }
+      if (place == 'x' || place == 'y') {
+        end_text(text);
+        any_signs += kReal;
+      } else {
+        // A '-' alone between two numbers separates them too.
+        const std::string without = WithoutSign(text);
+        const bool separates = without.empty() && !places_.empty();
+        end_text(separates ? text : without);
+        any_signs += kAnySign;
+      }
       expression += place == 'x' || place == 'y' ? kReal : kWhole;
       places_ += place;
       i += 2;
     } else if (c == '*') {
+      end_text(text);
       expression += ".*";
+      any_signs += ".*";
     } else {
-      if (std::string("\\^$.|?+()[]{}/").find(c) != std::string::npos) expression += '\\';
-      expression += c;
+      text += c;
     }
   }
+  end_text(text);
   for (const char place : places_) {
     if (CountOf(places_, place) > 1) {
       throw Error(fmt::format("the option name: {{{}}} is expected once, found {} times in '{}'",
@@ -131,6 +252,7 @@ NamePattern::NamePattern(const std::string& pattern) : text_(pattern) {
   }
   try {
     expression_ = std::regex(expression);
+    any_signs_ = std::regex(any_signs);
   } catch (const std::regex_error&) {
     throw Error(fmt::format("the option name: '{}' is too complicated", PrintableUtf8(pattern)));
   }
@@ -166,10 +288,19 @@ std::optional<NameNumbers> NamePattern::Match(const std::string& name) const {
   return numbers;
 }
 
+bool NamePattern::MatchesUpToSigns(const std::string& name) const {
+  try {
+    return name.size() <= kMaxName && std::regex_match(name, any_signs_);
+  } catch (const std::regex_error&) {
+    return false;
+  }
+}
+
 std::optional<NameProposal> ProposedPattern(const std::vector<std::string>& names) {
+  const bool may_follow_digit = std::any_of(names.begin(), names.end(), HasSignAfterDigit);
   std::map<std::vector<std::string>, std::vector<SplitName>> groups;
   for (const std::string& name : names) {
-    SplitName split = Split(name);
+    SplitName split = Split(name, may_follow_digit);
     groups[split.text].push_back(split);
   }
   const auto largest = std::max_element(
@@ -177,60 +308,48 @@ std::optional<NameProposal> ProposedPattern(const std::vector<std::string>& name
       [](const auto& a, const auto& b) { return a.second.size() < b.second.size(); });
   if (largest == groups.end() || largest->second.size() < 2) return std::nullopt;
   const std::vector<SplitName>& group = largest->second;
-  std::vector<std::size_t> changing;
-  for (std::size_t i = 0; i < group.front().numbers.size(); ++i) {
-    if (std::any_of(group.begin(), group.end(), [&](const SplitName& name) {
-          return name.numbers[i] != group.front().numbers[i];
-        })) {
-      changing.push_back(i);
+  const std::vector<std::size_t> changing = ChangingPlaces(group);
+  if (!MayBePlaces(group, changing)) return std::nullopt;
+  NameProposal proposal = ProposalOf(largest->first, group, changing);
+  try {
+    proposal.other_signs = OfOtherSigns(NamePattern(proposal.pattern), names);
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const Error&) {
+    // A name with braces of its own: whoever reads the views says so.
+  }
+  for (const auto& [text, others] : groups) {
+    if (text == largest->first || others.size() < 2) continue;
+    const std::vector<std::size_t> places = ChangingPlaces(others);
+    if (places.size() != changing.size() || !MayBePlaces(others, places)) continue;
+    const std::string pattern = ProposalOf(text, others, places).pattern;
+    if (2 * others.size() >= group.size()) {
+      proposal.other_patterns.push_back(pattern);
+    } else if (IsFullGrid(others, places)) {
+      proposal.smaller_patterns.push_back(pattern);
     }
   }
-  if (changing.empty() || changing.size() > 2) return std::nullopt;
-  // The times of photographs, for example, are too long for Match.
-  for (const SplitName& name : group) {
-    for (const std::size_t i : changing) {
-      if (name.numbers[i].size() - (IsSigned(name.numbers[i]) ? 1 : 0) > kMaxDigits)
-        return std::nullopt;
-    }
-  }
-  NameProposal proposal;
-  proposal.changing = static_cast<int>(changing.size());
-  proposal.names = group.size();
-  const std::string ending = OtherEnding(groups, largest->first, group.size());
-  const char* const places[] = {proposal.changing == 1 ? "{n}" : "{v}", "{u}"};
-  std::string with_signs, with_other_ending;
-  for (std::size_t i = 0; i < largest->first.size(); ++i) {
-    const bool is_last = i >= group.front().numbers.size();
-    proposal.pattern += largest->first[i];
-    with_signs += largest->first[i];
-    with_other_ending += is_last && !ending.empty() ? ending : largest->first[i];
-    if (is_last) break;
-    const auto place = std::find(changing.begin(), changing.end(), i);
-    std::string number = group.front().numbers[i];
-    if (place != changing.end()) {
-      const Dash dash = DashAt(group, i);
-      number = places[place - changing.begin()];
-      with_signs +=
-          dash == Dash::kText && IsSigned(group.front().numbers[i]) ? "-" + number : number;
-      if (dash == Dash::kEither) proposal.is_sign_unclear = true;
-      if (dash != Dash::kSign && IsSigned(group.front().numbers[i])) number = "-" + number;
-    } else {
-      with_signs += number;
-    }
-    proposal.pattern += number;
-    with_other_ending += number;
-  }
-  if (proposal.is_sign_unclear) proposal.other_pattern = with_signs;
-  if (!ending.empty()) proposal.other_ending_pattern = with_other_ending;
   return proposal;
 }
 
 void RequireClear(const std::string& path, const NameProposal& proposal) {
-  if (!proposal.other_ending_pattern.empty()) {
+  // A single name may be that of anything: it is reported (AddWarningsOfNames).
+  if (proposal.other_signs.size() > 1) {
     throw Error(fmt::format(
-        "{}: names of images of two kinds differ in their ending only: the option name must state "
-        "which of them are the views: '{}' or '{}'",
-        path, PrintableUtf8(proposal.pattern), PrintableUtf8(proposal.other_ending_pattern)));
+        "{}: names fit '{}' but for what stands before their numbers, which may be signs: {}; '-' "
+        "and '+' are read as signs, letters are not: rename the images, or the option name must "
+        "state which of them are the views: '{}'",
+        path, PrintableUtf8(proposal.pattern), Listed(proposal.other_signs),
+        PrintableUtf8(proposal.pattern)));
+  }
+  if (!proposal.other_patterns.empty()) {
+    std::vector<std::string> patterns;
+    for (const std::string& pattern : proposal.other_patterns)
+      patterns.push_back(fmt::format("'{}'", pattern));
+    throw Error(fmt::format(
+        "{}: images of several kinds have names with rows and columns: the option name must state "
+        "which of them are the views: '{}' or {}",
+        path, PrintableUtf8(proposal.pattern), Listed(patterns)));
   }
   if (proposal.is_sign_unclear) {
     throw Error(fmt::format(
@@ -266,6 +385,24 @@ ViewGrid GridOfNames(const std::string& path, const NamePattern& pattern,
   }
   return pattern.HasRowAndColumn() ? GridOfViews(path, views, reading)
                                    : GridOfNumbers(path, views, reading);
+}
+
+void AddWarningsOfNames(const std::string& path, const NamePattern& pattern,
+                        const std::optional<NameProposal>& proposal,
+                        const std::vector<std::string>& others, ViewSource* source) {
+  if (proposal && !proposal->smaller_patterns.empty()) {
+    source->notices.push_back(fmt::format(
+        "{}: other images have names with rows and columns too and are not read: {}; the option "
+        "name states which of them are the views",
+        path, Listed(proposal->smaller_patterns)));
+  }
+  const std::vector<std::string> other_signs = OfOtherSigns(pattern, others);
+  if (!other_signs.empty()) {
+    source->notices.push_back(fmt::format(
+        "{}: {} image(s) are not read whose names fit '{}' but for signs, or letters that may "
+        "stand for signs: {}",
+        path, other_signs.size(), PrintableUtf8(pattern.text()), Listed(other_signs)));
+  }
 }
 
 }  // namespace thicklens::io

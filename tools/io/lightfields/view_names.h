@@ -17,7 +17,7 @@ struct NameNumbers {
 };
 
 // A pattern of names: "view_{v}_{u}.jpg". {v} is the row, {u} the column, {n} a number that counts
-// row by row, {x} and {y} are positions, and * is any text. Numbers may be negative.
+// row by row, {x} and {y} are positions, and * is any text. Numbers may have a sign, '-' or '+'.
 class NamePattern {
  public:
   // Throws Error for a pattern that cannot give each view a place.
@@ -25,6 +25,9 @@ class NamePattern {
 
   // Returns nothing if the name does not fit.
   std::optional<NameNumbers> Match(const std::string& name) const;
+  // Whether the name would fit with other signs before its numbers, or with letters that stand for
+  // signs: "cam_m2_p1.png" and "cam_-2_1.png".
+  bool MatchesUpToSigns(const std::string& name) const;
   bool HasRowAndColumn() const { return has_row_and_column_; }
   const std::string& text() const { return text_; }
 
@@ -32,11 +35,11 @@ class NamePattern {
   std::string text_;
   std::string places_;  // letters of the places, in their order
   bool has_row_and_column_ = false;
-  std::regex expression_;
+  std::regex expression_, any_signs_;
 };
 
 // The pattern that names suggest: that of the largest group of names that differ only in numbers.
-// A '-' directly before digits is a sign where other numbers at its place have none.
+// A '-' directly before digits is a sign where other numbers at its place have none or a '+'.
 struct NameProposal {
   std::string pattern;    // "view_{v}_{u}.png", or "frame_{n}.png" with one changing number
   int changing = 0;       // how many numbers change
@@ -45,8 +48,13 @@ struct NameProposal {
   // has it as text, and `other_pattern` takes it as a sign.
   bool is_sign_unclear = false;
   std::string other_pattern;
-  // Fits images that differ from the others in their ending only; empty: there are few or none.
-  std::string other_ending_pattern;
+  // Patterns of other groups with at least half as many names, in which as many numbers change: a
+  // light field may be in each of them.
+  std::vector<std::string> other_patterns;
+  // Patterns of smaller groups that are full grids of at least 2 x 2 views.
+  std::vector<std::string> smaller_patterns;
+  // Names that would fit with other signs, or with letters that may stand for signs.
+  std::vector<std::string> other_signs;
 };
 // Throws Error if a proposal cannot be used without a statement of the user.
 void RequireClear(const std::string& path, const NameProposal& proposal);
@@ -57,6 +65,12 @@ std::optional<NameProposal> ProposedPattern(const std::vector<std::string>& name
 ViewGrid GridOfNames(const std::string& path, const NamePattern& pattern,
                      const std::vector<std::string>& names, const LightFieldReading& reading,
                      std::vector<std::string>* others);
+
+// Adds warnings about images that are not read although they may be views: other groups of names,
+// and names that fit the pattern but for signs.
+void AddWarningsOfNames(const std::string& path, const NamePattern& pattern,
+                        const std::optional<NameProposal>& proposal,
+                        const std::vector<std::string>& others, ViewSource* source);
 
 }  // namespace thicklens::io
 

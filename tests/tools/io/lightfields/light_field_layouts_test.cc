@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdlib>
 #include <functional>
 #include <opencv2/imgcodecs.hpp>
 #include <string>
@@ -175,6 +176,67 @@ TEST_F(LightFieldLayouts, ImagesOfTwoEndingsNeedTheOptionName) {
   LightFieldReading reading;
   reading.name = "view_{v}_{u}.png";
   ExpectViews(Read(path, reading));
+}
+
+// Labels and views of equal size: before, the alphabetically first were read.
+TEST_F(LightFieldLayouts, ImagesOfTwoNamesNeedTheOptionName) {
+  const auto name_with = [](const std::string& stem) {
+    return [stem](int v, int u) {
+      return stem + std::to_string(v) + "_" + std::to_string(u) + ".png";
+    };
+  };
+  Folder(name_with("view_"), InOrder);
+  const std::string path = Folder(name_with("label_"), [](int, int) { return View(0, 0); });
+  EXPECT_THAT(ErrorOf([&] { Read(path); }),
+              AllOf(HasSubstr("'view_{v}_{u}.png'"), HasSubstr("'label_{v}_{u}.png'"),
+                    HasSubstr("the option name")));
+  LightFieldReading reading;
+  reading.name = "view_{v}_{u}.png";
+  ExpectViews(Read(path, reading));
+  EXPECT_THAT(facts_.notices, IsEmpty());
+}
+
+TEST_F(LightFieldLayouts, ASmallerGridOfOtherNamesIsReported) {
+  const std::string path = Folder(RowAndColumn, InOrder);
+  for (const char* place : {"0_0", "0_1", "1_0", "1_1"})
+    folder_.Put("lf/thumb_" + std::string(place) + ".png", EncodedTile(View(0, 0)));
+  ExpectViews(Read(path));
+  EXPECT_THAT(facts_.notices, ElementsAre(HasSubstr("thumb_{v}_{u}.png")));
+}
+
+TEST_F(LightFieldLayouts, APlusIsASign) {
+  const auto with_plus = [](int number) {
+    return (number < 0 ? "" : "+") + std::to_string(number);
+  };
+  ExpectViews(Read(Folder(
+      [&](int v, int u) { return "cam_" + with_plus(v - 1) + "_" + with_plus(u - 1) + ".png"; },
+      InOrder)));
+  EXPECT_THAT(facts_.one_line, HasSubstr("'cam_{v}_{u}.png'"));
+  TemporaryFolder next;
+  for (int v = 0; v < 3; ++v) {
+    for (int u = 0; u < 3; ++u) {
+      next.Put("lf/cam" + with_plus(v - 1) + with_plus(u - 1) + ".png", EncodedTile(InOrder(u, v)));
+    }
+  }
+  ExpectViews(Read(next / "lf"));
+  EXPECT_THAT(facts_.one_line, AllOf(HasSubstr("'cam{v}{u}.png'"), Not(HasSubstr("not views"))));
+}
+
+// Before, the largest group was read: "cam_p{v}_p{u}.png".
+TEST_F(LightFieldLayouts, LettersForSignsAreRefused) {
+  const auto with_letter = [](int number) {
+    return (number < 0 ? "m" : "p") + std::to_string(std::abs(number));
+  };
+  const std::string path = Folder(
+      [&](int v, int u) { return "cam_" + with_letter(v - 1) + "_" + with_letter(u - 1) + ".png"; },
+      InOrder);
+  EXPECT_THAT(ErrorOf([&] { Read(path); }),
+              AllOf(HasSubstr("may be signs"), HasSubstr("cam_m1_m1.png")));
+  LightFieldReading reading;
+  reading.name = "cam_p{v}_p{u}.png";
+  EXPECT_EQ(Read(path, reading).u_count, 2);
+  EXPECT_THAT(facts_.notices,
+              ::testing::Contains(AllOf(HasSubstr("5 image(s)"), HasSubstr("cam_m1_m1.png"))));
 }
 
 // The times of photographs have more digits than a row or a column may have.
