@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -21,6 +23,12 @@ constexpr double kRepeats = 0.5;
 constexpr int kMaxPitchPx = 20;
 // Differences across the edge of a lenslet, relative to those inside.
 constexpr double kEdgeContrast = 1.3;
+// The mean deviation within a line, relative to that within a usual column: JPEG of low quality
+// leaves 0.2.
+constexpr double kFlat = 0.3;
+// The column beside a line differs from the line's colour at least by this part of what columns
+// usually do: beside an object on a plain background few pixels differ.
+constexpr double kSharp = 0.1;
 // Rows of an image that are compared.
 constexpr int kRows = 400;
 
@@ -73,33 +81,127 @@ int RepetitionsAcross(const cv::Mat& grey) {
   return 1;
 }
 
-// Tiles along one axis and the columns of one colour between them.
-struct AxisBorders {
-  int count = 1, gap_px = 0, tile_px = 0;
+double Middle(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// Mean absolute differences between the values of each column and its level, one for each column.
+std::vector<double> DeviationsFrom(const std::vector<double>& levels, const cv::Mat& grey) {
+  std::vector<double> sums(levels.size(), 0.0);
+  for (int y = 0; y < grey.rows; ++y) {
+    ThrowIfCancelled();
+    const auto* row = grey.ptr<float>(y);
+    for (std::size_t x = 0; x < sums.size(); ++x)
+      sums[x] += std::abs(static_cast<double>(row[x]) - levels[x]);
+  }
+  for (double& sum : sums) sum /= grey.rows;
+  return sums;
+}
+
+std::vector<double> MeansOf(const cv::Mat& grey) {
+  std::vector<double> sums(static_cast<std::size_t>(grey.cols), 0.0);
+  for (int y = 0; y < grey.rows; ++y) {
+    ThrowIfCancelled();
+    const auto* row = grey.ptr<float>(y);
+    for (std::size_t x = 0; x < sums.size(); ++x) sums[x] += static_cast<double>(row[x]);
+  }
+  for (double& sum : sums) sum /= grey.rows;
+  return sums;
+}
+
+// Neighbouring columns of one colour.
+struct FlatRun {
+  int at = 0, width = 0;
+  double level = 0;
+  int End() const { return at + width; }
 };
-std::optional<AxisBorders> BordersAcross(const cv::Mat& grey) {
-  std::vector<std::pair<int, int>> gaps;  // first column and number of columns
+
+std::vector<FlatRun> FlatRuns(const cv::Mat& grey, double* tolerance) {
+  std::vector<FlatRun> runs;
+  const std::vector<double> levels = MeansOf(grey);
+  const std::vector<double> deviations = DeviationsFrom(levels, grey);
+  *tolerance = kFlat * Middle(deviations);
   for (int x = 0; x < grey.cols; ++x) {
-    const float first = grey.at<float>(0, x);
-    bool is_flat = true;
-    for (int y = 1; y < grey.rows && is_flat; ++y) is_flat = grey.at<float>(y, x) == first;
-    if (!is_flat) continue;
-    if (!gaps.empty() && gaps.back().first + gaps.back().second == x) {
-      ++gaps.back().second;
+    const auto i = static_cast<std::size_t>(x);
+    if (!(deviations[i] < *tolerance)) continue;
+    if (!runs.empty() && runs.back().End() == x &&
+        std::abs(runs.back().level - levels[i]) < *tolerance) {
+      ++runs.back().width;
     } else {
-      gaps.emplace_back(x, 1);
+      runs.push_back({x, 1, levels[i]});
     }
   }
-  if (gaps.empty() || gaps.size() >= static_cast<std::size_t>(kMaxTiles)) return std::nullopt;
-  const int count = static_cast<int>(gaps.size()) + 1;
-  const AxisBorders borders{count, gaps.front().second, gaps.front().first};
-  const int step = borders.tile_px + borders.gap_px;
-  if (borders.tile_px < kMinTilePx || borders.gap_px >= borders.tile_px) return std::nullopt;
-  for (int i = 1; i < count; ++i) {
-    const auto& [at, width] = gaps[static_cast<std::size_t>(i - 1)];
-    if (width != borders.gap_px || at != i * step - borders.gap_px) return std::nullopt;
+  return runs;
+}
+
+// Whether runs of one colour are lines between tiles of one size, or the border around them.
+std::optional<AxisLines> RegularLines(std::vector<FlatRun> runs, int columns) {
+  AxisLines lines;
+  const bool begins = runs.front().at == 0;
+  const bool ends = runs.back().End() == columns;
+  lines.first_px = begins ? runs.front().width : 0;
+  const int last_px = ends ? runs.back().width : 0;
+  if (begins) runs.erase(runs.begin());
+  if (ends && !runs.empty()) runs.pop_back();
+  lines.count = static_cast<int>(runs.size()) + 1;
+  if (lines.count > kMaxTiles) return std::nullopt;
+  if (!runs.empty()) lines.gap_px = runs.front().width;
+  lines.tile_px = (runs.empty() ? columns - last_px : runs.front().at) - lines.first_px;
+  // Lines on one side of each tile may be the uniform edge of the views, such as a sky.
+  if (begins != ends) lines.one_side_px = lines.first_px + last_px;
+  if (begins != ends && lines.one_side_px != lines.gap_px) return std::nullopt;
+  if (lines.tile_px < kMinTilePx || 2 * lines.gap_px > lines.tile_px ||
+      2 * std::max(lines.first_px, last_px) > lines.tile_px) {
+    return std::nullopt;
   }
-  return count * step - borders.gap_px == grey.cols ? std::optional(borders) : std::nullopt;
+  const int step = lines.tile_px + lines.gap_px;
+  for (int i = 1; i < lines.count; ++i) {
+    const FlatRun& run = runs[static_cast<std::size_t>(i - 1)];
+    if (run.width != lines.gap_px || run.at != lines.first_px + i * step - lines.gap_px)
+      return std::nullopt;
+  }
+  const int end = lines.first_px + lines.count * step - lines.gap_px + last_px;
+  return end == columns ? std::optional(lines) : std::nullopt;
+}
+
+// Whether the columns beside the lines differ from them as the others do.
+bool AreSharp(const cv::Mat& grey, const std::vector<FlatRun>& runs) {
+  const std::vector<double> differences = DeviationsFrom(
+      std::vector<double>(static_cast<std::size_t>(grey.cols), runs.front().level), grey);
+  const double least = kSharp * Middle(differences);
+  for (const FlatRun& run : runs) {
+    if (run.at > 0 && differences[static_cast<std::size_t>(run.at - 1)] < least) return false;
+    if (run.End() < grey.cols && differences[static_cast<std::size_t>(run.End())] < least)
+      return false;
+  }
+  return true;
+}
+
+AxisLines LinesAcross(const cv::Mat& grey) {
+  AxisLines none;
+  none.tile_px = grey.cols;
+  if (grey.cols < kMinTilePx || grey.rows < 1) return none;
+  double tolerance = 0;
+  const std::vector<FlatRun> runs = FlatRuns(grey, &tolerance);
+  std::vector<double> tried;
+  constexpr std::size_t kMaxColours = 8;
+  for (const FlatRun& first : runs) {
+    const auto is_alike = [&](double level) { return std::abs(level - first.level) < tolerance; };
+    if (std::any_of(tried.begin(), tried.end(), is_alike)) continue;
+    if (tried.size() == kMaxColours) break;
+    tried.push_back(first.level);
+    std::vector<FlatRun> of_colour;
+    for (const FlatRun& run : runs) {
+      if (is_alike(run.level)) of_colour.push_back(run);
+    }
+    const std::optional<AxisLines> lines = RegularLines(of_colour, grey.cols);
+    if (!lines || !AreSharp(grey, of_colour)) continue;
+    if (lines->one_side_px == 0) return *lines;
+    none.one_side_px = lines->one_side_px;
+  }
+  return none;
 }
 
 int PitchAcross(const cv::Mat& grey) {
@@ -141,15 +243,9 @@ bool Repeats(const cv::Mat& pixels, AxisCounts counts) {
   return RepeatsAcross(grey, counts.across) && RepeatsAcross(grey.t(), counts.down);
 }
 
-std::optional<BorderedTiles> BorderedTilesOf(const cv::Mat& pixels) {
+TileLines LinesOf(const cv::Mat& pixels) {
   const cv::Mat grey = GreyOf(pixels);
-  const std::optional<AxisBorders> across = BordersAcross(grey);
-  if (!across) return std::nullopt;
-  const std::optional<AxisBorders> down = BordersAcross(grey.t());
-  if (!down) return std::nullopt;
-  return BorderedTiles{{across->count, down->count},
-                       {across->gap_px, down->gap_px},
-                       {across->tile_px, down->tile_px}};
+  return {LinesAcross(grey), LinesAcross(grey.t())};
 }
 
 int LensletPitchOf(const cv::Mat& pixels) {

@@ -16,12 +16,20 @@ struct AxisCounts {
 AxisCounts RepetitionsOf(const cv::Mat& pixels);
 // Whether it repeats itself so often; 1 along an axis: that axis is not asked.
 bool Repeats(const cv::Mat& pixels, AxisCounts counts);
-// Tiles of one size with lines of one colour between them, but not around them.
-struct BorderedTiles {
-  AxisCounts tiles;
-  AxisCounts gap_px, tile_px;
+// Tiles of one size along an axis, with lines of one colour between them, a border of that colour
+// around all of them, or both. Lines may have the noise of JPEG.
+struct AxisLines {
+  int count = 1;     // of tiles; 1: no lines divide the image
+  int gap_px = 0;    // between tiles
+  int first_px = 0;  // of the border before the first tile
+  int tile_px = 0;   // of a tile, or of all that is within the border
+  // Every tile has a uniform edge of this width on one side, which may be its own; it is no line.
+  int one_side_px = 0;
 };
-std::optional<BorderedTiles> BorderedTilesOf(const cv::Mat& pixels);
+struct TileLines {
+  AxisLines across, down;
+};
+TileLines LinesOf(const cv::Mat& pixels);
 // The period of the differences between neighbouring pixels, as the edges of square lenslets have
 // it: 2 to 20 px; 0: there is none, or the axes differ.
 int LensletPitchOf(const cv::Mat& pixels);

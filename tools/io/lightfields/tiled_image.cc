@@ -1,5 +1,5 @@
 // One image with all views side by side, U x V tiles without borders, as in many papers, or with
-// lines of one colour between them, as our own mosaics have them.
+// lines of one colour between them, as our own mosaics have them, or around them.
 #include <fmt/format.h>
 
 #include <memory>
@@ -16,40 +16,72 @@ namespace thicklens::io {
 
 namespace {
 
-// Views with lines between them. The tiles must be those of the option layout, if it states them.
-ViewSource BorderedSource(const LayoutInput& input,
-                          const std::shared_ptr<const DecodedImage>& image,
-                          const BorderedTiles& found) {
-  const int stated_u = input.is_forced ? input.reading->layout_u : 0;
-  const int stated_v = input.is_forced ? input.reading->layout_v : 0;
-  const AxisCounts tiles = found.tiles;
-  if (stated_u > 0 && (stated_u != tiles.across || stated_v != tiles.down)) {
-    throw Error(fmt::format(
-        "{}: the option layout states {} x {} views, but lines of {} x {} px divide the image into "
-        "{} x {}: tiles:{}x{}",
-        input.path, stated_u, stated_v, found.gap_px.across, found.gap_px.down, tiles.across,
-        tiles.down, tiles.across, tiles.down));
-  }
-  ViewSource source;
-  source.kind = "an image of views side by side";
-  source.frame = FullFrame(tiles.across, tiles.down);
-  source.details.push_back(
-      fmt::format("{} x {} views, which lines of {} x {} px divide; the lines are left out",
-                  tiles.across, tiles.down, found.gap_px.across, found.gap_px.down));
-  source.read = [image, found, path = input.path](int k, int l) {
-    const cv::Rect tile(k * (found.tile_px.across + found.gap_px.across),
-                        l * (found.tile_px.down + found.gap_px.down), found.tile_px.across,
-                        found.tile_px.down);
-    return LightOfPixels(image->pixels(tile), image->facts, path);
-  };
-  return source;
+bool HasLines(const AxisLines& lines) { return lines.gap_px > 0 || lines.first_px > 0; }
+
+// What is left out, as a clause.
+std::string LinesInWords(const TileLines& lines) {
+  const AxisLines &across = lines.across, &down = lines.down;
+  const bool has_gaps = across.gap_px > 0 || down.gap_px > 0;
+  const std::string border =
+      across.first_px > 0 || down.first_px > 0
+          ? fmt::format("a border of {} x {} px", across.first_px, down.first_px)
+          : "";
+  if (!has_gaps) return border + " is left out";
+  return fmt::format("lines of {} x {} px divide the views{}, and are left out", across.gap_px,
+                     down.gap_px, border.empty() ? "" : " within " + border);
 }
 
 // How often the image repeats itself, as a clause for a message about other numbers.
 std::string RepetitionsInWords(AxisCounts found) {
   if (found.across < 2 && found.down < 2) return "";
+  if (found.down < 2)
+    return fmt::format("; the image repeats itself {} times across: tiles:{}xV", found.across,
+                       found.across);
+  if (found.across < 2)
+    return fmt::format("; the image repeats itself {} times down: tiles:Ux{}", found.down,
+                       found.down);
   return fmt::format("; the image repeats itself {} times across and {} times down: tiles:{}x{}",
                      found.across, found.down, found.across, found.down);
+}
+
+// The part of the image in which tiles without lines may be: all of it along an axis without lines,
+// what is within the border, or one tile along an axis with lines between tiles.
+cv::Mat Undivided(const cv::Mat& pixels, const TileLines& lines) {
+  return pixels(cv::Rect(lines.across.first_px, lines.down.first_px, lines.across.tile_px,
+                         lines.down.tile_px));
+}
+
+// Numbers of tiles: those of the lines, and otherwise how often the image repeats itself.
+AxisCounts CountsOf(const cv::Mat& pixels, const TileLines& lines) {
+  AxisCounts counts{lines.across.count, lines.down.count};
+  if (counts.across > 1 && counts.down > 1) return counts;
+  const AxisCounts repeated = RepetitionsOf(Undivided(pixels, lines));
+  if (counts.across == 1) counts.across = repeated.across;
+  if (counts.down == 1) counts.down = repeated.down;
+  return counts;
+}
+
+// Throws Error if lines divide the image into other numbers than the option layout states.
+void RequireStated(const LayoutInput& input, AxisCounts stated, const TileLines& lines) {
+  const bool differs = (lines.across.count > 1 && lines.across.count != stated.across) ||
+                       (lines.down.count > 1 && lines.down.count != stated.down);
+  if (!differs) return;
+  const AxisCounts tiles{lines.across.count > 1 ? lines.across.count : stated.across,
+                         lines.down.count > 1 ? lines.down.count : stated.down};
+  throw Error(fmt::format(
+      "{}: the option layout states {} x {} views, but lines of {} x {} px divide the image into "
+      "{} x {}: tiles:{}x{}",
+      input.path, stated.across, stated.down, lines.across.gap_px, lines.down.gap_px, tiles.across,
+      tiles.down, tiles.across, tiles.down));
+}
+
+// Tiles without lines along an axis divide what is within the border.
+bool SetTileSize(int count, AxisLines* lines) {
+  if (lines->count > 1) return true;
+  if (lines->tile_px % count != 0) return false;
+  lines->count = count;
+  lines->tile_px /= count;
+  return true;
 }
 
 }  // namespace
@@ -58,42 +90,65 @@ std::optional<ViewSource> OpenTiledImage(const LayoutInput& input) {
   ReportInput(input.path);
   const auto image = std::make_shared<const DecodedImage>(ReadImageData(input.path));
   const cv::Mat& pixels = image->pixels;
-  // An image with two such lines may show anything, so that more are needed unless the layout is
-  // stated.
-  const std::optional<BorderedTiles> bordered = BorderedTilesOf(pixels);
-  if (bordered && (input.is_forced || bordered->tiles.across * bordered->tiles.down >= 9))
-    return BorderedSource(input, image, *bordered);
-  AxisCounts tiles{input.reading->layout_u, input.reading->layout_v};
-  const bool is_found = !input.is_forced || tiles.across == 0;
-  if (is_found) {
-    tiles = RepetitionsOf(pixels);
+  const AxisCounts stated =
+      input.is_forced ? AxisCounts{input.reading->layout_u, input.reading->layout_v} : AxisCounts{};
+  const bool is_stated = stated.across > 0;
+  TileLines lines = LinesOf(pixels);
+  // What looks like lines may be in the views themselves.
+  const bool has_lines = HasLines(lines.across) || HasLines(lines.down);
+  const bool are_divided = lines.across.count > 1 || lines.down.count > 1;
+  if (is_stated && are_divided &&
+      (lines.across.count == 1 || lines.across.count != stated.across) &&
+      (lines.down.count == 1 || lines.down.count != stated.down) && Repeats(pixels, stated)) {
+    lines = TileLines{{1, 0, 0, pixels.cols, 0}, {1, 0, 0, pixels.rows, 0}};
+  }
+  AxisCounts tiles = stated;
+  if (is_stated) {
+    RequireStated(input, stated, lines);
+  } else {
+    tiles = CountsOf(pixels, lines);
+    // An image with two such lines may show anything, so that more are needed unless the layout is
+    // stated.
+    const bool are_few = are_divided && tiles.across * tiles.down < 9;
+    if (!input.is_forced && (tiles.across < 2 || tiles.down < 2 || are_few)) return std::nullopt;
     if (tiles.across < 2 || tiles.down < 2) {
-      if (!input.is_forced) return std::nullopt;
       throw Error(fmt::format(
           "{}: the {} x {} px do not repeat across and down as views side by side do (found {} x "
           "{}): the option layout must state how many views there are, e.g. tiles:9x9",
           input.path, pixels.cols, pixels.rows, tiles.across, tiles.down));
     }
   }
-  if (pixels.cols % tiles.across != 0 || pixels.rows % tiles.down != 0) {
+  const AxisCounts undivided{lines.across.tile_px, lines.down.tile_px};
+  if (!SetTileSize(tiles.across, &lines.across) || !SetTileSize(tiles.down, &lines.down)) {
+    const std::string within = has_lines ? fmt::format(" (of {} x {} px; {})", pixels.cols,
+                                                       pixels.rows, LinesInWords(lines))
+                                         : "";
     throw Error(fmt::format(
-        "{}: {} x {} px are not a whole number of pixels for each of {} x {} views; views without "
-        "borders are expected, or with lines of one colour between them{}",
-        input.path, pixels.cols, pixels.rows, tiles.across, tiles.down,
+        "{}: {} x {} px{} are not a whole number of pixels for each of {} x {} views; views "
+        "without "
+        "borders are expected, or with lines of one colour and one width between them or around "
+        "them{}",
+        input.path, undivided.across, undivided.down, within, tiles.across, tiles.down,
         RepetitionsInWords(RepetitionsOf(pixels))));
   }
-  const int width = pixels.cols / tiles.across;
-  const int height = pixels.rows / tiles.down;
   ViewSource source;
   source.kind = "an image of views side by side";
   source.frame = FullFrame(tiles.across, tiles.down);
+  if (HasLines(lines.across) || HasLines(lines.down)) source.details.push_back(LinesInWords(lines));
+  const bool is_found = !is_stated && !are_divided;
   if (is_found) {
     source.details.push_back(
         fmt::format("{} x {} views, because the image repeats that often; the option layout states "
                     "other numbers: tiles:{}x{}",
                     tiles.across, tiles.down, tiles.across, tiles.down));
   }
-  if (!is_found && !Repeats(pixels, tiles)) {
+  if (lines.across.one_side_px > 0 || lines.down.one_side_px > 0) {
+    source.notices.push_back(fmt::format(
+        "{}: every view has a uniform edge of {} x {} px on one side, which may be a line between "
+        "views and is kept; the option crop leaves it out",
+        input.path, lines.across.one_side_px, lines.down.one_side_px));
+  }
+  if (is_stated && !has_lines && !Repeats(pixels, tiles)) {
     const AxisCounts found = RepetitionsOf(pixels);
     const bool is_other = (found.across > 1 && found.across != tiles.across) ||
                           (found.down > 1 && found.down != tiles.down);
@@ -103,8 +158,11 @@ std::optional<ViewSource> OpenTiledImage(const LayoutInput& input) {
                                            RepetitionsInWords(found)));
     }
   }
-  source.read = [image, width, height, path = input.path](int k, int l) {
-    const cv::Rect tile(k * width, l * height, width, height);
+  source.read = [image, lines, path = input.path](int k, int l) {
+    const AxisLines &across = lines.across, &down = lines.down;
+    const cv::Rect tile(across.first_px + k * (across.tile_px + across.gap_px),
+                        down.first_px + l * (down.tile_px + down.gap_px), across.tile_px,
+                        down.tile_px);
     return LightOfPixels(image->pixels(tile), image->facts, path);
   };
   return source;

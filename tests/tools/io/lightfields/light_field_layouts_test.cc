@@ -537,6 +537,64 @@ TEST_F(LightFieldLayouts, LinesBetweenTheViewsAreLeftOut) {
               AllOf(HasSubstr("states 3 x 2 views"), HasSubstr("tiles:3x3")));
 }
 
+// 3 x 3 views with lines between them and a border around them.
+cv::Mat Mosaic(cv::Size gap, cv::Size border, int level) {
+  const int step_x = kViewWidthPx + gap.width, step_y = kViewHeightPx + gap.height;
+  cv::Mat mosaic(3 * step_y - gap.height + 2 * border.height,
+                 3 * step_x - gap.width + 2 * border.width, CV_8UC3, cv::Scalar::all(level));
+  for (int l = 0; l < 3; ++l) {
+    for (int k = 0; k < 3; ++k) {
+      InOrder(k, l).copyTo(mosaic(cv::Rect(border.width + k * step_x, border.height + l * step_y,
+                                           kViewWidthPx, kViewHeightPx)));
+    }
+  }
+  return mosaic;
+}
+
+// Before, a border around the image made it one without lines, and views contained them.
+TEST_F(LightFieldLayouts, BordersAroundTheViewsAreLeftOut) {
+  LightFieldReading reading;
+  reading.layout = "tiles";
+  reading.layout_u = reading.layout_v = 3;
+  const cv::Size none(0, 0), two(2, 2), four(4, 4);
+  for (const int level : {0, 255}) {
+    // montage -geometry +2+2; lines and a rim of one width; a rim alone; lines in one direction.
+    for (const auto& [gap, border] :
+         {std::pair(four, two), std::pair(two, two), std::pair(none, four),
+          std::pair(cv::Size(3, 0), none), std::pair(cv::Size(0, 2), cv::Size(0, 1))}) {
+      SCOPED_TRACE(::testing::Message() << gap << ", " << border << ", " << level);
+      ExpectViews(Read(folder_.Put("m.png", EncodedTile(Mosaic(gap, border, level))), reading));
+      EXPECT_THAT(facts_.one_line, HasSubstr("left out"));
+    }
+  }
+  ExpectViews(Read(folder_.Put("m.png", EncodedTile(Mosaic(four, two, 0)))));
+  EXPECT_THAT(facts_.one_line, HasSubstr("lines of 4 x 4 px divide the views within a border of 2 "
+                                         "x 2 px"));
+  const cv::Mat uneven = Mosaic(none, four, 0)(cv::Rect(2, 0, 3 * kViewWidthPx + 6, 200)).clone();
+  ExpectViews(Read(folder_.Put("m.png", EncodedTile(uneven)), reading));
+  // Lines on the right of each view only may be an edge of the views.
+  const cv::Mat right =
+      Mosaic({2, 0}, {2, 0}, 0)(cv::Rect(2, 0, 3 * kViewWidthPx + 6, 192)).clone();
+  EXPECT_EQ(Read(folder_.Put("m.png", EncodedTile(right)), reading).s_count, kViewWidthPx + 2);
+  EXPECT_THAT(facts_.notices, ::testing::Contains(HasSubstr("uniform edge of 2 x 0 px")));
+  reading.layout_u = 5;
+  EXPECT_THAT(
+      ErrorOf([&] { Read(folder_.Put("m.png", EncodedTile(Mosaic(none, two, 0))), reading); }),
+      AllOf(HasSubstr("288 x 192 px (of 292 x 196 px"), HasSubstr("5 x 3 views")));
+}
+
+TEST_F(LightFieldLayouts, LinesMayHaveTheNoiseOfJpeg) {
+  for (const int level : {0, 255}) {
+    const cv::Mat mosaic = Mosaic({2, 2}, {0, 0}, level);
+    const model::LightField light_field =
+        Read(folder_.Put("mosaic.jpg", EncodedTile(mosaic, ".jpg")));
+    EXPECT_EQ(light_field.u_count, 3);
+    EXPECT_EQ(light_field.v_count, 3);
+    EXPECT_EQ(light_field.s_count, kViewWidthPx);
+    EXPECT_EQ(light_field.t_count, kViewHeightPx);
+  }
+}
+
 TEST_F(LightFieldLayouts, AnotherNumberOfTilesIsNamed) {
   constexpr int kSide = 4;
   cv::Mat tiles(kSide * kViewHeightPx, kSide * kViewWidthPx, CV_8UC3);
