@@ -165,24 +165,18 @@ struct Rendering {
 };
 
 OptionNames RenderOptionNames() {
-  return {{"hci_grid", "--grid"},
-          {"allow_missing_views", "--sparse"},
-          {"inner_views", "--views"},
-          {"layout", "--layout"},
-          {"view_name", "--name"},
-          {"view_order", "--view-order"},
-          {"crop", "--crop"},
-          {"aperture", "--aperture and --aperture-shape"},
-          {"aperture.shape", "--aperture-shape"},
-          {"aperture.radius", "--aperture"},
-          {"effects", "--effects"},
-          {"effects.without", "--without"},
-          {"effects.tolerance", "--effect-tolerance"},
-          {"depth_mm", "--focus"},
-          {"disparity_px", "--focus-disparity"},
-          {"device", "--device"},
-          {"noise_levels", "--noise"},
-          {"bits", "--bits"}};
+  OptionNames names = {{"aperture", "--aperture and --aperture-shape"},
+                       {"aperture.shape", "--aperture-shape"},
+                       {"aperture.radius", "--aperture"},
+                       {"effects", "--effects"},
+                       {"effects.without", "--without"},
+                       {"effects.tolerance", "--effect-tolerance"},
+                       {"depth_mm", "--focus"},
+                       {"disparity_px", "--focus-disparity"},
+                       {"device", "--device"},
+                       {"noise_levels", "--noise"},
+                       {"bits", "--bits"}};
+  return names.Add(ReadingOptionNames());
 }
 
 RenderAperture ApertureOf(const RenderOptions& options) {

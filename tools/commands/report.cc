@@ -17,15 +17,14 @@
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
-#include "thicklens/base/printable_text.h"
 #include "thicklens/base/utc_time.h"
 #include "thicklens/depth.h"
 #include "thicklens/estimator/disparity_map.h"
 #include "thicklens/io/aperture_statement.h"
 #include "thicklens/io/frame_files.h"
 #include "thicklens/io/image_io.h"
-#include "thicklens/io/light_field_io.h"
 #include "thicklens/io/video_file.h"
+#include "thicklens/light_field.h"
 #include "thicklens/model/light_field.h"
 #include "thicklens/model/light_field_grid.h"
 #include "thicklens/model/sweep_file.h"
@@ -72,12 +71,13 @@ bool NeedsCrop(const std::optional<model::PixelRect>& crop, int width_px, int he
                   path, width_px, height_px, light_field.s_count, light_field.t_count));
 }
 
-model::LightField ReadCropped(const std::string& path, io::LightFieldReading reading) {
+LightField ReadCropped(const CommonOptions& common, const std::string& path,
+                       const ReadingOptions& options) {
+  const CommandRun run(common, ReadingOptionNames());
+  LightFieldReadOptions reading = LightFieldReadOptionsOf(options);
   const std::optional<model::PixelRect> crop = std::exchange(reading.crop, std::nullopt);
-  io::LightFieldFacts facts;
-  const model::LightField light_field = io::ReadLightField(path, reading, &facts);
-  if (!facts.is_plain) spdlog::info("{}", PrintableUtf8(facts.one_line));
-  for (const std::string& notice : facts.notices) spdlog::warn("{}", PrintableUtf8(notice));
+  LightField light_field = WithOptionNames(
+      run.names(), [&] { return thicklens::ReadLightField(path, reading, run.control()); });
   if (NeedsCrop(crop, light_field.s_count, light_field.t_count)) {
     return WithFileContext(path, [&] { return model::CropViews(light_field, *crop); });
   }
@@ -104,9 +104,9 @@ void RequireSameViewpoints(const ReportOptions& options, const model::LightField
 
 // Returns the true views that correspond to the views of the light field.
 model::LightField ReadTruth(const ReportOptions& options, const model::LightField& light_field) {
-  io::LightFieldReading reading = ReadingOf(options.reading);
-  reading.u_count = reading.v_count = 0;
-  model::LightField truth = ReadCropped(options.truth_path, reading);
+  ReadingOptions reading = options.reading;
+  reading.views.text.clear();
+  model::LightField truth = ReadCropped(options.common, options.truth_path, reading);
   if (truth.s_count != light_field.s_count || truth.t_count != light_field.t_count) {
     ThrowOtherSize(options.truth_path, truth.s_count, truth.t_count, light_field);
   }
@@ -313,7 +313,7 @@ ComparisonRecord ReadMatchingComparison(const ReportOptions& options,
 CommandResult Report(const ReportOptions& options) {
   OutputFile output(options.output_path);
   const model::LightField light_field =
-      ReadCropped(options.light_field_path, ReadingOf(options.reading));
+      ReadCropped(options.common, options.light_field_path, options.reading);
   std::optional<model::LightField> truth;
   if (!options.truth_path.empty()) truth = ReadTruth(options, light_field);
   ThrowIfCancelled();
@@ -356,7 +356,7 @@ CommandResult Report(const ReportOptions& options) {
 }
 
 void CheckUsage(const ReportOptions& options) {
-  ReadingOf(options.reading);
+  LightFieldReadOptionsOf(options.reading);
   const DepthOptions& depth = options.depth;
   if (!options.depth_path.empty()) {
     ConventionOf(depth);

@@ -8,6 +8,11 @@
 
 namespace thicklens::tools {
 
+OptionNames& OptionNames::Add(const OptionNames& others) {
+  names_.insert(others.names_.begin(), others.names_.end());
+  return *this;
+}
+
 std::string OptionNames::operator()(const std::string& field) const {
   for (std::string path = field;; path.erase(path.rfind('.'))) {
     const auto found = names_.find(path);

@@ -22,6 +22,8 @@ class OptionNames {
  public:
   OptionNames(std::initializer_list<std::pair<const std::string, std::string>> names)
       : names_(names) {}
+  // Adds the entries of other names. An entry of the same path stays as it is.
+  OptionNames& Add(const OptionNames& others);
   // The path itself if no entry stands for it.
   std::string operator()(const std::string& field) const;
 

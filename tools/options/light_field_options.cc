@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <tuple>
 #include <vector>
 
 #include "thicklens/base/error.h"
@@ -14,7 +13,6 @@
 namespace thicklens::tools {
 namespace {
 
-constexpr int kMaxGrid = 1000;
 constexpr int kMaxLayoutCount = 100;
 
 }  // namespace
@@ -60,7 +58,8 @@ struct LayoutRequest {
   int u_count = 0, v_count = 0;
 };
 
-LayoutRequest LayoutOf(const std::string& text) {
+// `dashes` is what stands before the name of the option: "--".
+LayoutRequest LayoutOf(const std::string& text, const std::string& dashes) {
   LayoutRequest request;
   if (text.empty()) return request;
   const std::size_t colon = text.find(':');
@@ -68,20 +67,20 @@ LayoutRequest LayoutOf(const std::string& text) {
   const std::vector<std::string> names = io::LightFieldLayouts();
   if (std::find(names.begin(), names.end(), request.name) == names.end()) {
     throw UsageError(
-        fmt::format("--layout: {} is expected, found '{}'", fmt::join(names, ", "), text));
+        fmt::format("{}layout: {} is expected, found '{}'", dashes, fmt::join(names, ", "), text));
   }
   if (colon == std::string::npos) return request;
   const std::string form = "NAME:UxV (numbers across and down, e.g. lenslets:14x14)";
   const std::vector<int> counts =
-      SplitWhole("--layout", text.substr(colon + 1), 'x', form, 1, kMaxLayoutCount);
+      SplitWhole(dashes + "layout", text.substr(colon + 1), 'x', form, 1, kMaxLayoutCount);
   if (counts.size() != 2)
-    throw UsageError(fmt::format("--layout: {} is expected, found '{}'", form, text));
+    throw UsageError(fmt::format("{}layout: {} is expected, found '{}'", dashes, form, text));
   request.u_count = counts[0];
   request.v_count = counts[1];
   return request;
 }
 
-ViewOrderChange ViewOrderOf(const std::string& text) {
+ViewOrderChange ViewOrderOf(const std::string& text, const std::string& dashes) {
   ViewOrderChange change;
   if (text.empty() || text == "none") return change;
   for (std::size_t begin = 0; begin <= text.size();) {
@@ -93,9 +92,9 @@ ViewOrderChange ViewOrderOf(const std::string& text) {
                                             : nullptr;
     if (flag == nullptr || *flag) {
       throw UsageError(fmt::format(
-          "--view-order: swap, mirror-u and mirror-v, each once, with commas between them, or "
+          "{}view-order: swap, mirror-u and mirror-v, each once, with commas between them, or "
           "none are expected, found '{}'",
-          text));
+          dashes, text));
     }
     *flag = true;
     begin = end + 1;
@@ -134,32 +133,22 @@ void AddReadingOptions(CLI::App* command, ReadingOptions* options) {
       ->type_name("CHANGES");
 }
 
-io::LightFieldReading ReadingOf(const ReadingOptions& options) {
-  io::LightFieldReading reading;
-  const LayoutRequest layout = LayoutOf(options.layout);
-  reading.layout = layout.name;
-  reading.layout_u = layout.u_count;
-  reading.layout_v = layout.v_count;
-  reading.name = options.name;
-  const ViewOrderChange change = ViewOrderOf(options.view_order);
-  reading.swap_uv = change.swap;
-  reading.mirror_u = change.mirror_u;
-  reading.mirror_v = change.mirror_v;
-  reading.grid = options.grid;
-  reading.sparse = options.sparse;
-  std::tie(reading.u_count, reading.v_count) = ViewCounts(options.views);
-  reading.crop = CropRect(options.crop);
-  return reading;
+OptionNames ReadingOptionNames() {
+  return {{"hci_grid", "--grid"},     {"allow_missing_views", "--sparse"},
+          {"inner_views", "--views"}, {"layout", "--layout"},
+          {"view_name", "--name"},    {"view_order", "--view-order"},
+          {"crop", "--crop"}};
 }
 
-LightFieldReadOptions LightFieldReadOptionsOf(const ReadingOptions& options) {
+LightFieldReadOptions LightFieldReadOptionsOf(const ReadingOptions& options,
+                                              const std::string& dashes) {
   LightFieldReadOptions reading;
-  const LayoutRequest layout = LayoutOf(options.layout);
+  const LayoutRequest layout = LayoutOf(options.layout, dashes);
   reading.layout = layout.name;
   if (layout.u_count > 0)
     reading.layout_counts = thicklens::ViewCounts{layout.u_count, layout.v_count};
   reading.view_name = options.name;
-  reading.view_order = ViewOrderOf(options.view_order);
+  reading.view_order = ViewOrderOf(options.view_order, dashes);
   reading.hci_grid = options.grid;
   reading.allow_missing_views = options.sparse;
   const auto [u_count, v_count] = ViewCounts(options.views);

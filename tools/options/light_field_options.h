@@ -11,6 +11,7 @@
 #include "thicklens/io/light_field_io.h"
 #include "thicklens/light_field.h"
 #include "thicklens/model/scene.h"
+#include "tools/options/interface_options.h"
 
 namespace thicklens::tools {
 
@@ -38,9 +39,12 @@ struct ReadingOptions {
   CropOption crop;
   std::string layout, name, view_order;
 };
+constexpr int kMaxGrid = 1000;  // of --grid
 void AddReadingOptions(CLI::App* command, ReadingOptions* options);
-io::LightFieldReading ReadingOf(const ReadingOptions& options);                // throws UsageError
-LightFieldReadOptions LightFieldReadOptionsOf(const ReadingOptions& options);  // throws UsageError
+OptionNames ReadingOptionNames();
+// Throws UsageError, which names --layout and --view-order with this in front of their names.
+LightFieldReadOptions LightFieldReadOptionsOf(const ReadingOptions& options,
+                                              const std::string& dashes = "--");
 
 // The options --depth-kind, --depth-unit, --disparity-scale and --disparity-offset, and those of
 // inverse depth, state what a depth map's numbers mean. Kind and unit are never guessed: z and

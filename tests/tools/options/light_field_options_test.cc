@@ -56,21 +56,6 @@ TEST(CropOption, IsARectangle) {
     EXPECT_THAT(UsageErrorOf([&] { CropRect({text}); }), StartsWith("--crop: ")) << text;
 }
 
-TEST(ReadingOptions, AreHandedOn) {
-  ReadingOptions options;
-  options.grid = 9;
-  options.sparse = true;
-  options.views.text = "3x5";
-  options.crop.text = "0,1,2,3";
-  const io::LightFieldReading reading = ReadingOf(options);
-  EXPECT_EQ(reading.grid, 9);
-  EXPECT_TRUE(reading.sparse);
-  EXPECT_EQ(reading.u_count, 3);
-  EXPECT_EQ(reading.v_count, 5);
-  ASSERT_TRUE(reading.crop);
-  EXPECT_EQ(reading.crop->height, 3);
-}
-
 TEST(ReadingOptions, AreHandedToTheInterface) {
   ReadingOptions options;
   EXPECT_FALSE(LightFieldReadOptionsOf(options).inner_views);
@@ -86,6 +71,21 @@ TEST(ReadingOptions, AreHandedToTheInterface) {
   EXPECT_EQ(reading.inner_views->v, 5);
   ASSERT_TRUE(reading.crop);
   EXPECT_EQ(reading.crop->height, 3);
+}
+
+TEST(ReadingOptions, MessagesNameTheOptionAsItIsTyped) {
+  ReadingOptions options;
+  options.layout = "foo";
+  EXPECT_THAT(UsageErrorOf([&] { LightFieldReadOptionsOf(options); }), StartsWith("--layout: "));
+  for (const char* wrong : {"foo", "tiles:3", "tiles:axb"}) {
+    options.layout = wrong;
+    EXPECT_THAT(UsageErrorOf([&] { LightFieldReadOptionsOf(options, "--other-"); }),
+                StartsWith("--other-layout: "));
+  }
+  options.layout = "";
+  options.view_order = "back";
+  EXPECT_THAT(UsageErrorOf([&] { LightFieldReadOptionsOf(options, "--other-"); }),
+              StartsWith("--other-view-order: "));
 }
 
 TEST(DepthOptions, KindAndUnitAreNotGuessed) {
