@@ -58,25 +58,26 @@ Image ReadCroppedImage(const std::string& path, const Rect& crop,
 }
 
 OptionNames CompareOptionNames() {
-  return {{"hci_grid", "--grid"},     {"allow_missing_views", "--sparse"},
-          {"inner_views", "--views"}, {"layout", "--layout"},
-          {"view_name", "--name"},    {"view_order", "--view-order"},
-          {"crop", "--crop"},         {"border_px", "--border"},
-          {"baseline", "--dibr"},     {"depth.meaning.kind", "--depth-kind"}};
+  OptionNames names = {
+      {"border_px", "--border"}, {"baseline", "--dibr"}, {"depth.meaning.kind", "--depth-kind"}};
+  return names.Add(ReadingOptionNames());
 }
 
 // ---- Two images.
 
 CommandResult CompareImageFiles(const CompareOptions& options) {
   const LightFieldReadOptions reading = LightFieldReadOptionsOf(options.reading);
-  const OtherReadingOptions& replaced = options.other_reading;
-  if (reading.hci_grid > 0 || reading.allow_missing_views || reading.inner_views ||
-      !options.reading.view_order.empty() || replaced.grid > 0 || !replaced.view_order.empty() ||
-      !options.dibr_paths.empty()) {
+  std::vector<std::string> given;
+  if (reading.hci_grid > 0) given.emplace_back("--grid");
+  if (reading.allow_missing_views) given.emplace_back("--sparse");
+  if (reading.inner_views) given.emplace_back("--views");
+  if (!options.reading.view_order.empty()) given.emplace_back("--view-order");
+  for (const std::string& name : GivenNames(options.other_reading)) given.push_back(name);
+  if (!options.dibr_paths.empty()) given.emplace_back("--dibr");
+  if (!given.empty()) {
     throw UsageError(fmt::format(
-        "--grid, --sparse, --views, --view-order and --dibr are for light fields, but {} is an "
-        "image; --layout states that it is one",
-        PrintableUtf8(options.reference_path)));
+        "{}: only for light fields, but {} is an image; --layout states that it is a light field",
+        fmt::join(given, ", "), PrintableUtf8(options.reference_path)));
   }
   for (const std::string& path : {options.reference_path, options.other_path}) {
     const std::string layout = io::LayoutThatIsStated(path);
@@ -127,10 +128,33 @@ Baseline ReadBaseline(const CompareOptions& options, const Rect& crop, bool has_
   return baseline;
 }
 
-// Reads one of both light fields. If one is a folder and the other a file, what is wrong with one
-// may be that the user meant another pair.
-LightField ReadCompared(const ComparedInput& input, const ComparedInput& partner,
-                        const LightFieldReadOptions& reading, const RunControl& run) {
+// What an error of one of both inputs may have to do with the other, in parentheses, or nothing.
+std::string OfThePair(const CompareOptions& options, const ComparedInput& input,
+                      const ComparedInput& partner, const std::string& what) {
+  const OtherReadingOptions& replaced = options.other_reading;
+  const bool is_named_once = !options.reading.name.empty() && replaced.name.empty();
+  if (is_named_once && !partner.is_own && input.is_folder == partner.is_folder &&
+      what.find("no name fits") != std::string::npos) {
+    return fmt::format(" (--name is for both inputs; --other-name states the names of {})",
+                       PrintableUtf8(options.other_path));
+  }
+  // If one is a folder and the other a file, the user may have meant another pair, unless the file
+  // or an option says that it is a light field.
+  if (input.is_folder == partner.is_folder) return "";
+  const bool is_stated = !options.reading.layout.empty() || !replaced.layout.empty() ||
+                         !options.reading.name.empty() || !replaced.name.empty();
+  const ComparedInput& file = input.is_folder ? partner : input;
+  if (is_stated || !io::LayoutThatIsStated(file.path).empty()) return "";
+  return fmt::format(
+      " (two images or two light fields are expected, found the {} {} and the {} {})",
+      input.is_folder ? "folder" : "file", PrintableUtf8(input.path),
+      partner.is_folder ? "folder" : "file", PrintableUtf8(partner.path));
+}
+
+// Reads one of both light fields.
+LightField ReadCompared(const CompareOptions& options, const ComparedInput& input,
+                        const ComparedInput& partner, const LightFieldReadOptions& reading,
+                        const RunControl& run) {
   try {
     return ReadLightField(input.path, reading, run);
   } catch (const Interrupted&) {
@@ -138,12 +162,7 @@ LightField ReadCompared(const ComparedInput& input, const ComparedInput& partner
   } catch (const OptionError&) {
     throw;
   } catch (const Error& error) {
-    if (input.is_folder == partner.is_folder) throw;
-    throw Error(
-        fmt::format("{} (two images or two light fields are expected, found the {} {} and "
-                    "the {} {})",
-                    error.what(), input.is_folder ? "folder" : "file", PrintableUtf8(input.path),
-                    partner.is_folder ? "folder" : "file", PrintableUtf8(partner.path)));
+    throw Error(error.what() + OfThePair(options, input, partner, error.what()));
   }
 }
 
@@ -153,9 +172,16 @@ LightFieldScores ScoresOf(const CompareOptions& options, const ComparedInput& re
       ReadingsOf(options.reading, options.other_reading, reference_input, other_input);
   const LightFieldReadOptions reference_reading = LightFieldReadOptionsOf(readings.reference);
   LightFieldReadOptions other_reading = LightFieldReadOptionsOf(readings.other);
-  LightField reference = ReadCompared(reference_input, other_input, reference_reading, run);
+  LightField reference =
+      ReadCompared(options, reference_input, other_input, reference_reading, run);
   const Rect crop = std::exchange(other_reading.crop, std::nullopt);
-  LightField other = ReadCompared(other_input, reference_input, other_reading, run);
+  // What is said about the other input names the options that are for it alone.
+  const OptionNames other_names = OtherReadingOptionNames();
+  RunControl other_run = run;
+  other_run.option_name = other_names;
+  LightField other = WithOptionNames(other_names, [&] {
+    return ReadCompared(options, other_input, reference_input, other_reading, other_run);
+  });
   if (IsToCrop(crop, other.s_count, other.t_count))
     other = WithFileContext(options.other_path, [&] { return model::CropViews(other, *crop); });
   thicklens::CompareOptions asked;

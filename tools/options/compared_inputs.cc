@@ -15,8 +15,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kMaxOtherGrid = 1000;
-
 std::string NameOfLayout(const std::string& text) { return text.substr(0, text.find(':')); }
 
 // The options that an input gets of those that were given for both.
@@ -32,6 +30,7 @@ ReadingOptions SharedOptions(const ReadingOptions& options, const ComparedInput&
   // Only inputs that the options may be for are asked whether they fit better.
   const bool has_other_kind = !partner.is_own && partner.is_folder != input.is_folder;
   if (!has_other_kind) return mine;
+  if (!input.is_folder) mine.grid = 0;
   if (!mine.layout.empty()) {
     if (io::IsLayoutOfFolders(NameOfLayout(mine.layout)) != input.is_folder) clear();
   } else if (!input.is_folder) {
@@ -44,7 +43,7 @@ ReadingOptions SharedOptions(const ReadingOptions& options, const ComparedInput&
 
 void AddOtherReadingOptions(CLI::App* command, OtherReadingOptions* options) {
   command->add_option("--other-grid", options->grid, "As --grid, for OTHER only")
-      ->check(CLI::Range(1, kMaxOtherGrid))
+      ->check(CLI::Range(1, kMaxGrid))
       ->type_name("N");
   command->add_option("--other-layout", options->layout, "As --layout, for OTHER only")
       ->type_name("NAME[:UxV]");
@@ -54,6 +53,23 @@ void AddOtherReadingOptions(CLI::App* command, OtherReadingOptions* options) {
       ->add_option("--other-view-order", options->view_order,
                    "As --view-order, for OTHER only; none: its views are in order")
       ->type_name("CHANGES");
+}
+
+OptionNames OtherReadingOptionNames() {
+  OptionNames names = {{"hci_grid", "--other-grid"},
+                       {"layout", "--other-layout"},
+                       {"view_name", "--other-name"},
+                       {"view_order", "--other-view-order"}};
+  return names.Add(ReadingOptionNames());
+}
+
+std::vector<std::string> GivenNames(const OtherReadingOptions& options) {
+  std::vector<std::string> names;
+  if (options.grid > 0) names.emplace_back("--other-grid");
+  if (!options.layout.empty()) names.emplace_back("--other-layout");
+  if (!options.name.empty()) names.emplace_back("--other-name");
+  if (!options.view_order.empty()) names.emplace_back("--other-view-order");
+  return names;
 }
 
 ComparedInput ComparedInputOf(const std::string& path) {
@@ -84,8 +100,9 @@ ComparedReadings ReadingsOf(const ReadingOptions& options, const OtherReadingOpt
   if (!replaced.layout.empty()) readings.other.layout = replaced.layout;
   if (!replaced.name.empty()) readings.other.name = replaced.name;
   if (!replaced.view_order.empty()) readings.other.view_order = replaced.view_order;
-  for (const ReadingOptions& reading : {readings.reference, readings.other})
-    LightFieldReadOptionsOf(reading);  // reports wrong usage
+  // These report wrong usage. What is wrong for both is reported about the first.
+  LightFieldReadOptionsOf(readings.reference);
+  LightFieldReadOptionsOf(readings.other, "--other-");
   return readings;
 }
 

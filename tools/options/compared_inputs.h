@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <string>
+#include <vector>
 
 #include "tools/options/light_field_options.h"
 
@@ -15,6 +16,10 @@ struct OtherReadingOptions {
   std::string layout, name, view_order;
 };
 void AddOtherReadingOptions(CLI::App* command, OtherReadingOptions* options);
+// The options that state how the second input is read.
+OptionNames OtherReadingOptionNames();
+// Those of them that were given, "--other-grid".
+std::vector<std::string> GivenNames(const OtherReadingOptions& options);
 
 // An input as far as the rules below need it.
 struct ComparedInput {
@@ -32,6 +37,7 @@ struct ComparedReadings {
 //   - A folder of thicklens gets none of them, unless both inputs are such folders.
 //   - --layout is for the inputs of its kind, folder or file, if there is one; --name and
 //     --view-order then go with it. --name without --layout is for folders, if there is one.
+//   - --grid is for folders, if there is one: of a file it would be the size of lenslets.
 //   - --view-order without --layout is refused for a folder and a file of other programs: it is not
 //     known which is meant.
 // Throws UsageError.

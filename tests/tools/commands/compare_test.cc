@@ -517,6 +517,31 @@ TEST_F(CompareProgram, AFileOfViewsIsComparedWithAFolder) {
   EXPECT_THAT(result.out, HasSubstr("identical"));
 }
 
+// Before, the messages named the options that are for both inputs.
+TEST_F(CompareProgram, MessagesAboutTheOtherNameItsOptions) {
+  const std::string folder = PutHci("truth", 3, 0);
+  const std::string image = PutImage("a.png", View(0, 0));
+  EXPECT_THAT(Run({folder, folder, "--grid", "7", "--other-view-order", "mirror-u"}).err,
+              HasSubstr("the option --other-view-order"));
+  EXPECT_THAT(Failure({folder, folder, "--grid", "7", "--other-name", "a_{v}_{u}.png"}),
+              Not(HasSubstr("--name is for both")));
+  EXPECT_THAT(Failure({folder, folder, "--name", "a_{v}_{u}.png"}), HasSubstr("--other-name"));
+  EXPECT_THAT(Failure({image, image, "--other-grid", "3"}, 2),
+              AllOf(HasSubstr("--other-grid: only for light fields"),
+                    HasSubstr("states that it is a light field"), Not(HasSubstr("--views"))));
+  EXPECT_THAT(Failure({image, image, "--other-layout", "foo"}, 2), HasSubstr("--other-layout: "));
+}
+
+// The first bytes say that it is a file of Matlab: nobody compares two images.
+TEST_F(CompareProgram, ATruncatedFileOfViewsIsNoImage) {
+  std::string content = "MATLAB 5.0 MAT-file";
+  content.resize(124, ' ');
+  content += {'\0', '\1', 'I', 'M', '\16', '\0', '\0', '\0', '\0', '\1', '\0', '\0'};
+  const std::string file = folder_.Put("cut.mat", content);
+  EXPECT_THAT(Failure({PutHci("truth", 3, 0), file, "--grid", "7"}),
+              AllOf(HasSubstr("cut.mat"), Not(HasSubstr("two images"))));
+}
+
 TEST_F(CompareProgram, RefusesWrongUsage) {
   const std::string image = PutImage("a.png", View(0, 0));
   const std::string folder = PutHci("truth", 3, 0);

@@ -82,6 +82,29 @@ TEST(ComparedReadings, OptionsOfTheOtherReplaceTheseOfBoth) {
   EXPECT_THROW(ReadingsOf(options, other, kFolderInput, kFileInput), UsageError);
 }
 
+// Of a file it would be the size of its lenslets.
+TEST(ComparedReadings, AGridIsForTheFolder) {
+  ReadingOptions options;
+  options.grid = 2;
+  const ComparedReadings readings = ReadingsOf(options, {}, kFolderInput, kFileInput);
+  EXPECT_EQ(readings.reference.grid, 2);
+  EXPECT_EQ(readings.other.grid, 0);
+  EXPECT_EQ(ReadingsOf(options, {}, kFileInput, kFolderInput).reference.grid, 0);
+  EXPECT_EQ(ReadingsOf(options, {}, kFileInput, kFolderInput).other.grid, 2);
+  EXPECT_EQ(ReadingsOf(options, {}, kFileInput, kFileInput).other.grid, 2);
+}
+
+TEST(ComparedReadings, MessagesAboutTheOtherNameItsOptions) {
+  OtherReadingOptions other;
+  other.layout = "foo";
+  EXPECT_THAT(ErrorOf([&] { ReadingsOf({}, other, kFileInput, kFileInput); }),
+              ::testing::StartsWith("--other-layout: "));
+  const OptionNames names = OtherReadingOptionNames();
+  EXPECT_EQ(names("view_order"), "--other-view-order");
+  EXPECT_EQ(names("hci_grid"), "--other-grid");
+  EXPECT_EQ(names("allow_missing_views"), "--sparse");
+}
+
 TEST(ComparedReadings, AnOrderForAnUnknownInputIsRefused) {
   ReadingOptions options;
   options.view_order = "swap";
