@@ -20,7 +20,10 @@ constexpr int kMinTilePx = 8;
 // Views side by side differ by their parallax only. A photograph without repetitions has a ratio
 // near 1.
 constexpr double kRepeats = 0.5;
-constexpr int kMaxPitchPx = 20;
+constexpr int kMaxPitchPx = 100;
+// Fewer edges may stand at regular distances by chance.
+constexpr int kMinEdges = 8;  // half of it up to kSmallPitchPx
+constexpr int kSmallPitchPx = 20;
 // Differences across the edge of a lenslet, relative to those inside.
 constexpr double kEdgeContrast = 1.3;
 // The mean deviation within a line, relative to that within a usual column: JPEG of low quality
@@ -212,21 +215,32 @@ int PitchAcross(const cv::Mat& grey) {
     const auto* row = grey.ptr<float>(y);
     for (std::size_t x = 0; x < step.size(); ++x) step[x] += std::abs(row[x + 1] - row[x]);
   }
+  // The contrast of the edges at every `pitch` columns, without those at every `left_out` columns.
+  const auto contrast_of = [&step](int pitch, int left_out) {
+    double edge = 0, inside = 0, edges = 0, insides = 0;
+    for (std::size_t i = 0; i < step.size(); ++i) {
+      const int x = static_cast<int>(i);
+      const bool is_edge = x % pitch == pitch - 1;
+      if (is_edge && left_out > 0 && x % left_out == left_out - 1) continue;
+      (is_edge ? edge : inside) += step[i];
+      (is_edge ? edges : insides) += 1;
+    }
+    return edges > 0 && inside > 0 ? (edge / edges) / (inside / insides) : 0.0;
+  };
   int best = 0;
   double best_contrast = kEdgeContrast;
   for (int pitch = 2; pitch <= kMaxPitchPx; ++pitch) {
-    if (grey.cols < 4 * pitch) break;
-    double edge = 0, inside = 0, edges = 0, insides = 0;
-    for (std::size_t x = 0; x < step.size(); ++x) {
-      const bool is_edge = static_cast<int>(x) % pitch == pitch - 1;
-      (is_edge ? edge : inside) += step[x];
-      (is_edge ? edges : insides) += 1;
-    }
-    const double contrast = inside > 0 ? (edge / edges) / (inside / insides) : 0;
+    if (grey.cols < (pitch > kSmallPitchPx ? kMinEdges : kMinEdges / 2) * pitch) break;
+    ThrowIfCancelled();
+    const double contrast = contrast_of(pitch, 0);
     if (contrast > best_contrast) {
       best_contrast = contrast;
       best = pitch;
     }
+  }
+  // Multiples of a pitch have its edges too.
+  for (int pitch = 2; pitch < best; ++pitch) {
+    if (best % pitch == 0 && contrast_of(pitch, best) > kEdgeContrast) return pitch;
   }
   return best;
 }

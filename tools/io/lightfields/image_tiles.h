@@ -31,7 +31,7 @@ struct TileLines {
 };
 TileLines LinesOf(const cv::Mat& pixels);
 // The period of the differences between neighbouring pixels, as the edges of square lenslets have
-// it: 2 to 20 px; 0: there is none, or the axes differ.
+// it: 2 to 100 px; 0: there is none, or the axes differ.
 int LensletPitchOf(const cv::Mat& pixels);
 // "1, 2, 4, 8": the numbers from 2 to 40 that divide both sides.
 std::string CommonDivisors(int width_px, int height_px);

@@ -104,8 +104,8 @@ AxisCounts LensletOf(const LayoutInput& input, const cv::Mat& pixels, std::strin
   }
   throw Error(fmt::format(
       "{}: {} x {} px are no whole number of lenslets of {} x {} px, and the image shows no other "
-      "size: the option grid must state how many pixels a lenslet has in a row (numbers that "
-      "divide both sides: {})",
+      "size: the option layout must state how many pixels a lenslet has: lenslets:14x14 (numbers "
+      "that divide both sides: {})",
       input.path, pixels.cols, pixels.rows, kLytroPx, kLytroPx,
       CommonDivisors(pixels.cols, pixels.rows)));
 }

@@ -15,6 +15,7 @@
 #include "support/error_message.h"
 #include "support/temporary_folder.h"
 #include "thicklens/io/light_field_io.h"
+#include "tools/io/lightfields/image_tiles.h"
 
 namespace thicklens::io {
 namespace {
@@ -501,6 +502,32 @@ TEST_F(LightFieldLayouts, WrongNumbersOfViewsAreNotConfirmed) {
   // Every third pixel of a photograph.
   Read(folder_.Put("photo.png", EncodedTile(View(0, 0))), reading);
   EXPECT_THAT(facts_.one_line, Not(HasSubstr("agree with")));
+}
+
+// Pixels of a lenslet side by side, as lenslets of so many px have them.
+cv::Mat LensletsOf(int edge_px, int width, int height) {
+  cv::Mat lenslets(height * edge_px, width * edge_px, CV_8UC3);
+  for (int l = 0; l < edge_px; ++l) {
+    for (int k = 0; k < edge_px; ++k) {
+      const cv::Mat view = View(k, l);
+      for (int y = 0; y < height; ++y) {
+        for (int x = 0; x < width; ++x)
+          lenslets.at<cv::Vec3b>(edge_px * y + l, edge_px * x + k) = view.at<cv::Vec3b>(y, x);
+      }
+    }
+  }
+  return lenslets;
+}
+
+// Before, 24 px were taken for two lenslets of 12 px.
+TEST_F(LightFieldLayouts, LargeLensletsShowTheirSize) {
+  for (const int edge_px : {5, 14, 24, 30})
+    EXPECT_EQ(LensletPitchOf(LensletsOf(edge_px, 40, 30)), edge_px);
+  LightFieldReading reading;
+  reading.layout = "lenslets";
+  reading.layout_u = reading.layout_v = 24;
+  Read(folder_.Put("lenslets.png", EncodedTile(LensletsOf(24, 40, 30))), reading);
+  EXPECT_THAT(facts_.one_line, Not(HasSubstr("steps at every")));
 }
 
 TEST_F(LightFieldLayouts, OneRowDoesNotShowItsDirection) {
