@@ -27,6 +27,8 @@ constexpr std::size_t kMaxAxes = 32;
 constexpr std::size_t kMaxLetters = 200;
 // Bytes of a variable that are inflated to find its name and size, and those of a structure.
 constexpr std::size_t kStartBytes = 4096;
+// After a variable, in its compressed bytes.
+constexpr std::size_t kPaddingBytes = 8;
 constexpr std::size_t kMaxOptionsBytes = std::size_t{64} << 20;
 
 // Types of elements, and classes of variables.
@@ -270,7 +272,7 @@ std::string TextOf(Bytes matrix, bool is_swapped) {
 
 enum class Inflate {
   kStart,  // the first bytes only: they may be damaged
-  kWhole   // to the end of the stream, whose checksum is then right; the bytes beyond are left out
+  kWhole   // to the end of the stream, whose checksum is then right; padding is left out
 };
 
 // Inflates at most so many bytes.
@@ -280,7 +282,7 @@ std::vector<unsigned char> Inflated(Bytes compressed, std::size_t most_bytes, In
   z_stream stream{};
   if (inflateInit(&stream) != Z_OK) throw ArrayRefusal("zlib cannot begin");
   const std::unique_ptr<z_stream, int (*)(z_stream*)> end(&stream, inflateEnd);
-  std::size_t in = 0, out = 0;
+  std::size_t in = 0, out = 0, beyond_out = 0;
   int result = Z_OK;
   while (result == Z_OK && (part == Inflate::kWhole || out < bytes.size())) {
     constexpr std::size_t kAtOnce = std::size_t{1} << 28;
@@ -293,7 +295,10 @@ std::vector<unsigned char> Inflated(Bytes compressed, std::size_t most_bytes, In
     stream.avail_out = static_cast<uInt>(out_now);
     result = inflate(&stream, Z_NO_FLUSH);
     in += in_now - stream.avail_in;
-    if (!is_beyond) out += out_now - stream.avail_out;
+    (is_beyond ? beyond_out : out) += out_now - stream.avail_out;
+    // A stream may go on for a thousand times its size.
+    if (beyond_out > kPaddingBytes)
+      throw ArrayRefusal("the compressed bytes of a variable hold more than it states");
   }
   if (result != Z_OK && result != Z_STREAM_END && result != Z_BUF_ERROR)
     throw ArrayRefusal("the compressed bytes of a variable are damaged");

@@ -187,6 +187,25 @@ TEST_F(StoredViews, WrongChecksumsAreRefused) {
   EXPECT_EQ(variables, 3);
 }
 
+// Before, a file of 4 MB was inflated to 4 GB for its checksum.
+TEST_F(StoredViews, MoreThanAVariableStatesIsNotInflated) {
+  using namespace std::string_literals;
+  const std::string content = ContentOf(StoredFilePath("levels-5.mat"));
+  constexpr std::size_t kHeaderBytes = 128, kMore = 64;
+  // zlib's format with a block that is not compressed, and any checksum.
+  const std::string contained = content.substr(kHeaderBytes) + std::string(kMore, '\0');
+  ASSERT_LT(contained.size(), 0xFFFFU);
+  const auto low = [](std::size_t size) { return static_cast<char>(size & 0xFFU); };
+  const auto high = [](std::size_t size) { return static_cast<char>(size >> 8U & 0xFFU); };
+  const std::size_t size = contained.size(), inverse = ~size;
+  const std::string stream = "\x78\x01\x01"s + low(size) + high(size) + low(inverse) +
+                             high(inverse) + contained + "\0\0\0\0"s;
+  const std::string tag = "\17\0\0\0"s + low(stream.size()) + high(stream.size()) + "\0\0"s;
+  const std::string path = folder_.Put("more.mat", content.substr(0, kHeaderBytes) + tag + stream);
+  EXPECT_THAT(ErrorOf([&] { Read(path); }),
+              AllOf(HasSubstr("more.mat"), HasSubstr("hold more than it states")));
+}
+
 TEST_F(StoredViews, LyingSizesAreRefused) {
   using namespace std::string_literals;
   // The number of channels in levels-5.mat, after the four other sizes.
