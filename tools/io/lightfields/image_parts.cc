@@ -214,6 +214,8 @@ std::optional<ViewSource> OpenImageParts(const LayoutInput& input) {
     return OpenMultiView(input, bytes, parts[0]);
   }
   if (!input.is_forced && !IsMultiPartExr(bytes)) {
+    // Other kinds of files have a main image, such as HEIF, or are animations.
+    if (KindOfImage(bytes) != ImageFileKind::kTiff) return std::nullopt;
     const int pages = PagesOfImage(bytes, input.path);
     if (pages < 2) return std::nullopt;
     const auto edge = static_cast<int>(std::lround(std::sqrt(pages)));

@@ -83,6 +83,13 @@ TEST_F(ExrLightFields, OtherPartsAreNamed) {
               AllOf(HasSubstr("unnamed-parts.exr"), HasSubstr("2")));
 }
 
+// An image may follow another in such a file, which has a main image and no pages.
+TEST_F(ExrLightFields, OnlyPagesOfTiffMayBeViews) {
+  EXPECT_THAT(ErrorOf([&] { ReadLightField(ExrPartsPath("two_images.heic"), {}); }),
+              AllOf(HasSubstr("views side by side, which this image does not show"),
+                    ::testing::Not(HasSubstr("pages"))));
+}
+
 TEST_F(ExrLightFields, BrokenFilesAreNamed) {
   for (const char* name : {"parts.exr", "multiview.exr", "multiview-parts.exr"}) {
     const std::string content = ContentOf(ExrPartsPath(name));
