@@ -262,11 +262,12 @@ void ReportOrder(const std::string& path, const ViewSource& source,
                  const model::LightField& light_field, LightFieldFacts* facts) {
   ViewOrderFinding finding = FindViewOrder(light_field);
   if (finding.order == ViewOrder::kAsStated && IsPlainImage(source, finding)) {
+    const std::string why = fmt::format(
+        "the shifts between the views, {:.2g} to {:.2g} px, are about those between neighbouring "
+        "pixels of one image ({:.2g} px): the size of the lenslets may be wrong",
+        finding.least_px, finding.most_px, source.plain_disparity_px);
     finding = {};
-    finding.why = fmt::format(
-        "the shifts between the views are those between neighbouring pixels of one image ({:.2g} "
-        "px everywhere): the size of the lenslets may be wrong",
-        source.plain_disparity_px);
+    finding.why = why;
   }
   if (finding.order == ViewOrder::kAsStated && !source.doubt.empty()) {
     // Pixels of one lenslet under another number are neighbours in the image, whose shifts have an
