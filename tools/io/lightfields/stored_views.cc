@@ -57,14 +57,18 @@ bool MayBeViews(const StoredArray& array) {
   return array.number != StoredNumber::kOther && (array.size.size() == 4 || array.size.size() == 5);
 }
 
+// The axes of a light field.
+const char* OrderInWords(ArrayFormat format) {
+  return format == ArrayFormat::kMat ? "LF(t, s, v, u, c): row and column of the view, row and "
+                                       "column of the pixel, colour"
+                                     : "LF of the shape (v, u, y, x, c): row and column of the "
+                                       "view, row and column of the pixel, colour";
+}
+
 // LF, or the only array that has as many axes as a light field.
 const StoredArray& LightFieldOf(const std::string& path, const StoredFile& content,
                                 ArrayFormat format) {
-  const char* const order = format == ArrayFormat::kMat
-                                ? "LF(t, s, v, u, c): row and column of the view, row and column "
-                                  "of the pixel, colour"
-                                : "LF of the shape (v, u, y, x, c): row and column of the view, "
-                                  "row and column of the pixel, colour";
+  const char* const order = OrderInWords(format);
   const StoredArray* found = nullptr;
   bool is_only = true;
   for (const StoredArray& array : content.arrays) {
@@ -165,6 +169,16 @@ ViewArray ArrayOf(const std::string& path, const StoredArray& array, ArrayFormat
         path, PrintableUtf8(array.name), views.column.count, views.row.count, views.x.count,
         views.y.count, views.channel.count, SizeInWords(array, format), array.type, kMaxViewsAlong,
         kMaxPx));
+  }
+  // Axes in another order make thousands of views of a few pixels.
+  const bool is_swarm = views.row.count * views.column.count > views.y.count * views.x.count;
+  if (is_swarm && across == 0) {
+    throw Error(fmt::format(
+        "{}: {} ({}) has {} x {} views of {} x {} px, fewer pixels than views: the axes may have "
+        "another order; expected: {}. If it is right, the option layout states it: {}:{}x{}",
+        path, PrintableUtf8(array.name), SizeInWords(array, format), views.column.count,
+        views.row.count, views.x.count, views.y.count, OrderInWords(format),
+        is_hdf ? "hdf5" : "mat", views.column.count, views.row.count));
   }
   if (across > 0 && (across != views.column.count || down != views.row.count)) {
     throw Error(fmt::format("{}: the option layout states {} x {} views, but {} ({}) has {} x {}",

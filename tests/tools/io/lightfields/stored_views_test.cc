@@ -187,6 +187,21 @@ TEST_F(StoredViews, WrongChecksumsAreRefused) {
   EXPECT_EQ(variables, 3);
 }
 
+// Rows and columns of pixels before those of views.
+TEST_F(StoredViews, MoreViewsThanPixelsAreRefused) {
+  using namespace std::string_literals;
+  const std::string sizes = "\2\0\0\0\3\0\0\0\6\0\0\0\10\0\0\0\3\0\0\0"s;
+  const std::string pixels_first = "\6\0\0\0\10\0\0\0\2\0\0\0\3\0\0\0\3\0\0\0"s;
+  EXPECT_THAT(ErrorWith("levels-5.mat", sizes, 0, pixels_first),
+              AllOf(HasSubstr("8 x 6 views of 3 x 2 px"), HasSubstr("LF(t, s, v, u, c)"),
+                    HasSubstr("mat:8x6")));
+  LightFieldReading reading;
+  reading.layout = "mat";
+  reading.layout_u = 8;
+  reading.layout_v = 6;
+  EXPECT_EQ(ReadLightField(folder_ / "levels-5.mat", reading).u_count, 8);
+}
+
 // Before, a file of 4 MB was inflated to 4 GB for its checksum.
 TEST_F(StoredViews, MoreThanAVariableStatesIsNotInflated) {
   using namespace std::string_literals;
