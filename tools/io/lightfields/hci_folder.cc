@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <sstream>
 #include <system_error>
 
@@ -107,24 +108,10 @@ int InferredRowLength(const std::string& folder, const HciViews& views) {
                   HciFile(numbers.back(), views.ending), kHciMarker));
 }
 
-}  // namespace
-
-std::optional<ViewSource> OpenHciFolder(const LayoutInput& input) {
+// The views, of which `first` is the number of the first in the first row.
+ViewSource HciSource(const LayoutInput& input, const HciViews& views, int row, int first) {
   const std::string& folder = input.path;
-  const HciViews views = HciViewsOf(folder);
   const std::vector<int>& numbers = views.numbers;
-  if (numbers.empty()) {
-    if (!input.is_forced) return std::nullopt;
-    throw Error(
-        fmt::format("{}: not a light field in the HCI layout: neither {}, {} nor another "
-                    "view is in it",
-                    folder, HciFile(0), HciFile(1)));
-  }
-  for (const int number : numbers)
-    ReportInput((fs::path(folder) / HciFile(number, views.ending)).string());
-  const int stated = input.reading->grid > 0 ? input.reading->grid : input.reading->layout_u;
-  const int row = stated > 0 ? stated : InferredRowLength(folder, views);
-  const int first = FirstOfNumbering(numbers, row);
   int first_u = row, last_u = 0;
   for (const int number : numbers) {
     first_u = std::min(first_u, (number - first) % row);
@@ -172,6 +159,29 @@ std::optional<ViewSource> OpenHciFolder(const LayoutInput& input) {
     const std::string path = (fs::path(folder) / HciFile(number_of(k, l), ending)).string();
     return ending == kPng ? ReadPngView(path, model::TransferCurve::Srgb()) : ReadLightOfFile(path);
   };
+  return source;
+}
+
+}  // namespace
+
+std::optional<ViewSource> OpenHciFolder(const LayoutInput& input) {
+  const std::string& folder = input.path;
+  const HciViews views = HciViewsOf(folder);
+  const std::vector<int>& numbers = views.numbers;
+  if (numbers.empty()) {
+    if (!input.is_forced) return std::nullopt;
+    throw Error(
+        fmt::format("{}: not a light field in the HCI layout: neither {}, {} nor another "
+                    "view is in it",
+                    folder, HciFile(0), HciFile(1)));
+  }
+  for (const int number : numbers)
+    ReportInput((fs::path(folder) / HciFile(number, views.ending)).string());
+  const int stated = input.reading->grid > 0 ? input.reading->grid : input.reading->layout_u;
+  const int row = stated > 0 ? stated : InferredRowLength(folder, views);
+  ViewSource source = HciSource(input, views, row, FirstOfNumbering(numbers, row));
+  if (MayStartAtOne(numbers, row))
+    source.from_one = std::make_shared<const ViewSource>(HciSource(input, views, row, 1));
   return source;
 }
 

@@ -2,6 +2,7 @@
 #define THICKLENS_TOOLS_IO_LIGHTFIELDS_LAYOUT_H_
 
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -26,6 +27,9 @@ struct ViewSource {
   std::string mirrored;              // a clause: which direction files of this layout mirror
   // The disparity that views of neighbouring pixels of a plain image have, px; 0: there are none.
   double plain_disparity_px = 0;
+  // Another reading of the same numbers, if the shifts between the views have to decide: views that
+  // are counted from 1 and not from 0.
+  std::shared_ptr<const ViewSource> from_one;
   std::string doubt;  // a clause: what speaks against the stated numbers of views; empty: nothing
 };
 

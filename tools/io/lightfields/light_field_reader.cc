@@ -257,9 +257,9 @@ bool IsPlainImage(const ViewSource& source, const ViewOrderFinding& finding) {
   return px > 0 && finding.least_px > (1 - kNear) * px && finding.most_px < (1 + kNear) * px;
 }
 
-// States what the shifts between the views say about their order.
-void ReportOrder(const std::string& path, const ViewSource& source,
-                 const model::LightField& light_field, LightFieldFacts* facts) {
+// States what the shifts between the views say about their order, and returns it.
+ViewOrder ReportOrder(const std::string& path, const ViewSource& source,
+                      const model::LightField& light_field, LightFieldFacts* facts) {
   ViewOrderFinding finding = FindViewOrder(light_field);
   if (finding.order == ViewOrder::kAsStated && IsPlainImage(source, finding)) {
     const std::string why = fmt::format(
@@ -326,6 +326,7 @@ void ReportOrder(const std::string& path, const ViewSource& source,
         "between views differ, but one step is taken for both",
         path, finding.step_ratio));
   }
+  return finding.order;
 }
 
 // ---- Black views.
@@ -448,32 +449,14 @@ std::string OneLine(const ViewSource& source, const model::LightField& light_fie
   return line;
 }
 
-}  // namespace
-
-std::vector<std::string> LightFieldLayouts() {
-  std::vector<std::string> names;
-  for (const ViewLayout& layout : kLayouts) names.emplace_back(layout.name);
-  return names;
+// Whether neighbouring views have the shifts of some order.
+bool IsInOrder(ViewOrder order) {
+  return order != ViewOrder::kUndecided && order != ViewOrder::kIrregular;
 }
 
-bool IsLayoutOfFolders(const std::string& layout) { return LayoutNamed(layout).is_of_folders; }
-
-std::string LayoutThatIsStated(const std::string& file) {
-  if (const std::optional<ArrayFormat> format = FormatOfArrays(file))
-    return *format == ArrayFormat::kMat ? "mat" : "hdf5";
-  if (IsNamedQuilt(file)) return "quilt";
-  return IsNamedEslf(file) ? "lenslets" : "";
-}
-
-model::LightField ReadLightField(const std::string& folder, const LightFieldReading& reading) {
-  LightFieldFacts ignored;
-  return ReadLightField(folder, reading, &ignored);
-}
-
-model::LightField ReadLightField(const std::string& folder, const LightFieldReading& reading,
-                                 LightFieldFacts* facts) {
+model::LightField ReadSource(const std::string& folder, const LightFieldReading& reading,
+                             ViewSource source, LightFieldFacts* facts, ViewOrder* order) {
   *facts = {};
-  ViewSource source = OpenSource(folder, reading);
   Reorder(reading, &source);
   model::LightField frame = source.frame;
   if (reading.u_count > 0) {
@@ -515,9 +498,57 @@ model::LightField ReadLightField(const std::string& folder, const LightFieldRead
   facts->notices = source.notices;
   facts->one_line = folder + ": " + OneLine(source, light_field);
   ExamineDarkViews(source.is_own, &light_field, facts);
-  if (!source.is_own) ReportOrder(folder, source, light_field, facts);
+  *order = source.is_own ? ViewOrder::kAsStated : ReportOrder(folder, source, light_field, facts);
   std::string why;
   if (!light_field.IsValid(&why)) throw Error(fmt::format("{}: {}", folder, why));
+  return light_field;
+}
+
+}  // namespace
+
+std::vector<std::string> LightFieldLayouts() {
+  std::vector<std::string> names;
+  for (const ViewLayout& layout : kLayouts) names.emplace_back(layout.name);
+  return names;
+}
+
+bool IsLayoutOfFolders(const std::string& layout) { return LayoutNamed(layout).is_of_folders; }
+
+std::string LayoutThatIsStated(const std::string& file) {
+  if (const std::optional<ArrayFormat> format = FormatOfArrays(file))
+    return *format == ArrayFormat::kMat ? "mat" : "hdf5";
+  if (IsNamedQuilt(file)) return "quilt";
+  return IsNamedEslf(file) ? "lenslets" : "";
+}
+
+model::LightField ReadLightField(const std::string& folder, const LightFieldReading& reading) {
+  LightFieldFacts ignored;
+  return ReadLightField(folder, reading, &ignored);
+}
+
+model::LightField ReadLightField(const std::string& folder, const LightFieldReading& reading,
+                                 LightFieldFacts* facts) {
+  const ViewSource source = OpenSource(folder, reading);
+  ViewOrder order = ViewOrder::kUndecided;
+  model::LightField light_field = ReadSource(folder, reading, source, facts, &order);
+  if (!source.from_one) return light_field;
+  LightFieldFacts facts_from_one;
+  ViewOrder order_from_one = ViewOrder::kUndecided;
+  model::LightField from_one =
+      ReadSource(folder, reading, *source.from_one, &facts_from_one, &order_from_one);
+  const bool is_from_one = IsInOrder(order_from_one) && !IsInOrder(order);
+  const bool is_decided = IsInOrder(order_from_one) != IsInOrder(order);
+  if (is_from_one) {
+    light_field = std::move(from_one);
+    *facts = facts_from_one;
+  }
+  facts->notices.push_back(fmt::format(
+      "{}: the numbers of the views may count from 0 or from 1, with as many missing; {}", folder,
+      !is_decided
+          ? "the shifts between the views do not decide it, and they are counted from 0: if "
+            "that is wrong, the names of the files must count from 0"
+      : is_from_one ? "the shifts between the views show that they count from 1"
+                    : "the shifts between the views show that they count from 0"));
   return light_field;
 }
 

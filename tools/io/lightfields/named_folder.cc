@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <memory>
 
 #include "thicklens/base/error.h"
 #include "thicklens/base/input_file.h"
@@ -17,6 +18,28 @@
 namespace thicklens::io {
 
 namespace fs = std::filesystem;
+
+namespace {
+
+// The views of a folder whose names fit a pattern.
+ViewSource NamedSource(const LayoutInput& input, const NamePattern& pattern, const ViewGrid& grid,
+                       const std::vector<std::string>& others) {
+  ViewSource source;
+  source.kind = fmt::format("a folder of views named '{}'", PrintableUtf8(pattern.text()));
+  source.frame = grid.frame;
+  source.details.push_back(pattern.HasRowAndColumn()
+                               ? "{v} is the row, {u} the column"
+                               : fmt::format("{{n}} counts row by row from {}", grid.first_number));
+  if (!others.empty()) source.details.push_back(fmt::format("not views: {}", Listed(others)));
+  if (!grid.missing.empty())
+    source.details.push_back(fmt::format("missing: {}", Listed(grid.missing)));
+  source.read = [folder = input.path, grid](int k, int l) {
+    return ReadLightOfFile((fs::path(folder) / grid.At(k, l)).string());
+  };
+  return source;
+}
+
+}  // namespace
 
 std::optional<ViewSource> OpenNamedFolder(const LayoutInput& input) {
   const std::vector<std::string> names = ImageNames(input.path);
@@ -42,22 +65,17 @@ std::optional<ViewSource> OpenNamedFolder(const LayoutInput& input) {
   const NamePattern pattern(text);
   std::vector<std::string> others;
   const ViewGrid grid = GridOfNames(input.path, pattern, names, *input.reading, &others);
-  ViewSource source;
-  source.kind = fmt::format("a folder of views named '{}'", PrintableUtf8(text));
-  source.frame = grid.frame;
-  source.details.push_back(pattern.HasRowAndColumn()
-                               ? "{v} is the row, {u} the column"
-                               : fmt::format("{{n}} counts row by row from {}", grid.first_number));
-  if (!others.empty()) source.details.push_back(fmt::format("not views: {}", Listed(others)));
-  if (!grid.missing.empty())
-    source.details.push_back(fmt::format("missing: {}", Listed(grid.missing)));
+  ViewSource source = NamedSource(input, pattern, grid, others);
+  if (grid.may_start_at_one) {
+    std::vector<std::string> ignored;
+    const ViewGrid from_one = GridOfNames(input.path, pattern, names, *input.reading, &ignored, 1);
+    source.from_one =
+        std::make_shared<const ViewSource>(NamedSource(input, pattern, from_one, others));
+  }
   AddWarningsOfNames(input.path, pattern, proposal, others, &source);
   for (const std::string& file : grid.files) {
     if (!file.empty()) ReportInput((fs::path(input.path) / file).string());
   }
-  source.read = [folder = input.path, grid](int k, int l) {
-    return ReadLightOfFile((fs::path(folder) / grid.At(k, l)).string());
-  };
   return source;
 }
 

@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <cstdlib>
 #include <numeric>
+#include <optional>
+#include <utility>
 
 #include "thicklens/base/error.h"
 #include "thicklens/base/printable_text.h"
@@ -109,26 +111,49 @@ ViewGrid GridOfViews(const std::string& path, const std::vector<NumberedView>& v
   return grid;
 }
 
+namespace {
+
+// The places in the smallest rectangle that holds the numbers, counted from `first`.
+std::int64_t PlacesFrom(int first, const std::vector<int>& numbers, int row) {
+  int least = row, most = 0;
+  for (const int number : numbers) {
+    least = std::min(least, (number - first) % row);
+    most = std::max(most, (number - first) % row);
+  }
+  const std::int64_t rows = (numbers.back() - first) / row - (numbers.front() - first) / row + 1;
+  return rows * (most - least + 1);
+}
+
+// Column and row of each number, relative to the first of them.
+std::vector<std::pair<int, int>> PlacesOf(int first, const std::vector<int>& numbers, int row) {
+  std::vector<std::pair<int, int>> places;
+  for (const int number : numbers) {
+    places.emplace_back((number - first) % row - (numbers.front() - first) % row,
+                        (number - first) / row - (numbers.front() - first) / row);
+  }
+  return places;
+}
+
+}  // namespace
+
 int FirstOfNumbering(const std::vector<int>& numbers, int row) {
   if (numbers.empty() || numbers.front() < 1) return 0;
   const bool may_be_one =
       numbers.front() == 1 || static_cast<std::int64_t>(row) * row == numbers.back();
   if (!may_be_one) return 0;
   // All rectangles hold the same views: the smaller one has fewer missing.
-  const auto places_from = [&](int first) {
-    int least = row, most = 0;
-    for (const int number : numbers) {
-      least = std::min(least, (number - first) % row);
-      most = std::max(most, (number - first) % row);
-    }
-    const std::int64_t rows = (numbers.back() - first) / row - (numbers.front() - first) / row + 1;
-    return rows * (most - least + 1);
-  };
-  return places_from(1) < places_from(0) ? 1 : 0;
+  return PlacesFrom(1, numbers, row) < PlacesFrom(0, numbers, row) ? 1 : 0;
+}
+
+bool MayStartAtOne(const std::vector<int>& numbers, int row) {
+  return !numbers.empty() && numbers.front() >= 1 && numbers.front() <= row &&
+         FirstOfNumbering(numbers, row) == 0 &&
+         PlacesFrom(1, numbers, row) == PlacesFrom(0, numbers, row) &&
+         PlacesOf(1, numbers, row) != PlacesOf(0, numbers, row);
 }
 
 ViewGrid GridOfNumbers(const std::string& path, const std::vector<NumberedView>& views,
-                       const LightFieldReading& reading) {
+                       const LightFieldReading& reading, std::optional<int> stated_first) {
   const auto [least, most] = std::minmax_element(
       views.begin(), views.end(), [](const auto& a, const auto& b) { return a.u < b.u; });
   if (least == views.end()) throw Error(fmt::format("{}: no view is in it", path));
@@ -138,11 +163,13 @@ ViewGrid GridOfNumbers(const std::string& path, const std::vector<NumberedView>&
   // Numbers with any start may form the full rectangle; others count from 0 or 1.
   const bool is_full = row > 0 && is_gapless && count % row == 0;
   int first = least->u;
+  bool may_start_at_one = false;
   if (row > 0 && least->u > 0 && !is_full) {
     std::vector<int> numbers;
     for (const NumberedView& view : views) numbers.push_back(view.u);
     std::sort(numbers.begin(), numbers.end());
-    first = FirstOfNumbering(numbers, row);
+    first = stated_first ? *stated_first : FirstOfNumbering(numbers, row);
+    may_start_at_one = MayStartAtOne(numbers, row);
   }
   if (row <= 0) {
     row = static_cast<int>(std::lround(std::sqrt(count)));
@@ -158,6 +185,7 @@ ViewGrid GridOfNumbers(const std::string& path, const std::vector<NumberedView>&
     placed.push_back({(view.u - first) % row, (view.u - first) / row, view.file});
   ViewGrid grid = GridOfViews(path, placed, reading);
   grid.first_number = first;
+  grid.may_start_at_one = may_start_at_one;
   return grid;
 }
 

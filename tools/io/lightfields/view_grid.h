@@ -22,6 +22,7 @@ struct ViewGrid {
   std::vector<std::string> files;    // index l * U + k; empty: the view is missing
   std::vector<std::string> missing;  // "the view in row 1, column 2"
   int first_number = 0;              // of GridOfNumbers: the number of the first view of a row
+  bool may_start_at_one = false;     // of GridOfNumbers: see MayStartAtOne
   const std::string& At(int k, int l) const {
     return files[static_cast<std::size_t>(l * frame.u_count + k)];
   }
@@ -35,11 +36,14 @@ ViewGrid GridOfViews(const std::string& path, const std::vector<NumberedView>& v
 // not among the sorted numbers, the first or the last view of a square from 1 is, and fewer views
 // are missing then within the rectangle of those that are there.
 int FirstOfNumbering(const std::vector<int>& numbers, int row);
+// Whether counting from 1 places the sorted numbers otherwise than FirstOfNumbering, which is 0,
+// and as few views are missing: of 25 views, the first from 0 or the last from 1.
+bool MayStartAtOne(const std::vector<int>& numbers, int row);
 // Places views that have one number each, counted row by row from 0, from 1 (FirstOfNumbering), or
 // from another number if they form a full rectangle. The length of a row is that of the options
-// layout or grid; otherwise the views must form a full square.
+// layout or grid; otherwise the views must form a full square. `first` states the first number.
 ViewGrid GridOfNumbers(const std::string& path, const std::vector<NumberedView>& views,
-                       const LightFieldReading& reading);
+                       const LightFieldReading& reading, std::optional<int> first = std::nullopt);
 
 // "a.png, b.png and 3 more"
 std::string Listed(const std::vector<std::string>& names);

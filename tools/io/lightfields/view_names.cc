@@ -362,7 +362,7 @@ void RequireClear(const std::string& path, const NameProposal& proposal) {
 
 ViewGrid GridOfNames(const std::string& path, const NamePattern& pattern,
                      const std::vector<std::string>& names, const LightFieldReading& reading,
-                     std::vector<std::string>* others) {
+                     std::vector<std::string>* others, std::optional<int> first) {
   std::vector<NumberedView> views;
   for (const std::string& name : names) {
     const std::optional<NameNumbers> numbers = pattern.Match(name);
@@ -384,7 +384,7 @@ ViewGrid GridOfNames(const std::string& path, const NamePattern& pattern,
                                 : ""));
   }
   return pattern.HasRowAndColumn() ? GridOfViews(path, views, reading)
-                                   : GridOfNumbers(path, views, reading);
+                                   : GridOfNumbers(path, views, reading, first);
 }
 
 void AddWarningsOfNames(const std::string& path, const NamePattern& pattern,

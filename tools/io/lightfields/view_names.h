@@ -61,10 +61,11 @@ void RequireClear(const std::string& path, const NameProposal& proposal);
 // Returns nothing if no two names differ only in their numbers, or if more than two numbers change.
 std::optional<NameProposal> ProposedPattern(const std::vector<std::string>& names);
 
-// The grid of the names that fit the pattern; `others` gets the names that do not.
+// The grid of the names that fit the pattern; `others` gets the names that do not. `first` is that
+// of GridOfNumbers.
 ViewGrid GridOfNames(const std::string& path, const NamePattern& pattern,
                      const std::vector<std::string>& names, const LightFieldReading& reading,
-                     std::vector<std::string>* others);
+                     std::vector<std::string>* others, std::optional<int> first = std::nullopt);
 
 // Adds warnings about images that are not read although they may be views: other groups of names,
 // and names that fit the pattern but for signs.

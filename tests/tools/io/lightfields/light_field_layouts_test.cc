@@ -339,6 +339,45 @@ TEST_F(LightFieldLayouts, HciNumbersMayBeginAtOne) {
   EXPECT_THAT(facts_.one_line, HasSubstr("row by row from 1"));
 }
 
+// Of 24 views with numbers from 1, the first may be missing, or the last: before, it was the first,
+// and every view was at the place of its neighbour.
+TEST_F(LightFieldLayouts, ShiftsShowWhetherNumbersCountFromOne) {
+  constexpr int kSide = 5;
+  LightFieldReading reading;
+  reading.grid = kSide;
+  reading.sparse = true;
+  for (const int first : {0, 1}) {
+    for (const char* stem : {"input_Cam0", "frame_"}) {
+      TemporaryFolder folder;
+      for (int i = 1 - first; i < kSide * kSide - first; ++i) {
+        const int number = i + first;
+        folder.Put(
+            std::string("lf/") + stem + (number < 10 ? "0" : "") + std::to_string(number) + ".png",
+            EncodedTile(View(i % kSide - 2, i / kSide - 2)));
+      }
+      if (stem[0] == 'f') reading.name = "frame_{n}.png";
+      const model::LightField light_field = Read(folder / "lf", reading);
+      reading.name.clear();
+      ASSERT_EQ(light_field.u_count, kSide);
+      ASSERT_EQ(light_field.v_count, kSide);
+      EXPECT_EQ(light_field.IsPresent(0, 0), first == 1);
+      EXPECT_EQ(light_field.IsPresent(4, 4), first == 0);
+      EXPECT_EQ(LevelAt(light_field, 1, 2, 30, 20), View(-1, 0).at<cv::Vec3b>(20, 30)[0]);
+      EXPECT_THAT(facts_.notices,
+                  ::testing::Contains(HasSubstr("that they count from " + std::to_string(first))));
+    }
+  }
+  // Equal views decide nothing.
+  TemporaryFolder folder;
+  for (int number = 1; number < kSide * kSide; ++number) {
+    folder.Put(
+        "lf/input_Cam0" + std::string(number < 10 ? "0" : "") + std::to_string(number) + ".png",
+        EncodedTile(View(0, 0)));
+  }
+  EXPECT_FALSE(Read(folder / "lf", reading).IsPresent(0, 0));
+  EXPECT_THAT(facts_.notices, ::testing::Contains(HasSubstr("do not decide it")));
+}
+
 TEST_F(LightFieldLayouts, BlackViewsAreNamedAndLeftOut) {
   const model::LightField light_field = Read(Folder(RowAndColumn, [](int u, int v) {
     return u == 2 && v == 0 ? cv::Mat(kViewHeightPx, kViewWidthPx, CV_8UC3, cv::Scalar(0, 1, 0))
