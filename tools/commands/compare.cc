@@ -128,7 +128,7 @@ Baseline ReadBaseline(const CompareOptions& options, const Rect& crop, bool has_
   return baseline;
 }
 
-// What an error of one of both inputs may have to do with the other, in parentheses, or nothing.
+// Returns how an error about one input may come from the other, in parentheses, or nothing.
 std::string OfThePair(const CompareOptions& options, const ComparedInput& input,
                       const ComparedInput& partner, const std::string& what) {
   const OtherReadingOptions& replaced = options.other_reading;
@@ -175,7 +175,7 @@ LightFieldScores ScoresOf(const CompareOptions& options, const ComparedInput& re
   LightField reference =
       ReadCompared(options, reference_input, other_input, reference_reading, run);
   const Rect crop = std::exchange(other_reading.crop, std::nullopt);
-  // What is said about the other input names the options that are for it alone.
+  // Messages about the other input name the options that are for it alone.
   const OptionNames other_names = OtherReadingOptionNames();
   RunControl other_run = run;
   other_run.option_name = other_names;

@@ -18,7 +18,7 @@ struct OtherReadingOptions {
 void AddOtherReadingOptions(CLI::App* command, OtherReadingOptions* options);
 // The options that state how the second input is read.
 OptionNames OtherReadingOptionNames();
-// Those of them that were given, "--other-grid".
+// Returns those of them that were given, "--other-grid".
 std::vector<std::string> GivenNames(const OtherReadingOptions& options);
 
 // An input as far as the rules below need it.

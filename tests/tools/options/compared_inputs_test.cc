@@ -82,7 +82,7 @@ TEST(ComparedReadings, OptionsOfTheOtherReplaceTheseOfBoth) {
   EXPECT_THROW(ReadingsOf(options, other, kFolderInput, kFileInput), UsageError);
 }
 
-// Of a file it would be the size of its lenslets.
+// A file would take it as the size of its lenslets.
 TEST(ComparedReadings, AGridIsForTheFolder) {
   ReadingOptions options;
   options.grid = 2;

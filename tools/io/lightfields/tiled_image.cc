@@ -18,7 +18,7 @@ namespace {
 
 bool HasLines(const AxisLines& lines) { return lines.gap_px > 0 || lines.first_px > 0; }
 
-// What is left out, as a clause.
+// The lines that are left out, as a clause.
 std::string LinesInWords(const TileLines& lines) {
   const AxisLines &across = lines.across, &down = lines.down;
   const bool has_gaps = across.gap_px > 0 || down.gap_px > 0;
@@ -94,7 +94,7 @@ std::optional<ViewSource> OpenTiledImage(const LayoutInput& input) {
       input.is_forced ? AxisCounts{input.reading->layout_u, input.reading->layout_v} : AxisCounts{};
   const bool is_stated = stated.across > 0;
   TileLines lines = LinesOf(pixels);
-  // What looks like lines may be in the views themselves.
+  // The views themselves may show such lines.
   const bool has_lines = HasLines(lines.across) || HasLines(lines.down);
   const bool are_divided = lines.across.count > 1 || lines.down.count > 1;
   if (is_stated && are_divided &&
