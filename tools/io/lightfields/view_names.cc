@@ -130,13 +130,37 @@ bool IsFullGrid(const std::vector<SplitName>& group, const std::vector<std::size
          rows.size() * columns.size() == group.size();
 }
 
-// The pattern of a group of names with these texts between the numbers.
+// The axis that the letters before a number name: 'u' for columns, 'v' for rows, or 0.
+char AxisInText(const std::string& text) {
+  std::size_t end = text.size();
+  while (end > 0 && !IsLetter(text[end - 1])) --end;
+  std::string word;
+  for (std::size_t i = end; i > 0 && IsLetter(text[i - 1]); --i) {
+    word.insert(word.begin(),
+                static_cast<char>(std::tolower(static_cast<unsigned char>(text[i - 1]))));
+  }
+  for (const char* column : {"u", "x", "c", "col", "column"}) {
+    if (word == column) return 'u';
+  }
+  for (const char* row : {"v", "y", "r", "row"}) {
+    if (word == row) return 'v';
+  }
+  return 0;
+}
+
+// The pattern of a group of names with these texts between the numbers. Rows come before columns
+// unless letters before both numbers say otherwise, as in "x0y1".
 NameProposal ProposalOf(const std::vector<std::string>& text, const std::vector<SplitName>& group,
                         const std::vector<std::size_t>& changing) {
   NameProposal proposal;
   proposal.changing = static_cast<int>(changing.size());
   proposal.names = group.size();
-  const char* const places[] = {proposal.changing == 1 ? "{n}" : "{v}", "{u}"};
+  const bool is_column_first = changing.size() == 2 && AxisInText(text[changing[0]]) == 'u' &&
+                               AxisInText(text[changing[1]]) == 'v';
+  const char* const places[] = {proposal.changing == 1 ? "{n}"
+                                : is_column_first      ? "{u}"
+                                                       : "{v}",
+                                is_column_first ? "{v}" : "{u}"};
   std::string with_signs;
   for (std::size_t i = 0; i < text.size(); ++i) {
     proposal.pattern += text[i];

@@ -116,7 +116,7 @@ TEST_F(LightFieldLayouts, APatternStatesTheNames) {
   }
   reading.name = "other_{v}_{u}.png";
   EXPECT_THAT(ErrorOf([&] { Read(folder_ / "lf", reading); }),
-              AllOf(HasSubstr("no name fits"), HasSubstr("c{v} r{u}x.png")));
+              AllOf(HasSubstr("no name fits"), HasSubstr("c{u} r{v}x.png")));
 }
 
 TEST_F(LightFieldLayouts, OneChangingNumberIsProposedOnly) {
@@ -203,6 +203,23 @@ TEST_F(LightFieldLayouts, ASmallerGridOfOtherNamesIsReported) {
     folder_.Put("lf/thumb_" + std::string(place) + ".png", EncodedTile(View(0, 0)));
   ExpectViews(Read(path));
   EXPECT_THAT(facts_.notices, ElementsAre(HasSubstr("thumb_{v}_{u}.png")));
+}
+
+// Before, the first number was the row always.
+TEST_F(LightFieldLayouts, LettersBeforeNumbersNameTheirAxes) {
+  for (const auto& [column, row] : {std::pair("x", "y"), std::pair("u", "_v"),
+                                    std::pair("Col_", "_Row_"), std::pair("im c", "r")}) {
+    TemporaryFolder folder;
+    for (int v = 0; v < 3; ++v) {
+      for (int u = 0; u < 3; ++u) {
+        folder.Put(
+            "lf/" + std::string(column) + std::to_string(u) + row + std::to_string(v) + ".png",
+            EncodedTile(InOrder(u, v)));
+      }
+    }
+    ExpectViews(Read(folder / "lf"));
+    EXPECT_THAT(facts_.notices, IsEmpty()) << column;
+  }
 }
 
 TEST_F(LightFieldLayouts, APlusIsASign) {
