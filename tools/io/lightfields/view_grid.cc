@@ -171,6 +171,14 @@ ViewGrid GridOfNumbers(const std::string& path, const std::vector<NumberedView>&
     first = stated_first ? *stated_first : FirstOfNumbering(numbers, row);
     may_start_at_one = MayStartAtOne(numbers, row);
   }
+  // "parts:4x6" of 25 pages: without this, 7 rows with views missing.
+  const int stated = reading.layout_u * reading.layout_v;
+  if (stated > 0 && (count > stated || (count < stated && !reading.sparse))) {
+    throw Error(fmt::format(
+        "{}: the option layout states {} x {} views, which are {}, but {} are there, from {} to {}",
+        path, reading.layout_u, reading.layout_v, stated, count, PrintableUtf8(least->file),
+        PrintableUtf8(most->file)));
+  }
   if (row <= 0) {
     row = static_cast<int>(std::lround(std::sqrt(count)));
     if (row * row != count || !is_gapless) {

@@ -713,6 +713,12 @@ TEST_F(LightFieldLayouts, PagesMayBeViews) {
   reading.layout = "parts";
   reading.layout_u = reading.layout_v = 3;
   ExpectViews(Read(path, reading));
+  for (const int rows : {2, 4}) {
+    reading.layout_v = rows;
+    EXPECT_THAT(ErrorOf([&] { Read(path, reading); }),
+                AllOf(HasSubstr("3 x " + std::to_string(rows) + " views"), HasSubstr("but 9 are"),
+                      Not(HasSubstr("sparse"))));
+  }
 }
 
 TEST_F(LightFieldLayouts, WhatDoesNotFitIsNamed) {
