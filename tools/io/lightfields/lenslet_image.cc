@@ -133,10 +133,18 @@ std::optional<ViewSource> OpenLensletImage(const LayoutInput& input) {
   const int edge = std::max(lenslet.across, lenslet.down);
   if (edge > 1) source.plain_disparity_px = 1.0 / edge;
   const int pitch = how.empty() ? LensletPitchOf(pixels) : 0;
-  if (pitch > 0 && pitch != lenslet.across) {
+  if (pitch > 0 && (pitch != lenslet.across || pitch != lenslet.down)) {
     source.doubt =
         fmt::format("the image has steps at every {} px, as lenslets of {} x {} px have them",
                     pitch, pitch, pitch);
+    // The blocks of JPEG have 8 px.
+    constexpr int kJpegBlockPx = 8;
+    if (pitch != kJpegBlockPx) {
+      source.notices.push_back(
+          fmt::format("{}: lenslets of {} x {} px are read, but {}; the option layout states "
+                      "another size: lenslets:{}x{}",
+                      input.path, lenslet.across, lenslet.down, source.doubt, pitch, pitch));
+    }
   }
   const int rest_x = pixels.cols % lenslet.across;
   const int rest_y = pixels.rows % lenslet.down;

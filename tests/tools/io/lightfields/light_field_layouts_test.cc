@@ -584,6 +584,11 @@ TEST_F(LightFieldLayouts, LargeLensletsShowTheirSize) {
   reading.layout_u = reading.layout_v = 24;
   Read(folder_.Put("lenslets.png", EncodedTile(LensletsOf(24, 40, 30))), reading);
   EXPECT_THAT(facts_.one_line, Not(HasSubstr("steps at every")));
+  EXPECT_THAT(facts_.notices, Not(::testing::Contains(HasSubstr("steps at every"))));
+  reading.layout_u = reading.layout_v = 12;
+  Read(folder_ / "lenslets.png", reading);
+  EXPECT_THAT(facts_.notices, ::testing::Contains(AllOf(HasSubstr("12 x 12 px are read"),
+                                                        HasSubstr("lenslets:24x24"))));
 }
 
 TEST_F(LightFieldLayouts, OneRowDoesNotShowItsDirection) {
