@@ -65,24 +65,27 @@ const char* OrderInWords(ArrayFormat format) {
                                        "view, row and column of the pixel, colour";
 }
 
-// LF, or the only array that has as many axes as a light field.
+// LF, or the only array that has as many axes as a light field. With stated numbers of views, one
+// axis may be that of all views.
 const StoredArray& LightFieldOf(const std::string& path, const StoredFile& content,
-                                ArrayFormat format) {
+                                ArrayFormat format, bool are_counts_stated) {
   const char* const order = OrderInWords(format);
-  const StoredArray* found = nullptr;
-  bool is_only = true;
   for (const StoredArray& array : content.arrays) {
-    if (array.name == kLf) {
-      if (MayBeViews(array)) return array;
-      throw Error(fmt::format(
-          "{}: LF is {} ({}); unsigned integers of 8 or 16 bits or floats are expected as {}", path,
-          SizeInWords(array, format), array.type, order));
-    }
-    if (!MayBeViews(array) || array.size.size() != 5) continue;
-    is_only = found == nullptr;
-    found = &array;
+    if (array.name != kLf) continue;
+    if (MayBeViews(array)) return array;
+    throw Error(fmt::format(
+        "{}: LF is {} ({}); unsigned integers of 8 or 16 bits or floats are expected as {}", path,
+        SizeInWords(array, format), array.type, order));
   }
-  if (found != nullptr && is_only) return *found;
+  for (const std::size_t axes : {std::size_t{5}, std::size_t{4}}) {
+    if (axes == 4 && !are_counts_stated) break;
+    std::vector<const StoredArray*> found;
+    for (const StoredArray& array : content.arrays) {
+      if (MayBeViews(array) && array.size.size() == axes) found.push_back(&array);
+    }
+    if (found.size() == 1) return *found.front();
+    if (!found.empty()) break;
+  }
   throw Error(fmt::format("{}: no light field is in it: an array {} is expected; {}", path, order,
                           ContentInWords(content, format)));
 }
@@ -304,10 +307,17 @@ void ExamineFloats(const std::string& path, const ViewArray& views, ViewSource* 
   cv::minMaxIdx(middle.reshape(1), nullptr, &most);
   constexpr double kWhite = 2;
   if (most > kWhite) {
+    constexpr double kLeastOfLevels = 16, kLevels = 255, kLevelsOf16Bits = 65535;
+    const bool are_levels = most > kLeastOfLevels && most <= kLevelsOf16Bits;
     source->notices.push_back(fmt::format(
         "{}: its floats go up to {:g}; light from 0 to 1 is expected: views are clipped there when "
-        "they are written as integers",
-        path, most));
+        "they are written as integers{}",
+        path, most,
+        are_levels
+            ? fmt::format("; if they are levels, divide them by {}, or store "
+                          "them as integers of {} bits, which are read as sRGB",
+                          most <= kLevels ? kLevels : kLevelsOf16Bits, most <= kLevels ? 8 : 16)
+            : ""));
   }
 }
 
@@ -352,7 +362,8 @@ std::optional<ViewSource> OpenArrays(const LayoutInput& input, ArrayFormat forma
   }
   ArrayFile file(input.path, format);
   const StoredFile& content = file.content();
-  const StoredArray& array = LightFieldOf(input.path, content, format);
+  const StoredArray& array =
+      LightFieldOf(input.path, content, format, input.is_forced && input.reading->layout_u > 0);
   const auto views = std::make_shared<ViewArray>(
       ArrayOf(input.path, array, format,
               input.is_forced ? AxisCounts{input.reading->layout_u, input.reading->layout_v}

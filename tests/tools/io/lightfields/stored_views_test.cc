@@ -187,6 +187,20 @@ TEST_F(StoredViews, WrongChecksumsAreRefused) {
   EXPECT_EQ(variables, 3);
 }
 
+TEST_F(StoredViews, AnArrayOfAnotherNameMayHoldViewsInOneAxis) {
+  std::string content = ContentOf(StoredFilePath("numbered.h5"));
+  const std::size_t at = content.find("LF");
+  ASSERT_NE(at, std::string::npos);
+  content.replace(at, 2, "ab");
+  const std::string path = folder_.Put("ab.h5", content);
+  EXPECT_THAT(ErrorOf([&] { Read(path); }), HasSubstr("no light field is in it"));
+  LightFieldReading reading;
+  reading.layout = "hdf5";
+  reading.layout_u = 3;
+  reading.layout_v = 2;
+  ExpectLevels(ReadLightField(path, reading), model::TransferCurve::Srgb());
+}
+
 // Rows and columns of pixels before those of views.
 TEST_F(StoredViews, MoreViewsThanPixelsAreRefused) {
   using namespace std::string_literals;
