@@ -171,6 +171,36 @@ std::string ContentOfFolder(const std::string& folder) {
       path));
 }
 
+// Throws Error about a file that is often taken for a light field and is of a kind that is not
+// read.
+void RefuseOtherKinds(const std::string& path, const std::string& bytes) {
+  struct OtherKind {
+    std::size_t at;
+    const char* mark;
+    const char* what;
+  };
+  constexpr std::array<OtherKind, 6> kKinds = {{
+      {0, "\x93NUMPY",
+       "an array of NumPy; write it as a data set LF of an HDF5 file (h5py) or a variable LF of a "
+       "MAT file (scipy.io.savemat)"},
+      {0, "PK\x03\x04",
+       "a ZIP archive (NPZ files of NumPy are such); extract its images, or write its array as a "
+       "data set LF of an HDF5 file"},
+      {0, "GIF8", "a GIF image of at most 256 colours; write its frames as PNG files"},
+      {4, "ftyp", "a video; extract its frames as PNG files"},
+      {0, "\x1A\x45\xDF\xA3", "a video; extract its frames as PNG files"},
+      {0, "\x89LFP",
+       "a raw file of a Lytro camera, whose lenslets must be decoded first, for example by the "
+       "Light "
+       "Field Toolbox for Matlab; its MAT files are read"},
+  }};
+  for (const OtherKind& kind : kKinds) {
+    if (bytes.size() > kind.at &&
+        bytes.compare(kind.at, std::string(kind.mark).size(), kind.mark) == 0)
+      throw Error(fmt::format("{}: is no light field but {}", path, kind.what));
+  }
+}
+
 // Opens a file or a folder by the first layout that it has, or by that of the options.
 ViewSource OpenSource(const std::string& path, const LightFieldReading& reading) {
   std::error_code ignored;
@@ -204,8 +234,13 @@ ViewSource OpenSource(const std::string& path, const LightFieldReading& reading)
     if (std::optional<ViewSource> source = layout->open(input)) return *std::move(source);
     ThrowNoLayout(path, input.is_folder);
   }
-  if (!input.is_folder && !IsFileOfArrays(path) && !KindOfImage(ReadWholeFile(path)))
-    ThrowNoLayout(path, false);
+  if (!input.is_folder && !IsFileOfArrays(path)) {
+    const std::string bytes = ReadWholeFile(path);
+    if (!KindOfImage(bytes)) {
+      RefuseOtherKinds(path, bytes);
+      ThrowNoLayout(path, false);
+    }
+  }
   for (const ViewLayout& candidate : kLayouts) {
     if (candidate.is_of_folders != input.is_folder) continue;
     if (std::optional<ViewSource> source = candidate.open(input)) return *std::move(source);

@@ -72,6 +72,8 @@ std::optional<ViewSource> OpenNamedFolder(const LayoutInput& input) {
     source.from_one =
         std::make_shared<const ViewSource>(NamedSource(input, pattern, from_one, others));
   }
+  if (pattern.HasRowAndColumn() && input.reading->grid > 0)
+    source.details.push_back("the option grid is not used, because names have row and column");
   AddWarningsOfNames(input.path, pattern, proposal, others, &source);
   for (const std::string& file : grid.files) {
     if (!file.empty()) ReportInput((fs::path(input.path) / file).string());

@@ -376,6 +376,8 @@ std::optional<ViewSource> OpenArrays(const LayoutInput& input, ArrayFormat forma
   source.frame =
       FullFrame(static_cast<int>(views->column.count), static_cast<int>(views->row.count));
   source.details.push_back(array.type);
+  if (input.reading->grid > 0)
+    source.details.push_back("the option grid is not used, because the array has rows and columns");
   ImageFacts facts;
   facts.sample_type = array.type;
   facts.transfer = TransferOf(content, *views, &source);

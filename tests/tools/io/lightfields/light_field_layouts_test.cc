@@ -726,6 +726,22 @@ TEST_F(LightFieldLayouts, PagesMayBeViews) {
   }
 }
 
+TEST_F(LightFieldLayouts, FilesOfOtherKindsAreNamed) {
+  for (const auto& [start, what] :
+       {std::pair("\x93NUMPY\1", "NumPy"), std::pair("PK\3\4", "ZIP"), std::pair("GIF89a", "GIF"),
+        std::pair("\x89LFP", "Lytro"), std::pair("1234ftypisom", "a video")}) {
+    const std::string path = folder_.Put("lf.dat", start + std::string(40, ' '));
+    EXPECT_THAT(ErrorOf([&] { Read(path); }), HasSubstr(what));
+  }
+}
+
+TEST_F(LightFieldLayouts, AnUnusedGridIsNamed) {
+  LightFieldReading reading;
+  reading.grid = 5;
+  ExpectViews(Read(Folder(RowAndColumn, InOrder), reading));
+  EXPECT_THAT(facts_.one_line, HasSubstr("the option grid is not used"));
+}
+
 TEST_F(LightFieldLayouts, WhatDoesNotFitIsNamed) {
   const std::string path = Folder(RowAndColumn, InOrder);
   LightFieldReading reading;
