@@ -307,8 +307,8 @@ void ExamineFloats(const std::string& path, const ViewArray& views, ViewSource* 
   cv::minMaxIdx(middle.reshape(1), nullptr, &most);
   constexpr double kWhite = 2;
   if (most > kWhite) {
-    constexpr double kLeastOfLevels = 16, kLevels = 255, kLevelsOf16Bits = 65535;
-    const bool are_levels = most > kLeastOfLevels && most <= kLevelsOf16Bits;
+    constexpr double kMinOfLevels = 16, kLevels = 255, kLevelsOf16Bits = 65535;
+    const bool are_levels = most > kMinOfLevels && most <= kLevelsOf16Bits;
     source->notices.push_back(fmt::format(
         "{}: its floats go up to {:g}; light from 0 to 1 is expected: views are clipped there when "
         "they are written as integers{}",
