@@ -75,6 +75,13 @@ void RequireStated(const LayoutInput& input, AxisCounts stated, const TileLines&
       tiles.down, tiles.across, tiles.down));
 }
 
+// A border alone that is wider than half a view is not one: the outer views may be black.
+bool DropWideBorder(int count, int all_px, AxisLines* lines) {
+  const bool is_wide = lines->count == 1 && 2 * lines->first_px * count > lines->tile_px;
+  if (is_wide) *lines = {1, 0, 0, all_px, 0};
+  return is_wide;
+}
+
 // Tiles without lines along an axis divide what is within the border.
 bool SetTileSize(int count, AxisLines* lines) {
   if (lines->count > 1) return true;
@@ -94,10 +101,9 @@ std::optional<ViewSource> OpenTiledImage(const LayoutInput& input) {
       input.is_forced ? AxisCounts{input.reading->layout_u, input.reading->layout_v} : AxisCounts{};
   const bool is_stated = stated.across > 0;
   TileLines lines = LinesOf(pixels);
+  const auto are_divided = [&lines] { return lines.across.count > 1 || lines.down.count > 1; };
   // The views themselves may show such lines.
-  const bool has_lines = HasLines(lines.across) || HasLines(lines.down);
-  const bool are_divided = lines.across.count > 1 || lines.down.count > 1;
-  if (is_stated && are_divided &&
+  if (is_stated && are_divided() &&
       (lines.across.count == 1 || lines.across.count != stated.across) &&
       (lines.down.count == 1 || lines.down.count != stated.down) && Repeats(pixels, stated)) {
     lines = TileLines{{1, 0, 0, pixels.cols, 0}, {1, 0, 0, pixels.rows, 0}};
@@ -105,11 +111,16 @@ std::optional<ViewSource> OpenTiledImage(const LayoutInput& input) {
   AxisCounts tiles = stated;
   if (is_stated) {
     RequireStated(input, stated, lines);
+    DropWideBorder(stated.across, pixels.cols, &lines.across);
+    DropWideBorder(stated.down, pixels.rows, &lines.down);
   } else {
     tiles = CountsOf(pixels, lines);
+    const bool is_other_across = DropWideBorder(tiles.across, pixels.cols, &lines.across);
+    const bool is_other_down = DropWideBorder(tiles.down, pixels.rows, &lines.down);
+    if (is_other_across || is_other_down) tiles = CountsOf(pixels, lines);
     // An image with two such lines may show anything, so that more are needed unless the layout is
     // stated.
-    const bool are_few = are_divided && tiles.across * tiles.down < 9;
+    const bool are_few = are_divided() && tiles.across * tiles.down < 9;
     if (!input.is_forced && (tiles.across < 2 || tiles.down < 2 || are_few)) return std::nullopt;
     if (tiles.across < 2 || tiles.down < 2) {
       throw Error(fmt::format(
@@ -118,6 +129,8 @@ std::optional<ViewSource> OpenTiledImage(const LayoutInput& input) {
           input.path, pixels.cols, pixels.rows, tiles.across, tiles.down));
     }
   }
+  const bool has_lines = HasLines(lines.across) || HasLines(lines.down);
+  const bool is_found = !is_stated && !are_divided();
   const AxisCounts undivided{lines.across.tile_px, lines.down.tile_px};
   if (!SetTileSize(tiles.across, &lines.across) || !SetTileSize(tiles.down, &lines.down)) {
     const std::string within = has_lines ? fmt::format(" (of {} x {} px; {})", pixels.cols,
@@ -125,17 +138,15 @@ std::optional<ViewSource> OpenTiledImage(const LayoutInput& input) {
                                          : "";
     throw Error(fmt::format(
         "{}: {} x {} px{} are not a whole number of pixels for each of {} x {} views; views "
-        "without "
-        "borders are expected, or with lines of one colour and one width between them or around "
-        "them{}",
+        "without borders are expected, or with lines of one colour and one width between them or "
+        "around them{}",
         input.path, undivided.across, undivided.down, within, tiles.across, tiles.down,
         RepetitionsInWords(RepetitionsOf(pixels))));
   }
   ViewSource source;
   source.kind = "an image of views side by side";
   source.frame = FullFrame(tiles.across, tiles.down);
-  if (HasLines(lines.across) || HasLines(lines.down)) source.details.push_back(LinesInWords(lines));
-  const bool is_found = !is_stated && !are_divided;
+  if (has_lines) source.details.push_back(LinesInWords(lines));
   if (is_found) {
     source.details.push_back(
         fmt::format("{} x {} views, because the image repeats that often; the option layout states "

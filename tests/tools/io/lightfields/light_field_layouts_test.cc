@@ -671,6 +671,26 @@ TEST_F(LightFieldLayouts, BordersAroundTheViewsAreLeftOut) {
       AllOf(HasSubstr("288 x 192 px (of 292 x 196 px"), HasSubstr("5 x 3 views")));
 }
 
+// The views outside a round aperture are black, and no border.
+TEST_F(LightFieldLayouts, BlackViewsAroundTheOthersAreNoBorder) {
+  constexpr int kSide = 5;
+  cv::Mat tiles(kSide * kViewHeightPx, kSide * kViewWidthPx, CV_8UC3, cv::Scalar::all(0));
+  for (int l = 1; l < kSide - 1; ++l) {
+    for (int k = 1; k < kSide - 1; ++k) {
+      View(k - 2, l - 2)
+          .copyTo(
+              tiles(cv::Rect(k * kViewWidthPx, l * kViewHeightPx, kViewWidthPx, kViewHeightPx)));
+    }
+  }
+  LightFieldReading reading;
+  reading.layout = "tiles";
+  reading.layout_u = reading.layout_v = kSide;
+  const model::LightField light_field = Read(folder_.Put("tiles.png", EncodedTile(tiles)), reading);
+  EXPECT_EQ(light_field.u_count, kSide);
+  EXPECT_EQ(light_field.s_count, kViewWidthPx);
+  EXPECT_EQ(LevelAt(light_field, 1, 3, 30, 20), View(-1, 1).at<cv::Vec3b>(20, 30)[0]);
+}
+
 TEST_F(LightFieldLayouts, LinesMayHaveTheNoiseOfJpeg) {
   for (const int level : {0, 255}) {
     const cv::Mat mosaic = Mosaic({2, 2}, {0, 0}, level);
