@@ -572,18 +572,23 @@ model::LightField ReadLightField(const std::string& folder, const LightFieldRead
   model::LightField from_one =
       ReadSource(folder, reading, *source.from_one, &facts_from_one, &order_from_one);
   const bool is_from_one = IsInOrder(order_from_one) && !IsInOrder(order);
-  const bool is_decided = IsInOrder(order_from_one) != IsInOrder(order);
   if (is_from_one) {
     light_field = std::move(from_one);
     *facts = facts_from_one;
   }
-  facts->notices.push_back(fmt::format(
-      "{}: the numbers of the views may count from 0 or from 1, with as many missing; {}", folder,
-      !is_decided
-          ? "the shifts between the views do not decide it, and they are counted from 0: if "
-            "that is wrong, the names of the files must count from 0"
-      : is_from_one ? "the shifts between the views show that they count from 1"
-                    : "the shifts between the views show that they count from 0"));
+  const std::string doubt =
+      "the numbers of the views may count from 0 or from 1, with as many missing; ";
+  if (is_from_one) {
+    facts->notices.push_back(fmt::format(
+        "{}: {}the shifts between the views show that they count from 1", folder, doubt));
+  } else if (IsInOrder(order) && !IsInOrder(order_from_one)) {
+    facts->one_line += "; " + doubt + "the shifts between the views show that they count from 0";
+  } else {
+    facts->notices.push_back(fmt::format(
+        "{}: {}the shifts between the views do not decide it, and they are counted from 0: if that "
+        "is wrong, the names of the files must count from 0",
+        folder, doubt));
+  }
   return light_field;
 }
 

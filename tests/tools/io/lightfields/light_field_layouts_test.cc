@@ -380,8 +380,9 @@ TEST_F(LightFieldLayouts, ShiftsShowWhetherNumbersCountFromOne) {
       EXPECT_EQ(light_field.IsPresent(0, 0), first == 1);
       EXPECT_EQ(light_field.IsPresent(4, 4), first == 0);
       EXPECT_EQ(LevelAt(light_field, 1, 2, 30, 20), View(-1, 0).at<cv::Vec3b>(20, 30)[0]);
-      EXPECT_THAT(facts_.notices,
-                  ::testing::Contains(HasSubstr("that they count from " + std::to_string(first))));
+      EXPECT_THAT(facts_.notices.empty() ? facts_.one_line : facts_.notices.back(),
+                  HasSubstr("that they count from " + std::to_string(first)));
+      EXPECT_EQ(facts_.notices.empty(), first == 0);
     }
   }
   // Equal views decide nothing.
