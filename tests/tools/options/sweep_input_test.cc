@@ -160,7 +160,7 @@ TEST_F(SweepInputTest, ReadingsInTheNamesAreProposedAndRead) {
   arguments_.readings_csv = folder_.Put("readings.csv", "file,z\nz10um.png,1\nz9.5um.png,2\n");
   EXPECT_THAT(ErrorOf([&] { ReadSweepInput(arguments_); }), HasSubstr("exclude each other"));
   arguments_.readings.name_pattern.clear();
-  arguments_.readings.unit = "feet";
+  arguments_.readings.unit = "furlong";
   EXPECT_THAT(ErrorOf([&] { ReadSweepInput(arguments_); }), StartsWith("--unit: "));
   arguments_.readings.unit = "counts";
   arguments_.readings.scale_mm = 0.5;

@@ -385,11 +385,12 @@ DepthFile DecodeImageDepth(const std::string& bytes, const std::string& name,
       PfmFactor(std::exchange(decoded.facts.value_scale, 1), reading.pfm_scale, &file);
   if (decoded.facts.is_inverted && decoded.facts.full_scale) {
     // The photometric interpretation is about light. Data has it by mistake more often than not.
-    cv::subtract(cv::Scalar(*decoded.facts.full_scale), values, values, cv::noArray(), CV_64F);
+    cv::Mat stored;
+    cv::subtract(cv::Scalar(*decoded.facts.full_scale), values, stored, cv::noArray(), CV_64F);
+    values = stored;
     file.notes.emplace_back(
         "The file states that 0 is white (MINISWHITE): that is about images, and the values are "
-        "read "
-        "as they are stored, not inverted.");
+        "read as they are stored, not inverted.");
   }
   values.convertTo(values, CV_32F);  // exact for 16 bits
   file.map.width_px = values.cols;

@@ -221,14 +221,20 @@ TEST_F(StoredViews, MoreThanAVariableStatesIsNotInflated) {
   using namespace std::string_literals;
   const std::string content = ContentOf(StoredFilePath("levels-5.mat"));
   constexpr std::size_t kHeaderBytes = 128, kMore = 64;
-  // zlib's format with a block that is not compressed, and any checksum.
+  // zlib's format with a block that is not compressed, and its checksum (RFC 1950).
   const std::string contained = content.substr(kHeaderBytes) + std::string(kMore, '\0');
   ASSERT_LT(contained.size(), 0xFFFFU);
   const auto low = [](std::size_t size) { return static_cast<char>(size & 0xFFU); };
   const auto high = [](std::size_t size) { return static_cast<char>(size >> 8U & 0xFFU); };
   const std::size_t size = contained.size(), inverse = ~size;
+  std::uint32_t a = 1, b = 0;
+  for (const char c : contained) {
+    a = (a + static_cast<unsigned char>(c)) % 65521;
+    b = (b + a) % 65521;
+  }
+  const std::string checksum = {high(b), low(b), high(a), low(a)};
   const std::string stream = "\x78\x01\x01"s + low(size) + high(size) + low(inverse) +
-                             high(inverse) + contained + "\0\0\0\0"s;
+                             high(inverse) + contained + checksum;
   const std::string tag = "\17\0\0\0"s + low(stream.size()) + high(stream.size()) + "\0\0"s;
   const std::string path = folder_.Put("more.mat", content.substr(0, kHeaderBytes) + tag + stream);
   EXPECT_THAT(ErrorOf([&] { Read(path); }),

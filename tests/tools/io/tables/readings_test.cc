@@ -257,10 +257,11 @@ TEST_F(MetadataReadings, OfExif) {
        {Distance("c.jpg", -1, 1), Distance("c.jpg", 1, 0), Photo("c.jpg", {})}) {
     EXPECT_THAT(ErrorOf([&] { ReadReadings("", {file}, options_); }),
                 AllOf(StartsWith(file), HasSubstr("no finite focus distance")));
-    EXPECT_THAT(ErrorOf([&] {
-                  ReadReadings("", {folder_ / "a.jpg", file}, options_);
-                }),
-                AllOf(StartsWith(file), HasSubstr("Exif.Photo.SubjectDistance is missing")));
+    EXPECT_THAT(
+        ErrorOf([&] {
+          ReadReadings("", {folder_ / "a.jpg", file}, options_);
+        }),
+        AllOf(StartsWith(file), HasSubstr("Exif.Photo.SubjectDistance has no finite number")));
   }
   EXPECT_THAT(ErrorOf([&] {
                 ReadReadings("", {folder_ / "a.jpg", Distance("d.jpg", 1, 4)}, options_);
