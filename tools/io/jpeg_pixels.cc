@@ -175,6 +175,7 @@ Spectrum SpectrumOf(const std::array<double, kCoefficients>& steps, const LevelC
       for (int j = 0; j < kFalls; ++j) {
         double likelihood = 0;
         for (std::size_t k = 1; k < kCoefficients && likelihood > most; ++k) {
+          if (!(steps[k] > 0)) continue;  // a broken table, which decodes to 0
           const double half_steps = steps[k] / (2 * scale) * std::pow(Frequency(k), kFallStep * j);
           const double outside = std::exp(-half_steps);
           const double first = active * outside, second = first * outside * outside;
@@ -211,6 +212,7 @@ double QuantisationVariance(const std::array<double, kCoefficients>& steps,
   double sum = 0;
   for (std::size_t k = 0; k < kCoefficients; ++k) {
     const double q = steps[k], uniform = q * q / 12;
+    if (!(q > 0)) continue;
     const double share = counts.not_zero[k] / blocks;
     // The mean of a block follows no power of the frequency 0.
     const bool has_own = k == 0 || counts.not_zero[k] >= kMinDraws;

@@ -341,8 +341,15 @@ void TakeAlpha(const cv::Mat& pixels, int channel, DepthFile* file) {
 // The values that the file states as holes. Whether 0 is one in a map of integers is for the rules
 // of holes to say.
 void TakeNoData(double no_data, DepthFile* file) {
-  if (std::isnan(no_data) || (no_data == 0 && file->map.integer)) return;
-  const auto mark = static_cast<float>(no_data);
+  if (std::isnan(no_data)) return;
+  // Whether zeros are depths is a choice of the caller, model::HoleRules.
+  if (no_data == 0) {
+    if (!file->map.integer)
+      file->notes.emplace_back("It states 0 as its value without data (GDAL_NODATA).");
+    return;
+  }
+  constexpr double kLargest = std::numeric_limits<float>::max();
+  const auto mark = static_cast<float>(std::clamp(no_data, -kLargest, kLargest));
   std::size_t holes = 0;
   for (float& value : file->map.values) {
     if (value != mark) continue;
