@@ -66,14 +66,15 @@ bool IsUsualMark(double magnitude, double largest_of_type) {
 }
 
 // The mark of OpenCV's stereo matchers for pixels without a match, the least disparity less 1: -1,
-// or -16 in 1/16 px. It is suspected where no other value is below 0, beside more
-// than two others: two planes are a scene.
+// or -16 in 1/16 px. It is suspected where no other value is below 0, in the smaller part of a map
+// that has many other values: some planes, or a wall behind them, are a scene.
 std::optional<SuspectedMark> UnmatchedMark(const RawDepthMap& map, double least_pixels) {
+  constexpr std::size_t kMinOthers = 16;
   SuspectedMark mark;
   std::vector<float> others;
   for (const float value : map.values) {
     if (!(value < 0)) {
-      const bool is_new = !std::isnan(value) && others.size() < 3 &&
+      const bool is_new = !std::isnan(value) && others.size() < kMinOthers &&
                           std::find(others.begin(), others.end(), value) == others.end();
       if (is_new) others.push_back(value);
       continue;
@@ -84,7 +85,9 @@ std::optional<SuspectedMark> UnmatchedMark(const RawDepthMap& map, double least_
     ++mark.pixels;
   }
   const auto pixels = static_cast<double>(mark.pixels);
-  return pixels >= least_pixels && others.size() > 2 ? std::optional(mark) : std::nullopt;
+  const bool is_suspected =
+      pixels >= least_pixels && others.size() == kMinOthers && 2 * mark.pixels < map.values.size();
+  return is_suspected ? std::optional(mark) : std::nullopt;
 }
 
 // Finds them among the values that are left, in which NaN marks the holes.

@@ -168,6 +168,8 @@ TEST(DepthHoles, AWallOrASkyIsNoSuspectedMark) {
   EXPECT_THAT(SuspectsIn(DepthKind::kDisparity, RampAnd(-3, 9, {-1})), IsEmpty());
   EXPECT_THAT(SuspectsIn(DepthKind::kDisparity, RampAnd(2, 9, {-2})), IsEmpty());
   EXPECT_THAT(SuspectsIn(DepthKind::kDisparity, RampAnd(2, 2, {-1})), IsEmpty());
+  // A wall behind what is nearer takes most of the image.
+  EXPECT_THAT(SuspectsIn(DepthKind::kDisparity, RampAnd(2, 60, {-1}, false, {}, 100)), IsEmpty());
   // The near end of relative maps, and two planes.
   EXPECT_THAT(SuspectsIn(DepthKind::kInverse, RampAnd(20, 90, {255}, true, 255)), IsEmpty());
   EXPECT_THAT(SuspectsIn(DepthKind::kDisparity, RampAnd(0, 0, {5})), IsEmpty());

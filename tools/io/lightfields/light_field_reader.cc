@@ -293,8 +293,10 @@ bool IsPlainImage(const ViewSource& source, const ViewOrderFinding& finding) {
 }
 
 // States what the shifts between the views say about their order, and returns it.
+// `is_stated`: by the option view-order.
 ViewOrder ReportOrder(const std::string& path, const ViewSource& source,
-                      const model::LightField& light_field, LightFieldFacts* facts) {
+                      const model::LightField& light_field, bool is_stated,
+                      LightFieldFacts* facts) {
   ViewOrderFinding finding = FindViewOrder(light_field);
   if (finding.order == ViewOrder::kAsStated && IsPlainImage(source, finding)) {
     const std::string why = fmt::format(
@@ -317,6 +319,12 @@ ViewOrder ReportOrder(const std::string& path, const ViewSource& source,
           ? "the shifts do not say which of both counts backwards: in the right order near things "
             "have the larger disparity"
           : source.mirrored;
+  // An order that is wrong now and was stated is another one than that of the views.
+  const auto remedy = [&](const std::string& turns) {
+    return is_stated ? "the option view-order states an order that is not that of the views: leave "
+                       "it out, or state another"
+                     : turns;
+  };
   switch (finding.order) {
     case ViewOrder::kUndecided:
       facts->one_line +=
@@ -334,20 +342,21 @@ ViewOrder ReportOrder(const std::string& path, const ViewSource& source,
     case ViewOrder::kSwapped:
       facts->notices.push_back(fmt::format(
           "{}: rows and columns of the views are exchanged: the scene shifts up or down between "
-          "neighbours in a row; the option view-order swap exchanges them",
-          path));
+          "neighbours in a row; {}",
+          path, remedy("the option view-order swap exchanges them")));
       break;
     case ViewOrder::kMirrored:
       facts->notices.push_back(fmt::format(
           "{}: the rows or the columns of the views count backwards: disparities have opposite "
-          "signs across and down; the option view-order mirror-u or mirror-v turns them ({})",
-          path, mirrored));
+          "signs across and down; {} ({})",
+          path, remedy("the option view-order mirror-u or mirror-v turns them"), mirrored));
       break;
     case ViewOrder::kSwappedMirrored:
       facts->notices.push_back(fmt::format(
-          "{}: rows and columns of the views are exchanged, and one of them counts backwards; the "
-          "option view-order swap,mirror-u or swap,mirror-v turns them ({})",
-          path, mirrored));
+          "{}: rows and columns of the views are exchanged, and one of them counts backwards; {} "
+          "({})",
+          path, remedy("the option view-order swap,mirror-u or swap,mirror-v turns them"),
+          mirrored));
       break;
     case ViewOrder::kIrregular:
       facts->notices.push_back(fmt::format(
@@ -533,7 +542,10 @@ model::LightField ReadSource(const std::string& folder, const LightFieldReading&
   facts->notices = source.notices;
   facts->one_line = folder + ": " + OneLine(source, light_field);
   ExamineDarkViews(source.is_own, &light_field, facts);
-  *order = source.is_own ? ViewOrder::kAsStated : ReportOrder(folder, source, light_field, facts);
+  *order = source.is_own
+               ? ViewOrder::kAsStated
+               : ReportOrder(folder, source, light_field,
+                             reading.swap_uv || reading.mirror_u || reading.mirror_v, facts);
   std::string why;
   if (!light_field.IsValid(&why)) throw Error(fmt::format("{}: {}", folder, why));
   return light_field;
