@@ -581,8 +581,18 @@ model::LightField ReadLightField(const std::string& folder, const LightFieldRead
   if (!source.from_one) return light_field;
   LightFieldFacts facts_from_one;
   ViewOrder order_from_one = ViewOrder::kUndecided;
-  model::LightField from_one =
-      ReadSource(folder, reading, *source.from_one, &facts_from_one, &order_from_one);
+  model::LightField from_one;
+  try {
+    from_one = ReadSource(folder, reading, *source.from_one, &facts_from_one, &order_from_one);
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const Error& error) {
+    // Counted from 1, the views may not have the stated numbers, for example.
+    facts->one_line +=
+        fmt::format("; the numbers of the views are counted from 0, and cannot be read from 1 ({})",
+                    error.what());
+    return light_field;
+  }
   const bool is_from_one = IsInOrder(order_from_one) && !IsInOrder(order);
   if (is_from_one) {
     light_field = std::move(from_one);

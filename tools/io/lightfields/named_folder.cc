@@ -69,8 +69,9 @@ std::optional<ViewSource> OpenNamedFolder(const LayoutInput& input) {
   if (grid.may_start_at_one) {
     std::vector<std::string> ignored;
     const ViewGrid from_one = GridOfNames(input.path, pattern, names, *input.reading, &ignored, 1);
-    source.from_one =
-        std::make_shared<const ViewSource>(NamedSource(input, pattern, from_one, others));
+    const auto other = std::make_shared<ViewSource>(NamedSource(input, pattern, from_one, others));
+    AddWarningsOfNames(input.path, pattern, proposal, others, other.get());
+    source.from_one = other;
   }
   if (pattern.HasRowAndColumn() && input.reading->grid > 0)
     source.details.push_back("the option grid is not used, because names have row and column");

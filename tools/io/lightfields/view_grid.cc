@@ -171,9 +171,10 @@ ViewGrid GridOfNumbers(const std::string& path, const std::vector<NumberedView>&
     first = stated_first ? *stated_first : FirstOfNumbering(numbers, row);
     may_start_at_one = MayStartAtOne(numbers, row);
   }
-  // "parts:4x6" of 25 pages: without this, 7 rows with views missing.
+  // "parts:4x6" of 25 pages: without this, 7 rows with views missing. Numbers with gaps may be a
+  // part of the stated views: if it is no rectangle, the message names the missing ones.
   const int stated = reading.layout_u * reading.layout_v;
-  if (stated > 0 && (count > stated || (count < stated && !reading.sparse))) {
+  if (stated > 0 && (count > stated || (count < stated && is_gapless && !reading.sparse))) {
     throw Error(fmt::format(
         "{}: the option layout states {} x {} views, which are {}, but {} are there, from {} to {}",
         path, reading.layout_u, reading.layout_v, stated, count, PrintableUtf8(least->file),

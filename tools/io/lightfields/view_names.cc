@@ -33,7 +33,7 @@ std::size_t CountOf(const std::string& text, char c) {
 bool IsLetter(char c) { return std::isalpha(static_cast<unsigned char>(c)) != 0; }
 
 // Whether the character begins a number: a '-' or a '+' before digits may be its sign, but a '-'
-// between digits separates two numbers, unless other names have a '+' between digits.
+// between digits separates two numbers, unless other names of its kind have a '+' between digits.
 bool IsSign(const std::string& name, std::size_t i, bool may_follow_digit) {
   return (name[i] == '-' || name[i] == '+') && i + 1 < name.size() && IsDigit(name[i + 1]) &&
          (i == 0 || !IsDigit(name[i - 1]) || may_follow_digit);
@@ -46,6 +46,19 @@ bool HasSignAfterDigit(const std::string& name) {
     if (name[i] == '+' && IsDigit(name[i - 1]) && IsDigit(name[i + 1])) return true;
   }
   return false;
+}
+
+// The name with a mark for each number and each sign: names of one kind have one template.
+std::string TemplateOf(const std::string& name) {
+  std::string text;
+  for (std::size_t i = 0; i < name.size(); ++i) {
+    if (IsDigit(name[i])) {
+      if (i == 0 || !IsDigit(name[i - 1])) text += '0';
+    } else {
+      text += name[i] == '+' ? '-' : name[i];
+    }
+  }
+  return text;
 }
 
 // A name as text and numbers in turn: text[0] number[0] text[1] ...
@@ -321,10 +334,14 @@ bool NamePattern::MatchesUpToSigns(const std::string& name) const {
 }
 
 std::optional<NameProposal> ProposedPattern(const std::vector<std::string>& names) {
-  const bool may_follow_digit = std::any_of(names.begin(), names.end(), HasSignAfterDigit);
+  // A '+' between digits of another image says nothing of these.
+  std::set<std::string> with_sign_after_digit;
+  for (const std::string& name : names) {
+    if (HasSignAfterDigit(name)) with_sign_after_digit.insert(TemplateOf(name));
+  }
   std::map<std::vector<std::string>, std::vector<SplitName>> groups;
   for (const std::string& name : names) {
-    SplitName split = Split(name, may_follow_digit);
+    SplitName split = Split(name, with_sign_after_digit.count(TemplateOf(name)) > 0);
     groups[split.text].push_back(split);
   }
   const auto largest = std::max_element(
@@ -347,9 +364,12 @@ std::optional<NameProposal> ProposedPattern(const std::vector<std::string>& name
     const std::vector<std::size_t> places = ChangingPlaces(others);
     if (places.size() != changing.size() || !MayBePlaces(others, places)) continue;
     const std::string pattern = ProposalOf(text, others, places).pattern;
-    if (2 * others.size() >= group.size()) {
+    const bool is_large = 2 * others.size() >= group.size();
+    // Masks of some views are no second light field beside a full one.
+    const bool is_clear = IsFullGrid(group, changing) && !IsFullGrid(others, places);
+    if (is_large && !is_clear) {
       proposal.other_patterns.push_back(pattern);
-    } else if (IsFullGrid(others, places)) {
+    } else if (is_large || IsFullGrid(others, places)) {
       proposal.smaller_patterns.push_back(pattern);
     }
   }

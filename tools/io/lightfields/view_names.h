@@ -49,9 +49,11 @@ struct NameProposal {
   bool is_sign_unclear = false;
   std::string other_pattern;
   // Patterns of other groups with at least half as many names, in which as many numbers change: a
-  // light field may be in each of them.
+  // light field may be in each of them. Groups that are no full grid are not among them if the
+  // largest group is one.
   std::vector<std::string> other_patterns;
-  // Patterns of smaller groups that are full grids of at least 2 x 2 views.
+  // Patterns of smaller groups that are full grids of at least 2 x 2 views, and of large groups
+  // that are not full grids.
   std::vector<std::string> smaller_patterns;
   // Names that would fit with other signs, or with letters that may stand for signs.
   std::vector<std::string> other_signs;

@@ -205,6 +205,29 @@ TEST_F(LightFieldLayouts, ASmallerGridOfOtherNamesIsReported) {
   EXPECT_THAT(facts_.notices, ElementsAre(HasSubstr("thumb_{v}_{u}.png")));
 }
 
+// Masks of some views are no light field, but may be as many as half of the views.
+TEST_F(LightFieldLayouts, MasksOfSomeViewsAreReported) {
+  const std::string path = Folder(RowAndColumn, InOrder);
+  for (const char* place : {"0_0", "0_2", "1_1", "2_0", "2_2"})
+    folder_.Put("lf/mask_" + std::string(place) + ".png", EncodedTile(View(0, 0)));
+  ExpectViews(Read(path));
+  EXPECT_THAT(facts_.notices, ElementsAre(HasSubstr("mask_{v}_{u}.png")));
+  // Without one of the views, either may be meant.
+  std::remove((path + "/view_1_1.png").c_str());
+  EXPECT_THAT(ErrorOf([&] { Read(path); }), HasSubstr("'mask_{v}_{u}.png'"));
+}
+
+// Before, such an image made every '-' a sign.
+TEST_F(LightFieldLayouts, APlusInAnotherNameDecidesNothing) {
+  const std::string path = Folder(
+      [](int v, int u) { return "view-0" + std::to_string(v) + "-0" + std::to_string(u) + ".png"; },
+      InOrder);
+  folder_.Put("lf/HDR_1+2.png", EncodedTile(View(0, 0)));
+  ExpectViews(Read(path));
+  EXPECT_THAT(facts_.one_line,
+              AllOf(HasSubstr("'view-{v}-{u}.png'"), HasSubstr("not views: HDR_1+2.png")));
+}
+
 // Before, the first number was the row always.
 TEST_F(LightFieldLayouts, LettersBeforeNumbersNameTheirAxes) {
   for (const auto& [column, row] : {std::pair("x", "y"), std::pair("u", "_v"),
@@ -394,6 +417,55 @@ TEST_F(LightFieldLayouts, ShiftsShowWhetherNumbersCountFromOne) {
   }
   EXPECT_FALSE(Read(folder / "lf", reading).IsPresent(0, 0));
   EXPECT_THAT(facts_.notices, ::testing::Contains(HasSubstr("do not decide it")));
+}
+
+// Counted from 1, these are 5 x 4 views, which do not have the inner 4 x 5.
+TEST_F(LightFieldLayouts, NumbersThatCannotCountFromOneCountFromZero) {
+  for (const int number : {3, 6, 8, 11, 12, 13, 15, 18, 20})
+    folder_.Put("lf/v" + std::to_string(number) + ".png", EncodedTile(View(0, 0)));
+  LightFieldReading reading;
+  reading.name = "v{n}.png";
+  reading.grid = 5;
+  reading.sparse = true;
+  reading.u_count = 4;
+  reading.v_count = 5;
+  const model::LightField light_field = Read(folder_ / "lf", reading);
+  EXPECT_EQ(light_field.u_count, 4);
+  EXPECT_EQ(light_field.v_count, 5);
+  EXPECT_TRUE(light_field.IsPresent(3, 0));
+  EXPECT_THAT(facts_.one_line, HasSubstr("cannot be read from 1"));
+}
+
+TEST_F(LightFieldLayouts, ViewsThatCountFromOneHaveTheWarningsOfTheirNames) {
+  constexpr int kSide = 5;
+  for (int i = 0; i < kSide * kSide - 1; ++i) {
+    folder_.Put("lf/frame_" + std::to_string(i + 1) + ".png",
+                EncodedTile(View(i % kSide - 2, i / kSide - 2)));
+  }
+  folder_.Put("lf/frame_m3.png", EncodedTile(View(0, 0)));
+  LightFieldReading reading;
+  reading.name = "frame_{n}.png";
+  reading.grid = kSide;
+  reading.sparse = true;
+  EXPECT_TRUE(Read(folder_ / "lf", reading).IsPresent(0, 0));
+  EXPECT_THAT(facts_.notices, ::testing::Contains(HasSubstr("that they count from 1")));
+  EXPECT_THAT(facts_.notices, ::testing::Contains(HasSubstr("frame_m3.png")));
+}
+
+// The numbers of views state the length of a row, also where only inner views are there.
+TEST_F(LightFieldLayouts, InnerViewsOfAStatedNumberingAreRead) {
+  LightFieldReading reading;
+  reading.name = "v{n}.png";
+  reading.layout = "names";
+  reading.layout_u = reading.layout_v = 5;
+  const auto name = [](int v, int u) { return "v" + std::to_string(5 * v + u + 6) + ".png"; };
+  ExpectViews(Read(Folder(name, InOrder), reading));
+  std::remove((folder_ / "lf/v12.png").c_str());
+  EXPECT_THAT(ErrorOf([&] { Read(folder_ / "lf", reading); }), HasSubstr("missing"));
+  TemporaryFolder gapless;
+  for (int number = 0; number < 9; ++number)
+    gapless.Put("lf/v" + std::to_string(number) + ".png", EncodedTile(View(0, 0)));
+  EXPECT_THAT(ErrorOf([&] { Read(gapless / "lf", reading); }), HasSubstr("states 5 x 5 views"));
 }
 
 TEST_F(LightFieldLayouts, BlackViewsAreNamedAndLeftOut) {
