@@ -182,6 +182,16 @@ bool AreSharp(const cv::Mat& grey, const std::vector<FlatRun>& runs) {
   return true;
 }
 
+// Mean absolute difference between the columns x - 1 and x.
+double StepAt(const cv::Mat& grey, int x) {
+  double sum = 0;
+  for (int y = 0; y < grey.rows; ++y) {
+    const auto* row = grey.ptr<float>(y);
+    sum += std::abs(row[x] - row[x - 1]);
+  }
+  return sum / grey.rows;
+}
+
 AxisLines LinesAcross(const cv::Mat& grey) {
   AxisLines none;
   none.tile_px = grey.cols;
@@ -260,6 +270,20 @@ bool Repeats(const cv::Mat& pixels, AxisCounts counts) {
 TileLines LinesOf(const cv::Mat& pixels) {
   const cv::Mat grey = GreyOf(pixels);
   return {LinesAcross(grey), LinesAcross(grey.t())};
+}
+
+bool AreEdgesWithinBorder(const cv::Mat& pixels, AxisLines border, int count, bool is_down) {
+  cv::Mat grey = GreyOf(pixels);
+  if (is_down) grey = grey.t();
+  double within = 0, whole = 0;
+  for (int i = 1; i < count; ++i) {
+    const int edge_within = border.first_px + i * (border.tile_px / count);
+    const int edge_whole = i * (grey.cols / count);
+    if (edge_within == edge_whole) continue;  // as in the middle of an even number
+    within += StepAt(grey, edge_within);
+    whole += StepAt(grey, edge_whole);
+  }
+  return within > kEdgeContrast * whole;
 }
 
 int LensletPitchOf(const cv::Mat& pixels) {

@@ -30,6 +30,9 @@ struct TileLines {
   AxisLines across, down;
 };
 TileLines LinesOf(const cv::Mat& pixels);
+// Whether so many tiles within a border alone have clearer edges than as many tiles of the whole
+// image, whose outer tiles contain the border; false if the edges do not show it.
+bool AreEdgesWithinBorder(const cv::Mat& pixels, AxisLines border, int count, bool is_down);
 // The period of the differences between neighbouring pixels, as the edges of square lenslets have
 // it: 2 to 100 px; 0: there is none, or the axes differ.
 int LensletPitchOf(const cv::Mat& pixels);

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "thicklens/base/error.h"
 #include "thicklens/base/input_file.h"
@@ -75,11 +77,62 @@ void RequireStated(const LayoutInput& input, AxisCounts stated, const TileLines&
       tiles.down, tiles.across, tiles.down));
 }
 
+bool IsBorderAlone(const AxisLines& lines) { return lines.count == 1 && lines.first_px > 0; }
+
 // A border alone that is wider than half a view is not one: the outer views may be black.
-bool DropWideBorder(int count, int all_px, AxisLines* lines) {
-  const bool is_wide = lines->count == 1 && 2 * lines->first_px * count > lines->tile_px;
-  if (is_wide) *lines = {1, 0, 0, all_px, 0};
-  return is_wide;
+bool IsWideBorder(const AxisLines& lines, int count) {
+  return IsBorderAlone(lines) && 2 * lines.first_px * count > lines.tile_px;
+}
+
+// Whether a border alone belongs to the outer views: the whole image is a whole number of pixels
+// for each view, and the edges of the views do not stand within the border.
+bool IsBorderOfViews(const cv::Mat& pixels, const AxisLines& lines, int count, bool is_down) {
+  if (!IsBorderAlone(lines) || count < 2) return false;
+  if ((is_down ? pixels.rows : pixels.cols) % count != 0) return false;
+  return lines.tile_px % count != 0 || !AreEdgesWithinBorder(pixels, lines, count, is_down);
+}
+
+// Takes a border that is none, or one of the views, for a part of the image.
+bool DropBorder(const cv::Mat& pixels, int count, bool is_down, AxisLines* lines) {
+  if (!IsWideBorder(*lines, count) && !IsBorderOfViews(pixels, *lines, count, is_down))
+    return false;
+  *lines = {1, 0, 0, is_down ? pixels.rows : pixels.cols, 0};
+  return true;
+}
+
+// A sentence about the border of an axis that is taken for a part of the outer views.
+void AddNoticeOfBorder(const std::string& path, const AxisLines& found, const AxisLines& lines,
+                       int count, const char* axis, std::vector<std::string>* notices) {
+  if (!IsBorderAlone(found) || lines.first_px > 0 || IsWideBorder(found, count)) return;
+  notices->push_back(fmt::format(
+      "{}: a border of {} px {} is read as part of the outer views, which have {} px: if it is "
+      "around all views and not a part of them, it must be cut off the image",
+      path, found.first_px, axis, lines.tile_px));
+}
+
+// The pixels that are left behind the last tile.
+int LastPx(const AxisLines& lines, int all_px) {
+  return all_px - lines.first_px - lines.count * lines.tile_px - (lines.count - 1) * lines.gap_px;
+}
+
+// Whether lines may be the edges of views of one size without lines, such as black bars.
+bool MayBeBarsOfViews(const AxisLines& lines, int all_px) {
+  return lines.count > 1 && lines.gap_px > 0 && lines.first_px > 0 &&
+         lines.first_px + LastPx(lines, all_px) == lines.gap_px && all_px % lines.count == 0;
+}
+
+// A sentence about lines that may be bars of the views.
+void AddNoticeOfBars(const std::string& path, const cv::Mat& pixels, const TileLines& lines,
+                     std::vector<std::string>* notices) {
+  const bool across = MayBeBarsOfViews(lines.across, pixels.cols);
+  const bool down = MayBeBarsOfViews(lines.down, pixels.rows);
+  if (!across && !down) return;
+  const int width = across ? pixels.cols / lines.across.count : lines.across.tile_px;
+  const int height = down ? pixels.rows / lines.down.count : lines.down.tile_px;
+  notices->push_back(fmt::format(
+      "{}: every view has a uniform edge on both sides, which may be lines between views or bars "
+      "of the views themselves, and is left out: {} x {} of {} x {} px are read",
+      path, lines.across.tile_px, lines.down.tile_px, width, height));
 }
 
 // Tiles without lines along an axis divide what is within the border.
@@ -108,19 +161,26 @@ std::optional<ViewSource> OpenTiledImage(const LayoutInput& input) {
       (lines.down.count == 1 || lines.down.count != stated.down) && Repeats(pixels, stated)) {
     lines = TileLines{{1, 0, 0, pixels.cols, 0}, {1, 0, 0, pixels.rows, 0}};
   }
+  const TileLines found = lines;
   AxisCounts tiles = stated;
   if (is_stated) {
     RequireStated(input, stated, lines);
-    DropWideBorder(stated.across, pixels.cols, &lines.across);
-    DropWideBorder(stated.down, pixels.rows, &lines.down);
+    DropBorder(pixels, stated.across, false, &lines.across);
+    DropBorder(pixels, stated.down, true, &lines.down);
   } else {
     tiles = CountsOf(pixels, lines);
-    const bool is_other_across = DropWideBorder(tiles.across, pixels.cols, &lines.across);
-    const bool is_other_down = DropWideBorder(tiles.down, pixels.rows, &lines.down);
+    // An image that does not repeat itself within a border may do so with it.
+    const auto drop = [&pixels](int count, bool is_down, AxisLines* axis) {
+      if (count > 1 || !IsBorderAlone(*axis)) return DropBorder(pixels, count, is_down, axis);
+      *axis = {1, 0, 0, is_down ? pixels.rows : pixels.cols, 0};
+      return true;
+    };
+    const bool is_other_across = drop(tiles.across, false, &lines.across);
+    const bool is_other_down = drop(tiles.down, true, &lines.down);
     if (is_other_across || is_other_down) tiles = CountsOf(pixels, lines);
     // An image with two such lines may show anything, so that more are needed unless the layout is
-    // stated.
-    const bool are_few = are_divided() && tiles.across * tiles.down < 9;
+    // stated or the image repeats itself, as views with black bars do.
+    const bool are_few = are_divided() && tiles.across * tiles.down < 9 && !Repeats(pixels, tiles);
     if (!input.is_forced && (tiles.across < 2 || tiles.down < 2 || are_few)) return std::nullopt;
     if (tiles.across < 2 || tiles.down < 2) {
       throw Error(fmt::format(
@@ -145,6 +205,10 @@ std::optional<ViewSource> OpenTiledImage(const LayoutInput& input) {
   }
   ViewSource source;
   source.kind = "an image of views side by side";
+  AddNoticeOfBorder(input.path, found.across, lines.across, tiles.across, "across",
+                    &source.notices);
+  AddNoticeOfBorder(input.path, found.down, lines.down, tiles.down, "down", &source.notices);
+  AddNoticeOfBars(input.path, pixels, lines, &source.notices);
   source.frame = FullFrame(tiles.across, tiles.down);
   if (has_lines) source.details.push_back(LinesInWords(lines));
   if (is_found) {
@@ -160,13 +224,13 @@ std::optional<ViewSource> OpenTiledImage(const LayoutInput& input) {
         input.path, lines.across.one_side_px, lines.down.one_side_px));
   }
   if (is_stated && !has_lines && !Repeats(pixels, tiles)) {
-    const AxisCounts found = RepetitionsOf(pixels);
-    const bool is_other = (found.across > 1 && found.across != tiles.across) ||
-                          (found.down > 1 && found.down != tiles.down);
+    const AxisCounts repeated = RepetitionsOf(pixels);
+    const bool is_other = (repeated.across > 1 && repeated.across != tiles.across) ||
+                          (repeated.down > 1 && repeated.down != tiles.down);
     if (is_other) {
       source.notices.push_back(fmt::format("{}: the option layout states {} x {} views{}",
                                            input.path, tiles.across, tiles.down,
-                                           RepetitionsInWords(found)));
+                                           RepetitionsInWords(repeated)));
     }
   }
   source.read = [image, lines, path = input.path](int k, int l) {

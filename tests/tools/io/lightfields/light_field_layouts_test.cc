@@ -764,6 +764,64 @@ TEST_F(LightFieldLayouts, BlackViewsAroundTheOthersAreNoBorder) {
   EXPECT_EQ(LevelAt(light_field, 1, 3, 30, 20), View(-1, 1).at<cv::Vec3b>(20, 30)[0]);
 }
 
+// Views side by side, of which each was changed.
+cv::Mat SideBySide(int across, int down, const std::function<void(cv::Mat*)>& change) {
+  cv::Mat tiles(down * kViewHeightPx, across * kViewWidthPx, CV_8UC3);
+  for (int l = 0; l < down; ++l) {
+    for (int k = 0; k < across; ++k) {
+      cv::Mat view = View(k, l, 0.2);
+      change(&view);
+      view.copyTo(
+          tiles(cv::Rect(k * kViewWidthPx, l * kViewHeightPx, kViewWidthPx, kViewHeightPx)));
+    }
+  }
+  return tiles;
+}
+
+// The outer views may be black at their outer edges: 4 x 96 px are not 4 x 94 px in a border.
+TEST_F(LightFieldLayouts, BlackEdgesOfTheOuterViewsAreNoBorder) {
+  LightFieldReading reading;
+  reading.layout = "tiles";
+  reading.layout_u = reading.layout_v = 4;
+  for (const int border_px : {3, 4}) {  // 4 x 94.5 px, 4 x 94 px
+    cv::Mat tiles = SideBySide(4, 4, [](cv::Mat*) {});
+    tiles.colRange(0, border_px).setTo(cv::Scalar::all(0));
+    tiles.colRange(tiles.cols - border_px, tiles.cols).setTo(cv::Scalar::all(0));
+    const model::LightField light_field =
+        Read(folder_.Put("tiles.png", EncodedTile(tiles)), reading);
+    EXPECT_EQ(light_field.s_count, kViewWidthPx) << border_px;
+    EXPECT_EQ(LevelAt(light_field, 1, 3, 30, 20), View(1, 3, 0.2).at<cv::Vec3b>(20, 30)[0]);
+    EXPECT_THAT(facts_.notices, ::testing::Contains(HasSubstr("part of the outer views")));
+  }
+  // A border around them is one also where the whole image is divisible.
+  cv::Mat bordered(4 * kViewHeightPx, 4 * kViewWidthPx + 8, CV_8UC3, cv::Scalar::all(0));
+  SideBySide(4, 4, [](cv::Mat*) {
+  }).copyTo(bordered(cv::Rect(4, 0, 4 * kViewWidthPx, 4 * kViewHeightPx)));
+  const model::LightField light_field =
+      Read(folder_.Put("bordered.png", EncodedTile(bordered)), reading);
+  EXPECT_EQ(light_field.s_count, kViewWidthPx);
+  EXPECT_EQ(LevelAt(light_field, 1, 3, 30, 20), View(1, 3, 0.2).at<cv::Vec3b>(20, 30)[0]);
+  EXPECT_THAT(facts_.one_line, HasSubstr("a border of 4 x 0 px is left out"));
+}
+
+// Few views with bars of their own repeat themselves: before, they were taken for any image.
+TEST_F(LightFieldLayouts, FewViewsWithBlackBarsAreRecognised) {
+  constexpr int kBarPx = 5;
+  for (const auto& [across, down] : {std::pair(4, 2), std::pair(2, 4), std::pair(2, 2)}) {
+    const cv::Mat tiles = SideBySide(across, down, [](cv::Mat* view) {
+      view->rowRange(0, kBarPx).setTo(cv::Scalar::all(0));
+      view->rowRange(kViewHeightPx - kBarPx, kViewHeightPx).setTo(cv::Scalar::all(0));
+    });
+    const model::LightField light_field = Read(folder_.Put("tiles.png", EncodedTile(tiles)));
+    EXPECT_EQ(light_field.u_count, across);
+    EXPECT_EQ(light_field.v_count, down);
+    EXPECT_EQ(light_field.s_count, kViewWidthPx);
+    EXPECT_EQ(light_field.t_count, kViewHeightPx - 2 * kBarPx);
+    EXPECT_THAT(facts_.notices, ::testing::Contains(AllOf(HasSubstr("96 x 54 of 96 x 64 px"),
+                                                          HasSubstr("bars of the views"))));
+  }
+}
+
 TEST_F(LightFieldLayouts, LinesMayHaveTheNoiseOfJpeg) {
   for (const int level : {0, 255}) {
     const cv::Mat mosaic = Mosaic({2, 2}, {0, 0}, level);
