@@ -250,6 +250,10 @@ TEST_F(BrokenVideoTest, TruncatedTransportStreams) {
   ASSERT_EQ(whole.size() % kPacket, 0U);
   EXPECT_THAT(Refusal(folder_.Put("part.ts", whole.substr(0, whole.size() - 100))),
               AllOf(HasSubstr("part.ts"), HasSubstr("truncated"), HasSubstr("188")));
+  // Bytes that begin no packet are no part of the video.
+  EXPECT_EQ(
+      VideoFile(folder_.Put("padded.ts", whole + std::string(20, '\0'))).Survey().frames.size(),
+      VideoFile(VideoPath("stream.ts")).Survey().frames.size());
   EXPECT_FALSE(VideoFile(VideoPath("stream.ts")).Survey().frames.back().may_be_cut);
   // The first packet of a frame, which needs more of them, has the time and no stuffing.
   std::string first(kPacket, '\x11');

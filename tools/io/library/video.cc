@@ -130,18 +130,32 @@ class VideoBytes {
 
 // While it lives, FFmpeg allocates no larger piece of memory than the tables of a container may
 // need: some dozens of bytes for each frame, which has at least one byte in the file. A header that
-// lies about its numbers would get gigabytes.
+// lies about its numbers would get gigabytes. The limit is one for the process: it is the largest
+// of all videos that are being opened, and leaves room for the frames that other threads decode.
 class AllocationLimit {
  public:
   explicit AllocationLimit(std::int64_t file_bytes) {
-    constexpr std::int64_t kMinBytes = 64 << 20, kBytesPerByte = 64;
+    constexpr std::int64_t kMinBytes = 256 << 20, kBytesPerByte = 64;
     constexpr std::int64_t kMaxBytes = std::numeric_limits<int>::max();  // FFmpeg's own limit
     const std::int64_t table = std::min(file_bytes, kMaxBytes / kBytesPerByte) * kBytesPerByte;
-    av_max_alloc(static_cast<std::size_t>(std::min(kMaxBytes, kMinBytes + table)));
+    const std::lock_guard<std::mutex> lock(mutex_);
+    largest_ = std::max(largest_, std::min(kMaxBytes, kMinBytes + table));
+    ++count_;
+    av_max_alloc(static_cast<std::size_t>(largest_));
   }
-  ~AllocationLimit() { av_max_alloc(std::numeric_limits<int>::max()); }
+  ~AllocationLimit() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (--count_ > 0) return;
+    largest_ = 0;
+    av_max_alloc(std::numeric_limits<int>::max());
+  }
   AllocationLimit(const AllocationLimit&) = delete;
   AllocationLimit& operator=(const AllocationLimit&) = delete;
+
+ private:
+  static inline std::mutex mutex_;
+  static inline int count_ = 0;  // of the videos that are being opened
+  static inline std::int64_t largest_ = 0;
 };
 
 struct CloseFormat {

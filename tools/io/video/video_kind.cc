@@ -188,7 +188,9 @@ std::map<unsigned, StreamEnd> EndsOfTransportStream(Peek* file) {
 
 void RequireWholeTransportStream(const std::string& path) {
   Peek file(path);
-  if (file.size() % kTsPacket != 0) {
+  // Bytes that begin no packet are no part of the video.
+  const auto rest = file.size() % kTsPacket;
+  if (rest != 0 && file.Bytes(file.size() - rest, 1) == "G") {
     throw Error(fmt::format(
         "{}: the video is truncated: the file has {} bytes, and MPEG-TS has packets of {} bytes; "
         "copy it again",
