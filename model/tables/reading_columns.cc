@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cctype>
 #include <charconv>
+#include <cmath>
 #include <optional>
 #include <set>
 #include <utility>
@@ -172,9 +173,38 @@ std::string Trimmed(const std::string& text) {
   return text.substr(begin, text.find_last_not_of(" \t\n") - begin + 1);
 }
 
-bool IsDigits(const std::string& word) {
-  return std::all_of(word.begin(), word.end(),
-                     [](char c) { return std::isdigit(static_cast<unsigned char>(c)) != 0; });
+// Units that are not read. Any other word in a name is taken for a part of the name.
+bool IsUnreadUnit(const std::string& word) {
+  static const Words units = {"km",      "kilometer", "kilometers", "kilometre", "kilometres",
+                              "furlong", "furlongs",  "fathom",     "fathoms",   "mile",
+                              "miles",   "league",    "leagues",    "parsec",    "parsecs",
+                              "arb",     "dac",       "bit",        "bits"};
+  return units.count(word) > 0;
+}
+
+bool HasLength(const std::optional<ReadingUnit>& unit) {
+  return unit && unit->kind != ReadingUnit::Kind::kOther;
+}
+
+// "10um" and "mm2": another unit than the one that is known.
+bool IsUnitWithNumber(const std::string& word) {
+  constexpr char kDigits[] = "0123456789";
+  const std::size_t begin = word.find_first_not_of(kDigits);
+  if (begin == std::string::npos) return false;
+  const std::string letters = word.substr(begin, word.find_last_not_of(kDigits) + 1 - begin);
+  return letters.size() < word.size() && letters.size() > 1 && HasLength(FindUnit(letters));
+}
+
+// Whether the text in brackets multiplies the unit before it or names another: "mm (1/10)".
+bool ChangesUnit(const std::string& inside) {
+  const bool is_formula = inside.find_first_not_of("0123456789xX*/^.,-+eE ") == std::string::npos &&
+                          inside.find_first_of("0123456789") != std::string::npos &&
+                          inside.find_first_of("xX*/^eE") != std::string::npos;
+  const std::vector<std::string> words = WordsOf(inside);
+  return is_formula || std::any_of(words.begin(), words.end(), [](const std::string& word) {
+           return IsUnreadUnit(word) || IsUnitWithNumber(word) ||
+                  (word != "in" && HasLength(FindUnit(word)));
+         });
 }
 
 // Whether the word is known and no unit.
@@ -228,13 +258,27 @@ void TakeUnitOfWords(ColumnName* name) {
       unit &&
       (end > 1 || (unit->kind == ReadingUnit::Kind::kLength && last != "m" && last != "in") ||
        unit->kind == ReadingUnit::Kind::kOther);
-  // An unknown word behind a known one may be a unit that is not known.
-  const bool is_unknown =
-      !unit && end > 1 && end == words.size() && !IsPlain(last) && !IsDigits(last);
-  if (!may_be_unit && !is_unknown) return;
-  name->unit = last;
-  name->known = unit;
-  words.erase(words.begin() + static_cast<std::ptrdiff_t>(end - 1));
+  if (may_be_unit) {
+    name->unit = last;
+    name->known = unit;
+    words.erase(words.begin() + static_cast<std::ptrdiff_t>(end - 1));
+    return;
+  }
+  // "z_um_smoothed", "z in mm from front"; "z mm per click2" and "z_furlong" have none that is
+  // read.
+  const bool is_rate = std::find(words.begin(), words.end(), "per") != words.end();
+  for (std::size_t i = end; i-- > 1;) {
+    const std::string word = words[i];
+    const auto inner = FindUnit(word);
+    const bool is_unread = IsUnreadUnit(word) || IsUnitWithNumber(word);
+    const bool is_meant = HasLength(inner) && word != "in" && word != "m";
+    if (!is_unread && !is_meant) continue;
+    name->unit = word;
+    if (is_meant && is_rate) name->unit += " per";
+    if (is_meant && !is_rate) name->known = inner;
+    words.erase(words.begin() + static_cast<std::ptrdiff_t>(i));
+    return;
+  }
 }
 
 // "Position [µm]", "z (mm)", "z / mm", "z_um".
@@ -242,6 +286,7 @@ ColumnName NameOf(const std::string& cell) {
   constexpr std::size_t kLongest = 200;
   std::string text = cell.substr(0, kLongest);
   ColumnName name;
+  bool has_several = false, changes_unit = false;
   for (;;) {
     const std::size_t close = text.find_last_of("])}");
     const std::size_t open = close == std::string::npos ? close : text.find_last_of("[({", close);
@@ -250,12 +295,28 @@ ColumnName NameOf(const std::string& cell) {
     const std::string unit = UnitInBrackets(inside);
     text.replace(open, close - open + 1, unit.empty() ? " " + inside + " " : " ");
     if (unit.empty()) continue;
+    const auto known = FindUnit(unit);
+    if (!known) changes_unit = changes_unit || ChangesUnit(unit);
+    // "[mm] (rounded)": a word that is not known says nothing beside a unit that is.
+    if (!has_several && !changes_unit && !name.unit.empty() &&
+        known.has_value() != name.known.has_value()) {
+      if (known) name.unit = unit;
+      if (known) name.known = known;
+      continue;
+    }
     // Two units are none that is known.
+    has_several = has_several || (known && name.known);
     name.unit = name.unit.empty() ? unit : unit + " " + name.unit;
     name.known = FindUnit(name.unit);
   }
   name.words = WordsOf(text);
-  if (name.unit.empty()) TakeUnitOfWords(&name);
+  if (name.unit.empty()) {
+    TakeUnitOfWords(&name);
+  } else if (!name.known && !has_several && !changes_unit) {  // "reading mm (rounded)"
+    ColumnName of_words = name;
+    TakeUnitOfWords(&of_words);
+    if (HasLength(of_words.known)) name = of_words;
+  }
   if (name.unit.empty() && name.words.size() > 1 && name.words.front() == "t") {
     name.words.front() = "time";
   }
@@ -546,7 +607,7 @@ class Finder {
                                  "row",    "rows",   "line",   "n",      "i",     "no",   "nr",
                                  "number", "num",    "nummer", "image",  "img",   "bild", "page",
                                  "shot",   "photo",  "sample", "record", "count"};
-    if (!HasHeader()) return false;
+    if (!HasHeader() || !options_.unit.empty() || options_.scale_mm) return false;
     const ColumnName name = NameOf(CellOf(column));
     const bool is_of_pandas = !name.words.empty() && name.words.front() == "unnamed";
     const bool may_count =
@@ -558,9 +619,11 @@ class Finder {
       if (column >= cells.size() || cells[column].empty()) continue;
       const auto value = ToNumber(Trimmed(cells[column]), '.');
       if (!value || (before && *value != *before + 1)) return false;
+      // Without a name, readings in steps of 1 mm are as likely.
+      if (!before && Trimmed(CellOf(column)).empty() && *value != 0 && *value != 1) return false;
       before = value;
     }
-    return before && *before == static_cast<double>(static_cast<long long>(*before));
+    return before && *before == std::floor(*before);
   }
 
   [[noreturn]] void RefuseCount(std::size_t column, const std::vector<std::size_t>& numbers) const {
@@ -599,9 +662,34 @@ class Finder {
   // Whether the cells are units: by the name of the column or, without a header, by all of them.
   bool IsUnits(std::size_t column) const {
     const std::vector<std::string> words = WordsOf(CellOf(column));
-    if (std::any_of(words.begin(), words.end(), IsUnitWord)) return IsMost(texts_[column]);
+    if (std::any_of(words.begin(), words.end(), IsUnitWord)) {
+      return IsMost(texts_[column]) && (HasOnlyUnits(column) || MayBeUnits(column, words));
+    }
     if (HasHeader() && !words.empty()) return false;
     return HasOnlyUnits(column);
+  }
+
+  // A "unit" may be a device, too: "lens unit", or "cam A" before the readings.
+  bool MayBeUnits(std::size_t column, std::vector<std::string> words) const {
+    words.erase(std::remove_if(words.begin(), words.end(), IsUnitWord), words.end());
+    const auto all = All();
+    const bool names_column = std::any_of(all.begin(), all.end(), [&](std::size_t other) {
+      return other != column && !words.empty() && NameOf(CellOf(other)).words == words;
+    });
+    if (names_column) return true;
+    if (!words.empty() && !HasWord(words, ReadingWords())) return false;
+    const bool is_behind_numbers = words.empty() && column > 0 && IsMost(numbers_[column - 1]) &&
+                                   !HasWord(WordsOf(CellOf(column - 1)), FileWords());
+    if (is_behind_numbers) return true;
+    for (std::size_t i = found_.first_row; i < table_.rows.size(); ++i) {
+      const auto& cells = table_.rows[i].cells;
+      if (column >= cells.size()) continue;
+      const auto unit = FindUnit(cells[column]);
+      const bool is_letter = cells[column].size() == 1;  // "A", "C", and "V" name devices
+      if (HasLength(unit) || (unit && !is_letter) || IsUnreadUnit(LowerCase(cells[column])))
+        return true;
+    }
+    return false;
   }
 
   bool HasOnlyUnits(std::size_t column) const {

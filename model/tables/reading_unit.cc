@@ -133,15 +133,30 @@ std::string UnitStatedIn(const std::string& line) {
   }
   words.pop_back();
   if (!has_name) return "";
-  std::string stated, other;
+  const auto is_number = [&](std::size_t i) {
+    return words[i].find_first_not_of("+-.0123456789") == std::string::npos &&
+           words[i].find_first_of("0123456789") != std::string::npos;
+  };
+  std::string stated, stated_name, other;
   bool is_known = false;
   for (std::size_t i = name_at + 1; i < words.size(); ++i) {
     const auto unit = FindUnit(words[i]);
     if (!unit) continue;
+    const bool is_first = has_mark && i == name_at + 1;
+    const bool is_before_unit = i + 1 < words.size() && FindUnit(words[i + 1]).has_value();
+    // A preposition: "units in mm".
+    if (Normalised(words[i]) == "in" && i + 1 < words.size() && (is_before_unit || !is_first))
+      continue;
     is_known = true;
     if (unit->kind == Kind::kOther && unit->name != "s") other = words[i];
-    if (unit->kind == Kind::kOther || stated == words[i]) continue;
+    if (unit->kind == Kind::kOther || unit->name == stated_name) continue;
+    if (i > name_at + 1 && is_number(i - 1)) {
+      if (!stated.empty()) continue;  // a length: "units: mm; resolution 1 um"
+      const bool is_factor = has_mark && i == name_at + 2 && words[i - 1] != "1";
+      if (is_factor) return words[i - 1] + " " + words[i];  // a unit that is not known: "0.1 mm"
+    }
     stated += (stated.empty() ? "" : " ") + words[i];
+    stated_name = unit->name;
   }
   const bool is_alone = name_at == 0 && has_mark && words.size() > 1;
   if (!stated.empty() || !is_alone) return stated;
@@ -167,7 +182,8 @@ double ReadingInMm(double value, const std::string& stated, const ReadingOptions
         "{}{}; state the unit by --unit ({}), or the length of one of it by --reading-scale with "
         "--unit steps",
         place,
-        unit ? fmt::format("the unit '{}' is no unit of length", Shown(name))
+        unit ? fmt::format("the unit '{}' is no unit of length",
+                           Shown(options.unit.empty() ? stated : options.unit))
              : fmt::format("'{}' is taken for a unit, and none of that name is known", Shown(name)),
         kUnitNames));
   }

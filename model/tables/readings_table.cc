@@ -243,7 +243,7 @@ class Reader {
     for (const auto& [line, text] : lines) {
       if (columns_.header.line == line) continue;
       const std::string stated = UnitStatedIn(text);
-      if (stated.empty() || (!unit_.empty() && NameOf(unit_) == NameOf(stated))) continue;
+      if (stated.empty() || (!unit_.empty() && HasUnit(stated, NameOf(unit_)))) continue;
       if (!unit_.empty()) {
         throw Error(
             fmt::format("{}this line states the unit '{}', but {} '{}'; state the unit of "
@@ -261,6 +261,18 @@ class Reader {
                         Place(line), Shown(stated), kUnitNames));
       }
     }
+  }
+
+  // Whether it is the unit or, of several units, one of them.
+  static bool HasUnit(const std::string& units, const std::string& name) {
+    if (NameOf(units) == name) return true;
+    if (std::isdigit(static_cast<unsigned char>(units.front())) != 0) return false;  // "0.1 mm"
+    for (std::size_t begin = 0; begin < units.size();) {
+      const std::size_t end = std::min(units.find(' ', begin), units.size());
+      if (NameOf(units.substr(begin, end - begin)) == name) return true;
+      begin = end + 1;
+    }
+    return false;
   }
 
   static std::string NameOf(const std::string& unit) {

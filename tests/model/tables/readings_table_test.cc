@@ -244,6 +244,25 @@ TEST(ReadingsTable, MoreUnitsOfHeaders) {
   }
 }
 
+TEST(ReadingsTable, OtherWordsInHeadersAreNoUnits) {
+  const auto header = [](const std::string& name) { return "file," + name + "\na.png,2\n"; };
+  for (const char* name : {"reading mm (rounded)", "position_mm_bottom", "z in mm from front",
+                           "Position [mm] (rounded)", "focus [mm] (Mitutoyo)",
+                           "Position (mm) [left side]", "focus (Mitutoyo) [mm]"}) {
+    EXPECT_THAT(ValuesOf(header(name)), ElementsAre(2)) << name;
+    EXPECT_THAT(Read(header(name)).description, Not(HasSubstr("no unit is stated"))) << name;
+  }
+  EXPECT_THAT(ValuesOf(header("z_um_smoothed")), ElementsAre(0.002));
+  for (const char* name :
+       {"focus ring", "z coarse", "zpos_b", "position ch1", "Distance object", "position grob"}) {
+    EXPECT_THAT(ValuesOf(header(name)), ElementsAre(2)) << name;
+    EXPECT_THAT(Read(header(name)).description, HasSubstr("no unit is stated")) << name;
+  }
+  for (const char* name : {"z_km", "z_um2", "z mm per click2", "z [mm] (1/10)", "z (mm) (1/10 mm)",
+                           "z_encoder_b", "z turns coarse"})
+    EXPECT_NE(Refusal(header(name)), "(no error)") << name;
+}
+
 TEST(ReadingsTable, FractionsAreNamed) {
   for (const char* text : {"11 1/2", "11-1/2 in", "1/2"}) {
     EXPECT_THAT(Refusal("file,z\na.png," + std::string(text) + "\n"),
@@ -270,6 +289,14 @@ TEST(ReadingsTable, UnitsInTheirOwnColumn) {
   EXPECT_THAT(Refusal("file,z,u\na.png,1,um\n"),
               AllOf(HasSubstr("column 3 'u'"), HasSubstr("--unit")));
   EXPECT_THAT(ValuesOf("file,z,unit\na.png,1,um\n", WithUnit("cm")), ElementsAre(10));
+  // A unit may be a device.
+  for (const char* table : {"file,unit,z\na.png,A,1\n", "file,lens unit,z\na.png,A,1\n",
+                            "file,z,unit id\na.png,1,SN7\n", "unit,file,z\ncam A,a.png,1\n"})
+    EXPECT_THAT(ValuesOf(table), ElementsAre(1)) << table;
+  EXPECT_THAT(ValuesOf("file,unit,z\na.png,um,1\n"), ElementsAre(0.001));
+  EXPECT_THAT(Refusal("file,unit,z\na.png,parsec,1\n"), HasSubstr("'parsec'"));
+  EXPECT_THAT(Refusal("file,z,position unit\na.png,1,parsec\n"), HasSubstr("'parsec'"));
+  EXPECT_THAT(Refusal("file,z,unit\na.png,1,volts\n"), HasSubstr("'volts'"));
 }
 
 TEST(ReadingsTable, UnitsInOtherLines) {
@@ -280,6 +307,20 @@ TEST(ReadingsTable, UnitsInOtherLines) {
     EXPECT_THAT(set.description, HasSubstr("line 1")) << line;
   }
   EXPECT_THAT(ValuesOf("# unit: um\nfile,z_um\na.png,290000\n"), ElementsAre(290));
+  for (const char* line :
+       {"# All units in mm", "# units in mm", "# Einheiten in mm",
+        "# units: z in mm, exposure in ms", "# units: mm, pitch = 4.5 um",
+        "# units: mm; resolution 1 um", "# units: mm, millimeter", "Control unit in rack"}) {
+    for (const char* name : {"z", "z [mm]"}) {
+      EXPECT_THAT(ValuesOf(std::string(line) + "\nfile;" + name + "\na.png;290\n"),
+                  ElementsAre(290))
+          << line << " above " << name;
+    }
+  }
+  EXPECT_THAT(ValuesOf("# units: x in um, z in mm\nfile,z_mm\na.png,2\n"), ElementsAre(2));
+  EXPECT_THAT(Refusal("# units: x in um, z in mm\nfile,z\na.png,2\n"), HasSubstr("--unit"));
+  EXPECT_THAT(Refusal("# unit: 0.1 mm\nfile,z\na.png,2\n"), HasSubstr("'0.1 mm'"));
+  EXPECT_THAT(ValuesOf("# unit: in\nfile,z\na.png,2\n"), ElementsAre(50.8));
   EXPECT_THAT(ValuesOf("# unit of time: s\nfile,z\na.png,290\n"), ElementsAre(290));
   EXPECT_THAT(Refusal("# unit: um\nfile,z_mm\na.png,2\n"),
               AllOf(StartsWith("bench/t.csv:1: "), HasSubstr("'um'"), HasSubstr("'mm'"),
@@ -306,6 +347,10 @@ TEST(ReadingsTable, ACountOfRowsIsNoReading) {
   options.column = "Frame";
   EXPECT_THAT(ValuesOf("Frame,file\n0,a.png\n1,b.png\n", options), ElementsAre(0, 1));
   EXPECT_THAT(ValuesOf("z,file\n0,a.png\n1,b.png\n"), ElementsAre(0, 1));
+  // Readings in steps of 1 mm, and numbers that the options state to be readings.
+  EXPECT_THAT(ValuesOf("file,\na.png,95\nb.png,96\nc.png,97\n"), ElementsAre(95, 96, 97));
+  EXPECT_THAT(ValuesOf("file,line\na.png,1\nb.png,2\n", WithUnit("steps", 0.5)),
+              ElementsAre(0.5, 1));
   EXPECT_THAT(ValuesOf("frame,z\n0,5\n1,7\n"), ElementsAre(5, 7));
 }
 

@@ -13,6 +13,7 @@
 
 #include "thicklens/base/error.h"
 #include "thicklens/base/input_file.h"
+#include "tools/io/image_names.h"
 #include "tools/io/tables/reading_sources.h"
 
 namespace thicklens::io {
@@ -73,6 +74,7 @@ struct Choice {
   std::string name;
   std::string unit;
   bool is_focus_distance = false;
+  bool has_own_unit = false;  // by its name
 };
 
 std::string List(const std::vector<Field>& fields) {
@@ -84,8 +86,18 @@ std::string List(const std::vector<Field>& fields) {
   return text;
 }
 
-// The unit that a text beside the number states: "unit", or "z_unit" for "z". Empty: none.
-std::string UnitBeside(const json& frame, const std::string& name) {
+// Whether the unit is known and is not one of a position: "ms".
+bool IsOfAnotherQuantity(const std::string& unit) {
+  model::ReadingOptions options;
+  options.unit = unit;
+  if (options.IsValid(nullptr)) return false;
+  options.scale_mm = 1;
+  return options.IsValid(nullptr);
+}
+
+// The unit that a text beside the number states: "unit", or "z_unit" for "z". Empty: none. A "unit"
+// of seconds beside "z_mm" is that of another number.
+std::string UnitBeside(const json& frame, const std::string& name, bool has_own_unit) {
   const json* object = &frame;
   std::string key = name;
   // A name of several parts may be a key with points, or objects in each other.
@@ -101,7 +113,11 @@ std::string UnitBeside(const json& frame, const std::string& name) {
        {key + "_unit", key + "_units", key + "Unit", std::string("unit"), std::string("units"),
         std::string("Unit"), std::string("Units")}) {
     const auto found = object->find(of_unit);
-    if (found != object->end() && found->is_string()) return found->get<std::string>();
+    if (found == object->end() || !found->is_string()) continue;
+    auto unit = found->get<std::string>();
+    const bool is_of_other =
+        has_own_unit && of_unit.rfind(key, 0) != 0 && IsOfAnotherQuantity(unit);
+    if (!is_of_other) return unit;
   }
   return "";
 }
@@ -177,7 +193,8 @@ Choice ChooseByName(const json& frame, const std::string& place,
 
 Choice Choose(const json& frame, const std::string& place, const model::ReadingOptions& options) {
   Choice choice = ChooseByName(frame, place, options);
-  TakeUnit(UnitBeside(frame, choice.name), place, options, &choice);
+  choice.has_own_unit = !choice.unit.empty();
+  TakeUnit(UnitBeside(frame, choice.name, choice.has_own_unit), place, options, &choice);
   return choice;
 }
 
@@ -194,7 +211,7 @@ double ReadingOf(const json& frame, const Choice& choice, const std::string& pla
     throw Error(fmt::format("{}'{}' must be a number of at most 1e30, found {}", place,
                             Shown(choice.name), found->value));
   }
-  const std::string beside = UnitBeside(frame, choice.name);
+  const std::string beside = UnitBeside(frame, choice.name, choice.has_own_unit);
   if (!beside.empty() && options.unit.empty() && !AreOneUnit(beside, choice.unit)) {
     throw Error(
         fmt::format("{}the unit '{}' is stated, but the readings before are in {}; state "
@@ -321,12 +338,17 @@ bool IsNaturallyBefore(const std::string& one, const std::string& other) {
   return one.size() - i < other.size() - k;
 }
 
-// {"a.png": 95.5, ..} as a list of objects.
-json ListOfPairs(const json& object) {
+// {"a.png": 95.5, ..} as a list of objects. The ending of "f/2.8" is none of a file; other endings
+// than those of images are of files only where nothing else is.
+json ListOfPairs(const json& object, bool any_ending) {
+  const auto is_name = [&](const std::string& key) {
+    const std::string ending = fs::path(key).extension().string();
+    return IsImageName(key) || (any_ending && ending.size() > 1 &&
+                                std::isalpha(static_cast<unsigned char>(ending[1])) != 0);
+  };
   json list = json::array();
   for (const auto& [key, value] : object.items()) {
-    if (value.is_number() && fs::path(key).extension().string().size() > 1)
-      list.push_back({{"file", key}, {"reading", value}});
+    if (value.is_number() && is_name(key)) list.push_back({{"file", key}, {"reading", value}});
   }
   std::sort(list.begin(), list.end(), [](const json& one, const json& other) {
     return IsNaturallyBefore(one["file"], other["file"]);
@@ -392,8 +414,12 @@ model::ReadingSet ReadingsOfJson(const std::string& text, const std::string& pat
       parsed.is_array() ? FramesOfList(parsed, path, options) : FramesOfObject(parsed, path);
   json pairs;  // the frames point into it
   if (frames.empty() && parsed.is_object()) {
-    pairs = ListOfPairs(parsed);
-    const json* const list = pairs.empty() ? ListIn(parsed, path, options) : &pairs;
+    pairs = ListOfPairs(parsed, false);
+    const json* list = pairs.empty() ? ListIn(parsed, path, options) : &pairs;
+    if (list == nullptr) {
+      pairs = ListOfPairs(parsed, true);
+      list = &pairs;
+    }
     if (list != nullptr) frames = FramesOfList(*list, path, options);
   }
   if (frames.empty()) {
@@ -418,7 +444,10 @@ model::ReadingSet ReadingsOfJson(const std::string& text, const std::string& pat
       choice = Choose(*frame.metadata, place, options);
       for (const char* key : {"unit", "units", "Unit", "Units"}) {
         const bool has_text = parsed.is_object() && parsed.contains(key) && parsed[key].is_string();
-        if (has_text) TakeUnit(parsed[key].get<std::string>(), path + ": ", options, &*choice);
+        if (!has_text) continue;
+        const auto unit = parsed[key].get<std::string>();
+        if (choice->has_own_unit && IsOfAnotherQuantity(unit)) continue;
+        TakeUnit(unit, path + ": ", options, &*choice);
       }
     }
     const auto [other, added] = known.emplace(frame.file, frame.name);

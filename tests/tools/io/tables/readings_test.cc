@@ -185,6 +185,14 @@ TEST_F(Readings, UnitsBesideTheNumbersOfJson) {
               AllOf(HasSubstr("'mm'"), HasSubstr("um"), HasSubstr("--unit")));
   EXPECT_THAT(Refusal("l.json", R"([{"file": "a.png", "z": 2, "unit": "parsec"}])"),
               AllOf(HasSubstr("'parsec'"), HasSubstr("--unit")));
+  // The unit of another number.
+  EXPECT_THAT(Values(Table("l.json", R"([{"file": "a.png", "z_mm": 95.5, "exposure": 10,
+                                          "unit": "ms"}])")),
+              ElementsAre(95.5));
+  EXPECT_THAT(Refusal("l.json", R"([{"file": "a.png", "z": 95.5, "unit": "ms"}])"),
+              HasSubstr("--unit"));
+  EXPECT_THAT(Values(Table("l.json", R"({"f/2.8": 1, "frames": [{"file": "a.png", "z": 5}]})")),
+              ElementsAre(5));
 }
 
 TEST_F(Readings, OfTextAsBefore) {
