@@ -252,6 +252,9 @@ void TakeUnitOfWords(ColumnName* name) {
     }
   }
   const std::string& last = words[end - 1];
+  // A micrometer screw: "Micrometer reading" states no unit.
+  static const Words screws = {"micrometer", "micrometre", "mikrometer"};
+  if (end == 1 && words.size() > 1 && screws.count(last) > 0) return;
   const auto unit = FindUnit(last);
   // A name of one word is a unit only if it is no name: "m" and "in" alone say nothing.
   const bool may_be_unit =

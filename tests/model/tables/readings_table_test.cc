@@ -253,8 +253,8 @@ TEST(ReadingsTable, OtherWordsInHeadersAreNoUnits) {
     EXPECT_THAT(Read(header(name)).description, Not(HasSubstr("no unit is stated"))) << name;
   }
   EXPECT_THAT(ValuesOf(header("z_um_smoothed")), ElementsAre(0.002));
-  for (const char* name :
-       {"focus ring", "z coarse", "zpos_b", "position ch1", "Distance object", "position grob"}) {
+  for (const char* name : {"focus ring", "Micrometer reading", "z coarse", "zpos_b", "position ch1",
+                           "Distance object", "position grob"}) {
     EXPECT_THAT(ValuesOf(header(name)), ElementsAre(2)) << name;
     EXPECT_THAT(Read(header(name)).description, HasSubstr("no unit is stated")) << name;
   }
