@@ -389,7 +389,7 @@ class FfmpegVideo : public VideoDecoder {
     constexpr int kThreads = 4;
     codec_->max_pixels = kMaxPixels;
     codec_->thread_count = kThreads;
-    // Of a damaged stream, threads for whole frames return other frames from run to run.
+    // Threads for whole frames return other frames of a damaged stream from run to run.
     codec_->thread_type = FF_THREAD_SLICE;
     const int code = avcodec_open2(codec_.get(), decoder, nullptr);
     if (code < 0) throw Refusal("its decoder cannot be opened: " + ReasonOf(code));
