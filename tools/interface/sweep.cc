@@ -3,11 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <system_error>
 #include <utility>
@@ -67,22 +65,13 @@ void ApplyOverrides(const SweepOverrides& overrides, const RunScope& run, model:
   if (overrides.target) file->target = *overrides.target;
 }
 
-// Whether the content is a JPEG image: a name may be wrong. A stream of Motion JPEG begins like
-// one.
-bool IsJpeg(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::array<char, 3> start{};
-  file.read(start.data(), start.size());
-  return file && start == std::array<char, 3>{'\xFF', '\xD8', '\xFF'} && !io::IsVideoFile(path);
-}
-
 // Compression removes fine detail, which looks like blur, and a fit of the frames alone cannot
 // separate the two: on a simulated sweep with 1 px of blur, quality 90 changes kappa by 1 %.
 void NoteCompression(const std::vector<model::SweepFrame>& frames,
                      std::vector<std::string>* notices) {
   std::map<std::string, bool> is_jpeg;  // a file may have many frames
   for (const model::SweepFrame& frame : frames) {
-    if (is_jpeg.count(frame.image) == 0) is_jpeg.emplace(frame.image, IsJpeg(frame.image));
+    if (is_jpeg.count(frame.image) == 0) is_jpeg.emplace(frame.image, io::IsJpegFile(frame.image));
   }
   const auto jpegs = std::count_if(frames.begin(), frames.end(),
                                    [&](const auto& frame) { return is_jpeg.at(frame.image); });

@@ -568,8 +568,8 @@ TEST(ReadingsTable, CutOffAnywhere) {
 TEST(ReadingOptions, AreChecked) {
   std::string why;
   EXPECT_TRUE(ReadingOptions{}.IsValid(&why));
-  EXPECT_FALSE(WithUnit("feet").IsValid(&why));
-  EXPECT_THAT(why, AllOf(StartsWith("unit: "), HasSubstr("'feet'")));
+  EXPECT_FALSE(WithUnit("furlong").IsValid(&why));
+  EXPECT_THAT(why, AllOf(StartsWith("unit: "), HasSubstr("'furlong'")));
   EXPECT_FALSE(WithUnit("steps", std::nan("")).IsValid(&why));
   EXPECT_THAT(why, StartsWith("scale_mm: "));
   EXPECT_FALSE(WithUnit("steps", 0).IsValid(nullptr));

@@ -58,15 +58,10 @@ std::string KindOfRow(const std::string& row) {
 }
 
 // Files of a kind that are refused, each for a reason that the row of the kind states.
-const std::map<std::string, std::string> kRefused = {{"cmyk.jpg", "CMYK"},
-                                                     {"cmyk.tif", "CMYK"},
-                                                     {"lab.tif", "Lab"},
-                                                     {"c64.tif", "complex numbers"},
-                                                     {"i64.tif", "64-bit"},
-                                                     {"imagej.tif", "ImageJ"},
-                                                     {"mosaic.tif", "mosaic"},
-                                                     {"animated.webp", "animation"},
-                                                     {"deep_and_z.exr", "eep pixels"}};
+const std::map<std::string, std::string> kRefused = {
+    {"cmyk.jpg", "CMYK"},           {"cmyk.tif", "CMYK"},          {"lab.tif", "Lab"},
+    {"c64.tif", "complex numbers"}, {"i64.tif", "64-bit"},         {"imagej.tif", "ImageJ"},
+    {"mosaic.tif", "mosaic"},       {"animated.webp", "animation"}};
 
 TEST(FormatTable, NamesEveryKindThatIsRead) {
   std::vector<std::string> kinds;
@@ -109,8 +104,8 @@ TEST(FormatTable, WhatTheRowsSayIsReadIsRead) {
     } catch (const Error& error) {
       const std::string what = error.what();
       if (what.find("THICKLENS_WITH_GPL=OFF") != std::string::npos) continue;
-      // Files of several pages are read once one is chosen.
-      reading.page = 0;
+      // Files of several pages are read once one is chosen; the first part of this file is deep.
+      reading.page = name == "deep_and_z.exr" ? 1 : 0;
       EXPECT_FALSE(DecodeImageFile(bytes, name, reading).pixels.empty()) << name << ": " << what;
       ++files_read[NameOf(*kind)];
     }

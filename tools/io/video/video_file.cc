@@ -104,6 +104,11 @@ bool IsVideoFile(const std::string& path) {
   return !start.empty() && KindOfVideo(start, path).has_value();
 }
 
+bool IsJpegFile(const std::string& path) {
+  const std::string start = StartOf(path);
+  return KindOfImage(start) == ImageFileKind::kJpeg && !KindOfVideo(start, path);
+}
+
 class VideoFile::Reader {
  public:
   explicit Reader(const std::string& path) : path_(path), kind_(RequireVideoKind(path)) {

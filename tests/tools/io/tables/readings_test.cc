@@ -348,7 +348,7 @@ TEST_F(OmeReadings, SpacingOfTheSlices) {
   EXPECT_THAT(Pages(Ome("SizeZ=\"2\" PhysicalSizeZ=\"0.5\" PhysicalSizeZUnit=\"mm\"", "")),
               ElementsAre(0, 0.5));
   EXPECT_THAT(OmeRefusal(Ome("SizeZ=\"2\" PhysicalSizeZ=\"1\" PhysicalSizeZUnit=\"pixel\"", "")),
-              AllOf(HasSubstr("'px'"), HasSubstr("--unit")));
+              AllOf(HasSubstr("'pixel'"), HasSubstr("--unit")));
   // Channels change before slices, as the order says.
   const PageReadings two = ReadingsOfOmeXml(
       R"(<OME><Image><Pixels DimensionOrder="XYCZT" SizeZ="2" SizeC="2" SizeT="1" PhysicalSizeZ="1"/>

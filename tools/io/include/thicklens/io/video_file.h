@@ -18,6 +18,9 @@ THICKLENS_EXPORT bool IsNameOfVideo(const std::string& path);
 // Whether the file is a video, by its content: MP4, MOV, Matroska, WebM, AVI, MPEG-TS or, with
 // their endings, raw streams of Motion JPEG, H.264 and H.265. False for a file that cannot be read.
 THICKLENS_EXPORT bool IsVideoFile(const std::string& path);
+// Whether the file is a JPEG image, by its content, and no stream of Motion JPEG, which begins like
+// one. False for a file that cannot be read.
+THICKLENS_EXPORT bool IsJpegFile(const std::string& path);
 
 // The findings of a pass over all frames of a video.
 struct VideoSurvey {
