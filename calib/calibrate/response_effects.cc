@@ -226,7 +226,7 @@ class ResponseCheck {
   // Whether the frames exclude that light was read by another one of the usual curves, whose powers
   // are about 2.2 and its inverse. If they contradict the stated one, the light was corrected.
   bool IsTransferDecided() const {
-    constexpr double kNearestUsual = 0.6;  // |ln power|, a little less than that of gamma-1.8
+    constexpr double kNearestUsual = 0.55;  // |ln power|, a little less than that of gamma-1.8
     const CameraResponse& response = result_.diagnostics.response;
     if (response.ContradictsTransfer()) return true;
     const auto& power = response.light_exponent;
