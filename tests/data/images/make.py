@@ -256,6 +256,17 @@ run('heif-enc', '-L', '-b', '10', 'heif_source16.png', '-o', 'u10.heic')
 run('heif-enc', '-A', '-b', '12', 'heif_source16.png', '-o', 'u12.avif')
 os.remove('heif_source.png')
 os.remove('heif_source16.png')
+# Two tiles that state BT.2020 with PQ; the image that they make states nothing (its third property
+# becomes its second once more).
+y, x = np.mgrid[:64, :128]
+Image.fromarray(np.stack([(x + y) % 256, x, 2 * y], axis=-1).astype(np.uint8)).save('tiles_source.png')
+run('avifenc', '--grid', '2x1', '-d', '8', '--cicp', '9/16/9', '--min', '0', '--max', '5', '-s', '8',
+    'tiles_source.png', 'tiles.avif')
+os.remove('tiles_source.png')
+with open('tiles.avif', 'rb') as file:
+    tiles = file.read()
+with open('tiles.avif', 'wb') as file:
+    file.write(tiles.replace(bytes([0, 1, 3, 1, 2, 3]), bytes([0, 1, 3, 1, 2, 2]), 1))
 # The box of bits per channel, which is optional, becomes a turn or a mirror.
 with open('rgb.heic', 'rb') as file:
     heic = file.read()

@@ -1,5 +1,8 @@
 // HEIC and AVIF by libheif, which keeps 10 and 12 bits; OpenImageIO 2.4 makes 8 bits of them.
 #include <libheif/heif.h>
+extern "C" {
+#include <libavutil/csp.h>
+}
 
 #include <algorithm>
 #include <cmath>
@@ -8,8 +11,10 @@
 #include <cstring>
 #include <memory>
 #include <opencv2/core.hpp>
+#include <optional>
 
 #include "tools/io/library/decoders.h"
+#include "tools/io/library/heif_boxes.h"
 #include "tools/io/transfer_code.h"
 
 namespace thicklens::io {
@@ -73,111 +78,27 @@ cv::Mat Interleaved(const heif_image* image, heif_channel channel, int type) {
   return pixels;
 }
 
-void TakeColour(const heif_image_handle* handle, ImageFacts* facts) {
-  const std::size_t size = heif_image_handle_get_raw_color_profile_size(handle);
-  constexpr std::size_t kMaxBytes = 32 << 20;
-  if (size > 0 && size <= kMaxBytes) {
-    facts->icc_profile.resize(size);
-    if (heif_image_handle_get_raw_color_profile(handle, facts->icc_profile.data()).code !=
-        heif_error_Ok) {
-      facts->icc_profile.clear();
-    }
-  }
-  heif_color_profile_nclx* nclx = nullptr;
-  if (heif_image_handle_get_nclx_color_profile(handle, &nclx).code != heif_error_Ok ||
-      nclx == nullptr) {
-    return;
-  }
-  facts->transfer = TransferOfCode(nclx->transfer_characteristics);
-  constexpr int kUnspecified = 2;
-  if (nclx->color_primaries != kUnspecified && nclx->color_primary_white_x > 0) {
-    facts->chromaticities = std::array<double, 8>{
-        nclx->color_primary_red_x,   nclx->color_primary_red_y,  nclx->color_primary_green_x,
-        nclx->color_primary_green_y, nclx->color_primary_blue_x, nclx->color_primary_blue_y,
-        nclx->color_primary_white_x, nclx->color_primary_white_y};
-  }
-  heif_nclx_color_profile_free(nclx);
+// A code that FFmpeg's tables do not have means nothing.
+void TakeCodes(const HeifColourCodes& codes, ImageFacts* facts) {
+  facts->transfer = TransferOfCode(codes.transfer);
+  const AVColorPrimariesDesc* const known =
+      av_csp_primaries_desc_from_id(static_cast<AVColorPrimaries>(codes.primaries));
+  if (known == nullptr) return;
+  facts->chromaticities = std::array<double, 8>{av_q2d(known->prim.r.x), av_q2d(known->prim.r.y),
+                                                av_q2d(known->prim.g.x), av_q2d(known->prim.g.y),
+                                                av_q2d(known->prim.b.x), av_q2d(known->prim.b.y),
+                                                av_q2d(known->wp.x),     av_q2d(known->wp.y)};
 }
 
-// Boxes of a file of ISO/IEC 14496-12. libheif 1.15 applies the turns and mirrors of an image but
-// does not say which they are.
-class Boxes {
- public:
-  explicit Boxes(const std::string& bytes) : bytes_(bytes) {}
-
-  struct Box {
-    std::size_t begin = 0, end = 0;  // of its content
-    std::string type;
-  };
-
-  std::uint32_t Number(std::size_t at, std::size_t count) const {
-    std::uint32_t value = 0;
-    for (std::size_t i = 0; i < count; ++i)
-      value =
-          value << 8 | (at + i < bytes_.size() ? static_cast<std::uint8_t>(bytes_[at + i]) : 0U);
-    return value;
+void TakeProfile(const heif_image_handle* handle, ImageFacts* facts) {
+  const std::size_t size = heif_image_handle_get_raw_color_profile_size(handle);
+  constexpr std::size_t kMaxBytes = 32 << 20;
+  if (size == 0 || size > kMaxBytes) return;
+  facts->icc_profile.resize(size);
+  if (heif_image_handle_get_raw_color_profile(handle, facts->icc_profile.data()).code !=
+      heif_error_Ok) {
+    facts->icc_profile.clear();
   }
-  std::vector<Box> Inside(std::size_t begin, std::size_t end) const {
-    std::vector<Box> boxes;
-    constexpr std::size_t kHeader = 8;
-    while (begin + kHeader <= end) {
-      std::size_t size = Number(begin, 4);
-      const std::size_t header = size == 1 ? 2 * kHeader : kHeader;
-      if (size == 1) size = Number(begin + 12, 4);  // of at most 4 GiB
-      if (size == 0) size = end - begin;
-      if (size < header || size > end - begin) break;
-      boxes.push_back({begin + header, begin + size, bytes_.substr(begin + 4, 4)});
-      begin += size;
-    }
-    return boxes;
-  }
-  Box Find(const Box& box, std::size_t skip, const std::string& type) const {
-    for (const Box& inner : Inside(box.begin + skip, box.end)) {
-      if (inner.type == type) return inner;
-    }
-    return {};
-  }
-
- private:
-  const std::string& bytes_;
-};
-
-// How the decoded image becomes the displayed one: 1 to 8 as in EXIF.
-int OrientationOf(const std::string& bytes, heif_item_id id, bool* is_cropped) {
-  const Boxes boxes(bytes);
-  const Boxes::Box file{0, bytes.size(), ""};
-  const Boxes::Box properties = boxes.Find(boxes.Find(file, 0, "meta"), 4, "iprp");
-  const Boxes::Box list_box = boxes.Find(properties, 0, "ipco");
-  const std::vector<Boxes::Box> list = boxes.Inside(list_box.begin, list_box.end);
-  const Boxes::Box links = boxes.Find(properties, 0, "ipma");
-  // It is mirrored left to right or not, and then turned anticlockwise.
-  bool is_mirrored = false;
-  std::uint32_t turns = 0;
-  std::size_t at = links.begin + 8;
-  const std::uint32_t count = boxes.Number(links.begin + 4, 4);
-  const bool has_long_ids = boxes.Number(links.begin, 1) >= 1;
-  const bool has_long_links = (boxes.Number(links.begin + 3, 1) & 1U) != 0;
-  for (std::uint32_t i = 0; i < count && at < links.end; ++i) {
-    const std::uint32_t item = boxes.Number(at, has_long_ids ? 4 : 2);
-    at += has_long_ids ? 4 : 2;
-    const std::uint32_t item_links = boxes.Number(at++, 1);
-    for (std::uint32_t k = 0; k < item_links; ++k) {
-      const std::uint32_t link =
-          has_long_links ? boxes.Number(at, 2) & 0x7FFFU : boxes.Number(at, 1) & 0x7FU;
-      at += has_long_links ? 2 : 1;
-      if (item != id || link < 1 || link > list.size()) continue;
-      const Boxes::Box& property = list[link - 1];
-      const std::uint32_t value = boxes.Number(property.begin, 1) & 3U;
-      if (property.type == "clap") *is_cropped = true;
-      if (property.type == "irot") turns = (turns + value) % 4;
-      if (property.type == "imir") {  // 0: upside down, 1: left to right, as libheif has it
-        turns = ((value & 1U) == 1 ? 4 - turns : 6 - turns) % 4;
-        is_mirrored = !is_mirrored;
-      }
-    }
-  }
-  constexpr int kPlain[] = {1, 8, 3, 6}, kMirrored[] = {2, 5, 4, 7};
-  return is_mirrored ? kMirrored[turns] : kPlain[turns];
 }
 
 }  // namespace
@@ -240,9 +161,12 @@ DecodedImage DecodeHeif(const std::string& bytes, const LibraryReading& reading)
                       ? AlphaKind::kAssociated
                       : AlphaKind::kStraight;
   }
-  TakeColour(handle.get(), &facts);
+  TakeProfile(handle.get(), &facts);
+  const HeifBoxes boxes(bytes);
+  if (const std::optional<HeifColourCodes> codes = boxes.ColourCodesOf(images[page]))
+    TakeCodes(*codes, &facts);
   bool is_cropped = false;
-  facts.orientation = OrientationOf(bytes, images[page], &is_cropped);
+  facts.orientation = boxes.OrientationOf(images[page], &is_cropped);
   if (is_cropped) facts.notes.emplace_back("The file's crop is not applied.");
   if (bytes.compare(8, 4, "avif") == 0 || bytes.compare(8, 4, "avis") == 0)
     facts.file_kind = "AVIF";
