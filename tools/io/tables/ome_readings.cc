@@ -159,6 +159,7 @@ class OmeParser {
     if (element == "Pixels") TakePixels(values);
     if (document_.images.empty()) return;
     Pixels& pixels = document_.images.back();
+    if (element == "Pixels") is_in_data_ = false;  // a broken file may have it in TiffData
     if (element == "Plane") TakePlane(values, &pixels);
     if (element == "TiffData") {
       is_in_data_ = true;
