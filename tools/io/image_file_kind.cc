@@ -172,6 +172,28 @@ std::optional<StatedSize> SizeOfExr(const std::string& bytes) {
   return std::nullopt;
 }
 
+constexpr std::size_t kBytesPerExrChannel = 16;  // after the name
+
+// Throws Error for a channel whose type is none of those of EXR: OpenImageIO 2.4 aborts the
+// program.
+void RequireKnownChannels(const std::string& bytes, const ExrAttribute& channels,
+                          const std::string& name) {
+  std::size_t at = channels.value_at;
+  while (at < channels.end() && bytes[at] != '\0') {
+    const std::string channel = bytes.c_str() + at;
+    at += channel.size() + 1;
+    const double type = LittleEndian(bytes, at);
+    constexpr double kUnsigned = 0, kFloat = 2;
+    if (!(type >= kUnsigned && type <= kFloat)) {
+      throw Error(fmt::format(
+          "{}: a broken image: channel '{}' has the type {:.0f}; 0 (unsigned 32-bit integers), 1 "
+          "(half) or 2 (float) is expected",
+          name, PrintableUtf8(channel), type));
+    }
+    at += kBytesPerExrChannel;
+  }
+}
+
 // Returns how many bytes OpenEXR reads as the value, whatever size is stated; none if it reads the
 // stated size.
 std::optional<double> BytesOfExrValue(const std::string& bytes, const ExrAttribute& attribute) {
@@ -207,10 +229,9 @@ std::optional<double> BytesOfExrValue(const std::string& bytes, const ExrAttribu
     return kSides + kBytesPerPixel * LittleEndian(bytes, begin) * LittleEndian(bytes, begin + 4);
   }
   if (attribute.type == "chlist") {  // names, each with 16 bytes, up to an empty name
-    constexpr std::size_t kBytesPerChannel = 16;
     std::size_t at = begin;
     while (at < bytes.size() && bytes[at] != '\0')
-      at += std::strlen(bytes.c_str() + at) + 1 + kBytesPerChannel;
+      at += std::strlen(bytes.c_str() + at) + 1 + kBytesPerExrChannel;
     return static_cast<double>(at + 1 - begin);
   }
   if (attribute.type == "stringvector") {  // each with its length before it
@@ -244,6 +265,7 @@ void RequirePossibleExrHeaders(const std::string& bytes, const std::string& name
           "{}: a broken image: '{}' of type {} states {:.0f} bytes and has {:.0f}", name,
           PrintableUtf8(attribute->name), PrintableUtf8(attribute->type), attribute->size, *read));
     }
+    if (attribute && attribute->type == "chlist") RequireKnownChannels(bytes, *attribute, name);
     constexpr std::size_t kFlagsAt = 5;  // the second byte of the version
     constexpr char kSeveralParts = 0x10;
     const bool is_end = bytes[at] == '\0';
