@@ -109,7 +109,9 @@ std::vector<LibraryPage> HeifPages(const std::string& bytes) {
   for (const heif_item_id id : Images(context.get())) {
     const Handle handle = HandleOf(context.get(), id);
     pages.push_back({heif_image_handle_get_width(handle.get()),
-                     heif_image_handle_get_height(handle.get()), ""});
+                     heif_image_handle_get_height(handle.get()),
+                     "",
+                     {}});
   }
   return pages;
 }
