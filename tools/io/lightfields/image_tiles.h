@@ -2,8 +2,9 @@
 #define THICKLENS_TOOLS_IO_LIGHTFIELDS_IMAGE_TILES_H_
 
 #include <opencv2/core/mat.hpp>
-#include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 namespace thicklens::io {
 
@@ -11,28 +12,24 @@ namespace thicklens::io {
 struct AxisCounts {
   int across = 0, down = 0;
 };
+constexpr int kMaxTiles = 40;  // along an axis
+constexpr int kMinTilePx = 8;
 // How often an image repeats itself across and down, as views side by side do: the differences at
-// the distance of one view are much smaller than at half of it. At most 40; 1: it does not repeat.
+// the distance of one view are much smaller than at half of it, and smaller than for other numbers.
+// At most 40; 1: it does not repeat.
 AxisCounts RepetitionsOf(const cv::Mat& pixels);
 // Whether it repeats itself so often; 1 along an axis: that axis is not asked.
 bool Repeats(const cv::Mat& pixels, AxisCounts counts);
-// Tiles of one size along an axis, with lines of one colour between them, a border of that colour
-// around all of them, or both. Lines may have the noise of JPEG.
-struct AxisLines {
-  int count = 1;     // of tiles; 1: no lines divide the image
-  int gap_px = 0;    // between tiles
-  int first_px = 0;  // of the border before the first tile
-  int tile_px = 0;   // of a tile, or of all that is within the border
-  // Every tile has a uniform edge of this width on one side, which may be its own; it is no line.
-  int one_side_px = 0;
-};
-struct TileLines {
-  AxisLines across, down;
-};
-TileLines LinesOf(const cv::Mat& pixels);
-// Whether so many tiles within a border alone have clearer edges than as many tiles of the whole
-// image, whose outer tiles contain the border; false if the edges do not show it.
-bool AreEdgesWithinBorder(const cv::Mat& pixels, AxisLines border, int count, bool is_down);
+// The differences of a grey image (GreyOf) at a distance across, relative to those at half of it.
+double RatioAt(const cv::Mat& grey, int lag_px);
+// Numbers of tiles, each with the ratio at the distance of a tile.
+using RatioOfCount = std::pair<int, double>;
+// The largest number with about the least ratio; 1: none repeats. A small object on a plain
+// background repeats itself at wrong distances too, but less well; views without parallax do so in
+// fractions of their number.
+int CountOf(const std::vector<RatioOfCount>& ratios);
+// The sum of the colour channels, as floats. It throws CancelledError.
+cv::Mat GreyOf(const cv::Mat& pixels);
 // The period of the differences between neighbouring pixels, as the edges of square lenslets have
 // it: 2 to 100 px; 0: there is none, or the axes differ.
 int LensletPitchOf(const cv::Mat& pixels);

@@ -11,6 +11,7 @@
 #include "thicklens/io/image_file.h"
 #include "tools/io/lightfields/image_tiles.h"
 #include "tools/io/lightfields/layout.h"
+#include "tools/io/lightfields/tile_lines.h"
 #include "tools/io/lightfields/view_grid.h"
 #include "tools/io/lightfields/view_pixels.h"
 
@@ -135,6 +136,12 @@ void AddNoticeOfBars(const std::string& path, const cv::Mat& pixels, const TileL
       path, lines.across.tile_px, lines.down.tile_px, width, height));
 }
 
+// Whether the uniform edge on one side of each view may be a line; a wide one is the views' own.
+bool MayBeLine(const AxisLines& lines) {
+  constexpr int kWidestPart = 10;
+  return lines.one_side_px > 0 && kWidestPart * lines.one_side_px <= lines.tile_px;
+}
+
 // Tiles without lines along an axis divide what is within the border.
 bool SetTileSize(int count, AxisLines* lines) {
   if (lines->count > 1) return true;
@@ -217,7 +224,7 @@ std::optional<ViewSource> OpenTiledImage(const LayoutInput& input) {
                     "other numbers: tiles:{}x{}",
                     tiles.across, tiles.down, tiles.across, tiles.down));
   }
-  if (lines.across.one_side_px > 0 || lines.down.one_side_px > 0) {
+  if (MayBeLine(lines.across) || MayBeLine(lines.down)) {
     source.notices.push_back(fmt::format(
         "{}: every view has a uniform edge of {} x {} px on one side, which may be a line between "
         "views and is kept; the option crop leaves it out",
