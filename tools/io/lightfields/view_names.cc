@@ -32,11 +32,19 @@ std::size_t CountOf(const std::string& text, char c) {
 
 bool IsLetter(char c) { return std::isalpha(static_cast<unsigned char>(c)) != 0; }
 
-// Whether the character begins a number: a '-' or a '+' before digits may be its sign, but a '-'
-// between digits separates two numbers, unless other names of its kind have a '+' between digits.
-bool IsSign(const std::string& name, std::size_t i, bool may_follow_digit) {
-  return (name[i] == '-' || name[i] == '+') && i + 1 < name.size() && IsDigit(name[i + 1]) &&
-         (i == 0 || !IsDigit(name[i - 1]) || may_follow_digit);
+// What a '-' or a '+' before a number may be in names of one kind.
+enum class SignRule {
+  kNotAfterDigit,   // a sign; between digits it separates two numbers
+  kAlsoAfterDigit,  // a sign also there: names of "%+d%+d"
+  kAfterDash        // a sign only behind a '-' that separates: names of "img-%d-%d", "img--2-1.png"
+};
+
+// Whether the character is the sign of a number.
+bool IsSign(const std::string& name, std::size_t i, SignRule rule) {
+  if ((name[i] != '-' && name[i] != '+') || i + 1 >= name.size() || !IsDigit(name[i + 1]))
+    return false;
+  if (rule == SignRule::kAfterDash) return i > 0 && name[i - 1] == '-';
+  return i == 0 || !IsDigit(name[i - 1]) || rule == SignRule::kAlsoAfterDigit;
 }
 bool IsSigned(const std::string& number) { return number.front() == '-' || number.front() == '+'; }
 
@@ -44,6 +52,14 @@ bool IsSigned(const std::string& number) { return number.front() == '-' || numbe
 bool HasSignAfterDigit(const std::string& name) {
   for (std::size_t i = 1; i + 1 < name.size(); ++i) {
     if (name[i] == '+' && IsDigit(name[i - 1]) && IsDigit(name[i + 1])) return true;
+  }
+  return false;
+}
+
+// Whether two dashes are before a number, as in "img--2-1.png": the first separates.
+bool HasDashBeforeSign(const std::string& name) {
+  for (std::size_t i = 0; i + 2 < name.size(); ++i) {
+    if (name[i] == '-' && name[i + 1] == '-' && IsDigit(name[i + 2])) return true;
   }
   return false;
 }
@@ -66,11 +82,11 @@ struct SplitName {
   std::vector<std::string> text, numbers;
 };
 
-SplitName Split(const std::string& name, bool may_follow_digit) {
+SplitName Split(const std::string& name, SignRule rule) {
   SplitName split;
   split.text.emplace_back();
   for (std::size_t i = 0; i < name.size();) {
-    if (!IsDigit(name[i]) && !IsSign(name, i, may_follow_digit)) {
+    if (!IsDigit(name[i]) && !IsSign(name, i, rule)) {
       split.text.back() += name[i++];
       continue;
     }
@@ -80,6 +96,39 @@ SplitName Split(const std::string& name, bool may_follow_digit) {
     split.text.emplace_back();
   }
   return split;
+}
+
+// Names of one kind by the texts between their numbers.
+using NameGroups = std::map<std::vector<std::string>, std::vector<SplitName>>;
+
+NameGroups::const_iterator LargestOf(const NameGroups& groups) {
+  return std::max_element(groups.begin(), groups.end(), [](const auto& a, const auto& b) {
+    return a.second.size() < b.second.size();
+  });
+}
+
+// Two dashes before a number are a text and a sign both in names of "img-%d-%d" and of "img%d-%d";
+// in the former, one dash is a text. The meaning is the one by which more names are alike.
+NameGroups GroupsOf(const std::vector<std::string>& names) {
+  // A '+' between digits of another image says nothing of these.
+  std::set<std::string> with_sign_after_digit;
+  for (const std::string& name : names) {
+    if (HasSignAfterDigit(name)) with_sign_after_digit.insert(TemplateOf(name));
+  }
+  NameGroups groups, behind_dashes;
+  for (const std::string& name : names) {
+    const SplitName split =
+        Split(name, with_sign_after_digit.count(TemplateOf(name)) > 0 ? SignRule::kAlsoAfterDigit
+                                                                      : SignRule::kNotAfterDigit);
+    groups[split.text].push_back(split);
+  }
+  if (std::none_of(names.begin(), names.end(), HasDashBeforeSign)) return groups;
+  for (const std::string& name : names) {
+    const SplitName split = Split(name, SignRule::kAfterDash);
+    behind_dashes[split.text].push_back(split);
+  }
+  const bool are_more = LargestOf(behind_dashes)->second.size() > LargestOf(groups)->second.size();
+  return are_more ? behind_dashes : groups;
 }
 
 // The meaning of the '-' or '+' before the numbers at one place of the names.
@@ -334,19 +383,8 @@ bool NamePattern::MatchesUpToSigns(const std::string& name) const {
 }
 
 std::optional<NameProposal> ProposedPattern(const std::vector<std::string>& names) {
-  // A '+' between digits of another image says nothing of these.
-  std::set<std::string> with_sign_after_digit;
-  for (const std::string& name : names) {
-    if (HasSignAfterDigit(name)) with_sign_after_digit.insert(TemplateOf(name));
-  }
-  std::map<std::vector<std::string>, std::vector<SplitName>> groups;
-  for (const std::string& name : names) {
-    SplitName split = Split(name, with_sign_after_digit.count(TemplateOf(name)) > 0);
-    groups[split.text].push_back(split);
-  }
-  const auto largest = std::max_element(
-      groups.begin(), groups.end(),
-      [](const auto& a, const auto& b) { return a.second.size() < b.second.size(); });
+  const NameGroups groups = GroupsOf(names);
+  const auto largest = LargestOf(groups);
   if (largest == groups.end() || largest->second.size() < 2) return std::nullopt;
   const std::vector<SplitName>& group = largest->second;
   const std::vector<std::size_t> changing = ChangingPlaces(group);

@@ -141,6 +141,22 @@ TEST_F(LightFieldLayouts, NamesMayHaveNegativeCoordinates) {
   ExpectViews(Read(path, reading));
 }
 
+// "img--1-0.png" and "img-0--1.png" are of one kind, and "img-1-0.png" and "img0--1.png" of
+// another. Before, the former were taken for two kinds.
+TEST_F(LightFieldLayouts, ADashMayBeBeforeASign) {
+  for (const std::string start : {"img-", "img"}) {
+    TemporaryFolder folder;
+    for (int v = -1; v < 2; ++v) {
+      for (int u = -1; u < 2; ++u) {
+        folder.Put("lf/" + start + std::to_string(v) + "-" + std::to_string(u) + ".png",
+                   EncodedTile(View(u, v)));
+      }
+    }
+    ExpectViews(Read(folder / "lf"));
+    EXPECT_THAT(facts_.one_line, HasSubstr("'" + start + "{v}-{u}.png'"));
+  }
+}
+
 // A '-' after a digit or a letter separates, and of "a_-1" alone nobody knows.
 TEST_F(LightFieldLayouts, ADashMaySeparateNumbers) {
   ExpectViews(Read(Folder(
