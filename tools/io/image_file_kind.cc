@@ -473,8 +473,13 @@ void RequirePossibleSize(const std::string& bytes, ImageFileKind kind, const std
   if (!size) return;
   // Small images may have a container that is larger than needed.
   constexpr double kLittle = 1 << 20;
+  const double possible = size->most_of_a_byte * static_cast<double>(bytes.size());
   const double needed = size->width_px * size->height_px * size->bytes_per_px;
-  if (needed <= kLittle + size->most_of_a_byte * static_cast<double>(bytes.size())) {
+  // OpenImageIO 2.4 takes memory for this many rows at least, which matters if they are very wide.
+  constexpr double kRows = 256, kMuch = 1 << 28;
+  const double taken =
+      kind == ImageFileKind::kExr ? size->width_px * kRows * size->bytes_per_px : 0.0;
+  if (needed <= kLittle + possible && taken <= kMuch + possible) {
     RequireMemory(size->width_px, size->height_px, size->bytes_per_px, name);
     return;
   }
