@@ -149,7 +149,31 @@ TEST(ResponseEffects, RemovedWeakDetailIsReportedWithItsSize) {
                                                  HasSubstr("no blocks of a strong compression"),
                                                  HasSubstr("makes kappa too large"))));
   EXPECT_THAT(c.summary.warnings, Not(Contains(HasSubstr("contradict sensor.transfer"))));
+  EXPECT_THAT(c.summary.warnings, Not(Contains(HasSubstr("A wrong sensor.transfer"))));
   ExpectCoversRatio(c, s.truth);
+}
+
+// At f/16 the blur changes little between frames, which then do not show the power of their
+// transfer: a wrong one removes weak detail as noise reduction does, and moves kappa to either
+// side.
+TEST(ResponseEffects, AWrongTransferIsNamedBesideNoiseReduction) {
+  for (const std::uint64_t seed : {1U, 4U}) {
+    model::SweepSimulationOptions options = SweepCase("ii", 240, seed);
+    options.target.kind = model::TargetKind::kDeadLeaves;
+    options.camera.sensor.transfer = model::TransferCurve::Linear();
+    constexpr double kFNumber = 16;
+    model::ThickLens& lens = options.camera.lens;
+    lens.aperture_radius_mm = lens.rear_focal_length_mm / (2 * kFNumber);
+    SimulatedSweep s = Simulate(options);
+    GiveFloor(&s);
+    s.sweep.camera.sensor.transfer = model::TransferCurve::Srgb();
+    const Calibration c = CalibrateWithoutMap(s);
+    EXPECT_THAT(c.summary.warnings,
+                Contains(AllOf(HasSubstr("removed weak detail"), HasSubstr("Noise reduction has"),
+                               HasSubstr("A wrong sensor.transfer has this effect as well"))))
+        << seed;
+    ExpectCoversRatio(c, s.truth);
+  }
 }
 
 // An under-exposed camera cuts off the darkest values, and an over-exposed one the brightest. The
