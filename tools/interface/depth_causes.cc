@@ -181,6 +181,18 @@ std::string CauseInCompression(const DepthMap& map) {
 
 // ---- Relative maps.
 
+// The range with the largest value of the type, which marks holes, but is the nearest surface of a
+// relative map: other values go beyond half of it, which those of a map in mm (33 m) seldom do.
+ValueRange WithLargestOfType(const DepthMap& map, ValueRange range) {
+  const std::optional<double> largest = map.largest_of_type;
+  constexpr double kHalf = 0.5;
+  if (!largest || !(range.most > kHalf * *largest)) return range;
+  const auto value = static_cast<float>(*largest);
+  if (std::find(map.values.begin(), map.values.end(), value) != map.values.end())
+    range.most = std::max(range.most, *largest);
+  return range;
+}
+
 std::string CauseInSpan(const ValueRange& range, const RunScope& run) {
   const std::optional<double> full_scale = SpannedScale(range);
   if (!full_scale) return "";
@@ -252,7 +264,7 @@ std::string CauseInMap(const DepthMap& map, const RunScope& run) {
   const std::string signs = CauseInSigns(found.values, run);
   if (!signs.empty()) return signs;
   // A ramp that was stored as JPEG has small values beside zeros too: both are named.
-  const std::string span = CauseInSpan(found.range, run);
+  const std::string span = CauseInSpan(WithLargestOfType(map, found.range), run);
   const std::string compression = CauseInCompression(map);
   if (span.empty() || compression.empty()) return span + compression;
   return span + "; or, if 0 means 'no depth', " + compression;

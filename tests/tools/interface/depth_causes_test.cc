@@ -75,6 +75,15 @@ TEST(DepthCauses, HolesAndMarksDoNotSpanARelativeMap) {
   EXPECT_THAT(CauseOf(map), IsEmpty());
 }
 
+// A flat nearest surface has the largest value of the type in many pixels, which are holes of a map
+// in mm. The others go beyond half of it, as no such map does.
+TEST(DepthCauses, TheLargestOfTheTypeMayBeTheNearestSurface) {
+  DepthMap map = MapWith(WithMark(DepthRamp(100, 53807, 50), 9, 65535));
+  map.is_integer = true;
+  map.largest_of_type = 65535;
+  EXPECT_THAT(CauseOf(map), HasSubstr("from 100 to 6.554e+04 span 0 to 65535, as those of a rel"));
+}
+
 TEST(DepthCauses, NamesAnotherSignAndItsRemedy) {
   EXPECT_THAT(CauseOf(MapWith({-500, -600, -700, -800, 0, 1})),
               AllOf(HasSubstr("4 of its values are negative and 1 positive"),
