@@ -278,9 +278,11 @@ void ReadChunks(const Layout& layout, OpenFile* file, cv::Mat* image) {
   // A chunk may be larger than the image, but not by much.
   const std::size_t samples = layout.SamplesPerChunkPixel();
   const std::size_t needed_row = (std::size_t{layout.chunk_width} * samples * layout.bits + 7) / 8;
-  constexpr tmsize_t kMaxChunkBytes = tmsize_t{1} << 32;
+  constexpr tmsize_t kMuch = tmsize_t{1} << 28;
+  const auto image_bytes = static_cast<tmsize_t>(image->total() * image->elemSize());
+  const tmsize_t max_chunk_bytes = std::min(tmsize_t{1} << 32, kMuch + image_bytes);
   if (chunk_bytes <= 0 || row_bytes <= 0 || static_cast<std::size_t>(row_bytes) < needed_row ||
-      chunk_bytes > kMaxChunkBytes || layout.chunk_width == 0 || layout.chunk_height == 0) {
+      chunk_bytes > max_chunk_bytes || layout.chunk_width == 0 || layout.chunk_height == 0) {
     throw Error(file->error.empty() ? "the sizes of its strips or tiles make no sense"
                                     : file->error);
   }
