@@ -11,7 +11,7 @@ HeifBoxes::HeifBoxes(const std::string& bytes) : bytes_(bytes) {
   meta_ = Find({0, bytes.size(), ""}, 0, "meta");
 }
 
-// Of bytes in the order that network protocols use; bytes behind the file's end count as zero.
+// The value of bytes of which the highest comes first; bytes behind the file's end count as zero.
 std::uint32_t HeifBoxes::Number(std::size_t at, std::size_t count) const {
   std::uint32_t value = 0;
   for (std::size_t i = 0; i < count; ++i)

@@ -27,7 +27,7 @@ class HeifBoxes {
   // where the image has a crop.
   int OrientationOf(std::uint32_t item, bool* is_cropped) const;
 
-  // Those of the image or, where it is made of tiles and states none, of its first tile.
+  // The codes of the image or, where it is made of tiles and states none, of its first tile.
   std::optional<HeifColourCodes> ColourCodesOf(std::uint32_t item) const;
 
  private:

@@ -32,7 +32,7 @@ std::size_t CountOf(const std::string& text, char c) {
 
 bool IsLetter(char c) { return std::isalpha(static_cast<unsigned char>(c)) != 0; }
 
-// What a '-' or a '+' before a number may be in names of one kind.
+// The meaning of a '-' or a '+' before a number in names of one kind.
 enum class SignRule {
   kNotAfterDigit,   // a sign; between digits it separates two numbers
   kAlsoAfterDigit,  // a sign also there: names of "%+d%+d"
