@@ -155,21 +155,14 @@ std::optional<ExrAttribute> ExrAttributeAt(const std::string& bytes, std::size_t
 
 constexpr std::size_t kExrHeaderAt = 8;
 
-std::optional<StatedSize> SizeOfExr(const std::string& bytes) {
-  std::size_t at = kExrHeaderAt;
-  while (const std::optional<ExrAttribute> attribute = ExrAttributeAt(bytes, at)) {
-    if (attribute->size < 0) break;
-    if (attribute->name == "dataWindow") {
-      const auto side = [&](std::size_t low, std::size_t high) {
-        return LittleEndian(bytes, attribute->value_at + high) + 1 -
-               LittleEndian(bytes, attribute->value_at + low);
-      };
-      constexpr double kHalfFloat = 2, kMax = 1 << 16;
-      return StatedSize{side(0, 8), side(4, 12), kHalfFloat, kMax};
-    }
-    at = attribute->end();
-  }
-  return std::nullopt;
+// The data window of a part of an EXR file.
+StatedSize SizeOfExrWindow(const std::string& bytes, const ExrAttribute& window) {
+  const auto side = [&](std::size_t low, std::size_t high) {
+    return LittleEndian(bytes, window.value_at + high) + 1 -
+           LittleEndian(bytes, window.value_at + low);
+  };
+  constexpr double kHalfFloat = 2, kMax = 1 << 16;
+  return {side(0, 8), side(4, 12), kHalfFloat, kMax};
 }
 
 constexpr std::size_t kBytesPerExrChannel = 16;  // after the name
@@ -247,6 +240,22 @@ std::optional<double> BytesOfExrValue(const std::string& bytes, const ExrAttribu
   return std::nullopt;
 }
 
+// Throws Error if the file is too small for an image of that size, or memory is.
+void RequireFits(const StatedSize& size, double least_rows, const std::string& bytes,
+                 const std::string& name) {
+  // Small images may have a container that is larger than needed.
+  constexpr double kLittle = 1 << 20, kMuch = 1 << 28;
+  const double possible = size.most_of_a_byte * static_cast<double>(bytes.size());
+  const double needed = size.width_px * size.height_px * size.bytes_per_px;
+  const double taken = size.width_px * least_rows * size.bytes_per_px;
+  if (needed <= kLittle + possible && taken <= kMuch + possible) {
+    RequireMemory(size.width_px, size.height_px, size.bytes_per_px, name);
+    return;
+  }
+  throw Error(fmt::format("{}: a broken image: {:.0f}x{:.0f} px do not fit into {} bytes", name,
+                          size.width_px, size.height_px, bytes.size()));
+}
+
 // Checks the sizes of attributes, because OpenEXR allocates memory for an attribute before it reads
 // it. Of some types it reads another number of bytes than is stated, and would take what follows
 // for the name of the next attribute. A file of several parts has one header per part, one after
@@ -266,6 +275,11 @@ void RequirePossibleExrHeaders(const std::string& bytes, const std::string& name
           PrintableUtf8(attribute->name), PrintableUtf8(attribute->type), attribute->size, *read));
     }
     if (attribute && attribute->type == "chlist") RequireKnownChannels(bytes, *attribute, name);
+    // OpenImageIO 2.4 takes memory for this many rows at least, which matters if they are very
+    // wide.
+    constexpr double kRows = 256;
+    if (attribute && attribute->name == "dataWindow")
+      RequireFits(SizeOfExrWindow(bytes, *attribute), kRows, bytes, name);
     constexpr std::size_t kFlagsAt = 5;  // the second byte of the version
     constexpr char kSeveralParts = 0x10;
     const bool is_end = bytes[at] == '\0';
@@ -323,8 +337,6 @@ std::optional<StatedSize> SizeOf(const std::string& bytes, ImageFileKind kind) {
       return SizeOfJpeg(bytes);
     case ImageFileKind::kTiff:
       return SizeOfTiff(bytes);
-    case ImageFileKind::kExr:
-      return SizeOfExr(bytes);
     case ImageFileKind::kBmp:
       return SizeOfBmp(bytes);
     case ImageFileKind::kPnm:
@@ -469,22 +481,8 @@ std::string NameOf(ImageFileKind kind) {
 
 void RequirePossibleSize(const std::string& bytes, ImageFileKind kind, const std::string& name) {
   if (kind == ImageFileKind::kExr) RequirePossibleExrHeaders(bytes, name);
-  const std::optional<StatedSize> size = SizeOf(bytes, kind);
-  if (!size) return;
-  // Small images may have a container that is larger than needed.
-  constexpr double kLittle = 1 << 20;
-  const double possible = size->most_of_a_byte * static_cast<double>(bytes.size());
-  const double needed = size->width_px * size->height_px * size->bytes_per_px;
-  // OpenImageIO 2.4 takes memory for this many rows at least, which matters if they are very wide.
-  constexpr double kRows = 256, kMuch = 1 << 28;
-  const double taken =
-      kind == ImageFileKind::kExr ? size->width_px * kRows * size->bytes_per_px : 0.0;
-  if (needed <= kLittle + possible && taken <= kMuch + possible) {
-    RequireMemory(size->width_px, size->height_px, size->bytes_per_px, name);
-    return;
-  }
-  throw Error(fmt::format("{}: a broken image: {:.0f}x{:.0f} px do not fit into {} bytes", name,
-                          size->width_px, size->height_px, bytes.size()));
+  if (const std::optional<StatedSize> size = SizeOf(bytes, kind))
+    RequireFits(*size, 0, bytes, name);
 }
 
 }  // namespace thicklens::io
