@@ -22,8 +22,10 @@ constexpr double kSharp = 0.1;
 // JPEG changes the columns so near to an edge that they seem to belong to its other side, or to
 // none.
 constexpr int kBlurPx = 3;
-// The mean step at the edges of such lines, relative to the usual one between columns.
-constexpr double kLineContrast = 1.2;
+// The columns of such a line differ from its colour by less than this part of what columns usually
+// do, and those beside it by more.
+constexpr double kOfLine = 0.3;
+constexpr double kRepeatsWithoutLines = 0.5;
 // Differences across the edges of views, relative to those elsewhere.
 constexpr double kEdgeContrast = 1.3;
 
@@ -116,7 +118,9 @@ std::optional<AxisLines> RegularLines(std::vector<FlatRun> runs, int columns) {
 // suffice for whole pixels.
 std::optional<AxisLines> EvenLines(int columns, int count, int gap_px, int first_px) {
   const int rest = columns - 2 * first_px - (count - 1) * gap_px;
-  if (rest < count * std::max(kMinTilePx, 2 * gap_px) || rest % count != 0) return std::nullopt;
+  if (rest < count * std::max(kMinTilePx, 2 * std::max(gap_px, first_px)) || rest % count != 0) {
+    return std::nullopt;
+  }
   AxisLines lines;
   lines.count = count;
   lines.gap_px = gap_px;
@@ -161,8 +165,9 @@ double StepAt(const cv::Mat& grey, int x) {
 }
 
 // Lines whose edges JPEG blurred, so that runs of several widths are found in the place of lines of
-// one width: of the lines of one width about there, those at whose edges the columns differ most.
-// Fewer than three tiles may be anything.
+// one width: of the lines of one width about there, which have the colour of the runs and no column
+// beside them has it, those at whose edges the columns differ most. Fewer than three tiles may be
+// anything.
 std::optional<AxisLines> BlurredLines(const cv::Mat& grey, const std::vector<FlatRun>& runs) {
   const bool begins = runs.front().at <= kBlurPx;
   const bool ends = runs.back().End() >= grey.cols - kBlurPx;
@@ -172,33 +177,42 @@ std::optional<AxisLines> BlurredLines(const cv::Mat& grey, const std::vector<Fla
   if (count > kMaxTiles) return std::nullopt;
   const auto by_width = [](const FlatRun& a, const FlatRun& b) { return a.width < b.width; };
   const int widest_px = std::max_element(runs.begin(), runs.end(), by_width)->width + 2 * kBlurPx;
-  std::vector<double> steps(static_cast<std::size_t>(grey.cols), 0.0);
-  for (int x = 1; x < grey.cols; ++x) steps[static_cast<std::size_t>(x)] = StepAt(grey, x);
-  const auto is_near = [](const FlatRun& run, const FlatRun& line) {
-    return run.at >= line.at - kBlurPx && run.End() <= line.End() + kBlurPx;
+  const double level = runs.front().level;
+  const std::vector<double> differences =
+      DeviationsFrom(std::vector<double>(static_cast<std::size_t>(grey.cols), level), grey);
+  const double most = kOfLine * Middle(differences);
+  const auto has_colour = [&](int x) { return differences[static_cast<std::size_t>(x)] < most; };
+  const auto is_line = [&](const FlatRun& run, const FlatRun& line) {
+    if (run.at < line.at - kBlurPx || run.End() > line.End() + kBlurPx) return false;
+    if (line.at > 0 && has_colour(line.at - 1)) return false;
+    if (line.End() < grey.cols && has_colour(line.End())) return false;
+    for (int x = line.at; x < line.End(); ++x) {
+      if (!has_colour(x)) return false;
+    }
+    return true;
   };
+  // Views that show an object on a plain background are no narrower than the image says.
+  const bool is_whole =
+      grey.cols % count == 0 && RatioAt(grey, grey.cols / count) < kRepeatsWithoutLines;
   std::optional<AxisLines> best;
-  double most = kLineContrast * Middle(steps);
+  double best_step = 0;
   for (int gap = 1; gap <= widest_px; ++gap) {
+    ThrowIfCancelled();
     for (int first = begins ? 1 : 0; first <= (begins ? widest_px : 0); ++first) {
       std::optional<AxisLines> lines = EvenLines(grey.cols, count, gap, first);
-      if (!lines) continue;
-      lines->level = runs.front().level;
+      if (!lines || (is_whole && 2 * first != gap)) continue;
       const std::vector<FlatRun> places = RunsOf(*lines, grey.cols);
-      if (!std::equal(runs.begin(), runs.end(), places.begin(), places.end(), is_near) ||
-          !AreSharp(grey, places)) {
-        continue;
-      }
+      if (!std::equal(runs.begin(), runs.end(), places.begin(), places.end(), is_line)) continue;
       double sum = 0, edges = 0;
       for (const FlatRun& line : places) {
         for (const int x : {line.at, line.End()}) {
           if (x == 0 || x == grey.cols) continue;
-          sum += steps[static_cast<std::size_t>(x)];
+          sum += StepAt(grey, x);
           ++edges;
         }
       }
-      if (sum > most * edges) {
-        most = sum / edges;
+      if (sum > best_step * edges) {
+        best_step = sum / edges;
         best = lines;
       }
     }
@@ -232,7 +246,7 @@ std::optional<AxisLines> LinesLike(const AxisLines& other, const cv::Mat& grey) 
   return count > 1 ? EvenLines(grey.cols, count, other.gap_px, other.first_px) : std::nullopt;
 }
 
-AxisLines LinesAcross(const cv::Mat& grey) {
+AxisLines LinesAcross(const cv::Mat& grey, bool may_be_blurred) {
   AxisLines none;
   none.tile_px = grey.cols;
   if (grey.cols < kMinTilePx || grey.rows < 1) return none;
@@ -251,7 +265,7 @@ AxisLines LinesAcross(const cv::Mat& grey) {
     }
     std::optional<AxisLines> lines = RegularLines(of_colour, grey.cols);
     if (lines && !AreSharp(grey, of_colour)) continue;
-    if (!lines) lines = BlurredLines(grey, of_colour);
+    if (!lines && may_be_blurred) lines = BlurredLines(grey, of_colour);
     if (!lines) continue;
     lines->level = first.level;
     if (lines->one_side_px == 0) return *lines;
@@ -262,9 +276,9 @@ AxisLines LinesAcross(const cv::Mat& grey) {
 
 }  // namespace
 
-TileLines LinesOf(const cv::Mat& pixels) {
+TileLines LinesOf(const cv::Mat& pixels, bool may_be_blurred) {
   const cv::Mat grey = GreyOf(pixels), transposed = grey.t();
-  TileLines lines = {LinesAcross(grey), LinesAcross(transposed)};
+  TileLines lines = {LinesAcross(grey, may_be_blurred), LinesAcross(transposed, may_be_blurred)};
   const auto complete = [](const AxisLines& other, const cv::Mat& image, AxisLines* axis) {
     if (other.count < 2 || other.gap_px == 0 || axis->count > 1) return;
     if (const std::optional<AxisLines> like = LinesLike(other, image)) *axis = *like;

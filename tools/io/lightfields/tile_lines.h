@@ -19,7 +19,8 @@ struct AxisLines {
 struct TileLines {
   AxisLines across, down;
 };
-TileLines LinesOf(const cv::Mat& pixels);
+// `may_be_blurred`: the image was compressed with losses.
+TileLines LinesOf(const cv::Mat& pixels, bool may_be_blurred);
 // Whether so many tiles within a border alone have clearer edges than as many tiles of the whole
 // image, whose outer tiles contain the border; false if the edges do not show it.
 bool AreEdgesWithinBorder(const cv::Mat& pixels, AxisLines border, int count, bool is_down);

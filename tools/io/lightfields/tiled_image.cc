@@ -19,6 +19,11 @@ namespace thicklens::io {
 
 namespace {
 
+bool IsLossy(const ImageFacts& facts) {
+  const std::string& kind = facts.file_kind;
+  return kind == "JPEG" || kind == "WebP" || kind == "HEIF" || kind == "AVIF";
+}
+
 bool HasLines(const AxisLines& lines) { return lines.gap_px > 0 || lines.first_px > 0; }
 
 // The lines that are left out, as a clause.
@@ -160,7 +165,7 @@ std::optional<ViewSource> OpenTiledImage(const LayoutInput& input) {
   const AxisCounts stated =
       input.is_forced ? AxisCounts{input.reading->layout_u, input.reading->layout_v} : AxisCounts{};
   const bool is_stated = stated.across > 0;
-  TileLines lines = LinesOf(pixels);
+  TileLines lines = LinesOf(pixels, IsLossy(image->facts));
   const auto are_divided = [&lines] { return lines.across.count > 1 || lines.down.count > 1; };
   // The views themselves may show such lines.
   if (is_stated && are_divided() &&

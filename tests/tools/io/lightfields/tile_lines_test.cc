@@ -83,7 +83,7 @@ TEST(TileLinesTest, JpegBlursLines) {
     for (const int quality : {95, 90, 85, 80, 75}) {
       SCOPED_TRACE(::testing::Message()
                    << border.gap_px << " px, level " << border.level << ", quality " << quality);
-      ExpectLines(LinesOf(ThroughJpeg(Tiles(5, border), quality)), 5, border);
+      ExpectLines(LinesOf(ThroughJpeg(Tiles(5, border), quality), true), 5, border);
     }
   }
 }
@@ -95,16 +95,60 @@ TEST(TileLinesTest, LinesMayHaveTheColourOfTheViewsEdges) {
     const Border border{3, border_px, 255};
     const cv::Mat tiles =
         Tiles(5, border, [](cv::Mat* view) { view->rowRange(0, 20).setTo(cv::Scalar::all(255)); });
-    ExpectLines(LinesOf(tiles), 5, border);
+    ExpectLines(LinesOf(tiles, false), 5, border);
   }
 }
 
 // A photograph has no lines, and neither have views that show some of their own.
 TEST(TileLinesTest, TexturesHaveNoLines) {
-  const TileLines lines = LinesOf(ThroughJpeg(Tiles(5, {}), 80));
+  const TileLines lines = LinesOf(ThroughJpeg(Tiles(5, {}), 80), true);
   EXPECT_EQ(lines.across.count, 1);
   EXPECT_EQ(lines.down.count, 1);
   EXPECT_EQ(lines.across.first_px, 0);
+}
+
+// The margins of objects that fill most of the views are no lines of the views: they move with the
+// parallax, by a fraction of a pixel per view.
+TEST(TileLinesTest, MarginsOfObjectsAreNoLines) {
+  constexpr int kObjectWidthPx = 70, kObjectHeightPx = 52;
+  for (const bool is_jpeg : {false, true}) {
+    cv::Mat tiles(5 * kViewHeightPx, 5 * kViewWidthPx, CV_8UC3, cv::Scalar::all(255));
+    for (int l = 0; l < 5; ++l) {
+      for (int k = 0; k < 5; ++k) {
+        cv::Mat view(kViewHeightPx, kViewWidthPx, CV_8UC3, cv::Scalar::all(255));
+        View(0, 0)(cv::Rect(0, 0, kObjectWidthPx, kObjectHeightPx))
+            .copyTo(view(cv::Rect(5, 4, kObjectWidthPx, kObjectHeightPx)));
+        const cv::Mat move = (cv::Mat_<double>(2, 3) << 1, 0, 0.75 * (2 - k), 0, 1, 0.75 * (2 - l));
+        cv::warpAffine(view, view, move, view.size(), cv::INTER_LINEAR, cv::BORDER_REPLICATE);
+        view.copyTo(
+            tiles(cv::Rect(k * kViewWidthPx, l * kViewHeightPx, kViewWidthPx, kViewHeightPx)));
+      }
+    }
+    const TileLines lines = LinesOf(is_jpeg ? ThroughJpeg(tiles, 90) : tiles, is_jpeg);
+    for (const auto& [axis, view_px] :
+         {std::pair(lines.across, kViewWidthPx), std::pair(lines.down, kViewHeightPx)}) {
+      const bool keeps_pitch = axis.tile_px + axis.gap_px == view_px;
+      EXPECT_TRUE(axis.count == 1 || keeps_pitch)
+          << axis.count << " tiles of " << axis.tile_px << " px, lines of " << axis.gap_px << " px";
+    }
+  }
+}
+
+// A mosaic that was resized has lines of two widths: no tiles of one size fit it.
+TEST(TileLinesTest, LinesOfTwoWidthsAreRefused) {
+  cv::Mat tiles(5 * kViewHeightPx + 17, 5 * kViewWidthPx + 17, CV_8UC3, cv::Scalar::all(255));
+  for (int l = 0, y = 0; l < 5; ++l, y += kViewHeightPx + 3 + (l + 1) % 2) {
+    for (int k = 0, x = 0; k < 5; ++k, x += kViewWidthPx + 3 + (k + 1) % 2) {
+      const cv::Rect place =
+          cv::Rect(x, y, kViewWidthPx, kViewHeightPx) & cv::Rect({}, tiles.size());
+      View(k, l)(cv::Rect({}, place.size())).copyTo(tiles(place));
+    }
+  }
+  for (const bool is_jpeg : {false, true}) {
+    const TileLines lines = LinesOf(is_jpeg ? ThroughJpeg(tiles, 90) : tiles, is_jpeg);
+    EXPECT_EQ(lines.across.count, 1) << lines.across.gap_px;
+    EXPECT_EQ(lines.down.count, 1) << lines.down.gap_px;
+  }
 }
 
 // Half of the views' width or height shows nothing. Before, 5 x 6 views were found: two thirds of
