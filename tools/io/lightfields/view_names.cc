@@ -107,28 +107,55 @@ NameGroups::const_iterator LargestOf(const NameGroups& groups) {
   });
 }
 
+// The name with a mark for each number, and without the dashes and signs before it.
+std::string KindOf(const std::string& name) {
+  std::string kind;
+  for (std::size_t i = 0; i < name.size(); ++i) {
+    if (IsDigit(name[i])) {
+      while (!kind.empty() && (kind.back() == '-' || kind.back() == '+')) kind.pop_back();
+      if (i == 0 || !IsDigit(name[i - 1])) kind += '0';
+    } else {
+      kind += name[i];
+    }
+  }
+  return kind;
+}
+
 // Two dashes before a number are a text and a sign both in names of "img-%d-%d" and of "img%d-%d";
-// in the former, one dash is a text. The meaning is the one by which more names are alike.
+// in the former, one dash is a text. The meaning is the one by which more names of that kind are
+// alike.
 NameGroups GroupsOf(const std::vector<std::string>& names) {
+  std::map<std::string, std::vector<std::string>> kinds;
+  for (const std::string& name : names) kinds[KindOf(name)].push_back(name);
   // A '+' between digits of another image says nothing of these.
   std::set<std::string> with_sign_after_digit;
   for (const std::string& name : names) {
     if (HasSignAfterDigit(name)) with_sign_after_digit.insert(TemplateOf(name));
   }
-  NameGroups groups, behind_dashes;
-  for (const std::string& name : names) {
-    const SplitName split =
-        Split(name, with_sign_after_digit.count(TemplateOf(name)) > 0 ? SignRule::kAlsoAfterDigit
-                                                                      : SignRule::kNotAfterDigit);
-    groups[split.text].push_back(split);
+  NameGroups groups;
+  for (const auto& [kind, of_kind] : kinds) {
+    NameGroups found;
+    for (const std::string& name : of_kind) {
+      const SplitName split =
+          Split(name, with_sign_after_digit.count(TemplateOf(name)) > 0 ? SignRule::kAlsoAfterDigit
+                                                                        : SignRule::kNotAfterDigit);
+      found[split.text].push_back(split);
+    }
+    if (std::any_of(of_kind.begin(), of_kind.end(), HasDashBeforeSign)) {
+      NameGroups behind_dashes;
+      for (const std::string& name : of_kind) {
+        const SplitName split = Split(name, SignRule::kAfterDash);
+        behind_dashes[split.text].push_back(split);
+      }
+      if (LargestOf(behind_dashes)->second.size() > LargestOf(found)->second.size())
+        found = std::move(behind_dashes);
+    }
+    for (const auto& [text, group] : found) {
+      std::vector<SplitName>& all = groups[text];
+      all.insert(all.end(), group.begin(), group.end());
+    }
   }
-  if (std::none_of(names.begin(), names.end(), HasDashBeforeSign)) return groups;
-  for (const std::string& name : names) {
-    const SplitName split = Split(name, SignRule::kAfterDash);
-    behind_dashes[split.text].push_back(split);
-  }
-  const bool are_more = LargestOf(behind_dashes)->second.size() > LargestOf(groups)->second.size();
-  return are_more ? behind_dashes : groups;
+  return groups;
 }
 
 // The meaning of the '-' or '+' before the numbers at one place of the names.

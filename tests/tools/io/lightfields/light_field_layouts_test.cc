@@ -152,6 +152,9 @@ TEST_F(LightFieldLayouts, ADashMayBeBeforeASign) {
                    EncodedTile(View(u, v)));
       }
     }
+    // Other images, fewer or as many, do not decide for these.
+    folder.Put("lf/mask_-1_-1.png", EncodedTile(View(0, 0)));
+    folder.Put("lf/mask_0_1.png", EncodedTile(View(0, 0)));
     ExpectViews(Read(folder / "lf"));
     EXPECT_THAT(facts_.one_line, HasSubstr("'" + start + "{v}-{u}.png'"));
   }
