@@ -188,6 +188,11 @@ ValueRange WithLargestOfType(const DepthMap& map, ValueRange range) {
   constexpr double kHalf = 0.5;
   if (!largest || !(range.most > kHalf * *largest)) return range;
   const auto value = static_cast<float>(*largest);
+  const std::vector<double>& stated = map.holes.hole_values;
+  const bool is_stated = std::any_of(stated.begin(), stated.end(), [value](double hole) {
+    return static_cast<float>(hole) == value;
+  });
+  if (is_stated) return range;
   if (std::find(map.values.begin(), map.values.end(), value) != map.values.end())
     range.most = std::max(range.most, *largest);
   return range;

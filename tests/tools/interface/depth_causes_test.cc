@@ -82,6 +82,8 @@ TEST(DepthCauses, TheLargestOfTheTypeMayBeTheNearestSurface) {
   map.is_integer = true;
   map.largest_of_type = 65535;
   EXPECT_THAT(CauseOf(map), HasSubstr("from 100 to 6.554e+04 span 0 to 65535, as those of a rel"));
+  map.holes.hole_values = {65535};
+  EXPECT_THAT(CauseOf(map), IsEmpty());
 }
 
 TEST(DepthCauses, NamesAnotherSignAndItsRemedy) {
