@@ -82,7 +82,9 @@ cv::Mat Interleaved(const heif_image* image, heif_channel channel, int type) {
 void TakeCodes(const HeifColourCodes& codes, ImageFacts* facts) {
   facts->transfer = TransferOfCode(codes.transfer);
   const AVColorPrimariesDesc* const known =
-      av_csp_primaries_desc_from_id(static_cast<AVColorPrimaries>(codes.primaries));
+      codes.primaries < AVCOL_PRI_NB
+          ? av_csp_primaries_desc_from_id(static_cast<AVColorPrimaries>(codes.primaries))
+          : nullptr;
   if (known == nullptr) return;
   facts->chromaticities = std::array<double, 8>{av_q2d(known->prim.r.x), av_q2d(known->prim.r.y),
                                                 av_q2d(known->prim.g.x), av_q2d(known->prim.g.y),
