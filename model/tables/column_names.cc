@@ -197,13 +197,12 @@ std::string LowerCase(const std::string& text) {
   for (std::size_t i = 0; i < text.size(); ++i) {
     const auto byte = static_cast<unsigned char>(text[i]);
     const auto next = i + 1 < text.size() ? static_cast<unsigned char>(text[i + 1]) : 0U;
+    const bool is_latin =  // U+00C0 to U+00DE
+        byte == 0xC3 && next >= 0x80 && next <= 0x9E && next != 0x97;
+    const bool is_cyrillic = byte == 0xD0 && next >= 0x90 && next <= 0x9F;  // U+0410 to U+041F
     if (byte < 0x80) {
       lower += static_cast<char>(std::tolower(byte));
-    } else if (byte == 0xC3 && next >= 0x80 && next <= 0x9E && next != 0x97) {  // U+00C0 to U+00DE
-      lower += text[i];
-      lower += static_cast<char>(next + 0x20);
-      ++i;
-    } else if (byte == 0xD0 && next >= 0x90 && next <= 0x9F) {  // U+0410 to U+041F
+    } else if (is_latin || is_cyrillic) {
       lower += text[i];
       lower += static_cast<char>(next + 0x20);
       ++i;

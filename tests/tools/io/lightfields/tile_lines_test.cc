@@ -23,7 +23,8 @@ cv::Mat View(int k, int l) {
     std::mt19937 random(7);
     for (int y = 0; y < noise.rows; ++y) {
       for (int x = 0; x < noise.cols; ++x) {
-        for (int c = 0; c < 3; ++c) noise.at<cv::Vec3b>(y, x)[c] = random() % 256;
+        for (int c = 0; c < 3; ++c)
+          noise.at<cv::Vec3b>(y, x)[c] = static_cast<unsigned char>(random() % 256);
       }
     }
     cv::GaussianBlur(noise, noise, {}, 1.0);
