@@ -15,9 +15,6 @@
 namespace thicklens::io {
 namespace {
 
-// Views side by side differ by their parallax only. A photograph without repetitions has a ratio
-// near 1.
-constexpr double kRepeats = 0.5;
 // Ratios that differ by less are alike.
 constexpr double kAlike = 1.2, kAlikeFloor = 0.02;
 constexpr int kMaxPitchPx = 100;

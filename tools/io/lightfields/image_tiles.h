@@ -22,6 +22,9 @@ AxisCounts RepetitionsOf(const cv::Mat& pixels);
 bool Repeats(const cv::Mat& pixels, AxisCounts counts);
 // The differences of a grey image (GreyOf) at a distance across, relative to those at half of it.
 double RatioAt(const cv::Mat& grey, int lag_px);
+// The ratio below which an image repeats itself: views side by side differ by their parallax only,
+// and a photograph without repetitions has a ratio near 1.
+constexpr double kRepeats = 0.5;
 // Numbers of tiles, each with the ratio at the distance of a tile.
 using RatioOfCount = std::pair<int, double>;
 // The largest number with about the least ratio; 1: none repeats. A small object on a plain

@@ -25,7 +25,6 @@ constexpr int kBlurPx = 3;
 // The columns of such a line differ from its colour by less than this part of what columns usually
 // do, and those beside it by more.
 constexpr double kOfLine = 0.3;
-constexpr double kRepeatsWithoutLines = 0.5;
 // Differences across the edges of views, relative to those elsewhere.
 constexpr double kEdgeContrast = 1.3;
 
@@ -192,8 +191,7 @@ std::optional<AxisLines> BlurredLines(const cv::Mat& grey, const std::vector<Fla
     return true;
   };
   // Views that show an object on a plain background are no narrower than the image says.
-  const bool is_whole =
-      grey.cols % count == 0 && RatioAt(grey, grey.cols / count) < kRepeatsWithoutLines;
+  const bool is_whole = grey.cols % count == 0 && RatioAt(grey, grey.cols / count) < kRepeats;
   std::optional<AxisLines> best;
   double best_step = 0;
   for (int gap = 1; gap <= widest_px; ++gap) {
