@@ -479,6 +479,20 @@ std::string NameOf(ImageFileKind kind) {
   return "raw";
 }
 
+bool IsLossy(const std::string& bytes, ImageFileKind kind) {
+  if (kind != ImageFileKind::kWebp) return kind == ImageFileKind::kJpeg;
+  constexpr std::size_t kHeaderBytes = 12, kNameBytes = 4, kChunkBytes = 8;
+  std::size_t at = kHeaderBytes;
+  while (at + kChunkBytes <= bytes.size()) {
+    if (bytes.compare(at, kNameBytes, "VP8 ") == 0) return true;
+    std::size_t size = 0;
+    for (std::size_t i = kChunkBytes; i > kNameBytes; --i)
+      size = size << 8 | static_cast<unsigned char>(bytes[at + i - 1]);
+    at += kChunkBytes + size + size % 2;  // chunks have an even size
+  }
+  return false;
+}
+
 void RequirePossibleSize(const std::string& bytes, ImageFileKind kind, const std::string& name) {
   if (kind == ImageFileKind::kExr) RequirePossibleExrHeaders(bytes, name);
   if (const std::optional<StatedSize> size = SizeOf(bytes, kind))

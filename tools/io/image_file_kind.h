@@ -30,6 +30,9 @@ std::string NameOfOtherKind(const std::string& bytes);
 std::string ReadableKinds();
 std::string NameOf(ImageFileKind kind);
 
+// Whether the file is compressed with losses: JPEG, and WebP with a chunk "VP8 ".
+bool IsLossy(const std::string& bytes, ImageFileKind kind);
+
 // Decoders allocate memory by the size that a header states. Throws Error that begins with `name`
 // if so few bytes cannot hold that size at the kind's maximum compression. A header that cannot be
 // parsed passes; the decoder reports it. Kinds whose size is found by their decoder pass as well.

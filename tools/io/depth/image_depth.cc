@@ -119,21 +119,6 @@ double LargestDifference(const cv::Mat& pixels, const std::vector<int>& channels
   return largest;
 }
 
-// Whether the file is compressed with losses: JPEG, and WebP with a chunk "VP8 ".
-bool IsLossy(const std::string& bytes, ImageFileKind kind) {
-  if (kind != ImageFileKind::kWebp) return kind == ImageFileKind::kJpeg;
-  constexpr std::size_t kHeaderBytes = 12, kNameBytes = 4, kChunkBytes = 8;
-  std::size_t at = kHeaderBytes;
-  while (at + kChunkBytes <= bytes.size()) {
-    if (bytes.compare(at, kNameBytes, "VP8 ") == 0) return true;
-    std::size_t size = 0;
-    for (std::size_t i = kChunkBytes; i > kNameBytes; --i)
-      size = size << 8 | static_cast<unsigned char>(bytes[at + i - 1]);
-    at += kChunkBytes + size + size % 2;  // chunks have an even size
-  }
-  return false;
-}
-
 // Chooses the channel of the depth.
 class DepthChannel {
  public:

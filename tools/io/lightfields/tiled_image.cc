@@ -3,12 +3,14 @@
 #include <fmt/format.h>
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "thicklens/base/error.h"
 #include "thicklens/base/input_file.h"
 #include "thicklens/io/image_file.h"
+#include "tools/io/image_file_kind.h"
 #include "tools/io/lightfields/image_tiles.h"
 #include "tools/io/lightfields/layout.h"
 #include "tools/io/lightfields/tile_lines.h"
@@ -18,11 +20,6 @@
 namespace thicklens::io {
 
 namespace {
-
-bool IsLossy(const ImageFacts& facts) {
-  const std::string& kind = facts.file_kind;
-  return kind == "JPEG" || kind == "WebP" || kind == "HEIF" || kind == "AVIF";
-}
 
 bool HasLines(const AxisLines& lines) { return lines.gap_px > 0 || lines.first_px > 0; }
 
@@ -160,12 +157,14 @@ bool SetTileSize(int count, AxisLines* lines) {
 
 std::optional<ViewSource> OpenTiledImage(const LayoutInput& input) {
   ReportInput(input.path);
-  const auto image = std::make_shared<const DecodedImage>(ReadImageData(input.path));
+  const std::string bytes = ReadWholeFile(input.path);
+  const std::optional<ImageFileKind> kind = KindOfImage(bytes);
+  const auto image = std::make_shared<const DecodedImage>(DecodeImageFile(bytes, input.path));
   const cv::Mat& pixels = image->pixels;
   const AxisCounts stated =
       input.is_forced ? AxisCounts{input.reading->layout_u, input.reading->layout_v} : AxisCounts{};
   const bool is_stated = stated.across > 0;
-  TileLines lines = LinesOf(pixels, IsLossy(image->facts));
+  TileLines lines = LinesOf(pixels, kind && IsLossy(bytes, *kind));
   const auto are_divided = [&lines] { return lines.across.count > 1 || lines.down.count > 1; };
   // The views themselves may show such lines.
   if (is_stated && are_divided() &&
