@@ -10,6 +10,7 @@
 
 #include "thicklens/base/export.h"
 #include "thicklens/model/camera.h"
+#include "thicklens/model/conjugates.h"
 #include "thicklens/model/sweep_file.h"
 
 namespace thicklens::calib {
@@ -26,6 +27,8 @@ struct FocusSweep {
   FrameReader read_frame;                    // set by the caller
   double reading_sigma_mm = 0;               // standard deviation of a reading, mm; 0: not stated
   std::optional<model::Estimate> offset_mm;  // absent: found from the image scale
+  // What is known of the plane of focus, by the sweep's file or the data of an objective.
+  std::vector<model::StatedConjugate> stated_focus;
   model::BenchDirection direction = model::BenchDirection::kAway;  // sign of the reading in z
   model::SweepTarget target = model::SweepTarget::kAuto;  // kind of the target, if it is stated
   model::FloorKnowledge floor;                            // what is known of the blur floor, px

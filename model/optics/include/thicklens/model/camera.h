@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "thicklens/base/export.h"
+#include "thicklens/model/objective.h"
 #include "thicklens/model/thick_lens.h"
 #include "thicklens/model/transfer_curve.h"
 
@@ -91,6 +92,11 @@ struct CameraCalibration {
 struct Camera {
   std::string name;          // name for messages and reports
   ThickLens lens;            // lengths in mm from the principal planes
+  // The data of a microscope objective by which the lens is stated; `lens` is LensOfObjective.
+  std::optional<Objective> objective;
+  // Distance from the front of the lens's barrel to Ap behind it, mm. It converts working distances
+  // to depths. Absent: not stated.
+  std::optional<double> aperture_behind_front_mm;
   Sensor sensor;             // size, pitch, principal point, transfer curve
   Psf psf = Psf::kGaussian;  // shape of the defocus blur
   // The key is the path of the field in the file, e.g. "lens.aperture_radius_mm"; an element of a
