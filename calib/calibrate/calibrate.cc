@@ -11,8 +11,10 @@
 
 #include "calib/calibrate/focus_solution.h"
 #include "calib/calibrate/response_effects.h"
+#include "calib/calibrate/zero_choice.h"
 #include "calib/edges/edge_blur.h"
 #include "calib/fit/blur_measurement.h"
+#include "calib/fit/known_focus.h"
 #include "calib/fit/source_recipe.h"
 #include "calib/registration/change_of_reference.h"
 #include "calib/registration/frame_structure.h"
@@ -39,6 +41,7 @@ namespace {
 
 constexpr double kZeroReach = 2;        // sigmas by which one zero contradicts another
 constexpr double kZeroMoves = 0.1;      // share of the zero's sigma above which a shift matters
+constexpr double kPartOfStep = 0.2;     // of the readings, by which known depths may be off
 constexpr double kFewRegistered = 0.8;  // share of the used frames; below it the light is checked
 constexpr int kMaxThreads = 1024;
 
@@ -218,8 +221,13 @@ class Calibrator {
 
   // Determines the bench offset (given, or from the image scale), then every frame's depth.
   bool FindDepths() {
+    CollectStatements();
     std::optional<double> known_mm;
-    if (sweep_.offset_mm) known_mm = sweep_.offset_mm->value;
+    if (sweep_.offset_mm) {
+      known_mm = sweep_.offset_mm->value;
+    } else if (best_statement_) {
+      known_mm = OffsetOfFocusAt(model::FocusDepthOf(sweep_.camera.lens, *best_statement_).value);
+    }
     std::vector<ScaleSample> samples = TrackScale(
         sweep_, [this](std::size_t frame) { return Grey(frame); }, used(), reference_, known_mm,
         options_.threads, [this] { Tick(); });
@@ -237,8 +245,7 @@ class Calibrator {
       result_.frames[sample.frame].image_scale_sigma = sample.registration.scale_sigma;
     }
     if (!is_lone_edge && !ScalesAllowAResult(samples)) return false;
-    if (const auto reason =
-            ReasonAgainstScales(sweep_, result_.frames, used(), result_.diagnostics.scale))
+    if (const auto reason = ReasonAgainstScales(result_.frames, used(), result_.diagnostics.scale))
       return Refuse(*reason);
     RejectUnregistered(samples, used(), reference_, result_.diagnostics.scale,
                        result_.diagnostics.structure, &result_.frames);
@@ -258,10 +265,8 @@ class Calibrator {
         if (check.refusal) return Refuse(*check.refusal);
         conflicting_offset_mm_ = check.conflicting_mm;
       }
-    } else if (result_.diagnostics.scale.done) {
-      result_.summary.bench_offset_mm = result_.diagnostics.scale.offset_mm;
-    } else {
-      return Refuse(ReasonOfUnknownOffset(result_.diagnostics.scale));
+    } else if (!ChooseOffset()) {
+      return false;
     }
     if (ShowsDistortion(result_) ||
         FindScaleNonlinearity(scales_, result_.diagnostics.scale, sweep_))
@@ -301,6 +306,71 @@ class Calibrator {
                           "part of the target"));
   }
 
+  // Depth of reading 0 if the sharpest reading lies at that depth.
+  double OffsetOfFocusAt(double focus_depth_mm) const {
+    return focus_depth_mm - model::DirectionSign(sweep_.direction) * SharpestReadingMm();
+  }
+  double SharpestReadingMm() const {
+    const SharpestReading& sharpest = result_.diagnostics.sharpest;
+    return sharpest.done ? sharpest.reading_mm.value : result_.frames[reference_].reading_mm;
+  }
+
+  // Finds what is stated of the plane of focus, the period of the target included.
+  void CollectStatements() {
+    statements_ = sweep_.stated_focus;
+    if (sweep_.target_period_mm) {
+      const double beyond_mm = model::DirectionSign(sweep_.direction) *
+                               (result_.frames[reference_].reading_mm - SharpestReadingMm());
+      if (const auto measured = MagnificationOfPeriod(sweep_, Grey(reference_), beyond_mm))
+        statements_.push_back(*measured);
+    }
+    best_statement_ = MostPrecise(sweep_.camera, statements_);
+  }
+
+  // Takes the bench offset from the image scale or from what is stated of the plane of focus,
+  // whichever is more precise. Where neither exists, the offset stays open: the reading at focus is
+  // found without it.
+  bool ChooseOffset() {
+    const ScaleModel& law = result_.diagnostics.scale;
+    if (best_statement_) {
+      const model::Estimate focus_mm = FocusDepthWithTolerance(sweep_.camera, *best_statement_);
+      if (!law.done || focus_mm.sigma < law.offset_mm.sigma) {
+        known_focus_ = best_statement_;
+        result_.diagnostics.bench_offset_from = known_focus_->name;
+        result_.summary.bench_offset_mm =
+            Result{OffsetOfFocusAt(focus_mm.value), focus_mm.sigma, std::nullopt};
+        return true;
+      }
+    }
+    if (law.done && ScaleDeterminesDepth(law)) {
+      result_.summary.bench_offset_mm = law.offset_mm;
+      result_.diagnostics.bench_offset_from = kFromScale;
+      return true;
+    }
+    if (!law.done && !law.changes_too_little) return Refuse(ReasonOfUnknownOffset(law));
+    zero_is_open_ = true;
+    result_.summary.bench_offset_mm =
+        Result{OffsetOfFocusAt(UsualFocusDepth(sweep_.camera, scales_, SharpestReadingMm())), 0,
+               std::nullopt};
+    return true;
+  }
+
+  // Whether the bench offset from the image scale tells the target from the focal point, where d1
+  // and kappa become infinite.
+  bool ScaleDeterminesDepth(const ScaleModel& law) const {
+    const double depth_mm =
+        law.offset_mm.value + model::DirectionSign(sweep_.direction) * SharpestReadingMm();
+    return depth_mm - sweep_.camera.lens.front_focal_length_mm > kLeastKnown * law.offset_mm.sigma;
+  }
+
+  double ReadingRangeMm() const {
+    const auto [low, high] =
+        std::minmax_element(used().begin(), used().end(), [&](std::size_t a, std::size_t b) {
+          return result_.frames[a].reading_mm < result_.frames[b].reading_mm;
+        });
+    return result_.frames[*high].reading_mm - result_.frames[*low].reading_mm;
+  }
+
   // Takes the given bench offset and the readings as they are.
   bool UseGivenOffset() {
     TakeGivenOffset();
@@ -310,6 +380,7 @@ class Calibrator {
   void TakeGivenOffset() {
     result_.summary.bench_offset_mm =
         Result{sweep_.offset_mm->value, sweep_.offset_mm->sigma, std::nullopt};
+    result_.diagnostics.bench_offset_from = "offset_mm";
   }
 
   bool PlacedWithinReach() {
@@ -386,8 +457,11 @@ class Calibrator {
     task.reference = reference_;
     task.scales = scales_;
     task.scale_centre_mm = result_.diagnostics.scale.centre_mm;
-    task.law = result_.diagnostics.scale.kind == ScaleKind::kConstant ? BlurModel::kTelecentric
-                                                                      : BlurModel::kPerspective;
+    task.law = zero_is_open_ || result_.diagnostics.scale.kind == ScaleKind::kConstant
+                   ? BlurModel::kTelecentric
+                   : BlurModel::kPerspective;
+    task.known_focus = known_focus_;
+    task.zero_is_open = zero_is_open_;
     task.scale_follows_readings = result_.diagnostics.scale.done;
     task.offset_mm = {result_.summary.bench_offset_mm->value,
                       result_.summary.bench_offset_mm->sigma};
@@ -406,13 +480,16 @@ class Calibrator {
     BlurFitResult fit;
     const Calibration before = result_;
     SolveFocus(sweep_, &evidence, &fit, &result_);
-    if (ReplaceRejectedReference(before) || RefineOffsetWithFittedBlur(before))
+    if (ReplaceRejectedReference(before) || RefineOffsetWithFittedBlur(before) ||
+        RefineOffsetOfKnownFocus(before, fit))
       return MeasureAndSolve();
     if (!result_.frames[reference_].rejection.empty()) return;
     if (sweep_.target_period_mm) CheckMagnification(sweep_, reference_, Grey(reference_), &result_);
     if (result_.summary.outcome == Outcome::kRefused) return;
     WidenByContradictions(evidence.setup, fit);
+    CompareWithStatements(sweep_, statements_, &result_);
     task.scales = scales_;
+    task.offset_mm = evidence.setup.offset_mm;
     task.tick = [] { ThrowIfCancelled(); };
     CheckCameraResponse(task, evidence, fit, &result_);
     if (options_.map_field) MapField(sweep_, evidence, fit, &store_, &result_);
@@ -420,7 +497,7 @@ class Calibrator {
 
   // Widens the systematic intervals by the findings of the checks, as far as they move the results.
   void WidenByContradictions(const BlurFitSetup& setup, const BlurFitResult& fit) {
-    if (!sweep_.offset_mm && result_.diagnostics.scale.done) {
+    if (result_.diagnostics.bench_offset_from == kFromScale) {
       const Eigen::Vector2d& offsets_mm = result_.diagnostics.scale.offset_of_pupil_laws_mm;
       WidenByTrials(
           "light distribution over the pupil",
@@ -442,7 +519,7 @@ class Calibrator {
                     WithoutReadingStep(sweep_, setup, *slip_, scales_, reference_, result_), fit,
                     &result_);
     }
-    if (bend_ && !sweep_.offset_mm) {
+    if (bend_ && result_.diagnostics.bench_offset_from == kFromScale) {
       const double half_mm = 0.5 * std::abs(bend_->zero_spread_mm);
       const double zero_mm = setup.offset_mm.value;
       WidenByTrials("nonlinearity of the image scale",
@@ -475,7 +552,9 @@ class Calibrator {
   // The bench offset of the image scale was found with a usual blur ratio. It is found once more if
   // the fitted ratio moves it by more than a part of its error.
   bool RefineOffsetWithFittedBlur(const Calibration& before) {
-    if (sweep_.offset_mm || zero_is_settled_ || !result_.summary.blur_ratio) return false;
+    if (result_.diagnostics.bench_offset_from != kFromScale || zero_is_settled_ ||
+        !result_.summary.blur_ratio)
+      return false;
     zero_is_settled_ = true;
     Calibration again = before;
     CorrectForFalloff(result_.summary.blur_ratio->value, result_.summary.focus_depth_mm->value,
@@ -486,6 +565,21 @@ class Calibrator {
       return false;
     result_ = std::move(again);
     result_.summary.bench_offset_mm = result_.diagnostics.scale.offset_mm;
+    PlaceFrames();
+    return true;
+  }
+
+  // The blur was measured for the depths that the sharpest reading gives. It is measured once more
+  // if the fit moves them by more than a part of a step.
+  bool RefineOffsetOfKnownFocus(const Calibration& before, const BlurFitResult& fit) {
+    if (!known_focus_ || zero_is_settled_ || !result_.summary.blur_ratio) return false;
+    zero_is_settled_ = true;
+    const double moved_mm =
+        std::abs(fit.values[kBenchOffset] - before.summary.bench_offset_mm->value);
+    const double step_mm = ReadingRangeMm() / static_cast<double>(used().size());
+    if (!(moved_mm > kPartOfStep * step_mm)) return false;
+    result_ = before;
+    result_.summary.bench_offset_mm->value = fit.values[kBenchOffset];
     PlaceFrames();
     return true;
   }
@@ -509,6 +603,9 @@ class Calibrator {
   std::optional<ReadingStep> slip_;
   std::optional<ScaleNonlinearity> bend_;
   bool zero_is_settled_ = false;
+  std::vector<model::StatedConjugate> statements_;  // what is stated of the plane of focus
+  std::optional<model::StatedConjugate> best_statement_, known_focus_;
+  bool zero_is_open_ = false;  // nothing determines the bench offset
   // The zero from the image scale where it contradicts the given one.
   std::optional<model::Estimate> conflicting_offset_mm_;
   std::mutex progress_mutex_;

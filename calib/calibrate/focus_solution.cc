@@ -10,9 +10,11 @@
 
 #include "calib/fit/blur_tails.h"
 #include "calib/fit/frame_outliers.h"
+#include "calib/fit/known_focus.h"
 #include "calib/fit/misfit_causes.h"
 #include "calib/uncertainty/blur_choices.h"
 #include "calib/uncertainty/floor_choice.h"
+#include "calib/uncertainty/systematic_advice.h"
 #include "calib/uncertainty/systematic_parts.h"
 #include "thicklens/base/statistics.h"
 
@@ -40,11 +42,12 @@ class Solution {
     const FloorChoice choice =
         ChooseFloor(sweep_.floor, evidence_, &result_.summary.warnings, sweep_.sensor_px_per_px);
     evidence_.setup.floor_variance_px2 = choice.variance_px2;
-    fit_ = FitBlur(evidence_.setup);
+    fit_ = FitBlurWith(evidence_.setup, evidence_.known_focus);
     if (fit_.done && TakeTails(sweep_.camera.psf, fit_, &evidence_))
-      fit_ = FitBlur(evidence_.setup);
+      fit_ = FitBlurWith(evidence_.setup, evidence_.known_focus);
     result_.diagnostics.blur.message = fit_.message;
     if (!fit_.done) return Refuse(fit_.message + StatedFloor());
+    if (evidence_.known_focus) TakeFittedOffset();
     FillBlur();
     FillFrames();
     FillValues();
@@ -75,6 +78,16 @@ class Solution {
     if (!sweep_.floor.given_px) return "";
     return fmt::format(" (blur_floor_px is stated as {:.3g}, which may be too large)",
                        sweep_.sensor_px_per_px * sweep_.floor.given_px->value);
+  }
+
+  // Places the frames by the bench offset at which the fitted focus is the known one.
+  void TakeFittedOffset() {
+    model::Estimate& offset_mm = evidence_.setup.offset_mm;
+    offset_mm = {fit_.values[kBenchOffset], std::sqrt(fit_.covariance(kBenchOffset, kBenchOffset))};
+    result_.summary.bench_offset_mm = Result{offset_mm.value, offset_mm.sigma, std::nullopt};
+    const double sign = model::DirectionSign(sweep_.direction);
+    for (FrameMeasurement& frame : result_.frames)
+      frame.depth_mm = offset_mm.value + sign * frame.reading_mm;
   }
 
   FrameMeasurement& Frame(std::size_t fit_frame) {
@@ -201,10 +214,31 @@ class Solution {
     result_.diagnostics.focus_reading_mm =
         model::Estimate{model::DirectionSign(sweep_.direction) * (zf - zero_mm.value),
                         std::sqrt(at_held_zero_.covariance(kFocusDepth, kFocusDepth))};
+    FillSlope();
+    result_.diagnostics.magnification_at_focus =
+        model::Estimate{model::MagnificationAtFocus(lens, zf),
+                        lens.front_focal_length_mm * result_.summary.focus_depth_mm->sigma /
+                            std::pow(zf - lens.front_focal_length_mm, 2)};
     result_.summary.image_distance_mm = Result{
         model::ImageDistanceMm(lens, zf),
         std::abs(model::ImageDistanceSlope(lens, zf)) * result_.summary.focus_depth_mm->sigma,
         std::nullopt};
+  }
+
+  // d sigma/dz of the law far from the floor: kappa (r/p) K/zf^2 [D131], the same for both laws.
+  void FillSlope() {
+    const double zf = fit_.values[kFocusDepth];
+    const model::ThickLens& lens = evidence_.setup.lens;
+    const double by_ratio = lens.aperture_radius_mm / evidence_.setup.pixel_pitch_mm *
+                            lens.front_focal_length_mm / (zf * (zf - lens.front_focal_length_mm));
+    result_.diagnostics.blur_slope_px_per_mm =
+        model::Estimate{by_ratio * at_held_zero_.values[kBlurRatio],
+                        by_ratio * std::sqrt(at_held_zero_.covariance(kBlurRatio, kBlurRatio))};
+  }
+
+  void ForgetFocus() {
+    result_.diagnostics.focus_reading_mm.reset();
+    result_.diagnostics.blur_slope_px_per_mm.reset();
   }
 
   bool IsPlausible() {
@@ -219,7 +253,7 @@ class Solution {
     const double own_kappa_sigma = std::sqrt(at_held_zero_.covariance(kBlurRatio, kBlurRatio));
     const double own_zf_sigma = result_.diagnostics.focus_reading_mm->sigma;
     if (!(kappa > 3 * own_kappa_sigma)) {
-      result_.diagnostics.focus_reading_mm.reset();
+      ForgetFocus();
       Refuse(fmt::format(
           "the blur does not change over the sweep by more than its errors, for any bench offset "
           "(kappa would be {:.2g} +- {:.2g}): move the target farther from focus on both sides",
@@ -227,14 +261,21 @@ class Solution {
       return false;
     }
     if (!(own_zf_sigma < 0.5 * (farthest - nearest))) {
-      result_.diagnostics.focus_reading_mm.reset();
+      ForgetFocus();
       Refuse(
           fmt::format("the blur does not determine the in-focus distance: {:.1f} +- {:.1f} mm in a "
                       "sweep from {:.1f} to {:.1f} mm, with the bench offset held fixed",
                       zf, own_zf_sigma, nearest, farthest));
       return false;
     }
-    if (!(zf_sigma < 0.5 * (farthest - nearest)) || !(kappa > 3 * kappa_sigma)) {
+    if (evidence_.zero_is_open) {
+      Refuse(ReasonOfOpenZero());
+      return false;
+    }
+    // The error of the bench offset has nothing to do with the length of the sweep: it matters
+    // against the distance from the focal point, where d1 and kappa become infinite.
+    const double beyond_mm = zf - evidence_.setup.lens.front_focal_length_mm;
+    if (!(zf_sigma < beyond_mm / kLeastKnown) || !(kappa > kLeastKnown * kappa_sigma)) {
       Refuse(ReasonOfZero(nearest, farthest));
       return false;
     }
@@ -245,7 +286,9 @@ class Solution {
                       side, nearest, farthest, zf, std::max(zf_sigma, own_zf_sigma)));
       return false;
     }
-    if (!(kappa >= kSmallestRatio && kappa <= kLargestRatio)) {
+    // An uncertain bench offset makes the ratio uncertain, which is then no contradiction.
+    const double reach = kLeastKnown * kappa_sigma;
+    if (!(kappa + reach >= kSmallestRatio && kappa - reach <= kLargestRatio)) {
       Refuse(
           fmt::format("the blur ratio would have to be {:.{}f}, which no lens has ({} to {}): "
                       "check focal lengths, aperture radius, pixel pitch and the unit of the "
@@ -253,7 +296,7 @@ class Solution {
                       kappa, kappa < 0.1 ? 4 : 2, kSmallestRatio, kLargestRatio));
       return false;
     }
-    if (!(kappa >= kLowRatio && kappa <= kHighRatio)) {
+    if (!(kappa + reach >= kLowRatio && kappa - reach <= kHighRatio)) {
       result_.summary.warnings.push_back(
           fmt::format("a blur ratio of {:.3f} is unusual (the full aperture gives 0.5): a wrong "
                       "focal length, aperture radius or pixel pitch has this effect; photograph a "
@@ -269,24 +312,55 @@ class Solution {
     return true;
   }
 
+  std::string KnownReading() const {
+    const model::Estimate& slope = *result_.diagnostics.blur_slope_px_per_mm;
+    return fmt::format(
+        "The reading at focus is known ({:.6g} +- {:.2g} mm), and so is the growth of the blur "
+        "(sigma {:.4g} +- {:.2g} px per mm of reading)",
+        result_.diagnostics.focus_reading_mm->value, result_.diagnostics.focus_reading_mm->sigma,
+        slope.value, slope.sigma);
+  }
+
+  // What to state where the image scale does not determine the bench offset.
+  static constexpr char kStateOne[] =
+      "State one of: target_period_mm (with a grid or ruler of that period in view), "
+      "magnification, "
+      "image_distance_mm, focus_depth_mm or offset_mm; or, in the camera file, a microscope's "
+      "lens.magnification";
+
+  std::string ReasonOfOpenZero() const {
+    const ScaleModel& scale = result_.diagnostics.scale;
+    const std::string why = scale.done
+                                ? fmt::format(
+                                      "the sweep is too short for its image scale to determine the "
+                                      "bench offset ({:.4g} +- {:.2g} mm)",
+                                      scale.offset_mm.value, scale.offset_mm.sigma)
+                                : scale.message;
+    return fmt::format(
+        "nothing determines the distance of the target, on which zf, d1 and kappa depend: {}. {}. "
+        "{}",
+        why, KnownReading(), kStateOne);
+  }
+
   // The reason where the blur determines the reading at focus, but the bench offset does not
   // determine the depths of the sweep.
   std::string ReasonOfZero(double nearest_mm, double farthest_mm) const {
     const model::Estimate& zero_mm = evidence_.setup.offset_mm;
+    const std::string& origin = result_.diagnostics.bench_offset_from;
     const std::string from =
-        sweep_.offset_mm
-            ? fmt::format("offset_mm is stated as {:.4g} +- {:.2g} mm", zero_mm.value,
-                          zero_mm.sigma)
-            : fmt::format(
+        origin == kFromScale
+            ? fmt::format(
                   "the sweep is {:.3g} mm long at a depth of {:.4g} mm, too short for its image "
                   "scale to determine the bench offset ({:.4g} +- {:.2g} mm)",
-                  farthest_mm - nearest_mm, fit_.values[kFocusDepth], zero_mm.value, zero_mm.sigma);
+                  farthest_mm - nearest_mm, fit_.values[kFocusDepth], zero_mm.value, zero_mm.sigma)
+            : fmt::format("by {} it is {:.4g} +- {:.2g} mm", origin, zero_mm.value, zero_mm.sigma);
     return fmt::format(
         "the bench offset is not known well enough: {}, so that the in-focus distance is {:.1f} +- "
-        "{:.1f} mm. The reading at focus is known: {:.6g} +- {:.2g} mm. State offset_mm{}",
+        "{:.1f} mm with a focal length of {:.4g} mm. {}. {}",
         from, fit_.values[kFocusDepth], result_.summary.focus_depth_mm->sigma,
-        result_.diagnostics.focus_reading_mm->value, result_.diagnostics.focus_reading_mm->sigma,
-        sweep_.offset_mm ? " more exactly" : "");
+        evidence_.setup.lens.front_focal_length_mm, KnownReading(),
+        origin == kFromScale ? std::string(kStateOne)
+                             : fmt::format("State {} more exactly", origin));
   }
 
   void FillFloor(const FloorChoice& choice) {

@@ -18,6 +18,8 @@ namespace {
 
 constexpr double kHuber = 4;  // standard deviations; no weight is lost below
 constexpr int kRounds = 4;
+// Largest step of the bench offset for its slope, relative to zf - f1.
+constexpr double kLargestStep = 0.3;
 
 double HuberWeight(double standardised) {
   const double size = std::abs(standardised);
@@ -315,15 +317,19 @@ BlurFitResult FitBlur(const BlurFitSetup& setup, const BlurFitResult* start) {
         std::max(result.values[kFocusDepth] + move_mm, 1.001 * setup.lens.front_focal_length_mm);
     return Fit(moved, information).Run(&start_there, false);
   };
-  const BlurFitResult above = moved_by(offset_sigma_mm);
-  const BlurFitResult below = moved_by(-offset_sigma_mm);
+  // Where the offset's uncertainty reaches the focal point, a smaller step gives the slope.
+  const double step_mm =
+      std::min(offset_sigma_mm,
+               kLargestStep * (result.values[kFocusDepth] - setup.lens.front_focal_length_mm));
+  const BlurFitResult above = moved_by(step_mm);
+  const BlurFitResult below = moved_by(-step_mm);
   if (!above.done || !below.done) {
     result.done = false;
     result.message =
         "the fit of the blur does not converge at the ends of the bench offset's uncertainty";
     return result;
   }
-  const Eigen::Vector4d slope = (above.values - below.values) / (2 * offset_sigma_mm);
+  const Eigen::Vector4d slope = (above.values - below.values) / (2 * step_mm);
   result.covariance += slope * slope.transpose() * offset_sigma_mm * offset_sigma_mm;
   return result;
 }

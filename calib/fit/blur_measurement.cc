@@ -11,6 +11,7 @@
 #include "calib/edges/edge_spread.h"
 #include "calib/fit/blur_examples.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/base/statistics.h"
 
 namespace thicklens::calib {
 namespace {
@@ -24,6 +25,9 @@ constexpr double kModesOfAll = 30000;  // per ring, times frames
 constexpr int kPasses = 3;
 // No further pass follows if every frame's blur was predicted to within this part of the largest.
 constexpr double kExpectedWell = 0.3;
+
+constexpr double kVisibleBlurPx2 = 2;  // added variance that stands out in a registration
+constexpr double kUnusualRatio = 0.2;  // |ln| of the measured over the usual blur ratio
 
 double FloorToStartWith(const model::FloorKnowledge& floor) {
   if (floor.given_px) return floor.given_px->value * floor.given_px->value;
@@ -39,6 +43,8 @@ class Measurement {
     setup.pixel_pitch_mm = task.sweep.camera.sensor.pixel_pitch_mm;
     setup.law = task.law;
     setup.offset_mm = task.offset_mm;
+    evidence_.known_focus = task.known_focus;
+    evidence_.zero_is_open = task.zero_is_open;
     setup.direction = task.sweep.direction;
     setup.reading_sigma_mm = task.reading_sigma_mm;
     setup.reading_sigma_is_known = task.reading_sigma_is_known;
@@ -183,7 +189,7 @@ class Measurement {
 
   // ---- relative spectra ----
   void MeasureSpectra() {
-    double ratio = kDefaultRatio;
+    double ratio = RatioToStartWith();
     for (int pass = 0; pass < kPasses; ++pass) {
       SetUp(ratio);
       std::optional<EstimatorRegion> region =
@@ -213,6 +219,22 @@ class Measurement {
         return;
       }
     }
+  }
+
+  // The blur that the registrations show over the one expected for a ratio of 1. A bench offset
+  // that is far off, or wrong data of the lens, make the usual ratio a bad start.
+  double RatioToStartWith() const {
+    std::vector<double> ratios;
+    for (const ScaleSample& sample : task_.scales) {
+      const std::optional<double>& added_px2 = sample.registration.added_variance_px2;
+      if (!added_px2 || !(*added_px2 > kVisibleBlurPx2)) continue;
+      const double expected_px2 =
+          DefocusVariance(evidence_.setup, focus_mm_, DepthMm(sample.frame));
+      if (expected_px2 > 0) ratios.push_back(std::sqrt(*added_px2 / expected_px2));
+    }
+    if (ratios.size() < kMinFrames) return kDefaultRatio;
+    const double found = Median(ratios);
+    return std::abs(std::log(found / kDefaultRatio)) > kUnusualRatio ? found : kDefaultRatio;
   }
 
   void NoteNoSpectrum(const std::string& why) { evidence_.message = why; }

@@ -13,6 +13,7 @@
 #include "calib/sweep/frame_store.h"
 #include "thicklens/calib/calibration.h"
 #include "thicklens/calib/focus_sweep.h"
+#include "thicklens/model/conjugates.h"
 
 namespace thicklens::calib {
 
@@ -31,6 +32,9 @@ struct BlurTask {
   bool scale_follows_readings = false;  // then they may constrain readings' errors
   BlurModel law = BlurModel::kPerspective;
   model::Estimate offset_mm;
+  // Present: the plane of focus is known, and `offset_mm` is where the search of the offset starts.
+  std::optional<model::StatedConjugate> known_focus;
+  bool zero_is_open = false;   // nothing determines the offset; `offset_mm` is arbitrary
   double scale_centre_mm = 0;  // depth of the centre of perspective
   double reading_sigma_mm = 0;
   bool reading_sigma_is_known = true;
@@ -42,7 +46,9 @@ struct BlurTask {
 
 // The measurements of the estimators.
 struct BlurEvidence {
-  BlurFitSetup setup;               // has frames and estimators; the floor is left open
+  BlurFitSetup setup;  // has frames and estimators; the floor is left open
+  std::optional<model::StatedConjugate> known_focus;  // as in BlurTask
+  bool zero_is_open = false;                          // as in BlurTask
   std::vector<std::size_t> frames;  // indices into the sweep, for each of setup.frames
   int edges = -1, spectrum = -1;    // indices into setup.estimators; -1: absent
   // Edges of a target that is not stated to be an edge, where its texture is fitted. They give an

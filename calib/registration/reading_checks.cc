@@ -128,8 +128,7 @@ std::string ReasonOfUnknownOffset(const ScaleModel& law) {
                                         : "to calibrate without the image scale, state offset_mm");
 }
 
-std::optional<std::string> ReasonAgainstScales(const FocusSweep& sweep,
-                                               const std::vector<FrameMeasurement>& frames,
+std::optional<std::string> ReasonAgainstScales(const std::vector<FrameMeasurement>& frames,
                                                const std::vector<std::size_t>& used,
                                                const ScaleModel& law) {
   std::set<std::uint64_t> different;
@@ -140,7 +139,6 @@ std::optional<std::string> ReasonAgainstScales(const FocusSweep& sweep,
         used.size(), different.size(), law.message);
   }
   if (law.kind == ScaleKind::kReversed || law.contradicts_readings) return law.message;
-  if (law.kind == ScaleKind::kConstant && !sweep.offset_mm) return ReasonOfUnknownOffset(law);
   return std::nullopt;
 }
 

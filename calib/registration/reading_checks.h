@@ -30,8 +30,7 @@ std::string ReasonOfUnknownOffset(const ScaleModel& law);
 
 // Why the image scales of the used frames forbid any result: the readings run the other way or have
 // no order at all, or one image was repeated for all of them. Otherwise std::nullopt.
-std::optional<std::string> ReasonAgainstScales(const FocusSweep& sweep,
-                                               const std::vector<FrameMeasurement>& frames,
+std::optional<std::string> ReasonAgainstScales(const std::vector<FrameMeasurement>& frames,
                                                const std::vector<std::size_t>& used,
                                                const ScaleModel& law);
 

@@ -34,6 +34,7 @@ using Points = std::vector<Point>;
 // value = intercept + slope reading, fitted robustly against outliers.
 struct Line {
   double intercept = 0, slope = 0;
+  double slope_sigma = 0;
   double zero_sigma_mm = 0;  // error of the reading at which the value is 0
   double chi2 = 0;
   double Zero() const { return -intercept / slope; }
@@ -96,6 +97,7 @@ Line FitLine(const Points& points, double reading_sigma_mm, double widening) {
     const Eigen::Vector2d solved = covariance * right;
     line.slope = solved.y();
     line.intercept = solved.x() - solved.y() * middle_mm;
+    line.slope_sigma = std::sqrt(std::max(0.0, covariance(1, 1)));
     if (line.slope != 0) {
       const Eigen::Vector2d by(-1 / line.slope, solved.x() / (line.slope * line.slope));
       line.zero_sigma_mm = std::sqrt(std::max(0.0, by.dot(covariance * by)));
@@ -214,8 +216,22 @@ class Comparison {
   }
 
   // Cost of the blur ratio that the depth requires. Nearer than the focal point there is no image.
+  // In a sweep that is short against its depth, the scale determines the depth poorly: the slope of
+  // 1/scale, which is 1/depth, takes its best value, which costs its square in standard deviations.
   double OfDepth(double unit) const {
-    const double depth_mm = unit * result_.reference_depth_mm;
+    constexpr int kSteps = 60;
+    constexpr double kReach = 6;  // standard deviations of the slope
+    const double slope = std::abs(inverse_.slope);
+    double least = ChiSquareOfRatio(-1);
+    for (int i = -kSteps; i <= kSteps; ++i) {
+      const double off = kReach * i / kSteps;
+      const double moved = slope + off * inverse_.slope_sigma;
+      if (moved > 0) least = std::min(least, off * off + OfDepthAlone(unit / moved));
+    }
+    return least;
+  }
+
+  double OfDepthAlone(double depth_mm) const {
     if (!(depth_mm > sweep_.camera.lens.front_focal_length_mm)) return ChiSquareOfRatio(-1);
     if (!result_.blur_slope) return 0;
     return ChiSquareOfRatio(result_.blur_slope->RatioOfMovingTarget(sweep_.camera, depth_mm));
@@ -378,12 +394,7 @@ std::string UnitAdvice(const FocusSweep& sweep, const std::vector<FrameMeasureme
         "readings are in mm, and check the focal length",
         placed, f1_mm);
   }
-  // The blur may confirm that the target is so near: magnifications above 1 are not unusual.
-  if (!(*farthest < 2 * f1_mm) || (causes.blur_slope && causes.ReadingsMayBeRight())) return "";
-  return fmt::format(
-      "{}, less than two focal lengths ({:.3g} mm), where the image is larger than the target: "
-      "check that the readings are in mm, unless the image is indeed larger than life",
-      placed, 2 * f1_mm);
+  return "";
 }
 
 std::string ConstantScaleWarning(const FocusSweep& sweep, const std::vector<ScaleSample>& samples) {

@@ -54,9 +54,9 @@ ScaleCauses CompareScaleCauses(const std::vector<ScaleSample>& samples, const Fo
 std::optional<std::string> ReasonOfScaleCauses(const FocusSweep& sweep, const ScaleModel& law,
                                                const ScaleCauses& causes);
 
-// A question about the unit of the readings. It is asked where the law places every frame so near
-// that no image would form, or one larger than the target, and the blur does not confirm it. The
-// text names the unit that fits, if there is one. Otherwise it is empty.
+// A question about the unit of the readings. It is asked where the law places a frame so near that
+// no image would form, or where the blur shows another unit, which the text then names. Otherwise
+// it is empty: an image larger than its target is nothing unusual.
 std::string UnitAdvice(const FocusSweep& sweep, const std::vector<FrameMeasurement>& frames,
                        const ScaleModel& law, const ScaleCauses& causes);
 

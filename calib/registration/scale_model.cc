@@ -28,6 +28,8 @@ constexpr double kStatedScatter = 1.5;
 // longest bench would explain the change.
 constexpr double kConstantChange = 1e-3;
 constexpr double kLongestBenchMm = 1e4;
+// A change over the sweep below which scatter about the law is that of the registrations.
+constexpr double kSmallChange = 0.02;
 constexpr double kSignificant = 4;
 // Common error of the registrations from one end of a sweep to the other, measured on simulated
 // sweeps of known scale.
@@ -296,6 +298,7 @@ class ModelFinder {
     if (!AreEnough(following)) {
       DoesNotFollow(following, result);
     } else if (!is_close) {
+      result->changes_too_little = std::abs(line_.slope) * range_mm_ < kSmallChange;
       result->message = fmt::format(
           "readings and image scales scatter by {:.2g} mm about their law, {:.0f} % of the "
           "readings' range: too much to determine the bench offset (the readings are worse than "
@@ -349,11 +352,13 @@ class ModelFinder {
     } else if (const double most = change + 2 * change_sigma;
                most < kConstantChange && range_mm_ > most * kLongestBenchMm) {
       result->kind = ScaleKind::kConstant;
+      result->changes_too_little = true;
       result->message =
           "the image scale does not change with the reading (a telecentric lens, a moving sensor, "
           "frames that were aligned, or one image repeated): it does not determine the bench "
           "offset";
     } else {
+      result->changes_too_little = true;
       result->message = fmt::format(
           "the readings span {:.3g} mm, too little to determine how the image scale changes with "
           "them (by {:.2g} +- {:.2g} %): state offset_mm, or extend the sweep",

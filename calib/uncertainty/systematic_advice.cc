@@ -27,6 +27,14 @@ std::optional<std::string> WrongShape(const Calibration& calibration) {
   return std::nullopt;
 }
 
+// What was stated can only be stated more exactly.
+std::string RemedyOfOffset(const std::string& origin) {
+  if (!origin.empty() && origin != kFromScale) return fmt::format("state {} more exactly", origin);
+  return "state the magnification (by target_period_mm with a grid or ruler in view), "
+         "image_distance_mm, focus_depth_mm or offset_mm; or sweep over a longer range, so that "
+         "the image scale determines it better";
+}
+
 }  // namespace
 
 void SortAndAdvise(Calibration* calibration) {
@@ -61,8 +69,7 @@ void SortAndAdvise(Calibration* calibration) {
         due_to(worst_mm, WithArticle(parts.front().name)) + parts.front().remedy;
   } else if (zero_mm > noise_mm) {
     calibration->diagnostics.advice = due_to(zero_mm, "the bench offset") +
-                                      "measure offset_mm, or sweep over a longer range so that the "
-                                      "image scale determines it better";
+                                      RemedyOfOffset(calibration->diagnostics.bench_offset_from);
   } else {
     calibration->diagnostics.advice =
         due_to(noise_mm, "noise and readings") + "take more frames, or use a finer bench scale";

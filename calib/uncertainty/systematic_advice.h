@@ -14,6 +14,9 @@ namespace thicklens::calib {
 // shape is clearly wrong.
 inline constexpr const char* kShapePart = "shape of the blur";
 
+// CalibrationDiagnostics::bench_offset_from where the image scale determines the bench offset.
+inline constexpr char kFromScale[] = "the image scale";
+
 // Sorts the parts, the largest first, and gives the advice: how to shrink the largest share of the
 // error of d1. The statistical part counts at its 95 %, without the share of the bench offset,
 // which counts separately (0 without a zero). A wrong shape of the blur has priority over all

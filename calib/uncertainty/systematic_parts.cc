@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "calib/fit/blur_tails.h"
+#include "calib/fit/known_focus.h"
 #include "calib/fit/pupil_shapes.h"
 #include "calib/uncertainty/systematic_advice.h"
 
@@ -47,6 +48,7 @@ class Parts {
     AddTails();
     AddEstimator();
     AddTolerances();
+    AddAssumedTolerance();
     SystematicPart own;
     own.name = "blur estimator";
     own.blur_ratio = kEstimatorRatioError * fit_.values[kBlurRatio] * Eigen::Vector2d(-1, 1);
@@ -69,7 +71,9 @@ class Parts {
     widen(trial.fit.values[kBlurRatio] - fit_.values[kBlurRatio], &part->blur_ratio);
   }
 
-  Trial Try(const BlurFitSetup& setup) const { return {FitBlur(setup, &fit_), setup.lens}; }
+  Trial Try(const BlurFitSetup& setup) const {
+    return {FitBlurWith(setup, evidence_.known_focus, &fit_), setup.lens};
+  }
 
   void AddFloor(const FloorInterval& floor) {
     if (!floor) return;
@@ -297,6 +301,28 @@ class Parts {
       }
       if (is_used) result_.diagnostics.systematic_parts.push_back(part);
     }
+  }
+
+  // Where a magnification or a distance of the image gives the plane of focus, zf is in proportion
+  // to the focal length. Without a stated tolerance, that of labels is tried.
+  void AddAssumedTolerance() {
+    const auto& known = evidence_.known_focus;
+    if (!known || known->kind == model::ConjugateKind::kFocusDepth || sweep_.camera.objective ||
+        sweep_.camera.statements.count("lens.front_focal_length_mm") > 0)
+      return;
+    SystematicPart part;
+    part.name = "focal length";
+    part.remedy = fmt::format(
+        "state the tolerance of lens.front_focal_length_mm, from which {} gives the in-focus "
+        "distance ({:.0f} % is assumed)",
+        known->name, 100 * kFocalLengthTolerance);
+    for (const double change : {-kFocalLengthTolerance, kFocalLengthTolerance}) {
+      BlurFitSetup setup = evidence_.setup;
+      setup.lens.front_focal_length_mm *= 1 + change;
+      setup.lens.rear_focal_length_mm *= 1 + change;
+      Include(Try(setup), &part);
+    }
+    result_.diagnostics.systematic_parts.push_back(part);
   }
 
   // Changes a number of the camera file. Returns false if the fit does not use the number, or if

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "calib/calibrate/focus_solution.h"
+#include "calib/uncertainty/systematic_advice.h"
 #include "tests/calib/blur_samples.h"
 #include "thicklens/model/thick_lens.h"
 
@@ -34,6 +35,7 @@ struct FocusCase {
     sweep.camera.lens = bench.lens;
     sweep.camera.sensor.pixel_pitch_mm = bench.pitch_mm;
     sweep.direction = bench.direction;
+    calibration.diagnostics.bench_offset_from = calib::kFromScale;
     calibration.summary.bench_offset_mm =
         calib::Result{bench.offset_mm, offset_sigma_mm, std::nullopt};
     calib::FrameMeasurement dark;

@@ -317,6 +317,8 @@ json FitJson(const calib::Calibration& calibration) {
           {"channels", ChannelsJson(calibration.diagnostics.channels)},
           {"systematic_parts", PartsJson(calibration.diagnostics.systematic_parts)},
           {"advice", TextJson(calibration.diagnostics.advice)},
+          {"bench_offset_from", TextJson(calibration.diagnostics.bench_offset_from)},
+          {"magnification_at_focus", EstimateJson(calibration.diagnostics.magnification_at_focus)},
           {"examples", ExamplesJson(calibration)},
           {"frames_used", calibration.summary.frames_used},
           {"status", calib::OutcomeName(calibration.summary.outcome)},

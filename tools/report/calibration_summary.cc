@@ -129,6 +129,7 @@ std::string SecondaryLines(const calib::Calibration& calibration,
   }
   AddLine("sharpest", SharpestLine(calibration), &text);
   AddLine("focus", FocusReadingLine(calibration), &text);
+  AddLine("bench offset", OffsetOriginLine(calibration), &text);
   const calib::ScaleModel& scale = calibration.diagnostics.scale;
   if (!scale.done) AddLine("image scale", ScaleChangeLine(scale), &text);
   text +=

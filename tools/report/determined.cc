@@ -46,9 +46,22 @@ std::string SharpestLine(const calib::Calibration& calibration) {
 
 std::string FocusReadingLine(const calib::Calibration& calibration) {
   if (!calibration.diagnostics.focus_reading_mm) return "";
-  return fmt::format("reading {}, from the blur, without the error of the bench offset",
-                     WithError(calibration.diagnostics.focus_reading_mm->value,
-                               calibration.diagnostics.focus_reading_mm->sigma, "mm"));
+  std::string line = fmt::format("reading {}, from the blur, without the error of the bench offset",
+                                 WithError(calibration.diagnostics.focus_reading_mm->value,
+                                           calibration.diagnostics.focus_reading_mm->sigma, "mm"));
+  if (const auto& slope = calibration.diagnostics.blur_slope_px_per_mm)
+    line += fmt::format("; the blur grows by {} per mm of reading",
+                        WithError(slope->value, slope->sigma, "px"));
+  return line;
+}
+
+std::string OffsetOriginLine(const calib::Calibration& calibration) {
+  const calib::CalibrationDiagnostics& diagnostics = calibration.diagnostics;
+  if (diagnostics.bench_offset_from.empty()) return "";
+  std::string line = "by " + diagnostics.bench_offset_from;
+  if (const auto& m = diagnostics.magnification_at_focus; m && calibration.summary.focus_depth_mm)
+    line += fmt::format("; magnification at focus {}", WithError(m->value, m->sigma, ""));
+  return line;
 }
 
 std::string ScaleChangeLine(const calib::ScaleModel& scale) {
@@ -98,6 +111,7 @@ nlohmann::json SharpestJson(const calib::Calibration& calibration) {
   out["sharpest_image"] =
       image.empty() ? nlohmann::json(nullptr) : nlohmann::json(PrintableUtf8(image));
   out["focus_by_blur_mm"] = ErrorJson(calibration.diagnostics.focus_reading_mm);
+  out["blur_slope_px_per_mm"] = ErrorJson(calibration.diagnostics.blur_slope_px_per_mm);
   return out;
 }
 

@@ -113,26 +113,30 @@ TEST(SolveFocus, ABlurWithinItsErrorsIsRefused) {
   EXPECT_EQ(passes.calibration.summary.outcome, Outcome::kOk) << passes.calibration.summary.reason;
 }
 
-// The blur determines where focus is in the sweep; unknown is where the sweep is.
+// The blur determines where focus is in the sweep; unknown is where the sweep is. Its length is no
+// measure of that: d1 and kappa depend on how far the target is from the focal point.
 TEST(SolveFocus, ABenchZeroThatIsNotKnownIsNotBlamedOnTheBlur) {
   BlurBench bench = ExactBench();
-  // So short that the relative error of the blur ratio is smaller than that of zf
   bench.first_mm = 380;
   bench.last_mm = 425;
-  const double half_mm = 0.5 * (bench.last_mm - bench.first_mm);
-  // Nearly the whole error of the bench offset enters zf.
-  const FocusCase trial = Solved(bench, 0.001, 10);
-  const double per_zero = trial.calibration.summary.focus_depth_mm->sigma / 10;
-  EXPECT_NEAR(per_zero, 1, 0.1);
-  const FocusCase c = Solved(bench, 0.001, 1.1 * half_mm / per_zero);
+  // kappa is in proportion to zf (zf - f1).
+  const double f1_mm = bench.lens.front_focal_length_mm;
+  const double ratio_per_mm = bench.ratio * (1 / bench.focus_mm + 1 / (bench.focus_mm - f1_mm));
+  const double limit_mm = bench.ratio / 3 / ratio_per_mm;
+  EXPECT_GT(limit_mm, 60) << "more than the length of the sweep";
+  const FocusCase c = Solved(bench, 0.001, 1.1 * limit_mm);
   ExpectRefused(c.calibration,
                 "the bench offset is not known well enough: the sweep is 45 mm long");
-  EXPECT_THAT(c.calibration.summary.reason, HasSubstr("State offset_mm"));
+  EXPECT_THAT(c.calibration.summary.reason,
+              AllOf(HasSubstr("State one of: target_period_mm"), HasSubstr("offset_mm")));
   ASSERT_TRUE(c.calibration.diagnostics.focus_reading_mm) << "the reading of focus is determined";
   EXPECT_NEAR(c.calibration.diagnostics.focus_reading_mm->value, 400 - bench.offset_mm, 0.2);
   EXPECT_LT(c.calibration.diagnostics.focus_reading_mm->sigma, 1);
-  const FocusCase passes = Solved(bench, 0.001, 0.9 * half_mm / per_zero);
+  const FocusCase passes = Solved(bench, 0.001, 0.9 * limit_mm);
   EXPECT_EQ(passes.calibration.summary.outcome, Outcome::kOk) << passes.calibration.summary.reason;
+  EXPECT_NEAR(passes.calibration.summary.focus_depth_mm->sigma, 0.9 * limit_mm, 0.1 * limit_mm);
+  EXPECT_NEAR(passes.calibration.summary.blur_ratio->sigma, 0.9 * bench.ratio / 3,
+              0.1 * bench.ratio / 3);
 }
 
 TEST(SolveFocus, AFocusThatTheBlurDoesNotFixIsRefused) {

@@ -143,37 +143,6 @@ TEST(Reason, ALensThatMovesIsNamedAndNotTheDirectionOrTheUnit) {
   }
 }
 
-// At 1:1, with 3 mm of sweep at 200 mm, the scale determines the zero only to some millimetres.
-TEST(Reason, AnUnknownZeroOfAMacroSweepIsNamedAndTheFocusReported) {
-  model::SweepSimulationOptions options = SweepCase("ii", 384, 1);
-  options.camera.lens = testing::ThinLens(100, 17.86);
-  options.camera.sensor.pixel_pitch_mm = 0.0043;
-  options.camera.calibration->image_distance_mm = model::Estimate{200, 0};
-  options.first_depth_mm = 198.53;
-  options.step_mm = 0.1;
-  options.bench_offset_mm = 100;
-  options.reading_sigma_mm = 0.002;
-  options.bits = 16;
-  const SimulatedSweep simulated = Simulate(options);
-  for (const bool is_stated : {false, true}) {
-    SimulatedSweep s = simulated;
-    s.sweep.offset_mm.reset();
-    if (is_stated) s.sweep.offset_mm = model::Estimate{100, 2};
-    const Calibration c = CalibrateWithoutMap(s);
-    ASSERT_EQ(c.summary.outcome, Outcome::kRefused) << c.summary.reason;
-    EXPECT_THAT(
-        c.summary.reason,
-        AllOf(StartsWith("the bench offset is not known well enough"), HasSubstr("State offset_mm"),
-              HasSubstr("reading at focus is known: 100"),
-              Not(HasSubstr("that the readings are in mm")), Not(HasSubstr("blur does not"))))
-        << c.summary.reason;
-    ASSERT_TRUE(c.diagnostics.focus_reading_mm);
-    EXPECT_NEAR(c.diagnostics.focus_reading_mm->value, 100, 0.01);
-    EXPECT_LT(c.diagnostics.focus_reading_mm->sigma, 0.01);
-    ExpectSharpestAt(c, 100, 0.1);
-  }
-}
-
 // The bands prevent most frames from being registered to one another.
 TEST(Reason, AFlickeringLampIsNamedWhereFramesDoNotRegister) {
   SimulatedSweep s = Good();

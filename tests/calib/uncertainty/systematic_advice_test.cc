@@ -13,6 +13,7 @@
 namespace thicklens::calib {
 namespace {
 
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 using thicklens::testing::BlurBench;
@@ -106,12 +107,18 @@ TEST(WidenFocus, TheAdviceNamesTheLargestShare) {
       {0.001, 0.001, 0.3, "34 % of the error of d1 is due to noise and readings: take more frames"},
       {0.0016, 0.001, 0.3, "30 % of the error of d1 is due to noise and readings"},
       {0.0017, 0.001, 0.3, "30 % of the error of d1 is due to the first"},
-      {0.0014, 0.001, 0.4, "31 % of the error of d1 is due to the bench offset: measure offset_mm"},
+      {0.0014, 0.001, 0.4,
+       "31 % of the error of d1 is due to the bench offset: state the magnification"},
       {0.0018, 0.001, 0.4, "31 % of the error of d1 is due to the first"},
       // The share of the zero is not larger than the whole error of zf.
       {0.001, 0.001, 7, "51 % of the error of d1 is due to the bench offset"},
   };
   const model::ThickLens lens = BlurBench().lens;
+  Calibration stated = Plain(400, 0.5, 7, lens);
+  stated.diagnostics.bench_offset_from = "magnification";
+  WidenFocus("a hair", 0.001, "nothing", lens, &stated);
+  EXPECT_THAT(stated.diagnostics.advice,
+              EndsWith("the bench offset: state magnification more exactly"));
   for (const Case& k : cases) {
     SCOPED_TRACE(k.advice);
     Calibration c = Plain(400, 0.5, k.zero_mm, lens);

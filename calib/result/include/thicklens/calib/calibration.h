@@ -105,6 +105,9 @@ struct ScaleModel {
   // Relative increase of 1/scale over the range of the readings: positive where the target looks
   // smaller at larger readings ("away"). It is present whenever enough frames were registered.
   std::optional<model::Estimate> change_over_sweep;
+  // The scale of one target was measured, but it changes too little over the sweep to determine the
+  // offset, which the target's blur does not need.
+  bool changes_too_little = false;
   bool shows_no_scale = false;  // the target (spokes) looks the same at any scale: not sought
   int reference_frame = -1;     // index of the frame with scale 1; -1: none
   Result offset_mm;             // the bench offset: position of the aperture
@@ -260,6 +263,14 @@ struct CalibrationDiagnostics {
   // Reading at the plane of focus by the blur fit: the position of focus in the sweep. Its error
   // does not include that of the bench offset.
   std::optional<model::Estimate> focus_reading_mm;
+  // Growth of the sigma of the blur on the sensor far from focus, px per mm of reading. It needs
+  // neither camera nor bench offset either, and is present where focus_reading_mm is.
+  std::optional<model::Estimate> blur_slope_px_per_mm;
+  // Magnification in the plane of focus, f1/(zf - f1), dimensionless; present where zf is.
+  std::optional<model::Estimate> magnification_at_focus;
+  // What determines the bench offset: "offset_mm", "the image scale", or the name of the statement
+  // of the sweep's file or the camera file. Empty: nothing does.
+  std::string bench_offset_from;
   // The symptoms whose causes were compared, with the causes that are named.
   std::vector<Diagnosis> diagnoses;
   FrameStructureFinding structure;  // vignetting, bands and dust of the frames

@@ -1,0 +1,101 @@
+#include "calib/calibrate/zero_choice.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "calib/fit/blur_measurement.h"
+#include "calib/fit/known_focus.h"
+#include "calib/registration/target_period.h"
+#include "calib/uncertainty/systematic_advice.h"
+#include "thicklens/base/statistics.h"
+
+namespace thicklens::calib {
+namespace {
+
+constexpr double kSeenBlurPx2 = 2;          // added variance that stands out
+constexpr double kContradicts = 3;          // standard deviations
+constexpr double kMinContradiction = 1e-3;  // of zf
+
+}  // namespace
+
+std::optional<model::StatedConjugate> MagnificationOfPeriod(const FocusSweep& sweep,
+                                                            const cv::Mat& grey,
+                                                            double beyond_focus_mm) {
+  if (!sweep.target_period_mm) return std::nullopt;
+  const std::optional<PeriodEstimate> period = MeasurePeriodPx(grey);
+  if (!period) return std::nullopt;
+  const double in_frame =
+      period->period_px * sweep.camera.sensor.pixel_pitch_mm / *sweep.target_period_mm;
+  const double f1_mm = sweep.camera.lens.front_focal_length_mm;
+  double magnification = in_frame;
+  constexpr int kRounds = 20;  // each divides the error by about zf over the distance
+  for (int round = 0; round < kRounds; ++round) {
+    const double zf_mm = f1_mm * (1 + 1 / magnification);
+    const double at_focus = in_frame * (zf_mm + beyond_focus_mm) / zf_mm;
+    if (!(at_focus > 0)) return std::nullopt;
+    magnification = at_focus;
+  }
+  model::StatedConjugate stated;
+  stated.kind = model::ConjugateKind::kMagnification;
+  stated.value = {magnification, magnification * period->sigma_px / period->period_px};
+  stated.name = "target_period_mm";
+  return stated;
+}
+
+std::optional<model::StatedConjugate> MostPrecise(
+    const model::Camera& camera, const std::vector<model::StatedConjugate>& statements) {
+  const auto sigma_mm = [&](const model::StatedConjugate& stated) {
+    return FocusDepthWithTolerance(camera, stated).sigma;
+  };
+  const auto best =
+      std::min_element(statements.begin(), statements.end(),
+                       [&](const auto& a, const auto& b) { return sigma_mm(a) < sigma_mm(b); });
+  if (best == statements.end()) return std::nullopt;
+  return *best;
+}
+
+// [D131] sigma = kappa (r/p) f1/(zf (zf - f1)) |reading - reading at focus|, solved for zf.
+double UsualFocusDepth(const model::Camera& camera, const std::vector<ScaleSample>& samples,
+                       double sharpest_reading_mm) {
+  const double f1_mm = camera.lens.front_focal_length_mm;
+  std::vector<double> slopes;  // px per mm
+  for (const ScaleSample& sample : samples) {
+    const std::optional<double>& added_px2 = sample.registration.added_variance_px2;
+    if (!added_px2 || !(*added_px2 > kSeenBlurPx2)) continue;
+    slopes.push_back(std::sqrt(*added_px2) / sample.scale /
+                     std::abs(sample.reading_mm - sharpest_reading_mm));
+  }
+  if (slopes.empty() || !std::isfinite(Median(slopes))) return 2 * f1_mm;
+  const double product_mm2 = kDefaultRatio * camera.lens.aperture_radius_mm /
+                             camera.sensor.pixel_pitch_mm * f1_mm / Median(slopes);
+  return 0.5 * (f1_mm + std::sqrt(f1_mm * f1_mm + 4 * product_mm2));
+}
+
+void CompareWithStatements(const FocusSweep& sweep,
+                           const std::vector<model::StatedConjugate>& statements,
+                           Calibration* calibration) {
+  if (!calibration->summary.focus_depth_mm) return;
+  for (const model::StatedConjugate& stated : statements) {
+    const Result& found = *calibration->summary.focus_depth_mm;
+    const std::string& origin = calibration->diagnostics.bench_offset_from;
+    if (stated.name == origin) continue;
+    const model::Estimate focus_mm = FocusDepthWithTolerance(sweep.camera, stated);
+    const double apart_mm = focus_mm.value - found.value;
+    if (!(std::abs(apart_mm) >
+          kContradicts * std::hypot(focus_mm.sigma, found.sigma) + kMinContradiction * found.value))
+      continue;
+    calibration->summary.warnings.push_back(fmt::format(
+        "{} ({:.5g}) puts the in-focus distance at {:.5g} +- {:.2g} mm, {:+.3g} mm from that by {} "
+        "({:.5g} +- {:.2g} mm): one of them, the focal length, the pixel pitch or the unit of the "
+        "readings is wrong",
+        stated.name, stated.value.value, focus_mm.value, focus_mm.sigma, apart_mm, origin,
+        found.value, found.sigma));
+    WidenFocus(stated.name + " contradicts " + origin, std::abs(apart_mm),
+               "find out which of them is wrong: state the reliable one alone", sweep.camera.lens,
+               calibration);
+  }
+}
+
+}  // namespace thicklens::calib

@@ -1,0 +1,42 @@
+#ifndef THICKLENS_CALIB_FIT_KNOWN_FOCUS_H_
+#define THICKLENS_CALIB_FIT_KNOWN_FOCUS_H_
+
+#include <optional>
+
+#include "calib/fit/blur_fit.h"
+#include "thicklens/model/camera.h"
+#include "thicklens/model/conjugates.h"
+
+namespace thicklens::calib {
+
+// The part of a focal length within which it is taken to be right if the camera file states no
+// tolerance: labels are rounded by about as much.
+inline constexpr double kFocalLengthTolerance = 0.01;
+
+// The tolerance of the focal lengths relative to them: the one that the camera file states, or
+// kFocalLengthTolerance. 0 for an objective, whose equivalent lens is exact by its definition.
+double FocalLengthTolerance(const model::Camera& camera);
+
+// zf of a statement, mm from Ap. Sigma includes the error that a tolerance of the focal lengths, as
+// an even distribution, gives it.
+model::Estimate FocusDepthWithTolerance(const model::Camera& camera,
+                                        const model::StatedConjugate& stated);
+
+// FitBlur where the plane of focus is known and the bench offset is not [D130]: the offset is the
+// one at which the fitted zf is that of the statement; `setup.offset_mm` is only where its search
+// starts. With the fit's covariance C at a held offset and its slope g = d(zf, kappa, S0,
+// offset)/d offset, an error e of the fit and an error e_s of the statement's zf give
+//   (1 - g u^T/g_zf) e + g e_s/g_zf,  u^T e = e_zf,
+// so that zf has the error of the statement alone. `done` is false, with the reason, where the
+// statement is impossible for the lens.
+BlurFitResult FitBlurAtKnownFocus(const BlurFitSetup& setup, const model::StatedConjugate& known,
+                                  const BlurFitResult* start = nullptr);
+
+// FitBlurAtKnownFocus if a statement is given, otherwise FitBlur.
+BlurFitResult FitBlurWith(const BlurFitSetup& setup,
+                          const std::optional<model::StatedConjugate>& known,
+                          const BlurFitResult* start = nullptr);
+
+}  // namespace thicklens::calib
+
+#endif  // THICKLENS_CALIB_FIT_KNOWN_FOCUS_H_
