@@ -8,6 +8,7 @@
 namespace thicklens::calib {
 namespace {
 
+constexpr char kFocalLength[] = "lens.front_focal_length_mm";
 constexpr int kMaxMoves = 12;
 // The search ends where the fitted zf differs from the known one by less than this part of its own
 // error, or of zf.
@@ -35,11 +36,15 @@ BlurFitResult MovedBy(double move_mm, const BlurFitSetup& setup, const BlurFitRe
 
 }  // namespace
 
+bool StatesFocalLength(const model::Camera& camera) {
+  const auto stated = camera.statements.find(kFocalLength);
+  return stated != camera.statements.end() && stated->second.tolerance > 0;
+}
+
 double FocalLengthTolerance(const model::Camera& camera) {
   if (camera.objective) return 0;
-  const auto stated = camera.statements.find("lens.front_focal_length_mm");
-  return stated != camera.statements.end() && stated->second.tolerance > 0
-             ? stated->second.tolerance / camera.lens.front_focal_length_mm
+  return StatesFocalLength(camera)
+             ? camera.statements.at(kFocalLength).tolerance / camera.lens.front_focal_length_mm
              : kFocalLengthTolerance;
 }
 

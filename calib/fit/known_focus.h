@@ -13,6 +13,9 @@ namespace thicklens::calib {
 // tolerance: labels are rounded by about as much.
 inline constexpr double kFocalLengthTolerance = 0.01;
 
+// Whether the camera file states a tolerance of the front focal length.
+bool StatesFocalLength(const model::Camera& camera);
+
 // The tolerance of the focal lengths relative to them: the one that the camera file states, or
 // kFocalLengthTolerance. 0 for an objective, whose equivalent lens is exact by its definition.
 double FocalLengthTolerance(const model::Camera& camera);

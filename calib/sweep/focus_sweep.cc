@@ -75,6 +75,69 @@ bool IsKnown(const model::Estimate& estimate) {
   return std::isfinite(estimate.value) && estimate.sigma >= 0 && std::isfinite(estimate.sigma);
 }
 
+// The tolerance that the camera file states of a number; 0: none.
+double ToleranceOfField(const model::Camera& camera, const std::string& field) {
+  const auto found = camera.statements.find(field);
+  return found == camera.statements.end() ? 0 : found->second.tolerance;
+}
+
+// The standard deviation of an error of which only a bound is known: it is anywhere within.
+double SigmaOfTolerance(double tolerance) { return tolerance / std::sqrt(3.0); }
+
+// The depth from the aperture of the plane at the stated distance from the front of the lens.
+model::StatedConjugate DepthOfWorkingDistance(const model::Estimate& distance_mm,
+                                              const model::Camera& camera) {
+  if (!camera.aperture_behind_front_mm) {
+    throw Error(
+        "working_distance_mm is measured from the front of the lens: state "
+        "lens.aperture_behind_front_mm in the camera file (the distance from there to the "
+        "aperture), or state focus_depth_mm");
+  }
+  const double behind_mm = *camera.aperture_behind_front_mm;
+  const double depth_mm = distance_mm.value + behind_mm;
+  // Checked here, because later the sum is all that is known of the distance.
+  if (!(depth_mm > camera.lens.front_focal_length_mm)) {
+    throw Error(fmt::format(
+        "working_distance_mm is {}: with lens.aperture_behind_front_mm {} of the camera file it is "
+        "a depth of {:.6g} mm from the aperture, which must be larger than the front focal length "
+        "({:.6g} mm), because nothing nearer comes into focus",
+        distance_mm.value, behind_mm, depth_mm, camera.lens.front_focal_length_mm));
+  }
+  const double sigma_mm =
+      std::hypot(distance_mm.sigma,
+                 SigmaOfTolerance(ToleranceOfField(camera, "lens.aperture_behind_front_mm")));
+  return {model::ConjugateKind::kFocusDepth, {depth_mm, sigma_mm}, "working_distance_mm"};
+}
+
+// The magnification on the barrel of an objective. ISO 8039 allows it to deviate by 5 %, which
+// holds where the camera file states no tolerance.
+model::StatedConjugate MagnificationOfObjective(const model::Camera& camera) {
+  constexpr double kIso8039 = 0.05;
+  const std::string field = "lens.magnification";
+  const double magnification = camera.objective->magnification;
+  const double stated = ToleranceOfField(camera, field);
+  const double tolerance = stated > 0 ? stated : kIso8039 * magnification;
+  return {
+      model::ConjugateKind::kMagnification, {magnification, SigmaOfTolerance(tolerance)}, field};
+}
+
+std::vector<model::StatedConjugate> StatedFocus(const model::SweepFile& file,
+                                                const model::Camera& camera) {
+  using Kind = model::ConjugateKind;
+  std::vector<model::StatedConjugate> stated;
+  const auto add = [&](Kind kind, const std::optional<model::Estimate>& value, const char* key) {
+    if (value) stated.push_back({kind, *value, key});
+  };
+  add(Kind::kFocusDepth, file.focus_depth_mm, "focus_depth_mm");
+  if (file.working_distance_mm)
+    stated.push_back(DepthOfWorkingDistance(*file.working_distance_mm, camera));
+  add(Kind::kImageDistance, file.image_distance_mm, "image_distance_mm");
+  add(Kind::kTubeLength, file.optical_tube_length_mm, "optical_tube_length_mm");
+  add(Kind::kMagnification, file.magnification, "magnification");
+  if (camera.objective && !file.magnification) stated.push_back(MagnificationOfObjective(camera));
+  return stated;
+}
+
 }  // namespace
 
 bool FocusSweep::IsValid(std::string* why) const {
@@ -92,6 +155,13 @@ bool FocusSweep::IsValid(std::string* why) const {
     return Fail(why,
                 fmt::format("offset_mm must be finite with a finite sigma >= 0, found {} +- {}",
                             offset_mm->value, offset_mm->sigma));
+  }
+  for (const model::StatedConjugate& stated : stated_focus) {
+    try {
+      model::FocusDepthOf(camera.lens, stated);
+    } catch (const Error& error) {
+      return Fail(why, error.what());
+    }
   }
   if (floor.given_px && !(IsKnown(*floor.given_px) && floor.given_px->value >= 0)) {
     return Fail(why, fmt::format("floor.given_px must be finite and >= 0 with a finite sigma >= 0, "
@@ -134,6 +204,7 @@ FocusSweep MakeFocusSweep(const model::SweepFile& file, const model::Camera& cam
   sweep.frames = file.frames;
   sweep.reading_sigma_mm = file.reading_sigma_mm;
   sweep.offset_mm = file.offset_mm;
+  sweep.stated_focus = StatedFocus(file, camera);
   sweep.direction = file.direction;
   sweep.target = file.target;
   sweep.floor = file.floor;

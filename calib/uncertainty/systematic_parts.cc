@@ -308,7 +308,7 @@ class Parts {
   void AddAssumedTolerance() {
     const auto& known = evidence_.known_focus;
     if (!known || known->kind == model::ConjugateKind::kFocusDepth || sweep_.camera.objective ||
-        sweep_.camera.statements.count("lens.front_focal_length_mm") > 0)
+        StatesFocalLength(sweep_.camera))
       return;
     SystematicPart part;
     part.name = "focal length";
@@ -325,9 +325,27 @@ class Parts {
     result_.diagnostics.systematic_parts.push_back(part);
   }
 
+  // Changes a number of the objective's data, and with it the lens. Returns as Change does.
+  bool ChangeObjective(const std::string& field, double change, BlurFitSetup* setup) const {
+    model::Objective objective = *sweep_.camera.objective;
+    // The magnification is not tried here: its error is that of its statement about the plane of
+    // focus (FocusSweep::stated_focus) and would be counted twice.
+    double* number = field == "lens.numerical_aperture" ? &objective.numerical_aperture
+                     : field == "lens.tube_lens_focal_length_mm"
+                         ? &objective.tube_lens_focal_length_mm
+                         : nullptr;
+    if (number == nullptr) return false;
+    *number += change;
+    if (!objective.IsValid(nullptr)) return false;
+    setup->lens = model::LensOfObjective(objective);
+    return true;
+  }
+
   // Changes a number of the camera file. Returns false if the fit does not use the number, or if
   // its value is impossible.
-  static bool Change(const std::string& field, double change, BlurFitSetup* setup) {
+  bool Change(const std::string& field, double change, BlurFitSetup* setup) const {
+    if (sweep_.camera.objective && field.rfind("lens.", 0) == 0)
+      return ChangeObjective(field, change, setup);
     double* number = field == "lens.front_focal_length_mm"  ? &setup->lens.front_focal_length_mm
                      : field == "lens.rear_focal_length_mm" ? &setup->lens.rear_focal_length_mm
                      : field == "lens.lens_thickness_mm"    ? &setup->lens.lens_thickness_mm

@@ -22,6 +22,17 @@ namespace {
       camera.source.empty() ? fmt::format("camera '{}'", camera.name) : camera.source, missing));
 }
 
+// Whether the lens is that of the objective, up to the rounding of another way to compute it.
+bool IsLensOf(const Objective& objective, const ThickLens& lens) {
+  constexpr double kRounding = 1e-9;
+  const ThickLens expected = LensOfObjective(objective);
+  const auto same = [](double a, double b) { return std::abs(a - b) <= kRounding * b; };
+  return same(lens.front_focal_length_mm, expected.front_focal_length_mm) &&
+         same(lens.rear_focal_length_mm, expected.rear_focal_length_mm) &&
+         std::abs(lens.lens_thickness_mm) <= kRounding * expected.front_focal_length_mm &&
+         same(lens.aperture_radius_mm, expected.aperture_radius_mm);
+}
+
 }  // namespace
 
 std::string PsfName(Psf psf) { return psf == Psf::kGaussian ? "gaussian" : "disc"; }
@@ -42,6 +53,21 @@ bool Sensor::IsValid(std::string* why) const {
 bool Camera::IsValid(std::string* why) const {
   std::string inner;
   if (!lens.IsValid(&inner)) return Fail(why, "lens: " + inner);
+  if (objective) {
+    if (!objective->IsValid(&inner)) return Fail(why, "objective: " + inner);
+    if (!IsLensOf(*objective, lens)) {
+      return Fail(why, fmt::format("lens: it must be LensOfObjective of the objective, or the "
+                                   "objective absent: front_focal_length_mm is {} and "
+                                   "aperture_radius_mm {}, those of the objective are {} and {}",
+                                   lens.front_focal_length_mm, lens.aperture_radius_mm,
+                                   LensOfObjective(*objective).front_focal_length_mm,
+                                   LensOfObjective(*objective).aperture_radius_mm));
+    }
+  }
+  if (aperture_behind_front_mm && !std::isfinite(*aperture_behind_front_mm)) {
+    return Fail(why, fmt::format("aperture_behind_front_mm must be finite, found {}",
+                                 *aperture_behind_front_mm));
+  }
   if (!sensor.IsValid(&inner)) return Fail(why, "sensor: " + inner);
   if (!calibration) return true;
   const CameraCalibration& found = *calibration;
@@ -109,6 +135,7 @@ std::vector<std::string> AssumedFields(const Camera& camera) {
 }
 
 Camera ThinLensEquivalent(const Camera& camera) {
+  // An objective stays: its lens is thin, and so is its own equivalent.
   Camera thin = camera;
   thin.lens = ThinLensEquivalent(camera.lens);
   thin.calibration->image_distance_mm->value =

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "model/schema/former_blur_ratio.h"
 #include "model/schema/yaml_fields.h"
@@ -32,9 +33,59 @@ YamlNode ValueNode(const YamlNode& node, Camera* camera) {
   return node.At("value");
 }
 
+constexpr const char* kLengthsOfLens[] = {"front_focal_length_mm", "rear_focal_length_mm",
+                                          "lens_thickness_mm", "aperture_radius_mm"};
+constexpr const char* kDataOfObjective[] = {"magnification", "numerical_aperture",
+                                            "tube_lens_focal_length_mm"};
+constexpr char kApertureBehindFront[] = "aperture_behind_front_mm";
+
+// Returns the first of the keys that the map has; empty: it has none.
+template <std::size_t kCount>
+std::string FirstKeyOf(const YamlNode& node, const char* const (&keys)[kCount]) {
+  const auto found = std::find_if(std::begin(keys), std::end(keys),
+                                  [&node](const char* key) { return node.Has(key); });
+  return found == std::end(keys) ? "" : *found;
+}
+
+// Returns whether the lens is stated by the data of an objective. A mixture of both forms throws
+// Error: two statements of one lens could contradict each other.
+bool IsObjective(const YamlNode& node) {
+  const std::string length = FirstKeyOf(node, kLengthsOfLens);
+  const std::string datum = FirstKeyOf(node, kDataOfObjective);
+  if (!length.empty() && !datum.empty()) {
+    throw node.At(datum).ErrorHere(fmt::format(
+        "'{}' is of an objective and '{}' of a lens: state either {}, or {}, not both", datum,
+        length, fmt::join(kDataOfObjective, ", "), fmt::join(kLengthsOfLens, ", ")));
+  }
+  return !datum.empty();
+}
+
+void ReadObjective(const YamlNode& node, Camera* camera) {
+  Objective objective;
+  objective.magnification = ValueNode(node.At("magnification"), camera).PositiveNumber();
+  const YamlNode aperture = ValueNode(node.At("numerical_aperture"), camera);
+  objective.numerical_aperture = aperture.PositiveNumber();
+  if (!(objective.numerical_aperture < 1)) {
+    throw aperture.ErrorHere(fmt::format("must be < 1, found {}: immersion is not supported",
+                                         objective.numerical_aperture));
+  }
+  objective.tube_lens_focal_length_mm =
+      ValueNode(node.At("tube_lens_focal_length_mm"), camera).PositiveNumber();
+  camera->objective = objective;
+  camera->lens = LensOfObjective(objective);
+}
+
 void ReadLens(const YamlNode& node, Camera* camera) {
-  node.RequireKeys(
-      {"front_focal_length_mm", "rear_focal_length_mm", "lens_thickness_mm", "aperture_radius_mm"});
+  std::vector<std::string> keys(std::begin(kLengthsOfLens), std::end(kLengthsOfLens));
+  keys.insert(keys.end(), std::begin(kDataOfObjective), std::end(kDataOfObjective));
+  keys.emplace_back(kApertureBehindFront);
+  node.RequireKeys(keys);
+  if (const auto behind = node.Find(kApertureBehindFront))
+    camera->aperture_behind_front_mm = ValueNode(*behind, camera).Number();
+  if (IsObjective(node)) {
+    ReadObjective(node, camera);
+    return;
+  }
   ThickLens& lens = camera->lens;
   lens.front_focal_length_mm = ValueNode(node.At("front_focal_length_mm"), camera).PositiveNumber();
   lens.rear_focal_length_mm = ValueNode(node.At("rear_focal_length_mm"), camera).PositiveNumber();
@@ -132,12 +183,7 @@ class CameraWriter {
 
   std::string Write() {
     out_.Text("name", camera_.name);
-    out_.BeginMap("lens");
-    Stated("lens.", "front_focal_length_mm", camera_.lens.front_focal_length_mm);
-    Stated("lens.", "rear_focal_length_mm", camera_.lens.rear_focal_length_mm);
-    Stated("lens.", "lens_thickness_mm", camera_.lens.lens_thickness_mm);
-    Stated("lens.", "aperture_radius_mm", camera_.lens.aperture_radius_mm);
-    out_.EndMap();
+    WriteLens();
     WriteSensor();
     out_.Text("psf", PsfName(camera_.psf));
     if (camera_.calibration) WriteCalibration(*camera_.calibration);
@@ -175,6 +221,23 @@ class CameraWriter {
     } else {
       out_.Element(value);
     }
+  }
+
+  void WriteLens() {
+    out_.BeginMap("lens");
+    if (const auto& objective = camera_.objective) {
+      Stated("lens.", "magnification", objective->magnification);
+      Stated("lens.", "numerical_aperture", objective->numerical_aperture);
+      Stated("lens.", "tube_lens_focal_length_mm", objective->tube_lens_focal_length_mm);
+    } else {
+      Stated("lens.", "front_focal_length_mm", camera_.lens.front_focal_length_mm);
+      Stated("lens.", "rear_focal_length_mm", camera_.lens.rear_focal_length_mm);
+      Stated("lens.", "lens_thickness_mm", camera_.lens.lens_thickness_mm);
+      Stated("lens.", "aperture_radius_mm", camera_.lens.aperture_radius_mm);
+    }
+    if (camera_.aperture_behind_front_mm)
+      Stated("lens.", kApertureBehindFront, *camera_.aperture_behind_front_mm);
+    out_.EndMap();
   }
 
   void WriteSensor() {

@@ -24,6 +24,27 @@ void ReadOffset(const YamlNode& root, SweepFile* sweep) {
   sweep->offset_mm = ReadEstimate(*node, &YamlNode::Number);
 }
 
+// The statements about the plane of focus, in the order in which they are written. Each is > 0.
+struct FocusKey {
+  const char* key;
+  std::optional<Estimate> SweepFile::*field;
+};
+constexpr FocusKey kFocusKeys[] = {
+    {"focus_depth_mm", &SweepFile::focus_depth_mm},
+    {"working_distance_mm", &SweepFile::working_distance_mm},
+    {"image_distance_mm", &SweepFile::image_distance_mm},
+    {"optical_tube_length_mm", &SweepFile::optical_tube_length_mm},
+    {"magnification", &SweepFile::magnification},
+};
+
+void ReadFocus(const YamlNode& root, SweepFile* sweep) {
+  for (const FocusKey& of : kFocusKeys) {
+    const auto node = root.Find(of.key);
+    if (node && !IsUnknown(*node))
+      sweep->*of.field = ReadEstimate(*node, &YamlNode::PositiveNumber);
+  }
+}
+
 void ReadFloor(const YamlNode& root, SweepFile* sweep) {
   const auto node = root.Find("blur_floor_px");
   if (!node) return;
@@ -111,6 +132,11 @@ SweepFile ReadSweep(const std::string& path, const SweepReading& reading,
                     "readings_unit",
                     "reading_sigma_mm",
                     "offset_mm",
+                    "focus_depth_mm",
+                    "working_distance_mm",
+                    "image_distance_mm",
+                    "optical_tube_length_mm",
+                    "magnification",
                     "direction",
                     "target",
                     "target_period_mm",
@@ -140,6 +166,7 @@ SweepFile ReadSweep(const std::string& path, const SweepReading& reading,
     sweep.reading_sigma_stated = true;
   }
   ReadOffset(root, &sweep);
+  ReadFocus(root, &sweep);
   if (const auto direction = root.Find("direction")) {
     sweep.direction = direction->OneOf({"away", "toward"}) == "away" ? BenchDirection::kAway
                                                                      : BenchDirection::kToward;
@@ -210,6 +237,9 @@ std::string SweepToYaml(const SweepFile& sweep) {
     out.Measured("offset_mm", *sweep.offset_mm);
   } else {
     out.Text("offset_mm", "unknown");
+  }
+  for (const FocusKey& of : kFocusKeys) {
+    if (const auto& stated = sweep.*of.field) out.Measured(of.key, *stated);
   }
   out.Text("direction", BenchDirectionName(sweep.direction));
   out.Text("target", SweepTargetName(sweep.target));

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
+#include <string>
 
 #include "calib/uncertainty/systematic_parts.h"
 #include "tests/calib/focus_case.h"
@@ -80,6 +82,79 @@ TEST(AddSystematicParts, AToleranceIsWhatAnotherCameraFileWouldGive) {
     }
     EXPECT_GT(d1.norm() + kappa.norm(), 1e-4);
   }
+}
+
+// An objective that has the bench's lens and is focused on its plane: f = F/M, zf = f (1 + 1/M).
+model::Objective ObjectiveOfBench(const BlurBench& bench) {
+  const double f_mm = bench.lens.front_focal_length_mm;
+  const double magnification = f_mm / (bench.focus_mm - f_mm);
+  return {magnification, std::sin(std::atan(bench.lens.aperture_radius_mm / bench.focus_mm)),
+          f_mm * magnification};
+}
+
+// Solves the noisy bench with the lens of an objective in the place of its own.
+FocusCase SolvedWithObjective(const model::Objective& objective,
+                              const std::map<std::string, model::Provenance>& statements) {
+  BlurBench bench;
+  FocusCase c = FocusCase(bench).WithTexture(0.02).WithTrueFloor();
+  c.sweep.camera.objective = objective;
+  c.sweep.camera.lens = model::LensOfObjective(objective);
+  c.sweep.camera.statements = statements;
+  c.evidence.setup.lens = c.sweep.camera.lens;
+  c.Solve();
+  return c;
+}
+
+TEST(AddSystematicParts, AToleranceOfAnObjectiveIsWhatAnotherObjectiveWouldGive) {
+  const model::Objective objective = ObjectiveOfBench(BlurBench());
+  const struct {
+    const char* name;
+    double tolerance;
+    double model::Objective::*number;
+  } fields[] = {
+      {"lens.numerical_aperture", 4e-4, &model::Objective::numerical_aperture},
+      {"lens.tube_lens_focal_length_mm", 0.004, &model::Objective::tube_lens_focal_length_mm}};
+  for (const auto& field : fields) {
+    SCOPED_TRACE(field.name);
+    const FocusCase c = SolvedWithObjective(objective, {{field.name, {field.tolerance, false}}});
+    const SystematicPart* part = c.Part(field.name);
+    ASSERT_NE(part, nullptr);
+    Eigen::Vector2d d1(0, 0), kappa(0, 0);
+    const auto widen = [](double move, Eigen::Vector2d* ends) {
+      *ends = {std::min(ends->x(), move), std::max(ends->y(), move)};
+    };
+    for (const double change : {-field.tolerance, field.tolerance}) {
+      model::Objective other = objective;
+      other.*field.number += change;
+      const FocusCase again = SolvedWithObjective(other, {});
+      ASSERT_TRUE(again.calibration.summary.image_distance_mm) << again.calibration.summary.reason;
+      widen(again.calibration.summary.image_distance_mm->value -
+                c.calibration.summary.image_distance_mm->value,
+            &d1);
+      widen(again.calibration.summary.blur_ratio->value - c.calibration.summary.blur_ratio->value,
+            &kappa);
+    }
+    for (int end = 0; end < 2; ++end) {
+      EXPECT_NEAR(part->image_distance_mm[end], d1[end], 1e-7 + 1e-3 * std::abs(d1[end]));
+      EXPECT_NEAR(part->blur_ratio[end], kappa[end], 1e-6);
+    }
+    EXPECT_GT(kappa.norm(), 1e-3);
+  }
+}
+
+// Its error is that of the statement about the plane of focus.
+TEST(AddSystematicParts, TheMagnificationOfAnObjectiveIsNotTriedAgain) {
+  const model::Objective objective = ObjectiveOfBench(BlurBench());
+  const FocusCase c = SolvedWithObjective(objective, {{"lens.magnification", {0.001, false}},
+                                                      {"lens.numerical_aperture", {0.1, false}},
+                                                      {"sensor.pixel_pitch_mm", {1e-5, false}}});
+  EXPECT_EQ(c.Part("lens.magnification"), nullptr);
+  EXPECT_NE(c.Part("sensor.pixel_pitch_mm"), nullptr);
+  // The aperture minus its tolerance is below 0: only the larger one, with a smaller kappa, counts.
+  const SystematicPart* aperture = c.Part("lens.numerical_aperture");
+  ASSERT_NE(aperture, nullptr);
+  EXPECT_LT(aperture->blur_ratio.x(), -0.3);
+  EXPECT_EQ(aperture->blur_ratio.y(), 0);
 }
 
 // An end of the interval that is no valid lens is left out.

@@ -23,6 +23,7 @@ using ::testing::ElementsAre;
 using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 using ::testing::StartsWith;
 using ::thicklens::testing::ErrorOf;
 
@@ -159,6 +160,162 @@ TEST(CameraFile, StatementsAreKeptByPath) {
   EXPECT_THAT(ErrorWith("12.8", "{value: 12.8, sigma: 1}"), HasSubstr("unknown key 'sigma'"));
   EXPECT_THAT(ErrorWith("12.8", "{assumed: true}"), HasSubstr("'value' is missing"));
   EXPECT_THAT(ErrorWith("12.8", "{value: 12.8, assumed: perhaps}"), HasSubstr("'perhaps'"));
+}
+
+// ---- a lens that is stated by the data of an objective ----
+
+constexpr char kObjective[] =
+    "lens: {magnification: 10, numerical_aperture: 0.6, tube_lens_focal_length_mm: 200}\n";
+
+TEST(CameraFile, AnObjectiveStatesTheLens) {
+  const Camera camera = ParseCamera(Text("", kObjective), "c.yaml");
+  ASSERT_TRUE(camera.objective);
+  EXPECT_EQ(camera.objective->magnification, 10);
+  EXPECT_EQ(camera.objective->numerical_aperture, 0.6);
+  EXPECT_EQ(camera.objective->tube_lens_focal_length_mm, 200);
+  EXPECT_DOUBLE_EQ(camera.lens.front_focal_length_mm, 20);
+  EXPECT_DOUBLE_EQ(camera.lens.rear_focal_length_mm, 20);
+  EXPECT_EQ(camera.lens.lens_thickness_mm, 0);
+  // At the plane of focus, 22 mm, the cone has the sine 0.6 and the tangent 0.75.
+  EXPECT_NEAR(camera.lens.aperture_radius_mm, 16.5, 1e-12);
+  EXPECT_FALSE(ParseCamera(Text(""), "c.yaml").objective);
+
+  const Camera stated =
+      ParseCamera(Text("", Replaced(Replaced(kObjective, "10", "{value: 10, tolerance: 0.2}"),
+                                    "200", "{value: 200, assumed: true}")),
+                  "c.yaml");
+  EXPECT_EQ(stated.objective.value().magnification, 10);
+  ASSERT_EQ(stated.statements.size(), 2U);
+  EXPECT_EQ(stated.statements.at("lens.magnification").tolerance, 0.2);
+  EXPECT_THAT(AssumedFields(stated), ElementsAre("lens.tube_lens_focal_length_mm"));
+}
+
+TEST(CameraFile, AnObjectiveAndLengthsExcludeEachOther) {
+  EXPECT_EQ(ErrorOfText(Text("", Replaced(kObjective, "}", ", aperture_radius_mm: 3}"))),
+            "c.yaml:3:23: lens.magnification: 'magnification' is of an objective and "
+            "'aperture_radius_mm' of a lens: state either magnification, numerical_aperture, "
+            "tube_lens_focal_length_mm, or front_focal_length_mm, rear_focal_length_mm, "
+            "lens_thickness_mm, aperture_radius_mm, not both");
+  EXPECT_THAT(ErrorOfText(Text("", Replaced(kLens, "}", ", numerical_aperture: 0.1}"))),
+              AllOf(StartsWith("c.yaml:3:"), HasSubstr("'numerical_aperture' is of an objective"),
+                    HasSubstr("'front_focal_length_mm' of a lens")));
+}
+
+TEST(CameraFile, DataOfAnObjectiveAreChecked) {
+  const auto error = [](const std::string& what, const std::string& by) {
+    return ErrorOfText(Text("", Replaced(kObjective, what, by)));
+  };
+  EXPECT_EQ(error("0.6", "1.25"),
+            "c.yaml:3:47: lens.numerical_aperture: must be < 1, found 1.25: immersion is not "
+            "supported");
+  EXPECT_THAT(error("0.6", "{value: 1, tolerance: 0.1}"),
+              AllOf(StartsWith("c.yaml:3:55: lens.numerical_aperture.value: "),
+                    HasSubstr("immersion is not supported")));
+  EXPECT_THAT(error("0.6", "0"), HasSubstr("lens.numerical_aperture: must be > 0"));
+  EXPECT_THAT(error("10", "-10"), HasSubstr("c.yaml:3:23: lens.magnification: must be > 0"));
+  EXPECT_THAT(error("200", "0"), HasSubstr("lens.tube_lens_focal_length_mm: must be > 0"));
+  EXPECT_THAT(error(", tube_lens_focal_length_mm: 200", ""),
+              AllOf(StartsWith("c.yaml:3:"), HasSubstr("'tube_lens_focal_length_mm' is missing")));
+  EXPECT_THAT(error("numerical_aperture", "numerical_apperture"),
+              HasSubstr("did you mean 'numerical_aperture'?"));
+}
+
+TEST(CameraFile, ThePlaceOfTheApertureMayBeStatedWithBothForms) {
+  EXPECT_FALSE(ParseCamera(Text(""), "c.yaml").aperture_behind_front_mm);
+  for (const char* lens : {kLens, kObjective}) {
+    Camera camera =
+        ParseCamera(Text("", Replaced(lens, "}", ", aperture_behind_front_mm: 31.5}")), "c.yaml");
+    EXPECT_EQ(camera.aperture_behind_front_mm.value(), 31.5);
+    camera = ParseCamera(
+        Text("", Replaced(lens, "}",
+                          ", aperture_behind_front_mm: {value: -2, tolerance: 0.5, assumed: "
+                          "true}}")),
+        "c.yaml");
+    EXPECT_EQ(camera.aperture_behind_front_mm.value(), -2);
+    EXPECT_EQ(camera.statements.at("lens.aperture_behind_front_mm").tolerance, 0.5);
+    const Camera back = ParseCamera(CameraToYaml(camera), "c.yaml");
+    EXPECT_EQ(back.aperture_behind_front_mm.value(), -2);
+    EXPECT_EQ(back.statements.at("lens.aperture_behind_front_mm").tolerance, 0.5);
+    EXPECT_TRUE(back.statements.at("lens.aperture_behind_front_mm").assumed);
+    EXPECT_EQ(back.objective.has_value(), lens == kObjective);
+    EXPECT_THAT(
+        ErrorOfText(Text("", Replaced(lens, "}", ", aperture_behind_front_mm: near}"))),
+        AllOf(StartsWith("c.yaml:3:"), HasSubstr("lens.aperture_behind_front_mm: a number")));
+  }
+}
+
+TEST(CameraToYaml, AnObjectiveComesBackAsOne) {
+  for (const double magnification : {1.0 / 3, 1e29, 1.2345678901234567e-29, 10.0}) {
+    Camera camera = ParseCamera(Text("", kObjective), "c.yaml");
+    camera.objective->magnification = magnification;
+    camera.objective->numerical_aperture = 1.0 / 7;
+    camera.lens = LensOfObjective(*camera.objective);
+    camera.statements["lens.magnification"] = {0.3, false};
+    const std::string text = CameraToYaml(camera);
+    EXPECT_THAT(text, Not(HasSubstr("focal_length_mm: 20\n")));
+    const Camera back = ParseCamera(text, "c.yaml");
+    ASSERT_TRUE(back.objective) << text;
+    EXPECT_TRUE(SameBits(back.objective->magnification, magnification)) << magnification;
+    EXPECT_TRUE(SameBits(back.objective->numerical_aperture, 1.0 / 7));
+    EXPECT_TRUE(SameBits(back.lens.aperture_radius_mm, camera.lens.aperture_radius_mm));
+    EXPECT_EQ(back.statements.at("lens.magnification").tolerance, 0.3);
+    EXPECT_EQ(CameraToYaml(back), text);
+  }
+}
+
+TEST(Camera, AnObjectiveAgreesWithTheLens) {
+  const auto why = [](const auto& change) {
+    Camera camera = ParseCamera(Text("", kObjective), "c.yaml");
+    change(&camera);
+    std::string reason;
+    return camera.IsValid(&reason) ? "valid" : reason;
+  };
+  EXPECT_EQ(why([](Camera*) {}), "valid");
+  for (double ThickLens::*length :
+       {&ThickLens::front_focal_length_mm, &ThickLens::rear_focal_length_mm,
+        &ThickLens::lens_thickness_mm, &ThickLens::aperture_radius_mm}) {
+    EXPECT_THAT(why([&](Camera* c) { c->lens.*length += 1e-4; }),
+                HasSubstr("it must be LensOfObjective of the objective"));
+    EXPECT_EQ(why([&](Camera* c) {
+                c->lens.*length += 1e-4;
+                c->objective.reset();
+              }),
+              "valid");
+  }
+  EXPECT_THAT(why([](Camera* c) { c->objective->numerical_aperture = 1; }),
+              HasSubstr("objective: numerical_aperture is 1"));
+  EXPECT_THAT(why([](Camera* c) {
+                c->aperture_behind_front_mm = std::numeric_limits<double>::quiet_NaN();
+              }),
+              HasSubstr("aperture_behind_front_mm must be finite"));
+}
+
+TEST(Camera, TheThinEquivalentOfAnObjectiveIsItself) {
+  Camera camera = ParseCamera(Text("", kObjective), "c.yaml");
+  camera.calibration.emplace();
+  camera.calibration->image_distance_mm = Estimate{220, 0.1};
+  const Camera thin = ThinLensEquivalent(camera);
+  std::string reason;
+  EXPECT_TRUE(thin.IsValid(&reason)) << reason;
+  EXPECT_TRUE(thin.objective.has_value());
+  EXPECT_NEAR(thin.image_distance_mm(), 220, 1e-10);
+}
+
+// The former schema has no objectives of its own; its conversion needs the lens alone.
+TEST(CameraFile, AnObjectiveOfTheFormerSchemaIsConvertedAsItsLens) {
+  const std::string calibration =
+      "calibration: {image_distance_mm: 220, blur_ratio: 0.45, evidence: {method: "
+      "joint-blur-fit}}\n";
+  const auto former = [&](const std::string& lens) {
+    return ParseCamera(Replaced(Text(calibration, lens), "camera/2", "camera/1"), "c.yaml");
+  };
+  const Camera objective = former(kObjective);
+  const Camera lengths = former(
+      "lens: {front_focal_length_mm: 20, rear_focal_length_mm: 20, lens_thickness_mm: 0, "
+      "aperture_radius_mm: 16.5}\n");
+  EXPECT_NE(objective.blur_ratio(), 0.45);
+  EXPECT_NEAR(objective.blur_ratio(), lengths.blur_ratio(), 1e-12);
+  EXPECT_TRUE(objective.IsValid(nullptr));
 }
 
 Camera FullCamera() {

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -22,6 +23,7 @@ using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 using ::testing::SizeIs;
 using ::thicklens::testing::ContentOf;
 using ::thicklens::testing::ErrorOf;
@@ -50,6 +52,63 @@ TEST_F(SweepFolder, Offset) {
   EXPECT_THAT(ErrorWith(frames_ + "offset_mm: [1]\n"), HasSubstr("offset_mm"));
   EXPECT_THAT(ErrorWith(frames_ + "offset_mm: {value: 1, sigma: -1}\n"),
               HasSubstr("offset_mm.sigma"));
+}
+
+// Each statement about the plane of focus, with its key.
+struct StatementOfFocus {
+  const char* key;
+  std::optional<Estimate> SweepFile::*field;
+};
+constexpr StatementOfFocus kStatementsOfFocus[] = {
+    {"focus_depth_mm", &SweepFile::focus_depth_mm},
+    {"working_distance_mm", &SweepFile::working_distance_mm},
+    {"image_distance_mm", &SweepFile::image_distance_mm},
+    {"optical_tube_length_mm", &SweepFile::optical_tube_length_mm},
+    {"magnification", &SweepFile::magnification}};
+
+TEST_F(SweepFolder, PlaneOfFocus) {
+  for (const StatementOfFocus& of : kStatementsOfFocus) {
+    SCOPED_TRACE(of.key);
+    const std::string key = of.key;
+    EXPECT_FALSE((Read(frames_).*of.field).has_value());
+    EXPECT_FALSE((Read(frames_ + key + ": unknown\n").*of.field).has_value());
+    EXPECT_EQ((Read(frames_ + key + ": 2.5\n").*of.field).value().value, 2.5);
+    EXPECT_EQ((Read(frames_ + key + ": 2.5\n").*of.field).value().sigma, 0);
+    const SweepFile sweep = Read(frames_ + key + ": {value: 0.5, sigma: 0.02}\n");
+    EXPECT_EQ((sweep.*of.field).value().value, 0.5);
+    EXPECT_EQ((sweep.*of.field).value().sigma, 0.02);
+    for (const StatementOfFocus& other : kStatementsOfFocus)
+      EXPECT_EQ((sweep.*other.field).has_value(), other.key == of.key);
+    const std::string place = "s.yaml:4:" + std::to_string(key.size() + 3) + ": " + key;
+    EXPECT_THAT(ErrorWith(frames_ + key + ": 0\n"), HasSubstr(place + ": must be > 0, found 0"));
+    EXPECT_THAT(ErrorWith(frames_ + key + ": -3\n"), HasSubstr(place + ": must be > 0, found -3"));
+    EXPECT_THAT(ErrorWith(frames_ + key + ": near\n"), HasSubstr(place));
+    EXPECT_THAT(ErrorWith(frames_ + key + ": {value: -3}\n"),
+                HasSubstr(key + ".value: must be > 0, found -3"));
+    EXPECT_THAT(ErrorWith(frames_ + key + ": {value: 3, sigma: -1}\n"),
+                HasSubstr(key + ".sigma: must be >= 0"));
+    EXPECT_THAT(ErrorWith(frames_ + key + ": {value: 3, tolerance: 1}\n"),
+                HasSubstr("unknown key 'tolerance'"));
+  }
+}
+
+TEST_F(SweepFolder, StatementsOfFocusAreWrittenOnlyIfThereAreAny) {
+  const SweepFile none = Read(frames_);
+  for (const StatementOfFocus& of : kStatementsOfFocus)
+    EXPECT_THAT(SweepToYaml(none), Not(HasSubstr(of.key)));
+  SweepFile all = none;
+  all.camera_path = "c.yaml";
+  all.frames = {{"a.png", 1}};
+  double value = 1.0 / 3;
+  for (const StatementOfFocus& of : kStatementsOfFocus)
+    all.*of.field = Estimate{value += 1, value / 7};
+  folder_.Put("back.yaml", SweepToYaml(all));
+  const SweepFile back = ReadSweep(folder_ / "back.yaml", nullptr);
+  for (const StatementOfFocus& of : kStatementsOfFocus) {
+    SCOPED_TRACE(of.key);
+    EXPECT_EQ((back.*of.field).value().value, (all.*of.field).value().value);
+    EXPECT_EQ((back.*of.field).value().sigma, (all.*of.field).value().sigma);
+  }
 }
 
 TEST_F(SweepFolder, Floor) {
@@ -276,11 +335,18 @@ TEST(FileFormatsPage, ExamplesAreRead) {
   };
   const TemporaryFolder folder;
   EXPECT_EQ(ParseCamera(example("thicklens/camera/2"), "page").name, "bench-camera");
+  const Camera microscope = ParseCamera(example("thicklens/camera/2\nname: microscope"), "page");
+  EXPECT_EQ(microscope.objective.value().magnification, 10);
+  EXPECT_EQ(microscope.statements.at("lens.magnification").tolerance, 0.2);
 
   folder.Put("bench/frames/1.png");
   folder.Put("bench/positions.csv", "1.png,400\n");
   const std::string sweep = folder.Put("bench/sweep.yaml", example("thicklens/sweep/1"));
   EXPECT_THAT(ReadSweep(sweep, nullptr).frames, SizeIs(1));
+
+  const std::string macro =
+      folder.Put("bench/macro.yaml", example("thicklens/sweep/1\ncamera: macro.yaml"));
+  EXPECT_EQ(ReadSweep(macro, nullptr).magnification.value().value, 0.5);
 
   folder.Put("cameras/macro-bench.yaml",
              ContentOf(std::string(THICKLENS_SOURCE_DIR) + "/configs/cameras/macro-bench.yaml"));

@@ -27,7 +27,8 @@ struct FocusSweep {
   FrameReader read_frame;                    // set by the caller
   double reading_sigma_mm = 0;               // standard deviation of a reading, mm; 0: not stated
   std::optional<model::Estimate> offset_mm;  // absent: found from the image scale
-  // What is known of the plane of focus, by the sweep's file or the data of an objective.
+  // What is known of the plane of focus, by the sweep's file or the data of an objective. The names
+  // are the keys of the files, "magnification" or "lens.magnification".
   std::vector<model::StatedConjugate> stated_focus;
   model::BenchDirection direction = model::BenchDirection::kAway;  // sign of the reading in z
   model::SweepTarget target = model::SweepTarget::kAuto;  // kind of the target, if it is stated
@@ -44,8 +45,10 @@ struct FocusSweep {
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
 };
 
-// Makes a FocusSweep from its description. The caller sets `read_frame`. Throws Error if the
-// description takes its floor from the calibration of another camera.
+// Makes a FocusSweep from its description. The caller sets `read_frame`. A working distance becomes
+// a depth from Ap; an objective states its magnification unless the description does. Throws Error
+// if the description takes its floor from the calibration of another camera, or if its working
+// distance cannot be converted.
 THICKLENS_EXPORT FocusSweep MakeFocusSweep(const model::SweepFile& file,
                                            const model::Camera& camera);
 

@@ -90,8 +90,8 @@ struct CameraCalibration {
 
 // A thick lens with its sensor. It owns all its data; copies are independent.
 struct Camera {
-  std::string name;          // name for messages and reports
-  ThickLens lens;            // lengths in mm from the principal planes
+  std::string name;  // name for messages and reports
+  ThickLens lens;    // lengths in mm from the principal planes
   // The data of a microscope objective by which the lens is stated; `lens` is LensOfObjective.
   std::optional<Objective> objective;
   // Distance from the front of the lens's barrel to Ap behind it, mm. It converts working distances
