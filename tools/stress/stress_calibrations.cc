@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "thicklens/model/objective.h"
 #include "tools/stress/stress_suite.h"
 #include "tools/stress/stress_sweeps.h"
 
@@ -288,11 +289,64 @@ std::vector<StressCase> Optics() {
   return cases;
 }
 
+// A sweep of 31 frames about the plane of focus, whose bench offset is not stated.
+StressSweep Macro(const model::ThickLens& lens, double pitch_mm, double focus_mm, double step_mm) {
+  StressSweep sweep = Simulated([=](model::SweepSimulationOptions* simulation) {
+    simulation->camera.lens = lens;
+    simulation->camera.sensor.pixel_pitch_mm = pitch_mm;
+    simulation->camera.calibration->image_distance_mm =
+        model::Estimate{model::ImageDistanceMm(lens, focus_mm), 0};
+    simulation->first_depth_mm = focus_mm - 14.7 * step_mm;
+    simulation->step_mm = step_mm;
+    simulation->frame_count = 31;
+    simulation->bench_offset_mm = 0.3 * focus_mm;
+    simulation->reading_sigma_mm = 0.03 * step_mm;
+    simulation->bits = 16;
+  });
+  sweep.describe = [](model::SweepFile* file) { file->offset_mm.reset(); };
+  return sweep;
+}
+
+std::vector<StressCase> Macros() {
+  const auto within = [](double most_mm) {
+    return std::string("d1, zf and kappa within 4 standard errors of the truth, d1 within ") +
+           (most_mm < 1 ? "1" : std::to_string(std::lround(most_mm))) + " mm";
+  };
+  const model::ThickLens one_to_one = {100, 100, 0, 17.86};
+  std::vector<StressCase> cases;
+  cases.push_back(Sweep("macro-without-bench-offset",
+                        "magnification 1: 3 mm of sweep at 200 mm, whose image scale determines "
+                        "the bench offset to millimetres",
+                        within(20), Macro(one_to_one, 0.0043, 200, 0.1), Truth(20000)));
+  StressSweep known = Macro(one_to_one, 0.0043, 200, 0.1);
+  known.describe = [](model::SweepFile* file) {
+    file->offset_mm.reset();
+    file->magnification = model::Estimate{1, 0.001};
+  };
+  cases.push_back(Sweep("macro-with-magnification",
+                        "the same, with a magnification that is known to 0.1 %", within(1), known,
+                        Truth(1000)));
+  const model::Objective objective = {20, 0.4, 200};
+  StressSweep microscope = Macro(model::LensOfObjective(objective), 0.0065, 10.5, 0.001);
+  cases.push_back(Sweep(
+      "microscope-without-distance",
+      "magnification 20: 30 um of sweep, and nothing says how far the target is",
+      "refused: nothing determines the distance; the reading at focus is given", microscope,
+      Refusal({"nothing determines the distance of the target", "reading at focus is known"})));
+  microscope.change_camera = [objective](model::Camera* camera) { camera->objective = objective; };
+  cases.push_back(Sweep("microscope-with-objective",
+                        "the same, with the data of the objective in the camera file: the "
+                        "magnification is known to 5 %",
+                        within(20), microscope, Truth(20000)));
+  return cases;
+}
+
 }  // namespace
 
 std::vector<StressCase> CalibrationStressCases() {
   std::vector<StressCase> all;
-  for (std::vector<StressCase> part : {Frames2To5(), Focus(), Readings(), Damages(), Optics()}) {
+  for (std::vector<StressCase> part :
+       {Frames2To5(), Focus(), Readings(), Damages(), Optics(), Macros()}) {
     for (StressCase& hard : part) all.push_back(std::move(hard));
   }
   return all;
