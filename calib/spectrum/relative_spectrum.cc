@@ -157,6 +157,14 @@ class Fit {
     modes_ = *std::max_element(counts_.begin(), counts_.end());
   }
 
+  // The reference of an astigmatic lens is not the sharpest frame along either axis. The leakage is
+  // proportional to V for a small blur, so that its sign changes where a frame is sharper.
+  static Eigen::ArrayXcd SignedLeakage(const WindowLeakage& leakage, double added_px2,
+                                       std::size_t count) {
+    if (added_px2 >= 0) return leakage.At(added_px2, count);
+    return -leakage.At(-added_px2, count);
+  }
+
   // The window's leakage at the modes of a frame.
   Eigen::ArrayXcd LeakageOfFrame(Eigen::Index i) const {
     const Variance added =
@@ -167,8 +175,8 @@ class Fit {
     } else {
       // B_y B_x seen through the window: the leakage of one axis is blurred along the other.
       Eigen::ArrayXcd leaked = Eigen::ArrayXcd::Zero(Count(i));
-      const Eigen::ArrayXcd along[] = {leakage_.x.At(added[0], count),
-                                       leakage_.y.At(added[1], count)};
+      const Eigen::ArrayXcd along[] = {SignedLeakage(leakage_.x, added[0], count),
+                                       SignedLeakage(leakage_.y, added[1], count)};
       for (Eigen::Index k = 0; k < leaked.size(); ++k) {
         for (const int axis : {0, 1}) {
           const double other =

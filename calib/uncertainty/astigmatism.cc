@@ -134,8 +134,8 @@ class Astigmatism {
     WidenFocusAndRatio(
         "astigmatism", from_0(middle_mm - zf, 0),
         from_0(map.along_x->blur_ratio.value - kappa, map.along_y->blur_ratio.value - kappa),
-        "use a lens without astigmatism, or the middle of its field; zf and kappa "
-        "are those of neither direction",
+        "focus is at two depths: restrict roi_px to the middle of the field, or use a "
+        "smaller aperture or another lens",
         sweep_.camera.lens, &result_);
   }
 
