@@ -61,21 +61,29 @@ std::string CausesOfMisfit(const FocusSweep& sweep, const BlurEvidence& evidence
 }
 
 bool IsAstigmatic(const Calibration& calibration) {
-  const auto& astigmatism = calibration.diagnostics.field.astigmatism_mm;
-  return astigmatism &&
+  const FieldMap& field = calibration.diagnostics.field;
+  const auto& astigmatism = field.astigmatism_mm;
+  return astigmatism && field.along_x && field.along_y &&
          std::abs(astigmatism->value) >
              std::max(kSignificant * astigmatism->sigma, kMatters * SweepLengthMm(calibration));
 }
 
 std::string AstigmatismInWords(const Calibration& calibration) {
   if (!IsAstigmatic(calibration)) return "";
-  const model::Estimate& astigmatism = *calibration.diagnostics.field.astigmatism_mm;
+  const FieldMap& field = calibration.diagnostics.field;
+  const model::Estimate& astigmatism = *field.astigmatism_mm;
+  const model::Estimate& x = field.along_x->focus_depth_mm;
+  const model::Estimate& y = field.along_y->focus_depth_mm;
   return fmt::format(
-      "the blur along x is smallest at a depth {:.3g} +- {:.2g} mm {} than the blur along y: the "
-      "lens is astigmatic, or the texture along x has other depths than the texture along y (turn "
-      "the target by 90 degrees: only an effect of the lens stays the same). One blur law does not "
-      "describe both directions, and zf lies between their depths",
-      std::abs(astigmatism.value), astigmatism.sigma, astigmatism.value < 0 ? "nearer" : "farther");
+      "the blur along x is smallest at a depth of {:.2f} +- {:.2g} mm (kappa {:.3f}) and the blur "
+      "along y at {:.2f} +- {:.2g} mm (kappa {:.3f}), {:.3g} +- {:.2g} mm {}: the lens is "
+      "astigmatic, or the texture along x has other depths than the texture along y (turn the "
+      "target by 90 degrees: only an effect of the lens stays the same). One blur law does not "
+      "describe both directions; the intervals of zf, d1 and kappa include the middle between both "
+      "depths and both kappa",
+      x.value, x.sigma, field.along_x->blur_ratio.value, y.value, y.sigma,
+      field.along_y->blur_ratio.value, std::abs(astigmatism.value), astigmatism.sigma,
+      astigmatism.value < 0 ? "farther" : "nearer");
 }
 
 bool AstigmatismExplains(double spread_mm, const Calibration& calibration) {

@@ -2,6 +2,7 @@
 #define THICKLENS_CALIB_SPECTRUM_RELATIVE_SPECTRUM_H_
 
 #include <Eigen/Core>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -26,6 +27,8 @@ struct SpectrumSample {
   FrameSpectrum spectrum;
   double pixel_noise = 0;         // standard deviation of a pixel of the frame
   double start_variance_px2 = 0;  // V, relative to the reference for a Gaussian, otherwise absolute
+  // V along x and along y at the start of FitAxialBlur; absent: start_variance_px2 for both.
+  std::optional<Eigen::Vector2d> start_variances_px2;
 };
 
 struct RelativeBlurOptions {
@@ -58,6 +61,28 @@ struct RelativeBlur {
 RelativeBlur FitRelativeBlur(const std::vector<SpectrumSample>& samples, std::size_t reference,
                              const TargetWindow& window, const std::vector<Mode>& modes,
                              const WindowLeakage& leakage, const RelativeBlurOptions& options);
+
+// Blur along x and along y of each sample.
+struct AxialBlur {
+  bool done = false;
+  std::string message = "not run";
+  Eigen::Matrix2Xd
+      variances_px2;            // V_x and V_y, px^2 of the target; those of the reference are held
+  Eigen::MatrixXd covariance;   // of V_x and V_y of the samples in turn: x0, y0, x1, y1 ..
+  Eigen::VectorXd gains;        // g
+  Eigen::Matrix2Xd shifts_px;   // t
+  Eigen::VectorXd noise_ratio;  // scatter about the fit over what the pixel noise explains
+  std::vector<int> modes_used;  // number of modes of each sample
+  double chi2_per_dof = 0;      // all samples, relative to the pixel noise
+};
+
+// The same fit with two variances per frame: V |nu|^2 in H becomes V_x nu_x^2 + V_y nu_y^2 [D129].
+// Along a direction of frequency, V is then V_x cos^2 + V_y sin^2; a disc becomes an ellipse. V_x
+// and V_y are each known up to a constant of its own. The band is a limit for each direction,
+// because different frames may be sharpest along x and along y.
+AxialBlur FitAxialBlur(const std::vector<SpectrumSample>& samples, std::size_t reference,
+                       const TargetWindow& window, const std::vector<Mode>& modes,
+                       const AxisLeakage& leakage, const RelativeBlurOptions& options);
 
 // The transfer function H of one frame at |nu|, cycles per target px.
 double BlurTransfer(const RelativeBlurOptions& options, double variance_px2, double scale,

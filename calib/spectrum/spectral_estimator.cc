@@ -228,6 +228,19 @@ void MeasureRegions(const SpectralEstimatorSetup& setup, std::vector<EstimatorRe
   }
 }
 
+AxisLeakage MeasureAxisLeakage(const SpectralEstimatorSetup& setup, const EstimatorRegion& region,
+                               double largest_variance_px2) {
+  const EstimatorFrame& frame = setup.frames[region.frames[region.reference]];
+  const cv::Mat reference = Derotated(setup.read_grey(frame.frame), setup, frame);
+  const auto along = [&](const Eigen::Vector2d& axis) {
+    return WindowLeakage(reference, setup.origin_px, region.window, region.modes,
+                         region.samples[region.reference].spectrum, setup.psf,
+                         kLeakageMargin * std::sqrt(largest_variance_px2) + 0.5, setup.threads,
+                         axis);
+  };
+  return {along(Eigen::Vector2d::UnitX()), along(Eigen::Vector2d::UnitY())};
+}
+
 EstimatorRegion PartOf(const EstimatorRegion& region,
                        const std::function<bool(std::size_t frame)>& frame,
                        const std::function<bool(const Mode& mode)>& mode) {

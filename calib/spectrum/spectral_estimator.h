@@ -57,6 +57,11 @@ std::optional<EstimatorRegion> PlanRegion(const SpectralEstimatorSetup& setup, d
 // see are removed from it.
 void MeasureRegions(const SpectralEstimatorSetup& setup, std::vector<EstimatorRegion>* regions);
 
+// The leakage of a measured region's window for blur along x and along y, for a blur of up to
+// `largest_variance_px2` beyond that of the reference, px^2 of the target.
+AxisLeakage MeasureAxisLeakage(const SpectralEstimatorSetup& setup, const EstimatorRegion& region,
+                               double largest_variance_px2);
+
 // Part of a measured region: only those frames and modes for which the predicates are true. The
 // argument of `frame` is an index into SpectralEstimatorSetup::frames. The reference must be kept.
 EstimatorRegion PartOf(const EstimatorRegion& region,

@@ -21,7 +21,7 @@ constexpr double kLeakageBand = 4;  // H below exp(-4): no frame uses such a mod
 WindowLeakage::WindowLeakage(const cv::Mat& reference, const Eigen::Vector2d& origin_px,
                              const TargetWindow& window, const std::vector<Mode>& modes,
                              const FrameSpectrum& spectrum, model::Psf psf, double largest_sigma_px,
-                             int threads) {
+                             int threads, const Eigen::Vector2d& axes) {
   if (!(largest_sigma_px > 0)) return;
   step_px_ = largest_sigma_px / (kLeakageNodes - 1);
   const int pad = static_cast<int>(std::ceil(4 * largest_sigma_px));
@@ -48,7 +48,8 @@ WindowLeakage::WindowLeakage(const cv::Mat& reference, const Eigen::Vector2d& or
   nodes_[0] = Eigen::ArrayXcd::Zero(static_cast<Eigen::Index>(modes.size()));
   ParallelFor(kLeakageNodes - 1, threads, [&](int index) {
     const double sigma = step_px_ * (index + 1);
-    std::size_t count = 0;
+    // A blur along one axis leaves modes of every frequency in the band.
+    std::size_t count = axes.minCoeff() > 0 ? 0 : modes.size();
     while (count < modes.size() &&
            kTwoPiSquared * sigma * sigma * ModeFrequency(modes[count], window).squaredNorm() <
                kLeakageBand)
@@ -62,7 +63,8 @@ WindowLeakage::WindowLeakage(const cv::Mat& reference, const Eigen::Vector2d& or
       for (int u = 0; u < blurred.cols; ++u) {
         const double fx =
             static_cast<double>(u <= blurred.cols / 2 ? u : u - blurred.cols) / blurred.cols;
-        row[u] *= static_cast<float>(model::DefocusTransfer(psf, sigma, fx, fy));
+        row[u] *=
+            static_cast<float>(model::DefocusTransfer(psf, sigma, axes.x() * fx, axes.y() * fy));
       }
     }
     cv::Mat image;
@@ -75,8 +77,9 @@ WindowLeakage::WindowLeakage(const cv::Mat& reference, const Eigen::Vector2d& or
     for (std::size_t k = 0; k < count; ++k) {
       const Eigen::Vector2d nu = ModeFrequency(modes[k], window);
       const auto i = static_cast<Eigen::Index>(k);
-      node[i] =
-          seen->values[i] - spectrum.values[i] * model::DefocusTransfer(psf, sigma, nu.x(), nu.y());
+      node[i] = seen->values[i] - spectrum.values[i] * model::DefocusTransfer(psf, sigma,
+                                                                              axes.x() * nu.x(),
+                                                                              axes.y() * nu.y());
     }
   });
 }

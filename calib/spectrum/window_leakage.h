@@ -17,11 +17,12 @@ namespace thicklens::calib {
 class WindowLeakage {
  public:
   WindowLeakage() = default;
-  // `largest_sigma_px` is the end of the table. `spectrum` is that of the reference.
+  // `largest_sigma_px` is the end of the table. `spectrum` is that of the reference. `axes` are 1
+  // for the axes along which the image is blurred, and 0 for the others.
   WindowLeakage(const cv::Mat& reference, const Eigen::Vector2d& origin_px,
                 const TargetWindow& window, const std::vector<Mode>& modes,
-                const FrameSpectrum& spectrum, model::Psf psf, double largest_sigma_px,
-                int threads);
+                const FrameSpectrum& spectrum, model::Psf psf, double largest_sigma_px, int threads,
+                const Eigen::Vector2d& axes = {1, 1});
 
   // The leakage at the first `count` modes for a blur of `variance_px2` beyond that of the
   // reference; 0 for no added blur.
@@ -33,6 +34,11 @@ class WindowLeakage {
  private:
   double step_px_ = 0;                  // step of sigma between the nodes
   std::vector<Eigen::ArrayXcd> nodes_;  // fewer modes at strong blur; the rest is 0
+};
+
+// The leakage of a blur along x alone, and of one along y alone.
+struct AxisLeakage {
+  WindowLeakage x, y;
 };
 
 }  // namespace thicklens::calib

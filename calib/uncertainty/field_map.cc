@@ -10,6 +10,7 @@
 #include <opencv2/core.hpp>
 
 #include "calib/fit/misfit_causes.h"
+#include "calib/uncertainty/astigmatism.h"
 #include "calib/uncertainty/evenly_spread.h"
 #include "calib/uncertainty/systematic_advice.h"
 #include "thicklens/base/parallel.h"
@@ -48,9 +49,7 @@ class Field {
     }
     setup_.read_grey = [this](std::size_t frame) { return store_.Grey(frame); };
     // Astigmatism comes first, because it may cause different in-focus distances over the field.
-    MeasureAstigmatism();
-    const std::string astigmatism = AstigmatismInWords(result_);
-    if (!astigmatism.empty()) result_.summary.warnings.push_back(astigmatism);
+    MeasureAstigmatism(sweep_, evidence_, fit_, &result_);
     MapTiles();
     MeasureChannels();
   }
@@ -333,36 +332,6 @@ class Field {
                      "the sensor"
                    : "restrict roi_px to a part of the target at one depth",
                sweep_.camera.lens, &result_);
-  }
-
-  // Measures zf from the blur along x alone and along y alone.
-  void MeasureAstigmatism() {
-    const TargetWindow& window = evidence_.region.window;
-    const auto along = [&](int axis) {
-      EstimatorRegion part = PartOf(
-          evidence_.region, [&](std::size_t f) { return NewIndex(f).has_value(); },
-          [&](const Mode& mode) {
-            const Eigen::Vector2d nu = ModeFrequency(mode, window).cwiseAbs();
-            return nu[axis] > nu[1 - axis];
-          });
-      for (std::size_t& f : part.frames) f = *NewIndex(f);
-      std::string message;
-      return FocusOf(part, &message);
-    };
-    const auto along_x = along(0);
-    const auto along_y = along(1);
-    if (!along_x || !along_y) return;
-    result_.diagnostics.field.astigmatism_mm = model::Estimate{
-        along_x->value - along_y->value, std::hypot(along_x->sigma, along_y->sigma)};
-  }
-
-  // Returns the index, among the frames used here, of a frame of the evidence's own set-up.
-  std::optional<std::size_t> NewIndex(std::size_t evidence_index) const {
-    const std::size_t frame = evidence_.spectral.frames[evidence_index].frame;
-    for (std::size_t f = 0; f < setup_.frames.size(); ++f) {
-      if (setup_.frames[f].frame == frame) return f;
-    }
-    return std::nullopt;
   }
 
   void MeasureChannels() {

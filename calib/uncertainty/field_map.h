@@ -8,11 +8,12 @@
 
 namespace thicklens::calib {
 
-// Runs the same fit on parts of the field, on the blur along x and along y, and on the colour
-// channels: tilt, field curvature, depths of the target, astigmatism, axial colour. All fits use
-// the readings as the whole field's fit corrected them, so that errors that the parts share do not
-// hide their differences. Fills `field` and `channels` of the calibration, warns of properties that
-// one plane of focus does not describe, and widens the systematic interval by them.
+// Runs the same fit on parts of the field and on the colour channels: tilt, field curvature, depths
+// of the target, axial colour. These fits use the readings as the whole field's fit corrected them,
+// so that errors that the parts share do not hide their differences. The blur along x and along y
+// is measured first (MeasureAstigmatism), with readings of its own. Fills `field` and `channels` of
+// the calibration, warns of properties that one plane of focus does not describe, and widens the
+// systematic interval by them.
 void MapField(const FocusSweep& sweep, const BlurEvidence& evidence, const BlurFitResult& fit,
               FrameStore* store, Calibration* calibration);
 

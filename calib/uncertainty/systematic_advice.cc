@@ -78,20 +78,32 @@ void SortAndAdvise(Calibration* calibration) {
 
 void WidenFocus(const std::string& name, double move_mm, const std::string& remedy,
                 const model::ThickLens& lens, Calibration* calibration) {
-  const double zf = calibration->summary.focus_depth_mm->value;
+  WidenFocusAndRatio(name, {-move_mm, move_mm}, {0, 0}, remedy, lens, calibration);
+}
+
+void WidenFocusAndRatio(const std::string& name, const Eigen::Vector2d& focus_moves_mm,
+                        const Eigen::Vector2d& ratio_moves, const std::string& remedy,
+                        const model::ThickLens& lens, Calibration* calibration) {
+  CalibrationSummary& summary = calibration->summary;
+  const double zf = summary.focus_depth_mm->value;
   const double d1_mm = model::ImageDistanceMm(lens, zf);
   SystematicPart part;
   part.name = name;
   part.remedy = remedy;
   // d1 falls as zf grows; nearer than the focal point nothing comes into focus.
-  const double nearest_mm = std::max(zf - move_mm, std::min(zf, 1.01 * lens.front_focal_length_mm));
-  part.focus_depth_mm = {nearest_mm - zf, move_mm};
-  part.image_distance_mm = {model::ImageDistanceMm(lens, zf + move_mm) - d1_mm,
+  const double nearest_mm =
+      std::max(zf + focus_moves_mm.x(), std::min(zf, 1.01 * lens.front_focal_length_mm));
+  const double farthest_mm = zf + focus_moves_mm.y();
+  part.focus_depth_mm = {nearest_mm - zf, focus_moves_mm.y()};
+  part.image_distance_mm = {model::ImageDistanceMm(lens, farthest_mm) - d1_mm,
                             model::ImageDistanceMm(lens, nearest_mm) - d1_mm};
-  if (calibration->summary.focus_depth_mm->systematic)
-    *calibration->summary.focus_depth_mm->systematic += part.focus_depth_mm;
-  if (calibration->summary.image_distance_mm->systematic)
-    *calibration->summary.image_distance_mm->systematic += part.image_distance_mm;
+  part.blur_ratio = ratio_moves;
+  const auto add = [](std::optional<Result>* result, const Eigen::Vector2d& moves) {
+    if (*result && (*result)->systematic) *(*result)->systematic += moves;
+  };
+  add(&summary.focus_depth_mm, part.focus_depth_mm);
+  add(&summary.image_distance_mm, part.image_distance_mm);
+  add(&summary.blur_ratio, part.blur_ratio);
   calibration->diagnostics.systematic_parts.push_back(part);
   SortAndAdvise(calibration);
 }

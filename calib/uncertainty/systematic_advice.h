@@ -28,6 +28,12 @@ void SortAndAdvise(Calibration* calibration);
 void WidenFocus(const std::string& name, double move_mm, const std::string& remedy,
                 const model::ThickLens& lens, Calibration* calibration);
 
+// Adds a part that moves zf by `focus_moves_mm` and kappa by `ratio_moves` (lowest <= 0 <= highest)
+// to the table and linearly to the intervals of zf, d1 and kappa.
+void WidenFocusAndRatio(const std::string& name, const Eigen::Vector2d& focus_moves_mm,
+                        const Eigen::Vector2d& ratio_moves, const std::string& remedy,
+                        const model::ThickLens& lens, Calibration* calibration);
+
 // Adds a part to the table and to the intervals of zf, d1, kappa and the bench offset: the fit is
 // repeated with each of `setups` instead of the assumed one.
 void WidenByTrials(const std::string& name, const std::string& remedy,

@@ -19,8 +19,9 @@ struct TextureView {
   double contrast = 1, mean = 0.4;
 };
 
-// Transfer function of a frame's blur at |nu|, cycles per target px.
+// Transfer function of a frame's blur at |nu|, or at nu, cycles per target px.
 using Transfer = std::function<double(double nu)>;
+using PlaneTransfer = std::function<double(const Eigen::Vector2d& nu)>;
 
 inline Transfer GaussianOf(double variance_px2) {
   return [variance_px2](double nu) {
@@ -45,6 +46,12 @@ class KnownTexture {
 
   cv::Mat Render(int width_px, int height_px, const Eigen::Vector2d& origin_px,
                  const TextureView& view, const Transfer& transfer) const {
+    return RenderPlane(width_px, height_px, origin_px, view,
+                       [&](const Eigen::Vector2d& nu) { return transfer(nu.norm()); });
+  }
+  // The same with a blur that depends on the direction.
+  cv::Mat RenderPlane(int width_px, int height_px, const Eigen::Vector2d& origin_px,
+                      const TextureView& view, const PlaneTransfer& transfer) const {
     cv::Mat_<double> sum(height_px, width_px, view.mean);
     const double c = std::cos(view.rotation_rad), s = std::sin(view.rotation_rad);
     for (const Wave& wave : waves_) {
@@ -52,8 +59,8 @@ class KnownTexture {
       const Eigen::Vector2d nu(c * wave.nu.x() - s * wave.nu.y(),
                                s * wave.nu.x() + c * wave.nu.y());
       const Eigen::Vector2d in_frame = nu / view.scale;
-      const double amplitude = view.mean * view.contrast * wave.amplitude *
-                               transfer(wave.nu.norm()) * Sinc(in_frame.x()) * Sinc(in_frame.y());
+      const double amplitude = view.mean * view.contrast * wave.amplitude * transfer(wave.nu) *
+                               Sinc(in_frame.x()) * Sinc(in_frame.y());
       const std::complex<double> step = std::polar(1.0, kTurn * in_frame.x());
       const Eigen::Vector2d first = -origin_px - view.shift_px;
       for (int y = 0; y < height_px; ++y) {

@@ -235,6 +235,12 @@ json SideJson(const calib::SideFit& side) {
           {"frames_used", Count(side.done, side.frames_used)}};
 }
 
+json AxisFocusJson(const std::optional<calib::AxisFocus>& focus) {
+  if (!focus) return nullptr;
+  return {{"focus_depth_mm", EstimateJson(focus->focus_depth_mm)},
+          {"blur_ratio", EstimateJson(focus->blur_ratio)}};
+}
+
 json FieldJson(const calib::FieldMap& field) {
   json tiles = json::array(), clusters = json::array();
   for (const calib::FieldTile& tile : field.tiles)
@@ -256,6 +262,8 @@ json FieldJson(const calib::FieldMap& field) {
           {"tilt_down_deg", EstimateJson(field.tilt_down_deg)},
           {"curvature_mm", EstimateJson(field.curvature_mm)},
           {"astigmatism_mm", EstimateJson(field.astigmatism_mm)},
+          {"along_x", AxisFocusJson(field.along_x)},
+          {"along_y", AxisFocusJson(field.along_y)},
           {"clusters", std::move(clusters)}};
 }
 

@@ -1,11 +1,16 @@
 // The map over the field is compared with targets that are composed of sweeps at known depths.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <opencv2/core.hpp>
+#include <random>
+#include <string>
 #include <vector>
 
+#include "tests/calib/known_texture.h"
 #include "tests/calib/simulated_sweep.h"
 #include "thicklens/calib/calibrate.h"
 
@@ -149,6 +154,122 @@ TEST(FieldMap, DepthsOfATargetInStepsAreParted) {
   ASSERT_TRUE(c.summary.focus_depth_mm->systematic);
   EXPECT_LT(c.summary.focus_depth_mm->systematic->x(), truth - kStepMm + 1.5);
   EXPECT_GT(c.summary.focus_depth_mm->systematic->y(), truth - 1.5);
+}
+
+constexpr double kMiddleMm = 300, kRatio = 0.45;
+
+// A sweep of a lens in whose frames the blur along x is smallest `astigmatism_mm` farther than the
+// blur along y, about kMiddleMm. The frames are rendered in closed form.
+FocusSweep AstigmaticSweep(double astigmatism_mm, unsigned seed) {
+  constexpr double kFocalMm = 50, kRadiusMm = 8.9286, kPitchMm = 0.009, kOffsetMm = 190;
+  constexpr int kWidth = 200, kHeight = 150;
+  constexpr double kNoise = 0.002, kFloorPx2 = 0.25, kReadingSigmaMm = 0.05;
+  const double radius_px_mm = kRadiusMm / kPitchMm * kFocalMm * kMiddleMm / (kMiddleMm - kFocalMm);
+  const Eigen::Vector2d focus_mm(kMiddleMm + 0.5 * astigmatism_mm,
+                                 kMiddleMm - 0.5 * astigmatism_mm);
+  FocusSweep sweep;
+  sweep.camera.lens = {kFocalMm, kFocalMm, 0, kRadiusMm};
+  sweep.camera.sensor.width_px = kWidth;
+  sweep.camera.sensor.height_px = kHeight;
+  sweep.camera.sensor.pixel_pitch_mm = kPitchMm;
+  sweep.camera.sensor.principal_point_px = {0.5 * (kWidth - 1), 0.5 * (kHeight - 1)};
+  sweep.reading_sigma_mm = kReadingSigmaMm;
+  sweep.offset_mm = model::Estimate{kOffsetMm, 0};
+  sweep.floor.given_px = model::Estimate{std::sqrt(kFloorPx2), 0.01};
+  const thicklens::testing::KnownTexture texture(seed, 0.4, 400);
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal(0, kReadingSigmaMm);
+  std::vector<cv::Mat> stored;
+  for (int i = 0; i < 21; ++i) {
+    const double depth_mm = 285.4 + 1.5 * i;
+    thicklens::testing::TextureView view;
+    view.scale = kMiddleMm / depth_mm;
+    Eigen::Vector2d variance_px2;  // on the target
+    for (const int axis : {0, 1}) {
+      // The slope of R along each axis is that of a lens with this zf.
+      const double slope_px_mm = radius_px_mm * focus_mm[axis] * (kMiddleMm - kFocalMm) /
+                                 (kMiddleMm * (focus_mm[axis] - kFocalMm));
+      const double sigma_px = kRatio * slope_px_mm * (1 / depth_mm - 1 / focus_mm[axis]);
+      variance_px2[axis] = (kFloorPx2 + sigma_px * sigma_px) / (view.scale * view.scale);
+    }
+    const cv::Mat light = thicklens::testing::WithWhiteNoise(
+        texture.RenderPlane(kWidth, kHeight, sweep.camera.sensor.principal_point_px, view,
+                            [&](const Eigen::Vector2d& nu) {
+                              return std::exp(-2 * CV_PI * CV_PI *
+                                              variance_px2.dot(nu.cwiseAbs2()));
+                            }),
+        kNoise, 100 * seed + static_cast<unsigned>(i));
+    stored.emplace_back();
+    light.convertTo(stored.back(), CV_16U, 65535);
+    sweep.frames.push_back({"frame-" + std::to_string(i), depth_mm - kOffsetMm + normal(random)});
+  }
+  sweep.read_frame = [stored](std::size_t i) { return stored[i]; };
+  return sweep;
+}
+
+bool SaysAstigmatic(const Calibration& c) {
+  for (const std::string& warning : c.summary.warnings) {
+    if (warning.find("the lens is astigmatic") != std::string::npos) return true;
+  }
+  return false;
+}
+
+void ExpectAstigmatism(double truth_mm, unsigned seed) {
+  SCOPED_TRACE(truth_mm);
+  const Calibration c = Calibrate(AstigmaticSweep(truth_mm, seed), {});
+  const FieldMap& field = c.diagnostics.field;
+  ASSERT_TRUE(field.astigmatism_mm) << c.summary.reason;
+  ASSERT_TRUE(field.along_x && field.along_y);
+  const model::Estimate& found = *field.astigmatism_mm;
+  EXPECT_NEAR(found.value, truth_mm, std::max(3 * found.sigma, 0.03 * std::abs(truth_mm)));
+  EXPECT_LT(found.sigma, 0.2);
+  for (const double sign : {-1.0, 1.0}) {
+    const AxisFocus& along = sign > 0 ? *field.along_x : *field.along_y;
+    EXPECT_NEAR(along.focus_depth_mm.value, kMiddleMm + 0.5 * sign * truth_mm,
+                std::max(4 * along.focus_depth_mm.sigma, 0.03 * std::abs(truth_mm)));
+    EXPECT_NEAR(along.blur_ratio.value, kRatio, std::max(4 * along.blur_ratio.sigma, 0.01));
+  }
+  const auto expect_within = [](const Result& result, double truth) {
+    ASSERT_TRUE(result.systematic);
+    EXPECT_GT(truth, result.systematic->x() - 2 * result.sigma);
+    EXPECT_LT(truth, result.systematic->y() + 2 * result.sigma);
+  };
+  ASSERT_TRUE(c.summary.focus_depth_mm && c.summary.blur_ratio);
+  expect_within(*c.summary.blur_ratio, kRatio);
+  expect_within(*c.summary.focus_depth_mm, kMiddleMm);
+  const bool has_part =
+      std::any_of(c.diagnostics.systematic_parts.begin(), c.diagnostics.systematic_parts.end(),
+                  [](const SystematicPart& part) { return part.name == "astigmatism"; });
+  EXPECT_EQ(SaysAstigmatic(c), truth_mm != 0);
+  if (truth_mm != 0) {
+    EXPECT_THAT(c.summary.warnings,
+                Contains(HasSubstr("along x is smallest at a depth of " +
+                                   fmt::format("{:.2f}", field.along_x->focus_depth_mm.value))));
+  }
+  EXPECT_EQ(has_part, truth_mm != 0);
+}
+
+TEST(FieldMap, AnIsotropicLensHasNoAstigmatism) { ExpectAstigmatism(0, 1); }
+TEST(FieldMap, MeasuresAstigmatismOf2Mm) { ExpectAstigmatism(-2, 2); }
+TEST(FieldMap, MeasuresAstigmatismOf6Mm) { ExpectAstigmatism(-6, 6); }
+TEST(FieldMap, MeasuresAstigmatismOf12Mm) { ExpectAstigmatism(-12, 4); }
+TEST(FieldMap, MeasuresAstigmatismOfTheOtherSign) { ExpectAstigmatism(4, 5); }
+
+// The stated sigma of the astigmatism is compared with its deviations over new noise and readings.
+TEST(FieldMap, SlowAstigmatismSigmaIsTheScatter) {
+  for (const double truth_mm : {0.0, -4.0}) {
+    constexpr int kRuns = 10;
+    double squares = 0;
+    for (unsigned run = 0; run < kRuns; ++run) {
+      const Calibration c = Calibrate(AstigmaticSweep(truth_mm, 20 + run), {});
+      ASSERT_TRUE(c.diagnostics.field.astigmatism_mm);
+      const model::Estimate& found = *c.diagnostics.field.astigmatism_mm;
+      squares += std::pow((found.value - truth_mm) / found.sigma, 2) / kRuns;
+    }
+    // chi^2 of 10 draws is outside of these limits in one of 1000 cases.
+    EXPECT_GT(squares, 0.14) << truth_mm;
+    EXPECT_LT(squares, 2.96) << truth_mm;
+  }
 }
 
 TEST(FieldMap, EachColourHasItsOwnFocus) {

@@ -52,6 +52,24 @@ TEST(WidenFocus, AddsToBothIntervals) {
   EXPECT_THAT(c.diagnostics.advice, HasSubstr(" is due to the jump of the readings: fix it"));
 }
 
+TEST(WidenFocusAndRatio, AddsToOneSideOfEachInterval) {
+  const model::ThickLens lens = BlurBench().lens;
+  Calibration c = Plain(400, 0.1, 0, lens);
+  c.summary.blur_ratio = Result{0.4, 0.01, Eigen::Vector2d(0.39, 0.42)};
+  WidenFocusAndRatio("astigmatism", {-5, 0}, {0, 0.03}, "use another lens", lens, &c);
+  EXPECT_NEAR(c.summary.focus_depth_mm->systematic->x(), 399 - 5, 1e-9);
+  EXPECT_NEAR(c.summary.focus_depth_mm->systematic->y(), 402, 1e-9);
+  const double d1_mm = c.summary.image_distance_mm->value;
+  const double high_mm = 3 + 12.8 * 395 / 382.5;  // rho + f2 zf/(zf - f1) at 395 mm
+  EXPECT_NEAR(c.summary.image_distance_mm->systematic->x(), d1_mm - 0.002, 1e-9);
+  EXPECT_NEAR(c.summary.image_distance_mm->systematic->y(), d1_mm + 0.001 + (high_mm - d1_mm),
+              1e-9);
+  EXPECT_NEAR(c.summary.blur_ratio->systematic->x(), 0.39, 1e-12);
+  EXPECT_NEAR(c.summary.blur_ratio->systematic->y(), 0.45, 1e-12);
+  ASSERT_EQ(c.diagnostics.systematic_parts.size(), 1U);
+  EXPECT_EQ(c.diagnostics.systematic_parts[0].blur_ratio, Eigen::Vector2d(0, 0.03));
+}
+
 // Nearer than the focal point there is no image. One hundredth beyond it, d1 is rho + 101 f2.
 TEST(WidenFocus, StopsShortOfTheFocalPoint) {
   const model::ThickLens lens = BlurBench().lens;

@@ -171,6 +171,11 @@ struct DepthCluster {
   model::Estimate focus_depth_mm;  // weighted mean of the tiles, from Ap
   int tiles = 0;                   // number of tiles
 };
+// In-focus distance and blur ratio of the blur along one axis of the image.
+struct AxisFocus {
+  model::Estimate focus_depth_mm;  // zf from Ap, without the error of the bench offset
+  model::Estimate blur_ratio;      // kappa, dimensionless
+};
 // In-focus distance over the field of view.
 struct FieldMap {
   bool done = false;                // true if enough tiles were fitted
@@ -184,6 +189,8 @@ struct FieldMap {
   std::optional<model::Estimate> tilt_right_deg, tilt_down_deg;
   std::optional<model::Estimate> curvature_mm;    // zf at the outermost tile minus zf at the centre
   std::optional<model::Estimate> astigmatism_mm;  // zf of horizontal blur minus zf of vertical blur
+  // The blur along x (horizontal) and along y (vertical); present with astigmatism_mm.
+  std::optional<AxisFocus> along_x, along_y;
   std::vector<DepthCluster> clusters;             // a single cluster: the target is at one depth
 };
 
