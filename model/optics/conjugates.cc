@@ -32,16 +32,14 @@ Estimate FocusDepthOf(const ThickLens& lens, const StatedConjugate& stated) {
       return {f1_mm + f1_mm / value, f1_mm * sigma / (value * value)};
     case ConjugateKind::kImageDistance:
     case ConjugateKind::kTubeLength: {
-      const double infinity_mm = stated.kind == ConjugateKind::kImageDistance
-                                     ? lens.lens_thickness_mm + f2_mm
-                                     : 0;
+      const double infinity_mm =
+          stated.kind == ConjugateKind::kImageDistance ? lens.lens_thickness_mm + f2_mm : 0;
       const double beyond_mm = value - infinity_mm;  // Newton's x'
       if (!(beyond_mm > 0))
         throw Impossible(
             stated, fmt::format("it must be larger than {} mm, its value for a focus at infinity",
                                 infinity_mm));
-      return {f1_mm + f1_mm * f2_mm / beyond_mm,
-              f1_mm * f2_mm * sigma / (beyond_mm * beyond_mm)};
+      return {f1_mm + f1_mm * f2_mm / beyond_mm, f1_mm * f2_mm * sigma / (beyond_mm * beyond_mm)};
     }
   }
   throw Impossible(stated, "its kind is not known");
