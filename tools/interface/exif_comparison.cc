@@ -254,9 +254,12 @@ std::vector<ExifComparison> CompareExif(const io::PhotoExif& exif, const Camera&
   const auto add = [&](std::optional<ExifComparison> finding) {
     if (finding) findings.push_back(std::move(*finding));
   };
-  if (exif.focal_length_mm) add(FocalLengthFinding(*exif.focal_length_mm, camera));
-  if (exif.f_number) add(FNumberFinding(*exif.f_number, camera));
-  if (exif.subject_distance_mm) add(FocusDistanceFinding(*exif.subject_distance_mm, camera));
+  // The lengths of an objective's lens are those of an equivalent, which no device states.
+  const bool has_lengths = !camera.objective;
+  if (has_lengths && exif.focal_length_mm) add(FocalLengthFinding(*exif.focal_length_mm, camera));
+  if (has_lengths && exif.f_number) add(FNumberFinding(*exif.f_number, camera));
+  if (has_lengths && exif.subject_distance_mm)
+    add(FocusDistanceFinding(*exif.subject_distance_mm, camera));
   add(SizeFinding(exif, camera, size));
   add(PitchFinding(exif, camera));
   add(FieldOfViewFinding(exif, camera, size));

@@ -11,8 +11,10 @@ std::string MissingTolerancesLine(const Camera& camera) {
     const auto statement = camera.statements.find(field);
     return statement == camera.statements.end() || !(statement->second.tolerance > 0);
   };
-  const bool focal_length =
-      is_missing("lens.front_focal_length_mm") || is_missing("lens.rear_focal_length_mm");
+  // The focal length of an objective follows from its data: its magnification has an error without
+  // a statement, too.
+  const bool focal_length = !camera.objective && (is_missing("lens.front_focal_length_mm") ||
+                                                  is_missing("lens.rear_focal_length_mm"));
   const bool pitch = is_missing("sensor.pixel_pitch_mm");
   if (!focal_length && !pitch) return "";
   std::string effect;

@@ -67,6 +67,13 @@ bool IsIterative(BlockSolver::Linear linear) {
          linear == BlockSolver::Linear::kViennaCl;
 }
 
+// A statement about the plane of focus, which has no value 0.
+bool IsPositiveStatement(std::string* why, const std::string& field,
+                         const std::optional<Measured>& number) {
+  return !number || (Positive(why, field + ".value", number->value) &&
+                     NonNegative(why, field + ".sigma", number->sigma));
+}
+
 bool IsStatement(std::string* why, const std::string& field, const Measured& number) {
   return NonNegative(why, field + ".value", number.value) &&
          NonNegative(why, field + ".sigma", number.sigma);
@@ -179,6 +186,13 @@ bool SweepOverrides::IsValid(std::string* why) const {
          IfGiven(offset_mm, finite("offset_mm")) &&
          IfGiven(offset_sigma_mm, non_negative("offset_sigma_mm")) &&
          IfGiven(reading_sigma_mm, non_negative("reading_sigma_mm")) &&
+         IsPositiveStatement(why, "focus_depth_mm", focus_depth_mm) &&
+         IsPositiveStatement(why, "working_distance_mm", working_distance_mm) &&
+         IsPositiveStatement(why, "image_distance_mm", image_distance_mm) &&
+         IsPositiveStatement(why, "optical_tube_length_mm", optical_tube_length_mm) &&
+         IsPositiveStatement(why, "magnification", magnification) &&
+         IfGiven(target_period_mm,
+                 [why](double period) { return Positive(why, "target_period_mm", period); }) &&
          IfGiven(floor_px,
                  [why](const Measured& floor) { return IsStatement(why, "floor_px", floor); }) &&
          IfGiven(roi,

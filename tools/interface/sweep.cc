@@ -54,6 +54,13 @@ void ApplyOverrides(const SweepOverrides& overrides, const RunScope& run, model:
     file->floor_origin.reset();
     file->floor.given_px = overrides.floor_px;
   }
+  if (overrides.focus_depth_mm) file->focus_depth_mm = overrides.focus_depth_mm;
+  if (overrides.working_distance_mm) file->working_distance_mm = overrides.working_distance_mm;
+  if (overrides.image_distance_mm) file->image_distance_mm = overrides.image_distance_mm;
+  if (overrides.optical_tube_length_mm)
+    file->optical_tube_length_mm = overrides.optical_tube_length_mm;
+  if (overrides.magnification) file->magnification = overrides.magnification;
+  if (overrides.target_period_mm) file->target_period_mm = overrides.target_period_mm;
   if (overrides.roi) file->roi = *overrides.roi;
   if (overrides.full_scale) file->full_scale = overrides.full_scale;
   if (overrides.raw) file->raw = *overrides.raw;

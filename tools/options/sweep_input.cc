@@ -45,6 +45,29 @@ void TakeFloor(const SweepArguments& arguments, SweepOverrides* overrides) {
   overrides->floor_px = Measured{numbers[0], numbers.size() > 1 ? numbers[1] : 0};
 }
 
+// Returns a statement about the plane of focus; absent if it was not given.
+std::optional<Measured> FocusStatement(const std::string& option, const std::string& text) {
+  if (text.empty()) return std::nullopt;
+  const std::string form = "VALUE or VALUE:SIGMA";
+  const auto numbers = SplitNumbers(option, text, ':', form);
+  const bool in_range = numbers[0] > 0 && (numbers.size() < 2 || numbers[1] >= 0);
+  if (numbers.size() > 2 || !in_range) {
+    throw UsageError(fmt::format("{}: {} with VALUE > 0 and SIGMA >= 0 is expected, found '{}'",
+                                 option, form, text));
+  }
+  return Measured{numbers[0], numbers.size() > 1 ? numbers[1] : 0};
+}
+
+void TakeFocus(const SweepArguments& arguments, SweepOverrides* overrides) {
+  overrides->focus_depth_mm = FocusStatement("--focus-depth-mm", arguments.focus_depth_mm);
+  overrides->working_distance_mm =
+      FocusStatement("--working-distance-mm", arguments.working_distance_mm);
+  overrides->image_distance_mm = FocusStatement("--image-distance-mm", arguments.image_distance_mm);
+  overrides->optical_tube_length_mm = FocusStatement("--tube-length-mm", arguments.tube_length_mm);
+  overrides->magnification = FocusStatement("--magnification", arguments.magnification);
+  overrides->target_period_mm = arguments.target_period_mm;
+}
+
 void TakeRoi(const std::string& text, SweepOverrides* overrides) {
   if (text.empty()) return;
   const auto px = SplitPixels("--roi", text, ',', "x,y,width,height");
@@ -140,6 +163,7 @@ SweepOverrides SweepOverridesOf(const SweepArguments& arguments) {
   overrides.camera_path = arguments.camera_path;
   overrides.truth_path = arguments.truth_path;
   TakeOffset(arguments, &overrides);
+  TakeFocus(arguments, &overrides);
   TakeFloor(arguments, &overrides);
   TakeRoi(arguments.roi, &overrides);
   overrides.reading_sigma_mm = arguments.reading_sigma_mm;
@@ -166,6 +190,12 @@ OptionNames SweepOptionNames() {
           {"truth_path", "--truth"},
           {"offset_mm", "--offset-mm"},
           {"offset_sigma_mm", "--offset-sigma-mm"},
+          {"focus_depth_mm", "--focus-depth-mm"},
+          {"working_distance_mm", "--working-distance-mm"},
+          {"image_distance_mm", "--image-distance-mm"},
+          {"optical_tube_length_mm", "--tube-length-mm"},
+          {"magnification", "--magnification"},
+          {"target_period_mm", "--target-period-mm"},
           {"direction", "--direction"},
           {"reading_sigma_mm", "--reading-sigma-mm"},
           {"floor_px", "--floor-px"},

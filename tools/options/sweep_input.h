@@ -21,6 +21,9 @@ struct SweepArguments {
   std::optional<double> offset_sigma_mm;
   std::string direction;
   std::optional<double> reading_sigma_mm;
+  // VALUE or VALUE:SIGMA
+  std::string focus_depth_mm, working_distance_mm, image_distance_mm, tube_length_mm, magnification;
+  std::optional<double> target_period_mm;
   std::string floor_px;    // VALUE, VALUE:SIGMA or "unknown"
   std::string floor_from;  // a camera file
   std::string target;

@@ -98,6 +98,34 @@ void AddVideoOptions(CLI::App* command, SweepArguments* sweep) {
       ->type_name("N");
 }
 
+// The options for what is known of the plane of focus.
+static void AddFocusStatements(CLI::App* command, SweepArguments* sweep,
+                               const std::string& instead) {
+  const std::string form = ": VALUE or VALUE:SIGMA" + instead;
+  command
+      ->add_option("--focus-depth-mm", sweep->focus_depth_mm,
+                   "Depth of the plane of focus from the aperture" + form)
+      ->type_name("MM");
+  command
+      ->add_option("--working-distance-mm", sweep->working_distance_mm,
+                   "Distance from the front of the lens to the plane of focus (the camera file "
+                   "states lens.aperture_behind_front_mm)" +
+                       form)
+      ->type_name("MM");
+  command
+      ->add_option("--image-distance-mm", sweep->image_distance_mm,
+                   "Distance from the aperture to the sensor" + form)
+      ->type_name("MM");
+  command
+      ->add_option("--tube-length-mm", sweep->tube_length_mm,
+                   "Optical tube length, from the rear focal plane to the sensor" + form)
+      ->type_name("MM");
+  command
+      ->add_option("--magnification", sweep->magnification,
+                   "Size on the sensor over size in the plane of focus" + form)
+      ->type_name("M");
+}
+
 void AddSweepStatements(CLI::App* command, SweepArguments* sweep) {
   const std::string instead = "; overrides the sweep file";
   command->add_option("--offset-mm", sweep->offset_mm, "Depth of reading 0, or unknown" + instead)
@@ -106,6 +134,7 @@ void AddSweepStatements(CLI::App* command, SweepArguments* sweep) {
       ->add_option("--offset-sigma-mm", sweep->offset_sigma_mm, "Standard deviation of --offset-mm")
       ->check(NonNegative())
       ->type_name("MM");
+  AddFocusStatements(command, sweep, instead);
   command
       ->add_option("--direction", sweep->direction,
                    "away: larger readings are farther; toward: nearer" + instead)
@@ -129,6 +158,11 @@ void AddSweepStatements(CLI::App* command, SweepArguments* sweep) {
   command->add_option("--target", sweep->target, "Target that is photographed" + instead)
       ->check(CLI::IsMember({"auto", "texture", "printed-edge", "knife-edge"}))
       ->type_name("KIND");
+  command
+      ->add_option("--target-period-mm", sweep->target_period_mm,
+                   "Period of a periodic target, measured on it" + instead)
+      ->check(Between(0, 1e9, "millimetres on the target"))
+      ->type_name("MM");
   command->add_option("--roi", sweep->roi, "Part of the frames that is measured" + instead)
       ->type_name("X,Y,WIDTH,HEIGHT");
   constexpr int kMaxValue = 65535;

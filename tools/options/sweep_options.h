@@ -8,7 +8,9 @@
 namespace thicklens::tools {
 
 // Adds the options that override statements of a sweep's file: --offset-mm, --offset-sigma-mm,
-// --direction, --reading-sigma-mm, --floor-px, --floor-from, --target, --roi.
+// --focus-depth-mm, --working-distance-mm, --image-distance-mm, --tube-length-mm, --magnification,
+// --direction, --reading-sigma-mm, --floor-px, --floor-from, --target, --target-period-mm, --roi,
+// --full-scale, --raw.
 void AddSweepStatements(CLI::App* command, SweepArguments* sweep);
 
 // Adds the options that say where the readings are: --readings, --column, --file-column, --unit,

@@ -76,6 +76,14 @@ std::string HowItWasMade(const FocusSweep& sweep, const Calibration& calibration
   std::string html =
       "<h2>How it was made</h2>\n<div class=\"wide\"><table>\n<thead><tr><th>given camera "
       "parameter</th><th class=\"number\">value</th><th>tolerance</th></tr></thead>\n<tbody>\n";
+  if (const auto& objective = camera.objective) {
+    html += CameraRow(camera, "magnification of the objective", "lens.magnification",
+                      objective->magnification);
+    html += CameraRow(camera, "numerical aperture", "lens.numerical_aperture",
+                      objective->numerical_aperture);
+    html += CameraRow(camera, "focal length of the tube lens [mm]",
+                      "lens.tube_lens_focal_length_mm", objective->tube_lens_focal_length_mm);
+  }
   html += CameraRow(camera, "front focal length f1 [mm]", "lens.front_focal_length_mm",
                     camera.lens.front_focal_length_mm);
   html += CameraRow(camera, "rear focal length f2 [mm]", "lens.rear_focal_length_mm",

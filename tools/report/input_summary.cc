@@ -6,12 +6,15 @@
 #include <iterator>
 #include <optional>
 #include <set>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "thicklens/base/error.h"
 #include "thicklens/base/printable_text.h"
 #include "thicklens/calib/calibrate.h"
 #include "thicklens/calib/focus_sweep.h"
+#include "thicklens/model/conjugates.h"
 #include "thicklens/opencv.h"
 
 namespace thicklens::tools {
@@ -37,29 +40,97 @@ std::string FloorText(const model::FloorKnowledge& floor) {
   return EstimateText(floor.given_px, "px");
 }
 
+// A statement about the plane of focus as it was stated, and the depth that it gives.
+struct FocusLine {
+  std::string name, unit;
+  model::Estimate value, depth_mm;
+  bool is_depth = false;  // the statement is the depth itself
+};
+
+std::vector<FocusLine> FocusLinesOf(const Sweep& sweep) {
+  std::vector<FocusLine> lines;
+  const auto stated_focus = calib::MakeFocusSweep(sweep.description, sweep.camera).stated_focus;
+  for (const model::StatedConjugate& stated : stated_focus) {
+    // A working distance is the only statement that was converted.
+    const bool is_converted = stated.name == "working_distance_mm";
+    lines.push_back({stated.name, stated.kind == model::ConjugateKind::kMagnification ? "" : " mm",
+                     is_converted ? sweep.description.working_distance_mm.value() : stated.value,
+                     model::FocusDepthOf(sweep.camera.lens, stated),
+                     stated.kind == model::ConjugateKind::kFocusDepth && !is_converted});
+  }
+  return lines;
+}
+
+std::string FocusText(const Sweep& sweep) {
+  std::string text;
+  for (const FocusLine& line : FocusLinesOf(sweep)) {
+    text +=
+        fmt::format("{:<10} {} {:.6g}", text.empty() ? "focus" : "", line.name, line.value.value);
+    if (line.value.sigma > 0) text += fmt::format(" +- {:.2g}", line.value.sigma);
+    text += line.unit;
+    if (!line.is_depth)
+      text += fmt::format(": in focus at {} from the aperture", EstimateText(line.depth_mm, "mm"));
+    text += "\n";
+  }
+  return text;
+}
+
+std::string ObjectiveText(const std::optional<model::Objective>& objective) {
+  if (!objective) return "";
+  return fmt::format(
+      "           the equivalent lens of an objective {:.6g}x, numerical aperture {:.6g}, tube "
+      "lens "
+      "{:.6g} mm\n",
+      objective->magnification, objective->numerical_aperture,
+      objective->tube_lens_focal_length_mm);
+}
+
 std::string CameraText(const model::Camera& camera) {
   const model::ThickLens& lens = camera.lens;
   return fmt::format(
       "camera     {}: f1 {:.6g} mm, f2 {:.6g} mm, thickness {:.6g} mm, aperture radius {:.6g} mm\n"
-      "           {} x {} px of {:.6g} mm, principal point ({:.6g}, {:.6g}) px, {}, PSF {}\n",
+      "{}           {} x {} px of {:.6g} mm, principal point ({:.6g}, {:.6g}) px, {}, PSF {}\n",
       PrintableUtf8(camera.name), lens.front_focal_length_mm, lens.rear_focal_length_mm,
-      lens.lens_thickness_mm, lens.aperture_radius_mm, camera.sensor.width_px,
-      camera.sensor.height_px, camera.sensor.pixel_pitch_mm, camera.sensor.principal_point_px.x(),
-      camera.sensor.principal_point_px.y(), camera.sensor.transfer.Name(),
-      model::PsfName(camera.psf));
+      lens.lens_thickness_mm, lens.aperture_radius_mm, ObjectiveText(camera.objective),
+      camera.sensor.width_px, camera.sensor.height_px, camera.sensor.pixel_pitch_mm,
+      camera.sensor.principal_point_px.x(), camera.sensor.principal_point_px.y(),
+      camera.sensor.transfer.Name(), model::PsfName(camera.psf));
 }
 
 std::string BenchText(const Sweep& sweep, const Understanding& found) {
   const auto depths = DepthRangeMm(sweep, found);
   return fmt::format(
-      "readings   {:.6g} to {:.6g} mm, {} distinct, step {:.4g} mm (median), sigma {:.3g} mm\n"
-      "bench      direction {}, offset {}\n"
-      "depths     {}\n",
-      found.min_reading_mm, found.max_reading_mm, found.distinct_readings, found.median_step_mm,
-      sweep.description.reading_sigma_mm, model::BenchDirectionName(sweep.description.direction),
-      EstimateText(sweep.description.offset_mm, "mm"),
-      depths ? fmt::format("{:.6g} to {:.6g} mm from the aperture", depths->first, depths->second)
-             : "unknown until the offset is estimated from the image scale");
+             "readings   {:.6g} to {:.6g} mm, {} distinct, step {:.4g} mm (median), sigma {:.3g} "
+             "mm\n"
+             "bench      direction {}, offset {}\n"
+             "depths     {}\n",
+             found.min_reading_mm, found.max_reading_mm, found.distinct_readings,
+             found.median_step_mm, sweep.description.reading_sigma_mm,
+             model::BenchDirectionName(sweep.description.direction),
+             EstimateText(sweep.description.offset_mm, "mm"),
+             depths ? fmt::format("{:.6g} to {:.6g} mm from the aperture", depths->first,
+                                  depths->second)
+             : FocusLinesOf(sweep).empty()
+                 ? "unknown until the offset is estimated from the image scale"
+                 : "unknown until the frames are measured") +
+         FocusText(sweep);
+}
+
+std::string PeriodText(const model::SweepFile& description) {
+  if (!description.target_period_mm) return "";
+  return fmt::format(", period {:.6g} mm", *description.target_period_mm);
+}
+
+nlohmann::json StatedFocusJson(const Sweep& sweep) {
+  nlohmann::json list = nlohmann::json::array();
+  for (const FocusLine& line : FocusLinesOf(sweep)) {
+    list.push_back(
+        {{"name", line.name},
+         {"value", line.value.value},
+         {"sigma", line.value.sigma},
+         {"focus_depth_mm", {{"value", line.depth_mm.value}, {"sigma", line.depth_mm.sigma}}}});
+  }
+  return list;
 }
 
 }  // namespace
@@ -95,7 +166,7 @@ std::string UnderstandingText(const Sweep& sweep, const Understanding& found,
   return fmt::format(
       "frames     {}, the first {} x {} px, {} bit, {} channel{}\n{}{}{}"
       "region     {}\n"
-      "target     {}, blur floor {}\n"
+      "target     {}{}, blur floor {}\n"
       "method     {}\n"
       "output     {}\n"
       "dry run: nothing was measured\n",
@@ -104,7 +175,8 @@ std::string UnderstandingText(const Sweep& sweep, const Understanding& found,
       ReadingsLine(sweep), BenchText(sweep, found), CameraText(sweep.camera),
       roi.width > 0 ? fmt::format("{} x {} px from ({}, {})", roi.width, roi.height, roi.x, roi.y)
                     : "the whole field",
-      model::SweepTargetName(sweep.description.target), FloorText(sweep.description.floor),
+      model::SweepTargetName(sweep.description.target), PeriodText(sweep.description),
+      FloorText(sweep.description.floor),
       sweep.description.raw == model::SweepRaw::kGreen
           ? method + ", on the green sites of raw files"
           : method,
@@ -132,12 +204,16 @@ nlohmann::json UnderstandingJson(const Sweep& sweep, const Understanding& found,
                          {"direction", model::BenchDirectionName(sweep.description.direction)},
                          {"target", model::SweepTargetName(sweep.description.target)},
                          {"raw", model::SweepRawName(sweep.description.raw)},
+                         {"stated_focus", StatedFocusJson(sweep)},
+                         {"target_period_mm", nullptr},
                          {"offset_mm", nullptr},
                          {"depth_range_mm", nullptr}};
   if (sweep.description.offset_mm) {
     json["offset_mm"] = {{"value", sweep.description.offset_mm->value},
                          {"sigma", sweep.description.offset_mm->sigma}};
   }
+  if (sweep.description.target_period_mm)
+    json["target_period_mm"] = *sweep.description.target_period_mm;
   if (const auto depths = DepthRangeMm(sweep, found))
     json["depth_range_mm"] = {depths->first, depths->second};
   return json;

@@ -132,7 +132,7 @@ TEST(MakeFocusSweep, AnObjectiveStatesItsMagnification) {
   camera.statements["lens.magnification"] = {0, true};
   stated = MakeFocusSweep(file, camera).stated_focus;
   EXPECT_NEAR(stated.at(0).value.sigma, 1 / std::sqrt(12.0), 1e-12);
-  // What was measured takes its place; another statement stands beside it.
+  // A measured magnification takes its place; another statement stands beside it.
   file.magnification = model::Estimate{9.8, 0.01};
   stated = MakeFocusSweep(file, camera).stated_focus;
   ASSERT_THAT(stated, SizeIs(1));

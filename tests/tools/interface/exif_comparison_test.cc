@@ -86,6 +86,21 @@ TEST(CompareExif, BothFocalLengthsOfAThickLensCount) {
   EXPECT_EQ(VerdictOn("focal length", exif, camera), "agrees");
 }
 
+// The camera file of a microscope has an equivalent lens, which is not the one that EXIF describes.
+TEST(CompareExif, LengthsAreNotComparedWithThoseOfAnObjective) {
+  model::Camera camera = BenchLens();
+  io::PhotoExif exif;
+  exif.focal_length_mm = 35;
+  exif.f_number = 8;
+  exif.subject_distance_mm = 3000;
+  for (const char* quantity : {"focal length", "f-number", "focus distance"})
+    EXPECT_EQ(VerdictOn(quantity, exif, camera), "contradicts") << quantity;
+  camera.objective = model::Objective{4, 0.1, 200};
+  camera.lens = model::LensOfObjective(*camera.objective);
+  for (const char* quantity : {"focal length", "f-number", "focus distance"})
+    EXPECT_EQ(VerdictOn(quantity, exif, camera), "") << quantity;
+}
+
 TEST(CompareExif, TheFNumberMayBeOffByAThirdOfAStopAtMost) {
   const auto verdict = [](double number, double camera_number = 2.8) {
     model::Camera camera = BenchLens();

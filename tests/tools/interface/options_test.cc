@@ -7,7 +7,9 @@
 #include <functional>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "thicklens/thicklens.h"
@@ -118,6 +120,27 @@ TEST(InterfaceOptionsTest, SweepStatementsAreFinite) {
                     {kNan, kInfinity, -1});
   ExpectEachRefused(SweepOverrides(), &SweepOverrides::reading_sigma_mm, "reading_sigma_mm",
                     {kNan, kInfinity, -1});
+  ExpectEachRefused(SweepOverrides(), &SweepOverrides::target_period_mm, "target_period_mm",
+                    {kNan, kInfinity, 0, -1});
+  const std::pair<const char*, std::optional<Measured> SweepOverrides::*> of_focus[] = {
+      {"focus_depth_mm", &SweepOverrides::focus_depth_mm},
+      {"working_distance_mm", &SweepOverrides::working_distance_mm},
+      {"image_distance_mm", &SweepOverrides::image_distance_mm},
+      {"optical_tube_length_mm", &SweepOverrides::optical_tube_length_mm},
+      {"magnification", &SweepOverrides::magnification}};
+  for (const auto& [name, member] : of_focus) {
+    SweepOverrides focus;
+    focus.*member = Measured{2.5, 0.1};
+    ExpectValid(focus);
+    for (const double value : {kNan, kInfinity, 0.0, -2.5}) {
+      focus.*member = Measured{value, 0.1};
+      ExpectRefused(focus, std::string(name) + ".value");
+    }
+    for (const double sigma : {kNan, kInfinity, -0.1}) {
+      focus.*member = Measured{2.5, sigma};
+      ExpectRefused(focus, std::string(name) + ".sigma");
+    }
+  }
   SweepOverrides floor;
   floor.floor_px = Measured{kNan, 0};
   ExpectRefused(floor, "floor_px.value");

@@ -4,11 +4,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <optional>
 #include <string>
 
 #include "support/error_message.h"
 #include "support/temporary_folder.h"
 #include "tools/options/option_values.h"
+#include "tools/options/sweep_options.h"
 
 namespace thicklens::tools {
 namespace {
@@ -27,6 +29,12 @@ std::string CameraText(const std::string& pitch_mm, const std::string& calibrati
          "aperture_radius_mm: 9}\n"
          "sensor: {width_px: 9, height_px: 9, pixel_pitch_mm: " +
          pitch_mm + ", principal_point_px: [4, 4], transfer: linear}\n" + calibration;
+}
+
+// The camera with its aperture 20 mm behind the front of the lens.
+std::string Placed(std::string camera) {
+  const std::string before = "lens: {";
+  return camera.insert(camera.find(before) + before.size(), "aperture_behind_front_mm: 20, ");
 }
 
 constexpr char kMeasured[] =
@@ -202,6 +210,103 @@ TEST_F(SweepInputTest, ThePeriodOfTheTargetComesThrough) {
   EXPECT_EQ(ReadSweepInput(arguments_).description.raw, model::SweepRaw::kDemosaiced);
 }
 
+// ---- the plane of focus ----
+
+// Each option for the plane of focus, with what it becomes.
+struct FocusOption {
+  const char* option;
+  std::string SweepArguments::*text;
+  std::optional<Measured> model::SweepFile::*stated;
+  const char* key;
+};
+const FocusOption kFocusOptions[] = {
+    {"--focus-depth-mm", &SweepArguments::focus_depth_mm, &model::SweepFile::focus_depth_mm,
+     "focus_depth_mm"},
+    {"--working-distance-mm", &SweepArguments::working_distance_mm,
+     &model::SweepFile::working_distance_mm, "working_distance_mm"},
+    {"--image-distance-mm", &SweepArguments::image_distance_mm,
+     &model::SweepFile::image_distance_mm, "image_distance_mm"},
+    {"--tube-length-mm", &SweepArguments::tube_length_mm, &model::SweepFile::optical_tube_length_mm,
+     "optical_tube_length_mm"},
+    {"--magnification", &SweepArguments::magnification, &model::SweepFile::magnification,
+     "magnification"}};
+
+TEST_F(SweepInputTest, StatementsOfThePlaneOfFocusReplaceThoseOfTheFile) {
+  folder_.Put("camera.yaml", Placed(CameraText("0.005", "")));
+  for (const FocusOption& of : kFocusOptions) {
+    SCOPED_TRACE(of.option);
+    Sweep(std::string(of.key) + ": {value: 90, sigma: 3}\n");
+    SweepArguments arguments = arguments_;
+    const auto stated = [&] { return (ReadSweepInput(arguments).description.*of.stated).value(); };
+    EXPECT_EQ(stated().value, 90);
+    EXPECT_EQ(stated().sigma, 3);
+    arguments.*of.text = "75.5";
+    EXPECT_EQ(stated().value, 75.5);
+    EXPECT_EQ(stated().sigma, 0);
+    arguments.*of.text = "75.5:0.25";
+    EXPECT_EQ(stated().sigma, 0.25);
+    for (const char* wrong : {"0", "-3", "3:-1", "3:1:1", "near", "3:", "unknown", "nan"}) {
+      arguments.*of.text = wrong;
+      EXPECT_THAT(ErrorOf([&] { ReadSweepInput(arguments); }),
+                  AllOf(StartsWith(std::string(of.option) + ": "), HasSubstr("VALUE:SIGMA"),
+                        HasSubstr(std::string("'") + wrong + "'")));
+      EXPECT_THROW(ReadSweepInput(arguments), UsageError);
+    }
+    EXPECT_EQ(SweepOptionNames()(std::string(of.key) + ".sigma"), of.option);
+  }
+}
+
+TEST_F(SweepInputTest, AWorkingDistanceNeedsThePlaceOfTheAperture) {
+  arguments_.working_distance_mm = "75.5";
+  EXPECT_THAT(ErrorOf([&] { ReadSweepInput(arguments_); }),
+              HasSubstr("state lens.aperture_behind_front_mm in the camera file"));
+  folder_.Put("camera.yaml", Placed(CameraText("0.005", "")));
+  EXPECT_TRUE(ReadSweepInput(arguments_).IsValid(nullptr));
+  arguments_.working_distance_mm = "10";
+  EXPECT_THAT(ErrorOf([&] { ReadSweepInput(arguments_); }),
+              HasSubstr("it is a depth of 30 mm from the aperture"));
+}
+
+// A statement that the lens makes impossible is found when the sweep is checked.
+TEST_F(SweepInputTest, AnImageDistanceInFrontOfEveryImageIsNotValid) {
+  arguments_.image_distance_mm = "49";
+  const thicklens::Sweep input = ReadSweepInput(arguments_);
+  std::string why;
+  EXPECT_FALSE(input.IsValid(&why));
+  EXPECT_THAT(why, AllOf(HasSubstr("image_distance_mm is 49"), HasSubstr("larger than 50 mm")));
+}
+
+TEST_F(SweepInputTest, ThePeriodOfTheTargetMayBeGiven) {
+  Sweep("target_period_mm: 5\n");
+  arguments_.target_period_mm = 2.5;
+  EXPECT_EQ(ReadSweepInput(arguments_).description.target_period_mm.value(), 2.5);
+  arguments_.target_period_mm = -2.5;
+  EXPECT_THAT(ErrorOf([&] { ReadSweepInput(arguments_); }), StartsWith("--target-period-mm: "));
+  EXPECT_THROW(ReadSweepInput(arguments_), UsageError);
+}
+
+// The command line as CLI11 reads it.
+TEST(SweepStatements, AreReadFromTheCommandLine) {
+  CLI::App app;
+  SweepArguments arguments;
+  AddSweepStatements(&app, &arguments);
+  app.parse(
+      "--focus-depth-mm 120:1 --working-distance-mm 90 --image-distance-mm 75:0.5 "
+      "--tube-length-mm 160 --magnification 0.5:0.01 --target-period-mm 0.5");
+  const SweepOverrides overrides = SweepOverridesOf(arguments);
+  EXPECT_EQ(overrides.focus_depth_mm.value().sigma, 1);
+  EXPECT_EQ(overrides.working_distance_mm.value().value, 90);
+  EXPECT_EQ(overrides.image_distance_mm.value().sigma, 0.5);
+  EXPECT_EQ(overrides.optical_tube_length_mm.value().value, 160);
+  EXPECT_EQ(overrides.magnification.value().value, 0.5);
+  EXPECT_EQ(overrides.target_period_mm.value(), 0.5);
+  for (const char* wrong : {"0", "-1", "nan", "fine"}) {
+    CLI::App again;
+    AddSweepStatements(&again, &arguments);
+    EXPECT_THROW(again.parse(std::string("--target-period-mm ") + wrong), CLI::ParseError) << wrong;
+  }
+}
+
 // Numbers of the camera that affect a result and have no stated tolerance are reported once.
 TEST_F(SweepInputTest, MissingTolerancesAreReportedUnlessTheTruthIsKnown) {
   Sweep("");
@@ -211,6 +316,22 @@ TEST_F(SweepInputTest, MissingTolerancesAreReportedUnlessTheTruthIsKnown) {
       return line.find("no tolerance is stated") != std::string::npos;
     });
   };
+  EXPECT_EQ(reported(), 1);
+  // The error of an objective's magnification is known without a statement, that of a pitch is not.
+  const std::string objective =
+      "schema: thicklens/camera/2\nname: bench\n"
+      "lens: {magnification: 10, numerical_aperture: 0.25, tube_lens_focal_length_mm: 200}\n"
+      "sensor: {width_px: 9, height_px: 9, pixel_pitch_mm: PITCH, principal_point_px: [4, 4], "
+      "transfer: linear}\n";
+  const auto with_pitch = [&](const std::string& pitch) {
+    std::string text = objective;
+    return text.replace(text.find("PITCH"), 5, pitch);
+  };
+  folder_.Put("camera.yaml", with_pitch("0.005"));
+  EXPECT_EQ(reported(), 1);
+  folder_.Put("camera.yaml", with_pitch("{value: 0.005, tolerance: 0.00001}"));
+  EXPECT_EQ(reported(), 0);
+  folder_.Put("camera.yaml", CameraText("0.005", ""));
   EXPECT_EQ(reported(), 1);
   arguments_.truth_path =
       folder_.Put("known.yaml",

@@ -385,6 +385,18 @@ TEST(CalibrationReport, MarksAssumedNumbers) {
             1);
 }
 
+TEST(CalibrationReport, ShowsTheDataOfAnObjective) {
+  MadeUpCalibration made = MakeUpCalibration(9, 340, 15);
+  EXPECT_THAT(Page(made), Not(HasSubstr("magnification of the objective")));
+  made.sweep.camera.objective = model::Objective{12.5, 0.28, 164.5};
+  made.sweep.camera.statements["lens.numerical_aperture"] = {0.007, false};
+  const std::string page = Page(made);
+  EXPECT_THAT(page, HasSubstr("magnification of the objective"));
+  const XmlDocument document = ParseXml(page);
+  for (const char* cell : {"12.5", "0.28", "164.5", "± 0.007"})
+    EXPECT_TRUE(HasCell(document, cell)) << cell;
+}
+
 TEST(CalibrationReport, GivesErrorsAndCorrelations) {
   const std::string html = Page(MakeUpCalibration(41, 320, 4));
   EXPECT_THAT(html, HasSubstr(">+0.0003</td>"));  // d1

@@ -56,6 +56,14 @@ struct SweepOverrides {
   bool offset_unknown = false;            // the bench offset is to be found from the image scale
   std::optional<double> offset_mm;        // finite
   std::optional<double> offset_sigma_mm;  // finite, >= 0; needs an offset
+  // Statements about the plane of focus (model::SweepFile). Each value is finite and > 0, each
+  // sigma finite and >= 0.
+  std::optional<Measured> focus_depth_mm;          // zf from Ap
+  std::optional<Measured> working_distance_mm;     // from the front of the lens's barrel
+  std::optional<Measured> image_distance_mm;       // d1, from Ap to the sensor
+  std::optional<Measured> optical_tube_length_mm;  // from the rear focal plane to the sensor
+  std::optional<Measured> magnification;           // in the plane of focus, dimensionless
+  std::optional<double> target_period_mm;          // period of a periodic target, finite, > 0
   std::optional<model::BenchDirection> direction;  // sign of the reading in z
   std::optional<double> reading_sigma_mm;          // finite, >= 0
   bool floor_unknown = false;                  // discards what the file states of the blur floor

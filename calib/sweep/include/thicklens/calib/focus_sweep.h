@@ -27,7 +27,7 @@ struct FocusSweep {
   FrameReader read_frame;                    // set by the caller
   double reading_sigma_mm = 0;               // standard deviation of a reading, mm; 0: not stated
   std::optional<model::Estimate> offset_mm;  // absent: found from the image scale
-  // What is known of the plane of focus, by the sweep's file or the data of an objective. The names
+  // Statements about the plane of focus, by the sweep's file or the data of an objective. The names
   // are the keys of the files, "magnification" or "lens.magnification".
   std::vector<model::StatedConjugate> stated_focus;
   model::BenchDirection direction = model::BenchDirection::kAway;  // sign of the reading in z

@@ -77,14 +77,14 @@ struct SweepFile {
   double reading_sigma_mm = 0;        // standard deviation of the error of a reading, mm
   bool reading_sigma_stated = false;  // false: the scatter about the law of image scale is used
   std::optional<Estimate> offset_mm;  // absent: unknown
-  // What else is known of the plane of focus (model::StatedConjugate). It determines the depths of
-  // the sweep where neither `offset_mm` nor the image scale does; otherwise it is compared with
-  // them. All are absent unless they are stated.
-  std::optional<Estimate> focus_depth_mm;          // zf from Ap
-  std::optional<Estimate> working_distance_mm;     // from the front of the lens's barrel
-  std::optional<Estimate> image_distance_mm;       // d1, from Ap to the sensor
-  std::optional<Estimate> optical_tube_length_mm;  // from the rear focal plane to the sensor
-  std::optional<Estimate> magnification;           // in the plane of focus, > 0
+  // Statements about the plane of focus (model::StatedConjugate), each > 0. They determine the
+  // depths of the sweep where neither `offset_mm` nor the image scale does; otherwise they are
+  // compared with them. All are absent unless they are stated.
+  std::optional<Estimate> focus_depth_mm;            // zf from Ap
+  std::optional<Estimate> working_distance_mm;       // from the front of the lens's barrel
+  std::optional<Estimate> image_distance_mm;         // d1, from Ap to the sensor
+  std::optional<Estimate> optical_tube_length_mm;    // from the rear focal plane to the sensor
+  std::optional<Estimate> magnification;             // in the plane of focus, > 0
   BenchDirection direction = BenchDirection::kAway;  // whether readings grow away from the camera
   SweepTarget target = SweepTarget::kAuto;           // what was photographed
   FloorKnowledge floor;                              // what is known of the blur floor
