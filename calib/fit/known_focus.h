@@ -25,7 +25,7 @@ double FocalLengthTolerance(const model::Camera& camera);
 model::Estimate FocusDepthWithTolerance(const model::Camera& camera,
                                         const model::StatedConjugate& stated);
 
-// FitBlur where the plane of focus is known and the bench offset is not [D130]: the offset is the
+// FitBlur where the plane of focus is known and the bench offset is not [D132]: the offset is the
 // one at which the fitted zf is that of the statement; `setup.offset_mm` is only where its search
 // starts. With the fit's covariance C at a held offset and its slope g = d(zf, kappa, S0,
 // offset)/d offset, an error e of the fit and an error e_s of the statement's zf give
