@@ -360,7 +360,7 @@ class Calibrator {
   bool ScaleDeterminesDepth(const ScaleModel& law) const {
     const double depth_mm =
         law.offset_mm.value + model::DirectionSign(sweep_.direction) * SharpestReadingMm();
-    return depth_mm - sweep_.camera.lens.front_focal_length_mm > kLeastKnown * law.offset_mm.sigma;
+    return depth_mm - sweep_.camera.lens.front_focal_length_mm > kKnownSigmas * law.offset_mm.sigma;
   }
 
   double ReadingRangeMm() const {

@@ -275,7 +275,7 @@ class Solution {
     // The error of the bench offset has nothing to do with the length of the sweep: it matters
     // against the distance from the focal point, where d1 and kappa become infinite.
     const double beyond_mm = zf - evidence_.setup.lens.front_focal_length_mm;
-    if (!(zf_sigma < beyond_mm / kLeastKnown) || !(kappa > kLeastKnown * kappa_sigma)) {
+    if (!(zf_sigma < beyond_mm / kKnownSigmas) || !(kappa > kKnownSigmas * kappa_sigma)) {
       Refuse(ReasonOfZero(nearest, farthest));
       return false;
     }
@@ -287,7 +287,7 @@ class Solution {
       return false;
     }
     // An uncertain bench offset makes the ratio uncertain, which is then no contradiction.
-    const double reach = kLeastKnown * kappa_sigma;
+    const double reach = kKnownSigmas * kappa_sigma;
     if (!(kappa + reach >= kSmallestRatio && kappa - reach <= kLargestRatio)) {
       Refuse(
           fmt::format("the blur ratio would have to be {:.{}f}, which no lens has ({} to {}): "
@@ -321,7 +321,7 @@ class Solution {
         slope.value, slope.sigma);
   }
 
-  // What to state where the image scale does not determine the bench offset.
+  // The advice where the image scale does not determine the bench offset.
   static constexpr char kStateOne[] =
       "State one of: target_period_mm (with a grid or ruler of that period in view), "
       "magnification, "

@@ -9,7 +9,7 @@ namespace thicklens::calib {
 
 // Standard deviations by which the in-focus distance must exceed the focal length, and kappa 0, so
 // that d1 and kappa are determined.
-inline constexpr double kLeastKnown = 3;
+inline constexpr double kKnownSigmas = 3;
 
 // Derives the results from the blur of the frames. It rejects frames that do not follow the others
 // (they are named in their `rejection`), chooses the floor's constraint, fits, estimates the

@@ -27,7 +27,8 @@ std::optional<std::string> WrongShape(const Calibration& calibration) {
   return std::nullopt;
 }
 
-// What was stated can only be stated more exactly.
+// Returns the action that makes the bench offset more precise. A statement can only be made more
+// exactly.
 std::string RemedyOfOffset(const std::string& origin) {
   if (!origin.empty() && origin != kFromScale) return fmt::format("state {} more exactly", origin);
   return "state the magnification (by target_period_mm with a grid or ruler in view), "

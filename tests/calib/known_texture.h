@@ -49,7 +49,7 @@ class KnownTexture {
     return RenderPlane(width_px, height_px, origin_px, view,
                        [&](const Eigen::Vector2d& nu) { return transfer(nu.norm()); });
   }
-  // The same with a blur that depends on the direction.
+  // Makes such a texture with a blur that depends on the direction.
   cv::Mat RenderPlane(int width_px, int height_px, const Eigen::Vector2d& origin_px,
                       const TextureView& view, const PlaneTransfer& transfer) const {
     cv::Mat_<double> sum(height_px, width_px, view.mean);

@@ -137,7 +137,7 @@ TEST(MacroSweep, TheMorePreciseOfScaleAndStatementIsUsed) {
   Calibration c = CalibrateWithoutMap(sweep);
   EXPECT_EQ(c.diagnostics.bench_offset_from, "the image scale");
   EXPECT_THAT(c.summary.warnings, Each(Not(HasSubstr("focus_depth_mm (205"))));
-  // A statement that contradicts a given offset is told, and widens the interval.
+  // A statement that contradicts a given offset gives a warning and widens the interval.
   sweep.sweep.offset_mm = model::Estimate{100, 0.1};
   sweep.sweep.stated_focus = {{model::ConjugateKind::kFocusDepth, {205, 0.5}, "focus_depth_mm"}};
   c = CalibrateWithoutMap(sweep);

@@ -191,7 +191,7 @@ struct FieldMap {
   std::optional<model::Estimate> astigmatism_mm;  // zf of horizontal blur minus zf of vertical blur
   // The blur along x (horizontal) and along y (vertical); present with astigmatism_mm.
   std::optional<AxisFocus> along_x, along_y;
-  std::vector<DepthCluster> clusters;             // a single cluster: the target is at one depth
+  std::vector<DepthCluster> clusters;  // a single cluster: the target is at one depth
 };
 
 // Result of a fit to one colour channel.
@@ -275,7 +275,7 @@ struct CalibrationDiagnostics {
   std::optional<model::Estimate> blur_slope_px_per_mm;
   // Magnification in the plane of focus, f1/(zf - f1), dimensionless; present where zf is.
   std::optional<model::Estimate> magnification_at_focus;
-  // What determines the bench offset: "offset_mm", "the image scale", or the name of the statement
+  // The source of the bench offset: "offset_mm", "the image scale", or the name of the statement
   // of the sweep's file or the camera file. Empty: nothing does.
   std::string bench_offset_from;
   // The symptoms whose causes were compared, with the causes that are named.
