@@ -355,7 +355,7 @@ class Calibrator {
     return true;
   }
 
-  // Whether the bench offset from the image scale tells the target from the focal point, where d1
+  // Whether the image scale places the target beyond the focal point, where d1
   // and kappa become infinite.
   bool ScaleDeterminesDepth(const ScaleModel& law) const {
     const double depth_mm =
