@@ -44,6 +44,7 @@ constexpr double kZeroMoves = 0.1;      // share of the zero's sigma above which
 constexpr double kPartOfStep = 0.2;     // of the readings, by which known depths may be off
 constexpr double kFewRegistered = 0.8;  // share of the used frames; below it the light is checked
 constexpr int kMaxThreads = 1024;
+constexpr char kNoOffset[] = "nothing determines the bench offset";
 
 class Calibrator {
  public:
@@ -108,6 +109,7 @@ class Calibrator {
     }
     FindSharpest();
     ReportRootCause();
+    if (zero_is_open_) ForgetOffset();
   }
 
   // Runs also for a sweep that is refused, on the frames that passed the quality checks of the
@@ -334,7 +336,8 @@ class Calibrator {
     const ScaleModel& law = result_.diagnostics.scale;
     if (best_statement_) {
       const model::Estimate focus_mm = FocusDepthWithTolerance(sweep_.camera, *best_statement_);
-      if (!law.done || focus_mm.sigma < law.offset_mm.sigma) {
+      if (!law.done || sweep_.camera.objective || !ScaleDeterminesDepth(law) ||
+          focus_mm.sigma < law.offset_mm.sigma) {
         known_focus_ = best_statement_;
         result_.diagnostics.bench_offset_from = known_focus_->name;
         result_.summary.bench_offset_mm =
@@ -349,18 +352,34 @@ class Calibrator {
     }
     if (!law.done && !law.changes_too_little) return Refuse(ReasonOfUnknownOffset(law));
     zero_is_open_ = true;
+    if (sweep_.target_period_mm) {
+      result_.summary.warnings.emplace_back(
+          "target_period_mm is stated, but the sharpest frame shows no periodic texture");
+    }
     result_.summary.bench_offset_mm =
         Result{OffsetOfFocusAt(UsualFocusDepth(sweep_.camera, scales_, SharpestReadingMm())), 0,
                std::nullopt};
     return true;
   }
 
-  // Whether the image scale places the target beyond the focal point, where d1
-  // and kappa become infinite.
+  // Whether the image scale shows on which side of the focal point, where d1 and kappa become
+  // infinite, the target is. A target that is clearly nearer is a contradiction, which is found
+  // later.
   bool ScaleDeterminesDepth(const ScaleModel& law) const {
     const double depth_mm =
         law.offset_mm.value + model::DirectionSign(sweep_.direction) * SharpestReadingMm();
-    return depth_mm - sweep_.camera.lens.front_focal_length_mm > kKnownSigmas * law.offset_mm.sigma;
+    return std::abs(depth_mm - sweep_.camera.lens.front_focal_length_mm) >
+           kKnownSigmas * law.offset_mm.sigma;
+  }
+
+  // Removes what depends on an offset that nothing determines.
+  void ForgetOffset() {
+    result_.summary.bench_offset_mm.reset();
+    result_.diagnostics.paper_recipe = {};
+    result_.diagnostics.paper_recipe.message = kNoOffset;
+    result_.diagnostics.sharpness = {};
+    result_.diagnostics.sharpness.message = kNoOffset;
+    for (FrameMeasurement& frame : result_.frames) frame.depth_mm = 0;
   }
 
   double ReadingRangeMm() const {
@@ -380,11 +399,13 @@ class Calibrator {
   void TakeGivenOffset() {
     result_.summary.bench_offset_mm =
         Result{sweep_.offset_mm->value, sweep_.offset_mm->sigma, std::nullopt};
-    result_.diagnostics.bench_offset_from = "offset_mm";
+    result_.diagnostics.bench_offset_from = kFromOffset;
   }
 
   bool PlacedWithinReach() {
     PlaceFrames();
+    // These depths are only where the search starts.
+    if (zero_is_open_ || known_focus_) return true;
     return Passed(selection_.KeepPossibleDepths(result_.summary.bench_offset_mm->value,
                                                 sweep_.camera.lens.front_focal_length_mm));
   }
@@ -484,7 +505,13 @@ class Calibrator {
         RefineOffsetOfKnownFocus(before, fit))
       return MeasureAndSolve();
     if (!result_.frames[reference_].rejection.empty()) return;
-    if (sweep_.target_period_mm) CheckMagnification(sweep_, reference_, Grey(reference_), &result_);
+    if (known_focus_) {
+      // These use the depths, which the fit has moved.
+      result_.diagnostics.paper_recipe = RunSourceRecipe(sweep_.camera, result_.frames, used());
+      FitPeak();
+    }
+    if (sweep_.target_period_mm && result_.diagnostics.bench_offset_from != kFromPeriod)
+      CheckMagnification(sweep_, reference_, Grey(reference_), &result_);
     if (result_.summary.outcome == Outcome::kRefused) return;
     WidenByContradictions(evidence.setup, fit);
     CompareWithStatements(sweep_, statements_, &result_);
@@ -517,7 +544,7 @@ class Calibrator {
     if (slip_) {
       WidenByTrials("jump of the readings", "find the part that slipped, or take the sweep again",
                     WithoutReadingStep(sweep_, setup, *slip_, scales_, reference_, result_), fit,
-                    &result_);
+                    &result_, known_focus_);
     }
     if (bend_ && result_.diagnostics.bench_offset_from == kFromScale) {
       const double half_mm = 0.5 * std::abs(bend_->zero_spread_mm);

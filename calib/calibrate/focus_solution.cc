@@ -67,6 +67,7 @@ class Solution {
     result_.summary.reason = reason;
     if (result_.diagnostics.scale.kind == ScaleKind::kConstant)
       result_.summary.reason += "; " + result_.diagnostics.scale.message;
+    result_.diagnostics.magnification_at_focus.reset();
     result_.summary.image_distance_mm.reset();
     result_.summary.focus_depth_mm.reset();
     result_.summary.blur_ratio.reset();
@@ -289,11 +290,12 @@ class Solution {
     // An uncertain bench offset makes the ratio uncertain, which is then no contradiction.
     const double reach = kKnownSigmas * kappa_sigma;
     if (!(kappa + reach >= kSmallestRatio && kappa - reach <= kLargestRatio)) {
-      Refuse(
-          fmt::format("the blur ratio would have to be {:.{}f}, which no lens has ({} to {}): "
-                      "check focal lengths, aperture radius, pixel pitch and the unit of the "
-                      "readings, and that the target moved and not the lens",
-                      kappa, kappa < 0.1 ? 4 : 2, kSmallestRatio, kLargestRatio));
+      Refuse(fmt::format(
+          "the blur ratio would have to be {:.{}f}, which no lens has ({} to {}): "
+          "check focal lengths, aperture radius, pixel pitch, {}the unit of the readings, and "
+          "that the target moved and not the lens",
+          kappa, kappa < 0.1 ? 4 : 2, kSmallestRatio, kLargestRatio,
+          evidence_.known_focus ? evidence_.known_focus->name + ", " : ""));
       return false;
     }
     if (!(kappa + reach >= kLowRatio && kappa - reach <= kHighRatio)) {
@@ -318,7 +320,7 @@ class Solution {
         "The reading at focus is known ({:.6g} +- {:.2g} mm), and so is the growth of the blur "
         "(sigma {:.4g} +- {:.2g} px per mm of reading)",
         result_.diagnostics.focus_reading_mm->value, result_.diagnostics.focus_reading_mm->sigma,
-        slope.value, slope.sigma);
+        sweep_.sensor_px_per_px * slope.value, sweep_.sensor_px_per_px * slope.sigma);
   }
 
   // The advice where the image scale does not determine the bench offset.
@@ -330,7 +332,9 @@ class Solution {
 
   std::string ReasonOfOpenZero() const {
     const ScaleModel& scale = result_.diagnostics.scale;
-    const std::string why = scale.done
+    // The message of a constant scale is appended to every refusal.
+    const std::string why = scale.kind == ScaleKind::kConstant ? "the image scale does not change"
+                            : scale.done
                                 ? fmt::format(
                                       "the sweep is too short for its image scale to determine the "
                                       "bench offset ({:.4g} +- {:.2g} mm)",

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "calib/fit/frame_outliers.h"
+#include "calib/fit/known_focus.h"
 #include "calib/registration/scale_tracking.h"
 #include "calib/response/light_exponent.h"
 #include "calib/response/processing_traces.h"
@@ -198,7 +199,8 @@ class ResponseCheck {
         response.light_exponent->sigma);
     if (better) response.better_transfer = better->Name();
     const auto setup = better ? SetupBy(*better) : std::nullopt;
-    const BlurFitResult trial = setup ? FitBlur(*setup, &fit_) : BlurFitResult();
+    const BlurFitResult trial =
+        setup ? FitBlurWith(*setup, evidence_.known_focus, &fit_) : BlurFitResult();
     if (trial.done) {
       text += fmt::format(
           "; with transfer {} kappa is {:.4f} instead of {:.4f}, and zf moves by {:+.3f} mm",
@@ -206,7 +208,7 @@ class ResponseCheck {
           trial.values[kFocusDepth] - fit_.values[kFocusDepth]);
       WidenByTrials("sensor.transfer",
                     fmt::format("state transfer: {} in the camera file", better->Name()), {*setup},
-                    fit_, &result_);
+                    fit_, &result_, evidence_.known_focus);
     } else {
       text += fmt::format(
           "; {}, so that the effect on kappa is unknown and the interval of kappa does not "

@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "calib/uncertainty/systematic_advice.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/validity.h"
 #include "thicklens/calib/focus_sweep.h"
@@ -97,6 +98,12 @@ class Verifier {
     return std::find(open.begin(), open.end(), name) == open.end();
   }
 
+  // Whether a statement gives the plane of focus, so that the sweep does not measure d1.
+  bool FocusIsStated() const {
+    const std::string& origin = found_.diagnostics.bench_offset_from;
+    return !origin.empty() && origin != kFromScale && origin != kFromOffset;
+  }
+
   std::optional<model::Estimate> StoredFocusDepth() const {
     if (!stored_.image_distance_mm) return std::nullopt;
     const double zf = camera_.focus_depth_mm();
@@ -108,8 +115,12 @@ class Verifier {
   void TakeParameters() {
     if (found_.summary.outcome == Outcome::kRefused) return;
     const std::string open = "the sweep does not determine it";
+    const std::string of_focus = FocusIsStated()
+                                     ? fmt::format("it follows from {}, which is stated",
+                                                   found_.diagnostics.bench_offset_from)
+                                     : std::string();
     Take(kImageDistance, stored_.image_distance_mm, found_.summary.image_distance_mm,
-         Systematic(&SystematicPart::image_distance_mm), IsFixed(kImageDistance) ? "" : open);
+         Systematic(&SystematicPart::image_distance_mm), IsFixed(kImageDistance) ? of_focus : open);
     Take(kFocusDepth, StoredFocusDepth(), found_.summary.focus_depth_mm,
          Systematic(&SystematicPart::focus_depth_mm), "it follows from image_distance_mm");
     Take(kBlurRatio, stored_.blur_ratio, found_.summary.blur_ratio,
@@ -196,7 +207,8 @@ class Verifier {
   // An error of the bench offset moves all depths, including zf.
   void WarnOfBenchOffset() {
     const ComparedParameter* focus = Find(kFocusDepth);
-    if (focus == nullptr || sweep_.offset_mm || !found_.summary.bench_offset_mm) return;
+    if (focus == nullptr || sweep_.offset_mm || FocusIsStated() || !found_.summary.bench_offset_mm)
+      return;
     const double offset_sigma = found_.summary.bench_offset_mm->sigma;
     const double covariance = CovarianceOf(found_.diagnostics.covariance_order,
                                            found_.diagnostics.covariance, kImageDistance, kOffset);
@@ -272,6 +284,12 @@ class Verifier {
 
   // Returns the reason why agreement would prove nothing; empty if it is meaningful.
   std::string TooCoarse(const ComparedParameter* d1, const ComparedParameter* kappa) const {
+    if (d1 != nullptr && FocusIsStated()) {
+      return fmt::format(
+          "the sweep does not measure image_distance_mm, the main parameter of a calibration: it "
+          "follows from {}, which is stated",
+          found_.diagnostics.bench_offset_from);
+    }
     if (d1 == nullptr || !d1->counted) {
       return "the sweep does not determine image_distance_mm, the main parameter of a calibration";
     }

@@ -14,9 +14,11 @@
 namespace thicklens::calib {
 namespace {
 
-constexpr double kSeenBlurPx2 = 2;          // added variance that stands out
-constexpr double kContradicts = 3;          // standard deviations
-constexpr double kMinContradiction = 1e-3;  // of zf
+constexpr double kSeenBlurPx2 = 2;  // added variance that stands out
+// Standard deviation of a stated period relative to it: prints and rulers are good to about that.
+constexpr double kPeriodError = 0.003;
+constexpr double kContradicts = 3;               // standard deviations
+constexpr double kSmallestContradiction = 1e-3;  // of zf
 
 }  // namespace
 
@@ -39,8 +41,9 @@ std::optional<model::StatedConjugate> MagnificationOfPeriod(const FocusSweep& sw
   }
   model::StatedConjugate stated;
   stated.kind = model::ConjugateKind::kMagnification;
-  stated.value = {magnification, magnification * period->sigma_px / period->period_px};
-  stated.name = "target_period_mm";
+  stated.value = {magnification,
+                  magnification * std::hypot(period->sigma_px / period->period_px, kPeriodError)};
+  stated.name = kFromPeriod;
   return stated;
 }
 
@@ -64,8 +67,7 @@ double UsualFocusDepth(const model::Camera& camera, const std::vector<ScaleSampl
   for (const ScaleSample& sample : samples) {
     const std::optional<double>& added_px2 = sample.registration.added_variance_px2;
     if (!added_px2 || !(*added_px2 > kSeenBlurPx2)) continue;
-    slopes.push_back(std::sqrt(*added_px2) / sample.scale /
-                     std::abs(sample.reading_mm - sharpest_reading_mm));
+    slopes.push_back(std::sqrt(*added_px2) / std::abs(sample.reading_mm - sharpest_reading_mm));
   }
   if (slopes.empty() || !std::isfinite(Median(slopes))) return 2 * f1_mm;
   const double product_mm2 = kDefaultRatio * camera.lens.aperture_radius_mm /
@@ -77,24 +79,44 @@ void CompareWithStatements(const FocusSweep& sweep,
                            const std::vector<model::StatedConjugate>& statements,
                            Calibration* calibration) {
   if (!calibration->summary.focus_depth_mm) return;
-  for (const model::StatedConjugate& stated : statements) {
-    const Result& found = *calibration->summary.focus_depth_mm;
-    const std::string& origin = calibration->diagnostics.bench_offset_from;
-    if (stated.name == origin) continue;
-    const model::Estimate focus_mm = FocusDepthWithTolerance(sweep.camera, stated);
-    const double apart_mm = focus_mm.value - found.value;
-    if (!(std::abs(apart_mm) >
-          kContradicts * std::hypot(focus_mm.sigma, found.sigma) + kMinContradiction * found.value))
-      continue;
-    calibration->summary.warnings.push_back(fmt::format(
-        "{} ({:.5g}) puts the in-focus distance at {:.5g} +- {:.2g} mm, {:+.3g} mm from that by {} "
-        "({:.5g} +- {:.2g} mm): one of them, the focal length, the pixel pitch or the unit of the "
-        "readings is wrong",
-        stated.name, stated.value.value, focus_mm.value, focus_mm.sigma, apart_mm, origin,
-        found.value, found.sigma));
-    WidenFocus(stated.name + " contradicts " + origin, std::abs(apart_mm),
+  const Result found = *calibration->summary.focus_depth_mm;
+  const std::string& origin = calibration->diagnostics.bench_offset_from;
+  double found_sigma_mm = found.sigma;
+  const auto compare = [&](const std::string& name, double focus_mm, double sigma_mm) {
+    const double apart_mm = focus_mm - found.value;
+    const double both_mm = std::hypot(sigma_mm, found_sigma_mm);
+    if (!(std::abs(apart_mm) > kContradicts * both_mm + kSmallestContradiction * found.value))
+      return;
+    const std::string text = fmt::format(
+        "{} puts the in-focus distance at {:.5g} +- {:.2g} mm, {:+.3g} mm from that by {} ({:.5g} "
+        "+- {:.2g} mm): one of them, the focal length, the pixel pitch or the unit of the readings "
+        "is wrong{}",
+        name, focus_mm, sigma_mm, apart_mm, origin, found.value, found_sigma_mm,
+        name == kFromScale
+            ? ", or the entrance pupil of the lens is not at its front principal plane, "
+              "from which the image scale measures"
+            : "");
+    calibration->summary.warnings.push_back(text);
+    WidenFocus(name + " contradicts " + origin, std::abs(apart_mm),
                "find out which of them is wrong: state the reliable one alone", sweep.camera.lens,
                calibration);
+  };
+  for (const model::StatedConjugate& stated : statements) {
+    if (stated.name == origin) found_sigma_mm = FocusDepthWithTolerance(sweep.camera, stated).sigma;
+  }
+  const ScaleModel& scale = calibration->diagnostics.scale;
+  if (scale.done && !sweep.camera.objective && origin != kFromScale && origin != kFromOffset) {
+    // No pupil law is known to hold: the zero may lie anywhere in the interval of the laws.
+    const Eigen::Vector2d& laws_mm = scale.offset_of_pupil_laws_mm;
+    const double offset_mm = calibration->summary.bench_offset_mm->value;
+    compare(kFromScale, found.value + std::clamp(offset_mm, laws_mm.x(), laws_mm.y()) - offset_mm,
+            scale.offset_mm.sigma);
+  }
+  for (const model::StatedConjugate& stated : statements) {
+    if (stated.name == origin) continue;
+    const model::Estimate focus_mm = FocusDepthWithTolerance(sweep.camera, stated);
+    compare(fmt::format("{} ({:.5g})", stated.name, stated.value.value), focus_mm.value,
+            focus_mm.sigma);
   }
 }
 

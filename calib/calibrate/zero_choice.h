@@ -30,8 +30,10 @@ std::optional<model::StatedConjugate> MostPrecise(
 double UsualFocusDepth(const model::Camera& camera, const std::vector<ScaleSample>& samples,
                        double sharpest_reading_mm);
 
-// Compares the fitted zf with the statements that were not used for it. Each that contradicts it by
-// more than three standard deviations is a warning, and the interval of zf includes its own.
+// Compares the fitted zf with the statements that were not used for it, and with the image scale if
+// a statement was used. A contradiction of more than three standard deviations is a warning, and
+// the interval of zf then includes both. The image scale of an objective is not compared: it shows
+// where the entrance pupil is, which the equivalent lens does not describe.
 void CompareWithStatements(const FocusSweep& sweep,
                            const std::vector<model::StatedConjugate>& statements,
                            Calibration* calibration);

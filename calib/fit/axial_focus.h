@@ -26,7 +26,7 @@ struct AxialFocus {
 // Fits one blur law along x and one along y to the same frames [D130]. The readings' errors are
 // common to both laws and are part of the fit. `setup` has the readings, the bench offset (held)
 // and the floor, which must be known; its estimators are not used. `frames` are the samples'
-// indices in setup.frames, Frames that deviate from the law of an axis lose weight as in FitBlur.
+// indices in setup.frames. Frames that deviate from the law of an axis lose weight as in FitBlur.
 // The errors are widened where chi^2 per degree of freedom is above 1.
 AxialFocus FitAxialFocus(const BlurFitSetup& setup, const std::vector<std::size_t>& frames,
                          const AxialBlur& blur);

@@ -54,7 +54,7 @@ model::Estimate FocusDepthWithTolerance(const model::Camera& camera,
   if (stated.kind == model::ConjugateKind::kFocusDepth) return focus_mm;
   // A part of the tolerance is enough for the slope, and a sensor at a stated distance stays behind
   // the focal point.
-  constexpr double kStep = 1e-4;
+  constexpr double kStep = -1e-4;
   const double change_mm =
       (model::FocusDepthOf(Stretched(camera.lens, 1 + kStep), stated).value - focus_mm.value) /
       kStep;

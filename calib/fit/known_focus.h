@@ -13,6 +13,9 @@ namespace thicklens::calib {
 // tolerance: labels are rounded by about as much.
 inline constexpr double kFocalLengthTolerance = 0.01;
 
+// Name of the statement that follows from a period of the target.
+inline constexpr char kFromPeriod[] = "target_period_mm";
+
 // Whether the camera file states a tolerance of the front focal length.
 bool StatesFocalLength(const model::Camera& camera);
 

@@ -126,11 +126,20 @@ std::vector<model::StatedConjugate> StatedFocus(const model::SweepFile& file,
   using Kind = model::ConjugateKind;
   std::vector<model::StatedConjugate> stated;
   const auto add = [&](Kind kind, const std::optional<model::Estimate>& value, const char* key) {
-    if (value) stated.push_back({kind, *value, key});
+    if (!value) return;
+    if (camera.objective && kind != Kind::kMagnification) {
+      throw Error(fmt::format(
+          "{} is stated, but the camera file states the lens by an objective, whose equivalent "
+          "lens has no length that can be measured: state magnification",
+          key));
+    }
+    stated.push_back({kind, *value, key});
   };
   add(Kind::kFocusDepth, file.focus_depth_mm, "focus_depth_mm");
-  if (file.working_distance_mm)
-    stated.push_back(DepthOfWorkingDistance(*file.working_distance_mm, camera));
+  if (file.working_distance_mm) {
+    const model::StatedConjugate depth = DepthOfWorkingDistance(*file.working_distance_mm, camera);
+    add(depth.kind, depth.value, "working_distance_mm");
+  }
   add(Kind::kImageDistance, file.image_distance_mm, "image_distance_mm");
   add(Kind::kTubeLength, file.optical_tube_length_mm, "optical_tube_length_mm");
   add(Kind::kMagnification, file.magnification, "magnification");

@@ -9,6 +9,7 @@
 #include "calib/registration/scale_tracking.h"
 #include "calib/registration/target_period.h"
 #include "calib/sweep/frame_selection.h"
+#include "calib/uncertainty/systematic_advice.h"
 
 namespace thicklens::calib {
 namespace {
@@ -103,7 +104,8 @@ std::vector<BlurFitSetup> WithoutReadingStep(const FocusSweep& sweep, const Blur
   for (FitFrame& frame : earlier.frames) {
     if (frame.reading_mm < from_mm) frame.reading_mm += reading_step.jump_mm.value;
   }
-  if (sweep.offset_mm) return {later, earlier};
+  const std::string& origin = calibration.diagnostics.bench_offset_from;
+  if (sweep.offset_mm || (!origin.empty() && origin != kFromScale)) return {later, earlier};
   for (ScaleSample& sample : scales) {
     if (sample.reading_mm >= from_mm) sample.reading_mm -= reading_step.jump_mm.value;
   }

@@ -111,7 +111,8 @@ void WidenFocusAndRatio(const std::string& name, const Eigen::Vector2d& focus_mo
 
 void WidenByTrials(const std::string& name, const std::string& remedy,
                    const std::vector<BlurFitSetup>& setups, const BlurFitResult& fit,
-                   Calibration* calibration) {
+                   Calibration* calibration,
+                   const std::optional<model::StatedConjugate>& known_focus) {
   SystematicPart part;
   part.name = name;
   part.remedy = remedy;
@@ -119,7 +120,7 @@ void WidenByTrials(const std::string& name, const std::string& remedy,
   Eigen::Vector2d zero_mm(0, 0);
   if (zero) zero_mm = zero->systematic.value_or(Eigen::Vector2d(zero->value, zero->value));
   for (const BlurFitSetup& setup : setups) {
-    const BlurFitResult trial = FitBlur(setup, &fit);
+    const BlurFitResult trial = FitBlurWith(setup, known_focus, &fit);
     if (!trial.done) {
       calibration->summary.warnings.push_back(
           fmt::format("{}: the fit of its effect on the results failed, and the intervals do not "
@@ -135,7 +136,7 @@ void WidenByTrials(const std::string& name, const std::string& remedy,
     widen(model::ImageDistanceMm(setup.lens, trial.values[kFocusDepth]) - d1_mm,
           &part.image_distance_mm);
     widen(trial.values[kBlurRatio] - fit.values[kBlurRatio], &part.blur_ratio);
-    widen(setup.offset_mm.value, &zero_mm);
+    widen(trial.values[kBenchOffset], &zero_mm);
   }
   if (zero) zero->systematic = zero_mm;
   const auto add = [](std::optional<Result>* result, const Eigen::Vector2d& moves) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "calib/fit/blur_fit.h"
+#include "calib/fit/known_focus.h"
 #include "thicklens/calib/calibration.h"
 
 namespace thicklens::calib {
@@ -16,6 +17,8 @@ inline constexpr const char* kShapePart = "shape of the blur";
 
 // CalibrationDiagnostics::bench_offset_from where the image scale determines the bench offset.
 inline constexpr char kFromScale[] = "the image scale";
+// The same where offset_mm is stated.
+inline constexpr char kFromOffset[] = "offset_mm";
 
 // Sorts the parts, the largest first, and gives the advice: how to shrink the largest share of the
 // error of d1. The statistical part counts at its 95 %, without the share of the bench offset,
@@ -35,10 +38,12 @@ void WidenFocusAndRatio(const std::string& name, const Eigen::Vector2d& focus_mo
                         const model::ThickLens& lens, Calibration* calibration);
 
 // Adds a part to the table and to the intervals of zf, d1, kappa and the bench offset: the fit is
-// repeated with each of `setups` instead of the assumed one.
+// repeated with each of `setups` instead of the assumed one, at the known plane of focus if there
+// is one.
 void WidenByTrials(const std::string& name, const std::string& remedy,
                    const std::vector<BlurFitSetup>& setups, const BlurFitResult& fit,
-                   Calibration* calibration);
+                   Calibration* calibration,
+                   const std::optional<model::StatedConjugate>& known_focus = std::nullopt);
 
 // Adds a part that moves kappa alone, by `moves` (lowest <= 0 <= highest), to the table and
 // linearly to the interval of kappa.

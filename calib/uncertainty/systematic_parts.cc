@@ -14,6 +14,7 @@ namespace thicklens::calib {
 namespace {
 
 constexpr std::size_t kMinFrames = 5;
+constexpr char kFocalLengthField[] = "lens.front_focal_length_mm";
 constexpr double kShapesDiffer = 1.1;  // ratio of chi^2 of the frames
 // Difference of chi^2 of the frames, 4 standard deviations, beyond which a family is ruled out.
 constexpr double kRuledOut = 16;
@@ -72,7 +73,23 @@ class Parts {
   }
 
   Trial Try(const BlurFitSetup& setup) const {
-    return {FitBlurWith(setup, evidence_.known_focus, &fit_), setup.lens};
+    std::optional<model::StatedConjugate> known = evidence_.known_focus;
+    // A magnification from the period of the target is in proportion to the pixel pitch.
+    if (known && known->name == kFromPeriod)
+      known->value.value *= setup.pixel_pitch_mm / evidence_.setup.pixel_pitch_mm;
+    return {FitBlurWith(setup, known, &fit_), setup.lens};
+  }
+
+  // Includes a trial of a number of the camera file; one that fails must not pass for one without
+  // an effect.
+  void IncludeOrWarn(const Trial& trial, SystematicPart* part) {
+    if (!trial.fit.done) {
+      result_.summary.warnings.push_back(
+          fmt::format("{}: the fit at an end of its tolerance failed, and the intervals do not "
+                      "include it ({})",
+                      part->name, trial.fit.message));
+    }
+    Include(trial, part);
   }
 
   void AddFloor(const FloorInterval& floor) {
@@ -297,7 +314,7 @@ class Parts {
         BlurFitSetup setup = evidence_.setup;
         if (!Change(field, change, &setup)) continue;
         is_used = true;
-        Include(Try(setup), &part);
+        IncludeOrWarn(Try(setup), &part);
       }
       if (is_used) result_.diagnostics.systematic_parts.push_back(part);
     }
@@ -311,7 +328,7 @@ class Parts {
         StatesFocalLength(sweep_.camera))
       return;
     SystematicPart part;
-    part.name = "focal length";
+    part.name = kFocalLengthField;
     part.remedy = fmt::format(
         "state the tolerance of lens.front_focal_length_mm, from which {} gives the in-focus "
         "distance ({:.0f} % is assumed)",
@@ -320,7 +337,7 @@ class Parts {
       BlurFitSetup setup = evidence_.setup;
       setup.lens.front_focal_length_mm *= 1 + change;
       setup.lens.rear_focal_length_mm *= 1 + change;
-      Include(Try(setup), &part);
+      IncludeOrWarn(Try(setup), &part);
     }
     result_.diagnostics.systematic_parts.push_back(part);
   }
@@ -328,9 +345,12 @@ class Parts {
   // Changes a number of the objective's data, and with it the lens. Returns as Change does.
   bool ChangeObjective(const std::string& field, double change, BlurFitSetup* setup) const {
     model::Objective objective = *sweep_.camera.objective;
-    // The magnification is not tried here: its error is that of its statement about the plane of
-    // focus (FocusSweep::stated_focus) and would be counted twice.
-    double* number = field == "lens.numerical_aperture" ? &objective.numerical_aperture
+    // Where the magnification gives the plane of focus, its error is that of the statement, and
+    // would be counted twice.
+    const bool is_counted = evidence_.known_focus &&
+                            evidence_.known_focus->kind == model::ConjugateKind::kMagnification;
+    double* number = field == "lens.numerical_aperture"             ? &objective.numerical_aperture
+                     : field == "lens.magnification" && !is_counted ? &objective.magnification
                      : field == "lens.tube_lens_focal_length_mm"
                          ? &objective.tube_lens_focal_length_mm
                          : nullptr;
@@ -346,13 +366,16 @@ class Parts {
   bool Change(const std::string& field, double change, BlurFitSetup* setup) const {
     if (sweep_.camera.objective && field.rfind("lens.", 0) == 0)
       return ChangeObjective(field, change, setup);
-    double* number = field == "lens.front_focal_length_mm"  ? &setup->lens.front_focal_length_mm
+    double* number = field == kFocalLengthField             ? &setup->lens.front_focal_length_mm
                      : field == "lens.rear_focal_length_mm" ? &setup->lens.rear_focal_length_mm
                      : field == "lens.lens_thickness_mm"    ? &setup->lens.lens_thickness_mm
                      : field == "lens.aperture_radius_mm"   ? &setup->lens.aperture_radius_mm
                      : field == "sensor.pixel_pitch_mm"     ? &setup->pixel_pitch_mm
                                                             : nullptr;
     if (number == nullptr) return false;
+    // A statement of the image's side gives zf for both focal lengths, which change together.
+    if (evidence_.known_focus && field == kFocalLengthField)
+      setup->lens.rear_focal_length_mm *= 1 + change / setup->lens.front_focal_length_mm;
     *number += change;
     return setup->lens.IsValid(nullptr) && setup->pixel_pitch_mm > 0;
   }

@@ -108,6 +108,10 @@ void ConvertToSensorPixels(calib::Calibration* calibration) {
   for (calib::FieldTile& tile : found.field.tiles)
     tile.centre_px = kPx * tile.centre_px + Eigen::Vector2d::Constant((kPx - 1) / 2);
   if (found.magnification) found.magnification->period_px *= kPx;
+  if (found.blur_slope_px_per_mm) {
+    found.blur_slope_px_per_mm->value *= kPx;
+    found.blur_slope_px_per_mm->sigma *= kPx;
+  }
 }
 
 }  // namespace thicklens

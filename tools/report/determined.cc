@@ -57,7 +57,9 @@ std::string FocusReadingLine(const calib::Calibration& calibration) {
 
 std::string OffsetOriginLine(const calib::Calibration& calibration) {
   const calib::CalibrationDiagnostics& diagnostics = calibration.diagnostics;
-  if (diagnostics.bench_offset_from.empty()) return "";
+  if (diagnostics.bench_offset_from.empty() ||
+      calibration.summary.outcome == calib::Outcome::kRefused)
+    return "";
   std::string line = "by " + diagnostics.bench_offset_from;
   if (const auto& m = diagnostics.magnification_at_focus; m && calibration.summary.focus_depth_mm)
     line += fmt::format("; magnification at focus {}", WithError(m->value, m->sigma, ""));

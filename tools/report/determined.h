@@ -19,7 +19,7 @@ std::string SharpestLine(const calib::Calibration& calibration);
 // grows by 5.25 +- 0.01 px per mm of reading"; empty if it was not measured.
 std::string FocusReadingLine(const calib::Calibration& calibration);
 // "by the image scale; magnification at focus 1.000 +- 0.017"; empty if nothing determines the
-// bench offset.
+// bench offset, or if the calibration is refused.
 std::string OffsetOriginLine(const calib::Calibration& calibration);
 // "1/scale changes by +10.1 +- 0.1 % over the sweep: the target looks smaller at larger readings";
 // empty if it was not measured.

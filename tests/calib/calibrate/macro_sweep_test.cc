@@ -149,6 +149,26 @@ TEST(MacroSweep, TheMorePreciseOfScaleAndStatementIsUsed) {
   EXPECT_GT(c.summary.focus_depth_mm->systematic->y(), 204.9);
 }
 
+// The image scale puts the target at 200 mm, and a magnification of 0.85 at 218 mm.
+TEST(MacroSweep, AStatementThatTheImageScaleContradictsGivesAWarning) {
+  SimulatedSweep sweep = MacroSweep(kOneToOne);
+  sweep.sweep.stated_focus = {{model::ConjugateKind::kMagnification, {0.85, 0}, "magnification"}};
+  Calibration c = CalibrateWithoutMap(sweep);
+  ASSERT_NE(c.summary.outcome, Outcome::kRefused) << c.summary.reason;
+  EXPECT_NEAR(c.summary.focus_depth_mm->value, 100 + 100 / 0.85, 1e-3);
+  EXPECT_THAT(c.summary.warnings,
+              Contains(AllOf(StartsWith("the image scale puts the in-focus distance at"),
+                             HasSubstr("from that by magnification (217.65"),
+                             HasSubstr("entrance pupil"))));
+  EXPECT_LT(c.summary.focus_depth_mm->systematic->x(), 204) << "the interval includes both";
+  // A magnification that is off by a factor of two makes the blur impossible.
+  sweep.sweep.stated_focus[0].value.value = 0.5;
+  c = CalibrateWithoutMap(sweep);
+  ASSERT_EQ(c.summary.outcome, Outcome::kRefused);
+  EXPECT_THAT(c.summary.reason, AllOf(HasSubstr("which no lens has"), HasSubstr("magnification")));
+  ExpectFocusReading(c, sweep, 0.002);
+}
+
 // Objectives 10/0.25 and 20/0.4 with a tube lens of 200 mm. In 60 and 30 um of sweep the image
 // scale changes by 0.3 %.
 const model::Objective kTen = {10, 0.25, 200}, kTwenty = {20, 0.4, 200};
@@ -167,6 +187,10 @@ TEST(MacroSweep, WhereNothingDeterminesTheDistanceTheReadingAtFocusIsStillFound)
   EXPECT_NEAR(slope.value, TrueSlope(sweep), 4 * slope.sigma + 0.005 * slope.value);
   EXPECT_FALSE(c.summary.focus_depth_mm);
   EXPECT_FALSE(c.summary.blur_ratio);
+  EXPECT_FALSE(c.summary.bench_offset_mm);
+  EXPECT_FALSE(c.diagnostics.paper_recipe.done);
+  EXPECT_FALSE(c.diagnostics.sharpness.done);
+  EXPECT_EQ(c.frames.front().depth_mm, 0);
 }
 
 // kappa is the slope over M tan(asin NA), so that 1 % of M is 1 % of kappa.

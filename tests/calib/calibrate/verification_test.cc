@@ -99,6 +99,24 @@ TEST(VerifyCalibration, AChangeOfFiveSigmaIsFound) {
   EXPECT_THAT(result.reason, HasSubstr("image_distance_mm 60.025, stored 60 (+5.0 sigma)"));
 }
 
+// A magnification gives d1, which the sweep then does not measure; kappa is compared.
+TEST(VerifyCalibration, AStatedPlaneOfFocusIsNoMeasurementOfTheImageDistance) {
+  Calibration found = FoundCalibration(kD1Mm + 1, 0.004, kRatio + 0.001, 0.001);
+  found.summary.bench_offset_mm = Result{190, 0.1, std::nullopt};
+  found.diagnostics.bench_offset_from = "magnification";
+  Verification result = VerifyCalibration(StoredCamera(0.003, 0.001), {}, found, {});
+  EXPECT_EQ(result.verdict, Verdict::kUndetermined);
+  EXPECT_THAT(result.reason, HasSubstr("it follows from magnification, which is stated"));
+  EXPECT_FALSE(Named(result, "image_distance_mm").counted);
+  EXPECT_EQ(Named(result, "image_distance_mm").why_not_counted,
+            "it follows from magnification, which is stated");
+  EXPECT_TRUE(Named(result, "blur_ratio").counted);
+  EXPECT_THAT(result.warnings, IsEmpty());
+  found.diagnostics.bench_offset_from = "the image scale";
+  result = VerifyCalibration(StoredCamera(0.003, 0.001), {}, found, {});
+  EXPECT_EQ(result.verdict, Verdict::kDoesNotHold);
+}
+
 // Both matrices are correlated. A difference along the direction in which both are uncertain is not
 // significant; a difference across it is.
 TEST(VerifyCalibration, UsesTheCorrelationOfBothMatrices) {

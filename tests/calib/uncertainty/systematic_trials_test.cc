@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <map>
+#include <optional>
 #include <string>
 
 #include "calib/uncertainty/systematic_parts.h"
@@ -94,9 +95,11 @@ model::Objective ObjectiveOfBench(const BlurBench& bench) {
 
 // Solves the noisy bench with the lens of an objective in the place of its own.
 FocusCase SolvedWithObjective(const model::Objective& objective,
-                              const std::map<std::string, model::Provenance>& statements) {
+                              const std::map<std::string, model::Provenance>& statements,
+                              const std::optional<model::StatedConjugate>& known_focus = {}) {
   BlurBench bench;
   FocusCase c = FocusCase(bench).WithTexture(0.02).WithTrueFloor();
+  c.evidence.known_focus = known_focus;
   c.sweep.camera.objective = objective;
   c.sweep.camera.lens = model::LensOfObjective(objective);
   c.sweep.camera.statements = statements;
@@ -142,13 +145,21 @@ TEST(AddSystematicParts, AToleranceOfAnObjectiveIsWhatAnotherObjectiveWouldGive)
   }
 }
 
-// Its error is that of the statement about the plane of focus.
-TEST(AddSystematicParts, TheMagnificationOfAnObjectiveIsNotTriedAgain) {
+// Where a magnification gives the plane of focus, its error is that of the statement.
+TEST(AddSystematicParts, TheMagnificationOfAnObjectiveIsTriedOnce) {
   const model::Objective objective = ObjectiveOfBench(BlurBench());
-  const FocusCase c = SolvedWithObjective(objective, {{"lens.magnification", {0.001, false}},
-                                                      {"lens.numerical_aperture", {0.1, false}},
-                                                      {"sensor.pixel_pitch_mm", {1e-5, false}}});
+  const std::map<std::string, model::Provenance> statements = {
+      {"lens.magnification", {0.001, false}},
+      {"lens.numerical_aperture", {0.1, false}},
+      {"sensor.pixel_pitch_mm", {1e-5, false}}};
+  const FocusCase c =
+      SolvedWithObjective(objective, statements,
+                          model::StatedConjugate{model::ConjugateKind::kMagnification,
+                                                 {objective.magnification, 0.001},
+                                                 "lens.magnification"});
   EXPECT_EQ(c.Part("lens.magnification"), nullptr);
+  // Where the bench offset is given, nothing else contains it.
+  EXPECT_NE(SolvedWithObjective(objective, statements).Part("lens.magnification"), nullptr);
   EXPECT_NE(c.Part("sensor.pixel_pitch_mm"), nullptr);
   // The aperture minus its tolerance is below 0: only the larger one, with a smaller kappa, counts.
   const SystematicPart* aperture = c.Part("lens.numerical_aperture");

@@ -78,6 +78,7 @@ TEST(ConvertToSensorPixels, ConvertsAllThatIsInPixels) {
   green.diagnostics.blur.estimator = "relative spectrum";
   green.diagnostics.magnification = calib::MagnificationCheck{};
   green.diagnostics.magnification->period_px = 12;
+  green.diagnostics.blur_slope_px_per_mm = model::Estimate{3, 0.1};
   green.diagnostics.field.tiles.resize(1);
   green.diagnostics.field.tiles[0].centre_px = {10, 0};
   green.examples.resize(2);
@@ -108,6 +109,8 @@ TEST(ConvertToSensorPixels, ConvertsAllThatIsInPixels) {
                    std::exp(green.diagnostics.sharpness.log_parabola[0]) / 2);
   EXPECT_EQ(found.diagnostics.field.tiles[0].centre_px, Eigen::Vector2d(20.5, 0.5));
   EXPECT_EQ(found.diagnostics.magnification->period_px, 24);
+  EXPECT_DOUBLE_EQ(found.diagnostics.blur_slope_px_per_mm->value, 6);
+  EXPECT_DOUBLE_EQ(found.diagnostics.blur_slope_px_per_mm->sigma, 0.2);
   EXPECT_THAT(found.examples[0].x, ::testing::ElementsAre(DoubleEq(2)));
   EXPECT_THAT(found.examples[1].x, ::testing::ElementsAre(DoubleEq(0.1)));
 }

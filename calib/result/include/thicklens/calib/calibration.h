@@ -270,8 +270,9 @@ struct CalibrationDiagnostics {
   // Reading at the plane of focus by the blur fit: the position of focus in the sweep. Its error
   // does not include that of the bench offset.
   std::optional<model::Estimate> focus_reading_mm;
-  // Growth of the sigma of the blur on the sensor far from focus, px per mm of reading. It needs
-  // neither camera nor bench offset either, and is present where focus_reading_mm is.
+  // Growth of the sigma of the defocus on the sensor at focus, without the blur floor, px per mm of
+  // reading [D131]. In a short sweep it depends neither on the camera nor on the bench offset. It
+  // is present where focus_reading_mm is.
   std::optional<model::Estimate> blur_slope_px_per_mm;
   // Magnification in the plane of focus, f1/(zf - f1), dimensionless; present where zf is.
   std::optional<model::Estimate> magnification_at_focus;
