@@ -17,7 +17,7 @@ inline constexpr const char* kShapePart = "shape of the blur";
 
 // CalibrationDiagnostics::bench_offset_from where the image scale determines the bench offset.
 inline constexpr char kFromScale[] = "the image scale";
-// The same where offset_mm is stated.
+// Its value where offset_mm is stated.
 inline constexpr char kFromOffset[] = "offset_mm";
 
 // Sorts the parts, the largest first, and gives the advice: how to shrink the largest share of the
