@@ -22,15 +22,14 @@ FocusSweep MacroBench() {
   return sweep;
 }
 
-// A line grid of 0.1 mm, drawn at the magnification that the lens equation gives for a frame that is
-// beside the plane of focus.
+// A line grid of 0.1 mm, drawn at the magnification that the lens equation gives for a frame that
+// is beside the plane of focus.
 TEST(MagnificationOfPeriod, IsThatInThePlaneOfFocus) {
   FocusSweep sweep = MacroBench();
   sweep.target_period_mm = 0.1;
   const double zf = 190, d1_mm = model::ImageDistanceMm(sweep.camera.lens, zf);
   for (const double beyond_mm : {0.0, 3.0, -5.0}) {
-    const double in_frame =
-        -model::ChiefRayMagnification(sweep.camera.lens, d1_mm, zf + beyond_mm);
+    const double in_frame = -model::ChiefRayMagnification(sweep.camera.lens, d1_mm, zf + beyond_mm);
     const double period_px = in_frame * 0.1 / sweep.camera.sensor.pixel_pitch_mm;
     cv::Mat_<float> grey(256, 256);
     for (int y = 0; y < grey.rows; ++y) {

@@ -39,7 +39,8 @@ AxialCase DrawAxialCase(unsigned seed, double blur_sigma_px2, double reading_sig
   c.setup.reading_sigma_mm = reading_sigma_mm;
   c.setup.floor_variance_px2 = model::Estimate{kFloor, 0};
   c.blur.variances_px2.resize(2, kFrames);
-  c.blur.covariance = Eigen::MatrixXd::Zero(2 * kFrames, 2 * kFrames);
+  constexpr Eigen::Index kValues = Eigen::Index{2} * kFrames;
+  c.blur.covariance = Eigen::MatrixXd::Zero(kValues, kValues);
   for (int i = 0; i < kFrames; ++i) {
     const double depth_mm = 288 + i;
     const double scale = 300 / depth_mm;

@@ -15,7 +15,6 @@ namespace {
 using ::testing::HasSubstr;
 using thicklens::testing::BlurBench;
 using thicklens::testing::ExactBench;
-using thicklens::testing::FocusCase;
 
 // A sweep of 30 mm about the focus at 400 mm, too short for its blur to show the bench offset.
 BlurBench ShortBench() {

@@ -15,7 +15,6 @@ namespace {
 
 using ::testing::HasSubstr;
 using thicklens::testing::KnownTexture;
-using thicklens::testing::TextureFrame;
 using thicklens::testing::TextureScene;
 using thicklens::testing::TextureSweep;
 using thicklens::testing::WithWhiteNoise;
