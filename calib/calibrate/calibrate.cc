@@ -514,7 +514,7 @@ class Calibrator {
       CheckMagnification(sweep_, reference_, Grey(reference_), &result_);
     if (result_.summary.outcome == Outcome::kRefused) return;
     WidenByContradictions(evidence.setup, fit);
-    CompareWithStatements(sweep_, statements_, &result_);
+    CompareWithStatements(sweep_, statements_, evidence.setup, fit, &result_);
     task.scales = scales_;
     task.offset_mm = evidence.setup.offset_mm;
     task.tick = [] { ThrowIfCancelled(); };

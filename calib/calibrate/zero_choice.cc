@@ -8,6 +8,7 @@
 #include "calib/fit/blur_measurement.h"
 #include "calib/fit/known_focus.h"
 #include "calib/registration/target_period.h"
+#include "calib/uncertainty/calibration_checks.h"
 #include "calib/uncertainty/systematic_advice.h"
 #include "thicklens/base/statistics.h"
 
@@ -17,6 +18,7 @@ namespace {
 constexpr double kSeenBlurPx2 = 2;  // added variance that stands out
 // Standard deviation of a stated period relative to it: prints and rulers are good to about that.
 constexpr double kPeriodError = 0.003;
+constexpr double kReach = 2;  // standard deviations of the other depth that the intervals include
 constexpr double kContradicts = 3;               // standard deviations
 constexpr double kSmallestContradiction = 1e-3;  // of zf
 
@@ -77,6 +79,7 @@ double UsualFocusDepth(const model::Camera& camera, const std::vector<ScaleSampl
 
 void CompareWithStatements(const FocusSweep& sweep,
                            const std::vector<model::StatedConjugate>& statements,
+                           const BlurFitSetup& setup, const BlurFitResult& fit,
                            Calibration* calibration) {
   if (!calibration->summary.focus_depth_mm) return;
   const Result found = *calibration->summary.focus_depth_mm;
@@ -97,9 +100,14 @@ void CompareWithStatements(const FocusSweep& sweep,
               "from which the image scale measures"
             : "");
     calibration->summary.warnings.push_back(text);
-    WidenFocus(name + " contradicts " + origin, std::abs(apart_mm),
-               "find out which of them is wrong: state the reliable one alone", sweep.camera.lens,
-               calibration);
+    // The fit at the other depth and its error. Nothing comes into focus nearer than the focal
+    // point.
+    if (!(focus_mm > setup.lens.front_focal_length_mm)) return;
+    WidenByTrials(fmt::format("contradiction between {} and {}", name, origin),
+                  "find out which of them is wrong, and state the reliable one alone",
+                  WithOffsets(setup, {setup.offset_mm.value + apart_mm +
+                                      std::copysign(kReach * sigma_mm, apart_mm)}),
+                  fit, calibration);
   };
   for (const model::StatedConjugate& stated : statements) {
     if (stated.name == origin) found_sigma_mm = FocusDepthWithTolerance(sweep.camera, stated).sigma;
@@ -115,8 +123,7 @@ void CompareWithStatements(const FocusSweep& sweep,
   for (const model::StatedConjugate& stated : statements) {
     if (stated.name == origin) continue;
     const model::Estimate focus_mm = FocusDepthWithTolerance(sweep.camera, stated);
-    compare(fmt::format("{} ({:.5g})", stated.name, stated.value.value), focus_mm.value,
-            focus_mm.sigma);
+    compare(stated.name, focus_mm.value, focus_mm.sigma);
   }
 }
 

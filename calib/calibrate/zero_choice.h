@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "calib/fit/blur_fit.h"
 #include "calib/registration/image_scale.h"
 #include "thicklens/calib/calibration.h"
 #include "thicklens/calib/focus_sweep.h"
@@ -32,10 +33,12 @@ double UsualFocusDepth(const model::Camera& camera, const std::vector<ScaleSampl
 
 // Compares the fitted zf with the statements that were not used for it, and with the image scale if
 // a statement was used. A contradiction of more than three standard deviations is a warning, and
-// the interval of zf then includes both. The image scale of an objective is not compared: it shows
-// where the entrance pupil is, which the equivalent lens does not describe.
+// the intervals of zf, d1, kappa and the bench offset then include the fit at the other depth. The
+// image scale of an objective is not compared: it shows where the entrance pupil is, which the
+// equivalent lens does not describe.
 void CompareWithStatements(const FocusSweep& sweep,
                            const std::vector<model::StatedConjugate>& statements,
+                           const BlurFitSetup& setup, const BlurFitResult& fit,
                            Calibration* calibration);
 
 }  // namespace thicklens::calib

@@ -117,7 +117,10 @@ std::string HowItWasMade(const FocusSweep& sweep, const Calibration& calibration
   }
   item(sweep.offset_mm ? fmt::format("Bench offset given: {:.6g} ± {:.3g} mm.",
                                      sweep.offset_mm->value, sweep.offset_mm->sigma)
-                       : std::string("Bench offset not given: estimated from the image scale."));
+       : calibration.diagnostics.bench_offset_from.empty()
+           ? std::string("Bench offset not given, and not determined.")
+           : fmt::format("Bench offset not given: determined by {}.",
+                         calibration.diagnostics.bench_offset_from));
   if (sweep.floor.given_px)
     item(fmt::format("Blur floor given: {:.4g} ± {:.3g} px.", sweep.floor.given_px->value,
                      sweep.floor.given_px->sigma));

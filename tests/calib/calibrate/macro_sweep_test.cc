@@ -136,7 +136,7 @@ TEST(MacroSweep, TheMorePreciseOfScaleAndStatementIsUsed) {
   sweep.sweep.stated_focus = {{model::ConjugateKind::kFocusDepth, {205, 8}, "focus_depth_mm"}};
   Calibration c = CalibrateWithoutMap(sweep);
   EXPECT_EQ(c.diagnostics.bench_offset_from, "the image scale");
-  EXPECT_THAT(c.summary.warnings, Each(Not(HasSubstr("focus_depth_mm (205"))));
+  EXPECT_THAT(c.summary.warnings, Each(Not(HasSubstr("focus_depth_mm puts"))));
   // A statement that contradicts a given offset gives a warning and widens the interval.
   sweep.sweep.offset_mm = model::Estimate{100, 0.1};
   sweep.sweep.stated_focus = {{model::ConjugateKind::kFocusDepth, {205, 0.5}, "focus_depth_mm"}};
@@ -144,9 +144,13 @@ TEST(MacroSweep, TheMorePreciseOfScaleAndStatementIsUsed) {
   EXPECT_EQ(c.diagnostics.bench_offset_from, "offset_mm");
   EXPECT_NEAR(c.summary.focus_depth_mm->value, 200, 0.1);
   EXPECT_THAT(c.summary.warnings,
-              Contains(AllOf(StartsWith("focus_depth_mm (205) puts the in-focus distance at 205"),
+              Contains(AllOf(StartsWith("focus_depth_mm puts the in-focus distance at 205"),
                              HasSubstr("+5 mm from that by offset_mm"))));
   EXPECT_GT(c.summary.focus_depth_mm->systematic->y(), 204.9);
+  EXPECT_GT(c.summary.focus_depth_mm->systematic->x(), 199) << "nothing lies on the other side";
+  EXPECT_GT(c.summary.bench_offset_mm->systematic->y(), 104.9);
+  // kappa is in proportion to zf (zf - f1). The interval reaches to 205 mm and two sigma more.
+  EXPECT_NEAR(c.summary.blur_ratio->systematic->y(), 0.45 * 206 * 106 / (200 * 100), 0.005);
 }
 
 // The image scale puts the target at 200 mm, and a magnification of 0.85 at 218 mm.
