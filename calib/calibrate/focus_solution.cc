@@ -326,8 +326,8 @@ class Solution {
   // The advice where the image scale does not determine the bench offset.
   static constexpr char kStateOne[] =
       "State one of: target_period_mm (with a grid or ruler of that period in view), "
-      "magnification, "
-      "image_distance_mm, focus_depth_mm or offset_mm; or, in the camera file, a microscope's "
+      "magnification, image_distance_mm, focus_depth_mm or offset_mm; or, in the camera file, a "
+      "microscope's "
       "lens.magnification";
 
   std::string ReasonOfOpenZero() const {

@@ -76,10 +76,15 @@ BlurFitResult FitBlurAtKnownFocus(const BlurFitSetup& setup, const model::Stated
   BlurFitSetup held = setup;
   held.offset_mm.sigma = 0;
   BlurFitResult fit = FitBlur(held, start);
-  for (int move = 0; fit.done && move < kMaxMoves; ++move) {
+  for (int move = 0; fit.done; ++move) {
     const double gap_mm = focus_mm.value - fit.values[kFocusDepth];
     const double own_mm = std::sqrt(std::max(0.0, fit.covariance(kFocusDepth, kFocusDepth)));
     if (std::abs(gap_mm) < std::max(kPartOfError * own_mm, kPartOfDepth * focus_mm.value)) break;
+    if (move == kMaxMoves) {
+      fit.done = false;
+      fit.message = "no bench offset was found at which the blur is smallest at the known depth";
+      break;
+    }
     const BlurFitResult next = MovedBy(gap_mm, held, fit);
     held.offset_mm.value += gap_mm;
     fit = next;
