@@ -106,8 +106,9 @@ std::optional<double> BlurModel::SigmaErrorPx(double depth_mm) const {
 std::optional<double> BlurModel::ResidualSigmas(const FrameMeasurement& frame) const {
   if (!HasBlur(frame) || !frame.in_blur_fit || !frame.rejection.empty() || !IsDepth(frame.depth_mm))
     return std::nullopt;
-  const double sd_px = std::hypot(frame.blur_sigma_error_px,
-                                  SlopePxPerMm(frame.depth_mm) * sweep_->reading_sigma_mm);
+  const double sd_px =
+      std::hypot(frame.blur_sigma_error_px,
+                 SlopePxPerMm(frame.depth_mm) * frame.depth_per_reading * sweep_->reading_sigma_mm);
   return (frame.blur_sigma_px - SigmaPx(frame.depth_mm)) / sd_px;
 }
 
@@ -122,6 +123,8 @@ void BlurModel::TakeFloor(const Calibration& calibration) {
 }
 
 void BlurModel::TakeCovariance(const Calibration& calibration) {
+  // Where the lens or the sensor moves, the errors of d1 and of the depths of the frames cancel.
+  if (model::MovesFocus(calibration.diagnostics.moves)) return;
   const auto count = static_cast<Eigen::Index>(calibration.diagnostics.covariance_order.size());
   if (count == 0 || calibration.diagnostics.covariance.rows() != count ||
       calibration.diagnostics.covariance.cols() != count)

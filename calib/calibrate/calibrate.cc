@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "calib/calibrate/focus_solution.h"
+#include "calib/calibrate/moving_focus.h"
 #include "calib/calibrate/response_effects.h"
 #include "calib/calibrate/zero_choice.h"
 #include "calib/edges/edge_blur.h"
@@ -44,12 +45,18 @@ constexpr double kZeroMoves = 0.1;      // share of the zero's sigma above which
 constexpr double kPartOfStep = 0.2;     // of the readings, by which known depths may be off
 constexpr double kFewRegistered = 0.8;  // share of the used frames; below it the light is checked
 constexpr int kMaxThreads = 1024;
+// A motor whose steps are no millimetres would seem to be at a larger one.
+constexpr double kLargestRecognisedMagnification = 5;
+// Blur ratios of lenses, by which a sensor that moves is recognised.
+constexpr double kLeastRecognisedRatio = 0.3, kLargestRecognisedRatio = 0.7;
 constexpr char kNoOffset[] = "nothing determines the bench offset";
 
 class Calibrator {
  public:
-  Calibrator(const FocusSweep& sweep, const CalibrationOptions& options)
-      : sweep_(sweep), options_(options), store_(sweep), result_(Begun(sweep)) {
+  // With `motion`, the sweep is the equivalent one of a lens or a sensor that moves.
+  Calibrator(const FocusSweep& sweep, const CalibrationOptions& options,
+             const FocusMotion* motion = nullptr)
+      : sweep_(sweep), options_(options), motion_(motion), store_(sweep), result_(Begun(sweep)) {
     total_steps_ = 4 * static_cast<int>(sweep.frames.size());
   }
 
@@ -73,6 +80,25 @@ class Calibrator {
     result_.summary.seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     return std::move(result_);
+  }
+
+  SweepPreview Preview() {
+    SweepPreview preview;
+    std::string why;
+    if (!HasEnoughFrames(sweep_, &why)) {
+      Refuse(why);
+    } else if (RegionSidePx(sweep_) < kSmallestRegionPx) {
+      Refuse(RegionAdvice(sweep_));
+    } else if (MeasureAndCheck() && MeasureSharpness()) {
+      preview.passed = true;
+      preview.reference = reference_;
+      preview.samples = TrackScale(
+          sweep_, [this](std::size_t frame) { return Grey(frame); }, used(), reference_,
+          std::nullopt, options_.threads, [this] { Tick(); });
+    }
+    FindSharpest();
+    preview.found = std::move(result_);
+    return preview;
   }
 
  private:
@@ -262,7 +288,8 @@ class Calibrator {
     ReplaceReference();
     if (sweep_.offset_mm) {
       TakeGivenOffset();
-      if (!is_lone_edge) {
+      // The zero of an equivalent target is exact where it does not give the image distance.
+      if (!is_lone_edge && (motion_ == nullptr || sweep_.offset_mm->sigma > 0)) {
         const OffsetCheck check = CheckGivenOffset(sweep_, UnitThatFits(sweep_, causes_), &result_);
         if (check.refusal) return Refuse(*check.refusal);
         conflicting_offset_mm_ = check.conflicting_mm;
@@ -276,7 +303,9 @@ class Calibrator {
     if (const auto refusal = CheckDistortion(&result_)) return Refuse(*refusal);
     slip_ = FindReadingStep(scales_, result_.diagnostics.scale);
     if (slip_) WarnOfReadingStep(*slip_, &result_);
-    bend_ = CheckScaleNonlinearity(sweep_, scales_, &result_);
+    // The scale of an equivalent target is that of a lens that moves to second order only.
+    if (motion_ == nullptr || sweep_.moves != model::SweepMotion::kLens)
+      bend_ = CheckScaleNonlinearity(sweep_, scales_, &result_);
     return PlacedWithinReach();
   }
 
@@ -289,7 +318,8 @@ class Calibrator {
       const std::string warning = ConstantScaleWarning(sweep_, samples);
       if (!warning.empty()) result_.diagnostics.scale.message = warning;
     }
-    if (kind != ScaleKind::kInverseDepth && kind != ScaleKind::kReversed) return true;
+    if (motion_ != nullptr || (kind != ScaleKind::kInverseDepth && kind != ScaleKind::kReversed))
+      return true;
     causes_ = CompareScaleCauses(samples, sweep_);
     result_.diagnostics.diagnoses.push_back(causes_.diagnosis);
     const auto reason = ReasonOfScaleCauses(sweep_, result_.diagnostics.scale, causes_);
@@ -425,6 +455,10 @@ class Calibrator {
     if (!law->done || !(focus_depth_mm > camera.lens.front_focal_length_mm)) return;
     const double line_zero_mm = law->line_zero_mm();
     const auto centre_mm = [&](model::PupilLaw pupil) {
+      if (motion_ != nullptr) {
+        return motion_->EquivalentCentreMm(model::CentreOfPerspectiveMm(
+            motion_->lens(), camera.psf, pupil, blur_ratio, motion_->FocusDepthMm()));
+      }
       return model::CentreOfPerspectiveMm(camera.lens, camera.psf, pupil, blur_ratio,
                                           focus_depth_mm);
     };
@@ -500,7 +534,7 @@ class Calibrator {
     BlurEvidence evidence = MeasureBlur(task);
     BlurFitResult fit;
     const Calibration before = result_;
-    SolveFocus(sweep_, &evidence, &fit, &result_);
+    SolveFocus(sweep_, &evidence, &fit, &result_, motion_);
     if (ReplaceRejectedReference(before) || RefineOffsetWithFittedBlur(before) ||
         RefineOffsetOfKnownFocus(before, fit))
       return MeasureAndSolve();
@@ -514,7 +548,8 @@ class Calibrator {
       CheckMagnification(sweep_, reference_, Grey(reference_), &result_);
     if (result_.summary.outcome == Outcome::kRefused) return;
     WidenByContradictions(evidence.setup, fit);
-    CompareWithStatements(sweep_, statements_, evidence.setup, fit, &result_);
+    if (motion_ == nullptr)
+      CompareWithStatements(sweep_, statements_, evidence.setup, fit, &result_);
     task.scales = scales_;
     task.offset_mm = evidence.setup.offset_mm;
     task.tick = [] { ThrowIfCancelled(); };
@@ -621,6 +656,7 @@ class Calibrator {
 
   const FocusSweep& sweep_;
   const CalibrationOptions& options_;
+  const FocusMotion* motion_;
   FrameStore store_;
   Calibration result_;
   FrameSelection selection_{&result_.frames};  // frames that passed the quality checks
@@ -639,6 +675,64 @@ class Calibrator {
   int steps_done_ = 0;
   int total_steps_ = 0;
 };
+
+Calibration CalibrateMovingTarget(const FocusSweep& sweep, const CalibrationOptions& options) {
+  return Calibrator(sweep, options).Run();
+}
+
+Calibration CalibrateWithMotion(const FocusSweep& sweep, model::SweepMotion moves,
+                                const CalibrationOptions& options) {
+  TargetCalibration target;
+  target.preview = [&](const FocusSweep& of) { return Calibrator(of, options).Preview(); };
+  target.run = [&](const FocusSweep& equivalent, const FocusMotion& motion) {
+    return Calibrator(equivalent, options, &motion).Run();
+  };
+  return CalibrateMovingFocus(sweep, moves, target);
+}
+
+// Whether the image scale says that something else than the target moved, and nothing else explains
+// it.
+bool ShowsMovingFocus(const Calibration& calibration) {
+  return calibration.summary.outcome == Outcome::kRefused &&
+         std::any_of(calibration.diagnostics.diagnoses.begin(),
+                     calibration.diagnostics.diagnoses.end(),
+                     [](const Diagnosis& diagnosis) { return diagnosis.NamesOnly(kLensMoves); });
+}
+
+// Tries the sensor as the part that moves where the scale refutes a target. A lens that moves
+// changes the scale by 1/f per mm: where that is possible, too, only the user knows.
+Calibration Recognised(const FocusSweep& sweep, const CalibrationOptions& options,
+                       Calibration as_target) {
+  FocusSweep moving = sweep;
+  const auto& change = as_target.diagnostics.scale.change_over_sweep;
+  if (change && change->value != 0)
+    moving.direction =
+        change->value < 0 ? model::BenchDirection::kAway : model::BenchDirection::kToward;
+  Calibration found = CalibrateWithMotion(moving, model::SweepMotion::kSensor, options);
+  if (found.summary.outcome == Outcome::kRefused || !found.summary.blur_ratio ||
+      !found.summary.image_distance_mm)
+    return as_target;
+  const double kappa = found.summary.blur_ratio->value;
+  const model::ThickLens& lens = sweep.camera.lens;
+  const double distance_mm = found.summary.image_distance_mm->value - lens.lens_thickness_mm;
+  const double sigma_mm = std::hypot(found.summary.image_distance_mm->sigma,
+                                     kFocalLengthTolerance * lens.rear_focal_length_mm);
+  const bool may_be_lens =
+      std::abs(distance_mm - lens.rear_focal_length_mm) < kKnownSigmas * sigma_mm;
+  const auto& magnification = found.diagnostics.magnification_at_focus;
+  if (may_be_lens || !magnification || magnification->value > kLargestRecognisedMagnification ||
+      !(kappa > kLeastRecognisedRatio && kappa < kLargestRecognisedRatio))
+    return as_target;
+  found.diagnostics.moves_is_recognised = true;
+  found.summary.warnings.insert(
+      found.summary.warnings.begin(),
+      fmt::format("the image scale does not follow the target but the focus: the sweep is taken as "
+                  "moves: sensor, direction: {}, with which the frames follow the laws of scale "
+                  "and blur (chi2/dof {:.2g}, blur ratio {:.3f}); state moves and direction to "
+                  "confirm or to correct it",
+                  model::BenchDirectionName(moving.direction), found.summary.chi2_per_dof, kappa));
+  return found;
+}
 
 }  // namespace
 
@@ -672,7 +766,22 @@ Calibration Calibrate(const FocusSweep& sweep, const CalibrationOptions& options
   std::string why;
   if (!options.IsValid(&why)) throw Error("calibration options: " + why);
   if (!sweep.IsValid(&why)) throw Error("sweep: " + why);
-  return Calibrator(sweep, options).Run();
+  if (sweep.moves && model::MovesFocus(*sweep.moves))
+    return CalibrateWithMotion(sweep, *sweep.moves, options);
+  if (!sweep.moves && sweep.readings_are_focus_distances) {
+    Calibration found = CalibrateWithMotion(sweep, model::SweepMotion::kLens, options);
+    found.diagnostics.moves_is_recognised = true;
+    found.summary.warnings.insert(
+        found.summary.warnings.begin(),
+        "the readings are in dioptres, which is the unit of a focus drive: the sweep is taken as "
+        "moves: lens; state moves to confirm or to correct it");
+    return found;
+  }
+  Calibration found = CalibrateMovingTarget(sweep, options);
+  if (!sweep.moves && options.fit_blur && ShowsMovingFocus(found))
+    found = Recognised(sweep, options, std::move(found));
+  if (sweep.moves) found.diagnostics.moves = *sweep.moves;
+  return found;
 }
 
 }  // namespace thicklens::calib

@@ -27,7 +27,10 @@ model::Camera CalibratedCamera(const model::Camera& camera, const Calibration& c
     if (!r) return std::nullopt;
     return model::Estimate{r->value, r->sigma};
   };
-  found.bench_offset_mm = estimate(calibration.summary.bench_offset_mm);
+  // Where the lens or the sensor moves, the zero of its scale is no depth.
+  if (!model::MovesFocus(calibration.diagnostics.moves))
+    found.bench_offset_mm = estimate(calibration.summary.bench_offset_mm);
+  found.focus_positions = calibration.diagnostics.focus_positions;
   if (use_source_recipe) {
     found.evidence.method = "source-recipe";
     found.image_distance_mm =

@@ -30,9 +30,9 @@ constexpr double kSmallestRatio = 0.2, kLargestRatio = 0.8;
 constexpr double kLowRatio = 0.35, kHighRatio = 0.65;
 class Solution {
  public:
-  Solution(const FocusSweep& sweep, BlurEvidence* evidence, BlurFitResult* fit,
-           Calibration* calibration)
-      : sweep_(sweep), evidence_(*evidence), fit_(*fit), result_(*calibration) {}
+  Solution(const FocusSweep& sweep, const FocusMotion* motion, BlurEvidence* evidence,
+           BlurFitResult* fit, Calibration* calibration)
+      : sweep_(sweep), motion_(motion), evidence_(*evidence), fit_(*fit), result_(*calibration) {}
 
   void Run() {
     if (evidence_.setup.estimators.empty()) return Refuse(evidence_.message);
@@ -242,6 +242,24 @@ class Solution {
     result_.diagnostics.blur_slope_px_per_mm.reset();
   }
 
+  // The reading that has a depth of the equivalent sweep; the depth itself without a motion.
+  double Shown(double depth_mm) const {
+    if (motion_ == nullptr) return depth_mm;
+    return motion_->ReadingAt(depth_mm - evidence_.setup.offset_mm.value)
+        .value_or(std::numeric_limits<double>::quiet_NaN());
+  }
+  // A range of depths, or of the readings that have them, the smaller first.
+  std::string ShownRange(double nearest_mm, double farthest_mm) const {
+    const auto [low, high] = std::minmax({Shown(nearest_mm), Shown(farthest_mm)});
+    return motion_ == nullptr ? fmt::format("{:.1f} to {:.1f} mm", low, high)
+                              : fmt::format("readings {:.5g} to {:.5g} mm", low, high);
+  }
+  // A depth beyond the sweep in words, or the reading that has it.
+  std::string ShownDepth(double depth_mm) const {
+    return motion_ == nullptr ? fmt::format("{:.0f} mm", depth_mm)
+                              : fmt::format("reading {:.5g} mm", Shown(depth_mm));
+  }
+
   bool IsPlausible() {
     const double zf = fit_.values[kFocusDepth];
     const double kappa = fit_.values[kBlurRatio];
@@ -257,16 +275,23 @@ class Solution {
       ForgetFocus();
       Refuse(fmt::format(
           "the blur does not change over the sweep by more than its errors, for any bench offset "
-          "(kappa would be {:.2g} +- {:.2g}): move the target farther from focus on both sides",
-          kappa, own_kappa_sigma));
+          "(kappa would be {:.2g} +- {:.2g}): move {} farther from focus on both sides",
+          kappa, own_kappa_sigma,
+          motion_ == nullptr ? "the target" : "the " + model::SweepMotionName(*sweep_.moves)));
       return false;
     }
     if (!(own_zf_sigma < 0.5 * (farthest - nearest))) {
       ForgetFocus();
       Refuse(
-          fmt::format("the blur does not determine the in-focus distance: {:.1f} +- {:.1f} mm in a "
-                      "sweep from {:.1f} to {:.1f} mm, with the bench offset held fixed",
-                      zf, own_zf_sigma, nearest, farthest));
+          motion_ == nullptr
+              ? fmt::format(
+                    "the blur does not determine the in-focus distance: {:.1f} +- {:.1f} mm in a "
+                    "sweep from {:.1f} to {:.1f} mm, with the bench offset held fixed",
+                    zf, own_zf_sigma, nearest, farthest)
+              : fmt::format(
+                    "the blur does not determine the reading at focus: {:.5g} +- {:.2g} mm in a "
+                    "sweep of {}",
+                    Shown(zf), own_zf_sigma, ShownRange(nearest, farthest)));
       return false;
     }
     if (evidence_.zero_is_open) {
@@ -281,10 +306,11 @@ class Solution {
       return false;
     }
     if (outside_mm > 0 && !(own_zf_sigma < StepMm())) {
-      Refuse(
-          fmt::format("sharpness is monotone: the focus lies {} than the sweep ({:.1f} to {:.1f} "
-                      "mm), at about {:.0f} +- {:.0f} mm; extend the sweep in this direction",
-                      side, nearest, farthest, zf, std::max(zf_sigma, own_zf_sigma)));
+      Refuse(fmt::format(
+          "sharpness is monotone: the focus lies {} the sweep ({}), at about {} +- "
+          "{:.2g} mm; extend the sweep in this direction",
+          motion_ == nullptr ? std::string(side) + " than" : "outside",
+          ShownRange(nearest, farthest), ShownDepth(zf), std::max(zf_sigma, own_zf_sigma)));
       return false;
     }
     // An uncertain bench offset makes the ratio uncertain, which is then no contradiction.
@@ -293,9 +319,11 @@ class Solution {
       Refuse(fmt::format(
           "the blur ratio would have to be {:.{}f}, which no lens has ({} to {}): "
           "check focal lengths, aperture radius, pixel pitch, {}the unit of the readings, and "
-          "that the target moved and not the lens",
+          "that the {} moved and not {}",
           kappa, kappa < 0.1 ? 4 : 2, kSmallestRatio, kLargestRatio,
-          evidence_.known_focus ? evidence_.known_focus->name + ", " : ""));
+          evidence_.known_focus ? evidence_.known_focus->name + ", " : "",
+          motion_ == nullptr ? "target" : model::SweepMotionName(*sweep_.moves),
+          motion_ == nullptr ? "the lens" : "the target"));
       return false;
     }
     if (!(kappa + reach >= kLowRatio && kappa - reach <= kHighRatio)) {
@@ -308,8 +336,13 @@ class Solution {
     result_.diagnostics.blur.outside_mm = outside_mm;
     if (outside_mm > 0) {
       result_.summary.warnings.push_back(
-          fmt::format("the focus at {:.2f} mm is extrapolated: it lies {:.2f} mm {} than the sweep",
-                      zf, outside_mm, side));
+          motion_ == nullptr
+              ? fmt::format(
+                    "the focus at {:.2f} mm is extrapolated: it lies {:.2f} mm {} than the sweep",
+                    zf, outside_mm, side)
+              : fmt::format("the focus at reading {:.5g} mm is extrapolated: it lies outside the "
+                            "sweep ({})",
+                            Shown(zf), ShownRange(nearest, farthest)));
     }
     return true;
   }
@@ -319,8 +352,11 @@ class Solution {
     return fmt::format(
         "The reading at focus is known ({:.6g} +- {:.2g} mm), and so is the growth of the blur "
         "(sigma {:.4g} +- {:.2g} px per mm of reading)",
-        result_.diagnostics.focus_reading_mm->value, result_.diagnostics.focus_reading_mm->sigma,
-        sweep_.sensor_px_per_px * slope.value, sweep_.sensor_px_per_px * slope.sigma);
+        motion_ == nullptr
+            ? result_.diagnostics.focus_reading_mm->value
+            : motion_->ReadingAt(result_.diagnostics.focus_reading_mm->value).value_or(0),
+        result_.diagnostics.focus_reading_mm->sigma, sweep_.sensor_px_per_px * slope.value,
+        sweep_.sensor_px_per_px * slope.sigma);
   }
 
   // The advice where the image scale does not determine the bench offset.
@@ -351,6 +387,14 @@ class Solution {
   std::string ReasonOfZero(double nearest_mm, double farthest_mm) const {
     const model::Estimate& zero_mm = evidence_.setup.offset_mm;
     const std::string& origin = result_.diagnostics.bench_offset_from;
+    if (motion_ != nullptr) {
+      return fmt::format(
+          "the distance from the lens to the sensor is not known well enough: by {} it is {:.4g} "
+          "+- {:.2g} mm at focus with a focal length of {:.4g} mm. {}. State one of: "
+          "focus_depth_mm, magnification, image_distance_mm or offset_mm (d1 at reading 0)",
+          origin, motion_->SensorDistanceAtFocusMm(), result_.summary.focus_depth_mm->sigma,
+          sweep_.camera.lens.front_focal_length_mm, KnownReading());
+    }
     const std::string from =
         origin == kFromScale
             ? fmt::format(
@@ -431,6 +475,7 @@ class Solution {
   }
 
   const FocusSweep& sweep_;
+  const FocusMotion* motion_;
   BlurEvidence& evidence_;
   BlurFitResult& fit_;
   BlurFitResult at_held_zero_;  // the same fit; its errors exclude the bench offset's
@@ -440,8 +485,8 @@ class Solution {
 }  // namespace
 
 void SolveFocus(const FocusSweep& sweep, BlurEvidence* evidence, BlurFitResult* fit,
-                Calibration* calibration) {
-  Solution(sweep, evidence, fit, calibration).Run();
+                Calibration* calibration, const FocusMotion* motion) {
+  Solution(sweep, motion, evidence, fit, calibration).Run();
 }
 
 }  // namespace thicklens::calib

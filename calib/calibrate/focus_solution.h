@@ -1,6 +1,7 @@
 #ifndef THICKLENS_CALIB_CALIBRATE_FOCUS_SOLUTION_H_
 #define THICKLENS_CALIB_CALIBRATE_FOCUS_SOLUTION_H_
 
+#include "calib/calibrate/focus_motion.h"
 #include "calib/fit/blur_measurement.h"
 #include "thicklens/calib/calibration.h"
 #include "thicklens/calib/focus_sweep.h"
@@ -16,8 +17,10 @@ inline constexpr double kKnownSigmas = 3;
 // systematic interval from the unknown quantities, and decides the outcome. It reads quality
 // checks, depths and sharpness from `calibration` and fills in the rest. On return `evidence` holds
 // the used frames and the assumed floor, and `fit` holds the fit.
+// With `motion`, the sweep is the equivalent one of that motion, and messages state its readings in
+// place of depths; otherwise it is null.
 void SolveFocus(const FocusSweep& sweep, BlurEvidence* evidence, BlurFitResult* fit,
-                Calibration* calibration);
+                Calibration* calibration, const FocusMotion* motion = nullptr);
 
 }  // namespace thicklens::calib
 

@@ -51,7 +51,10 @@ double FocalLengthTolerance(const model::Camera& camera) {
 model::Estimate FocusDepthWithTolerance(const model::Camera& camera,
                                         const model::StatedConjugate& stated) {
   model::Estimate focus_mm = model::FocusDepthOf(camera.lens, stated);
-  if (stated.kind == model::ConjugateKind::kFocusDepth) return focus_mm;
+  if (stated.kind == model::ConjugateKind::kFocusDepth) {
+    focus_mm.sigma = std::hypot(focus_mm.sigma, stated.sigma_of_bounds);
+    return focus_mm;
+  }
   // A part of the tolerance is enough for the slope, and a sensor at a stated distance stays behind
   // the focal point.
   constexpr double kStep = -1e-4;

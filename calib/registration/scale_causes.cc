@@ -303,14 +303,14 @@ std::string LensMovesReason(const FocusSweep& sweep, const ScaleCauses& causes) 
   }
   return fmt::format(
       "the image scale follows the lens, not the target: {}. This is a sweep of the focus ring, of "
-      "a focus motor or of the sensor; move the target (or the whole camera) along the axis and "
-      "leave the focus unchanged{}",
+      "a focus motor or of the sensor: state moves: lens or moves: sensor (--moves), or move the "
+      "target (or the whole camera) along the axis and leave the focus unchanged{}",
       evidence, meaning);
 }
 
 std::string NotDistinguished() {
-  return "Scale and blur do not distinguish these causes: check what moved (in a sweep with the "
-         "focus ring or a focus motor the lens moves, and the target must be moved instead)";
+  return "Scale and blur do not distinguish these causes: state what moved (in a sweep with the "
+         "focus ring or a focus motor the lens moves: --moves lens)";
 }
 
 }  // namespace

@@ -215,6 +215,8 @@ FocusSweep MakeFocusSweep(const model::SweepFile& file, const model::Camera& cam
   sweep.offset_mm = file.offset_mm;
   sweep.stated_focus = StatedFocus(file, camera);
   sweep.direction = file.direction;
+  sweep.moves = file.moves;
+  sweep.readings_are_focus_distances = file.readings_are_focus_distances;
   sweep.target = file.target;
   sweep.floor = file.floor;
   sweep.target_period_mm = file.target_period_mm;

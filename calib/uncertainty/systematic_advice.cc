@@ -120,7 +120,13 @@ void WidenByTrials(const std::string& name, const std::string& remedy,
   Eigen::Vector2d zero_mm(0, 0);
   if (zero) zero_mm = zero->systematic.value_or(Eigen::Vector2d(zero->value, zero->value));
   for (const BlurFitSetup& setup : setups) {
-    const BlurFitResult trial = FitBlurWith(setup, known_focus, &fit);
+    // The focus moves with the zero. From the old one, the fit of a sweep that is short against
+    // that move would start outside the sweep.
+    BlurFitResult start = fit;
+    start.values[kFocusDepth] =
+        std::max(fit.values[kFocusDepth] + setup.offset_mm.value - fit.values[kBenchOffset],
+                 1.001 * setup.lens.front_focal_length_mm);
+    const BlurFitResult trial = FitBlurWith(setup, known_focus, &start);
     if (!trial.done) {
       calibration->summary.warnings.push_back(
           fmt::format("{}: the fit of its effect on the results failed, and the intervals do not "

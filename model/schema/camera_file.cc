@@ -164,14 +164,29 @@ void ReadCovariance(const YamlNode& node, CameraCalibration* calibration) {
   }
 }
 
+FocusPositions ReadFocusPositions(const YamlNode& node) {
+  node.RequireKeys({"unit", "positions"});
+  FocusPositions found;
+  found.unit = node.At("unit").OneOf({"mm", kDioptreUnit});
+  for (const YamlNode& position : node.At("positions").Elements()) {
+    const auto pair = position.ElementsExactly(2);
+    found.positions.push_back({pair[0].Number(), pair[1].PositiveNumber()});
+  }
+  std::string why;
+  if (!found.IsValid(&why)) throw node.ErrorHere(why);
+  return found;
+}
+
 CameraCalibration ReadCalibration(const YamlNode& node) {
   node.RequireKeys({"image_distance_mm", "blur_ratio", "blur_floor_px", "bench_offset_mm",
-                    "covariance", "evidence"});
+                    "focus_positions", "covariance", "evidence"});
   CameraCalibration calibration;
   calibration.image_distance_mm = FindEstimate(node, "image_distance_mm", &YamlNode::Number);
   calibration.blur_ratio = FindEstimate(node, "blur_ratio", &YamlNode::NonNegativeNumber);
   calibration.blur_floor_px = FindEstimate(node, "blur_floor_px", &YamlNode::NonNegativeNumber);
   calibration.bench_offset_mm = FindEstimate(node, "bench_offset_mm", &YamlNode::Number);
+  if (const auto positions = node.Find("focus_positions"))
+    calibration.focus_positions = ReadFocusPositions(*positions);
   if (const auto covariance = node.Find("covariance")) ReadCovariance(*covariance, &calibration);
   calibration.evidence = ReadEvidence(node.At("evidence"));
   return calibration;
@@ -277,8 +292,24 @@ class CameraWriter {
     MeasuredIfAny("blur_ratio", calibration.blur_ratio);
     MeasuredIfAny("blur_floor_px", calibration.blur_floor_px);
     MeasuredIfAny("bench_offset_mm", calibration.bench_offset_mm);
+    if (calibration.focus_positions) WriteFocusPositions(*calibration.focus_positions);
     if (!calibration.covariance_order.empty()) WriteCovariance(calibration);
     WriteEvidence(calibration.evidence);
+    out_.EndMap();
+  }
+
+  // Each position is a pair: what the scale or the drive shows, and d1 there, mm.
+  void WriteFocusPositions(const FocusPositions& found) {
+    out_.BeginMap("focus_positions");
+    out_.Text("unit", found.unit);
+    out_.BeginList("positions");
+    for (const FocusPositions::Position& position : found.positions) {
+      out_.BeginListInLine();
+      out_.Element(position.reading);
+      out_.Element(position.image_distance_mm);
+      out_.EndList();
+    }
+    out_.EndList();
     out_.EndMap();
   }
 

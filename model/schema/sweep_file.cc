@@ -15,6 +15,8 @@ namespace thicklens::model {
 namespace {
 
 constexpr char kSchema[] = "thicklens/sweep/1";
+constexpr SweepMotion kMotions[] = {SweepMotion::kTarget, SweepMotion::kCamera, SweepMotion::kLens,
+                                    SweepMotion::kSensor};
 
 bool IsUnknown(const YamlNode& node) { return node.IsScalar() && node.Text() == "unknown"; }
 
@@ -104,6 +106,23 @@ double DirectionSign(BenchDirection direction) {
   return direction == BenchDirection::kAway ? 1 : -1;
 }
 
+std::string SweepMotionName(SweepMotion motion) {
+  switch (motion) {
+    case SweepMotion::kCamera:
+      return "camera";
+    case SweepMotion::kLens:
+      return "lens";
+    case SweepMotion::kSensor:
+      return "sensor";
+    default:
+      return "target";
+  }
+}
+
+bool MovesFocus(SweepMotion motion) {
+  return motion == SweepMotion::kLens || motion == SweepMotion::kSensor;
+}
+
 std::string SweepRawName(SweepRaw raw) { return raw == SweepRaw::kGreen ? "green" : "demosaiced"; }
 
 std::string SweepTargetName(SweepTarget target) {
@@ -138,6 +157,7 @@ SweepFile ReadSweep(const std::string& path, const SweepReading& reading,
                     "optical_tube_length_mm",
                     "magnification",
                     "direction",
+                    "moves",
                     "target",
                     "target_period_mm",
                     "blur_floor_px",
@@ -170,6 +190,12 @@ SweepFile ReadSweep(const std::string& path, const SweepReading& reading,
   if (const auto direction = root.Find("direction")) {
     sweep.direction = direction->OneOf({"away", "toward"}) == "away" ? BenchDirection::kAway
                                                                      : BenchDirection::kToward;
+  }
+  if (const auto moves = root.Find("moves")) {
+    const std::string name = moves->OneOf({"target", "camera", "lens", "sensor"});
+    for (const SweepMotion part : kMotions) {
+      if (name == SweepMotionName(part)) sweep.moves = part;
+    }
   }
   if (const auto target = root.Find("target")) {
     const std::string name = target->OneOf({"auto", "texture", "printed-edge", "knife-edge"});
@@ -223,6 +249,7 @@ SweepFile SweepFromPages(const std::string& path, int pages, const ReadingSet& r
   sweep.camera_path = camera_path;
   sweep.frames = PairPages(readings, path, pages);
   sweep.readings = readings.description;
+  sweep.readings_are_focus_distances = readings.in_dioptres;
   if (notices != nullptr)
     notices->insert(notices->end(), readings.notices.begin(), readings.notices.end());
   NoteOrderAndRepeats(sweep, notices);
@@ -242,6 +269,7 @@ std::string SweepToYaml(const SweepFile& sweep) {
     if (const auto& stated = sweep.*of.field) out.Measured(of.key, *stated);
   }
   out.Text("direction", BenchDirectionName(sweep.direction));
+  if (sweep.moves) out.Text("moves", SweepMotionName(*sweep.moves));
   out.Text("target", SweepTargetName(sweep.target));
   out.NumberIfAny("target_period_mm", sweep.target_period_mm);
   if (sweep.floor.given_px) {

@@ -178,6 +178,7 @@ void TakeReadings(const SweepReading& reading, const std::string& table,
   if (notices != nullptr)
     notices->insert(notices->end(), readings.notices.begin(), readings.notices.end());
   sweep->readings = readings.description;
+  sweep->readings_are_focus_distances = readings.in_dioptres;
   sweep->frames = PairFrames(readings, files, folder, notices);
   if (!table.empty()) return;
   // The order of names ("z10", "z9") means nothing.

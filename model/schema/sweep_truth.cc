@@ -17,23 +17,31 @@ SweepTruth ReadSweepTruth(const std::string& path) {
   const YamlNode root = YamlNode::LoadFile(path);
   root.RequireSchema(kTruthSchema);
   root.RequireKeys({"schema", "image_distance_mm", "focus_depth_mm", "blur_ratio", "blur_floor_px",
-                    "bench_offset_mm", "tilt_deg", "pupil_law", "effects", "left_out_grey_levels",
-                    "frames"});
+                    "bench_offset_mm", "moves", "tilt_deg", "pupil_law", "effects",
+                    "left_out_grey_levels", "frames"});
   SweepTruth truth;
   truth.image_distance_mm = root.At("image_distance_mm").PositiveNumber();
   truth.focus_depth_mm = root.At("focus_depth_mm").PositiveNumber();
   truth.blur_ratio = root.At("blur_ratio").NonNegativeNumber();
   truth.blur_floor_px = root.At("blur_floor_px").NonNegativeNumber();
   truth.bench_offset_mm = root.At("bench_offset_mm").Number();
+  if (const auto moves = root.Find("moves")) {
+    truth.moves = ReadNamed<SweepMotion>(
+        *moves,
+        {SweepMotion::kTarget, SweepMotion::kCamera, SweepMotion::kLens, SweepMotion::kSensor},
+        SweepMotionName);
+  }
   if (const auto tilt = root.Find("tilt_deg")) truth.tilt_deg = tilt->Number();
   if (const auto law = root.Find("pupil_law")) {
     truth.pupil_law = PupilLawName(ReadNamed(*law, AllPupilLaws(), PupilLawName));
   }
   for (const YamlNode& node : root.At("frames").Elements()) {
-    node.RequireKeys({"image", "depth_mm", "reading_mm", "blur_sigma_px"});
+    node.RequireKeys({"image", "depth_mm", "reading_mm", "blur_sigma_px", "image_distance_mm"});
     truth.frames.push_back({node.At("image").Text(), node.At("depth_mm").Number(),
                             node.At("reading_mm").Number(),
                             node.At("blur_sigma_px").NonNegativeNumber()});
+    if (const auto distance = node.Find("image_distance_mm"))
+      truth.frames.back().image_distance_mm = distance->PositiveNumber();
   }
   return truth;
 }
@@ -45,6 +53,7 @@ std::string SweepTruthToYaml(const SweepTruth& truth) {
   out.Number("blur_ratio", truth.blur_ratio);
   out.Number("blur_floor_px", truth.blur_floor_px);
   out.Number("bench_offset_mm", truth.bench_offset_mm);
+  if (truth.moves != SweepMotion::kTarget) out.Text("moves", SweepMotionName(truth.moves));
   if (truth.tilt_deg != 0) out.Number("tilt_deg", truth.tilt_deg);
   out.TextIfAny("pupil_law", truth.pupil_law);
   WriteEffects(truth.effects, &out);
@@ -55,6 +64,7 @@ std::string SweepTruthToYaml(const SweepTruth& truth) {
     out.Number("depth_mm", frame.depth_mm);
     out.Number("reading_mm", frame.reading_mm);
     out.Number("blur_sigma_px", frame.blur_sigma_px);
+    if (MovesFocus(truth.moves)) out.Number("image_distance_mm", frame.image_distance_mm);
     out.EndMap();
   }
   out.EndList();

@@ -163,6 +163,7 @@ ReadingSet ReadingsOfNames(const std::vector<std::string>& files, const ReadingO
     set.rows.push_back({file, ReadingInMm(*value, unit, options, place), place});
   }
   const bool is_stated = !unit.empty() || !options.unit.empty() || options.scale_mm;
+  set.in_dioptres = ReadingUnitName(unit, options) == kDioptres;
   set.description =
       fmt::format("'{}' in the names of {} files, {}{}", Shown(options.name_pattern), files.size(),
                   ReadingUnitName(unit, options), is_stated ? "" : " (no unit is stated)");

@@ -51,12 +51,28 @@ class Finder {
     found_.file = FindFile();
     found_.reading = FindReading();
     if (!found_.header.cells.empty()) found_.unit = NameOf(CellOf(found_.reading)).unit;
+    if (found_.unit.empty() && IsLensPosition()) found_.unit = kDioptres;
     found_.unit_column = FindUnitColumn();
     RefuseDoubtfulUnits();
     return found_;
   }
 
  private:
+  // Whether the readings are the LensPosition of libcamera, which is in dioptres. Other programs
+  // call the counts of a motor so, which are larger: a lens focuses on nothing nearer than 20 mm.
+  bool IsLensPosition() const {
+    constexpr double kMostDioptres = 50;
+    if (LowerCase(Trimmed(CellOf(found_.reading))) != "lensposition") return false;
+    bool has_fraction = false;
+    for (const TableRow& row : table_.rows) {
+      if (row.line <= found_.header.line || found_.reading >= row.cells.size()) continue;
+      const auto value = ToNumber(row.cells[found_.reading], '.');
+      if (!value || !(*value > 0 && *value <= kMostDioptres)) return false;
+      has_fraction = has_fraction || *value != std::floor(*value);
+    }
+    return has_fraction;
+  }
+
   bool HasHeader() const { return !found_.header.cells.empty(); }
   const std::string& CellOf(std::size_t column) const {
     static const std::string none;

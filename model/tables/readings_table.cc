@@ -300,6 +300,7 @@ class Reader {
 
   void Describe(const std::string& encoding, ReadingSet* set) const {
     const std::string name = ReadingUnitName(unit_, options_);
+    set->in_dioptres = name == kDioptres;
     std::string unit = name;
     if (!unit_place_.empty()) unit += fmt::format(" (as {} states)", unit_place_);
     const bool is_stated = !unit_.empty() || !options_.unit.empty() || options_.scale_mm;

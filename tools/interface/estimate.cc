@@ -39,6 +39,7 @@ void RequireValidEstimate(const DepthMap& depth, const std::optional<Camera>& ca
     checks::RequireValidCamera(*camera);
     return;
   }
+  if (options.lens_position) throw OptionError("lens_position", "lens_position: needs a camera");
   if (options.sensor_origin) throw OptionError("sensor_origin", "sensor_origin: needs a camera");
   if (options.st_depth_mm) throw OptionError("st_depth_mm", "st_depth_mm: needs a camera");
   if (options.exif == ExifCheck::kIgnore) {

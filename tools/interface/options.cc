@@ -209,6 +209,10 @@ bool SweepOverrides::IsValid(std::string* why) const {
                  [why](model::BenchDirection given) {
                    return OneOf(why, "direction", model::BenchDirection::kToward, given);
                  }) &&
+         IfGiven(moves,
+                 [why](model::SweepMotion given) {
+                   return OneOf(why, "moves", model::SweepMotion::kSensor, given);
+                 }) &&
          IfGiven(target, [why](model::SweepTarget given) {
            return OneOf(why, "target", model::SweepTarget::kKnifeEdge, given);
          });
@@ -321,6 +325,9 @@ bool EstimateOptions::IsValid(std::string* why) const {
     }
   }
   if (crop && !IsRect(why, "crop", *crop)) return false;
+  if (lens_position && !std::isfinite(*lens_position)) {
+    return Fail(why, "lens_position", fmt::format("must be finite, is {}", *lens_position));
+  }
   if (sensor_origin && !(WholeBetween(why, "sensor_origin.x", 0, kMaxPixels, sensor_origin->x) &&
                          WholeBetween(why, "sensor_origin.y", 0, kMaxPixels, sensor_origin->y))) {
     return false;

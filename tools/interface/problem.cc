@@ -14,6 +14,7 @@
 #include "thicklens/estimator/estimate_checks.h"
 #include "thicklens/io/exif.h"
 #include "thicklens/io/image_file.h"
+#include "thicklens/io/readings.h"
 #include "thicklens/model/effect_impact.h"
 #include "tools/interface/depth_causes.h"
 #include "tools/interface/depth_reports.h"
@@ -126,6 +127,57 @@ void CheckExif(const PhotoFile& photo, const Camera& camera, const PhotoSize& si
                   photo.name, NameOf(camera), contradictions, run->Option("exif")));
 }
 
+// The position of the lens that the metadata of the photograph state, dpt.
+std::optional<double> DioptresOfFile(const PhotoFile& photo, std::string* from) {
+  if (photo.path.empty()) return std::nullopt;
+  constexpr double kMmPerMetre = 1000;
+  try {
+    model::ReadingOptions options;
+    options.source = "exif";
+    const model::ReadingSet found = io::ReadReadings("", {photo.path}, options);
+    if (found.rows.empty() || !(found.rows.front().reading_mm > 0)) return std::nullopt;
+    *from = found.description;
+    return kMmPerMetre / found.rows.front().reading_mm;
+  } catch (const Error&) {
+    return std::nullopt;  // the file states none
+  }
+}
+
+// The camera with d1 of the position at which its lens was.
+Camera AtLensPosition(const PhotoFile& photo, Camera camera, const EstimateOptions& options,
+                      RunScope* run) {
+  const bool has_positions = camera.calibration && camera.calibration->focus_positions;
+  if (!has_positions) {
+    if (options.lens_position) {
+      throw OptionError("lens_position",
+                        fmt::format("{}: {} has no calibration.focus_positions; calibrate writes "
+                                    "them from a sweep in which the lens or the sensor moves",
+                                    run->Option("lens_position"), NameOf(camera)));
+    }
+    return camera;
+  }
+  const model::FocusPositions& positions = *camera.calibration->focus_positions;
+  std::optional<double> position = options.lens_position;
+  std::string from = run->Option("lens_position");
+  if (!position && positions.unit == model::kDioptreUnit) position = DioptresOfFile(photo, &from);
+  if (!position) {
+    run->Warn(fmt::format(
+        "{}: the camera's lens moves, and its position is not stated: d1 = {:.6g} mm of the "
+        "calibration is used; state it by {}",
+        photo.name, camera.image_distance_mm(), run->Option("lens_position")));
+    return camera;
+  }
+  const double d1_mm = WithFileContext(from + ": " + NameOf(camera),
+                                       [&] { return positions.ImageDistanceMm(*position); });
+  camera.calibration->image_distance_mm->value = d1_mm;
+  // The stored zf is that of the calibration.
+  camera.calibration->evidence.focus_depth_mm.reset();
+  run->Inform(fmt::format("{}: the lens at {:.6g} {} ({}): d1 = {:.6g} mm, zf = {:.6g} mm",
+                          photo.name, *position, positions.unit, from, d1_mm,
+                          camera.focus_depth_mm()));
+  return camera;
+}
+
 // The camera behind an image of the full size, which may be a part of its sensor, and of that the
 // crop.
 Camera CameraFor(const PhotoFile& photo, const std::optional<TransferCurve>& transfer, int width_px,
@@ -133,6 +185,7 @@ Camera CameraFor(const PhotoFile& photo, const std::optional<TransferCurve>& tra
                  EstimateDiagnostics* diagnostics, RunScope* run) {
   if (transfer) camera.sensor.transfer = *transfer;
   for (const std::string& notice : NoticesOf(camera)) run->Warn(notice);
+  camera = AtLensPosition(photo, std::move(camera), options, run);
   CheckExif(photo, camera, {width_px, height_px, options.sensor_origin.has_value()}, options.exif,
             diagnostics, run);
   if (options.sensor_origin) {

@@ -69,6 +69,7 @@ void ApplyOverrides(const SweepOverrides& overrides, const RunScope& run, model:
     file->reading_sigma_stated = true;
   }
   if (overrides.direction) file->direction = *overrides.direction;
+  if (overrides.moves) file->moves = overrides.moves;
   if (overrides.target) file->target = *overrides.target;
 }
 

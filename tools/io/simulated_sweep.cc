@@ -39,6 +39,7 @@ model::SweepFile DescribeSweep(const model::SweepSimulationOptions& simulation,
   sweep.reading_sigma_stated = true;
   if (!unknown_offset) sweep.offset_mm = model::Estimate{simulation.bench_offset_mm, 0};
   sweep.direction = simulation.direction;
+  if (simulation.moves != model::SweepMotion::kTarget) sweep.moves = simulation.moves;
   sweep.target = SweepTargetOf(simulation.target.kind);
   for (const model::SweepTruth::Frame& frame : truth.frames)
     sweep.frames.push_back({frame.image, frame.reading_mm});

@@ -93,6 +93,7 @@ OptionNames EstimateOptionNames() {
           {"inner_views", "--views"},
           {"camera", "--camera"},
           {"sensor_origin", "--sensor-origin"},
+          {"lens_position", "--lens-position"},
           {"exif", "--ignore-exif"},
           {"photo.transfer", "--transfer"},
           {"photo.orientation", "--orientation displayed"},
@@ -154,6 +155,7 @@ thicklens::EstimateOptions SettingsOf(const EstimateOptions& options) {
   }
   settings.crop = CropRect(options.crop);
   settings.sensor_origin = SensorOriginOf(options.sensor_origin);
+  settings.lens_position = options.lens_position;
   if (options.ignore_exif) settings.exif = ExifCheck::kIgnore;
   if (!options.aperture_shape.empty()) {
     settings.aperture.shape = model::ApertureShapeFromName(options.aperture_shape);

@@ -86,6 +86,12 @@ void AddInputOptions(CLI::App* command, EstimateOptions* options) {
       ->add_option("--sensor-origin", options->sensor_origin,
                    "Position on the camera's sensor of an image that is a part of it, px")
       ->type_name("X,Y");
+  command
+      ->add_option("--lens-position", options->lens_position,
+                   "Position of the lens or its motor, in the unit of the camera file's "
+                   "focus_positions; default: as the photograph's metadata state it, or that of "
+                   "the calibration")
+      ->type_name("P");
   command->add_flag("--ignore-exif", options->ignore_exif,
                     "Continue even if the EXIF of the photograph states another lens, setting or "
                     "sensor than the camera file");
@@ -397,6 +403,7 @@ void CheckEstimateUsage(const EstimateOptions& options) {
                     "used",
                     options.depth.kind));
   needs(!options.sensor_origin.empty(), camera, "--sensor-origin needs a --camera");
+  needs(options.lens_position.has_value(), camera, "--lens-position needs a --camera");
   needs(options.ignore_exif, camera, "--ignore-exif needs a --camera, with which EXIF is compared");
   needs(options.st_depth_mm.has_value(), camera, "--st-depth-mm needs a --camera");
   needs(options.grid > 0 || options.sparse, aperture_of, "--grid and --sparse need --aperture-of");

@@ -25,6 +25,7 @@ struct EstimateOptions {
   int grid = 0;
   bool sparse = false;
   std::string sensor_origin;
+  std::optional<double> lens_position;
   bool ignore_exif = false;  // for a photograph whose EXIF contradicts the camera file
   std::optional<double> st_depth_mm;
   std::string transfer;

@@ -157,7 +157,8 @@ std::vector<std::string> SweepArguments::Files() const {
   return {input, readings_csv, camera_path, truth_path, floor_from};
 }
 
-// Direction and target were checked against their lists of names when the command line was read.
+// Direction, moving part and target were checked against their lists of names when the command line
+// was read.
 SweepOverrides SweepOverridesOf(const SweepArguments& arguments) {
   SweepOverrides overrides;
   overrides.camera_path = arguments.camera_path;
@@ -178,6 +179,10 @@ SweepOverrides SweepOverridesOf(const SweepArguments& arguments) {
       overrides.direction = direction;
     }
   }
+  for (const auto part : {model::SweepMotion::kTarget, model::SweepMotion::kCamera,
+                          model::SweepMotion::kLens, model::SweepMotion::kSensor}) {
+    if (arguments.moves == model::SweepMotionName(part)) overrides.moves = part;
+  }
   for (const auto target : {model::SweepTarget::kAuto, model::SweepTarget::kTexture,
                             model::SweepTarget::kPrintedEdge, model::SweepTarget::kKnifeEdge}) {
     if (arguments.target == model::SweepTargetName(target)) overrides.target = target;
@@ -197,6 +202,7 @@ OptionNames SweepOptionNames() {
           {"magnification", "--magnification"},
           {"target_period_mm", "--target-period-mm"},
           {"direction", "--direction"},
+          {"moves", "--moves"},
           {"reading_sigma_mm", "--reading-sigma-mm"},
           {"floor_px", "--floor-px"},
           {"floor_from_calibration", "--floor-from"},

@@ -20,6 +20,7 @@ struct SweepArguments {
   std::string offset_mm;  // a number or "unknown"
   std::optional<double> offset_sigma_mm;
   std::string direction;
+  std::string moves;  // "target", "camera", "lens" or "sensor"
   std::optional<double> reading_sigma_mm;
   // VALUE or VALUE:SIGMA
   std::string focus_depth_mm, working_distance_mm, image_distance_mm, tube_length_mm, magnification;

@@ -128,7 +128,11 @@ static void AddFocusStatements(CLI::App* command, SweepArguments* sweep,
 
 void AddSweepStatements(CLI::App* command, SweepArguments* sweep) {
   const std::string instead = "; overrides the sweep file";
-  command->add_option("--offset-mm", sweep->offset_mm, "Depth of reading 0, or unknown" + instead)
+  command
+      ->add_option("--offset-mm", sweep->offset_mm,
+                   "Depth of reading 0, or unknown; with --moves lens or sensor, the distance from "
+                   "the aperture to the sensor at reading 0" +
+                       instead)
       ->type_name("MM");
   command
       ->add_option("--offset-sigma-mm", sweep->offset_sigma_mm, "Standard deviation of --offset-mm")
@@ -140,6 +144,13 @@ void AddSweepStatements(CLI::App* command, SweepArguments* sweep) {
                    "away: larger readings are farther; toward: nearer" + instead)
       ->check(CLI::IsMember({"away", "toward"}))
       ->type_name("WAY");
+  command
+      ->add_option("--moves", sweep->moves,
+                   "The part that moves from frame to frame: target, camera, lens (focus ring, "
+                   "motor) or sensor (camera back)" +
+                       instead)
+      ->check(CLI::IsMember({"target", "camera", "lens", "sensor"}))
+      ->type_name("PART");
   command
       ->add_option("--reading-sigma-mm", sweep->reading_sigma_mm,
                    "Standard deviation of a reading" + instead)

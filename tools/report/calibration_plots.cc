@@ -71,6 +71,8 @@ Abscissa AbscissaOf(const Calibration& calibration) {
     hi = depths == 0 ? frame.depth_mm : std::max(hi, frame.depth_mm);
     ++depths;
   }
+  if (depths >= 2 && hi > lo && model::MovesFocus(calibration.diagnostics.moves))
+    return {true, "depth z of the same blur at the calibrated focus [mm]"};
   if (depths >= 2 && hi > lo) return {true, "object depth z from Ap [mm]"};
   return {false, "bench reading b [mm] (no depths: the bench offset is unknown)"};
 }

@@ -108,10 +108,11 @@ std::string HowItWasMade(const FocusSweep& sweep, const Calibration& calibration
                               return a.reading_mm < b.reading_mm;
                             });
     item(
-        fmt::format("{} frames, bench readings {:.6g} to {:.6g} mm, direction {}, standard "
-                    "deviation of a reading {}.",
-                    sweep.frames.size(), lo->reading_mm, hi->reading_mm,
-                    model::BenchDirectionName(sweep.direction),
+        fmt::format("{} frames, the {} moves{}, bench readings {:.6g} to {:.6g} mm, direction {}, "
+                    "standard deviation of a reading {}.",
+                    sweep.frames.size(), model::SweepMotionName(calibration.diagnostics.moves),
+                    calibration.diagnostics.moves_is_recognised ? " (recognised, not stated)" : "",
+                    lo->reading_mm, hi->reading_mm, model::BenchDirectionName(sweep.direction),
                     origin.reading_sigma_stated ? fmt::format("{:.3g} mm", sweep.reading_sigma_mm)
                                                 : std::string("not stated")));
   }

@@ -204,6 +204,7 @@ std::vector<ResultRow> ResultRows(const calib::Calibration& calibration,
   rows[3] = {"blur_floor_px", "blur floor", "px", calibration.summary.blur_floor_px, {}, {}, {}};
   rows[4] = {
       "bench_offset_mm", "bench offset", "mm", calibration.summary.bench_offset_mm, {}, {}, {}};
+  if (model::MovesFocus(calibration.diagnostics.moves)) rows[4].label = "d1 at reading 0";
   if (calibration.diagnostics.paper_recipe.done) {
     rows[0].source = calibration.diagnostics.paper_recipe.image_distance_mm;
     rows[1].source = calibration.diagnostics.paper_recipe.focus_depth_mm;

@@ -52,6 +52,8 @@ std::string ScaleKindName(calib::ScaleKind kind) {
       return "constant";
     case calib::ScaleKind::kReversed:
       return "reversed";
+    case calib::ScaleKind::kMovingFocus:
+      return "moving-focus";
     case calib::ScaleKind::kUnknown:
       break;
   }
@@ -68,6 +70,8 @@ std::string ScaleKindWords(calib::ScaleKind kind) {
     case calib::ScaleKind::kReversed:
       return "as 1/z with reversed readings: check the direction of the scale, and whether the "
              "target moved and not the lens";
+    case calib::ScaleKind::kMovingFocus:
+      return "as the distance from the lens to the sensor changes it";
     case calib::ScaleKind::kUnknown:
       break;
   }

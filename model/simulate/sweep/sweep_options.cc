@@ -91,6 +91,21 @@ EffectSet SweepEffects() {
           Effect::kReadingError};
 }
 
+double SweepSimulationOptions::ImageDistanceMm(int frame_index) const {
+  return MovesFocus(moves) ? first_image_distance_mm + frame_index * step_mm
+                           : camera.image_distance_mm();
+}
+
+double SweepSimulationOptions::DepthMm(int frame_index) const {
+  return MovesFocus(moves) ? DepthAt(ImageDistanceMm(frame_index))
+                           : first_depth_mm + frame_index * step_mm;
+}
+
+double SweepSimulationOptions::DepthAt(double image_distance_mm) const {
+  return camera.focus_depth_mm() -
+         (moves == SweepMotion::kLens ? image_distance_mm - camera.image_distance_mm() : 0);
+}
+
 bool SweepSimulationOptions::IsValid(std::string* why) const {
   if (!IsSimulatable(camera, why) || !IsValidTarget(target, why)) return false;
   if (!camera.calibration->blur_floor_px) {
@@ -102,12 +117,18 @@ bool SweepSimulationOptions::IsValid(std::string* why) const {
   if (!(frame_count >= 1 && frame_count <= 100000)) {
     return Fail(why, fmt::format("bench.frames is {}: it must be from 1 to 100000", frame_count));
   }
-  const double last_depth_mm = first_depth_mm + (frame_count - 1) * step_mm;
-  const auto possible = [](double depth_mm) { return depth_mm > 0 && std::isfinite(depth_mm); };
-  if (!possible(first_depth_mm) || !possible(last_depth_mm)) {
+  const auto possible = [](double length_mm) { return length_mm > 0 && std::isfinite(length_mm); };
+  const double thickness_mm = camera.lens.lens_thickness_mm;
+  const double first_mm = ImageDistanceMm(0), last_mm = ImageDistanceMm(frame_count - 1);
+  if (!possible(first_mm - thickness_mm) || !possible(last_mm - thickness_mm)) {
+    return Fail(why, fmt::format("bench: the image distances run from {} to {} mm: they must be "
+                                 "finite and > {}",
+                                 first_mm, last_mm, std::max(0.0, thickness_mm)));
+  }
+  if (!possible(DepthMm(0)) || !possible(DepthMm(frame_count - 1))) {
     return Fail(why, fmt::format("bench: the depths run from {} to {} mm: they must be finite and "
                                  "> 0",
-                                 first_depth_mm, last_depth_mm));
+                                 DepthMm(0), DepthMm(frame_count - 1)));
   }
   if (!std::isfinite(bench_offset_mm)) {
     return Fail(why, fmt::format("bench.offset_mm is {}: it must be finite", bench_offset_mm));

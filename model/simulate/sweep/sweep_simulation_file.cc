@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <limits>
 #include <optional>
 #include <string>
@@ -66,9 +68,28 @@ TargetOptions ReadTarget(const YamlNode& node, std::vector<std::string>* notices
 }
 
 void ReadBench(const YamlNode& node, SweepSimulationOptions* options) {
-  node.RequireKeys(
-      {"first_depth_mm", "step_mm", "frames", "offset_mm", "direction", "reading_sigma_mm"});
-  options->first_depth_mm = node.At("first_depth_mm").PositiveNumber();
+  node.RequireKeys({"moves", "first_depth_mm", "first_image_distance_mm", "step_mm", "frames",
+                    "offset_mm", "direction", "reading_sigma_mm"});
+  if (const auto moves = node.Find("moves")) {
+    options->moves = ReadNamed<SweepMotion>(
+        *moves,
+        {SweepMotion::kTarget, SweepMotion::kCamera, SweepMotion::kLens, SweepMotion::kSensor},
+        SweepMotionName);
+  }
+  const bool moves_focus = MovesFocus(options->moves);
+  const char* other = moves_focus ? "first_depth_mm" : "first_image_distance_mm";
+  if (const auto unused = node.Find(other)) {
+    throw unused->ErrorHere(fmt::format(
+        "this key does not apply where the {} moves: {} is expected",
+        SweepMotionName(options->moves),
+        moves_focus ? "first_image_distance_mm (the target stays in the plane of focus that truth "
+                      "states)"
+                    : "first_depth_mm"));
+  }
+  if (moves_focus)
+    options->first_image_distance_mm = node.At("first_image_distance_mm").PositiveNumber();
+  else
+    options->first_depth_mm = node.At("first_depth_mm").PositiveNumber();
   options->step_mm = node.At("step_mm").Number();
   options->frame_count = node.At("frames").Integer(1, 100000);
   ReadNumber(node, "offset_mm", &options->bench_offset_mm);

@@ -36,6 +36,7 @@ bool IsEdge(TargetKind kind) {
 // The state of one frame.
 struct FrameState {
   double depth_mm = 0;
+  double image_distance_mm = 0;  // d1
   double reading_mm = 0;
   double lamp = 1;                 // irradiance, 1 = the mean of full scale
   Eigen::Vector2d drift_mm{0, 0};  // displacement of the target, X right, Y down
@@ -73,9 +74,8 @@ struct SweepSimulator::Impl {
     EffectSelectionOptions choice = options.effects;
     // All effects together cost nothing because frames are sums of waves.
     choice.kept = choice.kept.With(SweepEffects());
-    const double last_depth_mm =
-        options.first_depth_mm + (options.frame_count - 1) * options.step_mm;
-    const auto [near, far] = std::minmax(options.first_depth_mm, last_depth_mm);
+    const auto [near, far] =
+        std::minmax({options.DepthMm(0), options.DepthMm(options.frame_count - 1)});
     // The sides of a tilted target are nearer and farther than its middle.
     const auto [least, most] = Nearnesses(options.target.tilt_deg * kPi / 180);
     decision = SelectEffects(choice, Conditions(),
@@ -98,12 +98,14 @@ struct SweepSimulator::Impl {
         {target.Nearness(-0.5 - axis_px), target.Nearness(sensor.width_px - 0.5 - axis_px)});
   }
 
-  // Width p/|m|, mm on the target, of one px at a depth.
-  double PixelMm(double depth_mm, const EffectSet& on) const {
-    if (!on.Has(Effect::kMagnification)) depth_mm = options.camera.focus_depth_mm();
+  // Width p/|m|, mm on the target, of one px at a depth, for a sensor at a distance d1.
+  double PixelMm(double depth_mm, double image_distance_mm, const EffectSet& on) const {
+    if (!on.Has(Effect::kMagnification)) {
+      depth_mm = options.camera.focus_depth_mm();
+      image_distance_mm = options.camera.image_distance_mm();
+    }
     return options.camera.sensor.pixel_pitch_mm /
-           std::abs(ChiefRayMagnification(options.camera.lens, options.camera.image_distance_mm(),
-                                          depth_mm));
+           std::abs(ChiefRayMagnification(options.camera.lens, image_distance_mm, depth_mm));
   }
 
   // The middle of the sensor, px from the principal point.
@@ -114,29 +116,36 @@ struct SweepSimulator::Impl {
   }
 
   // Defocus sigma = kappa r_defocus, here in px.
-  double DefocusPx(double depth_mm) const {
+  double DefocusPx(double depth_mm, double image_distance_mm) const {
     const Camera& camera = options.camera;
-    return camera.blur_ratio() * BlurRadiusMm(camera.lens, camera.image_distance_mm(), depth_mm) /
+    return camera.blur_ratio() * BlurRadiusMm(camera.lens, image_distance_mm, depth_mm) /
            camera.sensor.pixel_pitch_mm;
   }
+  // K/p of a frame, px per unit slope of the chief ray.
+  double ScalePx(double image_distance_mm) const {
+    return DefocusScaleMm(options.camera.lens, image_distance_mm) /
+           options.camera.sensor.pixel_pitch_mm;
+  }
 
-  // The target of a frame. Its scale is the frame's at each depth.
-  TiltedTarget TargetOf(double depth_mm, double pixel_mm, const EffectSet& on) const {
-    const double scale_px = options.camera.focal_scale_px();
-    return {on.Has(Effect::kTilt) ? options.target.tilt_deg * kPi / 180 : 0, depth_mm, scale_px,
-            pixel_mm * scale_px / depth_mm};
+  // The target of a frame, as if a pixel of it had the width `pixel_mm` on the target's middle. Its
+  // scale is the frame's at each depth.
+  TiltedTarget TargetOf(const FrameState& frame, double pixel_mm, const EffectSet& on) const {
+    const double scale_px = ScalePx(frame.image_distance_mm);
+    return {on.Has(Effect::kTilt) ? options.target.tilt_deg * kPi / 180 : 0, frame.depth_mm,
+            scale_px, pixel_mm * scale_px / frame.depth_mm};
   }
   // The target of a frame as seen by the columns around `x_px`, px from the axis.
   TiltedTarget SeenTarget(const FrameState& frame, double x_px) const {
-    const double depth_mm = TargetOf(frame.depth_mm, frame.pixel_mm, decision.on).DepthMm(x_px);
-    return TargetOf(frame.depth_mm, frame.pixel_mm * SeenScale(depth_mm), decision.on);
+    const double depth_mm = TargetOf(frame, frame.pixel_mm, decision.on).DepthMm(x_px);
+    return TargetOf(frame, frame.pixel_mm * SeenScale(depth_mm, frame.image_distance_mm),
+                    decision.on);
   }
   bool IsTilted() const { return On(Effect::kTilt) && options.target.tilt_deg != 0; }
 
   std::vector<FrameState> FramesWith(const EffectSet& on) const {
     const Camera& camera = options.camera;
     const double focus_depth_mm = camera.focus_depth_mm();
-    const double focus_pixel_mm = PixelMm(focus_depth_mm, on);
+    const double focus_pixel_mm = PixelMm(focus_depth_mm, camera.image_distance_mm(), on);
     std::vector<FrameState> states;
     for (int i = 0; i < options.frame_count; ++i) {
       using Purpose = RandomDraws::Purpose;
@@ -145,9 +154,12 @@ struct SweepSimulator::Impl {
       RandomDraws lamp(options.seed, Purpose::kLamp, item);
       RandomDraws drift(options.seed, Purpose::kDrift, item);
       FrameState frame;
-      frame.depth_mm = options.first_depth_mm + i * options.step_mm;
+      frame.depth_mm = options.DepthMm(i);
+      frame.image_distance_mm = options.ImageDistanceMm(i);
+      const double position_mm =
+          MovesFocus(options.moves) ? frame.image_distance_mm : frame.depth_mm;
       frame.reading_mm =
-          DirectionSign(options.direction) * (frame.depth_mm - options.bench_offset_mm) +
+          DirectionSign(options.direction) * (position_mm - options.bench_offset_mm) +
           (on.Has(Effect::kReadingError) ? options.reading_sigma_mm * bench.Normal() : 0);
       // The lamp is at the camera: the irradiance of the target is (zf/z)^2, 1 in the plane of
       // focus.
@@ -160,8 +172,9 @@ struct SweepSimulator::Impl {
           on.Has(Effect::kDrift) ? options.drift_sigma_px * focus_pixel_mm : 0;
       frame.drift_mm.x() = drift_sigma_mm * drift.Normal();
       frame.drift_mm.y() = drift_sigma_mm * drift.Normal();
-      frame.pixel_mm = PixelMm(frame.depth_mm, on);
-      if (on.Has(Effect::kDefocus)) frame.defocus_sigma_px = DefocusPx(frame.depth_mm);
+      frame.pixel_mm = PixelMm(frame.depth_mm, frame.image_distance_mm, on);
+      if (on.Has(Effect::kDefocus))
+        frame.defocus_sigma_px = DefocusPx(frame.depth_mm, frame.image_distance_mm);
       states.push_back(frame);
     }
     return states;
@@ -187,10 +200,9 @@ struct SweepSimulator::Impl {
     mean_per_landing = profile->mean_per_landing();
   }
   // Factor of the positions that a pixel sees at a depth, for the mean of its rays.
-  double SeenScale(double depth_mm) const {
-    const Camera& camera = options.camera;
+  double SeenScale(double depth_mm, double image_distance_mm) const {
     return 1 +
-           mean_per_landing * DefocusPerAperture(camera.lens, camera.image_distance_mm(), depth_mm);
+           mean_per_landing * DefocusPerAperture(options.camera.lens, image_distance_mm, depth_mm);
   }
 
   void MakeTruth() {
@@ -203,11 +215,12 @@ struct SweepSimulator::Impl {
     truth.blur_floor_px = floor_px;
     truth.bench_offset_mm = options.bench_offset_mm;
     truth.pupil_law = PupilLawName(law);
+    truth.moves = options.moves;
     if (On(Effect::kTilt)) truth.tilt_deg = options.target.tilt_deg;
     for (std::size_t i = 0; i < frames.size(); ++i) {
-      truth.frames.push_back({fmt::format("frames/frame_{:03d}.png", i), frames[i].depth_mm,
-                              frames[i].reading_mm,
-                              std::hypot(floor_px, frames[i].defocus_sigma_px)});
+      truth.frames.push_back(
+          {fmt::format("frames/frame_{:03d}.png", i), frames[i].depth_mm, frames[i].reading_mm,
+           std::hypot(floor_px, frames[i].defocus_sigma_px), frames[i].image_distance_mm});
     }
   }
 
@@ -245,17 +258,28 @@ struct SweepSimulator::Impl {
     }
   }
 
-  // The depth of the sweep at which the target is sharpest; zf itself if the sweep passes it.
-  double ReferenceDepthMm() const {
+  // The state in which the target is sharpest: the plane of focus if the sweep passes it, otherwise
+  // the end of the sweep that is nearest to it.
+  FrameState ReferenceState() const {
+    FrameState state;
+    if (MovesFocus(options.moves)) {
+      const auto [least, most] =
+          std::minmax(frames.front().image_distance_mm, frames.back().image_distance_mm);
+      state.image_distance_mm = std::clamp(truth.image_distance_mm, least, most);
+      state.depth_mm = options.DepthAt(state.image_distance_mm);
+      return state;
+    }
     const auto [near, far] = std::minmax(frames.front().depth_mm, frames.back().depth_mm);
-    return std::clamp(truth.focus_depth_mm, near, far);
+    state.depth_mm = std::clamp(truth.focus_depth_mm, near, far);
+    state.image_distance_mm = truth.image_distance_mm;
+    return state;
   }
 
   // Position of the target's centre, mm: in the middle of the image at the reference depth. It is
   // off the axis if the principal point is not in the middle.
   Eigen::Vector2d TargetCentreMm(const EffectSet& on) const {
-    const double depth_mm = ReferenceDepthMm();
-    return TargetOf(depth_mm, PixelMm(depth_mm, on), on).At(CentrePx());
+    const FrameState state = ReferenceState();
+    return TargetOf(state, PixelMm(state.depth_mm, state.image_distance_mm, on), on).At(CentrePx());
   }
 
   // The tile must cover the field of every frame with its drift and blur; of a large blur it covers
@@ -270,7 +294,8 @@ struct SweepSimulator::Impl {
     const double most_floor_px = options.camera.calibration->blur_floor_px->value;
     TileRequest request;
     request.centre_mm = TargetCentreMm(all);
-    request.pixel_mm = PixelMm(ReferenceDepthMm(), all);
+    const FrameState reference = ReferenceState();
+    request.pixel_mm = PixelMm(reference.depth_mm, reference.image_distance_mm, all);
     request.field_mm = std::min(sensor.width_px, sensor.height_px) * request.pixel_mm;
     double nearest_pixel_mm = with_all.front().pixel_mm;
     const Eigen::Vector2d& axis_px = sensor.principal_point_px;
@@ -278,7 +303,7 @@ struct SweepSimulator::Impl {
       const double margin_px = std::min(3 * std::hypot(most_floor_px, frame.defocus_sigma_px),
                                         std::min(sensor.width_px, sensor.height_px) / 4.0) +
                                1;
-      const TiltedTarget target = TargetOf(frame.depth_mm, frame.pixel_mm, all);
+      const TiltedTarget target = TargetOf(frame, frame.pixel_mm, all);
       for (double x_px : {-0.5 - margin_px, sensor.width_px - 0.5 + margin_px}) {
         // Beyond a side that is so far away, the target repeats itself.
         if (target.Nearness(x_px - axis_px.x()) < kMinNearness) {
@@ -327,12 +352,13 @@ struct SweepSimulator::Impl {
     const double least = Nearnesses(options.target.tilt_deg * kPi / 180).first;
     return std::tan(tilt_rad) *
            std::max(camera.blur_ratio() * camera.lens.aperture_radius_mm / frame.depth_mm,
-                    std::max(far_px, 1.0) / (camera.focal_scale_px() * least));
+                    std::max(far_px, 1.0) / (ScalePx(frame.image_distance_mm) * least));
   }
 
   // Sigma of the defocus, and below the light, of a column at a depth.
   double SeenDefocusPx(const FrameState& frame, double depth_mm) const {
-    return IsTilted() && On(Effect::kDefocus) ? DefocusPx(depth_mm) : frame.defocus_sigma_px;
+    return IsTilted() && On(Effect::kDefocus) ? DefocusPx(depth_mm, frame.image_distance_mm)
+                                              : frame.defocus_sigma_px;
   }
   double LampAt(const FrameState& frame, double depth_mm) const {
     const bool falls = options.lamp_falloff && On(Effect::kLampFalloff);

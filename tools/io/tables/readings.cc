@@ -35,6 +35,7 @@ void FinishMetadata(const std::string& what, const std::string& stated_unit, boo
                     set->rows.front().place, what, set->rows.size()));
   }
   const bool is_stated = !stated_unit.empty() || !options.unit.empty() || options.scale_mm;
+  set->in_dioptres = model::ReadingUnitName(stated_unit, options) == model::kDioptres;
   set->description =
       fmt::format("{}, {}{}, {} files", what, model::ReadingUnitName(stated_unit, options),
                   is_stated ? "" : " (no unit is stated)", set->rows.size());

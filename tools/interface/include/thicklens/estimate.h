@@ -58,8 +58,12 @@ struct EstimateOptions {
   std::optional<ViewCounts> views;
   std::optional<PixelRect> crop;  // take only this rectangle of photograph and depth, px
   std::optional<SensorOrigin> sensor_origin;  // needs a camera; 0 to 100000 px
-  ExifCheck exif = ExifCheck::kRequire;       // what a contradiction does
-  ApertureOptions aperture;                   // weights of the views
+  // Position of the lens when the photograph was taken, in the unit of the camera's
+  // calibration.focus_positions, which give d1 of it. Absent: the one that the photograph's
+  // metadata state in dioptres or as a focus distance, otherwise that of the calibration.
+  std::optional<double> lens_position;
+  ExifCheck exif = ExifCheck::kRequire;  // what a contradiction does
+  ApertureOptions aperture;              // weights of the views
   // Depth of the ST plane from Ap, mm, 0 < st_depth_mm <= 1e9; absent: the plane of focus. Needs a
   // camera.
   std::optional<double> st_depth_mm;

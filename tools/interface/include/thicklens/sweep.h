@@ -65,6 +65,7 @@ struct SweepOverrides {
   std::optional<Measured> magnification;           // in the plane of focus, dimensionless
   std::optional<double> target_period_mm;          // period of a periodic target, finite, > 0
   std::optional<model::BenchDirection> direction;  // sign of the reading in z
+  std::optional<model::SweepMotion> moves;         // the part that moves
   std::optional<double> reading_sigma_mm;          // finite, >= 0
   bool floor_unknown = false;                  // discards what the file states of the blur floor
   std::optional<Measured> floor_px;            // value and sigma finite and >= 0

@@ -11,6 +11,7 @@
 #include "thicklens/calib/diagnosis.h"
 #include "thicklens/calib/frame_statistics.h"
 #include "thicklens/model/camera.h"
+#include "thicklens/model/sweep_file.h"
 
 // These types report what a calibration finds.
 namespace thicklens::calib {
@@ -36,9 +37,15 @@ struct SystematicPart {
 
 // The measurements on one frame. Depths are from Ap, and use the offset that was given or found.
 struct FrameMeasurement {
-  std::string image;                  // file name of the frame
-  double reading_mm = 0;              // what the scale of the bench shows
-  double depth_mm = 0;                // offset plus or minus reading
+  std::string image;      // file name of the frame
+  double reading_mm = 0;  // what the scale of the bench shows
+  // Depth of the target: offset plus or minus reading. Where the lens or the sensor moves, it is
+  // the depth at which the camera, focused as it was calibrated, shows a target with the same blur;
+  // 0: there is none, because the blur is that of a point beyond infinity.
+  double depth_mm = 0;
+  double depth_per_reading = 1;  // |d depth/d reading|, other than 1 where lens or sensor move
+  // d1 of this frame, from Ap, mm. Present where the lens or the sensor moves.
+  std::optional<double> image_distance_mm;
   FrameStatistics statistics;         // levels, contrast and noise
   std::string rejection;              // empty if the frame is used
   double mean_edge_slope = 0;         // MES, linear grey per px
@@ -94,6 +101,7 @@ enum class ScaleKind {
   kInverseDepth,  // as 1/z: a camera whose pupil does not move
   kConstant,      // telecentric, or the sensor moves
   kReversed,      // as 1/z with the opposite direction
+  kMovingFocus,   // as a lens or a sensor that moves changes it
 };
 
 // The bench offset from the image scale: 1/scale = (offset + direction * reading)/z_reference.
@@ -247,8 +255,9 @@ struct CalibrationSummary {
   std::optional<Result> focus_depth_mm;     // zf, from Ap toward the scene [S13]
   std::optional<Result> blur_ratio;         // kappa, dimensionless
   std::optional<Result> blur_floor_px;      // sigma of the blur floor
-  std::optional<Result> bench_offset_mm;    // depth of reading 0 from Ap
-  double chi2_per_dof = 0;                  // of the blur fit; 0: there is none
+  // Depth of reading 0 from Ap or, where the lens or the sensor moves, d1 of reading 0.
+  std::optional<Result> bench_offset_mm;
+  double chi2_per_dof = 0;  // of the blur fit; 0: there is none
   // In the blur fit, or, before the fit, the frames that passed the quality checks.
   int frames_used = 0;
   int frames_rejected = 0;  // frames that failed a check
@@ -276,6 +285,12 @@ struct CalibrationDiagnostics {
   std::optional<model::Estimate> blur_slope_px_per_mm;
   // Magnification in the plane of focus, f1/(zf - f1), dimensionless; present where zf is.
   std::optional<model::Estimate> magnification_at_focus;
+  // The part that moves, and whether the frames show it although it is not stated.
+  model::SweepMotion moves = model::SweepMotion::kTarget;
+  bool moves_is_recognised = false;
+  // d1 of the positions of the lens or of the sensor, in rising order of the position; present
+  // where they move and d1 is known.
+  std::optional<model::FocusPositions> focus_positions;
   // The source of the bench offset: "offset_mm", "the image scale", or the name of the statement
   // of the sweep's file or the camera file. Empty: nothing does.
   std::string bench_offset_from;

@@ -31,6 +31,12 @@ struct FocusSweep {
   // are the keys of the files, "magnification" or "lens.magnification".
   std::vector<model::StatedConjugate> stated_focus;
   model::BenchDirection direction = model::BenchDirection::kAway;  // sign of the reading in z
+  // The part that moves; absent: not stated. Where the lens or the sensor moves, `offset_mm` is d1
+  // at reading 0, and `direction` the sign of the reading in d1.
+  std::optional<model::SweepMotion> moves;
+  // True: the readings are the distances, mm from Ap, on which the lens is focused by its own
+  // scale.
+  bool readings_are_focus_distances = false;
   model::SweepTarget target = model::SweepTarget::kAuto;  // kind of the target, if it is stated
   model::FloorKnowledge floor;                            // what is known of the blur floor, px
   std::optional<double> target_period_mm;                 // period of a periodic target

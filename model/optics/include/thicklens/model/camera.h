@@ -72,6 +72,27 @@ struct Evidence {
   std::string date;                 // ISO 8601
 };
 
+// Name of the unit of positions in dioptres.
+inline constexpr char kDioptreUnit[] = "dpt";
+
+// The image distance of a camera whose lens or sensor moves, as a function of its position.
+struct FocusPositions {
+  // A position, as the scale or the drive shows it, and d1 there, mm from Ap.
+  struct Position {
+    double reading = 0;
+    double image_distance_mm = 0;
+  };
+  std::string unit = "mm";          // of the readings: "mm" or "dpt"
+  std::vector<Position> positions;  // at least two, in rising order of the reading
+
+  // d1 at a position, mm from Ap, by linear interpolation. Throws Error, which names the range, for
+  // a position outside it.
+  THICKLENS_EXPORT double ImageDistanceMm(double reading) const;
+  // Returns whether there are enough positions, all finite, in order and with d1 > 0. Otherwise
+  // `why`, if not null, gets the reason.
+  THICKLENS_EXPORT bool IsValid(std::string* why) const;
+};
+
 // The part of a camera that `thicklens calibrate` adds. A parameter that did not converge is
 // absent.
 struct CameraCalibration {
@@ -81,6 +102,9 @@ struct CameraCalibration {
   std::optional<Estimate> blur_ratio;
   std::optional<Estimate> blur_floor_px;    // sqrt(S0)
   std::optional<Estimate> bench_offset_mm;  // depth from Ap of reading 0, mm
+  // d1 of other positions of a lens or a sensor that moves. They share the error of
+  // image_distance_mm, which is that of the position at which the target was in focus.
+  std::optional<FocusPositions> focus_positions;
   // Covariance matrix of the parameters that `covariance_order` names, one row and one column for
   // each, in their units. Both are empty if no covariance is known.
   std::vector<std::string> covariance_order;

@@ -20,6 +20,18 @@ enum class BenchDirection { kAway, kToward };
 THICKLENS_EXPORT std::string BenchDirectionName(BenchDirection direction);
 THICKLENS_EXPORT double DirectionSign(BenchDirection direction);  // +1 away, -1 toward
 
+// The part that moves along the axis from frame to frame.
+enum class SweepMotion {
+  kTarget,  // the target: z = offset + reading or offset - reading
+  kCamera,  // the whole camera, which changes the depth of the target in the same way
+  kLens,    // the lens: a focus ring, helicoid or motor; target and sensor stand still
+  kSensor,  // the sensor or the camera back; target and lens stand still
+};
+// Name of the part: "target", "camera", "lens" or "sensor".
+THICKLENS_EXPORT std::string SweepMotionName(SweepMotion motion);
+// Whether the distance from the lens to the sensor changes.
+THICKLENS_EXPORT bool MovesFocus(SweepMotion motion);
+
 // Kind of the photographed target.
 enum class SweepTarget {
   kAuto,         // not stated: the frames decide
@@ -77,6 +89,13 @@ struct SweepFile {
   double reading_sigma_mm = 0;        // standard deviation of the error of a reading, mm
   bool reading_sigma_stated = false;  // false: the scatter about the law of image scale is used
   std::optional<Estimate> offset_mm;  // absent: unknown
+  // The part that moves; absent: not stated. Where the lens or the sensor moves, `offset_mm` is d1
+  // at reading 0, and readings that grow "away" are those at which the sensor is farther from the
+  // lens. The statements about the plane of focus are of the reading at focus.
+  std::optional<SweepMotion> moves;
+  // True: the readings were stated in dioptres and are the distances, mm from Ap, on which the
+  // lens is focused by its own scale. False: they are positions on a scale.
+  bool readings_are_focus_distances = false;
   // Statements about the plane of focus (model::StatedConjugate), each > 0. They determine the
   // depths of the sweep where neither `offset_mm` nor the image scale does; otherwise they are
   // compared with them. All are absent unless they are stated.
@@ -160,13 +179,14 @@ THICKLENS_EXPORT std::string SweepToYaml(const SweepFile& sweep);
 
 // Parameters with which a sweep was simulated, schema thicklens/sweep-truth/1.
 struct SweepTruth {
-  double image_distance_mm = 0;  // d1 from Ap to the sensor, mm
-  double focus_depth_mm = 0;     // zf from Ap, mm
-  double blur_ratio = 0;         // kappa, dimensionless
-  double blur_floor_px = 0;      // sigma of the blur floor, px
-  double bench_offset_mm = 0;    // depth from Ap of reading 0, mm
-  double tilt_deg = 0;           // tilt of the target, as in TargetOptions
-  std::string pupil_law;         // PupilLawName; empty: not stated
+  double image_distance_mm = 0;              // d1 from Ap to the sensor, mm
+  double focus_depth_mm = 0;                 // zf from Ap, mm
+  double blur_ratio = 0;                     // kappa, dimensionless
+  double blur_floor_px = 0;                  // sigma of the blur floor, px
+  SweepMotion moves = SweepMotion::kTarget;  // the part that moves
+  double bench_offset_mm = 0;  // z of reading 0, mm from Ap; d1 where lens or sensor move
+  double tilt_deg = 0;         // tilt of the target, as in TargetOptions
+  std::string pupil_law;       // PupilLawName; empty: not stated
   // The true values of one frame.
   struct Frame {
     std::string image;      // file name of the frame
@@ -175,6 +195,7 @@ struct SweepTruth {
     // Second-moment sigma of the blur, sqrt(floor^2 + (kappa r_defocus/p)^2), without the pixel
     // box.
     double blur_sigma_px = 0;
+    double image_distance_mm = 0;  // d1, from Ap to the sensor; 0: that of the sweep
   };
   std::vector<Frame> frames;      // in the order of the sweep
   EffectSelectionRecord effects;  // written, but not read

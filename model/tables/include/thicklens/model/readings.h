@@ -10,6 +10,9 @@
 
 namespace thicklens::model {
 
+// Name of the unit of readings in dioptres.
+inline constexpr char kDioptres[] = "dpt";
+
 // Which readings are read, and in which unit. An empty or absent value: found from the names of the
 // columns, from the units in the table, and from the numbers.
 struct ReadingOptions {
@@ -53,6 +56,8 @@ struct ReadingSet {
   std::string source;  // what the rows are in, for messages: "table.csv"
   std::string folder;  // the folder that names are relative to; empty: the current one
   std::vector<std::string> notices;  // assumptions, one line each
+  // True: the readings are stated in dioptres, the unit of the focus scale of a lens.
+  bool in_dioptres = false;
 };
 
 // The reading at one time.

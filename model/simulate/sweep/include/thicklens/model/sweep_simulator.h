@@ -56,11 +56,17 @@ struct SweepSimulationOptions {
   Camera camera;         // image size, pitch, lens; its calibration gives d1, kappa and the floor
   TargetOptions target;  // what is photographed
 
-  double first_depth_mm = 0;                         // true z of the first frame
-  double step_mm = 0;                                // step between frames, may be negative
-  int frame_count = 0;                               // number of frames
-  double bench_offset_mm = 0;                        // z = offset + reading or z = offset - reading
-  BenchDirection direction = BenchDirection::kAway;  // sign of the reading in z
+  // The part that moves. Where it is the lens or the sensor, the target is in the camera's plane of
+  // focus when the sensor is at the camera's image distance, the fall-off of the light and its
+  // distribution over the pupil are those of that state, and the two members behind it are about
+  // d1 in place of z.
+  SweepMotion moves = SweepMotion::kTarget;
+  double first_depth_mm = 0;           // true z of the first frame, from Ap
+  double first_image_distance_mm = 0;  // true d1 of the first frame; lens or sensor only
+  double step_mm = 0;                  // step between frames in z or d1, may be negative
+  int frame_count = 0;                 // number of frames
+  double bench_offset_mm = 0;          // z (or d1) = offset + reading, or offset - reading
+  BenchDirection direction = BenchDirection::kAway;  // sign of the reading in z (or d1)
   double reading_sigma_mm = 0;                       // sd of the error of each written reading
 
   double light_level = 0.5;         // mean linear grey at the plane of focus, of full scale
@@ -78,6 +84,13 @@ struct SweepSimulationOptions {
   EffectSelectionOptions effects;
   std::uint64_t seed = 1;            // of textures, noise and errors
   std::vector<std::string> notices;  // of the file, one line each: names that are deprecated
+
+  // Distance d1 of the sensor from Ap, and depth z of the target from Ap, in a frame, mm.
+  THICKLENS_EXPORT double ImageDistanceMm(int frame_index) const;
+  THICKLENS_EXPORT double DepthMm(int frame_index) const;
+  // The depth of the target where the sensor is at a distance d1 and lens or sensor move, mm: a
+  // lens that moves away from the sensor comes nearer to the target.
+  THICKLENS_EXPORT double DepthAt(double image_distance_mm) const;
 
   // Returns whether all members are valid. Otherwise `why`, if not null, gets the reason.
   THICKLENS_EXPORT bool IsValid(std::string* why) const;

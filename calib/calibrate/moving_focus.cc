@@ -1,0 +1,323 @@
+#include "calib/calibrate/moving_focus.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "calib/calibrate/focus_results.h"
+#include "calib/calibrate/zero_choice.h"
+#include "calib/fit/known_focus.h"
+#include "calib/registration/moving_scale.h"
+#include "calib/uncertainty/systematic_advice.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/statistics.h"
+
+namespace thicklens::calib {
+namespace {
+
+constexpr double kWrongWay = 5;        // standard deviations of the scale's slope
+constexpr double kPartOfStep = 0.2;    // of the readings, by which the reading at focus may be off
+constexpr double kLeastGrowth = 0.02;  // A below which the blur of a lens at 1:1 does not change
+constexpr double kGainDiffers = 3;     // standard deviations
+constexpr double kNearestFocus = 1.001;  // of f2: a nearer sensor has no object in focus
+
+// A value of xf and its source.
+struct Focus {
+  model::Estimate distance_mm;
+  std::string from;
+  std::optional<model::StatedConjugate> stated;
+};
+
+class MovingFocus {
+ public:
+  MovingFocus(const FocusSweep& sweep, model::SweepMotion moves, const TargetCalibration& target)
+      : sweep_(sweep),
+        lens_(sweep.camera.lens),
+        moves_(moves),
+        sign_(model::DirectionSign(sweep.direction)),
+        target_(target) {}
+
+  Calibration Run() {
+    preview_ = target_.preview(sweep_);
+    if (!preview_.passed) return Finished(std::move(preview_.found));
+    focus_reading_mm_ = SharpestReadingMm();
+    if (const auto reason = FindFocus()) return Refused(*reason);
+    constexpr int kRounds = 3;
+    for (int round = 0; round < kRounds; ++round) {
+      const FocusMotion motion(sweep_, moves_, focus_.distance_mm.value, focus_reading_mm_);
+      if (const auto reason = ReasonAgainst(motion)) return Refused(*reason);
+      Calibration found = target_.run(EquivalentSweep(motion), motion);
+      const auto reading_mm = FocusReading(found, motion);
+      const bool is_last = round + 1 == kRounds || IsSolvedByOffset();
+      if (!reading_mm || is_last || std::abs(*reading_mm - focus_reading_mm_) < PartOfStepMm())
+        return Converted(std::move(found), motion);
+      MoveFocusTo(*reading_mm);
+    }
+    return Refused("the reading at focus was not found");
+  }
+
+ private:
+  Calibration Finished(Calibration found) const {
+    found.diagnostics.moves = moves_;
+    return found;
+  }
+
+  Calibration Refused(const std::string& reason) {
+    Calibration found = preview_.found;
+    found.summary.outcome = Outcome::kRefused;
+    found.summary.reason = reason;
+    return Finished(std::move(found));
+  }
+
+  double SharpestReadingMm() const {
+    const SharpestReading& sharpest = preview_.found.diagnostics.sharpest;
+    return sharpest.done ? sharpest.reading_mm.value
+                         : preview_.found.frames[preview_.reference].reading_mm;
+  }
+
+  double PartOfStepMm() const {
+    std::vector<double> readings;
+    for (const FrameMeasurement& frame : preview_.found.frames)
+      readings.push_back(frame.reading_mm);
+    const auto [low, high] = std::minmax_element(readings.begin(), readings.end());
+    return kPartOfStep * (*high - *low) / static_cast<double>(readings.size());
+  }
+
+  // Whether the calibration of the equivalent target finds xf itself: its bench offset is D.
+  bool IsSolvedByOffset() const {
+    return moves_ == model::SweepMotion::kSensor && !sweep_.readings_are_focus_distances;
+  }
+
+  // With a statement, xf stays; with an offset, it moves with the reading at focus.
+  void MoveFocusTo(double reading_mm) {
+    if (!focus_.stated && !sweep_.readings_are_focus_distances)
+      focus_.distance_mm.value += sign_ * (reading_mm - focus_reading_mm_);
+    focus_reading_mm_ = reading_mm;
+  }
+
+  // ---- xf ----
+  std::vector<model::StatedConjugate> Statements() const {
+    std::vector<model::StatedConjugate> statements = sweep_.stated_focus;
+    if (sweep_.target_period_mm) {
+      const cv::Mat grey =
+          LinearGrey(sweep_.read_frame(preview_.reference), sweep_, preview_.reference);
+      if (const auto measured = MagnificationOfPeriod(sweep_, grey, 0))
+        statements.push_back(*measured);
+    }
+    return statements;
+  }
+
+  model::Estimate SensorDistanceOfStatement(const model::StatedConjugate& stated) const {
+    const model::Estimate depth_mm = model::FocusDepthOf(lens_, stated);
+    return {SensorDistanceOf(lens_, depth_mm.value),
+            std::abs(model::ImageDistanceSlope(lens_, depth_mm.value)) * depth_mm.sigma};
+  }
+
+  // The change of a statement's xf with the tolerance of the focal lengths, as a sigma.
+  double ErrorByFocalLength(const model::StatedConjugate& stated) const {
+    model::ThickLens longer = lens_;
+    const double change = FocalLengthTolerance(sweep_.camera) / std::sqrt(3.0);
+    longer.front_focal_length_mm *= 1 - change;
+    longer.rear_focal_length_mm *= 1 - change;
+    const double shifted_mm = SensorDistanceOf(longer, model::FocusDepthOf(longer, stated).value);
+    return shifted_mm - SensorDistanceOfStatement(stated).value;
+  }
+
+  std::optional<std::string> FindFocus() {
+    if (sweep_.readings_are_focus_distances) return FocusOfDistances();
+    scale_ = FitMovingScale(preview_.samples, lens_, moves_, sign_, focus_reading_mm_,
+                            sweep_.reading_sigma_mm);
+    if (scale_.slope_per_mm.sigma > 0 &&
+        sign_ * scale_.slope_per_mm.value < -kWrongWay * scale_.slope_per_mm.sigma) {
+      const bool is_away = sweep_.direction == model::BenchDirection::kAway;
+      return fmt::format(
+          "the image grows toward {} readings, but with moves: {} and direction: {} the distance "
+          "from the lens to the sensor, and the image with it, grows toward {} ones: direction "
+          "must be '{}', or something else moves",
+          is_away ? "smaller" : "larger", model::SweepMotionName(moves_),
+          is_away ? "away" : "toward", is_away ? "larger" : "smaller", is_away ? "toward" : "away");
+    }
+    std::vector<Focus> known;
+    for (const model::StatedConjugate& stated : Statements())
+      known.push_back({SensorDistanceOfStatement(stated), stated.name, stated});
+    if (sweep_.offset_mm) {
+      known.push_back(
+          {{sweep_.offset_mm->value - lens_.lens_thickness_mm + sign_ * focus_reading_mm_,
+            sweep_.offset_mm->sigma},
+           kFromOffset,
+           std::nullopt});
+    }
+    // If the sensor moves, the equivalent target is compared with its image scale, whose error is
+    // known better there.
+    if (scale_.sensor_distance_mm && (known.empty() || moves_ == model::SweepMotion::kLens))
+      known.push_back({*scale_.sensor_distance_mm, kFromScale, std::nullopt});
+    const auto error_mm = [&](const Focus& focus) {
+      return focus.stated ? std::hypot(focus.distance_mm.sigma, ErrorByFocalLength(*focus.stated))
+                          : focus.distance_mm.sigma;
+    };
+    const auto best =
+        std::min_element(known.begin(), known.end(),
+                         [&](const Focus& a, const Focus& b) { return error_mm(a) < error_mm(b); });
+    if (best == known.end()) return ReasonOfUnknownFocus();
+    focus_ = *best;
+    if (!(focus_.distance_mm.value > kNearestFocus * lens_.rear_focal_length_mm))
+      return ReasonOfImpossibleFocus();
+    for (const Focus& other : known) {
+      if (&other != &*best) Compare(other);
+    }
+    return std::nullopt;
+  }
+
+  std::optional<std::string> FocusOfDistances() {
+    if (!(focus_reading_mm_ > kNearestFocus * lens_.front_focal_length_mm)) {
+      return fmt::format(
+          "the sharpest frame is focused on {:.4g} mm ({:.4g} dpt), nearer than the focal length "
+          "({:.4g} mm): check the unit of the readings and the focal length",
+          focus_reading_mm_, kMmPerMetre / focus_reading_mm_, lens_.front_focal_length_mm);
+    }
+    focus_.distance_mm = {SensorDistanceOf(lens_, focus_reading_mm_), 0};
+    focus_.from = kFromDioptres;
+    return std::nullopt;
+  }
+
+  std::optional<std::string> ReasonOfUnknownFocus() const {
+    return fmt::format(
+        "nothing determines the distance from the lens to the sensor, on which d1, zf and kappa "
+        "depend: {}. State one of: focus_depth_mm (the distance of the target from the aperture), "
+        "magnification, target_period_mm (with a grid or ruler of that period in view), "
+        "image_distance_mm (at the reading at focus), or offset_mm (d1 at reading 0)",
+        moves_ == model::SweepMotion::kLens
+            ? "where the lens moves, the image scale changes by the same share per mm for any "
+              "distance (1/f), and this sweep is too short for the small difference"
+            : "the image scale changes too little over this sweep");
+  }
+
+  std::optional<std::string> ReasonOfImpossibleFocus() const {
+    return fmt::format(
+        "by {}, the sensor is {:.4g} +- {:.2g} mm behind the lens at the reading at focus "
+        "({:.5g} mm), but a lens of {:.4g} mm has objects in focus only at larger distances: check "
+        "{}, the focal length, the unit of the readings and what moves",
+        focus_.from, focus_.distance_mm.value, focus_.distance_mm.sigma, focus_reading_mm_,
+        lens_.rear_focal_length_mm, focus_.from);
+  }
+
+  // A statement that contradicts the one that is used, beyond the errors of both.
+  void Compare(const Focus& other) {
+    const auto error_mm = [&](const Focus& focus) {
+      return focus.stated ? std::hypot(focus.distance_mm.sigma, ErrorByFocalLength(*focus.stated))
+                          : focus.distance_mm.sigma;
+    };
+    const double apart_mm = other.distance_mm.value - focus_.distance_mm.value;
+    const double both_mm = std::hypot(error_mm(other), error_mm(focus_));
+    constexpr double kSmallest = 1e-3;  // of xf
+    if (!(std::abs(apart_mm) > kGainDiffers * both_mm + kSmallest * focus_.distance_mm.value))
+      return;
+    contradictions_.push_back(other.distance_mm.value);
+    warnings_.push_back(fmt::format(
+        "{} puts the sensor {:.5g} +- {:.2g} mm behind the lens at focus, {:+.3g} mm from that by "
+        "{}: one of them, the focal length, the unit of the readings or moves: {} is wrong",
+        other.from, other.distance_mm.value, error_mm(other), apart_mm, focus_.from,
+        model::SweepMotionName(moves_)));
+  }
+
+  std::optional<std::string> ReasonAgainst(const FocusMotion& motion) const {
+    if (motion.blur_per_scale() != 0 && std::abs(motion.blur_per_scale()) > kLeastGrowth)
+      return std::nullopt;
+    return fmt::format(
+        "at a magnification of {:.3g} a lens that moves does not change the focus: at 1:1 object "
+        "and image distance change alike. Move the target or the sensor, or use another "
+        "magnification",
+        model::MagnificationAtFocus(lens_, motion.FocusDepthMm()));
+  }
+
+  // ---- the equivalent sweep ----
+  FocusSweep EquivalentSweep(const FocusMotion& motion) const {
+    FocusSweep equivalent = sweep_;
+    equivalent.camera.lens = motion.EquivalentLens();
+    equivalent.camera.objective.reset();
+    // The tolerances of the lens's lengths act on the conversion, not on the equivalent lens.
+    for (auto it = equivalent.camera.statements.begin();
+         it != equivalent.camera.statements.end();) {
+      const bool is_of_lens = it->first.rfind("lens.", 0) == 0;
+      it = is_of_lens && it->first != "lens.aperture_radius_mm"
+               ? equivalent.camera.statements.erase(it)
+               : std::next(it);
+    }
+    equivalent.direction = model::BenchDirection::kAway;
+    equivalent.moves = moves_;
+    equivalent.readings_are_focus_distances = false;
+    equivalent.stated_focus.clear();
+    equivalent.target_period_mm.reset();
+    equivalent.offset_mm.reset();
+    if (!IsSolvedByOffset()) {
+      // z' does not depend on xf to first order: its zero is exact, and xf is known apart from it.
+      equivalent.offset_mm = model::Estimate{0, 0};
+    } else if (focus_.stated) {
+      equivalent.stated_focus.push_back({model::ConjugateKind::kFocusDepth,
+                                         {motion.unit_mm(), focus_.distance_mm.sigma},
+                                         focus_.stated->name,
+                                         ErrorByFocalLength(*focus_.stated)});
+    } else if (focus_.from == kFromOffset) {
+      equivalent.offset_mm = model::Estimate{0, focus_.distance_mm.sigma};
+    }
+    for (model::SweepFrame& frame : equivalent.frames) {
+      const auto depth_mm = motion.EquivalentDepthMm(frame.reading_mm);
+      // A frame whose blur is beyond that of any depth is as far away as a depth can be.
+      frame.reading_mm = depth_mm.value_or(kFarthest * motion.unit_mm());
+    }
+    if (sweep_.readings_are_focus_distances)
+      equivalent.reading_sigma_mm *=
+          std::abs(model::ImageDistanceSlope(lens_, motion.FocusDepthMm()));
+    return equivalent;
+  }
+
+  std::optional<double> FocusReading(const Calibration& found, const FocusMotion& motion) const {
+    if (!found.diagnostics.focus_reading_mm) return std::nullopt;
+    return motion.ReadingAt(found.diagnostics.focus_reading_mm->value);
+  }
+
+  Calibration Converted(Calibration found, const FocusMotion& motion) {
+    FocusOrigin origin;
+    origin.from = focus_.from;
+    origin.stated = focus_.stated;
+    if (focus_.stated) origin.sigma_of_bounds_mm = ErrorByFocalLength(*focus_.stated);
+    origin.sensor_distance_mm = focus_.distance_mm;
+    origin.from_offset = IsSolvedByOffset();
+    if (IsSolvedByOffset() && !found.diagnostics.bench_offset_from.empty())
+      origin.from = found.diagnostics.bench_offset_from;
+    origin.scale = scale_;
+    origin.contradicting_mm = contradictions_;
+    ConvertResults(sweep_, moves_, motion, origin, &found);
+    found.summary.warnings.insert(found.summary.warnings.begin(), warnings_.begin(),
+                                  warnings_.end());
+    return Finished(std::move(found));
+  }
+
+  static constexpr double kMmPerMetre = 1000;
+  static constexpr double kFarthest = 100;  // of u
+
+  const FocusSweep& sweep_;
+  const model::ThickLens& lens_;
+  model::SweepMotion moves_;
+  double sign_;
+  const TargetCalibration& target_;
+  SweepPreview preview_;
+  double focus_reading_mm_ = 0;
+  Focus focus_;
+  MovingScale scale_;
+  std::vector<std::string> warnings_;
+  std::vector<double> contradictions_;
+};
+
+}  // namespace
+
+Calibration CalibrateMovingFocus(const FocusSweep& sweep, model::SweepMotion moves,
+                                 const TargetCalibration& target) {
+  return MovingFocus(sweep, moves, target).Run();
+}
+
+}  // namespace thicklens::calib
