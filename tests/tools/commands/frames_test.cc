@@ -26,7 +26,7 @@ using thicklens::testing::ContentOf;
 using thicklens::testing::TemporaryFolder;
 using Arguments = std::vector<std::string>;
 
-constexpr int kSide = 144;
+constexpr int kFrameSidePx = 144;
 
 class FramesProgram : public ::testing::Test {
  protected:
@@ -49,22 +49,24 @@ class FramesProgram : public ::testing::Test {
     WriteFileAtomically(path, io::EncodeImageFile(stored, io::ImageFormat::kPng));
     return path;
   }
-  static cv::Mat Level(double level) { return cv::Mat(kSide, kSide, CV_32F, cv::Scalar(level)); }
+  static cv::Mat Level(double level) {
+    return cv::Mat(kFrameSidePx, kFrameSidePx, CV_32F, cv::Scalar(level));
+  }
   // Two stops from the centre to the corners.
   static cv::Mat Shading() {
-    cv::Mat shading(kSide, kSide, CV_32F);
-    for (int y = 0; y < kSide; ++y) {
-      for (int x = 0; x < kSide; ++x)
+    cv::Mat shading(kFrameSidePx, kFrameSidePx, CV_32F);
+    for (int y = 0; y < kFrameSidePx; ++y) {
+      for (int x = 0; x < kFrameSidePx; ++x)
         shading.at<float>(y, x) = static_cast<float>(
             std::pow(1 + (std::pow(x - 71.5, 2) + std::pow(y - 71.5, 2)) / (2 * 71.5 * 71.5), -2));
     }
     return shading;
   }
   static cv::Mat HotPixels() {
-    cv::Mat hot = cv::Mat::zeros(kSide, kSide, CV_32F);
+    cv::Mat hot = cv::Mat::zeros(kFrameSidePx, kFrameSidePx, CV_32F);
     cv::RNG random(9);
     for (int i = 0; i < 60; ++i)
-      hot.at<float>(random.uniform(0, kSide), random.uniform(0, kSide)) = 0.4F;
+      hot.at<float>(random.uniform(0, kFrameSidePx), random.uniform(0, kFrameSidePx)) = 0.4F;
     return hot;
   }
 
@@ -85,7 +87,7 @@ TEST_F(FramesProgram, AveragesExposuresAndFindsTheirHotPixels) {
   EXPECT_EQ(json["hot_pixels"], hot);
   EXPECT_EQ(json["method"], "median");
   EXPECT_NEAR(json["noise_of_one_frame"], 0.001, 0.0001);
-  EXPECT_NEAR(json["mean_level"], 0.02 + 0.4 * hot / (kSide * kSide), 1e-4);
+  EXPECT_NEAR(json["mean_level"], 0.02 + 0.4 * hot / (kFrameSidePx * kFrameSidePx), 1e-4);
   const io::DecodedImage image = io::ReadImageData(output);
   EXPECT_EQ(image.pixels.type(), CV_32F);
   EXPECT_THAT(image.facts.description, HasSubstr("thicklens frames average 1\nframes: 5\n"));

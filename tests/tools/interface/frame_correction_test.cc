@@ -33,7 +33,7 @@ using testing::SmallBenchSimulation;
 using testing::TemporaryFolder;
 using Files = std::vector<std::string>;
 
-constexpr int kSide = 144;  // of the sensor of SmallBenchSimulation
+constexpr int kSensorSidePx = 144;  // of the sensor of SmallBenchSimulation
 
 class FrameFilesForCorrection : public ::testing::Test {
  protected:
@@ -51,12 +51,14 @@ class FrameFilesForCorrection : public ::testing::Test {
     WriteFileAtomically(path, io::EncodeImageFile(stored, io::FormatOfName(name), writing));
     return path;
   }
-  static cv::Mat Level(double level) { return cv::Mat(kSide, kSide, CV_32F, cv::Scalar(level)); }
+  static cv::Mat Level(double level) {
+    return cv::Mat(kSensorSidePx, kSensorSidePx, CV_32F, cv::Scalar(level));
+  }
   // Detail of 4 to 20 px, as a target has.
   static cv::Mat Target(double level) {
-    cv::Mat target(kSide, kSide, CV_32F);
-    for (int y = 0; y < kSide; ++y) {
-      for (int x = 0; x < kSide; ++x) {
+    cv::Mat target(kSensorSidePx, kSensorSidePx, CV_32F);
+    for (int y = 0; y < kSensorSidePx; ++y) {
+      for (int x = 0; x < kSensorSidePx; ++x) {
         target.at<float>(y, x) =
             static_cast<float>(level * (1 + 0.4 * std::sin(0.6 * x) * std::sin(0.45 * y)));
       }
@@ -64,9 +66,9 @@ class FrameFilesForCorrection : public ::testing::Test {
     return target;
   }
   static cv::Mat Shading() {
-    cv::Mat shading(kSide, kSide, CV_32F);
-    for (int y = 0; y < kSide; ++y) {
-      for (int x = 0; x < kSide; ++x)
+    cv::Mat shading(kSensorSidePx, kSensorSidePx, CV_32F);
+    for (int y = 0; y < kSensorSidePx; ++y) {
+      for (int x = 0; x < kSensorSidePx; ++x)
         shading.at<float>(y, x) = static_cast<float>(
             1 / (1 + (std::pow(x - 71.5, 2) + std::pow(y - 71.5, 2)) / (71.5 * 71.5)));
     }
@@ -113,7 +115,7 @@ TEST_F(FrameFilesForCorrection, DarkAndFlatGiveTheLightOfTheTarget) {
   const cv::Mat grey = calib::LinearGrey(focus.read_frame(0), focus, 0);
   const cv::Mat expected = Target(0.3) * cv::mean(Shading())[0];
   // Noise of 0.004 and of the averages, enlarged where the flat is dark.
-  EXPECT_LT(cv::norm(grey, expected, cv::NORM_L2) / kSide, 0.008);
+  EXPECT_LT(cv::norm(grey, expected, cv::NORM_L2) / kSensorSidePx, 0.008);
   EXPECT_LT(std::abs(cv::mean(grey - expected)[0]), 0.0005);
 }
 
@@ -139,7 +141,9 @@ TEST_F(FrameFilesForCorrection, AnAverageKeepsItsRecord) {
 }
 
 TEST_F(FrameFilesForCorrection, ValuesOfEightBitsAreAveragedAsLight) {
-  const auto level = [](int value) { return cv::Mat(kSide, kSide, CV_8U, cv::Scalar(value)); };
+  const auto level = [](int value) {
+    return cv::Mat(kSensorSidePx, kSensorSidePx, CV_8U, cv::Scalar(value));
+  };
   const Files files = {PutStored("one.png", level(100)), PutStored("two.png", level(104))};
   FrameAverageOptions options;
   options.transfer = TransferCurve::Linear();
@@ -151,12 +155,13 @@ TEST_F(FrameFilesForCorrection, ValuesOfEightBitsAreAveragedAsLight) {
 
 // Values of 10 bits averaged as such are those of a sweep whose white is at 1023.
 TEST_F(FrameFilesForCorrection, AnAverageWithAnotherWhiteIsConverted) {
-  const cv::Mat stored(kSide, kSide, CV_16U, cv::Scalar(100));
+  const cv::Mat stored(kSensorSidePx, kSensorSidePx, CV_16U, cv::Scalar(100));
   const std::string path = folder_ / "average.tif";
   FrameAverageOptions options;
   WriteFileAtomically(path,
                       EncodeAveragedFrames(AverageFrames({PutStored("d.png", stored)}, options)));
-  Sweep sweep = SweepOf(PutStored("f.png", cv::Mat(kSide, kSide, CV_16U, cv::Scalar(700))));
+  Sweep sweep =
+      SweepOf(PutStored("f.png", cv::Mat(kSensorSidePx, kSensorSidePx, CV_16U, cv::Scalar(700))));
   sweep.description.full_scale = 1023;
   sweep.description.correction.dark = {path};
   sweep = ExamineFrames(sweep);
@@ -168,9 +173,10 @@ TEST_F(FrameFilesForCorrection, AnAverageWithAnotherWhiteIsConverted) {
 TEST_F(FrameFilesForCorrection, DefectsComeFromListsAndMasks) {
   const std::string list = folder_ / "bad.txt";
   WriteFileAtomically(list, "# x y\n3 5\n 7,9 1234567\n\n10 11 # hot\n");
-  cv::Mat mask = cv::Mat::zeros(kSide, kSide, CV_8U);
+  cv::Mat mask = cv::Mat::zeros(kSensorSidePx, kSensorSidePx, CV_8U);
   mask.at<std::uint8_t>(20, 30) = 1;
-  const cv::Mat found = ReadDefects({list, PutStored("mask.png", mask)}, kSide, kSide);
+  const cv::Mat found =
+      ReadDefects({list, PutStored("mask.png", mask)}, kSensorSidePx, kSensorSidePx);
   EXPECT_EQ(cv::countNonZero(found), 4);
   for (const cv::Point& place :
        {cv::Point(3, 5), cv::Point(7, 9), cv::Point(10, 11), cv::Point(30, 20)})
@@ -179,32 +185,33 @@ TEST_F(FrameFilesForCorrection, DefectsComeFromListsAndMasks) {
   EXPECT_THAT(Corrected({}, {}, {list}).correction_lines,
               Contains(AllOf(HasSubstr("bad.txt"), HasSubstr("3 pixels"))));
   WriteFileAtomically(list, "1 2\nx y\n");
-  EXPECT_THAT(ErrorOf([&] { ReadDefects({list}, kSide, kSide); }),
+  EXPECT_THAT(ErrorOf([&] { ReadDefects({list}, kSensorSidePx, kSensorSidePx); }),
               AllOf(HasSubstr("bad.txt:2"), HasSubstr("'x y'")));
   WriteFileAtomically(list, "144 2\n");
-  EXPECT_THAT(ErrorOf([&] { ReadDefects({list}, kSide, kSide); }),
+  EXPECT_THAT(ErrorOf([&] { ReadDefects({list}, kSensorSidePx, kSensorSidePx); }),
               AllOf(HasSubstr("bad.txt:1"), HasSubstr("(144, 2)"), HasSubstr("from 0")));
-  EXPECT_THAT(ErrorOf([&] { ReadDefects({folder_ / "mask.png"}, 99, kSide); }),
+  EXPECT_THAT(ErrorOf([&] { ReadDefects({folder_ / "mask.png"}, 99, kSensorSidePx); }),
               AllOf(HasSubstr("mask.png"), HasSubstr("144 x 144"), HasSubstr("99 x 144")));
 }
 
 // ---- what does not fit the frames ----
 
 TEST_F(FrameFilesForCorrection, AnotherSizeKindOrCurveIsNamedWithBothValues) {
-  const std::string small = PutStored("small.png", cv::Mat(100, kSide, CV_16U, cv::Scalar(9000)));
+  const std::string small =
+      PutStored("small.png", cv::Mat(100, kSensorSidePx, CV_16U, cv::Scalar(9000)));
   EXPECT_THAT(Refusal({}, {small}),
               AllOf(HasSubstr("flat"), HasSubstr("small.png"), HasSubstr("144 x 100"),
                     HasSubstr("f0.png"), HasSubstr("144 x 144")));
-  const std::string colour =
-      PutStored("colour.png", cv::Mat(kSide, kSide, CV_16UC3, cv::Scalar::all(30000)));
+  const std::string colour = PutStored(
+      "colour.png", cv::Mat(kSensorSidePx, kSensorSidePx, CV_16UC3, cv::Scalar::all(30000)));
   EXPECT_THAT(Refusal({}, {colour}), AllOf(HasSubstr("colour.png"), HasSubstr("3 channels"),
                                            HasSubstr("f0.png has 1 channel")));
   io::ImageWriting linear;
   linear.is_linear = true;
   Sweep sweep = SweepOf(frame_);
   sweep.camera.sensor.transfer = TransferCurve::Srgb();
-  sweep.description.correction.flat = {
-      PutStored("linear.png", cv::Mat(kSide, kSide, CV_16U, cv::Scalar(30000)), linear)};
+  sweep.description.correction.flat = {PutStored(
+      "linear.png", cv::Mat(kSensorSidePx, kSensorSidePx, CV_16U, cv::Scalar(30000)), linear)};
   EXPECT_THAT(ErrorOf([&] { ExamineFrames(sweep); }),
               AllOf(HasSubstr("linear.png"), HasSubstr("linear"), HasSubstr("f0.png"),
                     HasSubstr("none, and the camera file srgb")));
@@ -217,7 +224,8 @@ TEST_F(FrameFilesForCorrection, AnotherSizeKindOrCurveIsNamedWithBothValues) {
 }
 
 TEST_F(FrameFilesForCorrection, FilesOfUnequalTypesAreNotAveraged) {
-  const std::string bytes = PutStored("bytes.png", cv::Mat(kSide, kSide, CV_8U, cv::Scalar(9)));
+  const std::string bytes =
+      PutStored("bytes.png", cv::Mat(kSensorSidePx, kSensorSidePx, CV_8U, cv::Scalar(9)));
   EXPECT_THAT(ErrorOf([&] {
                 AverageFrames({dark_, bytes});
               }),
@@ -252,7 +260,7 @@ TEST_F(FrameFilesForCorrection, AFlatNeedsLightEverywhere) {
   EXPECT_THAT(Refusal({}, {flat}), AllOf(HasSubstr("circle.png"), HasSubstr("2880 pixels"),
                                          HasSubstr("below 2 %"), HasSubstr("roi_px")));
   Sweep sweep = SweepOf(frame_);
-  sweep.description.roi = {0, 32, kSide, 96};
+  sweep.description.roi = {0, 32, kSensorSidePx, 96};
   sweep.description.correction.flat = {flat};
   EXPECT_NE(ExamineFrames(sweep).correction, nullptr);
 }
