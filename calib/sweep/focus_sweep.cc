@@ -12,6 +12,7 @@
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/validity.h"
+#include "thicklens/calib/frame_correction.h"
 
 namespace thicklens::calib {
 namespace {
@@ -68,6 +69,57 @@ void DecodeChannel(const cv::Mat& stored, int channel, const DecodeTable& decode
     auto* out = light->ptr<float>(y);
     for (int x = 0; x < stored.cols; ++x, in += channels) out[x] = decode[*in];
   }
+}
+
+cv::Mat DecodedChannel(const cv::Mat& stored, const model::TransferCurve& transfer, int channel) {
+  const bool bytes = stored.depth() == CV_8U;
+  const auto decode = DecodeTableOf(transfer, bytes ? 256 : 65536);
+  cv::Mat light(stored.size(), CV_32F);
+  if (bytes) {
+    DecodeChannel<std::uint8_t>(stored, channel, *decode, &light);
+  } else {
+    DecodeChannel<std::uint16_t>(stored, channel, *decode, &light);
+  }
+  return light;
+}
+
+// Throws Error if the sweep's correction is not for frames like this one.
+void RequireCorrectionOf(const cv::Mat& stored, const FocusSweep& sweep, std::size_t index) {
+  const FrameCorrection& correction = *sweep.correction;
+  const int colours = stored.channels() == 4 ? 3 : stored.channels();
+  const bool fits = correction.size_px().empty() ||
+                    (correction.size_px() == stored.size() &&
+                     (correction.channels() <= 1 || correction.channels() == colours));
+  if (fits) return;
+  throw Error(
+      fmt::format("{}: the frame has {} x {} px and {} colour channel(s), but its dark, flat or "
+                  "defects have {} "
+                  "x {} px and {}",
+                  sweep.frames[index].Name(), stored.cols, stored.rows, colours,
+                  correction.size_px().width, correction.size_px().height, correction.channels()));
+}
+
+// The region of a whole frame; a defect at its border is replaced from both sides.
+cv::Mat RegionOfLight(const cv::Mat& light, const model::RegionOfInterest& roi) {
+  return roi.width > 0 ? light(cv::Rect(roi.x, roi.y, roi.width, roi.height)).clone() : light;
+}
+
+// One channel of a whole frame, corrected except for its defects.
+cv::Mat CorrectedChannel(const cv::Mat& stored, const FocusSweep& sweep, int channel) {
+  cv::Mat light = DecodedChannel(stored, sweep.camera.sensor.transfer, channel);
+  sweep.correction->Apply(channel, &light);
+  return light;
+}
+
+cv::Mat CorrectedGrey(const cv::Mat& stored, const FocusSweep& sweep, std::size_t index) {
+  RequireCorrectionOf(stored, sweep, index);
+  cv::Mat grey = CorrectedChannel(stored, sweep, 0);
+  if (stored.channels() >= 3) {
+    grey = 0.2126 * grey + 0.7152 * CorrectedChannel(stored, sweep, 1) +
+           0.0722 * CorrectedChannel(stored, sweep, 2);
+  }
+  sweep.correction->ReplaceDefects(&grey);
+  return RegionOfLight(grey, sweep.roi);
 }
 
 // Whether value and sigma are numbers that can be used.
@@ -246,6 +298,7 @@ cv::Mat RegionOf(const cv::Mat& stored, const FocusSweep& sweep, std::size_t ind
 
 cv::Mat LinearGrey(const cv::Mat& stored, const FocusSweep& sweep, std::size_t index) {
   const cv::Mat region = RegionOf(stored, sweep, index);
+  if (sweep.correction != nullptr) return CorrectedGrey(stored, sweep, index);
   const bool bytes = region.depth() == CV_8U;
   const auto decode = DecodeTableOf(sweep.camera.sensor.transfer, bytes ? 256 : 65536);
   cv::Mat grey(region.size(), CV_32F);
@@ -266,15 +319,12 @@ cv::Mat LinearChannel(const cv::Mat& stored, const FocusSweep& sweep, std::size_
         fmt::format("{}: channel {} is requested, but the image has {} channel(s), counted from 0",
                     sweep.frames[index].Name(), channel, colours));
   }
-  const bool bytes = region.depth() == CV_8U;
-  const auto decode = DecodeTableOf(sweep.camera.sensor.transfer, bytes ? 256 : 65536);
-  cv::Mat light(region.size(), CV_32F);
-  if (bytes) {
-    DecodeChannel<std::uint8_t>(region, channel, *decode, &light);
-  } else {
-    DecodeChannel<std::uint16_t>(region, channel, *decode, &light);
-  }
-  return light;
+  if (sweep.correction == nullptr)
+    return DecodedChannel(region, sweep.camera.sensor.transfer, channel);
+  RequireCorrectionOf(stored, sweep, index);
+  cv::Mat light = CorrectedChannel(stored, sweep, channel);
+  sweep.correction->ReplaceDefects(&light);
+  return RegionOfLight(light, sweep.roi);
 }
 
 }  // namespace thicklens::calib

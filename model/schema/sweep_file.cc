@@ -77,6 +77,31 @@ void ReadFloor(const YamlNode& root, SweepFile* sweep) {
   }
 }
 
+// The lists of files that correct the frames, in the order in which they are written.
+struct CorrectionKey {
+  const char* key;
+  std::vector<std::string> CorrectionFiles::*field;
+};
+constexpr CorrectionKey kCorrectionKeys[] = {
+    {"dark", &CorrectionFiles::dark},
+    {"flat", &CorrectionFiles::flat},
+    {"defects", &CorrectionFiles::defects},
+};
+
+void ReadCorrection(const YamlNode& root, SweepFile* sweep) {
+  for (const CorrectionKey& of : kCorrectionKeys) {
+    const auto node = root.Find(of.key);
+    if (!node) continue;
+    std::vector<std::string>& files = sweep->correction.*of.field;
+    if (node->IsSequence()) {
+      for (const YamlNode& file : node->Elements()) files.push_back(file.ResolvePath(file.Text()));
+      if (files.empty()) throw node->ErrorHere("one file or more is expected");
+    } else {
+      files.push_back(node->ResolvePath(node->Text()));
+    }
+  }
+}
+
 }  // namespace
 
 void NoteOrderAndRepeats(const SweepFile& sweep, std::vector<std::string>* notices) {
@@ -164,6 +189,9 @@ SweepFile ReadSweep(const std::string& path, const SweepReading& reading,
                     "roi_px",
                     "full_scale",
                     "raw",
+                    "dark",
+                    "flat",
+                    "defects",
                     "frames",
                     "frames_csv",
                     "frames_dir",
@@ -221,6 +249,7 @@ SweepFile ReadSweep(const std::string& path, const SweepReading& reading,
     sweep.raw =
         raw->OneOf({"demosaiced", "green"}) == "green" ? SweepRaw::kGreen : SweepRaw::kDemosaiced;
   }
+  ReadCorrection(root, &sweep);
   ReadSweepFrames(root, reading, &sweep, notices);
   NoteOrderAndRepeats(sweep, notices);
   return sweep;
@@ -288,6 +317,10 @@ std::string SweepToYaml(const SweepFile& sweep) {
   }
   if (sweep.full_scale) out.Number("full_scale", *sweep.full_scale);
   if (sweep.raw != SweepRaw::kDemosaiced) out.Text("raw", SweepRawName(sweep.raw));
+  for (const CorrectionKey& of : kCorrectionKeys) {
+    const std::vector<std::string>& files = sweep.correction.*of.field;
+    if (!files.empty()) out.List(of.key, files);
+  }
   out.BeginList("frames");
   for (const SweepFrame& frame : sweep.frames) {
     out.BeginMapInLine();

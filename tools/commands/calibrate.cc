@@ -160,7 +160,7 @@ std::string FramesLines(const Sweep& sweep, const Calibration& calibration) {
     lines += "raw        measured on the green sites of each 2 x 2 px; px below are the sensor's\n";
   if (sweep.description.full_scale)
     lines += fmt::format("full scale {}\n", PrintableUtf8(sweep.full_scale_reason));
-  return lines;
+  return lines + CorrectionText(sweep);
 }
 
 // Name of the choice for raw files; null: the frames are none.
@@ -201,6 +201,7 @@ CommandResult RunCalibration(const CalibrateOptions& options, const Sweep& sweep
   result.summary["read"] = FilesReadJson(calibration.frames_read ? *calibration.frames_read
                                                                  : std::vector<io::FilesRead>());
   result.summary["raw"] = RawMethod(sweep, calibration);
+  result.summary["correction"] = CorrectionJson(sweep);
   const auto& white = sweep.description.full_scale;
   result.summary["full_scale"] = {{"value", white ? nlohmann::json(*white) : nlohmann::json()},
                                   {"reason", PrintableUtf8(sweep.full_scale_reason)}};

@@ -19,6 +19,7 @@ void AddExplainCommand(CLI::App* program, CommandAction* action);
 void AddDoctorCommand(CLI::App* program, CommandAction* action);
 void AddCameraCommand(CLI::App* program, CommandAction* action);
 void AddDepthCommand(CLI::App* program, CommandAction* action);
+void AddFramesCommand(CLI::App* program, CommandAction* action);
 void AddTargetCommand(CLI::App* program, CommandAction* action);
 void AddBenchCommand(CLI::App* program, CommandAction* action);
 

@@ -58,6 +58,7 @@ MeasuredSweep MeasureSweep(const Sweep& given, bool map_field, RunScope* run) {
     std::string why;  // in pixels of the sensor
     if (!measured.sweep.IsValid(&why)) throw Error("sweep: " + why);
     calib::FocusSweep green = GreenPlaneSweep(measured.sweep);
+    green.correction = sweep.correction;
     green.read_frame = [files = measured.files, &green,
                         &sensor = measured.sweep.camera.sensor](std::size_t i) {
       return OfHalfTheSensor(files->Read(i), sensor, green.frames[i].Name());

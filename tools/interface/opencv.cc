@@ -161,6 +161,8 @@ cv::Mat MatFromDepthMap(const DepthMap& depth) {
 
 calib::FocusSweep FocusSweepOf(const Sweep& sweep) {
   calib::FocusSweep focus_sweep = calib::MakeFocusSweep(sweep.description, sweep.camera);
+  // The correction of green planes has their size, and these frames have the sensor's.
+  if (sweep.description.raw != model::SweepRaw::kGreen) focus_sweep.correction = sweep.correction;
   if (sweep.frames != nullptr) {
     focus_sweep.read_frame = [frames = sweep.frames,
                               names = FrameNames(sweep.description.frames)](std::size_t i) {

@@ -16,6 +16,7 @@
 #include "thicklens/effects.h"
 #include "thicklens/estimate.h"
 #include "thicklens/explain.h"
+#include "thicklens/frames.h"
 #include "thicklens/image.h"
 #include "thicklens/io/light_field_io.h"
 #include "thicklens/kernels/device.h"
@@ -161,6 +162,13 @@ bool DepthReadOptions::IsValid(const DepthMeaning& meaning, std::string* why) co
   if (!(*far_mm > 0)) return Unexpected(why, "far_mm", "a depth above 0, or infinity", *far_mm);
   return *near_mm != *far_mm ||
          Fail(why, "far_mm", "a depth that differs from near_mm is expected");
+}
+
+bool FrameAverageOptions::IsValid(std::string* why) const {
+  return OneOf(why, "method", calib::FrameAveraging::kMean, method) &&
+         OneOf(why, "raw", model::SweepRaw::kGreen, raw) && IfGiven(full_scale, [why](int white) {
+           return WholeBetween(why, "full_scale", 1, 65535, white);
+         });
 }
 
 bool SweepOverrides::IsValid(std::string* why) const {

@@ -16,12 +16,15 @@
 #include "thicklens/base/output_file.h"
 #include "thicklens/base/yaml_reader.h"
 #include "thicklens/calib/focus_sweep.h"
+#include "thicklens/frames.h"
 #include "thicklens/io/frame_files.h"
 #include "thicklens/io/full_scale.h"
 #include "thicklens/io/image_file.h"
 #include "thicklens/io/readings.h"
 #include "thicklens/io/video_file.h"
 #include "thicklens/model/camera_file.h"
+#include "thicklens/opencv.h"
+#include "tools/interface/frame_light.h"
 #include "tools/interface/missing_tolerances.h"
 #include "tools/interface/run_scope.h"
 #include "tools/interface/stated_transfer.h"
@@ -64,6 +67,10 @@ void ApplyOverrides(const SweepOverrides& overrides, const RunScope& run, model:
   if (overrides.roi) file->roi = *overrides.roi;
   if (overrides.full_scale) file->full_scale = overrides.full_scale;
   if (overrides.raw) file->raw = *overrides.raw;
+  const model::CorrectionFiles& correction = overrides.correction;
+  if (!correction.dark.empty()) file->correction.dark = correction.dark;
+  if (!correction.flat.empty()) file->correction.flat = correction.flat;
+  if (!correction.defects.empty()) file->correction.defects = correction.defects;
   if (overrides.reading_sigma_mm) {
     file->reading_sigma_mm = *overrides.reading_sigma_mm;
     file->reading_sigma_stated = true;
@@ -313,6 +320,40 @@ void TakeFullScale(const io::FullScaleFinding& finding, const RunScope& run, Swe
                   finding.reason, sweep->camera.sensor.transfer.Name(), remedy));
 }
 
+// The sweep with the correction that its description names, checked against a frame.
+void TakeCorrection(CorrectedFrame frame, const RunScope& run, Sweep* sweep) {
+  frame.transfer = sweep->camera.sensor.transfer;
+  frame.roi = sweep->description.roi;
+  FrameAverageOptions options;
+  options.full_scale = sweep->description.full_scale;
+  options.raw = sweep->description.raw;
+  FrameCorrectionFiles found =
+      ReadFrameCorrection(sweep->description.correction, frame, options, run.control());
+  sweep->correction = std::move(found.correction);
+  sweep->correction_lines = std::move(found.lines);
+  for (std::string& notice : found.notices) sweep->notices.push_back(std::move(notice));
+}
+
+bool NeedsCorrection(const Sweep& sweep) {
+  return sweep.correction == nullptr && !sweep.description.correction.IsEmpty() &&
+         !sweep.description.frames.empty();
+}
+
+// The first frame as it is measured.
+CorrectedFrame FirstFrame(const Sweep& sweep, const io::ImageFacts& facts) {
+  CorrectedFrame frame;
+  frame.name = sweep.description.frames.front().Name();
+  io::FrameFiles files({sweep.description.frames.front()}, sweep.description.full_scale,
+                       sweep.description.raw == model::SweepRaw::kGreen
+                           ? io::RawTreatment::kMosaicGreen
+                           : io::RawTreatment::kDemosaiced);
+  frame.stored = files.Read(0);
+  frame.stated_transfer = StatedTransferName(facts);
+  const auto read = files.Files();
+  frame.sensor = SensorTextOf(read.front().facts);
+  return frame;
+}
+
 OptionError NotRaw(const std::string& frame, const RunScope& run) {
   return OptionError(
       "raw",
@@ -411,6 +452,17 @@ Sweep ExamineFrames(Sweep sweep, const RunControl& control) {
   const RunScope run(control);
   const std::vector<model::SweepFrame>& frames = sweep.description.frames;
   const bool is_done = !sweep.full_scale_reason.empty();
+  if (sweep.frames != nullptr && NeedsCorrection(sweep)) {
+    CorrectedFrame frame;
+    frame.name = frames.front().image.empty() ? "frame 0" : frames.front().Name();
+    frame.stored = FocusSweepOf(sweep).read_frame(0);
+    TakeCorrection(std::move(frame), run, &sweep);
+  }
+  if (is_done && sweep.frames == nullptr && NeedsCorrection(sweep)) {
+    io::ImageFacts facts;
+    io::ReadFrame(frames.front(), &facts);
+    TakeCorrection(FirstFrame(sweep, facts), run, &sweep);
+  }
   if (sweep.frames != nullptr || is_done || frames.empty()) return sweep;
   const std::string path = frames.front().Name();
   io::ImageFacts facts;
@@ -440,6 +492,7 @@ Sweep ExamineFrames(Sweep sweep, const RunControl& control) {
   } else {
     TakeFullScale(FullScaleOfFrames(frames), run, &sweep);
   }
+  if (NeedsCorrection(sweep)) TakeCorrection(FirstFrame(sweep, facts), run, &sweep);
   return sweep;
 }
 

@@ -154,7 +154,10 @@ void CheckInput(const SweepArguments& arguments) {
 }  // namespace
 
 std::vector<std::string> SweepArguments::Files() const {
-  return {input, readings_csv, camera_path, truth_path, floor_from};
+  std::vector<std::string> files = {input, readings_csv, camera_path, truth_path, floor_from};
+  for (const auto* more : {&correction.dark, &correction.flat, &correction.defects})
+    files.insert(files.end(), more->begin(), more->end());
+  return files;
 }
 
 // Direction, moving part and target were checked against their lists of names when the command line
@@ -172,6 +175,7 @@ SweepOverrides SweepOverridesOf(const SweepArguments& arguments) {
   for (const auto raw : {model::SweepRaw::kDemosaiced, model::SweepRaw::kGreen}) {
     if (arguments.raw == model::SweepRawName(raw)) overrides.raw = raw;
   }
+  overrides.correction = arguments.correction;
   overrides.readings = arguments.readings;
   overrides.video = arguments.video;
   for (const auto direction : {model::BenchDirection::kAway, model::BenchDirection::kToward}) {
@@ -210,6 +214,9 @@ OptionNames SweepOptionNames() {
           {"roi", "--roi"},
           {"full_scale", "--full-scale"},
           {"raw", "--raw"},
+          {"correction.dark", "--dark"},
+          {"correction.flat", "--flat"},
+          {"correction.defects", "--defects"},
           {"readings", "--readings"},
           {"readings.column", "--column"},
           {"readings.file_column", "--file-column"},

@@ -31,6 +31,7 @@ struct SweepArguments {
   std::string roi;  // x,y,width,height
   std::optional<int> full_scale;
   std::string raw;  // "demosaiced" or "green"
+  model::CorrectionFiles correction;
   model::ReadingOptions readings;
   model::VideoSelection video;
 

@@ -126,6 +126,30 @@ static void AddFocusStatements(CLI::App* command, SweepArguments* sweep,
       ->type_name("M");
 }
 
+// The options for what corrects the frames.
+static void AddCorrectionFiles(CLI::App* command, model::CorrectionFiles* files,
+                               const std::string& instead) {
+  command
+      ->add_option("--dark", files->dark,
+                   "Exposures without light, which are averaged and subtracted from each frame in "
+                   "linear light; the sweep is given before it" +
+                       instead)
+      ->type_name("FILE...");
+  command
+      ->add_option(
+          "--flat", files->flat,
+          "Exposures of an even surface, which are averaged, less the dark, and divided by "
+          "their mean; each frame is divided by them" +
+              instead)
+      ->type_name("FILE...");
+  command
+      ->add_option("--defects", files->defects,
+                   "Defective pixels, which are interpolated: an image that is not 0 there, or a "
+                   "list of x and y" +
+                       instead)
+      ->type_name("FILE...");
+}
+
 void AddSweepStatements(CLI::App* command, SweepArguments* sweep) {
   const std::string instead = "; overrides the sweep file";
   command
@@ -191,6 +215,7 @@ void AddSweepStatements(CLI::App* command, SweepArguments* sweep) {
                        instead)
       ->check(CLI::IsMember({"demosaiced", "green"}))
       ->type_name("KIND");
+  AddCorrectionFiles(command, &sweep->correction, instead);
 }
 
 }  // namespace thicklens::tools

@@ -14,6 +14,7 @@
 #include "thicklens/base/printable_text.h"
 #include "thicklens/calib/calibrate.h"
 #include "thicklens/calib/focus_sweep.h"
+#include "thicklens/calib/frame_correction.h"
 #include "thicklens/model/conjugates.h"
 #include "thicklens/opencv.h"
 
@@ -160,6 +161,25 @@ std::string ReadingsLine(const Sweep& sweep) {
   return readings.empty() ? "" : fmt::format("read from  {}\n", PrintableUtf8(readings));
 }
 
+std::string CorrectionText(const Sweep& sweep) {
+  std::string text;
+  for (const std::string& line : sweep.correction_lines)
+    text += fmt::format("{:<10} {}\n", text.empty() ? "corrected" : "", PrintableUtf8(line));
+  return text;
+}
+
+nlohmann::json CorrectionJson(const Sweep& sweep) {
+  if (sweep.correction == nullptr) return nullptr;
+  const calib::FrameCorrection& correction = *sweep.correction;
+  nlohmann::json lines = nlohmann::json::array();
+  for (const std::string& line : sweep.correction_lines) lines.push_back(PrintableUtf8(line));
+  return {{"lines", lines},
+          {"dark", !correction.dark().empty()},
+          {"flat", !correction.gain().empty()},
+          {"interpolated_pixels", correction.defect_count()},
+          {"without_flat_light", correction.unlit_count()}};
+}
+
 std::string UnderstandingText(const Sweep& sweep, const Understanding& found,
                               const std::string& method, const std::string& outputs) {
   const model::RegionOfInterest& roi = sweep.description.roi;
@@ -172,7 +192,8 @@ std::string UnderstandingText(const Sweep& sweep, const Understanding& found,
       "dry run: nothing was measured\n",
       sweep.description.frames.size(), found.frame_size_px.width, found.frame_size_px.height,
       found.frame_bits, found.frame_channels, found.frame_channels == 1 ? "" : "s",
-      ReadingsLine(sweep), BenchText(sweep, found), CameraText(sweep.camera),
+      CorrectionText(sweep) + ReadingsLine(sweep), BenchText(sweep, found),
+      CameraText(sweep.camera),
       roi.width > 0 ? fmt::format("{} x {} px from ({}, {})", roi.width, roi.height, roi.x, roi.y)
                     : "the whole field",
       model::SweepTargetName(sweep.description.target), PeriodText(sweep.description),
@@ -204,6 +225,7 @@ nlohmann::json UnderstandingJson(const Sweep& sweep, const Understanding& found,
                          {"direction", model::BenchDirectionName(sweep.description.direction)},
                          {"target", model::SweepTargetName(sweep.description.target)},
                          {"raw", model::SweepRawName(sweep.description.raw)},
+                         {"correction", CorrectionJson(sweep)},
                          {"stated_focus", StatedFocusJson(sweep)},
                          {"target_period_mm", nullptr},
                          {"offset_mm", nullptr},

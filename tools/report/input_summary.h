@@ -26,6 +26,10 @@ Understanding Understand(const Sweep& sweep);
 // file lists them.
 std::string ReadingsLine(const Sweep& sweep);
 
+// Returns the lines that say what the frames are corrected by; empty: they are not.
+std::string CorrectionText(const Sweep& sweep);
+nlohmann::json CorrectionJson(const Sweep& sweep);
+
 // Returns the text of a dry run. `outputs` names the files that a run would write.
 std::string UnderstandingText(const Sweep& sweep, const Understanding& found,
                               const std::string& method, const std::string& outputs);

@@ -21,6 +21,7 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::ElementsAre;
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
@@ -264,6 +265,15 @@ TEST_F(SweepFolder, FullScaleIsAValueOfTheContainer) {
   EXPECT_EQ(sweep.raw, SweepRaw::kGreen);
   EXPECT_THAT(SweepToYaml(sweep), HasSubstr("raw: green\n"));
   EXPECT_THAT(ErrorWith(frames_ + "raw: red\n"), HasSubstr("raw"));
+  EXPECT_TRUE(sweep.correction.IsEmpty());
+  sweep = Read(frames_ + "dark: [d0.png, /d1.png]\nflat: w.tif\ndefects: bad.txt\n");
+  EXPECT_THAT(sweep.correction.dark, ElementsAre(EndsWith("/d0.png"), "/d1.png"));
+  EXPECT_THAT(sweep.correction.flat, ElementsAre(EndsWith("/w.tif")));
+  EXPECT_THAT(sweep.correction.defects, ElementsAre(EndsWith("/bad.txt")));
+  const std::string yaml = SweepToYaml(sweep);
+  EXPECT_THAT(yaml, HasSubstr("/d0.png, /d1.png]\n"));
+  EXPECT_THAT(ErrorWith(frames_ + "dark: []\n"), HasSubstr("dark: one file or more"));
+  EXPECT_THAT(ErrorWith(frames_ + "flat: {a: b}\n"), HasSubstr("flat"));
 }
 
 TEST_F(SweepFolder, YamlComesBack) {

@@ -175,7 +175,8 @@ TEST_F(ProgramTest, TheVersionListsTheLibrariesOfTheBuild) {
 TEST_F(ProgramTest, EveryCommandHasHelp) {
   for (const Arguments& command :
        {Arguments{"simulate", "sweep"}, Arguments{"calibrate"}, Arguments{"explain"},
-        Arguments{"camera", "init"}, Arguments{"depth", "extract"}}) {
+        Arguments{"camera", "init"}, Arguments{"depth", "extract"}, Arguments{"frames", "average"},
+        Arguments{"frames", "defects"}}) {
     Arguments arguments = command;
     arguments.emplace_back("--help");
     const ProgramResult result = Run(arguments);
@@ -187,8 +188,8 @@ TEST_F(ProgramTest, EveryCommandHasHelp) {
 }
 
 TEST_F(ProgramTest, WithoutACommandItPrintsTheHelp) {
-  for (const Arguments& arguments :
-       {Arguments{}, Arguments{"camera"}, Arguments{"depth"}, Arguments{"simulate"}}) {
+  for (const Arguments& arguments : {Arguments{}, Arguments{"camera"}, Arguments{"depth"},
+                                     Arguments{"frames"}, Arguments{"simulate"}}) {
     Arguments asked_for = arguments;
     asked_for.emplace_back("--help");
     const ProgramResult result = Run(arguments);

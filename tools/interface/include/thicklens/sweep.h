@@ -15,6 +15,9 @@
 #include "thicklens/run.h"
 
 namespace thicklens {
+namespace calib {
+class FrameCorrection;
+}
 
 // Where the frames of a sweep come from, if not from its files. The functions are called from
 // several threads at once.
@@ -43,6 +46,11 @@ struct Sweep {
   // Describes what shows the full scale of the frames' values, in one line; empty: ExamineFrames
   // has not been called, or the frames are not files.
   std::string full_scale_reason;
+  // The dark, the flat and the defects that the frames are corrected by; null: none. ExamineFrames
+  // makes it from the files that `description.correction` names, unless it is set.
+  std::shared_ptr<const calib::FrameCorrection> correction;
+  // The description of the files for the correction, one line for each of dark, flat and defects.
+  std::vector<std::string> correction_lines;
 
   // Returns true if a calibration can be attempted: the camera, the readings and the options of
   // the description are possible and finite. Does not open a frame.
@@ -75,6 +83,8 @@ struct SweepOverrides {
   // The value in the files that stands for white, 1 to 65535, e.g. 1023 for values of 10 bits.
   std::optional<int> full_scale;
   std::optional<model::SweepRaw> raw;  // what is measured of raw files
+  // Files by which the frames are corrected. Each list that is not empty replaces that of the file.
+  model::CorrectionFiles correction;
   // Which readings are read, and in which unit (thicklens/model/readings.h).
   model::ReadingOptions readings;
   // Which frames of a video are used, and its constant speed: for ReadSweepFolder of a video, and
@@ -101,7 +111,8 @@ THICKLENS_EXPORT Sweep ReadSweepFolder(const std::string& folder, const std::str
 
 // Returns the sweep with the full scale of its frames (`description.full_scale`, unless it is given
 // or that of the container) and what shows it, and with a notice if the files state another
-// transfer curve than the camera. It reads the first frame; if that has 16 bits of which the file
+// transfer curve than the camera. Files for the correction are averaged, checked against the first
+// frame and kept as `correction`. It reads the first frame; if that has 16 bits of which the file
 // does not state how many are used, it reads frames until their values show it. Calibrate and
 // VerifyCamera do this unless it has been done. Throws Error if the values do not show the full
 // scale and the result depends on it, and OptionError.

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <memory>
 #include <opencv2/core/mat.hpp>
 #include <optional>
 #include <string>
@@ -14,6 +15,8 @@
 #include "thicklens/model/sweep_file.h"
 
 namespace thicklens::calib {
+
+class FrameCorrection;
 
 // Reads the frame of an index as its file stores it: 8 or 16 bit, 1, 3 (RGB) or 4 channels. It must
 // be callable from several threads at once. It throws an Error that names the file.
@@ -41,6 +44,9 @@ struct FocusSweep {
   model::FloorKnowledge floor;                            // what is known of the blur floor, px
   std::optional<double> target_period_mm;                 // period of a periodic target
   model::RegionOfInterest roi;                            // the part of the frames that is measured
+  // Dark, flat and defects that LinearGrey and LinearChannel correct the light by, of the size of
+  // the frames; null: none.
+  std::shared_ptr<const FrameCorrection> correction;
   // Pixels of the sensor per pixel of the frames: 2 for the green plane of a mosaic. Camera, floor,
   // region and results have the pixels of the frames. Messages have those of the sensor, and so has
   // the interval of a floor that is not stated.
@@ -63,13 +69,15 @@ THICKLENS_EXPORT FocusSweep MakeFocusSweep(const model::SweepFile& file,
 THICKLENS_EXPORT cv::Mat RegionOf(const cv::Mat& stored, const FocusSweep& sweep,
                                   std::size_t index);
 
-// Returns the region as linear grey light in [0, 1], CV_32F (0.2126 R + 0.7152 G + 0.0722 B).
-// Throws as RegionOf does.
+// Returns the region as linear grey light in [0, 1], CV_32F (0.2126 R + 0.7152 G + 0.0722 B). A
+// correction of the sweep is applied, after which light may be below 0 or above 1. Throws as
+// RegionOf does.
 THICKLENS_EXPORT cv::Mat LinearGrey(const cv::Mat& stored, const FocusSweep& sweep,
                                     std::size_t index);
 
-// Returns one channel of the linear light, CV_32F: 0 red, 1 green, 2 blue; a frame with one channel
-// has 0 alone. Throws as RegionOf does, and also if the frame has no such channel.
+// Returns one channel of the linear light, CV_32F, corrected likewise: 0 red, 1 green, 2 blue; a
+// frame with one channel has 0 alone. Throws as RegionOf does, and also if the frame has no such
+// channel.
 THICKLENS_EXPORT cv::Mat LinearChannel(const cv::Mat& stored, const FocusSweep& sweep,
                                        std::size_t index, int channel);
 

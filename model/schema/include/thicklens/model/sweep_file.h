@@ -70,6 +70,15 @@ struct RegionOfInterest {
   int x = 0, y = 0, width = 0, height = 0;  // px; width 0: the whole field
 };
 
+// Files that correct the frames of a sweep, as paths that can be opened. Each list is averaged.
+struct CorrectionFiles {
+  std::vector<std::string> dark;     // exposures without light, which are subtracted
+  std::vector<std::string> flat;     // exposures of an even surface, by which is divided
+  std::vector<std::string> defects;  // masks or lists of pixels that are replaced
+  // Whether there are none.
+  bool IsEmpty() const { return dark.empty() && flat.empty() && defects.empty(); }
+};
+
 // One frame of a sweep.
 struct SweepFrame {
   std::string image;      // path that can be opened
@@ -114,6 +123,7 @@ struct SweepFile {
   // one that they state, or the one that their values show.
   std::optional<int> full_scale;
   SweepRaw raw = SweepRaw::kDemosaiced;  // what is measured of raw files
+  CorrectionFiles correction;            // what the frames are corrected by
   std::vector<SweepFrame> frames;        // in the order of the file
   // Describes in one line which readings were read, and in which unit; empty: the file lists them.
   std::string readings;
