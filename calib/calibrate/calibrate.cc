@@ -16,6 +16,7 @@
 #include "calib/fit/blur_measurement.h"
 #include "calib/fit/known_focus.h"
 #include "calib/fit/source_recipe.h"
+#include "calib/registration/axis_contrast.h"
 #include "calib/registration/change_of_reference.h"
 #include "calib/registration/frame_structure.h"
 #include "calib/registration/radial_causes.h"
@@ -124,6 +125,13 @@ class Calibrator {
     result_.diagnostics.structure =
         MeasureStructure({sweep_, [this](std::size_t frame) { return Grey(frame); }, used(),
                           samples, RegionCentre(sweep_), [this] { Tick(); }});
+  }
+
+  // Asked only where the registrations show a distortion, for which astigmatism may pass.
+  bool SeesAstigmatism() {
+    return ShowsDistortion(result_) &&
+           ShowsAstigmatism(
+               ChangeOfAxisContrast(scales_, [this](std::size_t frame) { return Grey(frame); }));
   }
 
   void EndBeforeFit() {
@@ -273,7 +281,7 @@ class Calibrator {
     if (ShowsDistortion(result_) ||
         FindScaleNonlinearity(scales_, result_.diagnostics.scale, sweep_))
       LookForStructure(scales_);
-    if (const auto refusal = CheckDistortion(&result_)) return Refuse(*refusal);
+    if (const auto refusal = CheckDistortion(&result_, SeesAstigmatism())) return Refuse(*refusal);
     slip_ = FindReadingStep(scales_, result_.diagnostics.scale);
     if (slip_) WarnOfReadingStep(*slip_, &result_);
     bend_ = CheckScaleNonlinearity(sweep_, scales_, &result_);

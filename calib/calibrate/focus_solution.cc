@@ -12,6 +12,7 @@
 #include "calib/fit/frame_outliers.h"
 #include "calib/fit/known_focus.h"
 #include "calib/fit/misfit_causes.h"
+#include "calib/uncertainty/astigmatism.h"
 #include "calib/uncertainty/blur_choices.h"
 #include "calib/uncertainty/floor_choice.h"
 #include "calib/uncertainty/systematic_advice.h"
@@ -36,6 +37,7 @@ class Solution {
 
   void Run() {
     if (evidence_.setup.estimators.empty()) return Refuse(evidence_.message);
+    TakeMeanOfAxes(sweep_, &evidence_);
     if (const auto reason = RejectOutliers(sweep_.direction, &evidence_, &result_))
       return Refuse(*reason);
     CompareChoices(sweep_.camera.psf, &evidence_);
@@ -55,6 +57,7 @@ class Solution {
     WarnOfMisfit();
     FitSides(evidence_, fit_, &result_);
     AddSystematicParts(sweep_, evidence_, fit_, choice.interval_px2, &result_);
+    if (evidence_.axial) MeasureAstigmatism(sweep_, evidence_, fit_, &result_);
     FillFloor(choice);
     FillCovariance();
     NameUnused();
@@ -129,6 +132,9 @@ class Solution {
                                               : "edges and relative spectrum";
     blur.family = sweep_.camera.psf;
     blur.tails = evidence_.taken_tails;
+    blur.astigmatic_blur_px =
+        fit_.values[kBlurRatio] *
+        std::sqrt(AstigmaticVariance(evidence_.setup, fit_.values[kFocusDepth]));
     if (evidence_.spectrum >= 0) blur.band = UsualBand(sweep_.camera.psf);
     blur.better_psf = evidence_.disc_misfit ? evidence_.better_psf : sweep_.camera.psf;
     blur.gaussian_misfit = evidence_.gaussian_misfit;
@@ -414,6 +420,14 @@ class Solution {
     for (std::size_t f = 0; f < evidence_.frames.size(); ++f) {
       FrameMeasurement& frame = Frame(f);
       if (frame.in_blur_fit || !frame.rejection.empty()) continue;
+      if (evidence_.axial &&
+          std::find(evidence_.axial->thinned_out.begin(), evidence_.axial->thinned_out.end(), f) !=
+              evidence_.axial->thinned_out.end()) {
+        frame.not_in_fit =
+            "the lens is astigmatic, and the blur along x and along y of so many frames is fitted "
+            "to evenly spread ones alone";
+        continue;
+      }
       frame.not_in_fit = frame.image_scale
                              ? "it is blurred too strongly, or its scale differs too much, for the "
                                "part of the target that all frames share"

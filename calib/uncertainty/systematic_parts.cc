@@ -45,6 +45,7 @@ class Parts {
     AddFloor(floor);
     AddSides();
     AddBand();
+    AddContrast();
     AddShape();
     AddTails();
     AddEstimator();
@@ -170,6 +171,20 @@ class Parts {
     SystematicPart part;
     part.name = "frequency band";
     part.remedy = "use a target with finer texture, or steps closer to focus";
+    Include(*trial, &part);
+    result_.diagnostics.systematic_parts.push_back(part);
+  }
+
+  // Adds the effect of a loss of contrast at all frequencies, which held gains take for blur.
+  void AddContrast() {
+    if (!evidence_.axial) return;
+    const std::optional<Trial> trial = With(evidence_.axial->free_gains, evidence_.spectrum);
+    if (!trial) return;
+    SystematicPart part;
+    part.name = "contrast of the blur's halo";
+    part.remedy =
+        "use frames closer to focus or a smaller aperture: neither blur shape fits, and the frames "
+        "lose contrast at all frequencies alike";
     Include(*trial, &part);
     result_.diagnostics.systematic_parts.push_back(part);
   }
