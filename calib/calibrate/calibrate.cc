@@ -42,6 +42,7 @@ namespace {
 
 constexpr double kZeroReach = 2;        // sigmas by which one zero contradicts another
 constexpr double kZeroMoves = 0.1;      // share of the zero's sigma above which a shift matters
+constexpr double kFarBetter = 3;        // ratio of errors
 constexpr double kPartOfStep = 0.2;     // of the readings, by which known depths may be off
 constexpr double kFewRegistered = 0.8;  // share of the used frames; below it the light is checked
 constexpr int kMaxThreads = 1024;
@@ -268,7 +269,7 @@ class Calibrator {
       result_.frames[sample.frame].in_scale_fit = result_.diagnostics.scale.done;
     }
     ReplaceReference();
-    if (sweep_.offset_mm) {
+    if (sweep_.offset_mm && !IsKnownBetterThanOffset()) {
       TakeGivenOffset();
       if (!is_lone_edge) {
         const OffsetCheck check = CheckGivenOffset(sweep_, UnitThatFits(sweep_, causes_), &result_);
@@ -335,6 +336,20 @@ class Calibrator {
         statements_.push_back(*measured);
     }
     best_statement_ = MostPrecise(sweep_.camera, statements_);
+  }
+
+  // Whether a statement of the plane of focus, or the image scale by far, is more precise than the
+  // stated offset. A rough offset then only has to agree. Pupil laws move the zero of the scale.
+  bool IsKnownBetterThanOffset() const {
+    const double sigma_mm = sweep_.offset_mm->sigma;
+    if (best_statement_ &&
+        FocusDepthWithTolerance(sweep_.camera, *best_statement_).sigma < sigma_mm)
+      return true;
+    const ScaleModel& law = result_.diagnostics.scale;
+    if (!law.done || sweep_.camera.objective || !ScaleDeterminesDepth(law)) return false;
+    const Eigen::Vector2d& laws_mm = law.offset_of_pupil_laws_mm;
+    return kFarBetter * std::hypot(law.offset_mm.sigma, 0.5 * (laws_mm.y() - laws_mm.x())) <
+           sigma_mm;
   }
 
   // Takes the bench offset from the image scale or from what is stated of the plane of focus,
@@ -520,7 +535,7 @@ class Calibrator {
     }
     if (sweep_.target_period_mm && result_.diagnostics.bench_offset_from != kFromPeriod)
       CheckMagnification(sweep_, reference_, Grey(reference_), &result_);
-    if (result_.summary.outcome == Outcome::kRefused) return;
+    if (result_.summary.outcome == Outcome::kRefused) return NameContradictions(fit);
     WidenByContradictions(evidence.setup, fit);
     CompareWithStatements(sweep_, statements_, evidence.setup, fit, &result_);
     task.scales = scales_;
@@ -528,6 +543,16 @@ class Calibrator {
     task.tick = [] { ThrowIfCancelled(); };
     CheckCameraResponse(task, evidence, fit, &result_);
     if (options_.map_field) MapField(sweep_, evidence, fit, &store_, &result_);
+  }
+
+  // A statement that is grossly wrong makes the blur impossible. The contradiction is the reason.
+  void NameContradictions(const BlurFitResult& fit) {
+    if (!fit.done || zero_is_open_) return;
+    const model::Estimate found_mm{fit.values[kFocusDepth],
+                                   std::sqrt(fit.covariance(kFocusDepth, kFocusDepth))};
+    std::string& reason = result_.summary.reason;
+    for (const Contradiction& other : FindContradictions(sweep_, statements_, found_mm, result_))
+      reason = other.text + "; the immediate reason is: " + reason;
   }
 
   // Widens the systematic intervals by the findings of the checks, as far as they move the results.

@@ -12,6 +12,7 @@
 #include "calib/fit/frame_outliers.h"
 #include "calib/fit/known_focus.h"
 #include "calib/fit/misfit_causes.h"
+#include "calib/registration/scale_causes.h"
 #include "calib/uncertainty/astigmatism.h"
 #include "calib/uncertainty/blur_choices.h"
 #include "calib/uncertainty/floor_choice.h"
@@ -298,10 +299,8 @@ class Solution {
     if (!(kappa + reach >= kSmallestRatio && kappa - reach <= kLargestRatio)) {
       Refuse(fmt::format(
           "the blur ratio would have to be {:.{}f}, which no lens has ({} to {}): "
-          "check focal lengths, aperture radius, pixel pitch, {}the unit of the readings, and "
-          "that the target moved and not the lens",
-          kappa, kappa < 0.1 ? 4 : 2, kSmallestRatio, kLargestRatio,
-          evidence_.known_focus ? evidence_.known_focus->name + ", " : ""));
+          "check {}the unit of the readings, and that the target moved and not the lens",
+          kappa, kappa < 0.1 ? 4 : 2, kSmallestRatio, kLargestRatio, NumbersOfRatio()));
       return false;
     }
     if (!(kappa + reach >= kLowRatio && kappa - reach <= kHighRatio)) {
@@ -320,6 +319,23 @@ class Solution {
     return true;
   }
 
+  // The numbers by which the growth of the blur gives its ratio. Those of an objective include its
+  // magnification, to which the ratio is in inverse proportion.
+  std::string NumbersOfRatio() const {
+    const auto& known = evidence_.known_focus;
+    if (sweep_.camera.objective && known && known->kind == model::ConjugateKind::kMagnification) {
+      const double magnification = known->value.value;
+      return fmt::format(
+          "{} ({:.4g}; with lens.numerical_aperture {:.3g} the blur fits about {:.2g}), "
+          "lens.tube_lens_focal_length_mm, lens.numerical_aperture, pixel pitch, ",
+          known->name, magnification, sweep_.camera.objective->numerical_aperture,
+          MagnificationOfBlur(*sweep_.camera.objective, evidence_.setup.pixel_pitch_mm,
+                              result_.diagnostics.blur_slope_px_per_mm->value));
+    }
+    return "focal lengths, aperture radius, pixel pitch, " +
+           (known ? known->name + ", " : std::string());
+  }
+
   std::string KnownReading() const {
     const model::Estimate& slope = *result_.diagnostics.blur_slope_px_per_mm;
     return fmt::format(
@@ -332,9 +348,8 @@ class Solution {
   // The advice where the image scale does not determine the bench offset.
   static constexpr char kStateOne[] =
       "State one of: target_period_mm (with a grid or ruler of that period in view), "
-      "magnification, image_distance_mm, focus_depth_mm or offset_mm; or, in the camera file, a "
-      "microscope's "
-      "lens.magnification";
+      "magnification, image_distance_mm, optical_tube_length_mm, working_distance_mm, "
+      "focus_depth_mm or offset_mm; or, in the camera file, a microscope's lens.magnification";
 
   std::string ReasonOfOpenZero() const {
     const ScaleModel& scale = result_.diagnostics.scale;
