@@ -115,7 +115,8 @@ std::optional<double> BlurModel::ResidualSigmas(const FrameMeasurement& frame) c
 void BlurModel::TakeFloor(const Calibration& calibration) {
   if (calibration.summary.blur_floor_px &&
       std::isfinite(calibration.summary.blur_floor_px->value)) {
-    floor_squared_px2_ = std::pow(calibration.summary.blur_floor_px->value, 2);
+    floor_squared_px2_ = std::pow(calibration.summary.blur_floor_px->value, 2) +
+                         std::pow(calibration.diagnostics.blur.astigmatic_blur_px, 2);
     return;
   }
   floor_squared_px2_ = FloorSquaredFromFrames(calibration);

@@ -17,6 +17,7 @@
 #include "calib/fit/blur_measurement.h"
 #include "calib/fit/known_focus.h"
 #include "calib/fit/source_recipe.h"
+#include "calib/registration/axis_contrast.h"
 #include "calib/registration/change_of_reference.h"
 #include "calib/registration/frame_structure.h"
 #include "calib/registration/radial_causes.h"
@@ -42,6 +43,7 @@ namespace {
 
 constexpr double kZeroReach = 2;        // sigmas by which one zero contradicts another
 constexpr double kZeroMoves = 0.1;      // share of the zero's sigma above which a shift matters
+constexpr double kFarBetter = 3;        // ratio of errors
 constexpr double kPartOfStep = 0.2;     // of the readings, by which known depths may be off
 constexpr double kFewRegistered = 0.8;  // share of the used frames; below it the light is checked
 constexpr int kMaxThreads = 1024;
@@ -150,6 +152,13 @@ class Calibrator {
     result_.diagnostics.structure =
         MeasureStructure({sweep_, [this](std::size_t frame) { return Grey(frame); }, used(),
                           samples, RegionCentre(sweep_), [this] { Tick(); }});
+  }
+
+  // Asked only where the registrations show a distortion, for which astigmatism may pass.
+  bool SeesAstigmatism() {
+    return ShowsDistortion(result_) &&
+           ShowsAstigmatism(
+               ChangeOfAxisContrast(scales_, [this](std::size_t frame) { return Grey(frame); }));
   }
 
   void EndBeforeFit() {
@@ -286,7 +295,7 @@ class Calibrator {
       result_.frames[sample.frame].in_scale_fit = result_.diagnostics.scale.done;
     }
     ReplaceReference();
-    if (sweep_.offset_mm) {
+    if (sweep_.offset_mm && !IsKnownBetterThanOffset()) {
       TakeGivenOffset();
       // The zero of an equivalent target is exact where it does not give the image distance.
       if (!is_lone_edge && (motion_ == nullptr || sweep_.offset_mm->sigma > 0)) {
@@ -300,7 +309,7 @@ class Calibrator {
     if (ShowsDistortion(result_) ||
         FindScaleNonlinearity(scales_, result_.diagnostics.scale, sweep_))
       LookForStructure(scales_);
-    if (const auto refusal = CheckDistortion(&result_)) return Refuse(*refusal);
+    if (const auto refusal = CheckDistortion(&result_, SeesAstigmatism())) return Refuse(*refusal);
     slip_ = FindReadingStep(scales_, result_.diagnostics.scale);
     if (slip_) WarnOfReadingStep(*slip_, &result_);
     // The scale of an equivalent target is that of a lens that moves to second order only.
@@ -357,6 +366,20 @@ class Calibrator {
         statements_.push_back(*measured);
     }
     best_statement_ = MostPrecise(sweep_.camera, statements_);
+  }
+
+  // Whether a statement of the plane of focus, or the image scale by far, is more precise than the
+  // stated offset. A rough offset then only has to agree. Pupil laws move the zero of the scale.
+  bool IsKnownBetterThanOffset() const {
+    const double sigma_mm = sweep_.offset_mm->sigma;
+    if (best_statement_ &&
+        FocusDepthWithTolerance(sweep_.camera, *best_statement_).sigma < sigma_mm)
+      return true;
+    const ScaleModel& law = result_.diagnostics.scale;
+    if (!law.done || sweep_.camera.objective || !ScaleDeterminesDepth(law)) return false;
+    const Eigen::Vector2d& laws_mm = law.offset_of_pupil_laws_mm;
+    return kFarBetter * std::hypot(law.offset_mm.sigma, 0.5 * (laws_mm.y() - laws_mm.x())) <
+           sigma_mm;
   }
 
   // Takes the bench offset from the image scale or from what is stated of the plane of focus,
@@ -546,7 +569,7 @@ class Calibrator {
     }
     if (sweep_.target_period_mm && result_.diagnostics.bench_offset_from != kFromPeriod)
       CheckMagnification(sweep_, reference_, Grey(reference_), &result_);
-    if (result_.summary.outcome == Outcome::kRefused) return;
+    if (result_.summary.outcome == Outcome::kRefused) return NameContradictions(fit);
     WidenByContradictions(evidence.setup, fit);
     if (motion_ == nullptr)
       CompareWithStatements(sweep_, statements_, evidence.setup, fit, &result_);
@@ -555,6 +578,16 @@ class Calibrator {
     task.tick = [] { ThrowIfCancelled(); };
     CheckCameraResponse(task, evidence, fit, &result_);
     if (options_.map_field) MapField(sweep_, evidence, fit, &store_, &result_);
+  }
+
+  // A statement that is grossly wrong makes the blur impossible. The contradiction is the reason.
+  void NameContradictions(const BlurFitResult& fit) {
+    if (!fit.done || zero_is_open_) return;
+    const model::Estimate found_mm{fit.values[kFocusDepth],
+                                   std::sqrt(fit.covariance(kFocusDepth, kFocusDepth))};
+    std::string& reason = result_.summary.reason;
+    for (const Contradiction& other : FindContradictions(sweep_, statements_, found_mm, result_))
+      reason = other.text + "; the immediate reason is: " + reason;
   }
 
   // Widens the systematic intervals by the findings of the checks, as far as they move the results.

@@ -9,7 +9,7 @@
 
 namespace thicklens::calib {
 
-// A sweep in which the lens or the sensor moves, as a sweep of an equivalent target [D133].
+// A sweep in which the lens or the sensor moves, as a sweep of an equivalent target [D138].
 //
 // With D from the rear principal plane to the sensor, z from Ap to the target, and xf, zf their
 // values at focus, D = xf + s (reading - reading at focus), s = +1 or -1, and z = zf (the sensor

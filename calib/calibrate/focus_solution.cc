@@ -12,6 +12,8 @@
 #include "calib/fit/frame_outliers.h"
 #include "calib/fit/known_focus.h"
 #include "calib/fit/misfit_causes.h"
+#include "calib/registration/scale_causes.h"
+#include "calib/uncertainty/astigmatism.h"
 #include "calib/uncertainty/blur_choices.h"
 #include "calib/uncertainty/floor_choice.h"
 #include "calib/uncertainty/systematic_advice.h"
@@ -36,6 +38,7 @@ class Solution {
 
   void Run() {
     if (evidence_.setup.estimators.empty()) return Refuse(evidence_.message);
+    TakeMeanOfAxes(sweep_, &evidence_);
     if (const auto reason = RejectOutliers(sweep_.direction, &evidence_, &result_))
       return Refuse(*reason);
     CompareChoices(sweep_.camera.psf, &evidence_);
@@ -55,6 +58,7 @@ class Solution {
     WarnOfMisfit();
     FitSides(evidence_, fit_, &result_);
     AddSystematicParts(sweep_, evidence_, fit_, choice.interval_px2, &result_);
+    if (evidence_.axial) MeasureAstigmatism(sweep_, evidence_, fit_, &result_);
     FillFloor(choice);
     FillCovariance();
     NameUnused();
@@ -129,6 +133,9 @@ class Solution {
                                               : "edges and relative spectrum";
     blur.family = sweep_.camera.psf;
     blur.tails = evidence_.taken_tails;
+    blur.astigmatic_blur_px =
+        fit_.values[kBlurRatio] *
+        std::sqrt(AstigmaticVariance(evidence_.setup, fit_.values[kFocusDepth]));
     if (evidence_.spectrum >= 0) blur.band = UsualBand(sweep_.camera.psf);
     blur.better_psf = evidence_.disc_misfit ? evidence_.better_psf : sweep_.camera.psf;
     blur.gaussian_misfit = evidence_.gaussian_misfit;
@@ -318,10 +325,8 @@ class Solution {
     if (!(kappa + reach >= kSmallestRatio && kappa - reach <= kLargestRatio)) {
       Refuse(fmt::format(
           "the blur ratio would have to be {:.{}f}, which no lens has ({} to {}): "
-          "check focal lengths, aperture radius, pixel pitch, {}the unit of the readings, and "
-          "that the {} moved and not {}",
-          kappa, kappa < 0.1 ? 4 : 2, kSmallestRatio, kLargestRatio,
-          evidence_.known_focus ? evidence_.known_focus->name + ", " : "",
+          "check {}the unit of the readings, and that the {} moved and not {}",
+          kappa, kappa < 0.1 ? 4 : 2, kSmallestRatio, kLargestRatio, NumbersOfRatio(),
           motion_ == nullptr ? "target" : model::SweepMotionName(*sweep_.moves),
           motion_ == nullptr ? "the lens" : "the target"));
       return false;
@@ -347,6 +352,23 @@ class Solution {
     return true;
   }
 
+  // The numbers by which the growth of the blur gives its ratio. Those of an objective include its
+  // magnification, to which the ratio is in inverse proportion.
+  std::string NumbersOfRatio() const {
+    const auto& known = evidence_.known_focus;
+    if (sweep_.camera.objective && known && known->kind == model::ConjugateKind::kMagnification) {
+      const double magnification = known->value.value;
+      return fmt::format(
+          "{} ({:.4g}; with lens.numerical_aperture {:.3g} the blur fits about {:.2g}), "
+          "lens.tube_lens_focal_length_mm, lens.numerical_aperture, pixel pitch, ",
+          known->name, magnification, sweep_.camera.objective->numerical_aperture,
+          MagnificationOfBlur(*sweep_.camera.objective, evidence_.setup.pixel_pitch_mm,
+                              result_.diagnostics.blur_slope_px_per_mm->value));
+    }
+    return "focal lengths, aperture radius, pixel pitch, " +
+           (known ? known->name + ", " : std::string());
+  }
+
   std::string KnownReading() const {
     const model::Estimate& slope = *result_.diagnostics.blur_slope_px_per_mm;
     return fmt::format(
@@ -362,9 +384,8 @@ class Solution {
   // The advice where the image scale does not determine the bench offset.
   static constexpr char kStateOne[] =
       "State one of: target_period_mm (with a grid or ruler of that period in view), "
-      "magnification, image_distance_mm, focus_depth_mm or offset_mm; or, in the camera file, a "
-      "microscope's "
-      "lens.magnification";
+      "magnification, image_distance_mm, optical_tube_length_mm, working_distance_mm, "
+      "focus_depth_mm or offset_mm; or, in the camera file, a microscope's lens.magnification";
 
   std::string ReasonOfOpenZero() const {
     const ScaleModel& scale = result_.diagnostics.scale;
@@ -458,6 +479,14 @@ class Solution {
     for (std::size_t f = 0; f < evidence_.frames.size(); ++f) {
       FrameMeasurement& frame = Frame(f);
       if (frame.in_blur_fit || !frame.rejection.empty()) continue;
+      if (evidence_.axial &&
+          std::find(evidence_.axial->thinned_out.begin(), evidence_.axial->thinned_out.end(), f) !=
+              evidence_.axial->thinned_out.end()) {
+        frame.not_in_fit =
+            "the lens is astigmatic, and the blur along x and along y of so many frames is fitted "
+            "to evenly spread ones alone";
+        continue;
+      }
       frame.not_in_fit = frame.image_scale
                              ? "it is blurred too strongly, or its scale differs too much, for the "
                                "part of the target that all frames share"

@@ -15,6 +15,7 @@
 #include "calib/response/processing_traces.h"
 #include "calib/response/response_frames.h"
 #include "calib/response/weak_detail.h"
+#include "calib/uncertainty/astigmatism.h"
 #include "calib/uncertainty/systematic_advice.h"
 
 namespace thicklens::calib {
@@ -181,8 +182,9 @@ class ResponseCheck {
     FrameStore store(sweep);
     BlurEvidence evidence = MeasureBlur(TaskWith(task_, sweep, store));
     Calibration scratch = result_;
-    if (evidence.setup.estimators.empty() || RejectOutliers(sweep.direction, &evidence, &scratch))
-      return std::nullopt;
+    if (evidence.setup.estimators.empty()) return std::nullopt;
+    if (evidence_.axial) TakeMeanOfAxes(sweep, &evidence);
+    if (RejectOutliers(sweep.direction, &evidence, &scratch)) return std::nullopt;
     evidence.setup.floor_variance_px2 = evidence_.setup.floor_variance_px2;
     return evidence.setup;
   }

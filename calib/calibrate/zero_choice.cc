@@ -77,53 +77,73 @@ double UsualFocusDepth(const model::Camera& camera, const std::vector<ScaleSampl
   return 0.5 * (f1_mm + std::sqrt(f1_mm * f1_mm + 4 * product_mm2));
 }
 
+std::vector<Contradiction> FindContradictions(const FocusSweep& sweep,
+                                              const std::vector<model::StatedConjugate>& statements,
+                                              const model::Estimate& found_mm,
+                                              const Calibration& calibration) {
+  std::vector<Contradiction> contradictions;
+  if (!calibration.summary.bench_offset_mm) return contradictions;
+  const double offset_mm = calibration.summary.bench_offset_mm->value;
+  const std::string& origin = calibration.diagnostics.bench_offset_from;
+  double found_sigma_mm = found_mm.sigma;
+  const auto compare = [&](const std::string& name, double focus_mm, double sigma_mm) {
+    const double apart_mm = focus_mm - found_mm.value;
+    const double both_mm = std::hypot(sigma_mm, found_sigma_mm);
+    if (!(std::abs(apart_mm) > kContradicts * both_mm + kSmallestContradiction * found_mm.value))
+      return;
+    const std::string text = fmt::format(
+        "{} puts the in-focus distance at {:.5g} +- {:.2g} mm, {:+.3g} mm from that by {} ({:.5g} "
+        "+- {:.2g} mm): one of them, the focal length, the pixel pitch or the unit of the readings "
+        "is wrong{}",
+        name, focus_mm, sigma_mm, apart_mm, origin, found_mm.value, found_sigma_mm,
+        name == kFromScale
+            ? ", or the entrance pupil of the lens is not at its front principal plane, "
+              "from which the image scale measures"
+            : "");
+    contradictions.push_back({name, {focus_mm, sigma_mm}, text});
+  };
+  for (const model::StatedConjugate& stated : statements) {
+    if (stated.name == origin) found_sigma_mm = FocusDepthWithTolerance(sweep.camera, stated).sigma;
+  }
+  const ScaleModel& scale = calibration.diagnostics.scale;
+  if (scale.done && !sweep.camera.objective && origin != kFromScale && origin != kFromOffset) {
+    // No pupil law is known to hold: the zero may lie anywhere in the interval of the laws.
+    const Eigen::Vector2d& laws_mm = scale.offset_of_pupil_laws_mm;
+    compare(kFromScale,
+            found_mm.value + std::clamp(offset_mm, laws_mm.x(), laws_mm.y()) - offset_mm,
+            scale.offset_mm.sigma);
+  }
+  if (sweep.offset_mm && origin != kFromOffset)
+    compare(kFromOffset, found_mm.value + sweep.offset_mm->value - offset_mm,
+            sweep.offset_mm->sigma);
+  for (const model::StatedConjugate& stated : statements) {
+    if (stated.name == origin) continue;
+    const model::Estimate focus_mm = FocusDepthWithTolerance(sweep.camera, stated);
+    compare(stated.name, focus_mm.value, focus_mm.sigma);
+  }
+  return contradictions;
+}
+
 void CompareWithStatements(const FocusSweep& sweep,
                            const std::vector<model::StatedConjugate>& statements,
                            const BlurFitSetup& setup, const BlurFitResult& fit,
                            Calibration* calibration) {
   if (!calibration->summary.focus_depth_mm) return;
   const Result found = *calibration->summary.focus_depth_mm;
-  const std::string& origin = calibration->diagnostics.bench_offset_from;
-  double found_sigma_mm = found.sigma;
-  const auto compare = [&](const std::string& name, double focus_mm, double sigma_mm) {
-    const double apart_mm = focus_mm - found.value;
-    const double both_mm = std::hypot(sigma_mm, found_sigma_mm);
-    if (!(std::abs(apart_mm) > kContradicts * both_mm + kSmallestContradiction * found.value))
-      return;
-    const std::string text = fmt::format(
-        "{} puts the in-focus distance at {:.5g} +- {:.2g} mm, {:+.3g} mm from that by {} ({:.5g} "
-        "+- {:.2g} mm): one of them, the focal length, the pixel pitch or the unit of the readings "
-        "is wrong{}",
-        name, focus_mm, sigma_mm, apart_mm, origin, found.value, found_sigma_mm,
-        name == kFromScale
-            ? ", or the entrance pupil of the lens is not at its front principal plane, "
-              "from which the image scale measures"
-            : "");
-    calibration->summary.warnings.push_back(text);
+  for (const Contradiction& other :
+       FindContradictions(sweep, statements, {found.value, found.sigma}, *calibration)) {
+    calibration->summary.warnings.push_back(other.text);
     // The fit at the other depth and its error. Nothing comes into focus nearer than the focal
     // point.
-    if (!(focus_mm > setup.lens.front_focal_length_mm)) return;
-    WidenByTrials(fmt::format("contradiction between {} and {}", name, origin),
-                  "find out which of them is wrong, and state the reliable one alone",
-                  WithOffsets(setup, {setup.offset_mm.value + apart_mm +
-                                      std::copysign(kReach * sigma_mm, apart_mm)}),
-                  fit, calibration);
-  };
-  for (const model::StatedConjugate& stated : statements) {
-    if (stated.name == origin) found_sigma_mm = FocusDepthWithTolerance(sweep.camera, stated).sigma;
-  }
-  const ScaleModel& scale = calibration->diagnostics.scale;
-  if (scale.done && !sweep.camera.objective && origin != kFromScale && origin != kFromOffset) {
-    // No pupil law is known to hold: the zero may lie anywhere in the interval of the laws.
-    const Eigen::Vector2d& laws_mm = scale.offset_of_pupil_laws_mm;
-    const double offset_mm = calibration->summary.bench_offset_mm->value;
-    compare(kFromScale, found.value + std::clamp(offset_mm, laws_mm.x(), laws_mm.y()) - offset_mm,
-            scale.offset_mm.sigma);
-  }
-  for (const model::StatedConjugate& stated : statements) {
-    if (stated.name == origin) continue;
-    const model::Estimate focus_mm = FocusDepthWithTolerance(sweep.camera, stated);
-    compare(stated.name, focus_mm.value, focus_mm.sigma);
+    if (!(other.focus_depth_mm.value > setup.lens.front_focal_length_mm)) continue;
+    const double apart_mm = other.focus_depth_mm.value - found.value;
+    WidenByTrials(
+        fmt::format("contradiction between {} and {}", other.name,
+                    calibration->diagnostics.bench_offset_from),
+        "find out which of them is wrong, and state the reliable one alone",
+        WithOffsets(setup, {setup.offset_mm.value + apart_mm +
+                            std::copysign(kReach * other.focus_depth_mm.sigma, apart_mm)}),
+        fit, calibration);
   }
 }
 

@@ -31,6 +31,20 @@ std::optional<model::StatedConjugate> MostPrecise(
 double UsualFocusDepth(const model::Camera& camera, const std::vector<ScaleSample>& samples,
                        double sharpest_reading_mm);
 
+// A statement, or the image scale, that puts the plane of focus elsewhere than the fit.
+struct Contradiction {
+  std::string name;                // "magnification", "the image scale", "offset_mm"
+  model::Estimate focus_depth_mm;  // zf from Ap by it, mm
+  std::string text;                // one sentence with both depths
+};
+
+// Compares a fitted zf with the statements that were not used for it, with a stated bench offset
+// that was not used, and with the image scale if a statement was used.
+std::vector<Contradiction> FindContradictions(const FocusSweep& sweep,
+                                              const std::vector<model::StatedConjugate>& statements,
+                                              const model::Estimate& found_mm,
+                                              const Calibration& calibration);
+
 // Compares the fitted zf with the statements that were not used for it, and with the image scale if
 // a statement was used. A contradiction of more than three standard deviations is a warning, and
 // the intervals of zf, d1, kappa and the bench offset then include the fit at the other depth. The

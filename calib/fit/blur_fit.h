@@ -54,6 +54,11 @@ struct BlurFitSetup {
   std::vector<BlurSamples> estimators;
   // S0, px^2: free, or given with its sigma (0: fixed).
   std::optional<model::Estimate> floor_variance_px2;
+  // Half of the difference of 1/zf along x and along y, 1/mm: of an astigmatic lens whose variances
+  // are the means of those along both. The mean follows the law about the medial focus, the mean
+  // of both in 1/z, and has a minimum of its own there beside S0 [D137]:
+  //   (V_x + V_y)/2 = S0 + A (1/z - 1/zf)^2 + A half_astigmatism^2.
+  double half_astigmatism_per_mm = 0;
 };
 
 // Parameters of a result, in this order.
@@ -88,6 +93,9 @@ double FittedDefocusVariance(const BlurFitSetup& setup, const BlurFitResult& fit
 // is multiplied by chi^2 per degree of freedom where that is larger than chance makes it (99 %), or
 // always where the readings' error is unknown. `start` replaces the search for a start.
 BlurFitResult FitBlur(const BlurFitSetup& setup, const BlurFitResult* start = nullptr);
+
+// Returns what astigmatism adds to sigma^2 at every depth for kappa = 1, px^2; 0 without it.
+double AstigmaticVariance(const BlurFitSetup& setup, double focus_depth_mm);
 
 // A robust parabola V(z) through the samples of an estimator, which any target follows whatever c
 // is (least trimmed squares over seeded triplets).

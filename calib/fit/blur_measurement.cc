@@ -317,6 +317,23 @@ class Measurement {
 
 }  // namespace
 
+void ReplaceSpectralBlur(EstimatorRegion region, RelativeBlur blur, BlurEvidence* evidence) {
+  const Eigen::VectorXd& by_tails = evidence->blur.variance_by_tails;
+  if (blur.variance_by_tails.size() == 0 && by_tails.size() > 0) {
+    blur.variance_by_tails = Eigen::VectorXd::Zero(blur.variances_px2.size());
+    for (std::size_t i = 0; i < region.frames.size(); ++i) {
+      const std::vector<std::size_t>& before = evidence->region.frames;
+      const auto at = std::find(before.begin(), before.end(), region.frames[i]);
+      if (at != before.end())
+        blur.variance_by_tails[static_cast<Eigen::Index>(i)] = by_tails[at - before.begin()];
+    }
+  }
+  evidence->region = std::move(region);
+  evidence->blur = std::move(blur);
+  evidence->setup.estimators[static_cast<std::size_t>(evidence->spectrum)] =
+      FitSamples(*evidence, evidence->blur, evidence->region);
+}
+
 BlurSamples AsSamples(const RelativeBlur& blur, const EstimatorRegion& region) {
   BlurSamples samples;
   samples.frames = region.frames;

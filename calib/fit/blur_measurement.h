@@ -44,6 +44,18 @@ struct BlurTask {
   std::function<void()> tick;  // called once per frame and pass
 };
 
+// The blur along x and along y of an astigmatic lens, of the frames of BlurEvidence::region.
+struct AxialEvidence {
+  AxisLeakage leakage;
+  AxialBlur blur;
+  // Indices into setup.frames: left out of a long sweep to save time, not because of their blur.
+  std::vector<std::size_t> thinned_out;
+  // Whether the gains were held because the family does not describe the shape of the blur, and
+  // the samples that free gains would give.
+  bool gains_are_held = false;
+  std::optional<BlurSamples> free_gains;
+};
+
 // The measurements of the estimators.
 struct BlurEvidence {
   BlurFitSetup setup;  // has frames and estimators; the floor is left open
@@ -70,11 +82,19 @@ struct BlurEvidence {
   EstimatorRegion region;              // the whole field, as measured
   RelativeBlur blur;                   // the whole field, as fitted
   double taken_tails = 0;              // tails of the blur that the family includes (TakeTails)
+  // Present: the lens is astigmatic, and the spectral estimator has the mean of both variances
+  // (TakeMeanOfAxes).
+  std::optional<AxialEvidence> axial;
 };
 
 // Measures edges where the target has them (and is not stated to be a texture), and the relative
 // spectra of all registered frames. The other choices are left open.
 BlurEvidence MeasureBlur(const BlurTask& task);
+
+// Takes a region and its blur in place of those of the whole field, with the samples of the
+// spectral estimator. The effect of the tails on V, if the new blur has none, stays that of the
+// frames before.
+void ReplaceSpectralBlur(EstimatorRegion region, RelativeBlur blur, BlurEvidence* evidence);
 
 // Returns one region's relative blur as samples of a fit. Their frames are indices of the
 // estimator.

@@ -8,7 +8,6 @@
 namespace thicklens::calib {
 namespace {
 
-constexpr char kFocalLength[] = "lens.front_focal_length_mm";
 constexpr int kMaxMoves = 12;
 // The search ends where the fitted zf differs from the known one by less than this part of its own
 // error, or of zf.
@@ -36,21 +35,46 @@ BlurFitResult MovedBy(double move_mm, const BlurFitSetup& setup, const BlurFitRe
 
 }  // namespace
 
+double ToleranceOfStatement(const model::Camera& camera, const model::StatedConjugate& stated) {
+  if (!camera.objective || stated.name != kFromObjective) return 0;
+  const auto found = camera.statements.find(kFromObjective);
+  return found != camera.statements.end() && found->second.tolerance > 0
+             ? found->second.tolerance
+             : kIso8039 * stated.value.value;
+}
+
+bool HasOneFocalLength(const model::ThickLens& lens) {
+  constexpr double kRounding = 1e-9;
+  return std::abs(lens.front_focal_length_mm - lens.rear_focal_length_mm) <=
+         kRounding * lens.front_focal_length_mm;
+}
+
+std::string FieldOfFocalLengthTolerance(const model::Camera& camera) {
+  const auto states = [&](const char* field) {
+    const auto stated = camera.statements.find(field);
+    return stated != camera.statements.end() && stated->second.tolerance > 0;
+  };
+  if (states(kFrontFocalLength)) return kFrontFocalLength;
+  return HasOneFocalLength(camera.lens) && states(kRearFocalLength) ? kRearFocalLength : "";
+}
+
 bool StatesFocalLength(const model::Camera& camera) {
-  const auto stated = camera.statements.find(kFocalLength);
-  return stated != camera.statements.end() && stated->second.tolerance > 0;
+  return !FieldOfFocalLengthTolerance(camera).empty();
 }
 
 double FocalLengthTolerance(const model::Camera& camera) {
   if (camera.objective) return 0;
-  return StatesFocalLength(camera)
-             ? camera.statements.at(kFocalLength).tolerance / camera.lens.front_focal_length_mm
-             : kFocalLengthTolerance;
+  const std::string field = FieldOfFocalLengthTolerance(camera);
+  return field.empty() ? kFocalLengthTolerance
+                       : camera.statements.at(field).tolerance / camera.lens.front_focal_length_mm;
 }
 
 model::Estimate FocusDepthWithTolerance(const model::Camera& camera,
                                         const model::StatedConjugate& stated) {
-  model::Estimate focus_mm = model::FocusDepthOf(camera.lens, stated);
+  model::StatedConjugate with_tolerance = stated;
+  with_tolerance.value.sigma =
+      std::hypot(stated.value.sigma, kEvenSpread * ToleranceOfStatement(camera, stated));
+  model::Estimate focus_mm = model::FocusDepthOf(camera.lens, with_tolerance);
   if (stated.kind == model::ConjugateKind::kFocusDepth) {
     focus_mm.sigma = std::hypot(focus_mm.sigma, stated.sigma_of_bounds);
     return focus_mm;

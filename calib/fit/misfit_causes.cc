@@ -42,7 +42,8 @@ std::string CausesOfMisfit(const FocusSweep& sweep, const BlurEvidence& evidence
   if (!readings_are_as_stated) causes.emplace_back("readings worse than stated");
   if (scale.kind == ScaleKind::kConstant)
     causes.emplace_back("borders that were filled in when the frames were aligned");
-  causes.emplace_back("an aberrated or astigmatic lens");
+  causes.emplace_back(evidence.axial ? "other aberrations than the astigmatism"
+                                     : "an aberrated or astigmatic lens");
   causes.emplace_back("sharpened or compressed images");
   causes.emplace_back("a wrong sensor.transfer");
   const bool is_gaussian = sweep.camera.psf == model::Psf::kGaussian;
@@ -78,12 +79,16 @@ std::string AstigmatismInWords(const Calibration& calibration) {
       "the blur along x is smallest at a depth of {:.2f} +- {:.2g} mm (kappa {:.3f}) and the blur "
       "along y at {:.2f} +- {:.2g} mm (kappa {:.3f}), {:.3g} +- {:.2g} mm {}: the lens is "
       "astigmatic, or the texture along x has other depths than the texture along y (turn the "
-      "target by 90 degrees: only an effect of the lens stays the same). One blur law does not "
-      "describe both directions; the intervals of zf, d1 and kappa include the middle between both "
-      "depths and both kappa",
+      "target by 90 degrees: only an effect of the lens stays the same). {}",
       x.value, x.sigma, field.along_x->blur_ratio.value, y.value, y.sigma,
       field.along_y->blur_ratio.value, std::abs(astigmatism.value), astigmatism.sigma,
-      astigmatism.value < 0 ? "farther" : "nearer");
+      astigmatism.value < 0 ? "farther" : "nearer",
+      calibration.diagnostics.blur.astigmatic_blur_px > 0
+          ? "zf, d1 and kappa are those of the mean of both variances: zf is the medial focus, "
+            "where "
+            "the blur is the same along x and along y"
+          : "One blur law does not describe both directions; the intervals of zf, d1 and kappa "
+            "include the middle between both depths and both kappa");
 }
 
 bool AstigmatismExplains(double spread_mm, const Calibration& calibration) {

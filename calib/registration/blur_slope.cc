@@ -13,7 +13,6 @@ constexpr double kRelativeError = 0.2, kMinErrorPx2 = 0.2;
 constexpr double kSignificant = 4;
 constexpr int kRounds = 8;
 constexpr double kCauchyWidth = 3;
-constexpr double kDefaultRatio = 0.45;  // usual blur ratio of lenses
 // Standard deviations of the logarithm of the ratio. The light of a whole aperture gives 0.5, and
 // no lens gives more than 0.7.
 constexpr double kDeviationBelow = 0.3, kDeviationAbove = 0.25;
@@ -33,7 +32,7 @@ double BlurSlope::RatioOfMovingLens(const model::Camera& camera) const {
 
 double ChiSquareOfRatio(double blur_ratio) {
   if (!(blur_ratio > 0)) return kImpossible;
-  const double log_ratio = std::log(blur_ratio / kDefaultRatio);
+  const double log_ratio = std::log(blur_ratio / kUsualBlurRatio);
   const double off = log_ratio / (log_ratio > 0 ? kDeviationAbove : kDeviationBelow);
   return std::min(off * off, kImpossible);
 }

@@ -32,6 +32,9 @@ struct BlurSlope {
 // beyond its errors.
 std::optional<BlurSlope> FindBlurSlope(const std::vector<ScaleSample>& samples);
 
+// Blur ratio that lenses usually have.
+inline constexpr double kUsualBlurRatio = 0.45;
+
 // chi^2 of a blur ratio. Lenses have 0.45 within 25 % (less above, where 0.5 is the whole
 // aperture), and the slope is good to 15 %. The result is very large where the ratio is not
 // positive.

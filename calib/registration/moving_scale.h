@@ -20,7 +20,7 @@ struct MovingScale {
   double chi2_per_dof = 0;  // of the law with the best D
 };
 
-// Fits scale = a D/z [D134] with D = xf + s (reading - focus_reading) and z = zf (the sensor moves)
+// Fits scale = a D/z [D139] with D = xf + s (reading - focus_reading) and z = zf (the sensor moves)
 // or z = zf - (D - xf) (the lens moves), zf the conjugate of xf, to the scales in (a, xf), robustly
 // (Cauchy). Each scale has its own error and the one that the reading's error gives it; both are
 // widened where the scatter about the law is larger.

@@ -14,14 +14,18 @@ inline constexpr char kLensDistorts[] = "the lens distorts";
 inline constexpr char kTargetIsNotFlat[] = "the target is not flat";
 inline constexpr char kVignettingShifts[] = "vignetting";
 inline constexpr char kFixedStructureShifts[] = "structure that stays on the sensor";
+inline constexpr char kAstigmatismShifts[] = "astigmatism";
 
 // Whether the registrations show a significant radial distortion that is large enough to report.
 bool ShowsDistortion(const Calibration& calibration);
 
 // If there is a distortion, adds the comparison of its causes to the calibration's diagnoses, and
 // adds a warning. `calibration->structure` must have been measured before. Returns a refusal
-// instead of the warning where the distortion is too large for a result.
-std::optional<std::string> CheckDistortion(Calibration* calibration);
+// instead of the warning where the distortion is too large for a result. `is_astigmatic` says that
+// the blur along x changes against that along y through the sweep (ShowsAstigmatism): this moves
+// detail in the registrations in proportion to the depth, as distortion does, so that it is a cause
+// as well, and no reason to refuse.
+std::optional<std::string> CheckDistortion(Calibration* calibration, bool is_astigmatic = false);
 
 // The warning about readings that bend against the image scale. It names the structure found in
 // `calibration.structure`.

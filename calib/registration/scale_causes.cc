@@ -166,6 +166,7 @@ class Comparison {
         result_.blur_slope ? ChiSquareOfRatio(result_.blur_slope->RatioOfMovingLens(sweep_.camera))
                            : 0;
     Add(kLensMoves, std::min(linear.chi2, inverse_.chi2) + lens_ratio);
+    AddObjective();
     SortCauses(&result_.diagnosis);
     ChooseUnit();
     return std::move(result_);
@@ -209,6 +210,18 @@ class Comparison {
                     : 0;
       Add(UnitName(name, unit), of_scale + OfDepth(u) + of_zero);
     }
+  }
+
+  // Data of an objective that are wrong explain any depth and any blur. They are a cause only where
+  // the stated ones fail. The blur per mm gives the magnification that would fit it.
+  void AddObjective() {
+    const auto& objective = sweep_.camera.objective;
+    if (!objective || !FollowsStatedDirection() || !(OfDepth(1) >= Diagnosis::kDecisive)) return;
+    Add(kObjectiveIsWrong, inverse_.chi2);
+    if (result_.blur_slope)
+      result_.fitting_magnification =
+          MagnificationOfBlur(*objective, sweep_.camera.sensor.pixel_pitch_mm,
+                              result_.blur_slope->px * std::abs(inverse_.slope));
   }
 
   static std::string UnitName(const std::string& law, const ReadingUnit& unit) {
@@ -261,6 +274,32 @@ class Comparison {
   double widening_ = 1, constant_ = 0;
   ScaleCauses result_;
 };
+
+std::string ObjectiveReason(const FocusSweep& sweep, const ScaleCauses& causes) {
+  const model::Objective& objective = *sweep.camera.objective;
+  const double f1_mm = sweep.camera.lens.front_focal_length_mm;
+  std::string text = fmt::format(
+      "the image scale and the blur contradict the data of the objective: with lens.magnification "
+      "{:.4g} and lens.tube_lens_focal_length_mm {:.4g} its focal length is {:.4g} mm",
+      objective.magnification, objective.tube_lens_focal_length_mm, f1_mm);
+  if (causes.reference_depth_mm > f1_mm && causes.blur_slope) {
+    text += fmt::format(
+        ", and at the {:.3g} mm of the image scale the blur ratio would be {:.2g}",
+        causes.reference_depth_mm,
+        causes.blur_slope->RatioOfMovingTarget(sweep.camera, causes.reference_depth_mm));
+  } else {
+    text += fmt::format(", but the image scale puts the target at {:.3g} mm",
+                        causes.reference_depth_mm);
+  }
+  if (causes.fitting_magnification) {
+    text += fmt::format(
+        ". With lens.numerical_aperture {:.3g} the blur fits a magnification of about {:.2g}",
+        objective.numerical_aperture, *causes.fitting_magnification);
+  }
+  return text +
+         ". Check lens.magnification and lens.tube_lens_focal_length_mm (the magnification holds "
+         "for the tube lens of the objective's maker)";
+}
 
 std::string LensMovesReason(const FocusSweep& sweep, const ScaleCauses& causes) {
   const double depth_mm = causes.reference_depth_mm;
@@ -315,6 +354,12 @@ std::string NotDistinguished() {
 
 }  // namespace
 
+double MagnificationOfBlur(const model::Objective& objective, double pixel_pitch_mm,
+                           double blur_px_per_mm) {
+  const double na = objective.numerical_aperture;
+  return blur_px_per_mm * pixel_pitch_mm * std::sqrt(1 - na * na) / (kUsualBlurRatio * na);
+}
+
 ScaleCauses CompareScaleCauses(const std::vector<ScaleSample>& samples, const FocusSweep& sweep) {
   return Comparison(samples, sweep).Run();
 }
@@ -326,6 +371,13 @@ std::optional<std::string> ReasonOfScaleCauses(const FocusSweep& sweep, const Sc
   if (!is_reversed && (diagnosis.Names(kTargetMoves) || diagnosis.Names(kZeroIsWrong)))
     return std::nullopt;
   const bool is_explained = IsExplained(causes);
+  if (is_explained && diagnosis.Names(kObjectiveIsWrong)) {
+    std::string text = ObjectiveReason(sweep, causes);
+    if (diagnosis.Names(kLensMoves))
+      text += ". Or the lens or the sensor moves, and not the target. " + NotDistinguished();
+    if (causes.unit) text += ". Or the readings are not in mm. " + UnitThatFits(sweep, causes);
+    return text;
+  }
   if (is_explained && diagnosis.NamesOnly(kLensMoves)) return LensMovesReason(sweep, causes);
   if (is_explained && diagnosis.Names(kLensMoves) && causes.unit) {
     return fmt::format("either {}; or the target moves{} and the readings are not in mm. {}. {}",
@@ -374,6 +426,7 @@ std::string UnitAdvice(const FocusSweep& sweep, const std::vector<FrameMeasureme
   if (depths_mm.empty()) return "";
   // ReasonOfScaleCauses names a lens that moves, together with the unit where both are possible.
   if (causes.diagnosis.Names(kLensMoves) && !causes.ReadingsMayBeRight()) return "";
+  if (causes.diagnosis.Names(kObjectiveIsWrong)) return "";
   const auto [nearest, farthest] = std::minmax_element(depths_mm.begin(), depths_mm.end());
   const double f1_mm = sweep.camera.lens.front_focal_length_mm;
   const std::string placed =

@@ -17,6 +17,8 @@ inline constexpr char kTargetMoves[] = "the target moves as stated";
 inline constexpr char kZeroIsWrong[] = "the target moves as stated, but offset_mm is wrong";
 inline constexpr char kReversedReadings[] = "the readings run the other way";
 inline constexpr char kLensMoves[] = "the lens or the sensor moves, not the target";
+// Compared where the camera file states the lens by an objective and the target as stated fails.
+inline constexpr char kObjectiveIsWrong[] = "the data of the objective are wrong";
 
 // A possible unit of readings that were assumed to be in millimetres.
 struct ReadingUnit {
@@ -38,12 +40,21 @@ struct ScaleCauses {
   // them.
   std::optional<ReadingUnit> unit;
   std::vector<ReadingUnit> other_units;  // units that explain them as well as `unit`
+  // The magnification that the blur fits, where kObjectiveIsWrong was compared.
+  std::optional<double> fitting_magnification;
 
   // Whether readings in millimetres of a target that moves as stated explain the observations.
   bool ReadingsMayBeRight() const {
     return diagnosis.Names(kTargetMoves) || diagnosis.Names(kZeroIsWrong);
   }
 };
+
+// The magnification at which an objective of this numerical aperture, with the usual blur ratio,
+// has a blur that grows by so many px of sigma per mm of the reading. From [D131] with f1/(zf - f1)
+// = M and r = zf tan(asin NA): sigma = kappa M tan(asin NA)/p |z - zf|. Neither the tube lens nor
+// the bench offset matters.
+double MagnificationOfBlur(const model::Objective& objective, double pixel_pitch_mm,
+                           double blur_px_per_mm);
 
 // Compares the causes. The samples must follow one law, as stated or reversed (`law.kind`).
 ScaleCauses CompareScaleCauses(const std::vector<ScaleSample>& samples, const FocusSweep& sweep);

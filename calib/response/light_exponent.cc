@@ -21,7 +21,11 @@ constexpr int kParts = 4;              // of the field, per axis
 constexpr int kNuisances = 9;
 constexpr Eigen::Index kMinWindows = 60;
 constexpr double kPixelsPerWindow = 4;  // windows are sampled so densely that 4 are one value
-constexpr double kMinChange = 1e-6;     // of the variance over the mean, relative to the mean
+// The change of the variances must differ between the windows by this part of itself. In a
+// chequerboard all windows have the same texture (0.002), and what differs is the raster of the
+// windows; random textures have 0.03 to 0.4.
+constexpr double kMinSpread = 0.015;
+constexpr double kMinChange = 1e-6;  // of the variance over the mean, relative to the mean
 constexpr int kMaxRounds = 14;
 constexpr double kSmallSlope = 0.003, kSmallPart = 0.25;  // the part is one of its sigma
 
@@ -104,7 +108,9 @@ class ExponentFit {
   // raised to the exponent.
   std::optional<model::Estimate> SlopeAt(double exponent) const {
     ResponseSums sums;
-    for (std::size_t i = 0; i < blurred_.size(); ++i) AddFrame(i, exponent, &sums);
+    ChangeSpread spread;
+    for (std::size_t i = 0; i < blurred_.size(); ++i) AddFrame(i, exponent, &sums, &spread);
+    if (!(spread.after > kMinSpread * kMinSpread * spread.before)) return std::nullopt;
     return sums.Slope();
   }
 
@@ -167,7 +173,14 @@ class ExponentFit {
     return kParts * part(in_reference.y, size.height) + part(in_reference.x, size.width);
   }
 
-  void AddFrame(std::size_t position, double exponent, ResponseSums* sums) const {
+  // Sums of squares of the change of the variances over all windows, before and after what gain,
+  // light and geometry may explain is removed.
+  struct ChangeSpread {
+    double before = 0, after = 0;
+  };
+
+  void AddFrame(std::size_t position, double exponent, ResponseSums* sums,
+                ChangeSpread* spread) const {
     const std::size_t index = blurred_[position];
     const double scale = crop_.Scale(index, reference_);
     const double added_px2 = crop_.AddedVariancePx2(index, reference_);
@@ -192,7 +205,10 @@ class ExponentFit {
     const Eigen::MatrixXd nuisances = NuisancesOf(windows, sharp, reference);
     const Eigen::MatrixXd basis = Eigen::HouseholderQR<Eigen::MatrixXd>(nuisances).householderQ() *
                                   Eigen::MatrixXd::Identity(n, kNuisances);
+    const double before2 = change.squaredNorm();
     for (Eigen::VectorXd* of : {&rest, &change}) *of -= basis * (basis.transpose() * *of);
+    spread->before += before2;
+    spread->after += change.squaredNorm();
     const double least = kMinChange * mean.mean();
     if (!(change.squaredNorm() > static_cast<double>(n) * least * least)) return;
     const double slope = rest.dot(change) / change.squaredNorm();

@@ -329,7 +329,7 @@ class Fit {
       const auto s = static_cast<std::size_t>(i);
       const Eigen::Index c = Count(i);
       Amplitudes d(kAmplitudes, c);
-      d.row(0).setOnes();
+      d.row(0).setConstant(options_.hold_gains ? 0 : 1);  // without a derivative it does not move
       for (int axis = 0; axis < kAxes; ++axis) {
         d.row(1 + axis) =
             (e.slopes[s] * shares_.row(axis).head(c).transpose().array()).matrix().transpose();
@@ -581,7 +581,28 @@ AxialBlur FitAxialBlur(const std::vector<SpectrumSample>& samples, std::size_t r
   blur.noise_ratio = fit.noise_ratio;
   blur.modes_used = fit.modes_used;
   blur.chi2_per_dof = fit.chi2_per_dof;
+  blur.texture = std::move(fit.texture);
   return blur;
+}
+
+RelativeBlur MeanOfAxes(const AxialBlur& axial) {
+  RelativeBlur mean;
+  mean.done = axial.done;
+  mean.message = axial.message;
+  mean.tails.sigma = std::numeric_limits<double>::infinity();
+  if (!axial.done) return mean;
+  mean.variances_px2 = axial.variances_px2.colwise().mean().transpose();
+  const Eigen::Index n = axial.variances_px2.cols();
+  const auto x = Eigen::seqN(0, n, 2), y = Eigen::seqN(1, n, 2);
+  mean.covariance = 0.25 * (axial.covariance(x, x) + axial.covariance(x, y) +
+                            axial.covariance(y, x) + axial.covariance(y, y));
+  mean.gains = axial.gains;
+  mean.shifts_px = axial.shifts_px;
+  mean.noise_ratio = axial.noise_ratio;
+  mean.modes_used = axial.modes_used;
+  mean.chi2_per_dof = axial.chi2_per_dof;
+  mean.texture = axial.texture;
+  return mean;
 }
 
 double BlurTransfer(const RelativeBlurOptions& options, double variance_px2, double scale,

@@ -37,6 +37,9 @@ struct RelativeBlurOptions {
   // Gaussian. A disc's first zero is at 1.84; its limit must be well below.
   double band = 2;
   double floor_variance_px2 = 0.25;  // disc: sigma^2 of the blur floor, sensor px
+  // Holds g at 1: the spectra are relative to the mean of their frame. A halo around the blur takes
+  // contrast at all frequencies alike, which a free gain would take for a change of the light.
+  bool hold_gains = false;
 };
 
 struct RelativeBlur {
@@ -74,6 +77,7 @@ struct AxialBlur {
   Eigen::VectorXd noise_ratio;  // scatter about the fit over what the pixel noise explains
   std::vector<int> modes_used;  // number of modes of each sample
   double chi2_per_dof = 0;      // all samples, relative to the pixel noise
+  Eigen::ArrayXcd texture;      // T
 };
 
 // Fits the spectra with two variances per frame: V |nu|^2 in H becomes V_x nu_x^2 + V_y nu_y^2
@@ -83,6 +87,11 @@ struct AxialBlur {
 AxialBlur FitAxialBlur(const std::vector<SpectrumSample>& samples, std::size_t reference,
                        const TargetWindow& window, const std::vector<Mode>& modes,
                        const AxisLeakage& leakage, const RelativeBlurOptions& options);
+
+// The mean of the variances along x and along y, with its covariance. Unlike either of them and
+// unlike a fit with one V, it does not depend on which direction has more texture. The tails are
+// unknown, with an infinite sigma.
+RelativeBlur MeanOfAxes(const AxialBlur& axial);
 
 // The transfer function H of one frame at |nu|, cycles per target px.
 double BlurTransfer(const RelativeBlurOptions& options, double variance_px2, double scale,

@@ -161,16 +161,12 @@ model::StatedConjugate DepthOfWorkingDistance(const model::Estimate& distance_mm
   return {model::ConjugateKind::kFocusDepth, {depth_mm, sigma_mm}, "working_distance_mm"};
 }
 
-// The magnification on the barrel of an objective. ISO 8039 allows it to deviate by 5 %, which
-// holds where the camera file states no tolerance.
+// The magnification on the barrel of an objective. Its error is a tolerance (ToleranceOfStatement)
+// and has no standard deviation.
 model::StatedConjugate MagnificationOfObjective(const model::Camera& camera) {
-  constexpr double kIso8039 = 0.05;
-  const std::string field = "lens.magnification";
-  const double magnification = camera.objective->magnification;
-  const double stated = ToleranceOfField(camera, field);
-  const double tolerance = stated > 0 ? stated : kIso8039 * magnification;
-  return {
-      model::ConjugateKind::kMagnification, {magnification, SigmaOfTolerance(tolerance)}, field};
+  return {model::ConjugateKind::kMagnification,
+          {camera.objective->magnification, 0},
+          "lens.magnification"};
 }
 
 std::vector<model::StatedConjugate> StatedFocus(const model::SweepFile& file,

@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "calib/fit/blur_examples.h"
+#include "calib/uncertainty/astigmatism.h"
 
 namespace thicklens::calib {
 namespace {
@@ -22,7 +23,7 @@ class Choices {
   void Run() {
     if (evidence_.spectrum < 0 || evidence_.region.samples.empty()) return;
     if (!LeaveOutRejected()) return;
-    if (const FittedRegion narrow = Fit(stated_, kNarrowPart); narrow.blur.done)
+    if (const FittedRegion narrow = FitAny(stated_, kNarrowPart); narrow.blur.done)
       evidence_.narrow_band = FitSamples(evidence_, narrow.blur, narrow.region);
     CompareShapes();
   }
@@ -41,6 +42,21 @@ class Choices {
     return FitRegion(evidence_.region, SpectralOptions(psf, evidence_.assumed_floor_px2, part));
   }
 
+  // Fits with the mean of the variances along both axes where the estimator uses it.
+  FittedRegion FitAny(model::Psf psf, double part) const {
+    return evidence_.axial ? FitMean(psf, part, evidence_.axial->leakage) : Fit(psf, part);
+  }
+
+  FittedRegion FitMean(model::Psf psf, double part, const AxisLeakage& leakage,
+                       AxialBlur* axes = nullptr) const {
+    RelativeBlurOptions options = SpectralOptions(psf, evidence_.assumed_floor_px2, part);
+    options.hold_gains = evidence_.axial->gains_are_held;
+    FittedAxes fitted = FitRegionAlongAxes(evidence_.region, leakage, options);
+    FittedRegion mean{std::move(fitted.region), MeanOfAxes(fitted.blur)};
+    if (axes != nullptr) *axes = std::move(fitted.blur);
+    return mean;
+  }
+
   // Returns false where the reference itself was rejected, because everything refers to it.
   bool LeaveOutRejected() {
     EstimatorRegion& region = evidence_.region;
@@ -51,20 +67,19 @@ class Choices {
     EstimatorRegion kept = PartOf(
         region, [this](std::size_t f) { return IsKept(f); }, [](const Mode&) { return true; });
     std::swap(region, kept);
-    FittedRegion fitted = Fit(stated_, 1);
-    if (!fitted.blur.done) {
-      std::swap(region, kept);
-      return false;
-    }
-    region = std::move(fitted.region);
-    evidence_.blur = std::move(fitted.blur);
-    Samples() = FitSamples(evidence_, evidence_.blur, region);
+    AxialBlur axes;
+    FittedRegion fitted =
+        evidence_.axial ? FitMean(stated_, 1, evidence_.axial->leakage, &axes) : Fit(stated_, 1);
+    std::swap(region, kept);
+    if (!fitted.blur.done) return false;
+    ReplaceSpectralBlur(std::move(fitted.region), std::move(fitted.blur), &evidence_);
+    if (evidence_.axial) evidence_.axial->blur = std::move(axes);
     return true;
   }
 
   // Compares both shapes over the same band, each with its own leakage.
   void CompareShapes() {
-    const RelativeBlur as_stated = Fit(stated_, CommonPart(stated_)).blur;
+    const RelativeBlur as_stated = FitAny(stated_, CommonPart(stated_)).blur;
     const FittedRegion other = FitOtherShape();
     const RelativeBlur& as_other = other.blur;
     if (as_stated.done && as_other.done) {
@@ -92,6 +107,14 @@ class Choices {
     double largest = 0;
     for (const std::size_t f : region.frames)
       largest = std::max(largest, estimator.frames[f].expected_variance_px2);
+    if (evidence_.axial) {
+      SpectralEstimatorSetup other = estimator;
+      other.psf = OtherPsf(stated_);
+      const Eigen::Matrix2Xd& variances = evidence_.axial->blur.variances_px2;
+      return FitMean(
+          other.psf, CommonPart(other.psf),
+          MeasureAxisLeakage(other, region, variances.maxCoeff() - variances.minCoeff()));
+    }
     WindowLeakage leakage(estimator.read_grey(estimator.frames[estimator.reference].frame),
                           estimator.origin_px, region.window, region.modes,
                           region.samples[region.reference].spectrum, OtherPsf(stated_),

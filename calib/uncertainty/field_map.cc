@@ -49,7 +49,7 @@ class Field {
     }
     setup_.read_grey = [this](std::size_t frame) { return store_.Grey(frame); };
     // Astigmatism comes first, because it may cause different in-focus distances over the field.
-    MeasureAstigmatism(sweep_, evidence_, fit_, &result_);
+    if (!evidence_.axial) MeasureAstigmatism(sweep_, evidence_, fit_, &result_);
     MapTiles();
     MeasureChannels();
   }
@@ -96,6 +96,19 @@ class Field {
            model::DirectionSign(sweep_.direction) * EstimatedReading(frame);
   }
 
+  // One variance of an astigmatic lens would depend on the direction of a part's texture.
+  FittedRegion BlurOf(const EstimatorRegion& region) const {
+    RelativeBlurOptions options =
+        SpectralOptions(sweep_.camera.psf, fit_.values[kFloorVariance], 1);
+    if (!evidence_.axial) return FitRegion(region, options);
+    options.hold_gains = evidence_.axial->gains_are_held;
+    const Eigen::Matrix2Xd& variances = evidence_.axial->blur.variances_px2;
+    const AxisLeakage leakage =
+        MeasureAxisLeakage(setup_, region, variances.maxCoeff() - variances.minCoeff());
+    FittedAxes fitted = FitRegionAlongAxes(region, leakage, options);
+    return {std::move(fitted.region), MeanOfAxes(fitted.blur)};
+  }
+
   // Returns zf of one region, with the corrected readings and the fitted floor.
   std::optional<model::Estimate> FocusOf(const EstimatorRegion& region,
                                          std::string* message) const {
@@ -103,8 +116,7 @@ class Field {
       *message = "it has too little texture, or too few frames show it";
       return std::nullopt;
     }
-    const FittedRegion fitted =
-        FitRegion(region, SpectralOptions(sweep_.camera.psf, fit_.values[kFloorVariance], 1));
+    const FittedRegion fitted = BlurOf(region);
     if (!fitted.blur.done) {
       *message = fitted.blur.message;
       return std::nullopt;

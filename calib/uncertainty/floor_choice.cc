@@ -48,7 +48,9 @@ std::optional<double> EdgeSoftness(const BlurEvidence& evidence, int sensor_px_p
   for (std::size_t i = 0; i < evidence.unstated_edges->frames.size(); ++i) {
     const FitFrame& frame = setup.frames[evidence.unstated_edges->frames[i]];
     const double depth_mm = setup.offset_mm.value + sign * frame.reading_mm;
-    const double defocus = FittedDefocusVariance(setup, fit, depth_mm);
+    const double defocus =
+        FittedDefocusVariance(setup, fit, depth_mm) +
+        std::pow(fit.values[kBlurRatio], 2) * AstigmaticVariance(setup, fit.values[kFocusDepth]);
     rests.push_back(evidence.unstated_edges->variances_px2[static_cast<Eigen::Index>(i)] *
                         frame.scale * frame.scale -
                     defocus);

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <string>
 
 #include "calib/fit/blur_tails.h"
 #include "calib/fit/known_focus.h"
@@ -14,7 +16,6 @@ namespace thicklens::calib {
 namespace {
 
 constexpr std::size_t kMinFrames = 5;
-constexpr char kFocalLengthField[] = "lens.front_focal_length_mm";
 constexpr double kShapesDiffer = 1.1;  // ratio of chi^2 of the frames
 // Difference of chi^2 of the frames, 4 standard deviations, beyond which a family is ruled out.
 constexpr double kRuledOut = 16;
@@ -45,11 +46,13 @@ class Parts {
     AddFloor(floor);
     AddSides();
     AddBand();
+    AddContrast();
     AddShape();
     AddTails();
     AddEstimator();
     AddTolerances();
     AddAssumedTolerance();
+    AddMagnificationOfObjective();
     SystematicPart own;
     own.name = "blur estimator";
     own.blur_ratio = kEstimatorRatioError * fit_.values[kBlurRatio] * Eigen::Vector2d(-1, 1);
@@ -61,7 +64,7 @@ class Parts {
 
  private:
   // Widens a part by a trial's result.
-  void Include(const Trial& trial, SystematicPart* part) const {
+  void Include(const Trial& trial, SystematicPart* part) {
     if (!trial.fit.done) return;
     const auto widen = [](double move, Eigen::Vector2d* interval) {
       *interval = {std::min(interval->x(), move), std::max(interval->y(), move)};
@@ -70,10 +73,16 @@ class Parts {
     widen(zf - fit_.values[kFocusDepth], &part->focus_depth_mm);
     widen(model::ImageDistanceMm(trial.lens, zf) - d1_mm_, &part->image_distance_mm);
     widen(trial.fit.values[kBlurRatio] - fit_.values[kBlurRatio], &part->blur_ratio);
+    widen(trial.fit.values[kBenchOffset] - fit_.values[kBenchOffset], &OffsetMoves(part->name));
   }
 
-  Trial Try(const BlurFitSetup& setup) const {
-    std::optional<model::StatedConjugate> known = evidence_.known_focus;
+  Eigen::Vector2d& OffsetMoves(const std::string& part) {
+    return offset_moves_mm_.try_emplace(part, Eigen::Vector2d::Zero()).first->second;
+  }
+
+  Trial Try(const BlurFitSetup& setup) const { return TryAt(evidence_.known_focus, setup); }
+
+  Trial TryAt(std::optional<model::StatedConjugate> known, const BlurFitSetup& setup) const {
     // A magnification from the period of the target is in proportion to the pixel pitch.
     if (known && known->name == kFromPeriod)
       known->value.value *= setup.pixel_pitch_mm / evidence_.setup.pixel_pitch_mm;
@@ -170,6 +179,20 @@ class Parts {
     SystematicPart part;
     part.name = "frequency band";
     part.remedy = "use a target with finer texture, or steps closer to focus";
+    Include(*trial, &part);
+    result_.diagnostics.systematic_parts.push_back(part);
+  }
+
+  // Adds the effect of a loss of contrast at all frequencies, which held gains take for blur.
+  void AddContrast() {
+    if (!evidence_.axial) return;
+    const std::optional<Trial> trial = With(evidence_.axial->free_gains, evidence_.spectrum);
+    if (!trial) return;
+    SystematicPart part;
+    part.name = "contrast of the blur's halo";
+    part.remedy =
+        "use frames closer to focus or a smaller aperture: neither blur shape fits, and the frames "
+        "lose contrast at all frequencies alike";
     Include(*trial, &part);
     result_.diagnostics.systematic_parts.push_back(part);
   }
@@ -302,10 +325,18 @@ class Parts {
     result_.diagnostics.systematic_parts.push_back(part);
   }
 
+  // Whether a focal length is that of the other one, whose tolerance counts: where a statement
+  // gives zf, they change together.
+  bool IsCountedByOther(const std::string& field) const {
+    return evidence_.known_focus && field == kRearFocalLength &&
+           HasOneFocalLength(evidence_.setup.lens) &&
+           FieldOfFocalLengthTolerance(sweep_.camera) != field;
+  }
+
   // Tries the numbers of the camera file that state a tolerance.
   void AddTolerances() {
     for (const auto& [field, statement] : sweep_.camera.statements) {
-      if (!(statement.tolerance > 0)) continue;
+      if (!(statement.tolerance > 0) || IsCountedByOther(field)) continue;
       SystematicPart part;
       part.name = field;
       part.remedy = fmt::format("measure {} better than +- {:.3g}", field, statement.tolerance);
@@ -328,7 +359,7 @@ class Parts {
         StatesFocalLength(sweep_.camera))
       return;
     SystematicPart part;
-    part.name = kFocalLengthField;
+    part.name = kFrontFocalLength;
     part.remedy = fmt::format(
         "state the tolerance of lens.front_focal_length_mm, from which {} gives the in-focus "
         "distance ({:.0f} % is assumed)",
@@ -342,11 +373,31 @@ class Parts {
     result_.diagnostics.systematic_parts.push_back(part);
   }
 
+  // The magnification of an objective gives the plane of focus within its tolerance. The equivalent
+  // lens stays as the camera file states it.
+  void AddMagnificationOfObjective() {
+    const auto& known = evidence_.known_focus;
+    const double tolerance = known ? ToleranceOfStatement(sweep_.camera, *known) : 0;
+    if (!(tolerance > 0)) return;
+    SystematicPart part;
+    part.name = kFromObjective;
+    part.remedy = fmt::format(
+        "measure the magnification (target_period_mm with a stage micrometer in view), or state "
+        "lens.magnification with a tolerance smaller than {:.2g}",
+        tolerance);
+    for (const double change : {-tolerance, tolerance}) {
+      model::StatedConjugate moved = *known;
+      moved.value.value += change;
+      IncludeOrWarn(TryAt(moved, evidence_.setup), &part);
+    }
+    result_.diagnostics.systematic_parts.push_back(part);
+  }
+
   // Changes a number of the objective's data, and with it the lens. Returns as Change does.
   bool ChangeObjective(const std::string& field, double change, BlurFitSetup* setup) const {
     model::Objective objective = *sweep_.camera.objective;
-    // Where the magnification gives the plane of focus, its error is that of the statement, and
-    // would be counted twice.
+    // Where the magnification gives the plane of focus, its error is that of the statement
+    // (AddMagnificationOfObjective), and would be counted twice.
     const bool is_counted = evidence_.known_focus &&
                             evidence_.known_focus->kind == model::ConjugateKind::kMagnification;
     double* number = field == "lens.numerical_aperture"             ? &objective.numerical_aperture
@@ -366,33 +417,41 @@ class Parts {
   bool Change(const std::string& field, double change, BlurFitSetup* setup) const {
     if (sweep_.camera.objective && field.rfind("lens.", 0) == 0)
       return ChangeObjective(field, change, setup);
-    double* number = field == kFocalLengthField             ? &setup->lens.front_focal_length_mm
-                     : field == "lens.rear_focal_length_mm" ? &setup->lens.rear_focal_length_mm
-                     : field == "lens.lens_thickness_mm"    ? &setup->lens.lens_thickness_mm
-                     : field == "lens.aperture_radius_mm"   ? &setup->lens.aperture_radius_mm
-                     : field == "sensor.pixel_pitch_mm"     ? &setup->pixel_pitch_mm
-                                                            : nullptr;
+    const bool is_front = field == kFrontFocalLength, is_rear = field == kRearFocalLength;
+    // A statement gives zf for both focal lengths of a lens in air, which are one length.
+    if ((is_front || is_rear) && evidence_.known_focus && HasOneFocalLength(setup->lens)) {
+      setup->lens.front_focal_length_mm += change;
+      setup->lens.rear_focal_length_mm += change;
+      return setup->lens.IsValid(nullptr);
+    }
+    double* number = is_front                             ? &setup->lens.front_focal_length_mm
+                     : is_rear                            ? &setup->lens.rear_focal_length_mm
+                     : field == "lens.lens_thickness_mm"  ? &setup->lens.lens_thickness_mm
+                     : field == "lens.aperture_radius_mm" ? &setup->lens.aperture_radius_mm
+                     : field == "sensor.pixel_pitch_mm"   ? &setup->pixel_pitch_mm
+                                                          : nullptr;
     if (number == nullptr) return false;
-    // A statement of the image's side gives zf for both focal lengths, which change together.
-    if (evidence_.known_focus && field == kFocalLengthField)
-      setup->lens.rear_focal_length_mm *= 1 + change / setup->lens.front_focal_length_mm;
     *number += change;
     return setup->lens.IsValid(nullptr) && setup->pixel_pitch_mm > 0;
   }
 
   // The floor's ends are as likely as its middle, so they add linearly; the rest adds in
-  // quadrature.
+  // quadrature. A bench offset that follows from the fit moves as well.
   void SetIntervals(const FloorInterval& floor) {
-    const auto total = [&](Eigen::Vector2d SystematicPart::*of) {
+    const auto sum = [&](const auto& of) {
       Eigen::Vector2d ends(0, 0), squares(0, 0);
       for (const SystematicPart& part : result_.diagnostics.systematic_parts) {
+        const Eigen::Vector2d moves = of(part);
         if (floor && part.name == "blur floor") {
-          ends += part.*of;
+          ends += moves;
         } else {
-          squares += (part.*of).cwiseAbs2();
+          squares += moves.cwiseAbs2();
         }
       }
       return Eigen::Vector2d(ends.x() - std::sqrt(squares.x()), ends.y() + std::sqrt(squares.y()));
+    };
+    const auto total = [&](Eigen::Vector2d SystematicPart::*of) {
+      return sum([of](const SystematicPart& part) { return part.*of; });
     };
     const auto set = [](std::optional<Result>* result, const Eigen::Vector2d& moves) {
       (*result)->systematic = moves.array() + (*result)->value;
@@ -400,6 +459,9 @@ class Parts {
     set(&result_.summary.focus_depth_mm, total(&SystematicPart::focus_depth_mm));
     set(&result_.summary.image_distance_mm, total(&SystematicPart::image_distance_mm));
     set(&result_.summary.blur_ratio, total(&SystematicPart::blur_ratio));
+    if (evidence_.known_focus && result_.summary.bench_offset_mm)
+      set(&result_.summary.bench_offset_mm,
+          sum([&](const SystematicPart& part) { return OffsetMoves(part.name); }));
   }
 
   const FocusSweep& sweep_;
@@ -407,6 +469,8 @@ class Parts {
   const BlurFitResult& fit_;
   Calibration& result_;
   double d1_mm_ = 0;
+  // Moves of the bench offset by each part, by its name: of a fit at a known plane of focus.
+  std::map<std::string, Eigen::Vector2d> offset_moves_mm_;
 };
 
 }  // namespace

@@ -55,6 +55,15 @@ std::string SuggestionFor(const std::string& key, const std::vector<std::string>
   for (const std::string& candidate : allowed) {
     if (EditDistance(key, candidate) <= 2) return fmt::format("did you mean '{}'?", candidate);
   }
+  // A name without its first words: tube_length_mm for optical_tube_length_mm.
+  const std::string ending = "_" + key;
+  std::vector<std::string> longer;
+  for (const std::string& candidate : allowed) {
+    if (candidate.size() > ending.size() &&
+        candidate.compare(candidate.size() - ending.size(), ending.size(), ending) == 0)
+      longer.push_back(candidate);
+  }
+  if (longer.size() == 1) return fmt::format("did you mean '{}'?", longer.front());
   return fmt::format("allowed here: {}", Join(allowed));
 }
 

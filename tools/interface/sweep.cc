@@ -274,6 +274,9 @@ Sweep Finish(model::SweepFile file, const std::string& sweep_yaml, const SweepOv
   if (!sweep.truth) {                         // the parameters of a simulated camera are exact
     const std::string missing = MissingTolerancesLine(sweep.camera);
     if (!missing.empty()) sweep.notices.push_back(missing);
+    const std::string objective =
+        ObjectiveLine(sweep.camera, file.magnification || file.target_period_mm);
+    if (!objective.empty()) sweep.notices.push_back(objective);
   }
   sweep.description = std::move(file);
   return sweep;

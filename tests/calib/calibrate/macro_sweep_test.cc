@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <optional>
 #include <string>
 
 #include "support/test_cameras.h"
@@ -33,12 +34,20 @@ struct MacroCase {
 const MacroCase kOneToOne = {{100, 100, 0, 17.86}, 0.0043, 200, 0.1, 0.002, 100};
 const MacroCase kFourToOne = {{45, 45, 0, 4.6}, 0.00345, 56.25, 0.03, 0.001, 40};
 
-SimulatedSweep MacroSweep(const MacroCase& macro, std::uint64_t seed = 1) {
+// Objectives 10/0.25 and 20/0.4 with a tube lens of 200 mm. In 60 and 30 um of sweep the image
+// scale changes by 0.3 %.
+const model::Objective kTen = {10, 0.25, 200}, kTwenty = {20, 0.4, 200};
+MacroCase TenToOne() { return {model::LensOfObjective(kTen), 0.0065, 22, 0.002, 0.0002, 5}; }
+MacroCase TwentyToOne() { return {model::LensOfObjective(kTwenty), 0.0065, 10.5, 0.001, 1e-4, 5}; }
+
+SimulatedSweep MacroSweep(const MacroCase& macro, std::uint64_t seed = 1,
+                          std::optional<model::TargetKind> target = std::nullopt) {
   model::SweepSimulationOptions options = SweepCase("ii", 384, seed);
   options.camera.lens = macro.lens;
   options.camera.sensor.pixel_pitch_mm = macro.pitch_mm;
   options.camera.calibration->image_distance_mm =
       model::Estimate{model::ImageDistanceMm(macro.lens, macro.focus_mm), 0};
+  if (target) options.target.kind = *target;
   options.frame_count = 31;
   options.first_depth_mm = macro.focus_mm - 14.7 * macro.step_mm;
   options.step_mm = macro.step_mm;
@@ -169,15 +178,84 @@ TEST(MacroSweep, AStatementThatTheImageScaleContradictsGivesAWarning) {
   sweep.sweep.stated_focus[0].value.value = 0.5;
   c = CalibrateWithoutMap(sweep);
   ASSERT_EQ(c.summary.outcome, Outcome::kRefused);
-  EXPECT_THAT(c.summary.reason, AllOf(HasSubstr("which no lens has"), HasSubstr("magnification")));
+  EXPECT_THAT(c.summary.reason,
+              AllOf(StartsWith("the image scale puts the in-focus distance at"),
+                    HasSubstr("from that by magnification (300 "),
+                    HasSubstr("; the immediate reason is: the blur ratio would have to be"),
+                    HasSubstr("which no lens has")));
   ExpectFocusReading(c, sweep, 0.002);
+  // So does another statement that it contradicts.
+  sweep.sweep.camera.statements["lens.front_focal_length_mm"].tolerance = 1e-3;
+  sweep.sweep.stated_focus[0].value.value = 5;
+  sweep.sweep.stated_focus.push_back(
+      {model::ConjugateKind::kFocusDepth, {200, 0.1}, "focus_depth_mm"});
+  c = CalibrateWithoutMap(sweep);
+  ASSERT_EQ(c.summary.outcome, Outcome::kRefused);
+  EXPECT_THAT(c.summary.reason, StartsWith("focus_depth_mm puts the in-focus distance at 200 "));
 }
 
-// Objectives 10/0.25 and 20/0.4 with a tube lens of 200 mm. In 60 and 30 um of sweep the image
-// scale changes by 0.3 %.
-const model::Objective kTen = {10, 0.25, 200}, kTwenty = {20, 0.4, 200};
-MacroCase TenToOne() { return {model::LensOfObjective(kTen), 0.0065, 22, 0.002, 0.0002, 5}; }
-MacroCase TwentyToOne() { return {model::LensOfObjective(kTwenty), 0.0065, 10.5, 0.001, 1e-4, 5}; }
+// A rough bench offset beside a more precise statement only has to agree with it.
+TEST(MacroSweep, ARoughOffsetOnlyHasToAgree) {
+  SimulatedSweep sweep = MacroSweep(kOneToOne);
+  sweep.sweep.offset_mm = model::Estimate{112, 15};
+  sweep.sweep.stated_focus = {{model::ConjugateKind::kMagnification, {1, 0.001}, "magnification"}};
+  Calibration c = CalibrateWithoutMap(sweep);
+  ASSERT_NE(c.summary.outcome, Outcome::kRefused) << c.summary.reason;
+  EXPECT_EQ(c.diagnostics.bench_offset_from, "magnification");
+  EXPECT_NEAR(c.summary.focus_depth_mm->value, 200, 1e-3);
+  EXPECT_THAT(c.summary.warnings, Each(Not(HasSubstr("offset_mm puts"))));
+  sweep.sweep.offset_mm = model::Estimate{180, 15};
+  c = CalibrateWithoutMap(sweep);
+  EXPECT_EQ(c.diagnostics.bench_offset_from, "magnification");
+  EXPECT_THAT(c.summary.warnings, Contains(StartsWith("offset_mm puts the in-focus distance")));
+  // The image scale takes its place only if it is much more precise.
+  sweep.sweep.stated_focus.clear();
+  sweep.sweep.offset_mm = model::Estimate{112, 15};
+  c = CalibrateWithoutMap(sweep);
+  EXPECT_EQ(c.diagnostics.bench_offset_from, "the image scale");
+  sweep.sweep.offset_mm = model::Estimate{100, 2};
+  c = CalibrateWithoutMap(sweep);
+  EXPECT_EQ(c.diagnostics.bench_offset_from, "offset_mm");
+}
+
+// Where a magnification gives zf, both focal lengths of a lens in air are one, and the offset moves
+// with zf.
+TEST(MacroSweep, OneFocalLengthCountsOnce) {
+  SimulatedSweep sweep = MacroSweep(kOneToOne);
+  sweep.sweep.stated_focus = {{model::ConjugateKind::kMagnification, {1, 0}, "magnification"}};
+  const auto half_mm = [](const std::optional<Result>& result) {
+    EXPECT_TRUE(result && result->systematic);
+    return 0.5 * (result->systematic->y() - result->systematic->x());
+  };
+  sweep.sweep.camera.statements["lens.front_focal_length_mm"].tolerance = 0.5;
+  const Calibration front = CalibrateWithoutMap(sweep);
+  EXPECT_NEAR(half_mm(front.summary.focus_depth_mm), 1, 0.02);  // zf = 2 f
+  EXPECT_NEAR(half_mm(front.summary.bench_offset_mm), 1, 0.02);
+  EXPECT_NEAR(front.summary.bench_offset_mm->systematic->mean(), 100, 0.1);
+  sweep.sweep.camera.statements["lens.rear_focal_length_mm"].tolerance = 0.5;
+  const Calibration both = CalibrateWithoutMap(sweep);
+  EXPECT_NEAR(half_mm(both.summary.focus_depth_mm), 1, 0.02);
+  EXPECT_NEAR(half_mm(both.summary.image_distance_mm), half_mm(front.summary.image_distance_mm),
+              1e-6);
+  sweep.sweep.camera.statements.erase("lens.front_focal_length_mm");
+  const Calibration rear = CalibrateWithoutMap(sweep);
+  EXPECT_NEAR(half_mm(rear.summary.focus_depth_mm), 1, 0.02) << "not the 1 % of labels";
+}
+
+TEST(MacroSweep, AWrongMagnificationOfAnObjectiveIsNamed) {
+  for (const double stated : {1.0, 100.0}) {
+    SimulatedSweep sweep = MacroSweep(TenToOne());
+    sweep.sweep.camera.objective = model::Objective{stated, 0.25, 200};
+    sweep.sweep.camera.lens = model::LensOfObjective(*sweep.sweep.camera.objective);
+    sweep.sweep.stated_focus = {
+        {model::ConjugateKind::kMagnification, {stated, 0.03 * stated}, "lens.magnification"}};
+    const Calibration c = CalibrateWithoutMap(sweep);
+    ASSERT_EQ(c.summary.outcome, Outcome::kRefused);
+    EXPECT_THAT(c.summary.reason, AllOf(HasSubstr("lens.magnification"), HasSubstr("the blur fits"),
+                                        HasSubstr("lens.tube_lens_focal_length_mm")));
+    EXPECT_THAT(c.summary.reason, Not(StartsWith("the image scale follows the lens")));
+  }
+}
 
 TEST(MacroSweep, WhereNothingDeterminesTheDistanceTheReadingAtFocusIsStillFound) {
   const SimulatedSweep sweep = MacroSweep(TwentyToOne());
@@ -213,7 +291,22 @@ TEST(MacroSweep, AnObjectiveGivesTheBlurRatio) {
     EXPECT_NEAR(c.diagnostics.magnification_at_focus->sigma, 0.01 * m, 1e-4 * m);
     EXPECT_NEAR(c.summary.blur_ratio->value, 0.45, 0.002);
     EXPECT_NEAR(c.summary.blur_ratio->sigma, 0.0045, 0.0008);
+    // The tolerance of the standard, 5 %, is an interval of kappa.
+    const Eigen::Vector2d& interval = *c.summary.blur_ratio->systematic;
+    EXPECT_NEAR(0.5 * (interval.y() - interval.x()), 0.05 * 0.45, 0.003);
     ExpectFocusReading(c, sweep, 0.0005);
+  }
+}
+
+// All parts of a chequerboard lose the same contrast, so that it does not show whether light is
+// conserved: no transfer is accused.
+TEST(MacroSweep, AChequerboardAccusesNoTransfer) {
+  for (const std::uint64_t seed : {1, 14}) {
+    const Calibration c =
+        CalibrateWithoutMap(MacroSweep(kOneToOne, seed, model::TargetKind::kCheckerboard));
+    ASSERT_NE(c.summary.outcome, Outcome::kRefused) << c.summary.reason;
+    EXPECT_FALSE(c.diagnostics.response.light_exponent);
+    EXPECT_THAT(c.summary.warnings, Each(Not(HasSubstr("contradict sensor.transfer"))));
   }
 }
 

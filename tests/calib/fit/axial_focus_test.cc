@@ -70,6 +70,38 @@ TEST(FitAxialFocus, FindsBothFoci) {
   EXPECT_NEAR(focus.difference_mm.value, kXMm - kYMm, 1e-3);
 }
 
+// The mean of both variances, with one kappa, follows one law about the focus with the mean power.
+// Without its own minimum there, the law would find another one.
+TEST(FitBlur, MeanOfBothAxesIsSmallestAtTheMedialFocus) {
+  AxialCase c = DrawAxialCase(4, 1e-4, 0);
+  BlurFitSetup setup = c.setup;
+  BlurSamples samples;
+  samples.frames = c.frames;
+  samples.variances_px2.resize(kFrames);
+  samples.covariance = 1e-8 * Eigen::MatrixXd::Identity(kFrames, kFrames);
+  for (int i = 0; i < kFrames; ++i) {
+    const double depth_mm = 288 + i, scale = 300 / depth_mm;
+    // Both axes have one slope: that of the lens with the medial focus.
+    constexpr double kMedialMm = 2 / (1 / kXMm + 1 / kYMm);
+    const double medial_slope = kMedialMm / (kMedialMm - 50);
+    double mean = 0;
+    for (const double zf_mm : {kXMm, kYMm}) {
+      const double ratio = kRatioX * medial_slope * (zf_mm - 50) / zf_mm;
+      mean += 0.5 * TruthPx2(zf_mm, ratio, depth_mm, scale);
+    }
+    samples.variances_px2[i] = mean + 0.3;
+  }
+  setup.estimators = {samples};
+  setup.half_astigmatism_per_mm = 0.5 * (1 / kXMm - 1 / kYMm);
+  const BlurFitResult fit = FitBlur(setup);
+  ASSERT_TRUE(fit.done) << fit.message;
+  EXPECT_NEAR(fit.values[kFocusDepth], 2 / (1 / kXMm + 1 / kYMm), 1e-4);
+  EXPECT_NEAR(fit.values[kBlurRatio], kRatioX, 1e-5);
+  EXPECT_NEAR(fit.softness_px2[0], 0.3, 1e-3);
+  setup.half_astigmatism_per_mm = 0;
+  EXPECT_GT(std::abs(FitBlur(setup).values[kFocusDepth] - fit.values[kFocusDepth]), 0.01);
+}
+
 // A frame with a wrong reading loses its weight in both laws.
 TEST(FitAxialFocus, AWrongReadingHasLittleEffect) {
   AxialCase c = DrawAxialCase(2, 0.02, 0.02);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "tests/calib/focus_case.h"
+#include "thicklens/model/objective.h"
 
 namespace thicklens::calib {
 namespace {
@@ -163,6 +164,26 @@ TEST(KnownFocus, AFocalLengthWithoutAToleranceHasThatOfLabels) {
   EXPECT_DOUBLE_EQ(FocalLengthTolerance(camera), 0.002);
   camera.objective = model::Objective{10, 0.25, 200};
   EXPECT_DOUBLE_EQ(FocalLengthTolerance(camera), 0);
+}
+
+// 5 % of 10 either way, anywhere within: zf = f (1 + 1/m), and the variance of an even distribution
+// is 1/3 of the square of its half width.
+TEST(KnownFocus, TheMagnificationOfAnObjectiveHasTheToleranceOfTheStandard) {
+  model::Camera camera;
+  camera.objective = model::Objective{10, 0.25, 200};
+  camera.lens = model::LensOfObjective(*camera.objective);
+  const model::StatedConjugate stated = {
+      model::ConjugateKind::kMagnification, {10, 0}, kFromObjective};
+  EXPECT_DOUBLE_EQ(ToleranceOfStatement(camera, stated), 0.5);
+  EXPECT_NEAR(FocusDepthWithTolerance(camera, stated).sigma, 20 * 0.5 / 100 / std::sqrt(3.0), 1e-9);
+  camera.statements[kFromObjective] = {0.1, false};
+  EXPECT_DOUBLE_EQ(ToleranceOfStatement(camera, stated), 0.1);
+  // One that is assumed without a tolerance has that of the standard.
+  camera.statements[kFromObjective] = {0, true};
+  EXPECT_DOUBLE_EQ(ToleranceOfStatement(camera, stated), 0.5);
+  EXPECT_EQ(ToleranceOfStatement(
+                camera, {model::ConjugateKind::kMagnification, {9.8, 0.01}, "magnification"}),
+            0);
 }
 
 }  // namespace

@@ -77,6 +77,18 @@ TEST(CheckDistortion, WhatNoLensDoesIsNotBlamedOnTheLens) {
   EXPECT_TRUE(c.diagnostics.diagnoses[0].NamesOnly(kTargetIsNotFlat));
 }
 
+// Astigmatism displaces detail in the same way, so that it is no reason to refuse.
+TEST(CheckDistortion, NamesAstigmatismWhereTheContrastShowsIt) {
+  Calibration c = Distorted(-0.06, 0.01);
+  EXPECT_FALSE(CheckDistortion(&c, true));
+  EXPECT_THAT(c.summary.warnings.at(0), AllOf(HasSubstr("as an astigmatic lens makes it"),
+                                              HasSubstr("-6.0 +- 1.0 % at the corner")));
+  EXPECT_TRUE(c.diagnostics.diagnoses.at(0).Names(kAstigmatismShifts));
+  Calibration too_large = Distorted(1.588, 0.05);
+  EXPECT_THAT(CheckDistortion(&too_large, true).value_or(""), HasSubstr("no lens distorts"));
+  EXPECT_FALSE(too_large.diagnostics.diagnoses.at(0).Names(kAstigmatismShifts));
+}
+
 TEST(CheckDistortion, WhatIsSeenInTheFramesIsNamedFirst) {
   Calibration dust = Distorted(0.007, 0.001);
   dust.diagnostics.structure.fixed_structure = model::Estimate{0.01, 0.001};

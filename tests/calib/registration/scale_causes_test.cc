@@ -10,6 +10,7 @@
 #include <string>
 
 #include "support/test_cameras.h"
+#include "thicklens/model/objective.h"
 #include "thicklens/model/thick_lens.h"
 
 namespace thicklens::calib {
@@ -203,6 +204,45 @@ TEST(ScaleCauses, ACauseThatUnitAndLensExplainAlikeIsLeftOpen) {
                       HasSubstr("; or the target moves"), HasSubstr("readings in centimetres"),
                       HasSubstr("do not distinguish these causes: check what moved")));
   }
+}
+
+// A sweep through an objective with the magnification `truth`, whose camera file states `stated`.
+// The blur is that of the true objective with a numerical aperture of 0.25.
+std::string ReasonOfObjective(double truth, double stated, double half_mm) {
+  FocusSweep sweep = Bench();
+  sweep.reading_sigma_mm = 1e-4;
+  sweep.camera.sensor.pixel_pitch_mm = 0.0065;
+  const double f_mm = 200 / truth;
+  sweep.camera.lens = testing::ThinLens(f_mm, f_mm * (1 + 1 / truth) * std::tan(std::asin(0.25)));
+  const auto samples =
+      MovingTarget(&sweep, f_mm * (1 + 1 / truth), half_mm, [](double z) { return z - 5; });
+  sweep.camera.objective = model::Objective{stated, 0.25, 200};
+  sweep.camera.lens = model::LensOfObjective(*sweep.camera.objective);
+  return ReasonOf(samples, sweep);
+}
+
+TEST(ScaleCauses, TheDataOfAnObjectiveAreNamedWhereTheyContradictScaleAndBlur) {
+  EXPECT_EQ(ReasonOfObjective(10, 10, 0.06), "");
+  EXPECT_THAT(ReasonOfObjective(10, 1, 0.06),
+              AllOf(StartsWith("the image scale and the blur contradict the data of the objective: "
+                               "with lens.magnification 1 "),
+                    HasSubstr("the image scale puts the target at 22 mm"),
+                    HasSubstr("the blur fits a magnification of about 9."),
+                    HasSubstr("lens.tube_lens_focal_length_mm")));
+  EXPECT_THAT(ReasonOfObjective(1, 10, 0.3),
+              AllOf(StartsWith("the image scale and the blur contradict the data of the objective: "
+                               "with lens.magnification 10 "),
+                    HasSubstr("the blur fits a magnification of about 0.9")));
+}
+
+// [D131] by finite differences of the lens equation: 20/0.4 with a tube lens of 165 mm.
+TEST(MagnificationOfBlur, IsThatOfTheLens) {
+  const model::Objective objective = {20, 0.4, 165};
+  const model::ThickLens lens = model::LensOfObjective(objective);
+  const double zf = lens.front_focal_length_mm * 1.05, step_mm = 1e-4;
+  const double d1_mm = model::ImageDistanceMm(lens, zf);
+  const double slope_px = 0.45 / 0.0065 * model::BlurRadiusMm(lens, d1_mm, zf + step_mm) / step_mm;
+  EXPECT_NEAR(MagnificationOfBlur(objective, 0.0065, slope_px), 20, 0.01);
 }
 
 TEST(ScaleCauses, TheUnitThatFitsScaleAndBlurIsNamed) {

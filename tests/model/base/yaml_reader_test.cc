@@ -113,6 +113,20 @@ TEST(YamlKeys, UnknownKeyGetsASuggestion) {
   EXPECT_THAT(error("something: 1"), HasSubstr("allowed here: aperture_radius_mm, name"));
 }
 
+TEST(YamlKeys, SuggestsTheOneNameThatEndsWithAKey) {
+  const auto message_for = [](const std::string& key) {
+    return ErrorOf([&] {
+      Parse(key + ": 1")
+          .RequireKeys({"optical_tube_length_mm", "working_distance_mm", "image_distance_mm"});
+    });
+  };
+  EXPECT_EQ(message_for("tube_length_mm"),
+            "f.yaml:1:1: unknown key 'tube_length_mm'; did you mean 'optical_tube_length_mm'?");
+  EXPECT_EQ(message_for("distance_mm"),
+            "f.yaml:1:1: unknown key 'distance_mm'; allowed here: optical_tube_length_mm, "
+            "working_distance_mm, image_distance_mm");
+}
+
 TEST(YamlKeys, WrongUnitSuffixIsCalledSo) {
   for (const char* key : {"aperture_radius_um", "aperture_radius_cm", "aperture_radius_m",
                           "aperture_radius_px", "aperture_radius"})

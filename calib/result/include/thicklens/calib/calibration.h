@@ -238,6 +238,10 @@ struct BlurFit {
   std::optional<double> gaussian_misfit,
       disc_misfit;        // chi^2 per dof of the estimator with each shape
   double outside_mm = 0;  // distance of the focus outside the sweep; 0: inside
+  // Sigma of the blur that an astigmatic lens has in the plane of medial focus beside the blur
+  // floor, where the law has the mean of the variances along x and along y [D137]: px of the frames
+  // as they were calibrated. 0: the law has one variance for all directions.
+  double astigmatic_blur_px = 0;
 };
 
 // A complete result (kOk), one that lacks a parameter (kPartial), or none (kRefused).
