@@ -48,9 +48,9 @@ constexpr double kPartOfStep = 0.2;     // of the readings, by which known depth
 constexpr double kFewRegistered = 0.8;  // share of the used frames; below it the light is checked
 constexpr int kMaxThreads = 1024;
 // A motor whose steps are no millimetres would seem to be at a larger one.
-constexpr double kLargestRecognisedMagnification = 5;
+constexpr double kMaxRecognisedMagnification = 5;
 // Blur ratios of lenses, by which a sensor that moves is recognised.
-constexpr double kLeastRecognisedRatio = 0.3, kLargestRecognisedRatio = 0.7;
+constexpr double kMinRecognisedRatio = 0.3, kMaxRecognisedRatio = 0.7;
 constexpr char kNoOffset[] = "nothing determines the bench offset";
 
 class Calibrator {
@@ -753,8 +753,8 @@ Calibration Recognised(const FocusSweep& sweep, const CalibrationOptions& option
   const bool may_be_lens =
       std::abs(distance_mm - lens.rear_focal_length_mm) < kKnownSigmas * sigma_mm;
   const auto& magnification = found.diagnostics.magnification_at_focus;
-  if (may_be_lens || !magnification || magnification->value > kLargestRecognisedMagnification ||
-      !(kappa > kLeastRecognisedRatio && kappa < kLargestRecognisedRatio))
+  if (may_be_lens || !magnification || magnification->value > kMaxRecognisedMagnification ||
+      !(kappa > kMinRecognisedRatio && kappa < kMaxRecognisedRatio))
     return as_target;
   found.diagnostics.moves_is_recognised = true;
   found.summary.warnings.insert(

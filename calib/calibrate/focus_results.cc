@@ -167,7 +167,7 @@ class Conversion {
     const double zf = equivalent_focus_->value, h = 1e-5 * zf;
     const double slope = std::abs(DistanceOf(zf + h) - DistanceOf(zf - h)) / (2 * h);
     xf_mm_.value = DistanceOf(zf);
-    // The error of the reading at focus, and of the source.
+    // The reading at focus and the statement each have an error.
     xf_mm_.sigma = slope * equivalent_focus_->sigma;
     if (!origin_.from_offset)
       xf_mm_.sigma = std::hypot(xf_mm_.sigma, origin_.sensor_distance_mm.sigma);
@@ -227,7 +227,7 @@ class Conversion {
     }
   }
 
-  // Of d1, kappa and the floor; the zero of the scale of a lens is no depth.
+  // Keeps d1, kappa and the floor; the zero of the scale of a lens is no depth.
   void ConvertCovariance(double ratio_by_xf) {
     std::vector<std::string>& names = result_.diagnostics.covariance_order;
     Eigen::MatrixXd& covariance = result_.diagnostics.covariance;

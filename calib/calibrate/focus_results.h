@@ -21,7 +21,7 @@ struct FocusOrigin {
   std::optional<model::StatedConjugate> stated;
   model::Estimate sensor_distance_mm;  // xf by that source, mm from the rear principal plane
   double sigma_of_bounds_mm = 0;       // its further error by the tolerance of the focal lengths
-  // True: the zf of the equivalent sweep gives xf. False: xf is that of the source.
+  // True: the zf of the equivalent sweep gives xf. False: xf is sensor_distance_mm.
   bool from_offset = false;
   MovingScale scale;
   std::vector<double> contradicting_mm;  // xf by the sources that contradict it

@@ -21,7 +21,7 @@ namespace {
 
 constexpr double kWrongWay = 5;        // standard deviations of the scale's slope
 constexpr double kPartOfStep = 0.2;    // of the readings, by which the reading at focus may be off
-constexpr double kLeastGrowth = 0.02;  // A below which the blur of a lens at 1:1 does not change
+constexpr double kMinGrowth = 0.02;  // A below which the blur of a lens at 1:1 does not change
 constexpr double kGainDiffers = 3;     // standard deviations
 constexpr double kNearestFocus = 1.001;  // of f2: a nearer sensor has no object in focus
 
@@ -92,7 +92,7 @@ class MovingFocus {
     return moves_ == model::SweepMotion::kSensor && !sweep_.readings_are_focus_distances;
   }
 
-  // With a statement, xf stays; with an offset, it moves with the reading at focus.
+  // A stated xf stays; that of an offset moves with the reading at focus.
   void MoveFocusTo(double reading_mm) {
     if (!focus_.stated && !sweep_.readings_are_focus_distances)
       focus_.distance_mm.value += sign_ * (reading_mm - focus_reading_mm_);
@@ -225,7 +225,7 @@ class MovingFocus {
   }
 
   std::optional<std::string> ReasonAgainst(const FocusMotion& motion) const {
-    if (motion.blur_per_scale() != 0 && std::abs(motion.blur_per_scale()) > kLeastGrowth)
+    if (motion.blur_per_scale() != 0 && std::abs(motion.blur_per_scale()) > kMinGrowth)
       return std::nullopt;
     return fmt::format(
         "at a magnification of {:.3g} a lens that moves does not change the focus: at 1:1 object "

@@ -11,7 +11,7 @@
 
 namespace thicklens::calib {
 
-// What is known of a sweep before its motion: the checks of the frames, their sharpness and scales.
+// A sweep before its motion is known: the checks of the frames, their sharpness and scales.
 struct SweepPreview {
   bool passed = false;               // false: `found` is refused
   Calibration found;                 // frames, sharpest reading

@@ -18,7 +18,7 @@ constexpr std::size_t kMinSamples = 5;
 constexpr double kCauchyWidth = 3;
 constexpr double kScaleBias = 3e-5;          // common error of the registrations (image_scale.h)
 constexpr double kKnown = 3;                 // standard deviations
-constexpr double kLeastInformation = 1e-10;  // of a parameter alone
+constexpr double kMinInformation = 1e-10;  // of a parameter alone
 
 // ln(scale) of a frame against the law, in standard deviations. The parameters are ln(a) and
 // ln(xf - f2), so that xf stays behind the focal point.
@@ -149,10 +149,10 @@ class MovingScaleFit {
       }
       normal += by * by.transpose();
     }
-    // What the other parameter leaves of the information on this one.
+    // The information on this parameter that the other one leaves.
     if (!(normal(0, 0) > 0)) return std::nullopt;
     const double left = normal(1, 1) - normal(0, 1) * normal(0, 1) / normal(0, 0);
-    if (!(left > kLeastInformation * normal(1, 1)) || !(normal(1, 1) > 0)) return std::nullopt;
+    if (!(left > kMinInformation * normal(1, 1)) || !(normal(1, 1) > 0)) return std::nullopt;
     return 1 / std::sqrt(left);
   }
 

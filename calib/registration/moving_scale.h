@@ -10,7 +10,7 @@
 
 namespace thicklens::calib {
 
-// What the image scales say where the lens or the sensor moves and the target stands still.
+// The image scales of a sweep in which the lens or the sensor moves and the target stands still.
 struct MovingScale {
   // Change of ln(scale) per mm of reading at focus. 0 +- 0: too few scales.
   model::Estimate slope_per_mm;

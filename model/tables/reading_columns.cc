@@ -61,13 +61,13 @@ class Finder {
   // Whether the readings are the LensPosition of libcamera, which is in dioptres. Other programs
   // call the counts of a motor so, which are larger: a lens focuses on nothing nearer than 20 mm.
   bool IsLensPosition() const {
-    constexpr double kMostDioptres = 50;
+    constexpr double kMaxDioptres = 50;
     if (LowerCase(Trimmed(CellOf(found_.reading))) != "lensposition") return false;
     bool has_fraction = false;
     for (const TableRow& row : table_.rows) {
       if (row.line <= found_.header.line || found_.reading >= row.cells.size()) continue;
       const auto value = ToNumber(row.cells[found_.reading], '.');
-      if (!value || !(*value > 0 && *value <= kMostDioptres)) return false;
+      if (!value || !(*value > 0 && *value <= kMaxDioptres)) return false;
       has_fraction = has_fraction || *value != std::floor(*value);
     }
     return has_fraction;

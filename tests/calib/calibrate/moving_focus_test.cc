@@ -150,7 +150,7 @@ TEST(MovingFocus, IsRecognised) {
   ExpectTrue(c, sweep);
   EXPECT_TRUE(c.diagnostics.moves_is_recognised);
   EXPECT_THAT(c.summary.warnings, Contains(HasSubstr("moves: sensor")));
-  // A statement that the target moves is believed, and contradicted.
+  // If the target is stated to move, that is not changed, and the sweep is refused.
   sweep.sweep.moves = SweepMotion::kTarget;
   EXPECT_EQ(CalibrateWithoutMap(sweep).summary.outcome, Outcome::kRefused);
 }

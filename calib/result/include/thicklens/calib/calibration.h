@@ -289,9 +289,8 @@ struct CalibrationDiagnostics {
   std::optional<model::Estimate> blur_slope_px_per_mm;
   // Magnification in the plane of focus, f1/(zf - f1), dimensionless; present where zf is.
   std::optional<model::Estimate> magnification_at_focus;
-  // The part that moves, and whether the frames show it although it is not stated.
-  model::SweepMotion moves = model::SweepMotion::kTarget;
-  bool moves_is_recognised = false;
+  model::SweepMotion moves = model::SweepMotion::kTarget;  // the part that moves
+  bool moves_is_recognised = false;  // true: the frames or the unit of the readings show it
   // d1 of the positions of the lens or of the sensor, in rising order of the position; present
   // where they move and d1 is known.
   std::optional<model::FocusPositions> focus_positions;

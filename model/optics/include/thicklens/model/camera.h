@@ -77,10 +77,10 @@ inline constexpr char kDioptreUnit[] = "dpt";
 
 // The image distance of a camera whose lens or sensor moves, as a function of its position.
 struct FocusPositions {
-  // A position, as the scale or the drive shows it, and d1 there, mm from Ap.
+  // A position and the image distance there.
   struct Position {
-    double reading = 0;
-    double image_distance_mm = 0;
+    double reading = 0;            // as the scale or the drive shows it, in `unit`
+    double image_distance_mm = 0;  // d1, from Ap to the sensor
   };
   std::string unit = "mm";          // of the readings: "mm" or "dpt"
   std::vector<Position> positions;  // at least two, in rising order of the reading

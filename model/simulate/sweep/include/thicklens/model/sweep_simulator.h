@@ -85,8 +85,9 @@ struct SweepSimulationOptions {
   std::uint64_t seed = 1;            // of textures, noise and errors
   std::vector<std::string> notices;  // of the file, one line each: names that are deprecated
 
-  // Distance d1 of the sensor from Ap, and depth z of the target from Ap, in a frame, mm.
+  // Distance d1 of the sensor from Ap in a frame, mm.
   THICKLENS_EXPORT double ImageDistanceMm(int frame_index) const;
+  // Depth z of the target from Ap in a frame, mm.
   THICKLENS_EXPORT double DepthMm(int frame_index) const;
   // The depth of the target where the sensor is at a distance d1 and lens or sensor move, mm: a
   // lens that moves away from the sensor comes nearer to the target.
