@@ -341,12 +341,57 @@ std::vector<StressCase> Macros() {
   return cases;
 }
 
+// A sweep of 25 frames about focus in which the lens or the sensor moves before a target at 300 mm.
+StressSweep Moving(model::SweepMotion moves) {
+  constexpr double kFocusMm = 300, kStepMm = 0.05;
+  const model::ThickLens lens = {50, 50, 4, 8.93};
+  const double d1_mm = model::ImageDistanceMm(lens, kFocusMm);
+  StressSweep sweep = Simulated([=](model::SweepSimulationOptions* simulation) {
+    simulation->camera.lens = lens;
+    simulation->camera.sensor.pixel_pitch_mm = 0.0045;
+    simulation->camera.calibration->image_distance_mm = model::Estimate{d1_mm, 0};
+    simulation->moves = moves;
+    simulation->first_image_distance_mm = d1_mm - 11.7 * kStepMm;
+    simulation->step_mm = kStepMm;
+    simulation->frame_count = 25;
+    simulation->bench_offset_mm = d1_mm - 3;
+    simulation->reading_sigma_mm = 0.03 * kStepMm;
+    simulation->bits = 16;
+  });
+  sweep.describe = [](model::SweepFile* file) { file->offset_mm.reset(); };
+  return sweep;
+}
+
+std::vector<StressCase> MovingFocus() {
+  std::vector<StressCase> cases;
+  cases.push_back(Sweep("moving-sensor",
+                        "the sensor moves by 1.2 mm and the target stands still: the image scale "
+                        "gives d1",
+                        "d1, zf and kappa within 4 standard errors of the truth, d1 within 3 mm",
+                        Moving(model::SweepMotion::kSensor), Truth(3000)));
+  StressSweep lens = Moving(model::SweepMotion::kLens);
+  cases.push_back(
+      Sweep("moving-lens-without-distance",
+            "the lens moves, and nothing says how far the target is: the image scale "
+            "is the same for all distances",
+            "refused: nothing determines the distance; a statement is asked for", lens,
+            Refusal({"nothing determines the distance from the lens", "focus_depth_mm"})));
+  lens.describe = [](model::SweepFile* file) {
+    file->offset_mm.reset();
+    file->focus_depth_mm = model::Estimate{300, 0.5};
+  };
+  cases.push_back(Sweep("moving-lens", "the same, with the distance of the target known to 0.5 mm",
+                        "d1, zf and kappa within 4 standard errors of the truth, d1 within 1 mm",
+                        lens, Truth(1000)));
+  return cases;
+}
+
 }  // namespace
 
 std::vector<StressCase> CalibrationStressCases() {
   std::vector<StressCase> all;
   for (std::vector<StressCase> part :
-       {Frames2To5(), Focus(), Readings(), Damages(), Optics(), Macros()}) {
+       {Frames2To5(), Focus(), Readings(), Damages(), Optics(), Macros(), MovingFocus()}) {
     for (StressCase& hard : part) all.push_back(std::move(hard));
   }
   return all;

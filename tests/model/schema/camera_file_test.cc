@@ -139,6 +139,29 @@ TEST(CameraFile, CalibrationIsChecked) {
               HasSubstr("'evidence' is missing"));
 }
 
+TEST(CameraFile, PositionsOfAMovingLensAreReadAndWritten) {
+  const auto with = [](const std::string& positions) {
+    return Text("calibration:\n  image_distance_mm: 17\n  focus_positions: " + positions +
+                "\n  evidence: {method: assumed}\n");
+  };
+  const Camera camera =
+      ParseCamera(with("{unit: dpt, positions: [[2, 16.5], [4.5, 17]]}"), "c.yaml");
+  const FocusPositions& found = camera.calibration->focus_positions.value();
+  EXPECT_EQ(found.unit, "dpt");
+  ASSERT_EQ(found.positions.size(), 2U);
+  EXPECT_EQ(found.positions[1].reading, 4.5);
+  EXPECT_EQ(found.positions[1].image_distance_mm, 17);
+  const Camera again = ParseCamera(CameraToYaml(camera), "again.yaml");
+  EXPECT_EQ(again.calibration->focus_positions.value().positions[0].image_distance_mm, 16.5);
+  EXPECT_EQ(again.calibration->focus_positions.value().unit, "dpt");
+  EXPECT_THAT(ErrorOfText(with("{unit: mm, positions: [[2, 16.5], [2, 17]]}")),
+              AllOf(StartsWith("c.yaml:8:"), HasSubstr("must rise, but 2 follows 2")));
+  EXPECT_THAT(ErrorOfText(with("{unit: mm, positions: [[2, 16.5]]}")), HasSubstr("at least 2"));
+  EXPECT_THAT(ErrorOfText(with("{unit: mm, positions: [[2, -1], [3, 4]]}")),
+              HasSubstr("must be > 0, found -1"));
+  EXPECT_THAT(ErrorOfText(with("{unit: inch, positions: [[2, 1], [3, 4]]}")), HasSubstr("dpt"));
+}
+
 TEST(CameraFile, StatementsAreKeptByPath) {
   const Camera camera =
       ParseCamera(Text("", Replaced(kLens, "12.8", "{value: 12.8, tolerance: 0.1, assumed: true}"),

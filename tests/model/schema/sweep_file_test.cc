@@ -93,6 +93,20 @@ TEST_F(SweepFolder, PlaneOfFocus) {
   }
 }
 
+TEST_F(SweepFolder, TheMovingPartIsReadAndWritten) {
+  EXPECT_FALSE(Read(frames_).moves.has_value());
+  EXPECT_THAT(SweepToYaml(Read(frames_)), Not(HasSubstr("moves")));
+  for (const SweepMotion part :
+       {SweepMotion::kTarget, SweepMotion::kCamera, SweepMotion::kLens, SweepMotion::kSensor}) {
+    const SweepFile sweep = Read(frames_ + "moves: " + SweepMotionName(part) + "\n");
+    EXPECT_EQ(sweep.moves.value(), part);
+    EXPECT_THAT(SweepToYaml(sweep), HasSubstr("moves: " + SweepMotionName(part) + "\n"));
+    EXPECT_EQ(MovesFocus(part), part == SweepMotion::kLens || part == SweepMotion::kSensor);
+  }
+  EXPECT_THAT(ErrorWith(frames_ + "moves: stage\n"),
+              AllOf(HasSubstr("s.yaml:4:8: moves"), HasSubstr("sensor")));
+}
+
 TEST_F(SweepFolder, StatementsOfFocusAreWrittenOnlyIfThereAreAny) {
   const SweepFile none = Read(frames_);
   for (const StatementOfFocus& of : kStatementsOfFocus)

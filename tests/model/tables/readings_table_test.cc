@@ -591,5 +591,22 @@ TEST(ReadingOptions, AreChecked) {
   EXPECT_FALSE(options.IsValid(&why));
 }
 
+// LensPosition is the name by which libcamera states dioptres; counts of a motor have it, too.
+TEST(ReadingsTable, TakesLensPositionAsDioptresUnlessItIsCounts) {
+  const ReadingSet dioptres =
+      ReadingsOfTable("file,LensPosition\na.png,2.5\nb.png,4\nc.png,8\n", "t.csv", {});
+  EXPECT_TRUE(dioptres.in_dioptres);
+  EXPECT_EQ(dioptres.rows[0].reading_mm, 400);
+  EXPECT_THAT(dioptres.description, ::testing::HasSubstr("dpt"));
+  const ReadingSet counts =
+      ReadingsOfTable("file,LensPosition\na.png,250\nb.png,400\nc.png,800\n", "t.csv", {});
+  EXPECT_FALSE(counts.in_dioptres);
+  EXPECT_EQ(counts.rows[0].reading_mm, 250);
+  ReadingOptions in_mm;
+  in_mm.unit = "mm";
+  EXPECT_FALSE(
+      ReadingsOfTable("file,LensPosition\na.png,2.5\nb.png,4\n", "t.csv", in_mm).in_dioptres);
+}
+
 }  // namespace
 }  // namespace thicklens::model

@@ -179,6 +179,28 @@ TEST_F(EstimateTest, DepthByItsUnitAndACamera) {
   EXPECT_LT(largest, 1e-3);  // depths differ by the rounding of float
 }
 
+TEST_F(EstimateTest, ThePositionOfAMovingLensGivesTheImageDistance) {
+  model::Camera moving = thicklens::testing::PhotographCamera(kWidth, kHeight);
+  const double d1_mm = moving.image_distance_mm();
+  moving.calibration->focus_positions =
+      model::FocusPositions{"mm", {{0, d1_mm}, {2, 1.01 * d1_mm}}};
+  const std::string camera = folder_.Put("moving.yaml", model::CameraToYaml(moving));
+  const std::string depth = Depth([](int, int) { return 900; });
+  const Arguments rest = {Image(),        depth, "--depth-kind", "z",
+                          "--depth-unit", "mm",  "--views",      "3x3"};
+  const Arguments with_camera = With(rest, {"--camera", camera});
+  const model::LightField found = Estimated(With(with_camera, {"--lens-position", "1"}));
+  EXPECT_NEAR(found.camera->image_distance_mm(), 1.005 * d1_mm, 1e-9 * d1_mm);
+  fs::remove_all(Output());
+  EXPECT_NEAR(Estimated(with_camera).camera->image_distance_mm(), d1_mm, 1e-9 * d1_mm);
+  fs::remove_all(Output());
+  EXPECT_THAT(Refusal(With(with_camera, {"--lens-position", "3"})),
+              AllOf(HasSubstr("--lens-position"), HasSubstr("from 0 to 2 mm")));
+  EXPECT_THAT(Refusal(With(With(rest, {"--camera", Camera()}), {"--lens-position", "1"}), 2),
+              HasSubstr("focus_positions"));
+  EXPECT_THAT(Refusal(With(rest, {"--lens-position", "1"}), 2), HasSubstr("--camera"));
+}
+
 TEST_F(EstimateTest, AnImageOfAPartOfTheSensor) {
   const std::string camera = folder_.Put("large.yaml", CameraYaml(kWidth + 20, kHeight + 8));
   const std::string depth = Depth([](int, int) { return 900; });

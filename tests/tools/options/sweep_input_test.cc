@@ -276,6 +276,13 @@ TEST_F(SweepInputTest, AnImageDistanceInFrontOfEveryImageIsNotValid) {
   EXPECT_THAT(why, AllOf(HasSubstr("image_distance_mm is 49"), HasSubstr("larger than 50 mm")));
 }
 
+TEST_F(SweepInputTest, TheMovingPartMayBeGiven) {
+  Sweep("moves: lens\n");
+  EXPECT_EQ(ReadSweepInput(arguments_).description.moves.value(), model::SweepMotion::kLens);
+  arguments_.moves = "sensor";
+  EXPECT_EQ(ReadSweepInput(arguments_).description.moves.value(), model::SweepMotion::kSensor);
+}
+
 TEST_F(SweepInputTest, ThePeriodOfTheTargetMayBeGiven) {
   Sweep("target_period_mm: 5\n");
   arguments_.target_period_mm = 2.5;

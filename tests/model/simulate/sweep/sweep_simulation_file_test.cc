@@ -59,6 +59,25 @@ const char kTruth[] = "truth: {focus_depth_mm: 300, blur_ratio: 0.4, blur_floor_
 const char kTarget[] = "target: {kind: dead-leaves}\n";
 const char kBench[] = "bench: {first_depth_mm: 290, step_mm: 1, frames: 21}\n";
 
+TEST_F(SweepSimulationFileTest, ReadsAMovingLensOrSensor) {
+  const std::string head = std::string(kHead) + kTruth + kTarget;
+  EXPECT_EQ(Read(head + kBench).moves, SweepMotion::kTarget);
+  const SweepSimulationOptions options =
+      Read(head + "bench: {moves: lens, first_image_distance_mm: 59, step_mm: 0.1, frames: 21}\n");
+  EXPECT_EQ(options.moves, SweepMotion::kLens);
+  EXPECT_DOUBLE_EQ(options.ImageDistanceMm(2), 59.2);
+  // The lens comes nearer to the target by what it moves away from the sensor.
+  EXPECT_NEAR(options.DepthMm(2), 300 - (59.2 - options.camera.image_distance_mm()), 1e-9);
+  EXPECT_THAT(
+      MessageOf(head + "bench: {moves: sensor, first_depth_mm: 290, step_mm: 1, frames: 2}\n"),
+      HasSubstr("first_image_distance_mm"));
+  EXPECT_THAT(MessageOf(head + "bench: {first_image_distance_mm: 59, step_mm: 1, frames: 2}\n"),
+              HasSubstr("does not apply where the target moves"));
+  EXPECT_THAT(MessageOf(head + "bench: {moves: sensor, first_image_distance_mm: 9, step_mm: -1, "
+                               "frames: 21}\n"),
+              HasSubstr("image distances run from 9 to -11 mm"));
+}
+
 TEST_F(SweepSimulationFileTest, ReadsEveryField) {
   const SweepSimulationOptions options =
       Read(std::string(kHead) + kTruth +
