@@ -14,12 +14,12 @@
 namespace thicklens::io {
 namespace {
 
-constexpr int kViewWidthPx = 80, kViewHeightPx = 60;
+constexpr int kLineViewWidthPx = 80, kLineViewHeightPx = 60;
 
 // A part of a random texture with details of a few pixels, which moves by 1 px per view.
 cv::Mat View(int k, int l) {
   static const cv::Mat texture = [] {
-    cv::Mat noise(kViewHeightPx + 20, kViewWidthPx + 20, CV_8UC3);
+    cv::Mat noise(kLineViewHeightPx + 20, kLineViewWidthPx + 20, CV_8UC3);
     std::mt19937 random(7);
     for (int y = 0; y < noise.rows; ++y) {
       for (int x = 0; x < noise.cols; ++x) {
@@ -31,7 +31,7 @@ cv::Mat View(int k, int l) {
     cv::normalize(noise, noise, 0, 255, cv::NORM_MINMAX);
     return noise;
   }();
-  return texture(cv::Rect(k, l, kViewWidthPx, kViewHeightPx)).clone();
+  return texture(cv::Rect(k, l, kLineViewWidthPx, kLineViewHeightPx)).clone();
 }
 
 struct Border {
@@ -41,7 +41,7 @@ struct Border {
 
 template <typename Change>
 cv::Mat Tiles(int count, const Border& border, const Change& change) {
-  const int step_x = kViewWidthPx + border.gap_px, step_y = kViewHeightPx + border.gap_px;
+  const int step_x = kLineViewWidthPx + border.gap_px, step_y = kLineViewHeightPx + border.gap_px;
   cv::Mat tiles(count * step_y - border.gap_px + 2 * border.first_px,
                 count * step_x - border.gap_px + 2 * border.first_px, CV_8UC3,
                 cv::Scalar::all(border.level));
@@ -50,7 +50,7 @@ cv::Mat Tiles(int count, const Border& border, const Change& change) {
       cv::Mat view = View(k, l);
       change(&view);
       view.copyTo(tiles(cv::Rect(border.first_px + k * step_x, border.first_px + l * step_y,
-                                 kViewWidthPx, kViewHeightPx)));
+                                 kLineViewWidthPx, kLineViewHeightPx)));
     }
   }
   return tiles;
@@ -68,7 +68,7 @@ cv::Mat ThroughJpeg(const cv::Mat& image, int quality) {
 
 void ExpectLines(const TileLines& lines, int count, const Border& border) {
   for (const auto& [axis, tile_px] :
-       {std::pair(lines.across, kViewWidthPx), std::pair(lines.down, kViewHeightPx)}) {
+       {std::pair(lines.across, kLineViewWidthPx), std::pair(lines.down, kLineViewHeightPx)}) {
     EXPECT_EQ(axis.count, count);
     EXPECT_EQ(axis.gap_px, border.gap_px);
     EXPECT_EQ(axis.first_px, border.first_px);
@@ -113,21 +113,21 @@ TEST(TileLinesTest, TexturesHaveNoLines) {
 TEST(TileLinesTest, MarginsOfObjectsAreNoLines) {
   constexpr int kObjectWidthPx = 70, kObjectHeightPx = 52;
   for (const bool is_jpeg : {false, true}) {
-    cv::Mat tiles(5 * kViewHeightPx, 5 * kViewWidthPx, CV_8UC3, cv::Scalar::all(255));
+    cv::Mat tiles(5 * kLineViewHeightPx, 5 * kLineViewWidthPx, CV_8UC3, cv::Scalar::all(255));
     for (int l = 0; l < 5; ++l) {
       for (int k = 0; k < 5; ++k) {
-        cv::Mat view(kViewHeightPx, kViewWidthPx, CV_8UC3, cv::Scalar::all(255));
+        cv::Mat view(kLineViewHeightPx, kLineViewWidthPx, CV_8UC3, cv::Scalar::all(255));
         View(0, 0)(cv::Rect(0, 0, kObjectWidthPx, kObjectHeightPx))
             .copyTo(view(cv::Rect(5, 4, kObjectWidthPx, kObjectHeightPx)));
         const cv::Mat move = (cv::Mat_<double>(2, 3) << 1, 0, 0.75 * (2 - k), 0, 1, 0.75 * (2 - l));
         cv::warpAffine(view, view, move, view.size(), cv::INTER_LINEAR, cv::BORDER_REPLICATE);
-        view.copyTo(
-            tiles(cv::Rect(k * kViewWidthPx, l * kViewHeightPx, kViewWidthPx, kViewHeightPx)));
+        view.copyTo(tiles(cv::Rect(k * kLineViewWidthPx, l * kLineViewHeightPx, kLineViewWidthPx,
+                                   kLineViewHeightPx)));
       }
     }
     const TileLines lines = LinesOf(is_jpeg ? ThroughJpeg(tiles, 90) : tiles, is_jpeg);
     for (const auto& [axis, view_px] :
-         {std::pair(lines.across, kViewWidthPx), std::pair(lines.down, kViewHeightPx)}) {
+         {std::pair(lines.across, kLineViewWidthPx), std::pair(lines.down, kLineViewHeightPx)}) {
       const bool keeps_pitch = axis.tile_px + axis.gap_px == view_px;
       EXPECT_TRUE(axis.count == 1 || keeps_pitch)
           << axis.count << " tiles of " << axis.tile_px << " px, lines of " << axis.gap_px << " px";
@@ -137,11 +137,12 @@ TEST(TileLinesTest, MarginsOfObjectsAreNoLines) {
 
 // A mosaic that was resized has lines of two widths: no tiles of one size fit it.
 TEST(TileLinesTest, LinesOfTwoWidthsAreRefused) {
-  cv::Mat tiles(5 * kViewHeightPx + 17, 5 * kViewWidthPx + 17, CV_8UC3, cv::Scalar::all(255));
-  for (int l = 0, y = 0; l < 5; ++l, y += kViewHeightPx + 3 + (l + 1) % 2) {
-    for (int k = 0, x = 0; k < 5; ++k, x += kViewWidthPx + 3 + (k + 1) % 2) {
+  cv::Mat tiles(5 * kLineViewHeightPx + 17, 5 * kLineViewWidthPx + 17, CV_8UC3,
+                cv::Scalar::all(255));
+  for (int l = 0, y = 0; l < 5; ++l, y += kLineViewHeightPx + 3 + (l + 1) % 2) {
+    for (int k = 0, x = 0; k < 5; ++k, x += kLineViewWidthPx + 3 + (k + 1) % 2) {
       const cv::Rect place =
-          cv::Rect(x, y, kViewWidthPx, kViewHeightPx) & cv::Rect({}, tiles.size());
+          cv::Rect(x, y, kLineViewWidthPx, kLineViewHeightPx) & cv::Rect({}, tiles.size());
       View(k, l)(cv::Rect({}, place.size())).copyTo(tiles(place));
     }
   }
