@@ -316,7 +316,8 @@ class Calibrator {
     }
     ScaleModel& law = result_.diagnostics.scale;
     if (!pattern.shading_removed || !law.done || !before.done) return true;
-    // What the shading moves is proportional to it, and so is the part that its error leaves.
+    // The shift of the offset is proportional to the shading, and so is the part that its error
+    // leaves.
     const double part =
         std::min(1.0, pattern.corner_stops->sigma / std::abs(pattern.corner_stops->value));
     law.offset_mm.sigma =

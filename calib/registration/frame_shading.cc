@@ -26,10 +26,10 @@ constexpr int kTilesOfTarget = 4;  // along each axis, for the jackknife
 constexpr int kShadingRounds = 4;
 constexpr double kCauchyOfShading = 2;  // width of the robust weight, in standard deviations
 constexpr double kShadingSigmas = 5;
-constexpr double kLeastShading = 0.04;  // ln; less does not move a scale by its error
+constexpr double kMinShading = 0.04;  // ln; less does not move a scale by its error
 // Prior standard deviation of a term, and the number of shrunk pixels that share their errors.
 constexpr double kPriorOfTerm = 2, kSharedPixels = 12;
-constexpr double kLeastPixels = 300;
+constexpr double kMinPixels = 300;
 // Largest standard deviation of the corner, ln, at which the field counts as determined.
 constexpr double kKnownShading = 0.5;
 
@@ -79,7 +79,7 @@ class ShadingFit {
       return result_;
     }
     Collect();
-    if (static_cast<double>(points_.size()) < kLeastPixels) {
+    if (static_cast<double>(points_.size()) < kMinPixels) {
       result_.message = "the frames share too little of the target";
       return result_;
     }
@@ -276,7 +276,7 @@ class ShadingFit {
         if (x != right / 2 && y != bottom / 2) corner += 0.25 * here;
         const model::Estimate value = estimate(here);
         const bool is_there =
-            std::abs(value.value) > std::max(kShadingSigmas * value.sigma, kLeastShading);
+            std::abs(value.value) > std::max(kShadingSigmas * value.sigma, kMinShading);
         result_.is_significant |= is_there;
         result_.largest = std::max(result_.largest, std::abs(value.value));
       }
@@ -285,7 +285,8 @@ class ShadingFit {
     if (!(at_corner.sigma < kKnownShading)) {
       result_.is_significant = false;
       result_.message =
-          "the image scale changes too little to tell shading of the frame from that of the target";
+          "the image scale changes too little to distinguish shading of the frame from that of the "
+          "target";
       return;
     }
     at_corner.value /= std::log(2.0);

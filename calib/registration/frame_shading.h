@@ -28,7 +28,7 @@ struct FrameShading {
   double largest = 0;
 };
 
-// Tells the shading of the frame from that of the target by their motion [D133]:
+// Distinguishes the shading of the frame from that of the target by their motion [D133]:
 //   ln I_i(p) = t(q) + g_i + h_i . u + terms . b(u),
 // where q is the place of p on the target, t the target, and g_i and h_i the gain and the slope of
 // the light of frame i. The frames are shrunk so much that their blur does not matter. t is

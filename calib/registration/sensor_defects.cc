@@ -16,26 +16,26 @@
 namespace thicklens::calib {
 namespace {
 
-constexpr std::size_t kFramesOfGroup = 5, kLeastOfGroup = 2;
+constexpr std::size_t kFramesOfGroup = 5, kMinOfGroup = 2;
 constexpr double kFineInnerPx = 1, kFineOuterPx = 3;  // band of the fine structure
 constexpr double kCandidateSigmas = 4.5;              // in each group
-constexpr double kLeastFine = 0.006;                  // ln, of the fine structure of a candidate
+constexpr double kMinFine = 0.006;                    // ln, of the fine structure of a candidate
 constexpr int kBorderPx = 4;          // smoothing and prediction lack the surroundings of these
 constexpr int kJoinPx = 4;            // parts of one speck are at most so far apart
 constexpr double kLargestPart = 0.1;  // of the field that candidates may cover
-constexpr int kMostCandidates = 300;
+constexpr int kMaxCandidates = 300;
 constexpr int kAroundPx = 12;  // surroundings of a candidate that are compared with it
 constexpr int kGrownPx = 8;    // reach of a speck beyond its candidate
-constexpr double kSpeckSigmas = 6, kLeastSpeck = 0.03;
+constexpr double kSpeckSigmas = 6, kMinSpeck = 0.03;
 constexpr double kSameInBoth = 0.4;  // least part of a speck that each group shows
-constexpr double kEdgeSigmas = 2.5, kLeastEdge = 0.006;  // where a speck ends
-constexpr double kOpaque = 0.3;                          // a speck that lets through less is filled
-constexpr double kBrightest = 1.6;                       // and so is one that is brighter
+constexpr double kEdgeSigmas = 2.5, kMinEdge = 0.006;  // where a speck ends
+constexpr double kOpaque = 0.3;                        // a speck that lets through less is filled
+constexpr double kBrightest = 1.6;                     // and so is one that is brighter
 constexpr int kFewPixels = 4;
 constexpr int kProofRounds = 3;
 constexpr double kUnknownBlurPx2 = 100;  // added variance, where it was not measured
 constexpr int kLargestCropPx = 384;
-constexpr double kLineSigmas = 6, kLeastLine = 0.002, kLineBandPx = 3, kClippedSigmas = 4;
+constexpr double kLineSigmas = 6, kMinLine = 0.002, kLineBandPx = 3, kClippedSigmas = 4;
 
 // A candidate with its surroundings, in the frame.
 struct Suspect {
@@ -116,7 +116,7 @@ class DefectFinder {
                      [](const auto* a, const auto* b) { return a->scale < b->scale; });
     for (std::size_t i = 0; i < order.size(); ++i)
       groups_[i < order.size() / 2 ? 0 : 1].push_back(order[i]);
-    return std::min(groups_[0].size(), groups_[1].size()) >= kLeastOfGroup;
+    return std::min(groups_[0].size(), groups_[1].size()) >= kMinOfGroup;
   }
 
   void MeanLogs() {
@@ -178,7 +178,7 @@ class DefectFinder {
     mean /= shifts;
     const double sigma = std::sqrt(std::max(0.0, squares / shifts - mean * mean));
     const double variance = product(0) - mean;
-    if (!(variance > kLineSigmas * sigma) || !(variance > kLeastLine * kLeastLine)) return 0;
+    if (!(variance > kLineSigmas * sigma) || !(variance > kMinLine * kMinLine)) return 0;
     const Eigen::VectorXd both = 0.5 * (profiles[0] + profiles[1]);
     const double share = std::min(1.0, variance * static_cast<double>(n) / both.squaredNorm());
     cv::Mat line(1, static_cast<int>(n), CV_32F);
@@ -200,8 +200,7 @@ class DefectFinder {
     for (std::size_t g = 0; g < 2; ++g) {
       fine[g] = FineOf(logs_[g]);
       double middle = 0;
-      const double limit =
-          std::max(kLeastFine, kCandidateSigmas * RobustDeviation(fine[g], &middle));
+      const double limit = std::max(kMinFine, kCandidateSigmas * RobustDeviation(fine[g], &middle));
       const cv::Mat outside = cv::abs(fine[g]) > limit;
       candidates = candidates.empty() ? outside : cv::Mat(candidates & outside);
     }
@@ -219,7 +218,7 @@ class DefectFinder {
     if (area == 0) return;
     if (area > kLargestPart * static_cast<double>(candidates.total())) {
       result_.message =
-          "the target is not blurred enough to tell its detail from that of the frame";
+          "the target is not blurred enough to distinguish its detail from that of the frame";
       return;
     }
     cv::Mat joined, labels, statistics, centroids;
@@ -232,7 +231,7 @@ class DefectFinder {
     cv::drawContours(joined, outlines, -1, 255, cv::FILLED);
     const int count =
         cv::connectedComponentsWithStats(joined, labels, statistics, centroids, 8, CV_32S);
-    if (count - 1 > kMostCandidates) {
+    if (count - 1 > kMaxCandidates) {
       result_.message = "more places differ than specks could be distinguished from the target";
       return;
     }
@@ -449,7 +448,7 @@ class DefectFinder {
     double& peak = suspect->peak;
     cv::Point at;
     cv::minMaxLoc(cv::abs(smooth), nullptr, &peak, nullptr, &at, suspect->candidate);
-    suspect->limit = std::max(kSpeckSigmas * suspect->sigma, kLeastSpeck);
+    suspect->limit = std::max(kSpeckSigmas * suspect->sigma, kMinSpeck);
     if (!(peak > suspect->limit)) return;
     const double sign = smooth.at<float>(at) > 0 ? 1 : -1;
     for (std::size_t g = 0; g < 2; ++g) {
@@ -462,7 +461,7 @@ class DefectFinder {
     cv::dilate(
         suspect->candidate, grown,
         cv::getStructuringElement(cv::MORPH_ELLIPSE, cv::Size(2 * kGrownPx + 1, 2 * kGrownPx + 1)));
-    const double limit = std::max(kEdgeSigmas * suspect->sigma, kLeastEdge);
+    const double limit = std::max(kEdgeSigmas * suspect->sigma, kMinEdge);
     const cv::Mat outside = (sign * smooth > limit) & grown;
     cv::connectedComponents(outside, labels, 8, CV_32S);
     suspect->speck = labels == labels.at<int>(at);

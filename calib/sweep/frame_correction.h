@@ -6,8 +6,8 @@
 
 namespace thicklens::calib {
 
-// What is removed from the linear light of every frame of a sweep, because it is fixed to the
-// frame. It has the size of the region of interest.
+// Structure that is fixed to the frame, and is removed from the linear light of every frame of a
+// sweep. It has the size of the region of interest.
 class FrameCorrection {
  public:
   // `log_gain`: ln of the relative light that passes at each pixel, CV_32F. `filled`: CV_8U, not 0

@@ -1,4 +1,4 @@
-// Shading of the frame in simulated sweeps, told apart from that of the target.
+// Shading of the frame in simulated sweeps, distinguished from that of the target.
 #include "calib/registration/frame_shading.h"
 
 #include <gmock/gmock.h>

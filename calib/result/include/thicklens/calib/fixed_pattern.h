@@ -20,7 +20,7 @@ struct FixedPattern {
 
   // Light at the corners of the region over that at its centre, in stops (factors of 2): the mean
   // of the four corners, negative where they are darker. Absent: the target's scale changes too
-  // little to tell the shading of the frame from that of the target.
+  // little to distinguish the shading of the frame from that of the target.
   std::optional<model::Estimate> corner_stops;
   bool shading_removed = false;  // true: the frames were divided by the shading
 
@@ -34,7 +34,7 @@ struct FixedPattern {
 
   // Whether anything was removed from the frames.
   THICKLENS_EXPORT bool Removed() const;
-  // What was removed, in one sentence; empty if nothing was.
+  // Text of one sentence that describes what was removed; empty if nothing was.
   THICKLENS_EXPORT std::string InWords() const;
 };
 
