@@ -166,6 +166,8 @@ struct SweepTruth {
   double blur_floor_px = 0;      // sigma of the blur floor, px
   double bench_offset_mm = 0;    // depth from Ap of reading 0, mm
   double tilt_deg = 0;           // tilt of the target, as in TargetOptions
+  double corner_stops = 0;       // shading: light at the farthest corner over the axis, stops
+  int specks = 0;                // number of specks on the sensor
   std::string pupil_law;         // PupilLawName; empty: not stated
   // The true values of one frame.
   struct Frame {
