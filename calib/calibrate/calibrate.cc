@@ -370,8 +370,8 @@ class Calibrator {
   }
 
   // Adds to what is removed from the light of every frame.
-  void AddToCorrection(const FrameCorrection& more) {
-    const FrameCorrection* before = store_.correction();
+  void AddToCorrection(const FixedPatternRemoval& more) {
+    const FixedPatternRemoval* before = store_.correction();
     store_.SetCorrection(before == nullptr ? more : before->With(more));
   }
 

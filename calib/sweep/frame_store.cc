@@ -22,8 +22,8 @@ cv::Mat FrameStore::Stored(std::size_t index) {
   return stored;
 }
 
-void FrameStore::SetCorrection(const FrameCorrection& correction) {
-  correction_ = std::make_unique<const FrameCorrection>(correction);
+void FrameStore::SetCorrection(const FixedPatternRemoval& correction) {
+  correction_ = std::make_unique<const FixedPatternRemoval>(correction);
 }
 
 cv::Mat FrameStore::Grey(std::size_t index) {

@@ -7,7 +7,7 @@
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
-#include "calib/sweep/frame_correction.h"
+#include "calib/sweep/fixed_pattern_removal.h"
 #include "thicklens/calib/focus_sweep.h"
 
 namespace thicklens::calib {
@@ -29,9 +29,9 @@ class FrameStore {
 
   // Removes `correction` from all light that is returned from now on. Must not be called while
   // another thread reads.
-  void SetCorrection(const FrameCorrection& correction);
+  void SetCorrection(const FixedPatternRemoval& correction);
   // The correction that is set; null: none.
-  const FrameCorrection* correction() const { return correction_.get(); }
+  const FixedPatternRemoval* correction() const { return correction_.get(); }
 
   // Returns the region of interest in linear light, CV_32F, corrected.
   cv::Mat Grey(std::size_t index);
@@ -47,7 +47,7 @@ class FrameStore {
   mutable std::mutex mutex_;
   std::vector<cv::Mat> kept_;  // empty where a frame is not kept
   std::size_t kept_bytes_ = 0;
-  std::unique_ptr<const FrameCorrection> correction_;
+  std::unique_ptr<const FixedPatternRemoval> correction_;
 };
 
 }  // namespace thicklens::calib

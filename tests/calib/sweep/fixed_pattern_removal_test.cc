@@ -1,4 +1,4 @@
-#include "calib/sweep/frame_correction.h"
+#include "calib/sweep/fixed_pattern_removal.h"
 
 #include <gtest/gtest.h>
 
@@ -8,20 +8,20 @@
 namespace thicklens::calib {
 namespace {
 
-TEST(FrameCorrection, DividesByTheGain) {
+TEST(FixedPatternRemoval, DividesByTheGain) {
   const cv::Mat log_gain(4, 6, CV_32F, cv::Scalar(std::log(0.25)));
   cv::Mat light(4, 6, CV_32F, cv::Scalar(0.1));
-  FrameCorrection(log_gain, cv::Mat()).Apply(&light);
+  FixedPatternRemoval(log_gain, cv::Mat()).Apply(&light);
   EXPECT_NEAR(light.at<float>(2, 3), 0.4, 1e-6);
   // Twice the same gain divides by its square.
   light.setTo(0.1);
-  const FrameCorrection one(log_gain, cv::Mat());
+  const FixedPatternRemoval one(log_gain, cv::Mat());
   one.With(one).Apply(&light);
   EXPECT_NEAR(light.at<float>(0, 0), 1.6, 1e-5);
 }
 
 // A linear field is filled without error at the centre of a symmetric group.
-TEST(FrameCorrection, FillsFromTheSurroundings) {
+TEST(FixedPatternRemoval, FillsFromTheSurroundings) {
   cv::Mat light(9, 9, CV_32F), filled = cv::Mat::zeros(9, 9, CV_8U);
   for (int y = 0; y < 9; ++y) {
     for (int x = 0; x < 9; ++x)
@@ -33,7 +33,7 @@ TEST(FrameCorrection, FillsFromTheSurroundings) {
   light(hole).setTo(7);
   filled.at<std::uint8_t>(0, 0) = 1;  // at the corner of the image
   light.at<float>(0, 0) = 0;
-  FrameCorrection(cv::Mat::zeros(9, 9, CV_32F), filled).Apply(&light);
+  FixedPatternRemoval(cv::Mat::zeros(9, 9, CV_32F), filled).Apply(&light);
   EXPECT_NEAR(light.at<float>(4, 4), before.at<float>(4, 4), 1e-6);
   EXPECT_LT(cv::norm(light(hole), before(hole), cv::NORM_INF), 0.03);
   EXPECT_NEAR(light.at<float>(0, 0), before.at<float>(0, 0), 0.03);
@@ -45,9 +45,9 @@ TEST(FrameCorrection, FillsFromTheSurroundings) {
   EXPECT_EQ(cv::norm(light, rest, cv::NORM_INF), 0);
 }
 
-TEST(FrameCorrection, AFrameWithoutAnyGoodPixelStaysAsItIs) {
+TEST(FixedPatternRemoval, AFrameWithoutAnyGoodPixelStaysAsItIs) {
   cv::Mat light(3, 3, CV_32F, cv::Scalar(0.5));
-  FrameCorrection(cv::Mat::zeros(3, 3, CV_32F), cv::Mat::ones(3, 3, CV_8U)).Apply(&light);
+  FixedPatternRemoval(cv::Mat::zeros(3, 3, CV_32F), cv::Mat::ones(3, 3, CV_8U)).Apply(&light);
   EXPECT_EQ(light.at<float>(1, 1), 0.5F);
 }
 

@@ -1,5 +1,5 @@
-#ifndef THICKLENS_CALIB_SWEEP_FRAME_CORRECTION_H_
-#define THICKLENS_CALIB_SWEEP_FRAME_CORRECTION_H_
+#ifndef THICKLENS_CALIB_SWEEP_FIXED_PATTERN_REMOVAL_H_
+#define THICKLENS_CALIB_SWEEP_FIXED_PATTERN_REMOVAL_H_
 
 #include <opencv2/core/mat.hpp>
 #include <vector>
@@ -8,14 +8,14 @@ namespace thicklens::calib {
 
 // Structure that is fixed to the frame, and is removed from the linear light of every frame of a
 // sweep. It has the size of the region of interest.
-class FrameCorrection {
+class FixedPatternRemoval {
  public:
   // `log_gain`: ln of the relative light that passes at each pixel, CV_32F. `filled`: CV_8U, not 0
   // at the pixels whose values are not used; empty: none.
-  FrameCorrection(const cv::Mat& log_gain, const cv::Mat& filled);
+  FixedPatternRemoval(const cv::Mat& log_gain, const cv::Mat& filled);
 
   // Both corrections in one; `more` comes on top of this one.
-  FrameCorrection With(const FrameCorrection& more) const;
+  FixedPatternRemoval With(const FixedPatternRemoval& more) const;
 
   // Divides by the gain. Then each pixel to be filled becomes the mean of the pixels around its
   // group, with weights 1/distance^3. `light` is CV_32F.
@@ -37,4 +37,4 @@ class FrameCorrection {
 
 }  // namespace thicklens::calib
 
-#endif  // THICKLENS_CALIB_SWEEP_FRAME_CORRECTION_H_
+#endif  // THICKLENS_CALIB_SWEEP_FIXED_PATTERN_REMOVAL_H_

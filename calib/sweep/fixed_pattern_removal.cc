@@ -1,4 +1,4 @@
-#include "calib/sweep/frame_correction.h"
+#include "calib/sweep/fixed_pattern_removal.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 
 namespace thicklens::calib {
 
-FrameCorrection::FrameCorrection(const cv::Mat& log_gain, const cv::Mat& filled)
+FixedPatternRemoval::FixedPatternRemoval(const cv::Mat& log_gain, const cv::Mat& filled)
     : log_gain_(log_gain),
       filled_(filled.empty() ? cv::Mat(cv::Mat::zeros(log_gain.size(), CV_8U)) : filled) {
   cv::exp(-log_gain_, inverse_gain_);
@@ -48,11 +48,11 @@ FrameCorrection::FrameCorrection(const cv::Mat& log_gain, const cv::Mat& filled)
   }
 }
 
-FrameCorrection FrameCorrection::With(const FrameCorrection& more) const {
+FixedPatternRemoval FixedPatternRemoval::With(const FixedPatternRemoval& more) const {
   return {log_gain_ + more.log_gain_, filled_ | more.filled_};
 }
 
-void FrameCorrection::Apply(cv::Mat* light) const {
+void FixedPatternRemoval::Apply(cv::Mat* light) const {
   cv::multiply(*light, inverse_gain_, *light);
   for (const Fill& fill : fills_) {
     float sum = 0;
