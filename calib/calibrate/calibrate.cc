@@ -19,11 +19,13 @@
 #include "calib/fit/source_recipe.h"
 #include "calib/registration/axis_contrast.h"
 #include "calib/registration/change_of_reference.h"
+#include "calib/registration/frame_shading.h"
 #include "calib/registration/frame_structure.h"
 #include "calib/registration/radial_causes.h"
 #include "calib/registration/reading_checks.h"
 #include "calib/registration/scale_causes.h"
 #include "calib/registration/scale_tracking.h"
+#include "calib/registration/sensor_defects.h"
 #include "calib/sharpness/sharpest_reading.h"
 #include "calib/sharpness/sharpness.h"
 #include "calib/sharpness/sharpness_peak.h"
@@ -46,6 +48,9 @@ constexpr double kZeroMoves = 0.1;      // share of the zero's sigma above which
 constexpr double kFarBetter = 3;        // ratio of errors
 constexpr double kPartOfStep = 0.2;     // of the readings, by which known depths may be off
 constexpr double kFewRegistered = 0.8;  // share of the used frames; below it the light is checked
+// Rounds of finding structure fixed to the frame: the second one, with better scales, finds the
+// remainder of a strong shading.
+constexpr int kPatternRounds = 2;
 constexpr int kMaxThreads = 1024;
 // A motor whose steps are no millimetres would seem to be at a larger one.
 constexpr double kMaxRecognisedMagnification = 5;
@@ -215,14 +220,17 @@ class Calibrator {
   // the frames that passed them.
   bool MeasureAndCheck() {
     ParallelFor(static_cast<int>(sweep_.frames.size()), options_.threads, [&](int i) {
-      const auto index = static_cast<std::size_t>(i);
-      result_.frames[index].statistics =
-          MeasureFrame(RegionOf(store_.Stored(index), sweep_, index), store_.Grey(index));
+      MeasureStatistics(static_cast<std::size_t>(i));
       Tick();
     });
     QualityCheckOptions checks = options_.checks;
     checks.edge_target |= sweep_.target == model::SweepTarget::kKnifeEdge;
     return Passed(selection_.KeepMeasurable(checks));
+  }
+
+  void MeasureStatistics(std::size_t frame) {
+    result_.frames[frame].statistics =
+        MeasureFrame(RegionOf(store_.Stored(frame), sweep_, frame), store_.Grey(frame));
   }
 
   bool MeasureSharpness() {
@@ -265,12 +273,9 @@ class Calibrator {
     } else if (best_statement_) {
       known_mm = OffsetOfFocusAt(model::FocusDepthOf(sweep_.camera.lens, *best_statement_).value);
     }
-    std::vector<ScaleSample> samples = TrackScale(
-        sweep_, [this](std::size_t frame) { return Grey(frame); }, used(), reference_, known_mm,
-        options_.threads, [this] { Tick(); });
-    result_.diagnostics.scale =
-        FitScaleModel(samples, static_cast<int>(reference_), sweep_.reading_sigma_mm,
-                      sweep_.direction, RegionCornerRadiusPx(sweep_));
+    std::vector<ScaleSample> samples = Track(known_mm);
+    result_.diagnostics.scale = LawOf(samples);
+    if (!RemoveFixedPattern(known_mm, &samples)) return false;
     CorrectForFalloff(kDefaultRatio, result_.diagnostics.scale.reference_depth_mm,
                       &result_.diagnostics.scale);
     const bool is_lone_edge =
@@ -316,6 +321,96 @@ class Calibrator {
     if (motion_ == nullptr || sweep_.moves != model::SweepMotion::kLens)
       bend_ = CheckScaleNonlinearity(sweep_, scales_, &result_);
     return PlacedWithinReach();
+  }
+
+  std::vector<ScaleSample> Track(const std::optional<double>& known_offset_mm) {
+    return TrackScale(
+        sweep_, [this](std::size_t frame) { return Grey(frame); }, used(), reference_,
+        known_offset_mm, options_.threads, [this] { Tick(); });
+  }
+
+  ScaleModel LawOf(const std::vector<ScaleSample>& samples) const {
+    return FitScaleModel(samples, static_cast<int>(reference_), sweep_.reading_sigma_mm,
+                         sweep_.direction, RegionCornerRadiusPx(sweep_));
+  }
+
+  // Finds structure that is fixed to the frame, removes it from the light of all frames, and
+  // measures sharpness and scale again. Returns false after a refusal.
+  bool RemoveFixedPattern(const std::optional<double>& known_offset_mm,
+                          std::vector<ScaleSample>* samples) {
+    FixedPattern& pattern = result_.diagnostics.fixed_pattern;
+    if (sweep_.target == model::SweepTarget::kKnifeEdge ||
+        sweep_.target == model::SweepTarget::kPrintedEdge) {
+      pattern.message = "an edge does not show what is fixed to the frame";
+      return true;
+    }
+    const ScaleModel before = result_.diagnostics.scale;
+    for (int round = 0; round < kPatternRounds; ++round) {
+      if (!FindFixedPattern(*samples, round == 0)) break;
+      ForEachUsed([&](std::size_t frame) { MeasureStatistics(frame); });
+      if (!MeasureSharpness()) return false;
+      *samples = Track(known_offset_mm);
+      result_.diagnostics.scale = LawOf(*samples);
+    }
+    ScaleModel& law = result_.diagnostics.scale;
+    if (!pattern.shading_removed || !law.done || !before.done) return true;
+    // The shift of the offset is proportional to the shading, and so is the part that its error
+    // leaves.
+    const double part =
+        std::min(1.0, pattern.corner_stops->sigma / std::abs(pattern.corner_stops->value));
+    law.offset_mm.sigma =
+        std::hypot(law.offset_mm.sigma, part * (law.offset_mm.value - before.offset_mm.value));
+    return true;
+  }
+
+  // Returns whether the store was given a new correction.
+  bool FindFixedPattern(const std::vector<ScaleSample>& samples, bool is_first) {
+    const FramePlaces places = {sweep_,
+                                [this](std::size_t frame) { return Grey(frame); },
+                                used(),
+                                samples,
+                                RegionCentre(sweep_),
+                                [] { ThrowIfCancelled(); }};
+    FixedPattern& pattern = result_.diagnostics.fixed_pattern;
+    const FrameShading shading = MeasureShading(places, options_.threads);
+    if (is_first) {
+      pattern.measured = shading.done;
+      pattern.message = shading.message;
+      pattern.corner_stops = shading.corner_stops;
+    }
+    bool changed = false;
+    if (shading.done && shading.is_significant) {
+      if (!is_first) {
+        pattern.corner_stops->value += shading.corner_stops->value;
+        pattern.corner_stops->sigma = shading.corner_stops->sigma;
+      }
+      pattern.shading_removed = true;
+      AddToCorrection({LogOfShading(shading, Grey(reference_).size()), cv::Mat()});
+      changed = true;
+    }
+    if (!is_first) return changed;
+    std::vector<double> sharpness;
+    for (const FrameMeasurement& frame : result_.frames)
+      sharpness.push_back(frame.normalised_edge_slope);
+    const SensorDefects defects =
+        FindSensorDefects(places, reference_, sharpness, options_.threads);
+    pattern.measured |= defects.done;
+    if (!defects.Any()) return changed;
+    pattern.specks = defects.specks;
+    pattern.deepest_speck = defects.deepest_speck;
+    pattern.defective_px = defects.defective_px;
+    pattern.divided_share = defects.divided_share;
+    pattern.filled_share = defects.filled_share;
+    pattern.column_deviation = defects.column_deviation;
+    pattern.row_deviation = defects.row_deviation;
+    AddToCorrection({defects.log_gain, defects.filled});
+    return true;
+  }
+
+  // Adds to what is removed from the light of every frame.
+  void AddToCorrection(const FixedPatternRemoval& more) {
+    const FixedPatternRemoval* before = store_.correction();
+    store_.SetCorrection(before == nullptr ? more : before->With(more));
   }
 
   // Compares the possible causes of the measured scales.

@@ -22,10 +22,20 @@ cv::Mat FrameStore::Stored(std::size_t index) {
   return stored;
 }
 
-cv::Mat FrameStore::Grey(std::size_t index) { return LinearGrey(Stored(index), sweep_, index); }
+void FrameStore::SetCorrection(const FixedPatternRemoval& correction) {
+  correction_ = std::make_unique<const FixedPatternRemoval>(correction);
+}
+
+cv::Mat FrameStore::Grey(std::size_t index) {
+  cv::Mat grey = LinearGrey(Stored(index), sweep_, index);
+  if (correction_) correction_->Apply(&grey);
+  return grey;
+}
 
 cv::Mat FrameStore::Channel(std::size_t index, int channel) {
-  return LinearChannel(Stored(index), sweep_, index, channel);
+  cv::Mat light = LinearChannel(Stored(index), sweep_, index, channel);
+  if (correction_) correction_->Apply(&light);
+  return light;
 }
 
 std::size_t FrameStore::kept_bytes() const {

@@ -2,10 +2,12 @@
 #define THICKLENS_CALIB_SWEEP_FRAME_STORE_H_
 
 #include <cstddef>
+#include <memory>
 #include <mutex>
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
+#include "calib/sweep/fixed_pattern_removal.h"
 #include "thicklens/calib/focus_sweep.h"
 
 namespace thicklens::calib {
@@ -25,10 +27,16 @@ class FrameStore {
   // reader throws.
   cv::Mat Stored(std::size_t index);
 
-  // Returns the region of interest in linear light, CV_32F.
+  // Removes `correction` from all light that is returned from now on. Must not be called while
+  // another thread reads.
+  void SetCorrection(const FixedPatternRemoval& correction);
+  // The correction that is set; null: none.
+  const FixedPatternRemoval* correction() const { return correction_.get(); }
+
+  // Returns the region of interest in linear light, CV_32F, corrected.
   cv::Mat Grey(std::size_t index);
-  // Returns one colour channel: 0 red, 1 green, 2 blue; a frame with one channel has 0 alone.
-  // Throws Error if the frame has no such channel.
+  // Returns one colour channel, corrected: 0 red, 1 green, 2 blue; a frame with one channel has 0
+  // alone. Throws Error if the frame has no such channel.
   cv::Mat Channel(std::size_t index, int channel);
 
   std::size_t kept_bytes() const;
@@ -39,6 +47,7 @@ class FrameStore {
   mutable std::mutex mutex_;
   std::vector<cv::Mat> kept_;  // empty where a frame is not kept
   std::size_t kept_bytes_ = 0;
+  std::unique_ptr<const FixedPatternRemoval> correction_;
 };
 
 }  // namespace thicklens::calib

@@ -21,7 +21,8 @@ class THICKLENS_EXPORT RandomDraws {  // the library of model uses it as well
     kDrift = 4,
     kSensor = 5,
     kEncodedNoise = 6,
-    kReadout = 7
+    kReadout = 7,
+    kSpecks = 8
   };
 
   // `item` is the index of the frame, so that a frame does not depend on the frames before it.

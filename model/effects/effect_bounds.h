@@ -109,6 +109,11 @@ EffectImpact TiltImpact(const EffectOptics& optics, const EffectSite& place,
 EffectImpact ReadingErrorImpact(const EffectOptics& optics, const EffectSite& place,
                                 const EffectSet& others);
 
+EffectImpact ShadingImpact(const EffectOptics& optics, const EffectSite& place,
+                           const EffectSet& others);
+EffectImpact DustImpact(const EffectOptics& optics, const EffectSite& place,
+                        const EffectSet& others);
+
 }  // namespace thicklens::model
 
 #endif  // THICKLENS_MODEL_EFFECTS_EFFECT_BOUNDS_H_

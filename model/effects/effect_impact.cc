@@ -58,6 +58,10 @@ Section SectionOf(Effect effect) {
       return TiltImpact;
     case Effect::kReadingError:
       return ReadingErrorImpact;
+    case Effect::kShading:
+      return ShadingImpact;
+    case Effect::kDust:
+      return DustImpact;
   }
   throw Error("no such effect");
 }
@@ -122,7 +126,12 @@ bool EffectConditions::IsValid(std::string* why) const {
   if (bench) {
     amounts.insert(amounts.end(), {{"bench.flicker", bench->flicker},
                                    {"bench.drift_sigma_px", bench->drift_sigma_px},
-                                   {"bench.reading_sigma_mm", bench->reading_sigma_mm}});
+                                   {"bench.reading_sigma_mm", bench->reading_sigma_mm},
+                                   {"bench.speck_depth", bench->speck_depth}});
+    if (!std::isfinite(bench->corner_stops)) {
+      return Fail(why,
+                  fmt::format("bench.corner_stops is {}: it must be finite", bench->corner_stops));
+    }
     if (!(std::abs(bench->tilt_deg) < 90)) {
       return Fail(
           why, fmt::format("bench.tilt_deg is {}: it must be between -90 and 90", bench->tilt_deg));

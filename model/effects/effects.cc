@@ -68,6 +68,11 @@ const std::vector<EffectFacts>& AllEffects() {
        "a target across the axis", EffectUnit::kMm, false},
       {Effect::kReadingError, "reading-error", "error of the bench's readings", "true readings",
        EffectUnit::kMm, true},
+      {Effect::kShading, "shading",
+       "the mount and filters take light toward the corners, as stated for the bench",
+       "the light that the lens alone gives", EffectUnit::kRelative, false},
+      {Effect::kDust, "dust", "specks on the sensor's cover take a part of the light",
+       "a clean sensor", EffectUnit::kRelative, false},
   };
   return facts;
 }

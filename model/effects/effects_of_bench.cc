@@ -118,4 +118,34 @@ EffectImpact ReadingErrorImpact(const EffectOptics& optics, const EffectSite& pl
   return {sigma_mm, EncodedChange(optics, place, ChangeByDepth(optics, place, sigma_mm, others))};
 }
 
+double ShadingAt(const Sensor& sensor, double corner_stops, const Eigen::Vector2d& position_px) {
+  const Eigen::Vector2d& axis_px = sensor.principal_point_px;
+  const Eigen::Vector2d far_px(std::max(axis_px.x(), sensor.width_px - 1 - axis_px.x()),
+                               std::max(axis_px.y(), sensor.height_px - 1 - axis_px.y()));
+  const double part = (position_px - axis_px).squaredNorm() / std::max(1.0, far_px.squaredNorm());
+  return std::pow(1 + (std::exp2(-corner_stops / 2) - 1) * part, -2);
+}
+
+// Shading. Formula: ShadingAt [D135]. Bound: the scaling of the brightest light. Enters: a factor
+// of each pixel. A calibration that does not know of it gets a biased image scale, because a slope
+// of the light moves the detail that a registration sees.
+EffectImpact ShadingImpact(const EffectOptics& optics, const EffectSite& place,
+                           const EffectSet& /*others*/) {
+  const auto& bench = optics.conditions().bench;
+  if (!bench || bench->corner_stops == 0) return {};
+  const double light = ShadingAt(optics.camera().sensor, bench->corner_stops, place.position_px);
+  return {std::abs(light - 1),
+          EncodedScaling(optics, place, light < 1 ? 1 - light : 1 - 1 / light)};
+}
+
+// Dust. Formula: a disc takes a part of the light. Bound: the scaling of the brightest light by
+// that part; a speck may be anywhere. Enters: a factor of each pixel. A calibration that does not
+// know of it sees detail that neither moves nor blurs: scale and kappa are biased.
+EffectImpact DustImpact(const EffectOptics& optics, const EffectSite& place,
+                        const EffectSet& /*others*/) {
+  const auto& bench = optics.conditions().bench;
+  if (!bench) return {};
+  return {bench->speck_depth, EncodedScaling(optics, place, bench->speck_depth)};
+}
+
 }  // namespace thicklens::model

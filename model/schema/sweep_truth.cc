@@ -17,8 +17,8 @@ SweepTruth ReadSweepTruth(const std::string& path) {
   const YamlNode root = YamlNode::LoadFile(path);
   root.RequireSchema(kTruthSchema);
   root.RequireKeys({"schema", "image_distance_mm", "focus_depth_mm", "blur_ratio", "blur_floor_px",
-                    "bench_offset_mm", "moves", "tilt_deg", "pupil_law", "effects",
-                    "left_out_grey_levels", "frames"});
+                    "bench_offset_mm", "moves", "tilt_deg", "corner_stops", "specks", "pupil_law",
+                    "effects", "left_out_grey_levels", "frames"});
   SweepTruth truth;
   truth.image_distance_mm = root.At("image_distance_mm").PositiveNumber();
   truth.focus_depth_mm = root.At("focus_depth_mm").PositiveNumber();
@@ -32,6 +32,8 @@ SweepTruth ReadSweepTruth(const std::string& path) {
         SweepMotionName);
   }
   if (const auto tilt = root.Find("tilt_deg")) truth.tilt_deg = tilt->Number();
+  if (const auto stops = root.Find("corner_stops")) truth.corner_stops = stops->Number();
+  if (const auto specks = root.Find("specks")) truth.specks = specks->Integer(0, 10000);
   if (const auto law = root.Find("pupil_law")) {
     truth.pupil_law = PupilLawName(ReadNamed(*law, AllPupilLaws(), PupilLawName));
   }
@@ -55,6 +57,8 @@ std::string SweepTruthToYaml(const SweepTruth& truth) {
   out.Number("bench_offset_mm", truth.bench_offset_mm);
   if (truth.moves != SweepMotion::kTarget) out.Text("moves", SweepMotionName(truth.moves));
   if (truth.tilt_deg != 0) out.Number("tilt_deg", truth.tilt_deg);
+  if (truth.corner_stops != 0) out.Number("corner_stops", truth.corner_stops);
+  if (truth.specks != 0) out.Number("specks", truth.specks);
   out.TextIfAny("pupil_law", truth.pupil_law);
   WriteEffects(truth.effects, &out);
   out.BeginList("frames");

@@ -167,6 +167,7 @@ std::string DetailLines(const calib::FocusSweep& sweep, const calib::Calibration
   if (!calibration.diagnostics.field.done && calibration.diagnostics.field.message != kNotRun)
     AddLine("field", "no map, " + calibration.diagnostics.field.message, &text);
   AddLine("colours", ChannelLine(calibration.diagnostics.channels), &text);
+  AddLine("fixed to the frame", PatternLine(calibration.diagnostics.fixed_pattern), &text);
   AddLine("camera response", ResponseLine(calibration.diagnostics.response), &text);
   const std::vector<calib::SystematicPart>& parts = calibration.diagnostics.systematic_parts;
   for (std::size_t i = 0; i < std::min(parts.size(), kReportedParts); ++i)

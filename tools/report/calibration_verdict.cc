@@ -85,6 +85,7 @@ std::string DeterminedInWords(const Calibration& calibration) {
     add("The sweep is sharpest at the ", SharpestLine(calibration));
   add("Focus lies at the ", FocusReadingLine(calibration));
   add("The bench offset is determined ", OffsetOriginLine(calibration));
+  add("", PatternLine(calibration.diagnostics.fixed_pattern));
   if (calibration.summary.outcome != calib::Outcome::kRefused) return html;
   add("", ScaleChangeLine(calibration.diagnostics.scale));
   add("", fmt::format("{} of {} frames can be used", calibration.summary.frames_used,

@@ -90,6 +90,8 @@ std::vector<std::string> DiagnosisLines(const calib::Calibration& calibration) {
   return lines;
 }
 
+std::string PatternLine(const calib::FixedPattern& pattern) { return pattern.InWords(); }
+
 std::string ResponseLine(const calib::CameraResponse& response) {
   std::vector<std::string> found;
   if (response.light_exponent)
@@ -144,6 +146,20 @@ nlohmann::json StructureJson(const calib::FrameStructureFinding& structure) {
                            : structure.bands_are_columns ? nlohmann::json("columns")
                                                          : nlohmann::json("rows");
   return out;
+}
+
+nlohmann::json PatternJson(const calib::FixedPattern& pattern) {
+  if (!pattern.measured) return nullptr;
+  return {{"message", PrintableUtf8(pattern.message)},
+          {"corner_stops", ErrorJson(pattern.corner_stops)},
+          {"shading_removed", pattern.shading_removed},
+          {"specks", pattern.specks},
+          {"deepest_speck", FiniteNumber(pattern.deepest_speck)},
+          {"defective_px", pattern.defective_px},
+          {"divided_share", FiniteNumber(pattern.divided_share)},
+          {"filled_share", FiniteNumber(pattern.filled_share)},
+          {"column_deviation", FiniteNumber(pattern.column_deviation)},
+          {"row_deviation", FiniteNumber(pattern.row_deviation)}};
 }
 
 nlohmann::json ResponseJson(const calib::CameraResponse& response) {

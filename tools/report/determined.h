@@ -27,6 +27,9 @@ std::string ScaleChangeLine(const calib::ScaleModel& scale);
 // "the image scale against the readings: the target moves as stated (chi2 31); then ...": one line
 // for each comparison.
 std::vector<std::string> DiagnosisLines(const calib::Calibration& calibration);
+// "structure fixed to the frame was found and removed: 25 specks (dust; ...": what was removed from
+// the frames; empty if nothing was.
+std::string PatternLine(const calib::FixedPattern& pattern);
 // "the light is the value as read to the power 1.002 +- 0.004; weak detail loses -0.1 +- 0.2 %":
 // what the frames show of the camera's transfer and processing; empty if they show nothing.
 std::string ResponseLine(const calib::CameraResponse& response);
@@ -35,6 +38,7 @@ std::string ResponseLine(const calib::CameraResponse& response);
 nlohmann::json SharpestJson(const calib::Calibration& calibration);
 nlohmann::json DiagnosesJson(const calib::Calibration& calibration);
 nlohmann::json StructureJson(const calib::FrameStructureFinding& structure);
+nlohmann::json PatternJson(const calib::FixedPattern& pattern);
 nlohmann::json ResponseJson(const calib::CameraResponse& response);
 
 }  // namespace thicklens::tools

@@ -386,12 +386,38 @@ std::vector<StressCase> MovingFocus() {
   return cases;
 }
 
+// Structure that stays at the same pixels while the target changes its size. The bench offset is
+// not stated, so that d1 comes from the image scale.
+std::vector<StressCase> FixedToTheFrame() {
+  const std::string required =
+      "d1, zf and kappa within 4 standard errors of the truth, d1 within 200 um";
+  const auto open = [](const std::function<void(model::SweepSimulationOptions*)>& change) {
+    StressSweep sweep = Simulated(change);
+    sweep.describe = [](model::SweepFile* file) { file->offset_mm.reset(); };
+    return sweep;
+  };
+  std::vector<StressCase> cases;
+  cases.push_back(
+      Sweep("dark-corners",
+            "the lens is wide open: the corners are two stops darker than the middle", required,
+            open([](model::SweepSimulationOptions* simulation) { simulation->corner_stops = -2; }),
+            Truth(200)));
+  cases.push_back(Sweep("dust-on-the-sensor",
+                        "6 specks of up to 5 px radius, which take 40 % of the light", required,
+                        open([](model::SweepSimulationOptions* simulation) {
+                          simulation->speck_count = 6;
+                          simulation->speck_radius_px = 5;
+                        }),
+                        Truth(200)));
+  return cases;
+}
+
 }  // namespace
 
 std::vector<StressCase> CalibrationStressCases() {
   std::vector<StressCase> all;
-  for (std::vector<StressCase> part :
-       {Frames2To5(), Focus(), Readings(), Damages(), Optics(), Macros(), MovingFocus()}) {
+  for (std::vector<StressCase> part : {Frames2To5(), Focus(), Readings(), Damages(), Optics(),
+                                       Macros(), MovingFocus(), FixedToTheFrame()}) {
     for (StressCase& hard : part) all.push_back(std::move(hard));
   }
   return all;

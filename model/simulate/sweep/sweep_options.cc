@@ -88,7 +88,7 @@ EffectSet SweepEffects() {
           Effect::kShotNoise,     Effect::kReadNoise,   Effect::kQuantisation,
           Effect::kTransferCurve, Effect::kLampFalloff, Effect::kFlicker,
           Effect::kMagnification, Effect::kDrift,       Effect::kTilt,
-          Effect::kReadingError};
+          Effect::kReadingError,  Effect::kShading,     Effect::kDust};
 }
 
 double SweepSimulationOptions::ImageDistanceMm(int frame_index) const {
@@ -154,6 +154,23 @@ bool SweepSimulationOptions::IsValid(std::string* why) const {
   }
   if (!(flicker >= 0 && flicker <= 0.5)) {
     return Fail(why, fmt::format("light.flicker is {}: it must be from 0 to 0.5", flicker));
+  }
+  if (!(corner_stops >= -6 && corner_stops <= 2)) {
+    return Fail(why, fmt::format("fixed_to_frame.corner_stops is {}: it must be from -6 to 2",
+                                 corner_stops));
+  }
+  if (!(speck_count >= 0 && speck_count <= 10000)) {
+    return Fail(
+        why, fmt::format("fixed_to_frame.specks is {}: it must be from 0 to 10000", speck_count));
+  }
+  if (!(speck_depth >= 0 && speck_depth <= 1)) {
+    return Fail(
+        why, fmt::format("fixed_to_frame.speck_depth is {}: it must be from 0 to 1", speck_depth));
+  }
+  if (!(speck_radius_px >= 0.5 && speck_radius_px <= 1000)) {
+    return Fail(why,
+                fmt::format("fixed_to_frame.speck_radius_px is {}: it must be from 0.5 to 1000",
+                            speck_radius_px));
   }
   if (bits != 8 && bits != 16) {
     return Fail(why, fmt::format("bits is {}: it must be 8 or 16", bits));

@@ -113,13 +113,22 @@ void ReadNoise(const YamlNode& node, SweepSimulationOptions* options) {
   ReadNumber(node, "read_noise_electrons", &options->read_noise_electrons);
 }
 
+void ReadFixedToFrame(const YamlNode& node, SweepSimulationOptions* options) {
+  node.RequireKeys({"corner_stops", "specks", "speck_depth", "speck_radius_px"});
+  ReadNumber(node, "corner_stops", &options->corner_stops);
+  if (const auto specks = node.Find("specks")) options->speck_count = specks->Integer(0, 10000);
+  ReadNumber(node, "speck_depth", &options->speck_depth);
+  ReadNumber(node, "speck_radius_px", &options->speck_radius_px);
+}
+
 }  // namespace
 
 SweepSimulationOptions ReadSweepSimulation(const std::string& path) {
   const YamlNode root = YamlNode::LoadFile(path);
   root.RequireSchema(kSchema);
   root.RequireKeys({"schema", "camera", "truth", "size_px", "target", "bench", "light",
-                    "drift_sigma_px", "noise", "bits", "pupil_law", "effects", "without", "seed"});
+                    "drift_sigma_px", "noise", "fixed_to_frame", "bits", "pupil_law", "effects",
+                    "without", "seed"});
   SweepSimulationOptions options;
   options.camera = ReadCamera(root.ResolvePath(root.At("camera").Text()));
   if (const auto truth = root.Find("truth")) ReadTruth(*truth, &options.camera);
@@ -129,6 +138,7 @@ SweepSimulationOptions ReadSweepSimulation(const std::string& path) {
   if (const auto light = root.Find("light")) ReadLight(*light, &options);
   ReadNumber(root, "drift_sigma_px", &options.drift_sigma_px);
   if (const auto noise = root.Find("noise")) ReadNoise(*noise, &options);
+  if (const auto fixed = root.Find("fixed_to_frame")) ReadFixedToFrame(*fixed, &options);
   if (const auto bits = root.Find("bits")) options.bits = bits->Integer(8, 16);
   if (const auto law = root.Find("pupil_law")) {
     options.pupil_law = ReadNamed(*law, AllPupilLaws(), PupilLawName);

@@ -55,6 +55,7 @@ struct SweepSimulator::Impl {
     MakePupil();
     MakeTruth();
     MakeFalloff();
+    MakeFixedToFrame();
     if (!IsEdge(options.target.kind)) MakeTile(image);
   }
 
@@ -64,9 +65,13 @@ struct SweepSimulator::Impl {
     conditions.bits = options.bits;
     conditions.full_well_electrons = options.full_well_electrons;
     conditions.read_noise_electrons = options.read_noise_electrons;
-    conditions.bench =
-        BenchConditions{options.lamp_falloff, options.flicker, options.drift_sigma_px,
-                        options.reading_sigma_mm, options.target.tilt_deg};
+    conditions.bench = BenchConditions{options.lamp_falloff,
+                                       options.flicker,
+                                       options.drift_sigma_px,
+                                       options.reading_sigma_mm,
+                                       options.target.tilt_deg,
+                                       options.corner_stops,
+                                       options.speck_count > 0 ? options.speck_depth : 0};
     return conditions;
   }
 
@@ -217,6 +222,8 @@ struct SweepSimulator::Impl {
     truth.pupil_law = PupilLawName(law);
     truth.moves = options.moves;
     if (On(Effect::kTilt)) truth.tilt_deg = options.target.tilt_deg;
+    if (On(Effect::kShading)) truth.corner_stops = options.corner_stops;
+    if (On(Effect::kDust)) truth.specks = options.speck_count;
     for (std::size_t i = 0; i < frames.size(); ++i) {
       truth.frames.push_back(
           {fmt::format("frames/frame_{:03d}.png", i), frames[i].depth_mm, frames[i].reading_mm,
@@ -254,6 +261,48 @@ struct SweepSimulator::Impl {
         const double rest = place - static_cast<double>(below);
         light_of_pixel.push_back(
             static_cast<float>(at_step[below] + rest * (at_step[below + 1] - at_step[below])));
+      }
+    }
+  }
+
+  // Multiplies the light of each pixel by what is fixed to the frame.
+  void MakeFixedToFrame() {
+    const Sensor& sensor = options.camera.sensor;
+    const bool shades = On(Effect::kShading) && options.corner_stops != 0;
+    const bool dusty = On(Effect::kDust) && options.speck_count > 0;
+    if (!shades && !dusty) return;
+    light_of_pixel.resize(
+        static_cast<std::size_t>(sensor.width_px) * static_cast<std::size_t>(sensor.height_px), 1);
+    if (shades) {
+      for (int y = 0; y < sensor.height_px; ++y) {
+        ThrowIfCancelled();
+        for (int x = 0; x < sensor.width_px; ++x) {
+          light_of_pixel[static_cast<std::size_t>(y * sensor.width_px + x)] *=
+              static_cast<float>(ShadingAt(sensor, options.corner_stops, Eigen::Vector2d(x, y)));
+        }
+      }
+    }
+    if (!dusty) return;
+    RandomDraws draws(options.seed, RandomDraws::Purpose::kSpecks, 0);
+    for (int i = 0; i < options.speck_count; ++i) AddSpeck(&draws);
+  }
+
+  // A disc whose edge is a ramp of the error function. Where specks overlap, each takes its part.
+  void AddSpeck(RandomDraws* draws) {
+    constexpr double kSoftnessPx = 1.5;  // sigma of the edge
+    const Sensor& sensor = options.camera.sensor;
+    const double x_px = draws->Uniform() * (sensor.width_px - 1);
+    const double y_px = draws->Uniform() * (sensor.height_px - 1);
+    const double radius_px = options.speck_radius_px * (1 + 2 * draws->Uniform()) / 3;
+    const double reach_px = radius_px + 4 * kSoftnessPx;
+    const int bottom = std::min(sensor.height_px - 1, static_cast<int>(y_px + reach_px));
+    const int right = std::min(sensor.width_px - 1, static_cast<int>(x_px + reach_px));
+    for (int y = std::max(0, static_cast<int>(y_px - reach_px)); y <= bottom; ++y) {
+      for (int x = std::max(0, static_cast<int>(x_px - reach_px)); x <= right; ++x) {
+        const double inside_px = radius_px - std::hypot(x - x_px, y - y_px);
+        const double part = 0.5 * std::erfc(-inside_px / (std::sqrt(2.0) * kSoftnessPx));
+        light_of_pixel[static_cast<std::size_t>(y * sensor.width_px + x)] *=
+            static_cast<float>(1 - options.speck_depth * part);
       }
     }
   }

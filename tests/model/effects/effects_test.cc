@@ -53,7 +53,7 @@ EffectSite PlaceAt(double x, double y, double depth_mm) {
 }
 
 TEST(EffectsTest, NamesAndSetsGoBothWays) {
-  EXPECT_EQ(AllEffects().size(), 19U);
+  EXPECT_EQ(AllEffects().size(), 21U);
   for (std::size_t i = 0; i < AllEffects().size(); ++i) {
     const EffectFacts& facts = AllEffects()[i];
     EXPECT_EQ(static_cast<std::size_t>(facts.effect), i);
@@ -289,8 +289,16 @@ TEST(EffectsTest, BenchMovesLightAndScaleAsItsGeometrySays) {
   EXPECT_DOUBLE_EQ(amount(Effect::kReadingError), 0.05);
   const double beside_mm = 300 * 330 / conditions.camera.focal_scale_px();
   EXPECT_NEAR(amount(Effect::kTilt), beside_mm * std::tan(2 * kPi / 180), 1e-9);
+  conditions.bench->corner_stops = -2;
+  conditions.bench->speck_depth = 0.4;
+  EXPECT_DOUBLE_EQ(amount(Effect::kDust), 0.4);
+  EXPECT_NEAR(ShadingAt(conditions.camera.sensor, -2, conditions.camera.sensor.principal_point_px),
+              1, 1e-12);
+  EXPECT_GT(amount(Effect::kShading), 0.1);
+  EXPECT_LT(amount(Effect::kShading), 0.75);
   conditions.bench.reset();
-  for (const Effect effect : {Effect::kLampFalloff, Effect::kMagnification, Effect::kTilt}) {
+  for (const Effect effect : {Effect::kLampFalloff, Effect::kMagnification, Effect::kTilt,
+                              Effect::kShading, Effect::kDust}) {
     EXPECT_EQ(amount(effect), 0);
   }
 }
@@ -403,7 +411,7 @@ TEST(EffectsTest, ChoiceIsReadAndFollowed) {
   EXPECT_TRUE(on(automatic).Has(Effect::kQuantisation));
   automatic.without = automatic.kept;
   EXPECT_FALSE(on(automatic).Has(Effect::kQuantisation));
-  EXPECT_EQ(SelectEffects(automatic, conditions, places, model).findings.size(), 17U);
+  EXPECT_EQ(SelectEffects(automatic, conditions, places, model).findings.size(), 19U);
   EXPECT_THAT(ErrorOf([&] { on(EffectSelectionOptionsFromText("auto", "tilt,drift", "")); }),
               HasSubstr("effect tilt does not apply to this image: its effects are thickness"));
 }

@@ -100,6 +100,28 @@ TEST(Determined, TheCameraResponseIsReported) {
   EXPECT_TRUE(found.at("noise_rise").is_null());
 }
 
+TEST(Determined, WhatWasRemovedFromTheFramesIsReported) {
+  MadeUpCalibration made = MakeUpCalibration(31, 300, 8);
+  calib::FixedPattern& pattern = made.calibration.diagnostics.fixed_pattern;
+  pattern.measured = true;
+  pattern.message = "fitted";
+  pattern.corner_stops = model::Estimate{-1.94, 0.03};
+  pattern.shading_removed = true;
+  pattern.specks = 12;
+  pattern.deepest_speck = 0.6;
+  pattern.divided_share = 0.02;
+  EXPECT_THAT(CalibrationText(made.sweep, made.calibration, nullptr),
+              AllOf(HasSubstr("fixed to the frame: structure fixed to the frame was found and "
+                              "removed: shading (-1.94 +- 0.03 stops"),
+                    HasSubstr("12 specks"), HasSubstr("cover 2 % of the region")));
+  const nlohmann::json out = CalibrationJson(made.sweep, made.calibration, nullptr, false);
+  const nlohmann::json& found = out.at("fixed_pattern");
+  EXPECT_EQ(found.at("corner_stops").at("value"), -1.94);
+  EXPECT_EQ(found.at("specks"), 12);
+  EXPECT_EQ(found.at("divided_share"), 0.02);
+  EXPECT_TRUE(found.at("shading_removed").get<bool>());
+}
+
 // A run that ended before a frame was opened has none of it.
 TEST(Determined, UnmeasuredValuesGiveNoReport) {
   MadeUpCalibration made = MakeUpCalibration(31, 300, 8);
@@ -112,6 +134,7 @@ TEST(Determined, UnmeasuredValuesGiveNoReport) {
   EXPECT_TRUE(out["sharpest_reading"].at("reading_mm").is_null());
   EXPECT_TRUE(out["sharpest_reading"].at("focus_by_blur_mm").is_null());
   EXPECT_TRUE(out.at("frame_structure").is_null());
+  EXPECT_TRUE(out.at("fixed_pattern").is_null());
   EXPECT_TRUE(out.at("camera_response").is_null());
   EXPECT_TRUE(out.at("diagnoses").empty());
 }

@@ -45,6 +45,9 @@ SweepSimulationOptions WideSweep() {
   options.drift_sigma_px = 2;
   options.full_well_electrons = 5000;
   options.read_noise_electrons = 12;
+  options.corner_stops = -1;
+  options.speck_count = 3;
+  options.speck_radius_px = 6;
   return options;
 }
 
@@ -75,7 +78,8 @@ TEST(SweepEffectsTest, EachIsSwitchedAlone) {
   const EffectSet of_light = {Effect::kThickness,     Effect::kDefocus,  Effect::kApertureShape,
                               Effect::kFalloff,       Effect::kPixelBox, Effect::kLensFloor,
                               Effect::kLampFalloff,   Effect::kFlicker,  Effect::kDrift,
-                              Effect::kMagnification, Effect::kTilt};
+                              Effect::kMagnification, Effect::kTilt,     Effect::kShading,
+                              Effect::kDust};
   for (const Effect effect : SweepEffects().Effects()) {
     SCOPED_TRACE(EffectName(effect));
     const std::vector<LinearImage> without = Frames(With(SweepEffects().Without({effect})));
@@ -217,6 +221,46 @@ TEST(SweepEffectsTest, EdgesWithoutThePixelBoxAreTheBlurredStep) {
     EXPECT_NEAR(disc.At(d), inside / whole, 1e-5);
     EXPECT_NEAR(both.At(d), blurred / whole, 1e-6);
   }
+}
+
+// cos^4 of an angle whose tangent grows with the distance from the axis, with the stated value in
+// the farthest corner, in every frame.
+TEST(SweepEffectsTest, ShadingIsFixedToTheFrame) {
+  const std::vector<LinearImage> plain = Frames(With({}));
+  const std::vector<LinearImage> shaded = Frames(With({Effect::kShading}));
+  const double far2 = std::pow(159 - 70, 2) + std::pow(119 - 55, 2);
+  const double angle_at_corner = std::acos(std::pow(0.5, 0.25));
+  for (std::size_t i = 0; i < plain.size(); ++i) {
+    for (int y = 0; y < 120; y += 7) {
+      for (int x = 0; x < 160; x += 7) {
+        const double r2 = std::pow(x - 70, 2) + std::pow(y - 55, 2);
+        const double angle = std::atan(std::tan(angle_at_corner) * std::sqrt(r2 / far2));
+        const auto at = static_cast<std::size_t>(y * 160 + x);
+        EXPECT_NEAR(static_cast<double>(shaded[i].values[at]),
+                    std::pow(std::cos(angle), 4) * static_cast<double>(plain[i].values[at]), 1e-6);
+      }
+    }
+  }
+}
+
+TEST(SweepEffectsTest, SpecksTakeTheirPartOfTheLightInEveryFrame) {
+  SweepSimulationOptions options = With({Effect::kDust});
+  const std::vector<LinearImage> plain = Frames(With({}));
+  const std::vector<LinearImage> dusty = Frames(options);
+  double area_px2 = 0;
+  for (std::size_t at = 0; at < plain[0].values.size(); ++at) {
+    const double kept =
+        static_cast<double>(dusty[0].values[at]) / static_cast<double>(plain[0].values[at]);
+    EXPECT_GT(kept, std::pow(1 - options.speck_depth, options.speck_count) - 1e-5);
+    EXPECT_LT(kept, 1 + 1e-5);
+    area_px2 += (1 - kept) / options.speck_depth;
+    EXPECT_NEAR(static_cast<double>(dusty[3].values[at]),
+                kept * static_cast<double>(plain[3].values[at]), 1e-6);
+  }
+  EXPECT_LT(area_px2, options.speck_count * kPi * 6.5 * 6.5);
+  EXPECT_GT(area_px2, kPi * 2 * 2) << "radii from 2 to 6 px; some may be cut by the border";
+  options.speck_count = 0;
+  EXPECT_EQ(Largest(Frames(options)[2], plain[2]), 0);
 }
 
 TEST(SweepEffectsTest, ReadingsAndNoiseAreLeftOutToo) {

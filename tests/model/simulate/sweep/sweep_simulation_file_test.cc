@@ -79,18 +79,23 @@ TEST_F(SweepSimulationFileTest, ReadsAMovingLensOrSensor) {
 }
 
 TEST_F(SweepSimulationFileTest, ReadsEveryField) {
-  const SweepSimulationOptions options =
-      Read(std::string(kHead) + kTruth +
-           "size_px: [400, 301]\n"
-           "target: {kind: image, image: scene.png, contrast: 0.7, feature_size_mm: 3,\n"
-           "         edge_angle_deg: -4, ink_sigma_mm: 0.02}\n"
-           "bench: {first_depth_mm: 310, step_mm: -1.5, frames: 12, offset_mm: 106.5,\n"
-           "        direction: toward, reading_sigma_mm: 0.07}\n"
-           "light: {level: 0.4, lamp_falloff: false, flicker: 0.02}\n"
-           "drift_sigma_px: 1.25\n"
-           "noise: {full_well_electrons: 9000, read_noise_electrons: 5}\n"
-           "bits: 16\n"
-           "seed: 77\n");
+  const SweepSimulationOptions options = Read(
+      std::string(kHead) + kTruth +
+      "size_px: [400, 301]\n"
+      "target: {kind: image, image: scene.png, contrast: 0.7, feature_size_mm: 3,\n"
+      "         edge_angle_deg: -4, ink_sigma_mm: 0.02}\n"
+      "bench: {first_depth_mm: 310, step_mm: -1.5, frames: 12, offset_mm: 106.5,\n"
+      "        direction: toward, reading_sigma_mm: 0.07}\n"
+      "light: {level: 0.4, lamp_falloff: false, flicker: 0.02}\n"
+      "drift_sigma_px: 1.25\n"
+      "fixed_to_frame: {corner_stops: -1.5, specks: 12, speck_depth: 0.6, speck_radius_px: 7}\n"
+      "noise: {full_well_electrons: 9000, read_noise_electrons: 5}\n"
+      "bits: 16\n"
+      "seed: 77\n");
+  EXPECT_EQ(options.corner_stops, -1.5);
+  EXPECT_EQ(options.speck_count, 12);
+  EXPECT_EQ(options.speck_depth, 0.6);
+  EXPECT_EQ(options.speck_radius_px, 7);
   EXPECT_NEAR(options.camera.image_distance_mm(), 60, 1e-12);
   EXPECT_EQ(options.camera.blur_ratio(), 0.4);
   EXPECT_EQ(options.camera.calibration->blur_floor_px->value, 0.6);
@@ -178,6 +183,9 @@ TEST_F(SweepSimulationFileTest, ErrorsHaveTheirPlaceInTheFile) {
       {head + kTruth + "target: {kind: knife-edge, image: a.png}\n" + kBench,
        "only for a target of the kind 'image'"},
       {head + kTruth + rest + "noise: {read_noise_electrons: 3}\n", "needs noise.full_well"},
+      {head + kTruth + rest + "fixed_to_frame: {corner_stops: -7}\n", "must be from -6 to 2"},
+      {head + kTruth + rest + "fixed_to_frame: {speck_depth: 2}\n", "must be from 0 to 1"},
+      {head + kTruth + rest + "fixed_to_frame: {specks: -1}\n", "specks"},
       {head + kTruth + rest + "bits: 12\n", "bits is 12: it must be 8 or 16"},
       {head + kTruth + rest + "light: {lamp_falloff: 1}\n", "true, false"},
   };

@@ -9,6 +9,7 @@
 #include "thicklens/base/export.h"
 #include "thicklens/calib/camera_response.h"
 #include "thicklens/calib/diagnosis.h"
+#include "thicklens/calib/fixed_pattern.h"
 #include "thicklens/calib/frame_statistics.h"
 #include "thicklens/model/camera.h"
 #include "thicklens/model/sweep_file.h"
@@ -300,7 +301,9 @@ struct CalibrationDiagnostics {
   // The symptoms whose causes were compared, with the causes that are named.
   std::vector<Diagnosis> diagnoses;
   FrameStructureFinding structure;  // vignetting, bands and dust of the frames
-  CameraResponse response;          // transfer curve and processing, by the frames
+  // Shading, dust and defective pixels that were removed. `structure` describes what is left.
+  FixedPattern fixed_pattern;
+  CameraResponse response;  // transfer curve and processing, by the frames
 
   SourceRecipe paper_recipe;                        // the paper's method, for comparison
   SharpnessPeak sharpness;                          // in-focus distance by sharpness alone

@@ -22,7 +22,16 @@ struct BenchConditions {
   double drift_sigma_px = 0;    // sd of the target's lateral position per frame and axis, px at zf
   double reading_sigma_mm = 0;  // standard deviation of the error of each reading
   double tilt_deg = 0;          // angle between the target and the plane across the axis
+  double corner_stops = 0;      // light at the farthest corner over that on the axis, factors of 2
+  double speck_depth = 0;       // part of the light that a speck on the sensor takes, 0 to 1
 };
+
+// Relative light that the shading of a camera lets through [D135]:
+// (1 + (c^(-1/2) - 1) r^2/R^2)^-2, c = 2^corner_stops, as cos^4 of an angle whose tangent is
+// proportional to r. r and R are distances from the axis, of the pixel and of the farthest corner.
+// It is 1 on the axis and c in that corner.
+THICKLENS_EXPORT double ShadingAt(const Sensor& sensor, double corner_stops,
+                                  const Eigen::Vector2d& position_px);
 
 // Conditions under which a scene is photographed.
 struct EffectConditions {

@@ -35,6 +35,8 @@ enum class Effect {
   kDrift,          // the target moves sideways from frame to frame
   kTilt,           // one side of the target is nearer than the other
   kReadingError,   // error of the bench's readings
+  kShading,        // light lost toward the corners by the mount or by filters
+  kDust,           // specks on the sensor's cover
 };
 
 // Unit of an impact.

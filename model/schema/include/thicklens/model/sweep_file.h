@@ -196,6 +196,8 @@ struct SweepTruth {
   SweepMotion moves = SweepMotion::kTarget;  // the part that moves
   double bench_offset_mm = 0;  // z of reading 0, mm from Ap; d1 where lens or sensor move
   double tilt_deg = 0;         // tilt of the target, as in TargetOptions
+  double corner_stops = 0;     // shading: light at the farthest corner over the axis, stops
+  int specks = 0;              // number of specks on the sensor
   std::string pupil_law;       // PupilLawName; empty: not stated
   // The true values of one frame.
   struct Frame {

@@ -76,6 +76,13 @@ struct SweepSimulationOptions {
   double full_well_electrons = 0;   // shot noise: electrons at full scale; 0: no shot noise
   double read_noise_electrons = 0;  // standard deviation of the read noise
   int bits = 8;                     // 8 or 16 per encoded value
+  // Fixed to the frame: light at the farthest corner over that on the axis, in stops (factors of 2;
+  // negative: darker), and soft discs on the sensor at random places, each of which takes a part of
+  // the light. Their radii are from a third of speck_radius_px to speck_radius_px.
+  double corner_stops = 0;
+  int speck_count = 0;         // number of specks on the sensor
+  double speck_depth = 0.4;    // part of the light that a speck takes, 0 to 1
+  double speck_radius_px = 9;  // radius of the largest speck, px
   // Distribution of the light of a point over the pupil; its second moment is (kappa r)^2 in any
   // case. If it is absent, the law of the paper is used where fall-off is on, and the uniform law
   // otherwise.
