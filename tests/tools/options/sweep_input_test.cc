@@ -334,10 +334,25 @@ TEST_F(SweepInputTest, MissingTolerancesAreReportedUnlessTheTruthIsKnown) {
     std::string text = objective;
     return text.replace(text.find("PITCH"), 5, pitch);
   };
+  const auto text_with_tolerance_of_magnification = [&] {
+    std::string text = with_pitch("0.005");
+    return text.replace(text.find("magnification: 10"), 17,
+                        "magnification: {value: 10, tolerance: 0.1}");
+  };
   folder_.Put("camera.yaml", with_pitch("0.005"));
   EXPECT_EQ(reported(), 1);
   folder_.Put("camera.yaml", with_pitch("{value: 0.005, tolerance: 0.00001}"));
   EXPECT_EQ(reported(), 0);
+  // What is assumed of the magnification is told unless it is stated or measured.
+  const auto tells = [&](const std::string& words) {
+    const thicklens::Sweep input = ReadSweepInput(arguments_);
+    return std::any_of(input.notices.begin(), input.notices.end(), [&](const std::string& line) {
+      return line.find(words) != std::string::npos;
+    });
+  };
+  EXPECT_TRUE(tells("the 5 % that ISO 8039 allows") && tells("equivalent thin lens"));
+  folder_.Put("camera.yaml", text_with_tolerance_of_magnification());
+  EXPECT_TRUE(!tells("ISO 8039") && tells("equivalent thin lens"));
   folder_.Put("camera.yaml", CameraText("0.005", ""));
   EXPECT_EQ(reported(), 1);
   arguments_.truth_path =
