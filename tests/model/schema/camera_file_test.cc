@@ -155,7 +155,8 @@ TEST(CameraFile, PositionsOfAMovingLensAreReadAndWritten) {
   EXPECT_EQ(again.calibration->focus_positions.value().positions[0].image_distance_mm, 16.5);
   EXPECT_EQ(again.calibration->focus_positions.value().unit, "dpt");
   EXPECT_THAT(ErrorOfText(with("{unit: mm, positions: [[2, 16.5], [2, 17]]}")),
-              AllOf(StartsWith("c.yaml:8:"), HasSubstr("must rise, but 2 follows 2")));
+              AllOf(StartsWith("c.yaml:7:20: calibration.focus_positions"),
+                    HasSubstr("must rise, but 2 follows 2")));
   EXPECT_THAT(ErrorOfText(with("{unit: mm, positions: [[2, 16.5]]}")), HasSubstr("at least 2"));
   EXPECT_THAT(ErrorOfText(with("{unit: mm, positions: [[2, -1], [3, 4]]}")),
               HasSubstr("must be > 0, found -1"));
