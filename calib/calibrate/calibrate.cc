@@ -97,11 +97,9 @@ class Calibrator {
     } else if (RegionSidePx(sweep_) < kSmallestRegionPx) {
       Refuse(RegionAdvice(sweep_));
     } else if (MeasureAndCheck() && MeasureSharpness()) {
-      preview.passed = true;
+      preview.samples = Track(std::nullopt);
+      preview.passed = RemoveFixedPattern(std::nullopt, &preview.samples);
       preview.reference = reference_;
-      preview.samples = TrackScale(
-          sweep_, [this](std::size_t frame) { return Grey(frame); }, used(), reference_,
-          std::nullopt, options_.threads, [this] { Tick(); });
     }
     FindSharpest();
     preview.found = std::move(result_);
@@ -302,8 +300,8 @@ class Calibrator {
     ReplaceReference();
     if (sweep_.offset_mm && !IsKnownBetterThanOffset()) {
       TakeGivenOffset();
-      // The zero of an equivalent target is exact where it does not give the image distance.
-      if (!is_lone_edge && (motion_ == nullptr || sweep_.offset_mm->sigma > 0)) {
+      // The zero of an equivalent target is exact by its construction.
+      if (!is_lone_edge && motion_ == nullptr) {
         const OffsetCheck check = CheckGivenOffset(sweep_, UnitThatFits(sweep_, causes_), &result_);
         if (check.refusal) return Refuse(*check.refusal);
         conflicting_offset_mm_ = check.conflicting_mm;
@@ -316,7 +314,7 @@ class Calibrator {
       LookForStructure(scales_);
     if (const auto refusal = CheckDistortion(&result_, SeesAstigmatism())) return Refuse(*refusal);
     slip_ = FindReadingStep(scales_, result_.diagnostics.scale);
-    if (slip_) WarnOfReadingStep(*slip_, &result_);
+    if (slip_ && motion_ == nullptr) WarnOfReadingStep(*slip_, &result_);
     // The scale of an equivalent target is that of a lens that moves to second order only.
     if (motion_ == nullptr || sweep_.moves != model::SweepMotion::kLens)
       bend_ = CheckScaleNonlinearity(sweep_, scales_, &result_);
@@ -832,6 +830,7 @@ bool ShowsMovingFocus(const Calibration& calibration) {
 Calibration Recognised(const FocusSweep& sweep, const CalibrationOptions& options,
                        Calibration as_target) {
   FocusSweep moving = sweep;
+  moving.offset_mm.reset();  // it was stated for the depth of a target
   const auto& change = as_target.diagnostics.scale.change_over_sweep;
   if (change && change->value != 0)
     moving.direction =

@@ -44,8 +44,11 @@ double FocusMotion::DefocusAt(double sensor_distance_mm) const {
   return model::DefocusPerAperture(lens_, sensor_distance_mm + lens_.lens_thickness_mm, depth_mm);
 }
 
-double FocusMotion::DefocusPerAperture(double reading_mm) const {
-  return DefocusAt(SensorDistanceMm(reading_mm));
+std::optional<double> FocusMotion::DefocusPerAperture(double reading_mm) const {
+  const double distance_mm = SensorDistanceMm(reading_mm);
+  const double depth_mm = zf_mm_ - (moves_ == model::SweepMotion::kLens ? distance_mm - xf_mm_ : 0);
+  if (!(distance_mm > 0) || !(depth_mm > 0)) return std::nullopt;
+  return DefocusAt(distance_mm);
 }
 
 double FocusMotion::BlurGrowth() const {

@@ -50,7 +50,8 @@ class FocusMotion {
 
   // D and c at a reading.
   double SensorDistanceMm(double reading_mm) const;
-  double DefocusPerAperture(double reading_mm) const;
+  // Nothing for D or z that are not > 0.
+  std::optional<double> DefocusPerAperture(double reading_mm) const;
   // z' at a reading, mm; nothing where no depth has this blur.
   std::optional<double> EquivalentDepthMm(double reading_mm) const;
   // The reading with a given z'; nothing if no reading near the sweep has it.

@@ -73,8 +73,8 @@ class Conversion {
     FillPositions();
     AddFocalLength();
     AddContradictions();
+    AddPupilLaws();
     CompareGain();
-    CompareScale();
     SortAndAdvise(&result_);
     CheckDepth();
   }
@@ -122,6 +122,9 @@ class Conversion {
     equivalent_zero_mm_ =
         scale.done ? std::optional(model::Estimate{scale.offset_mm.value, scale.offset_mm.sigma})
                    : std::nullopt;
+    // Readings grow the other way than z' where D grows with them.
+    if (scale.change_over_sweep) scale.change_over_sweep->value *= -sign_;
+    if (scale.kind == ScaleKind::kInverseDepth) scale.kind = ScaleKind::kMovingFocus;
     if (!scale.done) return;
     scale.done = false;
     scale.kind = ScaleKind::kMovingFocus;
@@ -152,7 +155,6 @@ class Conversion {
   // ---- D and zf ----
   // xf for a zf of the equivalent sweep, mm.
   double DistanceOf(double equivalent_mm) const {
-    if (origin_.from_offset) return motion_.unit_mm() * motion_.unit_mm() / equivalent_mm;
     if (origin_.stated) return origin_.sensor_distance_mm.value;
     const auto reading = motion_.ReadingAt(equivalent_mm - equivalent_offset_mm_);
     return reading ? motion_.SensorDistanceMm(*reading) : motion_.SensorDistanceAtFocusMm();
@@ -169,8 +171,7 @@ class Conversion {
     xf_mm_.value = DistanceOf(zf);
     // The reading at focus and the statement each have an error.
     xf_mm_.sigma = slope * equivalent_focus_->sigma;
-    if (!origin_.from_offset)
-      xf_mm_.sigma = std::hypot(xf_mm_.sigma, origin_.sensor_distance_mm.sigma);
+    xf_mm_.sigma = std::hypot(xf_mm_.sigma, origin_.sensor_distance_mm.sigma);
     zf_mm_ = DepthOf(xf_mm_.value);
   }
 
@@ -178,7 +179,7 @@ class Conversion {
 
   // |dln(kappa)/dxf|: the growth of the blur gives kappa for an xf.
   double RatioPerDistance() const {
-    if (origin_.from_offset || sweep_.readings_are_focus_distances) return 0;
+    if (sweep_.readings_are_focus_distances) return 0;
     const double h = 1e-4 * (xf_mm_.value - lens_.rear_focal_length_mm);
     const FocusMotion above(sweep_, moves_, xf_mm_.value + h, motion_.focus_reading_mm());
     const FocusMotion below(sweep_, moves_, xf_mm_.value - h, motion_.focus_reading_mm());
@@ -245,7 +246,7 @@ class Conversion {
         (2 * h);
     kept.row(0) *= slope / own_slope;
     kept.col(0) *= slope / own_slope;
-    if (!origin_.from_offset) {
+    {
       const double variance_mm2 = std::pow(origin_.sensor_distance_mm.sigma, 2);
       const double by_ratio =
           result_.summary.blur_ratio ? result_.summary.blur_ratio->value * ratio_by_xf : 0;
@@ -279,7 +280,8 @@ class Conversion {
   // Frames whose z' is smaller have the sensor farther back and are focused nearer: the target is
   // beyond their plane of focus.
   void ConvertSides() {
-    std::swap(result_.diagnostics.nearer, result_.diagnostics.farther);
+    if (motion_.blur_per_scale() > 0)
+      std::swap(result_.diagnostics.nearer, result_.diagnostics.farther);
     for (SideFit* side : {&result_.diagnostics.nearer, &result_.diagnostics.farther}) {
       if (!side->done) continue;
       const double distance_mm = DistanceOf(side->focus_depth_mm.value);
@@ -311,7 +313,8 @@ class Conversion {
     for (ChannelFocus& channel : result_.diagnostics.channels) {
       if (channel.done) channel.focus_depth_mm = FocusBeside(channel.focus_depth_mm);
     }
-    const double depth_factor = motion_.ImageDifference() * DepthSlope();
+    // The image of a part that is sharpest at a larger z' lies nearer to the lens (FocusBeside).
+    const double depth_factor = -motion_.ImageDifference() * DepthSlope();
     for (auto* difference : {&field.curvature_mm, &field.astigmatism_mm}) {
       if (!*difference) continue;
       (*difference)->value *= depth_factor;
@@ -333,7 +336,9 @@ class Conversion {
   double DepthOfBlur(double reading_mm) const {
     const double m = model::MagnificationAtFocus(lens_, zf_mm_) * lens_.rear_focal_length_mm /
                      lens_.front_focal_length_mm;
-    const double inverse = 1 + motion_.DefocusPerAperture(reading_mm) / m;
+    const auto defocus = motion_.DefocusPerAperture(reading_mm);
+    if (!defocus) return 0;
+    const double inverse = 1 + *defocus / m;
     return inverse > 0 ? zf_mm_ / inverse : 0;
   }
 
@@ -386,8 +391,12 @@ class Conversion {
     result_.diagnostics.systematic_parts.push_back(std::move(part));
   }
 
+  static void Include(double move, Eigen::Vector2d* interval) {
+    *interval = {std::min(interval->x(), move), std::max(interval->y(), move)};
+  }
+
   // xf, zf and kappa with focal lengths at an end of their tolerance.
-  void Include(double factor, SystematicPart* part) const {
+  void IncludeStretched(double factor, SystematicPart* part) const {
     FocusSweep changed = sweep_;
     changed.camera.lens = Stretched(lens_, factor);
     const model::ThickLens& lens = changed.camera.lens;
@@ -396,21 +405,18 @@ class Conversion {
       xf_mm = SensorDistanceOf(lens, FocusReading());
     } else if (origin_.stated) {
       xf_mm = SensorDistanceOf(lens, model::FocusDepthOf(lens, *origin_.stated).value);
-    } else if (!origin_.from_offset && origin_.from == kFromScale) {
+    } else if (moves_ == model::SweepMotion::kLens && origin_.from == kFromScale) {
       const MovingScale again = FitAgain(lens);
       if (again.sensor_distance_mm) xf_mm = again.sensor_distance_mm->value;
     }
     if (!(xf_mm > lens.rear_focal_length_mm)) return;
     const FocusMotion other(changed, moves_, xf_mm, FocusReading());
     const FocusMotion own(sweep_, moves_, xf_mm_.value, FocusReading());
-    const auto widen = [](double move, Eigen::Vector2d* interval) {
-      *interval = {std::min(interval->x(), move), std::max(interval->y(), move)};
-    };
-    widen(other.FocusDepthMm() - zf_mm_, &part->focus_depth_mm);
-    widen(xf_mm - xf_mm_.value, &part->image_distance_mm);
+    Include(other.FocusDepthMm() - zf_mm_, &part->focus_depth_mm);
+    Include(xf_mm - xf_mm_.value, &part->image_distance_mm);
     if (result_.summary.blur_ratio) {
-      widen(result_.summary.blur_ratio->value * (own.BlurGrowth() / other.BlurGrowth() - 1),
-            &part->blur_ratio);
+      Include(result_.summary.blur_ratio->value * (own.BlurGrowth() / other.BlurGrowth() - 1),
+              &part->blur_ratio);
     }
   }
 
@@ -441,7 +447,7 @@ class Conversion {
                           100 * tolerance);
     for (const double factor : {1 - tolerance, 1 + tolerance}) {
       try {
-        Include(factor, &part);
+        IncludeStretched(factor, &part);
       } catch (const Error& impossible) {
         result_.summary.warnings.push_back(
             fmt::format("{}: an end of its tolerance is impossible, and the intervals do not "
@@ -501,25 +507,28 @@ class Conversion {
     Widen(std::move(part));
   }
 
-  // The image scale of a sensor that moves gives D at reading 0 apart from any statement. The zero
-  // of the equivalent target grows where D falls.
-  void CompareScale() {
-    if (!origin_.from_offset || origin_.from == kFromScale || !equivalent_zero_mm_) return;
-    const Eigen::Vector2d& laws_mm = result_.diagnostics.scale.offset_of_pupil_laws_mm;
-    const double apart_mm =
-        equivalent_offset_mm_ - std::clamp(equivalent_offset_mm_, laws_mm.x(), laws_mm.y());
-    const double bounds_mm = origin_.stated ? origin_.sigma_of_bounds_mm : 0;
-    const double sigma_mm = std::hypot(equivalent_zero_mm_->sigma, xf_mm_.sigma, bounds_mm);
-    constexpr double kSmallest = 1e-3;  // of xf
-    if (!(std::abs(apart_mm) > kDiffers * sigma_mm + kSmallest * xf_mm_.value)) return;
-    const double by_scale_mm = xf_mm_.value + apart_mm;
-    result_.summary.warnings.push_back(fmt::format(
-        "the image scale puts the sensor {:.5g} +- {:.2g} mm behind the lens at focus, {:+.3g} mm "
-        "from that by {}: one of them, the focal length, the unit of the readings or moves: {} is "
-        "wrong",
-        by_scale_mm, equivalent_zero_mm_->sigma, apart_mm, origin_.from,
-        model::SweepMotionName(moves_)));
-    AddContradiction(by_scale_mm + std::copysign(2 * equivalent_zero_mm_->sigma, apart_mm));
+  // The image scale measures from the centre of perspective, which depends on the light over the
+  // pupil.
+  void AddPupilLaws() {
+    if (origin_.pupil_interval_mm.isZero()) return;
+    SystematicPart part;
+    part.name = "light distribution over the pupil";
+    part.remedy =
+        "state focus_depth_mm, magnification or image_distance_mm: a distance from the image scale "
+        "depends on how the light is distributed over the pupil";
+    const FocusMotion own(sweep_, moves_, xf_mm_.value, FocusReading());
+    for (const double move_mm : {origin_.pupil_interval_mm.x(), origin_.pupil_interval_mm.y()}) {
+      const double distance_mm = xf_mm_.value + move_mm;
+      if (!(distance_mm > lens_.rear_focal_length_mm)) continue;
+      const FocusMotion other(sweep_, moves_, distance_mm, FocusReading());
+      Include(distance_mm - xf_mm_.value, &part.image_distance_mm);
+      Include(other.FocusDepthMm() - zf_mm_, &part.focus_depth_mm);
+      if (result_.summary.blur_ratio) {
+        Include(result_.summary.blur_ratio->value * (own.BlurGrowth() / other.BlurGrowth() - 1),
+                &part.blur_ratio);
+      }
+    }
+    Widen(std::move(part));
   }
 
   // d1 and kappa may be known well where zf is not: near infinity zf grows without bound.

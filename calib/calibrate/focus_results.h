@@ -1,6 +1,7 @@
 #ifndef THICKLENS_CALIB_CALIBRATE_FOCUS_RESULTS_H_
 #define THICKLENS_CALIB_CALIBRATE_FOCUS_RESULTS_H_
 
+#include <Eigen/Core>
 #include <optional>
 #include <string>
 #include <vector>
@@ -20,9 +21,8 @@ struct FocusOrigin {
   std::string from;  // bench_offset_from
   std::optional<model::StatedConjugate> stated;
   model::Estimate sensor_distance_mm;  // xf by that source, mm from the rear principal plane
-  double sigma_of_bounds_mm = 0;       // its further error by the tolerance of the focal lengths
-  // True: the zf of the equivalent sweep gives xf. False: xf is sensor_distance_mm.
-  bool from_offset = false;
+  // By how much the light distribution over the pupil may move xf, mm.
+  Eigen::Vector2d pupil_interval_mm{0, 0};
   MovingScale scale;
   std::vector<double> contradicting_mm;  // xf by the sources that contradict it
 };

@@ -323,12 +323,12 @@ class Solution {
     // An uncertain bench offset makes the ratio uncertain, which is then no contradiction.
     const double reach = kKnownSigmas * kappa_sigma;
     if (!(kappa + reach >= kSmallestRatio && kappa - reach <= kLargestRatio)) {
-      Refuse(fmt::format(
-          "the blur ratio would have to be {:.{}f}, which no lens has ({} to {}): "
-          "check {}the unit of the readings, and that the {} moved and not {}",
-          kappa, kappa < 0.1 ? 4 : 2, kSmallestRatio, kLargestRatio, NumbersOfRatio(),
-          motion_ == nullptr ? "target" : model::SweepMotionName(*sweep_.moves),
-          motion_ == nullptr ? "the lens" : "the target"));
+      Refuse(
+          fmt::format("the blur ratio would have to be {:.{}f}, which no lens has ({} to {}): "
+                      "check {}the unit of the readings, and that the {} moved and not {}",
+                      kappa, kappa < 0.1 ? 4 : 2, kSmallestRatio, kLargestRatio, NumbersOfRatio(),
+                      motion_ == nullptr ? "target" : model::SweepMotionName(*sweep_.moves),
+                      motion_ == nullptr ? "the lens" : "the target"));
       return false;
     }
     if (!(kappa + reach >= kLowRatio && kappa - reach <= kHighRatio)) {

@@ -4,25 +4,33 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <utility>
 
 #include "calib/calibrate/focus_results.h"
 #include "calib/calibrate/zero_choice.h"
+#include "calib/fit/blur_measurement.h"
 #include "calib/fit/known_focus.h"
 #include "calib/registration/moving_scale.h"
+#include "calib/registration/scale_tracking.h"
 #include "calib/uncertainty/systematic_advice.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/statistics.h"
+#include "thicklens/model/pupil_law.h"
 
 namespace thicklens::calib {
 namespace {
 
-constexpr double kWrongWay = 5;        // standard deviations of the scale's slope
-constexpr double kPartOfStep = 0.2;    // of the readings, by which the reading at focus may be off
+constexpr double kWrongWay = 5;      // standard deviations of the scale's slope
+constexpr double kPartOfStep = 0.2;  // of the readings, by which the reading at focus may be off
 constexpr double kMinGrowth = 0.02;  // A below which the blur of a lens at 1:1 does not change
-constexpr double kGainDiffers = 3;     // standard deviations
+constexpr double kGainDiffers = 3;   // standard deviations
+constexpr double kScaleMustBeBetter = 2;  // than a statement, as a ratio of errors
+constexpr std::size_t kMinScales = 5;
+constexpr double kReach = 2;             // standard deviations of the other side of a contradiction
+constexpr double kPartOfSigma = 0.05;    // of the scale's zero that is left
 constexpr double kNearestFocus = 1.001;  // of f2: a nearer sensor has no object in focus
 
 // A value of xf and its source.
@@ -42,6 +50,15 @@ class MovingFocus {
         target_(target) {}
 
   Calibration Run() {
+    const auto begin = std::chrono::steady_clock::now();
+    Calibration found = Solve();
+    found.summary.seconds =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    return found;
+  }
+
+ private:
+  Calibration Solve() {
     preview_ = target_.preview(sweep_);
     if (!preview_.passed) return Finished(std::move(preview_.found));
     focus_reading_mm_ = SharpestReadingMm();
@@ -52,7 +69,7 @@ class MovingFocus {
       if (const auto reason = ReasonAgainst(motion)) return Refused(*reason);
       Calibration found = target_.run(EquivalentSweep(motion), motion);
       const auto reading_mm = FocusReading(found, motion);
-      const bool is_last = round + 1 == kRounds || IsSolvedByOffset();
+      const bool is_last = round + 1 == kRounds;
       if (!reading_mm || is_last || std::abs(*reading_mm - focus_reading_mm_) < PartOfStepMm())
         return Converted(std::move(found), motion);
       MoveFocusTo(*reading_mm);
@@ -60,7 +77,6 @@ class MovingFocus {
     return Refused("the reading at focus was not found");
   }
 
- private:
   Calibration Finished(Calibration found) const {
     found.diagnostics.moves = moves_;
     return found;
@@ -85,11 +101,6 @@ class MovingFocus {
       readings.push_back(frame.reading_mm);
     const auto [low, high] = std::minmax_element(readings.begin(), readings.end());
     return kPartOfStep * (*high - *low) / static_cast<double>(readings.size());
-  }
-
-  // Whether the calibration of the equivalent target finds xf itself: its bench offset is D.
-  bool IsSolvedByOffset() const {
-    return moves_ == model::SweepMotion::kSensor && !sweep_.readings_are_focus_distances;
   }
 
   // A stated xf stays; that of an offset moves with the reading at focus.
@@ -151,17 +162,15 @@ class MovingFocus {
            kFromOffset,
            std::nullopt});
     }
-    // If the sensor moves, the equivalent target is compared with its image scale, whose error is
-    // known better there.
-    if (scale_.sensor_distance_mm && (known.empty() || moves_ == model::SweepMotion::kLens))
-      known.push_back({*scale_.sensor_distance_mm, kFromScale, std::nullopt});
-    const auto error_mm = [&](const Focus& focus) {
-      return focus.stated ? std::hypot(focus.distance_mm.sigma, ErrorByFocalLength(*focus.stated))
-                          : focus.distance_mm.sigma;
-    };
+    if (const auto by_scale = FocusOfScale()) known.push_back(*by_scale);
+    // A statement is preferred unless the image scale is clearly better.
     const auto best =
-        std::min_element(known.begin(), known.end(),
-                         [&](const Focus& a, const Focus& b) { return error_mm(a) < error_mm(b); });
+        std::min_element(known.begin(), known.end(), [&](const Focus& a, const Focus& b) {
+          const auto cost = [&](const Focus& focus) {
+            return (focus.from == kFromScale ? kScaleMustBeBetter : 1) * ErrorMm(focus);
+          };
+          return cost(a) < cost(b);
+        });
     if (best == known.end()) return ReasonOfUnknownFocus();
     focus_ = *best;
     if (!(focus_.distance_mm.value > kNearestFocus * lens_.rear_focal_length_mm))
@@ -173,27 +182,36 @@ class MovingFocus {
   }
 
   std::optional<std::string> FocusOfDistances() {
-    if (!(focus_reading_mm_ > kNearestFocus * lens_.front_focal_length_mm)) {
+    for (const model::SweepFrame& frame : sweep_.frames) {
+      if (frame.reading_mm > kNearestFocus * lens_.front_focal_length_mm) continue;
       return fmt::format(
-          "the sharpest frame is focused on {:.4g} mm ({:.4g} dpt), nearer than the focal length "
-          "({:.4g} mm): check the unit of the readings and the focal length",
-          focus_reading_mm_, kMmPerMetre / focus_reading_mm_, lens_.front_focal_length_mm);
+          "{} is focused on {:.4g} mm ({:.4g} dpt), nearer than the focal length ({:.4g} mm): "
+          "check "
+          "the unit of the readings and the focal length",
+          frame.Name(), frame.reading_mm, kMmPerMetre / frame.reading_mm,
+          lens_.front_focal_length_mm);
     }
     focus_.distance_mm = {SensorDistanceOf(lens_, focus_reading_mm_), 0};
     focus_.from = kFromDioptres;
+    // The dioptres of a drive are nominal; a statement beside them is only compared.
+    for (const model::StatedConjugate& stated : Statements())
+      Compare({SensorDistanceOfStatement(stated), stated.name, stated});
     return std::nullopt;
   }
 
   std::optional<std::string> ReasonOfUnknownFocus() const {
+    const bool is_scale_open = preview_.samples.size() >= kMinScales;
     return fmt::format(
         "nothing determines the distance from the lens to the sensor, on which d1, zf and kappa "
         "depend: {}. State one of: focus_depth_mm (the distance of the target from the aperture), "
         "magnification, target_period_mm (with a grid or ruler of that period in view), "
         "image_distance_mm (at the reading at focus), or offset_mm (d1 at reading 0)",
-        moves_ == model::SweepMotion::kLens
+        !is_scale_open ? "the image scale could be measured on too few frames"
+        : moves_ == model::SweepMotion::kLens
             ? "where the lens moves, the image scale changes by the same share per mm for any "
               "distance (1/f), and this sweep is too short for the small difference"
-            : "the image scale changes too little over this sweep");
+            : "the image scale changes too little over this sweep, or not as that of a sensor "
+              "behind a lens of this focal length");
   }
 
   std::optional<std::string> ReasonOfImpossibleFocus() const {
@@ -205,22 +223,65 @@ class MovingFocus {
         lens_.rear_focal_length_mm, focus_.from);
   }
 
+  // The error of a source with that of the focal lengths.
+  double ErrorMm(const Focus& focus) const {
+    return focus.stated ? std::hypot(focus.distance_mm.sigma, ErrorByFocalLength(*focus.stated))
+                        : focus.distance_mm.sigma;
+  }
+
+  // xf by the image scale. The scale of a sensor that moves is that of the equivalent target, whose
+  // zero is by how much the assumed xf is too small; xf is found when the zero is 0.
+  std::optional<Focus> FocusOfScale() {
+    if (!scale_.sensor_distance_mm) return std::nullopt;
+    Focus focus{*scale_.sensor_distance_mm, kFromScale, std::nullopt};
+    if (moves_ == model::SweepMotion::kLens) return focus;
+    constexpr int kRounds = 4;
+    for (int round = 0; round < kRounds; ++round) {
+      if (!(focus.distance_mm.value > kNearestFocus * lens_.rear_focal_length_mm)) return focus;
+      const FocusMotion motion(sweep_, moves_, focus.distance_mm.value, focus_reading_mm_);
+      std::vector<ScaleSample> samples;
+      for (ScaleSample sample : preview_.samples) {
+        const auto depth_mm = motion.EquivalentDepthMm(sample.reading_mm);
+        if (!depth_mm) continue;
+        sample.reading_mm = *depth_mm;
+        samples.push_back(sample);
+      }
+      const ScaleModel law =
+          FitScaleModel(samples, static_cast<int>(preview_.reference), sweep_.reading_sigma_mm,
+                        model::BenchDirection::kAway, RegionCornerRadiusPx(sweep_));
+      if (!law.done) return round == 0 ? std::nullopt : std::optional(focus);
+      Eigen::Vector2d zeros_mm(0, 0);
+      double zero_mm = 0;
+      for (const model::PupilLaw pupil : model::AllPupilLaws()) {
+        const double at_mm =
+            law.offset_mm.value +
+            motion.EquivalentCentreMm(model::CentreOfPerspectiveMm(
+                lens_, sweep_.camera.psf, pupil, kDefaultRatio, motion.FocusDepthMm()));
+        const bool is_first = pupil == model::AllPupilLaws().front();
+        zeros_mm = {is_first ? at_mm : std::min(zeros_mm.x(), at_mm),
+                    is_first ? at_mm : std::max(zeros_mm.y(), at_mm)};
+        if (pupil == model::PupilLaw::kPaper) zero_mm = at_mm;
+      }
+      focus.distance_mm = {focus.distance_mm.value + zero_mm, law.offset_mm.sigma};
+      pupil_interval_mm_ = zeros_mm.array() - zero_mm;
+      if (std::abs(zero_mm) < kPartOfSigma * law.offset_mm.sigma) break;
+    }
+    return focus;
+  }
+
   // A statement that contradicts the one that is used, beyond the errors of both.
   void Compare(const Focus& other) {
-    const auto error_mm = [&](const Focus& focus) {
-      return focus.stated ? std::hypot(focus.distance_mm.sigma, ErrorByFocalLength(*focus.stated))
-                          : focus.distance_mm.sigma;
-    };
     const double apart_mm = other.distance_mm.value - focus_.distance_mm.value;
-    const double both_mm = std::hypot(error_mm(other), error_mm(focus_));
+    const double both_mm = std::hypot(ErrorMm(other), ErrorMm(focus_));
     constexpr double kSmallest = 1e-3;  // of xf
     if (!(std::abs(apart_mm) > kGainDiffers * both_mm + kSmallest * focus_.distance_mm.value))
       return;
-    contradictions_.push_back(other.distance_mm.value);
+    contradictions_.push_back(other.distance_mm.value +
+                              std::copysign(kReach * other.distance_mm.sigma, apart_mm));
     warnings_.push_back(fmt::format(
         "{} puts the sensor {:.5g} +- {:.2g} mm behind the lens at focus, {:+.3g} mm from that by "
         "{}: one of them, the focal length, the unit of the readings or moves: {} is wrong",
-        other.from, other.distance_mm.value, error_mm(other), apart_mm, focus_.from,
+        other.from, other.distance_mm.value, ErrorMm(other), apart_mm, focus_.from,
         model::SweepMotionName(moves_)));
   }
 
@@ -252,18 +313,8 @@ class MovingFocus {
     equivalent.readings_are_focus_distances = false;
     equivalent.stated_focus.clear();
     equivalent.target_period_mm.reset();
-    equivalent.offset_mm.reset();
-    if (!IsSolvedByOffset()) {
-      // z' does not depend on xf to first order: its zero is exact, and xf is known apart from it.
-      equivalent.offset_mm = model::Estimate{0, 0};
-    } else if (focus_.stated) {
-      equivalent.stated_focus.push_back({model::ConjugateKind::kFocusDepth,
-                                         {motion.unit_mm(), focus_.distance_mm.sigma},
-                                         focus_.stated->name,
-                                         ErrorByFocalLength(*focus_.stated)});
-    } else if (focus_.from == kFromOffset) {
-      equivalent.offset_mm = model::Estimate{0, focus_.distance_mm.sigma};
-    }
+    // z' does not depend on xf to first order: its zero is exact, and xf is known apart from it.
+    equivalent.offset_mm = model::Estimate{0, 0};
     for (model::SweepFrame& frame : equivalent.frames) {
       const auto depth_mm = motion.EquivalentDepthMm(frame.reading_mm);
       // A frame whose blur is beyond that of any depth is as far away as a depth can be.
@@ -284,11 +335,8 @@ class MovingFocus {
     FocusOrigin origin;
     origin.from = focus_.from;
     origin.stated = focus_.stated;
-    if (focus_.stated) origin.sigma_of_bounds_mm = ErrorByFocalLength(*focus_.stated);
+    if (focus_.from == kFromScale) origin.pupil_interval_mm = pupil_interval_mm_;
     origin.sensor_distance_mm = focus_.distance_mm;
-    origin.from_offset = IsSolvedByOffset();
-    if (IsSolvedByOffset() && !found.diagnostics.bench_offset_from.empty())
-      origin.from = found.diagnostics.bench_offset_from;
     origin.scale = scale_;
     origin.contradicting_mm = contradictions_;
     ConvertResults(sweep_, moves_, motion, origin, &found);
@@ -311,6 +359,7 @@ class MovingFocus {
   MovingScale scale_;
   std::vector<std::string> warnings_;
   std::vector<double> contradictions_;
+  Eigen::Vector2d pupil_interval_mm_{0, 0};
 };
 
 }  // namespace

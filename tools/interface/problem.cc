@@ -127,7 +127,7 @@ void CheckExif(const PhotoFile& photo, const Camera& camera, const PhotoSize& si
                   photo.name, NameOf(camera), contradictions, run->Option("exif")));
 }
 
-// The position of the lens that the metadata of the photograph state, dpt.
+// The position of the lens that the metadata of the photograph state in dioptres.
 std::optional<double> DioptresOfFile(const PhotoFile& photo, std::string* from) {
   if (photo.path.empty()) return std::nullopt;
   constexpr double kMmPerMetre = 1000;
@@ -135,7 +135,8 @@ std::optional<double> DioptresOfFile(const PhotoFile& photo, std::string* from) 
     model::ReadingOptions options;
     options.source = "exif";
     const model::ReadingSet found = io::ReadReadings("", {photo.path}, options);
-    if (found.rows.empty() || !(found.rows.front().reading_mm > 0)) return std::nullopt;
+    // A focus distance in m is too coarse, and a position without a unit may be a count.
+    if (!found.in_dioptres || found.rows.empty()) return std::nullopt;
     *from = found.description;
     return kMmPerMetre / found.rows.front().reading_mm;
   } catch (const Error&) {
@@ -146,12 +147,14 @@ std::optional<double> DioptresOfFile(const PhotoFile& photo, std::string* from) 
 // The camera with d1 of the position at which its lens was.
 Camera AtLensPosition(const PhotoFile& photo, Camera camera, const EstimateOptions& options,
                       RunScope* run) {
-  const bool has_positions = camera.calibration && camera.calibration->focus_positions;
+  const bool has_positions = camera.calibration && camera.calibration->focus_positions &&
+                             camera.calibration->image_distance_mm;
   if (!has_positions) {
     if (options.lens_position) {
       throw OptionError("lens_position",
-                        fmt::format("{}: {} has no calibration.focus_positions; calibrate writes "
-                                    "them from a sweep in which the lens or the sensor moves",
+                        fmt::format("{}: {} has no calibration.focus_positions with "
+                                    "image_distance_mm; calibrate writes them from a sweep in "
+                                    "which the lens or the sensor moves",
                                     run->Option("lens_position"), NameOf(camera)));
     }
     return camera;

@@ -112,8 +112,8 @@ TEST(FocusMotion, OfFocusDistancesFollowsTheLensEquation) {
   for (const double dioptres : {2.5, 5.0, 6.2, 9.0}) {
     const double focused_mm = 1000 / dioptres;
     const double sensor = 1 / (1 / 4.74 - dioptres / 1000), image = 1 / (1 / 4.74 - 1 / zf);
-    EXPECT_NEAR(std::abs(motion.DefocusPerAperture(focused_mm)), std::abs(sensor - image) / image,
-                1e-12);
+    EXPECT_NEAR(std::abs(motion.DefocusPerAperture(focused_mm).value()),
+                std::abs(sensor - image) / image, 1e-12);
     EXPECT_NEAR(motion.SensorDistanceMm(focused_mm), sensor, 1e-12);
     EXPECT_NEAR(*motion.ReadingAt(*motion.EquivalentDepthMm(focused_mm)), focused_mm, 1e-5);
   }

@@ -128,6 +128,7 @@ SimulatedSweep FocusRing() {
 
 TEST(Reason, ALensThatMovesIsNamedAndNotTheDirectionOrTheUnit) {
   SimulatedSweep s = FocusRing();
+  s.sweep.moves = model::SweepMotion::kTarget;  // otherwise it is taken as a sensor that moves
   for (const auto direction : {model::BenchDirection::kAway, model::BenchDirection::kToward}) {
     s.sweep.direction = direction;
     const Calibration c = CalibrateWithoutMap(s);

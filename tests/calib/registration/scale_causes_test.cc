@@ -160,7 +160,7 @@ TEST(ScaleCauses, LensAndTargetAreBothNamedWhereTheyLookAlike) {
   const auto samples = MovingTarget(&sweep, 100, 0.8, [](double z) { return 500 - z; });
   EXPECT_THAT(ReasonOf(samples, sweep),
               AllOf(HasSubstr("direction must be 'toward'"), HasSubstr("or the lens"),
-                    HasSubstr("do not distinguish these causes: check what moved")));
+                    HasSubstr("do not distinguish these causes: state what moved")));
 }
 
 TEST(ScaleCauses, ALensThatMovesIsNamedWhicheverDirectionIsStated) {
@@ -202,7 +202,7 @@ TEST(ScaleCauses, ACauseThatUnitAndLensExplainAlikeIsLeftOpen) {
     EXPECT_THAT(ReasonOf(samples, sweep),
                 AllOf(StartsWith("either the image scale follows the lens"),
                       HasSubstr("; or the target moves"), HasSubstr("readings in centimetres"),
-                      HasSubstr("do not distinguish these causes: check what moved")));
+                      HasSubstr("do not distinguish these causes: state what moved")));
   }
 }
 
