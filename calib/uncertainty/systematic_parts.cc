@@ -130,11 +130,17 @@ class Parts {
     const double apart_mm = nearer.focus_depth_mm.value - farther.focus_depth_mm.value;
     const double sigma_mm = std::hypot(nearer.focus_depth_mm.sigma, farther.focus_depth_mm.sigma);
     if (!(std::abs(apart_mm) > kSidesDisagree * sigma_mm)) return;
-    result_.summary.warnings.push_back(fmt::format(
-        "the two sides of focus disagree: the nearer frames alone give {:.2f} +- {:.2g} mm, "
-        "the farther ones {:.2f} +- {:.2g} mm",
-        nearer.focus_depth_mm.value, nearer.focus_depth_mm.sigma, farther.focus_depth_mm.value,
-        farther.focus_depth_mm.sigma));
+    // Where the lens or the sensor moves, these depths are those of the equivalent target.
+    result_.summary.warnings.push_back(
+        sweep_.moves && model::MovesFocus(*sweep_.moves)
+            ? fmt::format("the two sides of focus disagree: their readings at focus differ by "
+                          "{:.2g} +- {:.2g} mm",
+                          std::abs(apart_mm), sigma_mm)
+            : fmt::format("the two sides of focus disagree: the nearer frames alone give {:.2f} +- "
+                          "{:.2g} mm, "
+                          "the farther ones {:.2f} +- {:.2g} mm",
+                          nearer.focus_depth_mm.value, nearer.focus_depth_mm.sigma,
+                          farther.focus_depth_mm.value, farther.focus_depth_mm.sigma));
     SystematicPart part;
     part.name = "side of focus";
     part.remedy =

@@ -67,7 +67,7 @@ class Finder {
     for (const TableRow& row : table_.rows) {
       if (row.line <= found_.header.line || found_.reading >= row.cells.size()) continue;
       const auto value = ToNumber(row.cells[found_.reading], '.');
-      if (!value || !(*value > 0 && *value <= kMaxDioptres)) return false;
+      if (!value || !(*value >= 0 && *value <= kMaxDioptres)) return false;
       has_fraction = has_fraction || *value != std::floor(*value);
     }
     return has_fraction;

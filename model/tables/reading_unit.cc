@@ -205,8 +205,10 @@ double ReadingInMm(double value, const std::string& stated, const ReadingOptions
   if (unit->kind == Kind::kLength) return value * unit->mm_per_unit;
   constexpr double kMmPerMetre = 1000;
   if (!(value > 0)) {
-    throw Error(fmt::format("{}{} dpt: a reading in dioptres must be above 0 (0 is infinity)",
-                            place, value));
+    throw Error(
+        fmt::format("{}{} dpt: a reading in dioptres must be above 0 (0 is infinity: leave "
+                    "that frame out)",
+                    place, value));
   }
   return kMmPerMetre / value;
 }

@@ -26,7 +26,8 @@ using testing::SweepCase;
 // the focus.
 SimulatedSweep MovingSweep(SweepMotion moves, double focus_mm, double step_mm,
                            std::uint64_t seed = 1,
-                           model::BenchDirection direction = model::BenchDirection::kAway) {
+                           model::BenchDirection direction = model::BenchDirection::kAway,
+                           double tilt_deg = 0) {
   model::SweepSimulationOptions options = SweepCase("ii", 384, seed);
   options.camera.lens = {50, 50, 4, 8.9286};
   options.camera.sensor.pixel_pitch_mm = 0.0045;
@@ -38,6 +39,7 @@ SimulatedSweep MovingSweep(SweepMotion moves, double focus_mm, double step_mm,
   options.step_mm = step_mm;
   options.bench_offset_mm = d1_mm - 3;
   options.direction = direction;
+  options.target.tilt_deg = tilt_deg;
   options.reading_sigma_mm = 0.02 * step_mm;
   options.lamp_falloff = false;
   options.bits = 16;
@@ -229,6 +231,34 @@ TEST(MovingFocus, DepthsOfFramesAreThoseOfTheirBlur) {
                            camera.sensor.pixel_pitch_mm;
     EXPECT_NEAR(std::hypot(sweep.truth.blur_floor_px, blur_px), sweep.truth.frames[i].blur_sigma_px,
                 0.15);
+  }
+}
+
+// A tilted target is tilted by the same angle, whatever moves.
+TEST(MovingFocus, GivesTheTiltOfTheTarget) {
+  for (const SweepMotion moves : {SweepMotion::kSensor, SweepMotion::kLens}) {
+    SimulatedSweep sweep = MovingSweep(moves, 300, 0.05, 3, model::BenchDirection::kAway, 8);
+    sweep.sweep.stated_focus = {{model::ConjugateKind::kFocusDepth, {300, 0.3}, "focus_depth_mm"}};
+    const Calibration c = Calibrate(sweep.sweep, CalibrationOptions{});
+    ASSERT_TRUE(c.diagnostics.field.tilt_right_deg) << c.summary.reason;
+    EXPECT_NEAR(c.diagnostics.field.tilt_right_deg->value, 8,
+                4 * c.diagnostics.field.tilt_right_deg->sigma + 0.8);
+  }
+}
+
+// An image distance that is wrong is contradicted by the scale on the right side.
+TEST(MovingFocus, OfTheSensorIsComparedWithTheScale) {
+  SimulatedSweep sweep = MovingSweep(SweepMotion::kSensor, 300, 0.05);
+  const double d1_mm = sweep.truth.image_distance_mm;
+  for (const double off_mm : {-3.0, 3.0}) {
+    sweep.sweep.stated_focus = {
+        {model::ConjugateKind::kImageDistance, {d1_mm + off_mm, 0.05}, "image_distance_mm"}};
+    const Calibration c = CalibrateWithoutMap(sweep);
+    ASSERT_NE(c.summary.outcome, Outcome::kRefused) << c.summary.reason;
+    EXPECT_THAT(c.summary.warnings, Contains(HasSubstr("the image scale puts the sensor")));
+    const Eigen::Vector2d interval = *c.summary.image_distance_mm->systematic;
+    EXPECT_LE(interval.x(), d1_mm);
+    EXPECT_GE(interval.y(), d1_mm);
   }
 }
 

@@ -60,7 +60,7 @@ struct EstimateOptions {
   std::optional<SensorOrigin> sensor_origin;  // needs a camera; 0 to 100000 px
   // Position of the lens when the photograph was taken, in the unit of the camera's
   // calibration.focus_positions, which give d1 of it. Absent: the one that the photograph's
-  // metadata state in dioptres or as a focus distance, otherwise that of the calibration.
+  // metadata state in dioptres, otherwise that of the calibration.
   std::optional<double> lens_position;
   ExifCheck exif = ExifCheck::kRequire;  // what a contradiction does
   ApertureOptions aperture;              // weights of the views
