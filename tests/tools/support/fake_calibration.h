@@ -150,7 +150,11 @@ inline MadeUpCalibration MakeUpCalibration(int frame_count, double first_depth_m
 
   const double k_mm = 12.5 * kFocusMm / (kFocusMm - 12.5);
   const double d1_mm = 3.0 + 12.8 * kFocusMm / (kFocusMm - 12.5);
-  made.truth = {d1_mm, kFocusMm, kKappa, kFloorPx, kOffsetMm, 0, {}, {}, {}};
+  made.truth.image_distance_mm = d1_mm;
+  made.truth.focus_depth_mm = kFocusMm;
+  made.truth.blur_ratio = kKappa;
+  made.truth.blur_floor_px = kFloorPx;
+  made.truth.bench_offset_mm = kOffsetMm;
 
   std::mt19937 generator(7);
   std::normal_distribution<double> normal;
