@@ -21,7 +21,7 @@ struct FocusOrigin {
   std::string from;  // bench_offset_from
   std::optional<model::StatedConjugate> stated;
   model::Estimate sensor_distance_mm;  // xf by that source, mm from the rear principal plane
-  // By how much the light distribution over the pupil may move xf, mm.
+  // Interval by which the light distribution over the pupil may move xf, mm.
   Eigen::Vector2d pupil_interval_mm{0, 0};
   MovingScale scale;
   std::vector<double> contradicting_mm;  // xf by the sources that contradict it

@@ -16,8 +16,8 @@ namespace {
 
 constexpr std::size_t kMinSamples = 5;
 constexpr double kCauchyWidth = 3;
-constexpr double kScaleBias = 3e-5;          // common error of the registrations (image_scale.h)
-constexpr double kKnown = 3;                 // standard deviations
+constexpr double kScaleBias = 3e-5;        // common error of the registrations (image_scale.h)
+constexpr double kKnown = 3;               // standard deviations
 constexpr double kMinInformation = 1e-10;  // of a parameter alone
 
 // ln(scale) of a frame against the law, in standard deviations. The parameters are ln(a) and

@@ -343,7 +343,7 @@ TEST_F(SweepInputTest, MissingTolerancesAreReportedUnlessTheTruthIsKnown) {
   EXPECT_EQ(reported(), 1);
   folder_.Put("camera.yaml", with_pitch("{value: 0.005, tolerance: 0.00001}"));
   EXPECT_EQ(reported(), 0);
-  // What is assumed of the magnification is told unless it is stated or measured.
+  // A notice states the assumed tolerance of the magnification unless it is stated or measured.
   const auto tells = [&](const std::string& words) {
     const thicklens::Sweep input = ReadSweepInput(arguments_);
     return std::any_of(input.notices.begin(), input.notices.end(), [&](const std::string& line) {
