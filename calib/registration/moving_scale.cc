@@ -16,9 +16,10 @@ namespace {
 
 constexpr std::size_t kMinSamples = 5;
 constexpr double kCauchyWidth = 3;
-constexpr double kScaleBias = 3e-5;        // common error of the registrations (image_scale.h)
-constexpr double kKnown = 3;               // standard deviations
-constexpr double kMinInformation = 1e-10;  // of a parameter alone
+constexpr double kScaleBias = 3e-5;  // common error of the registrations (image_scale.h)
+constexpr double kKnown = 3;         // standard deviations
+constexpr double kMinBeyond = 1e-6, kMaxBeyond = 1e4;  // of xf - f2, relative to f2
+constexpr double kMinInformation = 1e-10;              // of a parameter alone
 
 // ln(scale) of a frame against the law, in standard deviations. The parameters are ln(a) and
 // ln(xf - f2), so that xf stays behind the focal point.
@@ -118,6 +119,11 @@ class MovingScaleFit {
           new ceres::AutoDiffCostFunction<ScaleResidual, 1, 1, 1>(new ScaleResidual(row)),
           new ceres::CauchyLoss(kCauchyWidth), log_a, log_beyond);
     }
+    // Beyond these, the scale is that of the middle within any error, and the numbers overflow.
+    problem.SetParameterLowerBound(log_beyond, 0,
+                                   std::log(kMinBeyond * lens_.rear_focal_length_mm));
+    problem.SetParameterUpperBound(log_beyond, 0,
+                                   std::log(kMaxBeyond * lens_.rear_focal_length_mm));
     ceres::Solver::Options options;
     options.logging_type = ceres::SILENT;
     options.num_threads = 1;
