@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <memory>
 #include <string>
@@ -39,8 +40,13 @@ double OffInSigmas(const nlohmann::json& summary, const char* name, double truth
     to = std::max(to, found["systematic"].at(1).get<double>());
   }
   const auto sigma = found["sigma"].get<double>();
-  if (!(sigma > 0)) throw Error(fmt::format("{} has a standard error of {:g}", name, sigma));
-  return std::max({0.0, from - truth, truth - to}) / sigma;
+  const double beyond = std::max({0.0, from - truth, truth - to});
+  // A tolerance alone gives an interval and no standard error.
+  if (!(sigma > 0)) {
+    if (!(to > from)) throw Error(fmt::format("{} has a standard error of {:g}", name, sigma));
+    return beyond > 0 ? std::numeric_limits<double>::infinity() : 0;
+  }
+  return beyond / sigma;
 }
 
 }  // namespace
