@@ -7,6 +7,7 @@
 
 #include "calib/calibrate/focus_solution.h"
 #include "calib/fit/known_focus.h"
+#include "calib/registration/moving_scale.h"
 #include "calib/uncertainty/systematic_advice.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/pi.h"
@@ -14,16 +15,8 @@
 namespace thicklens::calib {
 namespace {
 
-constexpr char kFocalLength[] = "lens.front_focal_length_mm";
 constexpr double kMmPerMetre = 1000;
 constexpr double kDiffers = 3;  // standard deviations
-
-model::ThickLens Stretched(const model::ThickLens& lens, double factor) {
-  model::ThickLens stretched = lens;
-  stretched.front_focal_length_mm *= factor;
-  stretched.rear_focal_length_mm *= factor;
-  return stretched;
-}
 
 Eigen::Vector2d Around(double value, double a, double b) {
   return {std::min({0.0, a - value, b - value}), std::max({0.0, a - value, b - value})};
@@ -177,7 +170,7 @@ class Conversion {
 
   double DepthSlope() const { return 1 / std::abs(model::ImageDistanceSlope(lens_, zf_mm_)); }
 
-  // |dln(kappa)/dxf|: the growth of the blur gives kappa for an xf.
+  // dln(kappa)/dxf: the growth of the blur gives kappa for an xf.
   double RatioPerDistance() const {
     if (sweep_.readings_are_focus_distances) return 0;
     const double h = 1e-4 * (xf_mm_.value - lens_.rear_focal_length_mm);
@@ -246,15 +239,13 @@ class Conversion {
         (2 * h);
     kept.row(0) *= slope / own_slope;
     kept.col(0) *= slope / own_slope;
-    {
-      const double variance_mm2 = std::pow(origin_.sensor_distance_mm.sigma, 2);
-      const double by_ratio =
-          result_.summary.blur_ratio ? result_.summary.blur_ratio->value * ratio_by_xf : 0;
-      kept(0, 0) += variance_mm2;
-      kept(0, 1) += by_ratio * variance_mm2;
-      kept(1, 0) += by_ratio * variance_mm2;
-      kept(1, 1) += by_ratio * by_ratio * variance_mm2;
-    }
+    const double variance_mm2 = std::pow(origin_.sensor_distance_mm.sigma, 2);
+    const double by_ratio =
+        result_.summary.blur_ratio ? result_.summary.blur_ratio->value * ratio_by_xf : 0;
+    kept(0, 0) += variance_mm2;
+    kept(0, 1) += by_ratio * variance_mm2;
+    kept(1, 0) += by_ratio * variance_mm2;
+    kept(1, 1) += by_ratio * by_ratio * variance_mm2;
     covariance = kept;
   }
 
@@ -439,11 +430,11 @@ class Conversion {
     const double tolerance = FocalLengthTolerance(sweep_.camera);
     if (!(tolerance > 0)) return;
     SystematicPart part;
-    part.name = kFocalLength;
+    part.name = kFrontFocalLength;
     part.remedy =
         StatesFocalLength(sweep_.camera)
-            ? fmt::format("measure {} better than +- {:.3g} %", kFocalLength, 100 * tolerance)
-            : fmt::format("state the tolerance of {} ({:.0f} % is assumed)", kFocalLength,
+            ? fmt::format("measure {} better than +- {:.3g} %", kFrontFocalLength, 100 * tolerance)
+            : fmt::format("state the tolerance of {} ({:.0f} % is assumed)", kFrontFocalLength,
                           100 * tolerance);
     for (const double factor : {1 - tolerance, 1 + tolerance}) {
       try {
@@ -452,7 +443,7 @@ class Conversion {
         result_.summary.warnings.push_back(
             fmt::format("{}: an end of its tolerance is impossible, and the intervals do not "
                         "include it ({})",
-                        kFocalLength, impossible.what()));
+                        kFrontFocalLength, impossible.what()));
       }
     }
     Widen(std::move(part));

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "calib/calibrate/focus_motion.h"
-#include "calib/registration/moving_scale.h"
 #include "thicklens/calib/calibration.h"
 #include "thicklens/model/conjugates.h"
 
@@ -23,7 +22,6 @@ struct FocusOrigin {
   model::Estimate sensor_distance_mm;  // xf by that source, mm from the rear principal plane
   // Interval by which the light distribution over the pupil may move xf, mm.
   Eigen::Vector2d pupil_interval_mm{0, 0};
-  MovingScale scale;
   std::vector<double> contradicting_mm;  // xf by the sources that contradict it
 };
 

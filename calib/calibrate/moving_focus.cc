@@ -337,7 +337,6 @@ class MovingFocus {
     origin.stated = focus_.stated;
     if (focus_.from == kFromScale) origin.pupil_interval_mm = pupil_interval_mm_;
     origin.sensor_distance_mm = focus_.distance_mm;
-    origin.scale = scale_;
     origin.contradicting_mm = contradictions_;
     ConvertResults(sweep_, moves_, motion, origin, &found);
     found.summary.warnings.insert(found.summary.warnings.begin(), warnings_.begin(),

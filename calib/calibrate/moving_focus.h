@@ -31,10 +31,11 @@ struct TargetCalibration {
 // zf and the magnification are those of the reading at focus, and
 //   d1(reading) = d1 + s (reading - reading at focus)
 // gives d1 of each position. xf comes from the readings if they are focus distances, otherwise from
-// what is stated (the most precise of the statements about the plane of focus and offset_mm) or
-// from the image scale: if the sensor moves, the scale is proportional to D and 0 at D = 0; if the
-// lens moves, the scale depends on xf only to second order, because d ln(scale)/d reading = 1/f for
-// a thin lens at any magnification, and a short sweep does not determine xf.
+// what is stated (the most precise of the statements about the plane of focus and offset_mm), or
+// from the image scale where that is at least twice as good; the others are compared with it. If
+// the sensor moves, the scale is proportional to D and 0 at D = 0; if the lens moves, the scale
+// depends on xf only to second order, because d ln(scale)/d reading = 1/f for a thin lens at any
+// magnification, and a short sweep does not determine xf.
 Calibration CalibrateMovingFocus(const FocusSweep& sweep, model::SweepMotion moves,
                                  const TargetCalibration& target);
 

@@ -16,13 +16,6 @@ constexpr double kSlopeStep = 1e-3;  // step of the slope by the offset, relativ
 
 const double kEvenSpread = 1 / std::sqrt(3.0);  // standard deviation of an even distribution on +-1
 
-model::ThickLens Stretched(const model::ThickLens& lens, double factor) {
-  model::ThickLens stretched = lens;
-  stretched.front_focal_length_mm *= factor;
-  stretched.rear_focal_length_mm *= factor;
-  return stretched;
-}
-
 // The fit at another bench offset. The focus moves with the zero, so that the search starts there.
 BlurFitResult MovedBy(double move_mm, const BlurFitSetup& setup, const BlurFitResult& from) {
   BlurFitSetup moved = setup;
@@ -34,6 +27,13 @@ BlurFitResult MovedBy(double move_mm, const BlurFitSetup& setup, const BlurFitRe
 }
 
 }  // namespace
+
+model::ThickLens Stretched(const model::ThickLens& lens, double factor) {
+  model::ThickLens stretched = lens;
+  stretched.front_focal_length_mm *= factor;
+  stretched.rear_focal_length_mm *= factor;
+  return stretched;
+}
 
 double ToleranceOfStatement(const model::Camera& camera, const model::StatedConjugate& stated) {
   if (!camera.objective || stated.name != kFromObjective) return 0;
@@ -75,10 +75,7 @@ model::Estimate FocusDepthWithTolerance(const model::Camera& camera,
   with_tolerance.value.sigma =
       std::hypot(stated.value.sigma, kEvenSpread * ToleranceOfStatement(camera, stated));
   model::Estimate focus_mm = model::FocusDepthOf(camera.lens, with_tolerance);
-  if (stated.kind == model::ConjugateKind::kFocusDepth) {
-    focus_mm.sigma = std::hypot(focus_mm.sigma, stated.sigma_of_bounds);
-    return focus_mm;
-  }
+  if (stated.kind == model::ConjugateKind::kFocusDepth) return focus_mm;
   // A part of the tolerance is enough for the slope, and a sensor at a stated distance stays behind
   // the focal point.
   constexpr double kStep = -1e-4;

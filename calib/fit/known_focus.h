@@ -39,6 +39,9 @@ bool HasOneFocalLength(const model::ThickLens& lens);
 // the camera file states none.
 std::string FieldOfFocalLengthTolerance(const model::Camera& camera);
 
+// The lens with both focal lengths times a factor.
+model::ThickLens Stretched(const model::ThickLens& lens, double factor);
+
 // Whether the camera file states a tolerance of the focal length.
 bool StatesFocalLength(const model::Camera& camera);
 

@@ -22,9 +22,6 @@ struct StatedConjugate {
   ConjugateKind kind = ConjugateKind::kFocusDepth;  // what is stated
   Estimate value;                                   // the stated value and its standard deviation
   std::string name;                                 // where it is stated, "lens.magnification"
-  // A further error of the value as a standard deviation, in its unit, that bounds of other numbers
-  // cause. It counts where sources are compared, and not in the statistical error.
-  double sigma_of_bounds = 0;
 };
 
 // zf from Ap and its standard deviation, mm, for a lens that is known exactly. From [S13], with
