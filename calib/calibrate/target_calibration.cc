@@ -1,0 +1,768 @@
+#include "calib/calibrate/target_calibration.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <mutex>
+#include <utility>
+
+#include "calib/calibrate/fixed_pattern.h"
+#include "calib/calibrate/focus_motion.h"
+#include "calib/calibrate/focus_solution.h"
+#include "calib/calibrate/response_effects.h"
+#include "calib/calibrate/zero_choice.h"
+#include "calib/edges/edge_blur.h"
+#include "calib/fit/blur_measurement.h"
+#include "calib/fit/known_focus.h"
+#include "calib/fit/source_recipe.h"
+#include "calib/registration/axis_contrast.h"
+#include "calib/registration/change_of_reference.h"
+#include "calib/registration/frame_structure.h"
+#include "calib/registration/radial_causes.h"
+#include "calib/registration/reading_checks.h"
+#include "calib/registration/scale_causes.h"
+#include "calib/registration/scale_tracking.h"
+#include "calib/sharpness/sharpest_reading.h"
+#include "calib/sharpness/sharpness.h"
+#include "calib/sharpness/sharpness_peak.h"
+#include "calib/sweep/frame_selection.h"
+#include "calib/sweep/frame_store.h"
+#include "calib/uncertainty/calibration_checks.h"
+#include "calib/uncertainty/field_map.h"
+#include "calib/uncertainty/systematic_advice.h"
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/parallel.h"
+#include "thicklens/model/pupil_law.h"
+
+namespace thicklens::calib {
+namespace {
+
+constexpr double kZeroReach = 2;        // sigmas by which one zero contradicts another
+constexpr double kZeroMoves = 0.1;      // share of the zero's sigma above which a shift matters
+constexpr double kFarBetter = 3;        // ratio of errors
+constexpr double kPartOfStep = 0.2;     // of the readings, by which known depths may be off
+constexpr double kFewRegistered = 0.8;  // share of the used frames; below it the light is checked
+// Rounds of finding structure fixed to the frame: the second one, with better scales, finds the
+// remainder of a strong shading.
+constexpr int kPatternRounds = 2;
+constexpr char kNoOffset[] = "nothing determines the bench offset";
+
+class Calibrator {
+ public:
+  // With `motion`, the sweep is the equivalent one of a lens or a sensor that moves.
+  Calibrator(const FocusSweep& sweep, const CalibrationOptions& options,
+             const FocusMotion* motion = nullptr)
+      : sweep_(sweep), options_(options), motion_(motion), store_(sweep), result_(Begun(sweep)) {
+    total_steps_ = 4 * static_cast<int>(sweep.frames.size());
+  }
+
+  Calibration Run() {
+    const auto begin = std::chrono::steady_clock::now();
+    std::string why;
+    if (!HasEnoughFrames(sweep_, &why)) {
+      Refuse(why);
+    } else if (RegionSidePx(sweep_) < kSmallestRegionPx) {
+      Refuse(RegionAdvice(sweep_));
+    } else {
+      Measure();
+    }
+    result_.summary.frames_used = result_.diagnostics.blur.done
+                                      ? result_.diagnostics.blur.frames_used
+                                      : static_cast<int>(used().size());
+    result_.summary.frames_rejected = static_cast<int>(
+        std::count_if(result_.frames.begin(), result_.frames.end(),
+                      [](const FrameMeasurement& frame) { return !frame.rejection.empty(); }));
+    result_.summary.chi2_per_dof = result_.diagnostics.blur.chi2_per_dof;
+    result_.summary.seconds =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    return std::move(result_);
+  }
+
+  SweepPreview Preview() {
+    SweepPreview preview;
+    std::string why;
+    if (!HasEnoughFrames(sweep_, &why)) {
+      Refuse(why);
+    } else if (RegionSidePx(sweep_) < kSmallestRegionPx) {
+      Refuse(RegionAdvice(sweep_));
+    } else if (MeasureAndCheck() && MeasureSharpness()) {
+      preview.samples = Track(std::nullopt);
+      preview.passed = RemoveFixedPattern(std::nullopt, &preview.samples);
+      preview.reference = reference_;
+    }
+    FindSharpest();
+    preview.found = std::move(result_);
+    return preview;
+  }
+
+ private:
+  static Calibration Begun(const FocusSweep& sweep) {
+    Calibration result;
+    for (const model::SweepFrame& frame : sweep.frames) {
+      FrameMeasurement measurement;
+      measurement.image = frame.Name();
+      measurement.reading_mm = frame.reading_mm;
+      result.frames.push_back(measurement);
+    }
+    return result;
+  }
+
+  bool Refuse(const std::string& reason) {
+    result_.summary.outcome = Outcome::kRefused;
+    result_.summary.reason = reason;
+    return false;
+  }
+  // Returns whether a quality check let enough frames pass.
+  bool Passed(const std::optional<std::string>& refusal) { return !refusal || Refuse(*refusal); }
+
+  void Measure() {
+    const bool needs_scale = options_.fit_blur || !sweep_.offset_mm;
+    if (MeasureAndCheck() && MeasureSharpness() &&
+        (needs_scale ? FindDepths() : UseGivenOffset())) {
+      result_.diagnostics.paper_recipe = RunSourceRecipe(sweep_.camera, result_.frames, used());
+      FitPeak();
+      if (options_.fit_blur) {
+        MeasureAndSolve();
+      } else {
+        EndBeforeFit();
+      }
+    }
+    FindSharpest();
+    ReportRootCause();
+    if (zero_is_open_) ForgetOffset();
+  }
+
+  // Runs also for a sweep that is refused, on the frames that passed the quality checks of the
+  // light.
+  void FindSharpest() {
+    const SharpestReading found = FindSharpestReading(result_.frames, used());
+    if (found.done || !result_.diagnostics.sharpest.done) result_.diagnostics.sharpest = found;
+  }
+
+  void LookForStructure(const std::vector<ScaleSample>& samples) {
+    if (result_.diagnostics.structure.measured) return;
+    result_.diagnostics.structure =
+        MeasureStructure({sweep_, [this](std::size_t frame) { return Grey(frame); }, used(),
+                          samples, RegionCentre(sweep_), [this] { Tick(); }});
+  }
+
+  // Asked only where the registrations show a distortion, for which astigmatism may pass.
+  bool SeesAstigmatism() {
+    return ShowsDistortion(result_) &&
+           ShowsAstigmatism(
+               ChangeOfAxisContrast(scales_, [this](std::size_t frame) { return Grey(frame); }));
+  }
+
+  void EndBeforeFit() {
+    result_.summary.outcome = Outcome::kPartial;
+    result_.summary.reason = "the fit of the blur was not requested";
+  }
+
+  // The reason of a refusal is often only the consequence of a simpler cause.
+  void ReportRootCause() {
+    const std::string exposure =
+        ExposureAdvice(result_.frames, [this] { return store_.Stored(0).depth() == CV_16U; });
+    if (result_.summary.outcome != Outcome::kRefused) {
+      if (!exposure.empty())
+        result_.summary.warnings.insert(
+            result_.summary.warnings.begin(),
+            exposure + "; the results come from the other frames alone");
+      return;
+    }
+    for (const std::string& cause :
+         {exposure, RegionAdvice(sweep_),
+          UnitAdvice(sweep_, result_.frames, result_.diagnostics.scale, causes_),
+          RegistrationAdvice(sweep_, result_.frames, used(), result_.diagnostics.scale,
+                             result_.diagnostics.structure)}) {
+      if (cause.empty()) continue;
+      // No advice is given on what is missing because of the light.
+      result_.summary.reason = cause == exposure
+                                   ? cause
+                                   : cause + "; the immediate reason is: " + result_.summary.reason;
+      return;
+    }
+  }
+
+  const std::vector<std::size_t>& used() const { return selection_.used(); }
+
+  void Tick() {
+    if (options_.progress) {
+      const std::lock_guard<std::mutex> lock(progress_mutex_);
+      options_.progress(std::min(++steps_done_, total_steps_), total_steps_);
+    }
+    ThrowIfCancelled();
+  }
+
+  template <typename Work>
+  void ForEachUsed(const Work& work) {
+    ParallelFor(static_cast<int>(used().size()), options_.threads, [&](int i) {
+      work(used()[static_cast<std::size_t>(i)]);
+      Tick();
+    });
+  }
+
+  cv::Mat Grey(std::size_t frame) { return store_.Grey(frame); }
+
+  // Applies the absolute checks to every frame, then the blank quality check against the median of
+  // the frames that passed them.
+  bool MeasureAndCheck() {
+    ParallelFor(static_cast<int>(sweep_.frames.size()), options_.threads, [&](int i) {
+      MeasureStatistics(static_cast<std::size_t>(i));
+      Tick();
+    });
+    QualityCheckOptions checks = options_.checks;
+    checks.edge_target |= sweep_.target == model::SweepTarget::kKnifeEdge;
+    return Passed(selection_.KeepMeasurable(checks));
+  }
+
+  void MeasureStatistics(std::size_t frame) {
+    result_.frames[frame].statistics =
+        MeasureFrame(RegionOf(store_.Stored(frame), sweep_, frame), store_.Grey(frame));
+  }
+
+  bool MeasureSharpness() {
+    double steepest = 0, steepest_relative = 0;
+    for (const std::size_t i : used()) {
+      const FrameStatistics& s = result_.frames[i].statistics;
+      steepest = std::max(steepest, s.top_gradient);
+      steepest_relative = std::max(steepest_relative, s.top_gradient / s.mean_linear);
+    }
+    ForEachUsed([&](std::size_t i) {
+      FrameMeasurement& frame = result_.frames[i];
+      const cv::Mat grey = Grey(i);
+      const double mean = frame.statistics.mean_linear;
+      const std::vector<SharpnessIndex> indices = MeanEdgeSlopes(
+          grey, {}, {kEdgeThreshold * steepest, kEdgeThreshold * steepest_relative * mean});
+      frame.mean_edge_slope = indices[0].mean_edge_slope;
+      frame.normalised_edge_slope = indices[1].mean_edge_slope / mean;
+      frame.edge_count = indices[1].edge_count;
+      if (const auto blur = MeasureSourceEdgeBlur(grey))
+        frame.source_blur_sigma_px = blur->sigma_px;
+    });
+    reference_ = SharpestUsed();
+    if (!Passed(selection_.KeepThoseWithEdges())) return false;
+    FindSharpest();
+    return true;
+  }
+
+  std::size_t SharpestUsed() const {
+    return *std::max_element(used().begin(), used().end(), [&](std::size_t a, std::size_t b) {
+      return result_.frames[a].normalised_edge_slope < result_.frames[b].normalised_edge_slope;
+    });
+  }
+
+  // Determines the bench offset (given, or from the image scale), then every frame's depth.
+  bool FindDepths() {
+    CollectStatements();
+    std::optional<double> known_mm;
+    if (sweep_.offset_mm) {
+      known_mm = sweep_.offset_mm->value;
+    } else if (best_statement_) {
+      known_mm = OffsetOfFocusAt(model::FocusDepthOf(sweep_.camera.lens, *best_statement_).value);
+    }
+    std::vector<ScaleSample> samples = Track(known_mm);
+    result_.diagnostics.scale = LawOf(samples);
+    if (!RemoveFixedPattern(known_mm, &samples)) return false;
+    CorrectForFalloff(kDefaultRatio, result_.diagnostics.scale.reference_depth_mm,
+                      &result_.diagnostics.scale);
+    const bool is_lone_edge =
+        IsLoneEdge(sweep_, used().size(), samples.size(), result_.diagnostics.scale);
+    if (is_lone_edge) ForgetScales(sweep_, &samples, &result_.diagnostics.scale);
+    for (const ScaleSample& sample : samples) {
+      if (sample.scale_is_from_reading) continue;
+      result_.frames[sample.frame].image_scale = sample.scale;
+      result_.frames[sample.frame].image_scale_sigma = sample.registration.scale_sigma;
+    }
+    if (!is_lone_edge && !ScalesAllowAResult(samples)) return false;
+    if (const auto reason = ReasonAgainstScales(result_.frames, used(), result_.diagnostics.scale))
+      return Refuse(*reason);
+    RejectUnregistered(samples, used(), reference_, result_.diagnostics.scale,
+                       result_.diagnostics.structure, &result_.frames);
+    WarnOfBands(samples.size());
+    RejectWrongReadings(sweep_, samples, result_.diagnostics.scale, &result_.frames);
+    if (!Passed(selection_.KeepUnrejected())) return false;
+    for (const ScaleSample& sample : samples) {
+      if (!result_.frames[sample.frame].rejection.empty()) continue;
+      scales_.push_back(sample);
+      result_.frames[sample.frame].in_scale_fit = result_.diagnostics.scale.done;
+    }
+    ReplaceReference();
+    if (sweep_.offset_mm && !IsKnownBetterThanOffset()) {
+      TakeGivenOffset();
+      // The zero of an equivalent target is exact by its construction.
+      if (!is_lone_edge && motion_ == nullptr) {
+        const OffsetCheck check = CheckGivenOffset(sweep_, UnitThatFits(sweep_, causes_), &result_);
+        if (check.refusal) return Refuse(*check.refusal);
+        conflicting_offset_mm_ = check.conflicting_mm;
+      }
+    } else if (!ChooseOffset()) {
+      return false;
+    }
+    if (ShowsDistortion(result_) ||
+        FindScaleNonlinearity(scales_, result_.diagnostics.scale, sweep_))
+      LookForStructure(scales_);
+    if (const auto refusal = CheckDistortion(&result_, SeesAstigmatism())) return Refuse(*refusal);
+    slip_ = FindReadingStep(scales_, result_.diagnostics.scale);
+    if (slip_ && motion_ == nullptr) WarnOfReadingStep(*slip_, &result_);
+    // The scale of an equivalent target is that of a lens that moves to second order only.
+    if (motion_ == nullptr || sweep_.moves != model::SweepMotion::kLens)
+      bend_ = CheckScaleNonlinearity(sweep_, scales_, &result_);
+    return PlacedWithinReach();
+  }
+
+  std::vector<ScaleSample> Track(const std::optional<double>& known_offset_mm) {
+    return TrackScale(
+        sweep_, [this](std::size_t frame) { return Grey(frame); }, used(), reference_,
+        known_offset_mm, options_.threads, [this] { Tick(); });
+  }
+
+  ScaleModel LawOf(const std::vector<ScaleSample>& samples) const {
+    return FitScaleModel(samples, static_cast<int>(reference_), sweep_.reading_sigma_mm,
+                         sweep_.direction, RegionCornerRadiusPx(sweep_));
+  }
+
+  // Finds structure that is fixed to the frame, removes it from the light of all frames, and
+  // measures sharpness and scale again. Returns false after a refusal.
+  bool RemoveFixedPattern(const std::optional<double>& known_offset_mm,
+                          std::vector<ScaleSample>* samples) {
+    FixedPattern& pattern = result_.diagnostics.fixed_pattern;
+    if (sweep_.target == model::SweepTarget::kKnifeEdge ||
+        sweep_.target == model::SweepTarget::kPrintedEdge) {
+      pattern.message = "an edge does not show what is fixed to the frame";
+      return true;
+    }
+    std::vector<double> sharpness;
+    for (const FrameMeasurement& frame : result_.frames)
+      sharpness.push_back(frame.normalised_edge_slope);
+    const ScaleModel before = result_.diagnostics.scale;
+    for (int round = 0; round < kPatternRounds; ++round) {
+      const FramePlaces places = PlacesOf(*samples);
+      const bool found =
+          round == 0
+              ? FindFixedPattern(places, reference_, sharpness, options_.threads, &store_, &pattern)
+              : FindRemainingShading(places, options_.threads, &store_, &pattern);
+      if (!found) break;
+      ForEachUsed([&](std::size_t frame) { MeasureStatistics(frame); });
+      if (!MeasureSharpness()) return false;
+      *samples = Track(known_offset_mm);
+      result_.diagnostics.scale = LawOf(*samples);
+    }
+    AddErrorOfShading(pattern, before, &result_.diagnostics.scale);
+    return true;
+  }
+
+  FramePlaces PlacesOf(const std::vector<ScaleSample>& samples) {
+    return {sweep_,
+            [this](std::size_t frame) { return Grey(frame); },
+            used(),
+            samples,
+            RegionCentre(sweep_),
+            [] { ThrowIfCancelled(); }};
+  }
+
+  // Compares the possible causes of the measured scales.
+  bool ScalesAllowAResult(const std::vector<ScaleSample>& samples) {
+    const ScaleKind kind = result_.diagnostics.scale.kind;
+    if (static_cast<double>(samples.size()) < kFewRegistered * static_cast<double>(used().size()))
+      LookForStructure(samples);
+    if (kind == ScaleKind::kConstant) {
+      const std::string warning = ConstantScaleWarning(sweep_, samples);
+      if (!warning.empty()) result_.diagnostics.scale.message = warning;
+    }
+    if (motion_ != nullptr || (kind != ScaleKind::kInverseDepth && kind != ScaleKind::kReversed))
+      return true;
+    causes_ = CompareScaleCauses(samples, sweep_);
+    result_.diagnostics.diagnoses.push_back(causes_.diagnosis);
+    const auto reason = ReasonOfScaleCauses(sweep_, result_.diagnostics.scale, causes_);
+    return !reason || Refuse(*reason);
+  }
+
+  void WarnOfBands(std::size_t registered) {
+    if (!result_.diagnostics.structure.HasBands() || !result_.diagnostics.scale.done) return;
+    const std::size_t frames = used().size();
+    result_.summary.warnings.push_back(
+        fmt::format("only {} of {} frames could be registered: {}{}", registered, frames,
+                    BandsInWords(result_.diagnostics.structure),
+                    BandsExplain(result_.diagnostics.structure, frames - registered, frames)
+                        ? ""
+                        : "; this does not explain so many missing frames: some may show another "
+                          "part of the target"));
+  }
+
+  // Depth of reading 0 if the sharpest reading lies at that depth.
+  double OffsetOfFocusAt(double focus_depth_mm) const {
+    return focus_depth_mm - model::DirectionSign(sweep_.direction) * SharpestReadingMm();
+  }
+  double SharpestReadingMm() const {
+    const SharpestReading& sharpest = result_.diagnostics.sharpest;
+    return sharpest.done ? sharpest.reading_mm.value : result_.frames[reference_].reading_mm;
+  }
+
+  // Finds what is stated of the plane of focus, the period of the target included.
+  void CollectStatements() {
+    statements_ = sweep_.stated_focus;
+    if (sweep_.target_period_mm) {
+      const double beyond_mm = model::DirectionSign(sweep_.direction) *
+                               (result_.frames[reference_].reading_mm - SharpestReadingMm());
+      if (const auto measured = MagnificationOfPeriod(sweep_, Grey(reference_), beyond_mm))
+        statements_.push_back(*measured);
+    }
+    best_statement_ = MostPrecise(sweep_.camera, statements_);
+  }
+
+  // Whether a statement of the plane of focus, or the image scale by far, is more precise than the
+  // stated offset. A rough offset then only has to agree. Pupil laws move the zero of the scale.
+  bool IsKnownBetterThanOffset() const {
+    const double sigma_mm = sweep_.offset_mm->sigma;
+    if (best_statement_ &&
+        FocusDepthWithTolerance(sweep_.camera, *best_statement_).sigma < sigma_mm)
+      return true;
+    const ScaleModel& law = result_.diagnostics.scale;
+    if (!law.done || sweep_.camera.objective || !ScaleDeterminesDepth(law)) return false;
+    const Eigen::Vector2d& laws_mm = law.offset_of_pupil_laws_mm;
+    return kFarBetter * std::hypot(law.offset_mm.sigma, 0.5 * (laws_mm.y() - laws_mm.x())) <
+           sigma_mm;
+  }
+
+  // Takes the bench offset from the image scale or from what is stated of the plane of focus,
+  // whichever is more precise. Where neither exists, the offset stays open: the reading at focus is
+  // found without it.
+  bool ChooseOffset() {
+    const ScaleModel& law = result_.diagnostics.scale;
+    if (best_statement_) {
+      const model::Estimate focus_mm = FocusDepthWithTolerance(sweep_.camera, *best_statement_);
+      if (!law.done || sweep_.camera.objective || !ScaleDeterminesDepth(law) ||
+          focus_mm.sigma < law.offset_mm.sigma) {
+        known_focus_ = best_statement_;
+        result_.diagnostics.bench_offset_from = known_focus_->name;
+        result_.summary.bench_offset_mm =
+            Result{OffsetOfFocusAt(focus_mm.value), focus_mm.sigma, std::nullopt};
+        return true;
+      }
+    }
+    if (law.done && ScaleDeterminesDepth(law)) {
+      result_.summary.bench_offset_mm = law.offset_mm;
+      result_.diagnostics.bench_offset_from = kFromScale;
+      return true;
+    }
+    if (!law.done && !law.changes_too_little) return Refuse(ReasonOfUnknownOffset(law));
+    zero_is_open_ = true;
+    if (sweep_.target_period_mm) {
+      result_.summary.warnings.emplace_back(
+          "target_period_mm is stated, but the sharpest frame shows no periodic texture");
+    }
+    result_.summary.bench_offset_mm =
+        Result{OffsetOfFocusAt(UsualFocusDepth(sweep_.camera, scales_, SharpestReadingMm())), 0,
+               std::nullopt};
+    return true;
+  }
+
+  // Whether the image scale shows on which side of the focal point, where d1 and kappa become
+  // infinite, the target is. A target that is clearly nearer is a contradiction, which is found
+  // later.
+  bool ScaleDeterminesDepth(const ScaleModel& law) const {
+    const double depth_mm =
+        law.offset_mm.value + model::DirectionSign(sweep_.direction) * SharpestReadingMm();
+    return std::abs(depth_mm - sweep_.camera.lens.front_focal_length_mm) >
+           kKnownSigmas * law.offset_mm.sigma;
+  }
+
+  // Removes what depends on an offset that nothing determines.
+  void ForgetOffset() {
+    result_.summary.bench_offset_mm.reset();
+    result_.diagnostics.paper_recipe = {};
+    result_.diagnostics.paper_recipe.message = kNoOffset;
+    result_.diagnostics.sharpness = {};
+    result_.diagnostics.sharpness.message = kNoOffset;
+    for (FrameMeasurement& frame : result_.frames) frame.depth_mm = 0;
+  }
+
+  double ReadingRangeMm() const {
+    const auto [low, high] =
+        std::minmax_element(used().begin(), used().end(), [&](std::size_t a, std::size_t b) {
+          return result_.frames[a].reading_mm < result_.frames[b].reading_mm;
+        });
+    return result_.frames[*high].reading_mm - result_.frames[*low].reading_mm;
+  }
+
+  // Takes the given bench offset and the readings as they are.
+  bool UseGivenOffset() {
+    TakeGivenOffset();
+    return PlacedWithinReach();
+  }
+
+  void TakeGivenOffset() {
+    result_.summary.bench_offset_mm =
+        Result{sweep_.offset_mm->value, sweep_.offset_mm->sigma, std::nullopt};
+    result_.diagnostics.bench_offset_from = kFromOffset;
+  }
+
+  bool PlacedWithinReach() {
+    PlaceFrames();
+    // These depths are only where the search starts.
+    if (zero_is_open_ || known_focus_) return true;
+    return Passed(selection_.KeepPossibleDepths(result_.summary.bench_offset_mm->value,
+                                                sweep_.camera.lens.front_focal_length_mm));
+  }
+
+  void PlaceFrames() {
+    const double sign = model::DirectionSign(sweep_.direction);
+    for (FrameMeasurement& frame : result_.frames)
+      frame.depth_mm = result_.summary.bench_offset_mm->value + sign * frame.reading_mm;
+  }
+
+  // The image scale's zero is the centre of perspective. Its distance from the aperture depends on
+  // the blur and on how the light spreads over the pupil, which is unknown for a real lens: the
+  // paper's law gives the value, and the other laws give an interval around it.
+  void CorrectForFalloff(double blur_ratio, double focus_depth_mm, ScaleModel* law) const {
+    const model::Camera& camera = sweep_.camera;
+    law->offset_of_pupil_laws_mm.setConstant(law->offset_mm.value);
+    if (!law->done || !(focus_depth_mm > camera.lens.front_focal_length_mm)) return;
+    const double line_zero_mm = law->line_zero_mm();
+    const auto centre_mm = [&](model::PupilLaw pupil) {
+      if (motion_ != nullptr) {
+        return motion_->EquivalentCentreMm(model::CentreOfPerspectiveMm(
+            motion_->lens(), camera.psf, pupil, blur_ratio, motion_->FocusDepthMm()));
+      }
+      return model::CentreOfPerspectiveMm(camera.lens, camera.psf, pupil, blur_ratio,
+                                          focus_depth_mm);
+    };
+    law->centre_mm = centre_mm(model::PupilLaw::kPaper);
+    law->offset_mm.value = line_zero_mm + law->centre_mm;
+    law->offset_of_pupil_laws_mm.setConstant(law->offset_mm.value);
+    for (const model::PupilLaw pupil : model::AllPupilLaws()) {
+      const double offset_mm = line_zero_mm + centre_mm(pupil);
+      law->offset_of_pupil_laws_mm = {std::min(law->offset_of_pupil_laws_mm.x(), offset_mm),
+                                      std::max(law->offset_of_pupil_laws_mm.y(), offset_mm)};
+    }
+  }
+
+  // The sharpest frame may be the one with the wrong reading. Then the next sharpest takes its
+  // place, and the registrations to the old reference are converted to the new one.
+  void ReplaceReference() {
+    if (result_.frames[reference_].rejection.empty()) return;
+    const ScaleSample* next = nullptr;
+    for (const ScaleSample& sample : scales_) {
+      if (next == nullptr || result_.frames[sample.frame].normalised_edge_slope >
+                                 result_.frames[next->frame].normalised_edge_slope)
+        next = &sample;
+    }
+    reference_ = next == nullptr ? SharpestUsed() : next->frame;
+    if (next != nullptr) ReferTo(next->registration, &scales_);
+  }
+
+  void FitPeak() {
+    std::vector<SharpnessSample> samples;
+    for (const std::size_t i : used()) {
+      samples.push_back({result_.frames[i].depth_mm, result_.frames[i].normalised_edge_slope});
+    }
+    result_.diagnostics.sharpness = FitSharpnessPeak(samples);
+  }
+
+  // Flat and defocused frames show the noise alone, but a fine texture in focus resembles noise: a
+  // low quantile of the frames is taken.
+  double SweepNoise() const {
+    std::vector<double> noises;
+    for (const std::size_t i : used()) noises.push_back(result_.frames[i].statistics.noise_sigma);
+    std::sort(noises.begin(), noises.end());
+    return noises[noises.size() / 10];
+  }
+
+  void MeasureAndSolve() {
+    const double start_mm = result_.diagnostics.sharpness.done
+                                ? result_.diagnostics.sharpness.focus_depth_mm
+                                : result_.frames[reference_].depth_mm;
+    BlurTask task(sweep_, store_);
+    task.frames = used();
+    task.reference = reference_;
+    task.scales = scales_;
+    task.scale_centre_mm = result_.diagnostics.scale.centre_mm;
+    task.law = zero_is_open_ || result_.diagnostics.scale.kind == ScaleKind::kConstant
+                   ? BlurModel::kTelecentric
+                   : BlurModel::kPerspective;
+    task.known_focus = known_focus_;
+    task.zero_is_open = zero_is_open_;
+    task.scale_follows_readings = result_.diagnostics.scale.done;
+    task.offset_mm = {result_.summary.bench_offset_mm->value,
+                      result_.summary.bench_offset_mm->sigma};
+    task.reading_sigma_mm = sweep_.reading_sigma_mm;
+    task.reading_sigma_is_known = sweep_.reading_sigma_mm > 0;
+    if (!task.reading_sigma_is_known && result_.diagnostics.scale.done) {
+      // No sigma was stated, but the scale law has measured it.
+      task.reading_sigma_mm = result_.diagnostics.scale.reading_rms_mm;
+    }
+    const auto [nearest, farthest] = DepthRange();
+    task.start_focus_depth_mm = std::clamp(start_mm, nearest, farthest);
+    task.pixel_noise = SweepNoise();
+    task.threads = options_.threads;
+    task.tick = [this] { Tick(); };
+    BlurEvidence evidence = MeasureBlur(task);
+    BlurFitResult fit;
+    const Calibration before = result_;
+    SolveFocus(sweep_, &evidence, &fit, &result_, motion_);
+    if (ReplaceRejectedReference(before) || RefineOffsetWithFittedBlur(before) ||
+        RefineOffsetOfKnownFocus(before, fit))
+      return MeasureAndSolve();
+    if (!result_.frames[reference_].rejection.empty()) return;
+    if (known_focus_) {
+      // These use the depths, which the fit has moved.
+      result_.diagnostics.paper_recipe = RunSourceRecipe(sweep_.camera, result_.frames, used());
+      FitPeak();
+    }
+    if (sweep_.target_period_mm && result_.diagnostics.bench_offset_from != kFromPeriod)
+      CheckMagnification(sweep_, reference_, Grey(reference_), &result_);
+    if (result_.summary.outcome == Outcome::kRefused) return NameContradictions(fit);
+    WidenByContradictions(evidence.setup, fit);
+    if (motion_ == nullptr)
+      CompareWithStatements(sweep_, statements_, evidence.setup, fit, &result_);
+    task.scales = scales_;
+    task.offset_mm = evidence.setup.offset_mm;
+    task.tick = [] { ThrowIfCancelled(); };
+    CheckCameraResponse(task, evidence, fit, &result_);
+    if (options_.map_field) MapField(sweep_, evidence, fit, &store_, &result_);
+  }
+
+  // A statement that is grossly wrong makes the blur impossible. The contradiction is the reason.
+  void NameContradictions(const BlurFitResult& fit) {
+    if (!fit.done || zero_is_open_) return;
+    const model::Estimate found_mm{fit.values[kFocusDepth],
+                                   std::sqrt(fit.covariance(kFocusDepth, kFocusDepth))};
+    std::string& reason = result_.summary.reason;
+    for (const Contradiction& other : FindContradictions(sweep_, statements_, found_mm, result_))
+      reason = other.text + "; the immediate reason is: " + reason;
+  }
+
+  // Widens the systematic intervals by the findings of the checks, as far as they move the results.
+  void WidenByContradictions(const BlurFitSetup& setup, const BlurFitResult& fit) {
+    if (result_.diagnostics.bench_offset_from == kFromScale) {
+      const Eigen::Vector2d& offsets_mm = result_.diagnostics.scale.offset_of_pupil_laws_mm;
+      WidenByTrials(
+          "light distribution over the pupil",
+          "measure offset_mm: a bench offset from the image scale depends on how the light "
+          "is distributed over the pupil",
+          WithOffsets(setup, {offsets_mm.x(), offsets_mm.y()}), fit, &result_);
+    }
+    if (conflicting_offset_mm_) {
+      // If the other zero is assumed, its error must be assumed too.
+      const model::Estimate& zero = *conflicting_offset_mm_;
+      const double reach_mm = kZeroReach * zero.sigma;
+      const Eigen::Vector2d& laws_mm = result_.diagnostics.scale.offset_of_pupil_laws_mm;
+      WidenByTrials("given offset_mm", "measure offset_mm again: the image scale contradicts it",
+                    WithOffsets(setup, {laws_mm.x() - reach_mm, laws_mm.y() + reach_mm}), fit,
+                    &result_);
+    }
+    if (slip_) {
+      WidenByTrials("jump of the readings", "find the part that slipped, or take the sweep again",
+                    WithoutReadingStep(sweep_, setup, *slip_, scales_, reference_, result_), fit,
+                    &result_, known_focus_);
+    }
+    if (bend_ && result_.diagnostics.bench_offset_from == kFromScale) {
+      const double half_mm = 0.5 * std::abs(bend_->zero_spread_mm);
+      const double zero_mm = setup.offset_mm.value;
+      WidenByTrials("nonlinearity of the image scale",
+                    NonlinearityRemedy(result_.diagnostics.structure),
+                    WithOffsets(setup, {zero_mm - half_mm, zero_mm + half_mm}), fit, &result_);
+    }
+  }
+
+  // Everything was measured relative to the reference. If its blur does not follow the others', the
+  // next sharpest frame takes its place.
+  bool ReplaceRejectedReference(const Calibration& before) {
+    if (result_.frames[reference_].rejection.empty()) return false;
+    std::vector<std::pair<std::string, double>> rejections;
+    for (const FrameMeasurement& frame : result_.frames)
+      rejections.emplace_back(frame.rejection, frame.reading_error_mm);
+    result_ = before;
+    for (std::size_t i = 0; i < rejections.size(); ++i) {
+      result_.frames[i].rejection = rejections[i].first;
+      result_.frames[i].reading_error_mm = rejections[i].second;
+    }
+    const auto is_rejected = [this](const ScaleSample& sample) {
+      return !result_.frames[sample.frame].rejection.empty();
+    };
+    scales_.erase(std::remove_if(scales_.begin(), scales_.end(), is_rejected), scales_.end());
+    if (!Passed(selection_.KeepUnrejected())) return false;
+    ReplaceReference();
+    return true;
+  }
+
+  // The bench offset of the image scale was found with a usual blur ratio. It is found once more if
+  // the fitted ratio moves it by more than a part of its error.
+  bool RefineOffsetWithFittedBlur(const Calibration& before) {
+    if (result_.diagnostics.bench_offset_from != kFromScale || zero_is_settled_ ||
+        !result_.summary.blur_ratio)
+      return false;
+    zero_is_settled_ = true;
+    Calibration again = before;
+    CorrectForFalloff(result_.summary.blur_ratio->value, result_.summary.focus_depth_mm->value,
+                      &again.diagnostics.scale);
+    const Result& zero_mm = again.diagnostics.scale.offset_mm;
+    if (!(std::abs(zero_mm.value - before.diagnostics.scale.offset_mm.value) >
+          kZeroMoves * zero_mm.sigma))
+      return false;
+    result_ = std::move(again);
+    result_.summary.bench_offset_mm = result_.diagnostics.scale.offset_mm;
+    PlaceFrames();
+    return true;
+  }
+
+  // The blur was measured for the depths that the sharpest reading gives. It is measured once more
+  // if the fit moves them by more than a part of a step.
+  bool RefineOffsetOfKnownFocus(const Calibration& before, const BlurFitResult& fit) {
+    if (!known_focus_ || zero_is_settled_ || !result_.summary.blur_ratio) return false;
+    zero_is_settled_ = true;
+    const double moved_mm =
+        std::abs(fit.values[kBenchOffset] - before.summary.bench_offset_mm->value);
+    const double step_mm = ReadingRangeMm() / static_cast<double>(used().size());
+    if (!(moved_mm > kPartOfStep * step_mm)) return false;
+    result_ = before;
+    result_.summary.bench_offset_mm->value = fit.values[kBenchOffset];
+    PlaceFrames();
+    return true;
+  }
+
+  std::pair<double, double> DepthRange() const {
+    const auto [low, high] =
+        std::minmax_element(used().begin(), used().end(), [&](std::size_t a, std::size_t b) {
+          return result_.frames[a].depth_mm < result_.frames[b].depth_mm;
+        });
+    return {result_.frames[*low].depth_mm, result_.frames[*high].depth_mm};
+  }
+
+  const FocusSweep& sweep_;
+  const CalibrationOptions& options_;
+  const FocusMotion* motion_;
+  FrameStore store_;
+  Calibration result_;
+  FrameSelection selection_{&result_.frames};  // frames that passed the quality checks
+  std::size_t reference_ = 0;                  // the sharpest of them, normalised
+  std::vector<ScaleSample> scales_;            // registered frames
+  ScaleCauses causes_;                         // possible causes of the scales
+  std::optional<ReadingStep> slip_;
+  std::optional<ScaleNonlinearity> bend_;
+  bool zero_is_settled_ = false;
+  std::vector<model::StatedConjugate> statements_;  // what is stated of the plane of focus
+  std::optional<model::StatedConjugate> best_statement_, known_focus_;
+  bool zero_is_open_ = false;  // nothing determines the bench offset
+  // The zero from the image scale where it contradicts the given one.
+  std::optional<model::Estimate> conflicting_offset_mm_;
+  std::mutex progress_mutex_;
+  int steps_done_ = 0;
+  int total_steps_ = 0;
+};
+
+}  // namespace
+
+Calibration CalibrateTarget(const FocusSweep& sweep, const CalibrationOptions& options,
+                            const FocusMotion* motion) {
+  return Calibrator(sweep, options, motion).Run();
+}
+
+SweepPreview PreviewTarget(const FocusSweep& sweep, const CalibrationOptions& options) {
+  return Calibrator(sweep, options).Preview();
+}
+
+}  // namespace thicklens::calib
