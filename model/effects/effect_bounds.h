@@ -113,6 +113,10 @@ EffectImpact ShadingImpact(const EffectOptics& optics, const EffectSite& place,
                            const EffectSet& others);
 EffectImpact DustImpact(const EffectOptics& optics, const EffectSite& place,
                         const EffectSet& others);
+EffectImpact AberrationsImpact(const EffectOptics& optics, const EffectSite& place,
+                               const EffectSet& others);
+EffectImpact DistortionImpact(const EffectOptics& optics, const EffectSite& place,
+                              const EffectSet& others);
 
 }  // namespace thicklens::model
 

@@ -62,6 +62,10 @@ Section SectionOf(Effect effect) {
       return ShadingImpact;
     case Effect::kDust:
       return DustImpact;
+    case Effect::kAberrations:
+      return AberrationsImpact;
+    case Effect::kDistortion:
+      return DistortionImpact;
   }
   throw Error("no such effect");
 }
@@ -132,6 +136,9 @@ bool EffectConditions::IsValid(std::string* why) const {
       return Fail(why,
                   fmt::format("bench.corner_stops is {}: it must be finite", bench->corner_stops));
     }
+    if (camera.calibration && camera.calibration->image_distance_mm &&
+        !bench->aberrations.IsValid(camera.lens, camera.focus_depth_mm(), why))
+      return false;
     if (!(std::abs(bench->tilt_deg) < 90)) {
       return Fail(
           why, fmt::format("bench.tilt_deg is {}: it must be between -90 and 90", bench->tilt_deg));

@@ -73,6 +73,11 @@ const std::vector<EffectFacts>& AllEffects() {
        "the light that the lens alone gives", EffectUnit::kRelative, false},
       {Effect::kDust, "dust", "specks on the sensor's cover take a part of the light",
        "a clean sensor", EffectUnit::kRelative, false},
+      {Effect::kAberrations, "aberrations",
+       "field curvature and astigmatism displace the plane of focus", "a flat plane of focus",
+       EffectUnit::kMm, false},
+      {Effect::kDistortion, "distortion", "the lens displaces the image toward the corners",
+       "a lens without distortion", EffectUnit::kPx, false},
   };
   return facts;
 }

@@ -1,4 +1,5 @@
 // Effects of a bench that moves a target from frame to frame.
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -146,6 +147,47 @@ EffectImpact DustImpact(const EffectOptics& optics, const EffectSite& place,
   const auto& bench = optics.conditions().bench;
   if (!bench) return {};
   return {bench->speck_depth, EncodedScaling(optics, place, bench->speck_depth)};
+}
+
+// Aberrations. Formula: FocusDisplacement [D150]. Bound: the change of the blur by the largest
+// displacement of the plane of focus at that place: a depth z is blurred as one at
+// 1/z' = 1/z - Delta would be. Enters: the blur of each pixel, which depends on the direction.
+EffectImpact AberrationsImpact(const EffectOptics& optics, const EffectSite& place,
+                               const EffectSet& others) {
+  const auto& bench = optics.conditions().bench;
+  if (!bench || !bench->aberrations.DisplaceFocus() || !std::isfinite(place.depth_mm) ||
+      !(optics.inverse_focus() > 0))
+    return {};
+  const double focus_mm = 1 / optics.inverse_focus();
+  const Sensor& sensor = optics.camera().sensor;
+  const Eigen::Matrix2d displacement =
+      FocusDisplacement(bench->aberrations, focus_mm, place.position_px - sensor.principal_point_px,
+                        FarthestCornerPx(sensor));
+  const double largest = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(displacement)
+                             .eigenvalues()
+                             .cwiseAbs()
+                             .maxCoeff();
+  const double nearness = std::max(1e-3, 1 - largest * place.depth_mm);
+  const double shift_mm = place.depth_mm * (1 / nearness - 1);
+  return {std::abs(focus_mm - 1 / (1 / focus_mm + largest)),
+          EncodedChange(optics, place, ChangeByDepth(optics, place, shift_mm, others))};
+}
+
+// Distortion. Formula: a point at the distance r from the axis is displaced by d r rho^2
+// (LensAberrations). Bound: ShiftChange of that displacement. Enters: the position of each pixel. A
+// calibration that does not know of it gets image scales that depend on the place.
+EffectImpact DistortionImpact(const EffectOptics& optics, const EffectSite& place,
+                              const EffectSet& others) {
+  const auto& bench = optics.conditions().bench;
+  if (!bench || bench->aberrations.distortion == 0) return {};
+  const Sensor& sensor = optics.camera().sensor;
+  const Eigen::Vector2d from_axis_px = place.position_px - sensor.principal_point_px;
+  const double shift_px =
+      (WithoutDistortion(bench->aberrations.distortion, from_axis_px, FarthestCornerPx(sensor)) -
+       from_axis_px)
+          .norm();
+  return {shift_px, EncodedChange(optics, place,
+                                  ShiftChange(place, shift_px, optics.SmoothingBy(others, place)))};
 }
 
 }  // namespace thicklens::model

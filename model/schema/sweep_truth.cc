@@ -1,4 +1,6 @@
 // Reader and writer of the file with the parameters of a simulated sweep.
+#include <utility>
+
 #include "model/schema/effect_yaml.h"
 #include "model/schema/yaml_fields.h"
 #include "model/schema/yaml_writer.h"
@@ -11,14 +13,27 @@ namespace {
 
 constexpr char kTruthSchema[] = "thicklens/sweep-truth/1";
 
+void WriteAberrations(const LensAberrations& aberrations, YamlWriter* out) {
+  if (!aberrations.DisplaceFocus() && aberrations.distortion == 0) return;
+  out->BeginMap("aberrations");
+  for (const auto& [name, value] :
+       {std::pair("field_curvature_mm", aberrations.field_curvature_mm),
+        std::pair("field_astigmatism_mm", aberrations.field_astigmatism_mm),
+        std::pair("astigmatism_mm", aberrations.astigmatism_mm),
+        std::pair("distortion", aberrations.distortion)}) {
+    if (value != 0) out->Number(name, value);
+  }
+  out->EndMap();
+}
+
 }  // namespace
 
 SweepTruth ReadSweepTruth(const std::string& path) {
   const YamlNode root = YamlNode::LoadFile(path);
   root.RequireSchema(kTruthSchema);
   root.RequireKeys({"schema", "image_distance_mm", "focus_depth_mm", "blur_ratio", "blur_floor_px",
-                    "bench_offset_mm", "moves", "tilt_deg", "corner_stops", "specks", "pupil_law",
-                    "effects", "left_out_grey_levels", "frames"});
+                    "bench_offset_mm", "moves", "tilt_deg", "corner_stops", "specks", "aberrations",
+                    "pupil_law", "effects", "left_out_grey_levels", "frames"});
   SweepTruth truth;
   truth.image_distance_mm = root.At("image_distance_mm").PositiveNumber();
   truth.focus_depth_mm = root.At("focus_depth_mm").PositiveNumber();
@@ -34,6 +49,7 @@ SweepTruth ReadSweepTruth(const std::string& path) {
   if (const auto tilt = root.Find("tilt_deg")) truth.tilt_deg = tilt->Number();
   if (const auto stops = root.Find("corner_stops")) truth.corner_stops = stops->Number();
   if (const auto specks = root.Find("specks")) truth.specks = specks->Integer(0, 10000);
+  if (const auto lens = root.Find("aberrations")) truth.aberrations = ReadAberrations(*lens);
   if (const auto law = root.Find("pupil_law")) {
     truth.pupil_law = PupilLawName(ReadNamed(*law, AllPupilLaws(), PupilLawName));
   }
@@ -59,6 +75,7 @@ std::string SweepTruthToYaml(const SweepTruth& truth) {
   if (truth.tilt_deg != 0) out.Number("tilt_deg", truth.tilt_deg);
   if (truth.corner_stops != 0) out.Number("corner_stops", truth.corner_stops);
   if (truth.specks != 0) out.Number("specks", truth.specks);
+  WriteAberrations(truth.aberrations, &out);
   out.TextIfAny("pupil_law", truth.pupil_law);
   WriteEffects(truth.effects, &out);
   out.BeginList("frames");

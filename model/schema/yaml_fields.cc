@@ -26,6 +26,16 @@ Estimate ReadEstimate(const YamlNode& node, double (YamlNode::*number)() const) 
   return estimate;
 }
 
+LensAberrations ReadAberrations(const YamlNode& node) {
+  node.RequireKeys({"field_curvature_mm", "field_astigmatism_mm", "astigmatism_mm", "distortion"});
+  LensAberrations aberrations;
+  ReadNumber(node, "field_curvature_mm", &aberrations.field_curvature_mm);
+  ReadNumber(node, "field_astigmatism_mm", &aberrations.field_astigmatism_mm);
+  ReadNumber(node, "astigmatism_mm", &aberrations.astigmatism_mm);
+  ReadNumber(node, "distortion", &aberrations.distortion);
+  return aberrations;
+}
+
 TransferCurve ReadTransfer(const YamlNode& node) {
   try {
     return TransferCurve::FromName(node.Text());

@@ -8,6 +8,7 @@
 
 #include "thicklens/base/yaml_reader.h"
 #include "thicklens/model/camera.h"
+#include "thicklens/model/lens_aberrations.h"
 
 // Readers of values that occur in several files. They throw Error with file:line:column.
 namespace thicklens::model {
@@ -20,6 +21,8 @@ Eigen::Vector2d ReadPair(const YamlNode& node);  // a list of two numbers
 // Reads a number, whose sigma is then 0, or {value: .., sigma: ..}. `number` reads and checks the
 // value: any, positive or not negative.
 Estimate ReadEstimate(const YamlNode& node, double (YamlNode::*number)() const);
+
+LensAberrations ReadAberrations(const YamlNode& node);  // the aberrations of a simulated sweep
 
 TransferCurve ReadTransfer(const YamlNode& node);  // the name of a transfer curve
 

@@ -83,12 +83,12 @@ std::string TargetKindName(TargetKind kind) {
 }
 
 EffectSet SweepEffects() {
-  return {Effect::kThickness,     Effect::kDefocus,     Effect::kApertureShape,
-          Effect::kFalloff,       Effect::kPixelBox,    Effect::kLensFloor,
-          Effect::kShotNoise,     Effect::kReadNoise,   Effect::kQuantisation,
-          Effect::kTransferCurve, Effect::kLampFalloff, Effect::kFlicker,
-          Effect::kMagnification, Effect::kDrift,       Effect::kTilt,
-          Effect::kReadingError,  Effect::kShading,     Effect::kDust};
+  return {
+      Effect::kThickness,     Effect::kDefocus,       Effect::kApertureShape, Effect::kFalloff,
+      Effect::kPixelBox,      Effect::kLensFloor,     Effect::kShotNoise,     Effect::kReadNoise,
+      Effect::kQuantisation,  Effect::kTransferCurve, Effect::kLampFalloff,   Effect::kFlicker,
+      Effect::kMagnification, Effect::kDrift,         Effect::kTilt,          Effect::kReadingError,
+      Effect::kShading,       Effect::kDust,          Effect::kAberrations,   Effect::kDistortion};
 }
 
 double SweepSimulationOptions::ImageDistanceMm(int frame_index) const {
@@ -172,6 +172,7 @@ bool SweepSimulationOptions::IsValid(std::string* why) const {
                 fmt::format("fixed_to_frame.speck_radius_px is {}: it must be from 0.5 to 1000",
                             speck_radius_px));
   }
+  if (!aberrations.IsValid(camera.lens, camera.focus_depth_mm(), why)) return false;
   if (bits != 8 && bits != 16) {
     return Fail(why, fmt::format("bits is {}: it must be 8 or 16", bits));
   }

@@ -127,8 +127,8 @@ SweepSimulationOptions ReadSweepSimulation(const std::string& path) {
   const YamlNode root = YamlNode::LoadFile(path);
   root.RequireSchema(kSchema);
   root.RequireKeys({"schema", "camera", "truth", "size_px", "target", "bench", "light",
-                    "drift_sigma_px", "noise", "fixed_to_frame", "bits", "pupil_law", "effects",
-                    "without", "seed"});
+                    "drift_sigma_px", "noise", "fixed_to_frame", "aberrations", "bits", "pupil_law",
+                    "effects", "without", "seed"});
   SweepSimulationOptions options;
   options.camera = ReadCamera(root.ResolvePath(root.At("camera").Text()));
   if (const auto truth = root.Find("truth")) ReadTruth(*truth, &options.camera);
@@ -139,6 +139,7 @@ SweepSimulationOptions ReadSweepSimulation(const std::string& path) {
   ReadNumber(root, "drift_sigma_px", &options.drift_sigma_px);
   if (const auto noise = root.Find("noise")) ReadNoise(*noise, &options);
   if (const auto fixed = root.Find("fixed_to_frame")) ReadFixedToFrame(*fixed, &options);
+  if (const auto lens = root.Find("aberrations")) options.aberrations = ReadAberrations(*lens);
   if (const auto bits = root.Find("bits")) options.bits = bits->Integer(8, 16);
   if (const auto law = root.Find("pupil_law")) {
     options.pupil_law = ReadNamed(*law, AllPupilLaws(), PupilLawName);

@@ -13,6 +13,7 @@
 #include "model/effects/aperture_irradiance.h"
 #include "model/simulate/sensor_noise.h"
 #include "model/simulate/sweep/edge_spread.h"
+#include "model/simulate/sweep/field_blur.h"
 #include "model/simulate/sweep/periodic_image.h"
 #include "model/simulate/sweep/sweep_target.h"
 #include "model/simulate/sweep/tilted_target.h"
@@ -31,6 +32,50 @@ constexpr double kSharpestTail = 12;
 
 bool IsEdge(TargetKind kind) {
   return kind == TargetKind::kPrintedEdge || kind == TargetKind::kKnifeEdge;
+}
+
+// Where the image is distorted, the one of a lens without distortion is computed at this distance
+// of its pixels, px, and with a border for the interpolation.
+constexpr double kFinePx = 1.0 / 3;
+constexpr int kFineBorder = 8;
+// Rows of an edge that have one blur where the lens is aberrated.
+constexpr int kEdgeRows = 4;
+
+// Evenly spaced pixel centres.
+struct PixelGrid {
+  Eigen::Vector2d first_px{0, 0};  // from the axis
+  double step_px = 1;
+  int columns = 0, rows = 0;
+
+  double XPx(double column) const { return first_px.x() + step_px * column; }
+  double YPx(double row) const { return first_px.y() + step_px * row; }
+};
+
+// Lanczos interpolation with six samples on each side, along both axes. `at` is in samples, at
+// least six of them from every border.
+double InterpolateSinc(const cv::Mat& image, const Eigen::Vector2d& at) {
+  constexpr int kSide = 6;
+  const auto kernel = [](double t) {
+    if (t == 0) return 1.0;
+    const double angle = kPi * t;
+    return kSide * std::sin(angle) * std::sin(angle / kSide) / (angle * angle);
+  };
+  const Eigen::Vector2i below = at.array().floor().cast<int>();
+  double x_weights[2 * kSide], sum_x = 0, sum_y = 0, sum = 0;
+  for (int k = 0; k < 2 * kSide; ++k) {
+    x_weights[k] = kernel(at.x() - (below.x() - kSide + 1 + k));
+    sum_x += x_weights[k];
+  }
+  for (int j = 0; j < 2 * kSide; ++j) {
+    const int row = below.y() - kSide + 1 + j;
+    const double weight = kernel(at.y() - row);
+    const double* values = image.ptr<double>(row) + below.x() - kSide + 1;
+    double along = 0;
+    for (int k = 0; k < 2 * kSide; ++k) along += x_weights[k] * values[k];
+    sum += weight * along;
+    sum_y += weight;
+  }
+  return sum / (sum_x * sum_y);
 }
 
 // The state of one frame.
@@ -71,7 +116,8 @@ struct SweepSimulator::Impl {
                                        options.reading_sigma_mm,
                                        options.target.tilt_deg,
                                        options.corner_stops,
-                                       options.speck_count > 0 ? options.speck_depth : 0};
+                                       options.speck_count > 0 ? options.speck_depth : 0,
+                                       options.aberrations};
     return conditions;
   }
 
@@ -125,6 +171,36 @@ struct SweepSimulator::Impl {
     const Camera& camera = options.camera;
     return camera.blur_ratio() * BlurRadiusMm(camera.lens, image_distance_mm, depth_mm) /
            camera.sensor.pixel_pitch_mm;
+  }
+  bool DisplacesFocus() const {
+    return On(Effect::kAberrations) && On(Effect::kDefocus) && options.aberrations.DisplaceFocus();
+  }
+  double Distortion() const { return On(Effect::kDistortion) ? options.aberrations.distortion : 0; }
+  // The defocus, px, of a light whose sigma on Ap is kappa r, as a matrix: DefocusPx for each
+  // direction.
+  Eigen::Matrix2d DefocusMapPx(double depth_mm, double image_distance_mm,
+                               const Eigen::Vector2d& from_axis_px) const {
+    const Camera& camera = options.camera;
+    const double sigma_px =
+        camera.blur_ratio() * camera.lens.aperture_radius_mm / camera.sensor.pixel_pitch_mm;
+    return sigma_px * (DefocusPerAperture(camera.lens, image_distance_mm, depth_mm) *
+                           Eigen::Matrix2d::Identity() -
+                       DefocusScaleMm(camera.lens, image_distance_mm) *
+                           FocusDisplacement(options.aberrations, camera.focus_depth_mm(),
+                                             from_axis_px, FarthestCornerPx(camera.sensor)));
+  }
+  // The largest sigma of the defocus of a frame, over the field and all directions.
+  double MostDefocusPx(const FrameState& frame, bool displaces_focus) const {
+    double most_px = frame.defocus_sigma_px;
+    if (!displaces_focus) return most_px;
+    const Eigen::Vector2d to_corner_px(FarthestCornerPx(options.camera.sensor), 0);
+    for (const Eigen::Vector2d& place_px :
+         {Eigen::Vector2d(0, 0), to_corner_px, Eigen::Vector2d(0, to_corner_px.x())}) {
+      const Eigen::Matrix2d map_px =
+          DefocusMapPx(frame.depth_mm, frame.image_distance_mm, place_px);
+      most_px = std::max(most_px, map_px.cwiseAbs().rowwise().sum().maxCoeff());
+    }
+    return most_px;
   }
   // K/p of a frame, px per unit slope of the chief ray.
   double ScalePx(double image_distance_mm) const {
@@ -195,7 +271,8 @@ struct SweepSimulator::Impl {
     const double scale_mm = DefocusScaleMm(camera.lens, camera.image_distance_mm());
     const double distance_mm = On(Effect::kThickness) ? camera.image_distance_mm() : scale_mm;
     double most_px = 0;
-    for (const FrameState& frame : frames) most_px = std::max(most_px, frame.defocus_sigma_px);
+    for (const FrameState& frame : frames)
+      most_px = std::max(most_px, MostDefocusPx(frame, DisplacesFocus()));
     // Every frequency of a frame is at most one cycle per px on each axis.
     profile.emplace(
         law,
@@ -208,6 +285,12 @@ struct SweepSimulator::Impl {
   double SeenScale(double depth_mm, double image_distance_mm) const {
     return 1 +
            mean_per_landing * DefocusPerAperture(options.camera.lens, image_distance_mm, depth_mm);
+  }
+
+  // Root of the mean variance over both axes, at the principal point.
+  double MeanDefocusPx(const FrameState& frame) const {
+    if (!DisplacesFocus()) return frame.defocus_sigma_px;
+    return DefocusMapPx(frame.depth_mm, frame.image_distance_mm, {0, 0}).norm() / std::sqrt(2.0);
   }
 
   void MakeTruth() {
@@ -224,10 +307,12 @@ struct SweepSimulator::Impl {
     if (On(Effect::kTilt)) truth.tilt_deg = options.target.tilt_deg;
     if (On(Effect::kShading)) truth.corner_stops = options.corner_stops;
     if (On(Effect::kDust)) truth.specks = options.speck_count;
+    if (On(Effect::kAberrations)) truth.aberrations = options.aberrations;
+    truth.aberrations.distortion = Distortion();
     for (std::size_t i = 0; i < frames.size(); ++i) {
-      truth.frames.push_back(
-          {fmt::format("frames/frame_{:03d}.png", i), frames[i].depth_mm, frames[i].reading_mm,
-           std::hypot(floor_px, frames[i].defocus_sigma_px), frames[i].image_distance_mm});
+      truth.frames.push_back({fmt::format("frames/frame_{:03d}.png", i), frames[i].depth_mm,
+                              frames[i].reading_mm, std::hypot(floor_px, MeanDefocusPx(frames[i])),
+                              frames[i].image_distance_mm});
     }
   }
 
@@ -349,7 +434,8 @@ struct SweepSimulator::Impl {
     double nearest_pixel_mm = with_all.front().pixel_mm;
     const Eigen::Vector2d& axis_px = sensor.principal_point_px;
     for (const FrameState& frame : with_all) {
-      const double margin_px = std::min(3 * std::hypot(most_floor_px, frame.defocus_sigma_px),
+      const double most_px = MostDefocusPx(frame, options.aberrations.DisplaceFocus());
+      const double margin_px = std::min(3 * std::hypot(most_floor_px, most_px),
                                         std::min(sensor.width_px, sensor.height_px) / 4.0) +
                                1;
       const TiltedTarget target = TargetOf(frame, frame.pixel_mm, all);
@@ -361,9 +447,12 @@ struct SweepSimulator::Impl {
         nearest_pixel_mm = std::min({nearest_pixel_mm, target.PixelAcrossMm(x_px - axis_px.x()),
                                      target.PixelDownMm(x_px - axis_px.x())});
         for (const double y_px : {-0.5 - margin_px, sensor.height_px - 0.5 + margin_px}) {
-          const Eigen::Vector2d reach_mm = (target.At(Eigen::Vector2d(x_px, y_px) - axis_px) -
-                                            frame.drift_mm - request.centre_mm)
-                                               .cwiseAbs();
+          // A barrel shows more of the target.
+          const Eigen::Vector2d seen_px =
+              WithoutDistortion(std::min(0.0, options.aberrations.distortion),
+                                Eigen::Vector2d(x_px, y_px) - axis_px, FarthestCornerPx(sensor));
+          const Eigen::Vector2d reach_mm =
+              (target.At(seen_px) - frame.drift_mm - request.centre_mm).cwiseAbs();
           request.width_mm = std::max(request.width_mm, 2 * reach_mm.x());
           request.height_mm = std::max(request.height_mm, 2 * reach_mm.y());
         }
@@ -414,64 +503,133 @@ struct SweepSimulator::Impl {
     return frame.lamp * (falls ? std::pow(frame.depth_mm / depth_mm, 2) : 1);
   }
 
-  // Columns `first` .. `last` of a frame with the blur and the scale of one of them. Pixel (x, y)
-  // shows the point that its chief ray meets, so that the image shows the target upright.
-  cv::Mat TileColumns(const FrameState& frame, int first, int last, double node_px) const {
-    const Sensor& sensor = options.camera.sensor;
-    const Eigen::Vector2d& axis_px = sensor.principal_point_px;
-    const Eigen::Vector2d beside_mm = -frame.drift_mm - tile_frame.origin_mm;
-    const TiltedTarget target = SeenTarget(frame, node_px - axis_px.x());
-    const double across_mm = target.PixelAcrossMm(node_px - axis_px.x());
-    const double down_mm = target.PixelDownMm(node_px - axis_px.x());
-    const auto periods_at = [&](const TiltedTarget& seen, double column_px) {
-      return (seen.At({column_px - axis_px.x(), 0}).x() + beside_mm.x()) / tile_frame.width_mm;
-    };
-    AxisSampling x{periods_at(target, first), across_mm / tile_frame.width_mm, last - first + 1};
-    if (IsTilted()) {
-      for (int column = first; column <= last; ++column) {
-        x.at.push_back(periods_at(SeenTarget(frame, column - axis_px.x()), column));
-      }
-    }
-    const AxisSampling y{(-axis_px.y() * down_mm + beside_mm.y()) / tile_frame.height_mm,
-                         down_mm / tile_frame.height_mm, sensor.height_px};
-    const double defocus_px = SeenDefocusPx(frame, target.DepthMm(node_px - axis_px.x()));
-    return tile_texture->Evaluate(x, y,
-                                  {floor_px, stored_camera.psf, defocus_px, On(Effect::kPixelBox),
-                                   profile ? &*profile : nullptr});
+  // The blur of the columns around a node, at a position from the axis.
+  FrameBlur BlurAt(const FrameState& frame, double depth_mm) const {
+    return {floor_px, stored_camera.psf, SeenDefocusPx(frame, depth_mm), On(Effect::kPixelBox),
+            profile ? &*profile : nullptr};
   }
 
-  LinearImage RenderTile(const FrameState& frame) const {
-    const Sensor& sensor = options.camera.sensor;
-    LinearImage image{sensor.width_px, sensor.height_px, 1, {}};
-    image.values.resize(static_cast<std::size_t>(sensor.width_px) *
-                        static_cast<std::size_t>(sensor.height_px));
+  // Columns `first` .. `last` of a grid of pixels with the blur and the scale at the column
+  // `node_px` from the axis. Pixel (x, y) shows the point that its chief ray meets, so that the
+  // image shows the target upright.
+  cv::Mat TileColumns(const FrameState& frame, const PixelGrid& grid, int first, int last,
+                      double node_px) const {
+    const Eigen::Vector2d beside_mm = -frame.drift_mm - tile_frame.origin_mm;
+    const TiltedTarget target = SeenTarget(frame, node_px);
+    const double across_mm = grid.step_px * target.PixelAcrossMm(node_px);
+    const double down_mm = target.PixelDownMm(node_px);
+    const auto periods_at = [&](const TiltedTarget& seen, double x_px) {
+      return (seen.At({x_px, 0}).x() + beside_mm.x()) / tile_frame.width_mm;
+    };
+    AxisSampling x{periods_at(target, grid.XPx(first)), across_mm / tile_frame.width_mm,
+                   last - first + 1};
+    if (IsTilted()) {
+      for (int column = first; column <= last; ++column) {
+        const double x_px = grid.XPx(column);
+        x.at.push_back(periods_at(SeenTarget(frame, x_px), x_px));
+      }
+    }
+    const AxisSampling y{(grid.YPx(0) * down_mm + beside_mm.y()) / tile_frame.height_mm,
+                         grid.step_px * down_mm / tile_frame.height_mm, grid.rows};
+    const double depth_mm = target.DepthMm(node_px);
+    FrameBlur blur = BlurAt(frame, depth_mm);
+    blur.pixel_steps = 1 / grid.step_px;
+    if (!DisplacesFocus()) return tile_texture->Evaluate(x, y, blur);
+    const FieldBlur field =
+        DecomposeBlur(cv::Size(x.count, y.count), [&](const Eigen::Vector2d& place) {
+          FrameBlur of_place = blur;
+          of_place.defocus_map_px = DefocusMapPx(
+              depth_mm, frame.image_distance_mm,
+              {grid.XPx(first) + grid.step_px * place.x(), grid.YPx(0) + grid.step_px * place.y()});
+          return of_place;
+        });
+    cv::Mat image;
+    for (std::size_t k = 0; k < field.blurs.size(); ++k) {
+      ThrowIfCancelled();
+      cv::Mat weights;
+      field.weights[k].convertTo(weights, CV_64F);
+      const cv::Mat part = tile_texture->Evaluate(x, y, field.blurs[k]).mul(weights);
+      image = k == 0 ? part : image + part;
+    }
+    return image;
+  }
+
+  // The light of a grid of pixels, without the factors of each pixel, CV_64F.
+  cv::Mat RenderGrid(const FrameState& frame, const PixelGrid& grid) const {
+    cv::Mat image = cv::Mat::zeros(grid.rows, grid.columns, CV_64F);
     const auto add = [&](const cv::Mat& light, int first, const auto& factor) {
       for (int i = 0; i < light.rows; ++i) {
         ThrowIfCancelled();
         const double* row = light.ptr<double>(i);
-        float* to = image.values.data() + static_cast<std::ptrdiff_t>(i) * sensor.width_px + first;
-        for (int j = 0; j < light.cols; ++j)
-          to[j] += static_cast<float>(factor(first + j) * row[j]);
+        double* to = image.ptr<double>(i) + first;
+        for (int j = 0; j < light.cols; ++j) to[j] += factor(first + j) * row[j];
       }
     };
     if (!IsTilted()) {
-      add(TileColumns(frame, 0, sensor.width_px - 1, sensor.principal_point_px.x()), 0,
-          [&](int) { return frame.lamp; });
+      add(TileColumns(frame, grid, 0, grid.columns - 1, 0), 0, [&](int) { return frame.lamp; });
       return image;
     }
-    const std::vector<int> nodes = NodesOf(sensor.width_px, ChangePerColumnPx(frame));
+    const std::vector<int> nodes = NodesOf(grid.columns, grid.step_px * ChangePerColumnPx(frame));
     for (std::size_t n = 0; n < nodes.size(); ++n) {
       const int node = nodes[n];
       const int before = n > 0 ? nodes[n - 1] : node - 1;
       const int after = n + 1 < nodes.size() ? nodes[n + 1] : node + 1;
-      add(TileColumns(frame, before + 1, after - 1, node), before + 1, [&](int column) {
-        const double share = column < node ? static_cast<double>(column - before) / (node - before)
-                                           : static_cast<double>(after - column) / (after - node);
-        const double x_px = column - sensor.principal_point_px.x();
-        return share * LampAt(frame, SeenTarget(frame, x_px).DepthMm(x_px));
-      });
+      add(TileColumns(frame, grid, before + 1, after - 1, grid.XPx(node)), before + 1,
+          [&](int column) {
+            const double share = column < node
+                                     ? static_cast<double>(column - before) / (node - before)
+                                     : static_cast<double>(after - column) / (after - node);
+            const double x_px = grid.XPx(column);
+            return share * LampAt(frame, SeenTarget(frame, x_px).DepthMm(x_px));
+          });
     }
     return image;
+  }
+
+  LinearImage RenderTile(const FrameState& frame) const {
+    const Sensor& sensor = options.camera.sensor;
+    const Eigen::Vector2d& axis_px = sensor.principal_point_px;
+    const PixelGrid pixels{-axis_px, 1, sensor.width_px, sensor.height_px};
+    const cv::Mat light =
+        Distortion() == 0 ? RenderGrid(frame, pixels) : RenderDistorted(frame, pixels);
+    LinearImage image{sensor.width_px, sensor.height_px, 1, {}};
+    image.values.reserve(light.total());
+    for (int y = 0; y < light.rows; ++y) {
+      const double* row = light.ptr<double>(y);
+      for (int x = 0; x < light.cols; ++x) image.values.push_back(static_cast<float>(row[x]));
+    }
+    return image;
+  }
+
+  // Computes the image of a lens without distortion on a fine grid and displaces it.
+  cv::Mat RenderDistorted(const FrameState& frame, const PixelGrid& pixels) const {
+    const Eigen::Vector2d last_px(pixels.XPx(pixels.columns - 1), pixels.YPx(pixels.rows - 1));
+    Eigen::Vector2d low_px = pixels.first_px, high_px = last_px;
+    for (const double x_px : {pixels.first_px.x(), 0.0, last_px.x()}) {
+      for (const double y_px : {pixels.first_px.y(), 0.0, last_px.y()}) {
+        const Eigen::Vector2d place_px = Undistorted({x_px, y_px});
+        low_px = low_px.cwiseMin(place_px);
+        high_px = high_px.cwiseMax(place_px);
+      }
+    }
+    low_px.array() -= kFineBorder * kFinePx;
+    const Eigen::Vector2d extent = (high_px - low_px) / kFinePx;
+    const PixelGrid fine{low_px, kFinePx, static_cast<int>(extent.x()) + kFineBorder + 2,
+                         static_cast<int>(extent.y()) + kFineBorder + 2};
+    const cv::Mat undistorted = RenderGrid(frame, fine);
+    cv::Mat image(pixels.rows, pixels.columns, CV_64F);
+    for (int y = 0; y < image.rows; ++y) {
+      ThrowIfCancelled();
+      for (int x = 0; x < image.cols; ++x) {
+        const Eigen::Vector2d place_px = Undistorted({pixels.XPx(x), pixels.YPx(y)});
+        image.at<double>(y, x) =
+            InterpolateSinc(undistorted, (place_px - fine.first_px) / fine.step_px);
+      }
+    }
+    return image;
+  }
+  Eigen::Vector2d Undistorted(const Eigen::Vector2d& from_axis_px) const {
+    return WithoutDistortion(Distortion(), from_axis_px, FarthestCornerPx(options.camera.sensor));
   }
 
   // An edge through the target's centre, dark on the left and bright on the right. A positive angle
@@ -481,9 +639,13 @@ struct SweepSimulator::Impl {
     LinearImage image{sensor.width_px, sensor.height_px, 1, {}};
     image.values.resize(static_cast<std::size_t>(sensor.width_px) *
                         static_cast<std::size_t>(sensor.height_px));
+    // The blur of an aberrated lens also depends on the row.
+    const int rows = DisplacesFocus() || Distortion() != 0 ? kEdgeRows : sensor.height_px;
     for (const ColumnStrip& strip : StripsOf(sensor.width_px, ChangePerColumnPx(frame))) {
-      ThrowIfCancelled();
-      RenderEdge(frame, strip, &image);
+      for (int row = 0; row < sensor.height_px; row += rows) {
+        ThrowIfCancelled();
+        RenderEdge(frame, strip, row, std::min(sensor.height_px, row + rows), &image);
+      }
     }
     return image;
   }
@@ -491,7 +653,8 @@ struct SweepSimulator::Impl {
   // An edge on the target is a line g = 0, where g is the distance on the target in mm. The
   // gradient of g in the image converts it to the distance of a pixel from the line, in px, and
   // gives its direction.
-  void RenderEdge(const FrameState& frame, const ColumnStrip& strip, LinearImage* image) const {
+  void RenderEdge(const FrameState& frame, const ColumnStrip& strip, int first_row, int end_row,
+                  LinearImage* image) const {
     const Sensor& sensor = options.camera.sensor;
     const TargetOptions& options_of = options.target;
     const Eigen::Vector2d& axis_px = sensor.principal_point_px;
@@ -503,20 +666,28 @@ struct SweepSimulator::Impl {
       return normal.dot(target.At(from_axis_px) - on_edge_mm);
     };
 
-    // The point where the edge crosses the middle of the strip, or the end of the middle that is
-    // nearest to the edge.
+    // The point where the edge crosses the middle of the strip, or the end of the middle within
+    // these rows that is nearest to the edge.
     Eigen::Vector2d middle_px(strip.middle_px() - axis_px.x(), 0);
     const double down_mm = target.PixelDownMm(middle_px.x());
     const double row_px = -distance_mm(middle_px) / (normal.y() * down_mm);
-    middle_px.y() = std::clamp(std::isnan(row_px) ? 0 : row_px, -axis_px.y(),
-                               sensor.height_px - 1 - axis_px.y());
+    middle_px.y() = std::clamp(std::isnan(row_px) ? 0 : row_px, first_row - axis_px.y(),
+                               end_row - 1 - axis_px.y());
     const Eigen::Vector2d gradient(normal.x() * target.PixelAcrossMm(middle_px.x()) +
                                        normal.y() * target.DownPerColumnMm(middle_px),
                                    normal.y() * down_mm);
     const double pixel_mm = gradient.norm();
 
     const double depth_mm = target.DepthMm(middle_px.x());
-    const double defocus_px = SeenDefocusPx(frame, depth_mm);
+    double defocus_px = SeenDefocusPx(frame, depth_mm);
+    if (DisplacesFocus()) {
+      // The blur across the edge, at the point of the edge that is nearest to the middle.
+      const Eigen::Vector2d on_edge_px =
+          middle_px - gradient * (distance_mm(middle_px) / gradient.squaredNorm());
+      defocus_px =
+          (DefocusMapPx(depth_mm, frame.image_distance_mm, on_edge_px) * gradient.normalized())
+              .norm();
+    }
     const double ink_px =
         options_of.kind == TargetKind::kPrintedEdge ? options_of.ink_sigma_mm / pixel_mm : 0;
     const bool disc = stored_camera.psf == Psf::kDisc;
@@ -530,10 +701,11 @@ struct SweepSimulator::Impl {
     const double lamp = LampAt(frame, depth_mm);
     const double dark = lamp * (1 - options_of.contrast);
     const double step = 2 * lamp * options_of.contrast;
-    for (int y = 0; y < sensor.height_px; ++y) {
+    for (int y = first_row; y < end_row; ++y) {
       ThrowIfCancelled();
       for (int x = strip.first; x < strip.first + strip.count; ++x) {
-        const double distance_px = distance_mm(Eigen::Vector2d(x, y) - axis_px) / pixel_mm;
+        const double distance_px =
+            distance_mm(Undistorted(Eigen::Vector2d(x, y) - axis_px)) / pixel_mm;
         image->values[static_cast<std::size_t>(y * sensor.width_px + x)] =
             static_cast<float>(dark + step * edge.At(distance_px));
       }

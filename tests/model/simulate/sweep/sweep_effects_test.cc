@@ -27,7 +27,8 @@ using thicklens::testing::TestSensor;
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kFocusMm = 300;
 
-// A thick lens with a wide field, so that every effect matters.
+// A thick lens with a wide field, so that every effect matters but the aberrations, whose tests are
+// in aberrated_sweep_test.cc.
 SweepSimulationOptions WideSweep() {
   SweepSimulationOptions options;
   Camera& camera = options.camera;

@@ -89,9 +89,15 @@ TEST_F(SweepSimulationFileTest, ReadsEveryField) {
       "light: {level: 0.4, lamp_falloff: false, flicker: 0.02}\n"
       "drift_sigma_px: 1.25\n"
       "fixed_to_frame: {corner_stops: -1.5, specks: 12, speck_depth: 0.6, speck_radius_px: 7}\n"
+      "aberrations: {field_curvature_mm: -3, field_astigmatism_mm: 2.5, astigmatism_mm: 1.5,\n"
+      "              distortion: -0.04}\n"
       "noise: {full_well_electrons: 9000, read_noise_electrons: 5}\n"
       "bits: 16\n"
       "seed: 77\n");
+  EXPECT_EQ(options.aberrations.field_curvature_mm, -3);
+  EXPECT_EQ(options.aberrations.field_astigmatism_mm, 2.5);
+  EXPECT_EQ(options.aberrations.astigmatism_mm, 1.5);
+  EXPECT_EQ(options.aberrations.distortion, -0.04);
   EXPECT_EQ(options.corner_stops, -1.5);
   EXPECT_EQ(options.speck_count, 12);
   EXPECT_EQ(options.speck_depth, 0.6);
@@ -184,6 +190,7 @@ TEST_F(SweepSimulationFileTest, ErrorsHaveTheirPlaceInTheFile) {
        "only for a target of the kind 'image'"},
       {head + kTruth + rest + "noise: {read_noise_electrons: 3}\n", "needs noise.full_well"},
       {head + kTruth + rest + "fixed_to_frame: {corner_stops: -7}\n", "must be from -6 to 2"},
+      {head + kTruth + rest + "aberrations: {distortion: -0.2}\n", "must be from -0.14 to 0.3"},
       {head + kTruth + rest + "fixed_to_frame: {speck_depth: 2}\n", "must be from 0 to 1"},
       {head + kTruth + rest + "fixed_to_frame: {specks: -1}\n", "specks"},
       {head + kTruth + rest + "bits: 12\n", "bits is 12: it must be 8 or 16"},

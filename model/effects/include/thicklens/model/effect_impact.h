@@ -9,6 +9,7 @@
 #include "thicklens/base/export.h"
 #include "thicklens/model/camera.h"
 #include "thicklens/model/effects.h"
+#include "thicklens/model/lens_aberrations.h"
 #include "thicklens/model/light_field_grid.h"
 #include "thicklens/model/scene.h"
 
@@ -24,6 +25,7 @@ struct BenchConditions {
   double tilt_deg = 0;          // angle between the target and the plane across the axis
   double corner_stops = 0;      // light at the farthest corner over that on the axis, factors of 2
   double speck_depth = 0;       // part of the light that a speck on the sensor takes, 0 to 1
+  LensAberrations aberrations = {};  // of the lens
 };
 
 // Relative light that the shading of a camera lets through [D135]:

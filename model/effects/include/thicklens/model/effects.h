@@ -37,6 +37,8 @@ enum class Effect {
   kReadingError,   // error of the bench's readings
   kShading,        // light lost toward the corners by the mount or by filters
   kDust,           // specks on the sensor's cover
+  kAberrations,    // field curvature and astigmatism displace the plane of focus
+  kDistortion,     // the lens displaces the image toward the corners
 };
 
 // Unit of an impact.

@@ -10,6 +10,7 @@
 #include "thicklens/base/export.h"
 #include "thicklens/model/camera.h"
 #include "thicklens/model/effect_selection.h"
+#include "thicklens/model/lens_aberrations.h"
 #include "thicklens/model/pupil_law.h"
 #include "thicklens/model/scene.h"
 #include "thicklens/model/sweep_file.h"
@@ -83,6 +84,9 @@ struct SweepSimulationOptions {
   int speck_count = 0;         // number of specks on the sensor
   double speck_depth = 0.4;    // part of the light that a speck takes, 0 to 1
   double speck_radius_px = 9;  // radius of the largest speck, px
+  // Field curvature, astigmatism and distortion of the lens. The plane of focus of the camera is
+  // the medial focus on the axis. Distortion displaces the blurred image of a lens without it.
+  LensAberrations aberrations;
   // Distribution of the light of a point over the pupil; its second moment is (kappa r)^2 in any
   // case. If it is absent, the law of the paper is used where fall-off is on, and the uniform law
   // otherwise.
