@@ -14,6 +14,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "benchmarks/accuracy/fault_study.h"
+#include "benchmarks/accuracy/kinds_study.h"
 #include "benchmarks/accuracy/processing_study.h"
 #include "benchmarks/accuracy/pupil_law_study.h"
 #include "benchmarks/accuracy/tables.h"
@@ -43,6 +44,8 @@ struct Arguments {
   bool faults = false;
   bool pupil_laws = false;
   bool processing = false;
+  bool benches = false;
+  KindsOptions kinds;
 };
 
 std::vector<std::string> TargetNames() {
@@ -103,6 +106,12 @@ void AddOptions(CLI::App* app, Arguments* arguments) {
   app->add_flag("--processing", arguments->processing,
                 "instead: sweeps whose frames were read with a wrong transfer curve, or denoised, "
                 "compressed or sharpened: the change of kappa, and what is reported");
+  app->add_flag("--benches", arguments->benches,
+                "instead: sweeps of each kind of configs/accuracy/benches.yaml, with the goals");
+  app->add_option("--kind", arguments->kinds.names, "with --benches: these kinds alone (all)");
+  app->add_option("--mixtures", arguments->kinds.mixtures,
+                  "with --benches: sweeps with random mixtures of the disturbances (0)")
+      ->check(CLI::NonNegativeNumber);
   app->add_option("--json", arguments->json_path, "write the tables to a file");
 }
 
@@ -164,6 +173,13 @@ void RunStudy(Arguments arguments) {
   } else if (arguments.pupil_laws) {
     json["pupil_laws"] =
         RunPupilLawStudy(arguments.cases, arguments.settings, arguments.sweeps, arguments.threads);
+  } else if (arguments.benches) {
+    KindsOptions kinds = arguments.kinds;
+    kinds.path = THICKLENS_SOURCE_DIR "/configs/accuracy/benches.yaml";
+    kinds.sweeps = arguments.sweeps;
+    kinds.first_seed = arguments.settings.first_seed;
+    kinds.threads = arguments.threads;
+    json["benches"] = RunKindsStudy(kinds);
   } else if (arguments.processing) {
     json["processing"] =
         RunProcessingStudy(arguments.settings, arguments.sweeps, arguments.threads);

@@ -40,9 +40,21 @@ Measured Compare(const calib::Result& result, double truth) {
   return {result.value - truth, result.sigma, interval.x() - truth, interval.y() - truth};
 }
 
-void Fill(const calib::Calibration& c, const SimulatedSweep& simulated, Trial* trial) {
+}  // namespace
+
+std::string FloorName(Floor floor) {
+  switch (floor) {
+    case Floor::kExact:
+      return "exact";
+    case Floor::kDrawn:
+      return "drawn";
+    default:
+      return "measured";
+  }
+}
+
+void FillTrial(const calib::Calibration& c, const model::SweepTruth& truth, Trial* trial) {
   trial->partial = c.summary.outcome == calib::Outcome::kPartial;
-  const model::SweepTruth& truth = simulated.truth;
   if (c.diagnostics.paper_recipe.done && c.diagnostics.paper_recipe.normalised_focus_depth_mm > 0)
     trial->recipe_error_mm =
         c.diagnostics.paper_recipe.normalised_focus_depth_mm - truth.focus_depth_mm;
@@ -56,19 +68,6 @@ void Fill(const calib::Calibration& c, const SimulatedSweep& simulated, Trial* t
   trial->focus_depth_mm = Compare(*c.summary.focus_depth_mm, truth.focus_depth_mm);
   trial->image_distance_mm = Compare(*c.summary.image_distance_mm, truth.image_distance_mm);
   trial->blur_ratio = Compare(*c.summary.blur_ratio, truth.blur_ratio);
-}
-
-}  // namespace
-
-std::string FloorName(Floor floor) {
-  switch (floor) {
-    case Floor::kExact:
-      return "exact";
-    case Floor::kDrawn:
-      return "drawn";
-    default:
-      return "measured";
-  }
 }
 
 model::SweepSimulationOptions Simulation(const TrialKey& key, const TrialSettings& settings) {
@@ -106,7 +105,7 @@ std::vector<Trial> RunTrials(const TrialKey& key, const TrialSettings& settings,
       const double begin = ThreadSeconds();
       const calib::Calibration c = calib::Calibrate(simulated.sweep, how);
       trial.seconds = how.threads == 1 ? ThreadSeconds() - begin : c.summary.seconds;
-      Fill(c, simulated, &trial);
+      FillTrial(c, simulated.truth, &trial);
     } catch (const std::exception& e) {
       trial.reason = Countable(std::string("error: ") + e.what());
     }

@@ -66,6 +66,9 @@ struct Trial {
 
 model::SweepSimulationOptions Simulation(const TrialKey& key, const TrialSettings& settings);
 
+// Sets what the calibration found, compared with the truth.
+void FillTrial(const calib::Calibration& calibration, const model::SweepTruth& truth, Trial* trial);
+
 // Simulates the sweep of a key and calibrates it, once for each kind of floor.
 std::vector<Trial> RunTrials(const TrialKey& key, const TrialSettings& settings,
                              const std::vector<Floor>& floors);
