@@ -93,7 +93,7 @@ AxisPlan PlanAxis(const AxisSampling& axis, int max_frequency, double gaussian_s
   return plan;
 }
 
-// The same positions with a step of `pixel_steps` steps, as a list if that differs.
+// The same positions, with the step of one px. A px has `pixel_steps` steps.
 AxisSampling InPixels(AxisSampling axis, double pixel_steps) {
   if (pixel_steps == 1) return axis;
   if (axis.at.empty()) {
@@ -101,15 +101,6 @@ AxisSampling InPixels(AxisSampling axis, double pixel_steps) {
   }
   axis.step *= pixel_steps;
   return axis;
-}
-
-// The least sigma of the defocus over all directions.
-double SmallestDefocusPx(const FrameBlur& blur) {
-  if (!blur.defocus_map_px) return blur.defocus_sigma_px;
-  // The eigenvalues are the mean of the diagonal +- the root.
-  const Eigen::Matrix2d& map = *blur.defocus_map_px;
-  const double mean = 0.5 * map.trace();
-  return std::abs(std::abs(mean) - std::hypot(0.5 * (map(0, 0) - map(1, 1)), map(0, 1)));
 }
 
 // A grid with its first kTaps nodes repeated behind the end, so that no tap wraps around. `grid` is
@@ -160,28 +151,14 @@ std::complex<double> PeriodicImage::Coefficient(int a, int b) const {
                         static_cast<std::size_t>(a + max_x_)];
 }
 
-double FrameBlur::DefocusTransferAt(double fx, double fy) const {
-  double sigma_px = defocus_sigma_px;
-  if (defocus_map_px) {
-    const Eigen::Vector2d f = *defocus_map_px * Eigen::Vector2d(fx, fy);
-    sigma_px = 1;
-    fx = f.x();
-    fy = f.y();
-  }
-  return profile == nullptr ? DefocusTransfer(psf, sigma_px, fx, fy)
-                            : profile->Transfer(2 * kPi * sigma_px * std::hypot(fx, fy));
-}
-
 cv::Mat PeriodicImage::Evaluate(const AxisSampling& x_steps, const AxisSampling& y_steps,
                                 const FrameBlur& blur) const {
-  // From here on a step is one px; the positions of the pixels stay.
   const AxisSampling x = InPixels(x_steps, blur.pixel_steps);
   const AxisSampling y = InPixels(y_steps, blur.pixel_steps);
   // Gaussians of both kinds combine to one Gaussian, which is separable. A disc and the light of a
   // pupil law are not.
   const bool separates =
-      !blur.defocus_map_px &&
-      (blur.defocus_sigma_px == 0 || (blur.psf == Psf::kGaussian && blur.profile == nullptr));
+      blur.defocus_sigma_px == 0 || (blur.psf == Psf::kGaussian && blur.profile == nullptr);
   const double gaussian_sigma_px =
       separates ? std::hypot(blur.floor_sigma_px, blur.defocus_sigma_px) : blur.floor_sigma_px;
   // The transfer function of a Gaussian under a pupil law falls nearly as fast as that of the
@@ -189,9 +166,15 @@ cv::Mat PeriodicImage::Evaluate(const AxisSampling& x_steps, const AxisSampling&
   const double reach_sigma_px =
       separates || blur.psf == Psf::kDisc
           ? gaussian_sigma_px
-          : std::hypot(blur.floor_sigma_px, kLawReach * SmallestDefocusPx(blur));
+          : std::hypot(blur.floor_sigma_px, kLawReach * blur.defocus_sigma_px);
   const AxisPlan x_plan = PlanAxis(x, max_x_, gaussian_sigma_px, reach_sigma_px, blur.pixel_box);
   const AxisPlan y_plan = PlanAxis(y, max_y_, gaussian_sigma_px, reach_sigma_px, blur.pixel_box);
+  const auto defocus_transfer = [&](double fx, double fy) {
+    return blur.profile == nullptr
+               ? DefocusTransfer(blur.psf, blur.defocus_sigma_px, fx, fy)
+               : blur.profile->Transfer(2 * kPi * blur.defocus_sigma_px * std::hypot(fx, fy));
+  };
+
   // First axis: row b of the spectrum is evaluated at the pixels' columns and kept transposed for
   // the second axis.
   const int rows = y_plan.limit + 1;
@@ -207,16 +190,10 @@ cv::Mat PeriodicImage::Evaluate(const AxisSampling& x_steps, const AxisSampling&
         auto* nodes = padded.ptr<std::complex<double>>(r);
         const double row_factor = y_plan.factor[static_cast<std::size_t>(b)];
         for (int a = 0; a <= x_plan.limit; ++a) {
-          const double factor = row_factor * x_plan.factor[static_cast<std::size_t>(a)];
-          const double right =
-              separates ? factor : factor * blur.DefocusTransferAt(a * x.step, b * y.step);
-          nodes[a] = Coefficient(a, b) * right;
-          if (a == 0) continue;
-          // Without a map the transfer function is the same for -a.
-          const double left = blur.defocus_map_px
-                                  ? factor * blur.DefocusTransferAt(-a * x.step, b * y.step)
-                                  : right;
-          nodes[x_plan.grid_size - a] = Coefficient(-a, b) * left;
+          double factor = row_factor * x_plan.factor[static_cast<std::size_t>(a)];
+          if (!separates) factor *= defocus_transfer(a * x.step, b * y.step);
+          nodes[a] = Coefficient(a, b) * factor;
+          if (a > 0) nodes[x_plan.grid_size - a] = Coefficient(-a, b) * factor;
         }
       }
       cv::dft(padded, fine.grid, cv::DFT_INVERSE | cv::DFT_ROWS);

@@ -1,10 +1,8 @@
 #ifndef THICKLENS_MODEL_SIMULATE_SWEEP_PERIODIC_IMAGE_H_
 #define THICKLENS_MODEL_SIMULATE_SWEEP_PERIODIC_IMAGE_H_
 
-#include <Eigen/Core>
 #include <complex>
 #include <opencv2/core.hpp>
-#include <optional>
 #include <vector>
 
 #include "thicklens/model/camera.h"
@@ -30,13 +28,7 @@ struct FrameBlur {
   bool pixel_box = true;  // false: a pixel is the light at its centre
   // The shape of the defocus blur if it is not that of `psf`; not owned.
   const PupilProfile* profile = nullptr;
-  // Replaces defocus_sigma_px if the lens is aberrated: a point has the defocus blur with a sigma
-  // of 1 px, transformed by this symmetric matrix.
-  std::optional<Eigen::Matrix2d> defocus_map_px = std::nullopt;
   double pixel_steps = 1;
-
-  // The transfer function of the defocus alone, at frequencies in cycles per px.
-  double DefocusTransferAt(double fx, double fy) const;
 };
 
 // An image that is a finite Fourier series: it repeats in both directions and is band-limited by
@@ -50,8 +42,8 @@ class PeriodicImage {
 
   // Returns the image behind blur and pixel box at every pixel centre, CV_64F, y.count x x.count:
   // sum over (a, b) of c(a, b) T(a x.step, b y.step) exp(2 pi i (a x + b y)), where T is the
-  // product of the transfer functions; x.step and y.step in it are of one px. The absolute error is
-  // below 1e-9 of the coefficients' norm. Thread safe.
+  // product of the transfer functions; x.step and y.step in it are those of one px. The absolute
+  // error is below 1e-9 of the coefficients' norm. Thread safe.
   cv::Mat Evaluate(const AxisSampling& x, const AxisSampling& y, const FrameBlur& blur) const;
 
   // The coefficient of exp(2 pi i (a x + b y)), a and b from -(count - 1)/2 to (count - 1)/2.

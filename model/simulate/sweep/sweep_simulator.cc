@@ -34,12 +34,12 @@ bool IsEdge(TargetKind kind) {
   return kind == TargetKind::kPrintedEdge || kind == TargetKind::kKnifeEdge;
 }
 
-// Where the image is distorted, the one of a lens without distortion is computed at this distance
-// of its pixels, px, and with a border for the interpolation.
-constexpr double kFinePx = 1.0 / 3;
+// The image of an aberrated lens is computed with samples this far apart, px, which hold its
+// highest frequency, and with a border of so many samples for the interpolation, and of so many
+// sigmas of the blur.
+constexpr double kFinePx = 0.5;
 constexpr int kFineBorder = 8;
-// Rows of an edge that have one blur where the lens is aberrated.
-constexpr int kEdgeRows = 4;
+constexpr double kBlurReach = 4.5;
 
 // Evenly spaced pixel centres.
 struct PixelGrid {
@@ -87,6 +87,7 @@ struct FrameState {
   Eigen::Vector2d drift_mm{0, 0};  // displacement of the target, X right, Y down
   double pixel_mm = 0;             // one px on the target: p/|m|
   double defocus_sigma_px = 0;     // value of kappa r_defocus
+  bool in_focus = false;           // true: without defocus
 };
 
 }  // namespace
@@ -472,7 +473,7 @@ struct SweepSimulator::Impl {
                               options.frame_count));
     }
     const FrameState& frame = frames[static_cast<std::size_t>(frame_index)];
-    LinearImage image = tile_texture ? RenderTile(frame) : RenderEdge(frame);
+    LinearImage image = RenderFrame(frame);
     for (std::size_t i = 0; i < light_of_pixel.size(); ++i) image.values[i] *= light_of_pixel[i];
     return image;
   }
@@ -495,18 +496,13 @@ struct SweepSimulator::Impl {
 
   // Sigma of the defocus, and below the light, of a column at a depth.
   double SeenDefocusPx(const FrameState& frame, double depth_mm) const {
+    if (frame.in_focus) return 0;
     return IsTilted() && On(Effect::kDefocus) ? DefocusPx(depth_mm, frame.image_distance_mm)
                                               : frame.defocus_sigma_px;
   }
   double LampAt(const FrameState& frame, double depth_mm) const {
     const bool falls = options.lamp_falloff && On(Effect::kLampFalloff);
     return frame.lamp * (falls ? std::pow(frame.depth_mm / depth_mm, 2) : 1);
-  }
-
-  // The blur of the columns around a node, at a position from the axis.
-  FrameBlur BlurAt(const FrameState& frame, double depth_mm) const {
-    return {floor_px, stored_camera.psf, SeenDefocusPx(frame, depth_mm), On(Effect::kPixelBox),
-            profile ? &*profile : nullptr};
   }
 
   // Columns `first` .. `last` of a grid of pixels with the blur and the scale at the column
@@ -531,31 +527,14 @@ struct SweepSimulator::Impl {
     }
     const AxisSampling y{(grid.YPx(0) * down_mm + beside_mm.y()) / tile_frame.height_mm,
                          grid.step_px * down_mm / tile_frame.height_mm, grid.rows};
-    const double depth_mm = target.DepthMm(node_px);
-    FrameBlur blur = BlurAt(frame, depth_mm);
-    blur.pixel_steps = 1 / grid.step_px;
-    if (!DisplacesFocus()) return tile_texture->Evaluate(x, y, blur);
-    const FieldBlur field =
-        DecomposeBlur(cv::Size(x.count, y.count), [&](const Eigen::Vector2d& place) {
-          FrameBlur of_place = blur;
-          of_place.defocus_map_px = DefocusMapPx(
-              depth_mm, frame.image_distance_mm,
-              {grid.XPx(first) + grid.step_px * place.x(), grid.YPx(0) + grid.step_px * place.y()});
-          return of_place;
-        });
-    cv::Mat image;
-    for (std::size_t k = 0; k < field.blurs.size(); ++k) {
-      ThrowIfCancelled();
-      cv::Mat weights;
-      field.weights[k].convertTo(weights, CV_64F);
-      const cv::Mat part = tile_texture->Evaluate(x, y, field.blurs[k]).mul(weights);
-      image = k == 0 ? part : image + part;
-    }
-    return image;
+    return tile_texture->Evaluate(
+        x, y,
+        {floor_px, stored_camera.psf, SeenDefocusPx(frame, target.DepthMm(node_px)),
+         On(Effect::kPixelBox), profile ? &*profile : nullptr, 1 / grid.step_px});
   }
 
-  // The light of a grid of pixels, without the factors of each pixel, CV_64F.
-  cv::Mat RenderGrid(const FrameState& frame, const PixelGrid& grid) const {
+  // The light of a grid of pixels of a texture, without the factors of each pixel, CV_64F.
+  cv::Mat RenderTile(const FrameState& frame, const PixelGrid& grid) const {
     cv::Mat image = cv::Mat::zeros(grid.rows, grid.columns, CV_64F);
     const auto add = [&](const cv::Mat& light, int first, const auto& factor) {
       for (int i = 0; i < light.rows; ++i) {
@@ -586,12 +565,11 @@ struct SweepSimulator::Impl {
     return image;
   }
 
-  LinearImage RenderTile(const FrameState& frame) const {
+  LinearImage RenderFrame(const FrameState& frame) const {
     const Sensor& sensor = options.camera.sensor;
-    const Eigen::Vector2d& axis_px = sensor.principal_point_px;
-    const PixelGrid pixels{-axis_px, 1, sensor.width_px, sensor.height_px};
-    const cv::Mat light =
-        Distortion() == 0 ? RenderGrid(frame, pixels) : RenderDistorted(frame, pixels);
+    const PixelGrid pixels{-sensor.principal_point_px, 1, sensor.width_px, sensor.height_px};
+    const cv::Mat light = DisplacesFocus() || Distortion() != 0 ? RenderAberrated(frame, pixels)
+                                                                : RenderGrid(frame, pixels);
     LinearImage image{sensor.width_px, sensor.height_px, 1, {}};
     image.values.reserve(light.total());
     for (int y = 0; y < light.rows; ++y) {
@@ -600,9 +578,42 @@ struct SweepSimulator::Impl {
     }
     return image;
   }
+  cv::Mat RenderGrid(const FrameState& frame, const PixelGrid& grid) const {
+    return tile_texture ? RenderTile(frame, grid) : RenderEdge(frame, grid);
+  }
 
-  // Computes the image of a lens without distortion on a fine grid and displaces it.
-  cv::Mat RenderDistorted(const FrameState& frame, const PixelGrid& pixels) const {
+  // Computes the image of a lens without distortion on a fine grid, in focus, lets each point of it
+  // spread its light, and displaces it.
+  cv::Mat RenderAberrated(const FrameState& frame, const PixelGrid& pixels) const {
+    const PixelGrid fine = FineGrid(frame, pixels);
+    FrameState still = frame;
+    if (DisplacesFocus()) still.in_focus = true;
+    cv::Mat light = RenderGrid(still, fine);
+    if (DisplacesFocus()) {
+      const auto map_px = [&](const Eigen::Vector2d& at) {
+        const Eigen::Vector2d from_axis_px = fine.first_px + fine.step_px * at;
+        const double depth_mm = TargetOf(frame, frame.pixel_mm, decision.on)
+                                    .DepthMm(std::clamp(from_axis_px.x(), pixels.first_px.x(),
+                                                        pixels.XPx(pixels.columns - 1)));
+        return DefocusMapPx(depth_mm, frame.image_distance_mm, from_axis_px);
+      };
+      light = Blurred(light, fine.step_px,
+                      {stored_camera.psf, profile ? &*profile : nullptr, map_px, floor_px});
+    }
+    cv::Mat image(pixels.rows, pixels.columns, CV_64F);
+    for (int y = 0; y < image.rows; ++y) {
+      ThrowIfCancelled();
+      for (int x = 0; x < image.cols; ++x) {
+        const Eigen::Vector2d place_px = Undistorted({pixels.XPx(x), pixels.YPx(y)});
+        image.at<double>(y, x) = InterpolateSinc(light, (place_px - fine.first_px) / fine.step_px);
+      }
+    }
+    return image;
+  }
+
+  // The grid for the undistorted image of these pixels, with a border for the interpolation and for
+  // the light that comes from beyond the image.
+  PixelGrid FineGrid(const FrameState& frame, const PixelGrid& pixels) const {
     const Eigen::Vector2d last_px(pixels.XPx(pixels.columns - 1), pixels.YPx(pixels.rows - 1));
     Eigen::Vector2d low_px = pixels.first_px, high_px = last_px;
     for (const double x_px : {pixels.first_px.x(), 0.0, last_px.x()}) {
@@ -612,21 +623,14 @@ struct SweepSimulator::Impl {
         high_px = high_px.cwiseMax(place_px);
       }
     }
-    low_px.array() -= kFineBorder * kFinePx;
-    const Eigen::Vector2d extent = (high_px - low_px) / kFinePx;
-    const PixelGrid fine{low_px, kFinePx, static_cast<int>(extent.x()) + kFineBorder + 2,
-                         static_cast<int>(extent.y()) + kFineBorder + 2};
-    const cv::Mat undistorted = RenderGrid(frame, fine);
-    cv::Mat image(pixels.rows, pixels.columns, CV_64F);
-    for (int y = 0; y < image.rows; ++y) {
-      ThrowIfCancelled();
-      for (int x = 0; x < image.cols; ++x) {
-        const Eigen::Vector2d place_px = Undistorted({pixels.XPx(x), pixels.YPx(y)});
-        image.at<double>(y, x) =
-            InterpolateSinc(undistorted, (place_px - fine.first_px) / fine.step_px);
-      }
-    }
-    return image;
+    const double reach_px = DisplacesFocus() ? kBlurReach * MostDefocusPx(frame, true) : 0;
+    const double border = kFineBorder + std::ceil(reach_px / kFinePx);
+    // Whole steps from the first pixel, so that pixels of an undistorted image are samples.
+    const Eigen::Vector2d before = ((pixels.first_px - low_px) / kFinePx).array().ceil() + border;
+    const Eigen::Vector2d after = ((high_px - pixels.first_px) / kFinePx).array().ceil() + border;
+    const Eigen::Vector2d count = before + after;
+    return {pixels.first_px - kFinePx * before, kFinePx, static_cast<int>(count.x()) + 1,
+            static_cast<int>(count.y()) + 1};
   }
   Eigen::Vector2d Undistorted(const Eigen::Vector2d& from_axis_px) const {
     return WithoutDistortion(Distortion(), from_axis_px, FarthestCornerPx(options.camera.sensor));
@@ -634,18 +638,12 @@ struct SweepSimulator::Impl {
 
   // An edge through the target's centre, dark on the left and bright on the right. A positive angle
   // leans its upper end to the right.
-  LinearImage RenderEdge(const FrameState& frame) const {
-    const Sensor& sensor = options.camera.sensor;
-    LinearImage image{sensor.width_px, sensor.height_px, 1, {}};
-    image.values.resize(static_cast<std::size_t>(sensor.width_px) *
-                        static_cast<std::size_t>(sensor.height_px));
-    // The blur of an aberrated lens also depends on the row.
-    const int rows = DisplacesFocus() || Distortion() != 0 ? kEdgeRows : sensor.height_px;
-    for (const ColumnStrip& strip : StripsOf(sensor.width_px, ChangePerColumnPx(frame))) {
-      for (int row = 0; row < sensor.height_px; row += rows) {
-        ThrowIfCancelled();
-        RenderEdge(frame, strip, row, std::min(sensor.height_px, row + rows), &image);
-      }
+  cv::Mat RenderEdge(const FrameState& frame, const PixelGrid& grid) const {
+    cv::Mat image(grid.rows, grid.columns, CV_64F);
+    for (const ColumnStrip& strip :
+         StripsOf(grid.columns, grid.step_px * ChangePerColumnPx(frame))) {
+      ThrowIfCancelled();
+      RenderEdge(frame, grid, strip, &image);
     }
     return image;
   }
@@ -653,12 +651,11 @@ struct SweepSimulator::Impl {
   // An edge on the target is a line g = 0, where g is the distance on the target in mm. The
   // gradient of g in the image converts it to the distance of a pixel from the line, in px, and
   // gives its direction.
-  void RenderEdge(const FrameState& frame, const ColumnStrip& strip, int first_row, int end_row,
-                  LinearImage* image) const {
-    const Sensor& sensor = options.camera.sensor;
+  void RenderEdge(const FrameState& frame, const PixelGrid& grid, const ColumnStrip& strip,
+                  cv::Mat* image) const {
     const TargetOptions& options_of = options.target;
-    const Eigen::Vector2d& axis_px = sensor.principal_point_px;
-    const TiltedTarget target = SeenTarget(frame, strip.middle_px() - axis_px.x());
+    const double middle_x_px = grid.XPx(strip.middle_px());
+    const TiltedTarget target = SeenTarget(frame, middle_x_px);
     const Eigen::Vector2d on_edge_mm = TargetCentreMm(decision.on) + frame.drift_mm;
     const double angle_rad = options_of.edge_angle_deg * kPi / 180;
     const Eigen::Vector2d normal(std::cos(angle_rad), std::sin(angle_rad));
@@ -666,28 +663,20 @@ struct SweepSimulator::Impl {
       return normal.dot(target.At(from_axis_px) - on_edge_mm);
     };
 
-    // The point where the edge crosses the middle of the strip, or the end of the middle within
-    // these rows that is nearest to the edge.
-    Eigen::Vector2d middle_px(strip.middle_px() - axis_px.x(), 0);
+    // The point where the edge crosses the middle of the strip, or the end of the middle that is
+    // nearest to the edge.
+    Eigen::Vector2d middle_px(middle_x_px, 0);
     const double down_mm = target.PixelDownMm(middle_px.x());
     const double row_px = -distance_mm(middle_px) / (normal.y() * down_mm);
-    middle_px.y() = std::clamp(std::isnan(row_px) ? 0 : row_px, first_row - axis_px.y(),
-                               end_row - 1 - axis_px.y());
+    middle_px.y() =
+        std::clamp(std::isnan(row_px) ? 0 : row_px, grid.YPx(0), grid.YPx(grid.rows - 1));
     const Eigen::Vector2d gradient(normal.x() * target.PixelAcrossMm(middle_px.x()) +
                                        normal.y() * target.DownPerColumnMm(middle_px),
                                    normal.y() * down_mm);
     const double pixel_mm = gradient.norm();
 
     const double depth_mm = target.DepthMm(middle_px.x());
-    double defocus_px = SeenDefocusPx(frame, depth_mm);
-    if (DisplacesFocus()) {
-      // The blur across the edge, at the point of the edge that is nearest to the middle.
-      const Eigen::Vector2d on_edge_px =
-          middle_px - gradient * (distance_mm(middle_px) / gradient.squaredNorm());
-      defocus_px =
-          (DefocusMapPx(depth_mm, frame.image_distance_mm, on_edge_px) * gradient.normalized())
-              .norm();
-    }
+    const double defocus_px = SeenDefocusPx(frame, depth_mm);
     const double ink_px =
         options_of.kind == TargetKind::kPrintedEdge ? options_of.ink_sigma_mm / pixel_mm : 0;
     const bool disc = stored_camera.psf == Psf::kDisc;
@@ -701,13 +690,11 @@ struct SweepSimulator::Impl {
     const double lamp = LampAt(frame, depth_mm);
     const double dark = lamp * (1 - options_of.contrast);
     const double step = 2 * lamp * options_of.contrast;
-    for (int y = first_row; y < end_row; ++y) {
+    for (int y = 0; y < grid.rows; ++y) {
       ThrowIfCancelled();
+      auto* row = image->ptr<double>(y);
       for (int x = strip.first; x < strip.first + strip.count; ++x) {
-        const double distance_px =
-            distance_mm(Undistorted(Eigen::Vector2d(x, y) - axis_px)) / pixel_mm;
-        image->values[static_cast<std::size_t>(y * sensor.width_px + x)] =
-            static_cast<float>(dark + step * edge.At(distance_px));
+        row[x] = dark + step * edge.At(distance_mm({grid.XPx(x), grid.YPx(y)}) / pixel_mm);
       }
     }
   }
