@@ -40,6 +40,12 @@ std::vector<WrongReading> FindWrongReadings(const FocusSweep& sweep,
   return wrong;
 }
 
+// Digits behind the point that an error of this size leaves: at least one.
+int DigitsOf(double sigma_mm) {
+  if (!(sigma_mm > 0)) return 1;
+  return std::clamp(static_cast<int>(std::ceil(-std::log10(sigma_mm))), 1, 7);
+}
+
 // Finds another frame such that each of the two has the other's reading.
 std::optional<std::size_t> SwappedWith(const WrongReading& one,
                                        const std::vector<WrongReading>& all,
@@ -150,10 +156,11 @@ void RejectWrongReadings(const FocusSweep& sweep, const std::vector<ScaleSample>
     FrameMeasurement& frame = (*frames)[one.frame];
     if (!frame.rejection.empty()) continue;
     frame.reading_error_mm = one.error_mm;
+    const int digits = DigitsOf(one.sigma_mm);
     frame.rejection = fmt::format(
-        "reading off by {:.1f} mm, or frame damaged: its image scale belongs to the reading {:.1f} "
-        "mm",
-        one.error_mm, frame.reading_mm - one.error_mm);
+        "reading off by {:.{}f} mm, or frame damaged: its image scale belongs to the reading "
+        "{:.{}f} mm",
+        one.error_mm, digits, frame.reading_mm - one.error_mm, digits);
     if (const auto other = SwappedWith(one, wrong, sweep))
       frame.rejection += fmt::format("; swapped with {}", FileName((*frames)[*other].image));
   }

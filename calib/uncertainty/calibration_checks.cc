@@ -116,6 +116,23 @@ std::vector<BlurFitSetup> WithoutReadingStep(const FocusSweep& sweep, const Blur
   return {later};
 }
 
+BlurFitSetup WithShiftedReadings(const FocusSweep& sweep, const BlurFitSetup& setup,
+                                 const std::vector<std::size_t>& frames,
+                                 const Eigen::VectorXd& shift_mm, std::vector<ScaleSample> scales,
+                                 std::size_t reference, const Calibration& calibration) {
+  BlurFitSetup shifted = setup;
+  for (std::size_t f = 0; f < frames.size(); ++f)
+    shifted.frames[f].reading_mm -= shift_mm[static_cast<Eigen::Index>(frames[f])];
+  if (calibration.diagnostics.bench_offset_from != kFromScale) return shifted;
+  for (ScaleSample& sample : scales)
+    sample.reading_mm -= shift_mm[static_cast<Eigen::Index>(sample.frame)];
+  const ScaleModel law = FitScaleModel(scales, static_cast<int>(reference), setup.reading_sigma_mm,
+                                       sweep.direction, RegionCornerRadiusPx(sweep));
+  if (law.done)
+    shifted.offset_mm.value = law.offset_mm.value + calibration.diagnostics.scale.centre_mm;
+  return shifted;
+}
+
 void CheckMagnification(const FocusSweep& sweep, std::size_t reference, const cv::Mat& grey,
                         Calibration* calibration) {
   if (!calibration->summary.image_distance_mm) return;

@@ -46,6 +46,14 @@ std::vector<BlurFitSetup> WithoutReadingStep(const FocusSweep& sweep, const Blur
                                              std::vector<ScaleSample> scales, std::size_t reference,
                                              const Calibration& calibration);
 
+// The setup with readings that are smaller by `shift_mm`, for each frame of the sweep. `frames` are
+// the frames of setup.frames. Where no zero was given, it is the one that the scales of the moved
+// readings give.
+BlurFitSetup WithShiftedReadings(const FocusSweep& sweep, const BlurFitSetup& setup,
+                                 const std::vector<std::size_t>& frames,
+                                 const Eigen::VectorXd& shift_mm, std::vector<ScaleSample> scales,
+                                 std::size_t reference, const Calibration& calibration);
+
 // Compares d1 from the target's period, which must be stated, with d1 from the focus. `grey` is the
 // linear light of the frame `reference`.
 void CheckMagnification(const FocusSweep& sweep, std::size_t reference, const cv::Mat& grey,
