@@ -313,7 +313,7 @@ class Calibrator {
     if (!stage_.errors.compared || stage_.may_be_jump)
       slip_ = FindReadingStep(scales_, result_.diagnostics.scale);
     if (!stage_.open.empty()) slip_.reset();
-    if (slip_ && motion_ == nullptr) WarnOfReadingStep(*slip_, &result_);
+    if (slip_) WarnOfReadingStep(sweep_, *slip_, &result_);
     // The scale of an equivalent target is that of a lens that moves to second order only.
     if (motion_ == nullptr || sweep_.moves != model::SweepMotion::kLens)
       bend_ = CheckScaleNonlinearity(sweep_, scales_, &result_);
@@ -347,7 +347,7 @@ class Calibrator {
     for (std::size_t i = 0; i < written.frames.size(); ++i)
       written.frames[i].reading_mm += result_.frames[i].stage_error_mm;
     const StageComparison found = CompareStageErrors(evidence, written, ReadingsOfStage(written));
-    // What one kind of evidence has shown stays where another shows nothing.
+    // A finding of one kind of evidence stays where another kind shows nothing.
     if (stage_.errors.compared && !found.errors.Corrected()) return false;
     auto& warnings = result_.summary.warnings;
     warnings.erase(std::remove(warnings.begin(), warnings.end(), stage_.errors.InWords()),
@@ -731,8 +731,8 @@ class Calibrator {
       reason = other.text + "; the immediate reason is: " + reason;
   }
 
-  // What is left of the stage's errors: their own error or, where their cause is open, each cause.
-  // Which run has the readings of a stated zero is not known.
+  // Adds the remaining error of the stage: that of the corrections or, where the cause is open,
+  // each cause. It is not known which run has the readings of a stated zero.
   void WidenByStage(const BlurEvidence& evidence, const BlurFitResult& fit) {
     const BlurFitSetup& setup = evidence.setup;
     std::vector<BlurFitSetup> setups;

@@ -92,7 +92,7 @@ struct BlurEvidence {
 // spectra of all registered frames. The other choices are left open.
 BlurEvidence MeasureBlur(const BlurTask& task);
 
-// What the blur shows of the readings' errors, by the estimator with the most frames.
+// Evidence of the blur about the readings' errors, by the estimator with the most frames.
 ReadingEvidence EvidenceOfBlur(const BlurEvidence& evidence);
 
 // Takes a region and its blur in place of those of the whole field, with the samples of the

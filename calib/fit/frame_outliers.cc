@@ -28,16 +28,19 @@ struct OffParabola {
   double deviation = 0;  // standard deviations
 };
 
-// A number of millimetres to a tenth of a step.
-std::string ToPartOfStep(double value_mm, double step_mm) {
+// Digits behind the point of millimetres that show a tenth of a step.
+int DigitsOfStep(double step_mm) {
   const int digits = step_mm > 0 ? static_cast<int>(std::ceil(1 - std::log10(step_mm))) : 1;
-  return fmt::format("{:.{}f}", value_mm, std::clamp(digits, 1, 7));
+  return std::clamp(digits, 1, 7);
 }
 
 class Outliers {
  public:
-  Outliers(model::BenchDirection direction, BlurEvidence* evidence, Calibration* calibration)
-      : sign_(model::DirectionSign(direction)), evidence_(*evidence), result_(*calibration) {}
+  Outliers(const FocusSweep& sweep, BlurEvidence* evidence, Calibration* calibration)
+      : sweep_(sweep),
+        sign_(model::DirectionSign(sweep.direction)),
+        evidence_(*evidence),
+        result_(*calibration) {}
 
   std::optional<std::string> RejectOutlier() {
     RejectScattered();
@@ -127,19 +130,20 @@ class Outliers {
     const double step_mm = StepMm();
     for (const OffParabola& off : off_) {
       FrameMeasurement& frame = Frame(off.fit_frame);
-      const auto shown = [&](double error_mm) {
-        return ToPartOfStep(frame.reading_mm - error_mm, step_mm);
+      const int digits = DigitsOfStep(step_mm);
+      const auto right = [&](std::size_t i) { return frame.reading_mm - off.errors_mm[i]; };
+      const auto error = [&](std::size_t i) {
+        return ReadingErrorInWords(sweep_, frame.reading_mm, right(i), digits);
       };
+      const auto shown = [&](std::size_t i) { return ReadingInWords(sweep_, right(i), digits); };
       std::string what = "frame damaged", belongs;
       if (!off.errors_mm.empty()) {
         frame.reading_error_mm = off.errors_mm.front();
         const bool has_two = off.errors_mm.size() > 1;
-        what = fmt::format(
-            "reading off by {} mm{}, or frame damaged", ToPartOfStep(off.errors_mm[0], step_mm),
-            has_two ? fmt::format(" (or {}, beyond focus)", ToPartOfStep(off.errors_mm[1], step_mm))
-                    : std::string());
-        belongs = fmt::format(", and belongs to the reading {} mm{}", shown(off.errors_mm[0]),
-                              has_two ? " or " + shown(off.errors_mm[1]) + " mm" : std::string());
+        what = fmt::format("reading off by {}{}, or frame damaged", error(0),
+                           has_two ? " (or " + error(1) + ", beyond focus)" : std::string());
+        belongs = fmt::format(", and belongs to the reading {}{}", shown(0),
+                              has_two ? " or " + shown(1) : std::string());
       }
       frame.rejection = fmt::format(
           "{}: its blur deviates by {:.0f} standard deviations from the law of the other frames{}",
@@ -168,6 +172,7 @@ class Outliers {
     *estimator = std::move(rest);
   }
 
+  const FocusSweep& sweep_;
   double sign_;
   BlurEvidence& evidence_;
   Calibration& result_;
@@ -176,9 +181,9 @@ class Outliers {
 
 }  // namespace
 
-std::optional<std::string> RejectOutliers(model::BenchDirection direction, BlurEvidence* evidence,
+std::optional<std::string> RejectOutliers(const FocusSweep& sweep, BlurEvidence* evidence,
                                           Calibration* calibration) {
-  return Outliers(direction, evidence, calibration).RejectOutlier();
+  return Outliers(sweep, evidence, calibration).RejectOutlier();
 }
 
 }  // namespace thicklens::calib

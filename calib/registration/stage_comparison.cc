@@ -365,7 +365,7 @@ class Comparison {
     return cause;
   }
 
-  void Weigh(Cause* cause) const {
+  void FindCost(Cause* cause) const {
     const bool is_bend = cause->kind == Kind::kBend;
     const Eigen::MatrixXd more = is_bend ? cause->errors : ColumnsOf(cause->errors);
     const Solved solved = Solve(Design(more));
@@ -394,7 +394,7 @@ class Comparison {
       for (const Cause& known : accepted_) {
         if (known.kind == cause->kind && known.kind != Kind::kPeriodic) return;
       }
-      Weigh(&*cause);
+      FindCost(&*cause);
       causes.push_back(std::move(*cause));
     };
     Cause bend;
@@ -423,7 +423,7 @@ class Comparison {
     bool is_one = is_of_stage;
     for (const Cause* cause : close) is_one = is_one && IsSameCorrection(*close.front(), *cause);
     if (is_one) {
-      // Of causes with the same correction, the one without a chosen place comes first. In a sweep
+      // A cause without a chosen place comes before others with the same correction. In a sweep
       // with one turn, steps that are lost there are backlash, whatever the odds of such a place.
       const auto first =
           std::min_element(close.begin(), close.end(),
@@ -454,7 +454,7 @@ class Comparison {
     return (gain_.array() * error_mm.array()).matrix();
   }
 
-  // What a cause changes beyond the law, of the samples.
+  // The change by a cause that the law does not take up, for each sample.
   Eigen::VectorXd BeyondLaw(const Cause& cause) const {
     const Eigen::MatrixXd columns =
         cause.kind == Kind::kBend ? cause.errors : ColumnsOf(cause.errors);

@@ -12,7 +12,7 @@
 
 namespace thicklens::calib {
 
-// What one quantity of the frames shows of the readings' errors.
+// Evidence of one quantity of the frames about the readings' errors.
 struct ReadingEvidence {
   std::vector<std::size_t> frames;  // indices into the sweep
   Eigen::VectorXd values;           // 1/scale, or the blur variance on the target
@@ -48,7 +48,8 @@ struct StageComparison {
   // Error of the readings of each frame of the sweep, written minus right reading, by which they
   // are to be corrected, mm; 0 without an error of the stage.
   Eigen::VectorXd error_mm;
-  // The same with each amplitude changed by twice its standard deviation in both directions.
+  // Errors of the readings with each amplitude changed by twice its standard deviation, up and
+  // down.
   std::vector<Eigen::VectorXd> changed_mm;
   // Patterns that the frames do not distinguish. The readings are then not to be corrected.
   std::vector<ReadingPattern> open;

@@ -76,13 +76,21 @@ std::optional<ScaleNonlinearity> CheckScaleNonlinearity(const FocusSweep& sweep,
   return nonlinearity;
 }
 
-void WarnOfReadingStep(const ReadingStep& reading_step, Calibration* calibration) {
+void WarnOfReadingStep(const FocusSweep& sweep, const ReadingStep& reading_step,
+                       Calibration* calibration) {
   const FrameMeasurement& frame = calibration->frames[reading_step.frame];
+  const model::Estimate& jump_mm = reading_step.jump_mm;
+  std::string jump = fmt::format("{:+.2f} +- {:.2f} mm", jump_mm.value, jump_mm.sigma);
+  if (sweep.shown_reading) {
+    const double before = sweep.shown_reading(frame.reading_mm - jump_mm.value);
+    const double change = sweep.shown_reading(frame.reading_mm) - before;
+    jump = fmt::format("{:+.2g} +- {:.1g} {}", change,
+                       std::abs(change * jump_mm.sigma / jump_mm.value), sweep.shown_unit);
+  }
   calibration->summary.warnings.push_back(
-      fmt::format("the readings jump by {:+.2f} +- {:.2f} mm against the image scale from {} "
-                  "(reading {:.6g} mm) on: check the clamp and the table of readings there",
-                  reading_step.jump_mm.value, reading_step.jump_mm.sigma, FileName(frame.image),
-                  frame.reading_mm));
+      fmt::format("the readings jump by {} against the image scale from {} (reading {}) on: check "
+                  "the clamp and the table of readings there",
+                  jump, FileName(frame.image), ReadingInWords(sweep, frame.reading_mm)));
 }
 
 std::vector<BlurFitSetup> WithOffsets(const BlurFitSetup& setup,

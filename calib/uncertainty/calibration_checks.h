@@ -33,7 +33,8 @@ std::optional<ScaleNonlinearity> CheckScaleNonlinearity(const FocusSweep& sweep,
                                                         const std::vector<ScaleSample>& scales,
                                                         Calibration* calibration);
 
-void WarnOfReadingStep(const ReadingStep& reading_step, Calibration* calibration);
+void WarnOfReadingStep(const FocusSweep& sweep, const ReadingStep& reading_step,
+                       Calibration* calibration);
 
 // The setups of fits with the alternatives that the checks leave possible. WithOffsets uses other
 // bench offsets, such as that of one half of the sweep. WithoutReadingStep moves the readings

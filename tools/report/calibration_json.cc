@@ -329,6 +329,10 @@ json FitJson(const calib::Calibration& calibration) {
           {"systematic_parts", PartsJson(calibration.diagnostics.systematic_parts)},
           {"advice", TextJson(calibration.diagnostics.advice)},
           {"moves", model::SweepMotionName(calibration.diagnostics.moves)},
+          {"step_length_mm", calibration.diagnostics.step_length_mm
+                                 ? json{{"value", calibration.diagnostics.step_length_mm->value},
+                                        {"sigma", calibration.diagnostics.step_length_mm->sigma}}
+                                 : json(nullptr)},
           {"moves_is_recognised", calibration.diagnostics.moves_is_recognised},
           {"bench_offset_from", TextJson(calibration.diagnostics.bench_offset_from)},
           {"magnification_at_focus", EstimateJson(calibration.diagnostics.magnification_at_focus)},

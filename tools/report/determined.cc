@@ -61,6 +61,8 @@ std::string OffsetOriginLine(const calib::Calibration& calibration) {
       calibration.summary.outcome == calib::Outcome::kRefused)
     return "";
   std::string line = "by " + diagnostics.bench_offset_from;
+  if (const auto& step = diagnostics.step_length_mm)
+    line += fmt::format("; 1 step = {}", WithError(step->value, step->sigma, "mm"));
   if (const auto& m = diagnostics.magnification_at_focus; m && calibration.summary.focus_depth_mm)
     line += fmt::format("; magnification at focus {}", WithError(m->value, m->sigma, ""));
   return line;

@@ -180,7 +180,7 @@ TEST(StageComparison, WrongRowsDecideNothing) {
   }
 }
 
-// With one turn, steps that are lost there look like backlash.
+// Steps that are lost at the only turn look like backlash.
 TEST(StageComparison, ASlipAtTheTurnIsNamedBesideBacklash) {
   int together = 0;
   for (unsigned seed = 1; seed <= 10; ++seed) {
