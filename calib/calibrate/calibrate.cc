@@ -7,6 +7,7 @@
 #include <set>
 #include <utility>
 
+#include "calib/calibrate/counted_focus.h"
 #include "calib/calibrate/focus_solution.h"
 #include "calib/calibrate/moving_focus.h"
 #include "calib/calibrate/target_calibration.h"
@@ -32,7 +33,24 @@ namespace thicklens::calib {
     target.run = [&](const FocusSweep& equivalent, const FocusMotion& motion) {
       return CalibrateTarget(equivalent, options, &motion);
     };
-    return CalibrateMovingFocus(sweep, moves, target);
+    return sweep.readings_are_counts ? CalibrateCountedFocus(sweep, moves, target)
+                                     : CalibrateMovingFocus(sweep, moves, target);
+  }
+
+  // Counts say nothing about a target that moves.
+  Calibration RefuseCounts(const FocusSweep& sweep) {
+    Calibration refused;
+    for (const model::SweepFrame& frame : sweep.frames) {
+      FrameMeasurement measurement;
+      measurement.image = frame.Name();
+      measurement.reading_mm = frame.reading_mm;
+      refused.frames.push_back(measurement);
+    }
+    refused.summary.reason =
+        "the readings are in steps of a length that is not stated: state their length in mm by "
+        "--reading-scale (readings_scale_mm) or, if they are those of a focus drive, moves: lens or "
+        "moves: sensor (--moves)";
+    return refused;
   }
 
   // Whether the image scale says that something else than the target moved, and nothing else
@@ -115,6 +133,7 @@ namespace thicklens::calib {
     if (!sweep.IsValid(&why)) throw Error("sweep: " + why);
     if (sweep.moves && model::MovesFocus(*sweep.moves))
       return CalibrateWithMotion(sweep, *sweep.moves, options);
+    if (sweep.readings_are_counts) return RefuseCounts(sweep);
     if (!sweep.moves && sweep.readings_are_focus_distances) {
       Calibration found = CalibrateWithMotion(sweep, model::SweepMotion::kLens, options);
       found.diagnostics.moves_is_recognised = true;

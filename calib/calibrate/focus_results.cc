@@ -7,7 +7,9 @@
 
 #include "calib/calibrate/focus_solution.h"
 #include "calib/fit/known_focus.h"
+#include "calib/fit/misfit_causes.h"
 #include "calib/registration/moving_scale.h"
+#include "calib/uncertainty/field_map.h"
 #include "calib/uncertainty/systematic_advice.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/pi.h"
@@ -98,6 +100,7 @@ class Conversion {
       const double per_depth = PerDepth(frame.reading_mm);
       frame.reading_error_mm *= -sign_ * per_depth;
       frame.reading_error_sigma_mm *= per_depth;
+      frame.stage_error_mm *= -sign_ * per_depth;
       frame.image_distance_mm =
           motion_.SensorDistanceMm(frame.reading_mm) + lens_.lens_thickness_mm;
     }
@@ -291,7 +294,29 @@ class Conversion {
     return {depth_mm, std::abs(g) * equivalent_mm.sigma * DepthSlope()};
   }
 
+  // Warnings that name values of the field are written again with the converted ones.
   void ConvertField() {
+    const std::vector<std::string> before = WordsOfField();
+    ConvertFieldValues();
+    const std::vector<std::string> after = WordsOfField();
+    auto& warnings = result_.summary.warnings;
+    for (std::size_t i = 0; i < before.size(); ++i) {
+      const auto at = std::find(warnings.begin(), warnings.end(), before[i]);
+      if (at == warnings.end()) continue;
+      if (i >= after.size())
+        warnings.erase(at);
+      else if (!after[i].empty())
+        *at = after[i];
+    }
+  }
+
+  std::vector<std::string> WordsOfField() const {
+    std::vector<std::string> words = {AstigmatismInWords(result_)};
+    for (const std::string& warning : FieldWarnings(result_)) words.push_back(warning);
+    return words;
+  }
+
+  void ConvertFieldValues() {
     FieldMap& field = result_.diagnostics.field;
     for (FieldTile& tile : field.tiles) {
       if (tile.done) tile.focus_depth_mm = FocusBeside(tile.focus_depth_mm);

@@ -13,6 +13,7 @@
 #include "calib/fit/known_focus.h"
 #include "calib/fit/misfit_causes.h"
 #include "calib/registration/scale_causes.h"
+#include "calib/sweep/frame_selection.h"
 #include "calib/uncertainty/astigmatism.h"
 #include "calib/uncertainty/blur_choices.h"
 #include "calib/uncertainty/floor_choice.h"
@@ -39,8 +40,7 @@ class Solution {
   void Run() {
     if (evidence_.setup.estimators.empty()) return Refuse(evidence_.message);
     TakeMeanOfAxes(sweep_, &evidence_);
-    if (const auto reason = RejectOutliers(sweep_.direction, &evidence_, &result_))
-      return Refuse(*reason);
+    if (const auto reason = RejectOutliers(sweep_, &evidence_, &result_)) return Refuse(*reason);
     CompareChoices(sweep_.camera.psf, &evidence_);
     const FloorChoice choice =
         ChooseFloor(sweep_.floor, evidence_, &result_.summary.warnings, sweep_.sensor_px_per_px);
@@ -192,11 +192,13 @@ class Solution {
       // Readings that are stated to be exact have no error to report.
       const std::string why =
           evidence_.setup.reading_sigma_mm > 0
-              ? fmt::format("off by {:.2f} mm or damaged", frame.reading_error_mm)
+              ? fmt::format("off by {} or damaged",
+                            ReadingErrorInWords(sweep_, frame.reading_mm,
+                                                frame.reading_mm - frame.reading_error_mm, 2))
               : std::string("damaged, or its reading is not exact");
-      names += fmt::format("{}{} (reading {} mm, {})", i == 0 ? "" : ", ",
-                           std::filesystem::path(frame.image).filename().string(), frame.reading_mm,
-                           why);
+      names += fmt::format("{}{} (reading {}, {})", i == 0 ? "" : ", ",
+                           std::filesystem::path(frame.image).filename().string(),
+                           ReadingInWords(sweep_, frame.reading_mm + frame.stage_error_mm), why);
     }
     if (light.size() > 3) names += fmt::format(" and {} more", light.size() - 3);
     result_.summary.warnings.push_back(
@@ -249,22 +251,25 @@ class Solution {
     result_.diagnostics.blur_slope_px_per_mm.reset();
   }
 
-  // The reading that has a depth of the equivalent sweep; the depth itself without a motion.
-  double Shown(double depth_mm) const {
-    if (motion_ == nullptr) return depth_mm;
-    return motion_->ReadingAt(depth_mm - evidence_.setup.offset_mm.value)
-        .value_or(std::numeric_limits<double>::quiet_NaN());
+  // A depth as it is, or the reading of the lens or the sensor that has it.
+  std::string Shown(double depth_mm) const {
+    return ReadingInWords(sweep_, depth_mm - evidence_.setup.offset_mm.value);
   }
   // A range of depths, or of the readings that have them, the smaller first.
   std::string ShownRange(double nearest_mm, double farthest_mm) const {
-    const auto [low, high] = std::minmax({Shown(nearest_mm), Shown(farthest_mm)});
-    return motion_ == nullptr ? fmt::format("{:.1f} to {:.1f} mm", low, high)
-                              : fmt::format("readings {:.5g} to {:.5g} mm", low, high);
+    if (motion_ == nullptr) return fmt::format("{:.1f} to {:.1f} mm", nearest_mm, farthest_mm);
+    return fmt::format("readings {} to {}", Shown(nearest_mm), Shown(farthest_mm));
+  }
+  // The error of a depth, or that of the reading that has it.
+  std::string ShownError(double depth_mm, double error_mm) const {
+    if (motion_ == nullptr) return fmt::format("{:.2g} mm", error_mm);
+    const double reading_mm = depth_mm - evidence_.setup.offset_mm.value;
+    std::string words = ReadingErrorInWords(sweep_, reading_mm + error_mm, reading_mm, 2);
+    return words.front() == '-' ? words.substr(1) : words;
   }
   // A depth beyond the sweep in words, or the reading that has it.
   std::string ShownDepth(double depth_mm) const {
-    return motion_ == nullptr ? fmt::format("{:.0f} mm", depth_mm)
-                              : fmt::format("reading {:.5g} mm", Shown(depth_mm));
+    return motion_ == nullptr ? fmt::format("{:.0f} mm", depth_mm) : "reading " + Shown(depth_mm);
   }
 
   bool IsPlausible() {
@@ -296,9 +301,8 @@ class Solution {
                     "sweep from {:.1f} to {:.1f} mm, with the bench offset held fixed",
                     zf, own_zf_sigma, nearest, farthest)
               : fmt::format(
-                    "the blur does not determine the reading at focus: {:.5g} +- {:.2g} mm in a "
-                    "sweep of {}",
-                    Shown(zf), own_zf_sigma, ShownRange(nearest, farthest)));
+                    "the blur does not determine the reading at focus: {} +- {} in a sweep of {}",
+                    Shown(zf), ShownError(zf, own_zf_sigma), ShownRange(nearest, farthest)));
       return false;
     }
     if (evidence_.zero_is_open) {
@@ -313,11 +317,12 @@ class Solution {
       return false;
     }
     if (outside_mm > 0 && !(own_zf_sigma < StepMm())) {
-      Refuse(fmt::format(
-          "sharpness is monotone: the focus lies {} the sweep ({}), at about {} +- "
-          "{:.2g} mm; extend the sweep in this direction",
-          motion_ == nullptr ? std::string(side) + " than" : "outside",
-          ShownRange(nearest, farthest), ShownDepth(zf), std::max(zf_sigma, own_zf_sigma)));
+      Refuse(
+          fmt::format("sharpness is monotone: the focus lies {} the sweep ({}), at about {} +- "
+                      "{}; extend the sweep in this direction",
+                      motion_ == nullptr ? std::string(side) + " than" : "outside",
+                      ShownRange(nearest, farthest), ShownDepth(zf),
+                      ShownError(zf, std::max(zf_sigma, own_zf_sigma))));
       return false;
     }
     // An uncertain bench offset makes the ratio uncertain, which is then no contradiction.
@@ -345,7 +350,7 @@ class Solution {
               ? fmt::format(
                     "the focus at {:.2f} mm is extrapolated: it lies {:.2f} mm {} than the sweep",
                     zf, outside_mm, side)
-              : fmt::format("the focus at reading {:.5g} mm is extrapolated: it lies outside the "
+              : fmt::format("the focus at reading {} is extrapolated: it lies outside the "
                             "sweep ({})",
                             Shown(zf), ShownRange(nearest, farthest)));
     }

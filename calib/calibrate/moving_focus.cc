@@ -15,6 +15,7 @@
 #include "calib/fit/known_focus.h"
 #include "calib/registration/moving_scale.h"
 #include "calib/registration/scale_tracking.h"
+#include "calib/sweep/frame_selection.h"
 #include "calib/uncertainty/systematic_advice.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/statistics.h"
@@ -217,10 +218,10 @@ class MovingFocus {
   std::optional<std::string> ReasonOfImpossibleFocus() const {
     return fmt::format(
         "by {}, the sensor is {:.4g} +- {:.2g} mm behind the lens at the reading at focus "
-        "({:.5g} mm), but a lens of {:.4g} mm has objects in focus only at larger distances: check "
+        "({}), but a lens of {:.4g} mm has objects in focus only at larger distances: check "
         "{}, the focal length, the unit of the readings and what moves",
-        focus_.from, focus_.distance_mm.value, focus_.distance_mm.sigma, focus_reading_mm_,
-        lens_.rear_focal_length_mm, focus_.from);
+        focus_.from, focus_.distance_mm.value, focus_.distance_mm.sigma,
+        ReadingInWords(sweep_, focus_reading_mm_), lens_.rear_focal_length_mm, focus_.from);
   }
 
   // The error of a source with that of the focal lengths.
@@ -315,6 +316,17 @@ class MovingFocus {
     equivalent.target_period_mm.reset();
     // z' does not depend on xf to first order: its zero is exact, and xf is known apart from it.
     equivalent.offset_mm = model::Estimate{0, 0};
+    equivalent.shown_unit = sweep_.readings_are_focus_distances ? model::kDioptreUnit
+                            : sweep_.shown_reading              ? sweep_.shown_unit
+                                                                : std::string("mm");
+    equivalent.shown_reading = [motion, own = sweep_.shown_reading,
+                                in_dioptres =
+                                    sweep_.readings_are_focus_distances](double depth_mm) {
+      const double reading_mm =
+          motion.ReadingAt(depth_mm).value_or(std::numeric_limits<double>::quiet_NaN());
+      if (in_dioptres) return kMmPerMetre / reading_mm;
+      return own ? own(reading_mm) : reading_mm;
+    };
     for (model::SweepFrame& frame : equivalent.frames) {
       const auto depth_mm = motion.EquivalentDepthMm(frame.reading_mm);
       // A frame whose blur is beyond that of any depth is as far away as a depth can be.

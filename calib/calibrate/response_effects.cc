@@ -184,7 +184,7 @@ class ResponseCheck {
     Calibration scratch = result_;
     if (evidence.setup.estimators.empty()) return std::nullopt;
     if (evidence_.axial) TakeMeanOfAxes(sweep, &evidence);
-    if (RejectOutliers(sweep.direction, &evidence, &scratch)) return std::nullopt;
+    if (RejectOutliers(sweep, &evidence, &scratch)) return std::nullopt;
     evidence.setup.floor_variance_px2 = evidence_.setup.floor_variance_px2;
     return evidence.setup;
   }

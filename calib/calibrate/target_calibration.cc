@@ -24,6 +24,7 @@
 #include "calib/registration/reading_checks.h"
 #include "calib/registration/scale_causes.h"
 #include "calib/registration/scale_tracking.h"
+#include "calib/registration/stage_comparison.h"
 #include "calib/sharpness/sharpest_reading.h"
 #include "calib/sharpness/sharpness.h"
 #include "calib/sharpness/sharpness_peak.h"
@@ -43,6 +44,7 @@ namespace {
 constexpr double kZeroReach = 2;        // sigmas by which one zero contradicts another
 constexpr double kZeroMoves = 0.1;      // share of the zero's sigma above which a shift matters
 constexpr double kFarBetter = 3;        // ratio of errors
+constexpr double kSigmasOfChange = 2;   // by which StageComparison changes its amplitudes
 constexpr double kPartOfStep = 0.2;     // of the readings, by which known depths may be off
 constexpr double kFewRegistered = 0.8;  // share of the used frames; below it the light is checked
 // Rounds of finding structure fixed to the frame: the second one, with better scales, finds the
@@ -55,7 +57,7 @@ class Calibrator {
   // With `motion`, the sweep is the equivalent one of a lens or a sensor that moves.
   Calibrator(const FocusSweep& sweep, const CalibrationOptions& options,
              const FocusMotion* motion = nullptr)
-      : sweep_(sweep), options_(options), motion_(motion), store_(sweep), result_(Begun(sweep)) {
+      : sweep_(sweep), options_(options), motion_(motion), store_(sweep_), result_(Begun(sweep)) {
     total_steps_ = 4 * static_cast<int>(sweep.frames.size());
   }
 
@@ -133,6 +135,7 @@ class Calibrator {
     FindSharpest();
     ReportRootCause();
     if (zero_is_open_) ForgetOffset();
+    RestoreReadings();
   }
 
   // Runs also for a sweep that is refused, on the frames that passed the quality checks of the
@@ -266,6 +269,8 @@ class Calibrator {
     std::vector<ScaleSample> samples = Track(known_mm);
     result_.diagnostics.scale = LawOf(samples);
     if (!RemoveFixedPattern(known_mm, &samples)) return false;
+    if (TakeStageErrors(EvidenceOfScales(samples), &samples))
+      result_.diagnostics.scale = LawOf(samples);
     CorrectForFalloff(kDefaultRatio, result_.diagnostics.scale.reference_depth_mm,
                       &result_.diagnostics.scale);
     const bool is_lone_edge =
@@ -305,12 +310,102 @@ class Calibrator {
         FindScaleNonlinearity(scales_, result_.diagnostics.scale, sweep_))
       LookForStructure(scales_);
     if (const auto refusal = CheckDistortion(&result_, SeesAstigmatism())) return Refuse(*refusal);
-    slip_ = FindReadingStep(scales_, result_.diagnostics.scale);
-    if (slip_ && motion_ == nullptr) WarnOfReadingStep(*slip_, &result_);
+    if (!stage_.errors.compared || stage_.may_be_jump)
+      slip_ = FindReadingStep(scales_, result_.diagnostics.scale);
+    if (!stage_.open.empty()) slip_.reset();
+    if (slip_) WarnOfReadingStep(sweep_, *slip_, &result_);
     // The scale of an equivalent target is that of a lens that moves to second order only.
     if (motion_ == nullptr || sweep_.moves != model::SweepMotion::kLens)
       bend_ = CheckScaleNonlinearity(sweep_, scales_, &result_);
     return PlacedWithinReach();
+  }
+
+  // The readings of the stage where those of the sweep are of an equivalent target.
+  StageReadings ReadingsOfStage(const FocusSweep& written) const {
+    StageReadings stage;
+    if (motion_ == nullptr) return stage;
+    constexpr double kPart = 1e-4;  // of a depth, for the derivative
+    const auto n = static_cast<Eigen::Index>(written.frames.size());
+    stage.readings_mm.resize(n);
+    stage.gains.resize(n);
+    for (Eigen::Index f = 0; f < n; ++f) {
+      const double depth_mm = written.frames[static_cast<std::size_t>(f)].reading_mm;
+      const auto at = motion_->ReadingAt(depth_mm),
+                 above = motion_->ReadingAt((1 + kPart) * depth_mm),
+                 below = motion_->ReadingAt((1 - kPart) * depth_mm);
+      if (!at || !above || !below || *above == *below) return {};
+      stage.readings_mm[f] = *at;
+      stage.gains[f] = 2 * kPart * depth_mm / (*above - *below);
+    }
+    return stage;
+  }
+
+  // Finds systematic errors of the stage in the readings as they were written, corrects those of
+  // sweep, frames and samples for them, and says so. Returns whether the readings were changed.
+  bool TakeStageErrors(const ReadingEvidence& evidence, std::vector<ScaleSample>* samples) {
+    FocusSweep written = sweep_;
+    for (std::size_t i = 0; i < written.frames.size(); ++i)
+      written.frames[i].reading_mm += result_.frames[i].stage_error_mm;
+    const StageComparison found = CompareStageErrors(evidence, written, ReadingsOfStage(written));
+    // A finding of one kind of evidence stays where another kind shows nothing.
+    if (stage_.errors.compared && !found.errors.Corrected()) return false;
+    auto& warnings = result_.summary.warnings;
+    warnings.erase(std::remove(warnings.begin(), warnings.end(), stage_.errors.InWords()),
+                   warnings.end());
+    stage_ = found;
+    result_.diagnostics.stage = found.errors;
+    const std::string words = found.errors.InWords();
+    if (!words.empty()) warnings.push_back(words);
+    if (!found.errors.Corrected()) return false;
+    for (std::size_t i = 0; i < sweep_.frames.size(); ++i) {
+      const double error_mm = found.error_mm[static_cast<Eigen::Index>(i)];
+      sweep_.frames[i].reading_mm = written.frames[i].reading_mm - error_mm;
+      result_.frames[i].reading_mm = sweep_.frames[i].reading_mm;
+      result_.frames[i].stage_error_mm = error_mm;
+    }
+    for (ScaleSample& sample : *samples) sample.reading_mm = sweep_.frames[sample.frame].reading_mm;
+    return true;
+  }
+
+  // The frames of the result have the readings as they were written.
+  void RestoreReadings() {
+    for (FrameMeasurement& frame : result_.frames) {
+      frame.reading_mm += frame.stage_error_mm;
+      if (frame.in_blur_fit || frame.reading_error_mm != 0)
+        frame.reading_error_mm += frame.stage_error_mm;
+    }
+    // An error of the correction moves about half of the frames against the others.
+    auto& reading_mm = result_.diagnostics.focus_reading_mm;
+    if (!reading_mm) return;
+    for (const Eigen::VectorXd& changed_mm : stage_.changed_mm) {
+      const Eigen::ArrayXd change_mm = (changed_mm - stage_.error_mm).array() / kSigmasOfChange;
+      const double spread_mm = std::sqrt((change_mm - change_mm.mean()).square().mean());
+      // Each amplitude was changed in both directions.
+      reading_mm->sigma = std::hypot(reading_mm->sigma, spread_mm / std::sqrt(2.0));
+    }
+  }
+
+  // Looks for errors of the stage in the blur where it shows readings better than the scale does:
+  // in a macro sweep the scale hardly changes. Returns whether the readings were corrected.
+  bool TakeStageErrorsOfBlur(const BlurEvidence& evidence) {
+    if (blur_was_compared_) return false;
+    blur_was_compared_ = true;
+    const ReadingEvidence blur = EvidenceOfBlur(evidence);
+    if (!(ReadingErrorOf(blur, sweep_) < ReadingErrorOf(EvidenceOfScales(scales_), sweep_)) ||
+        !TakeStageErrors(blur, &scales_))
+      return false;
+    ScaleModel& law = result_.diagnostics.scale;
+    if (law.done) {
+      const ScaleModel before = law;
+      law = LawOf(scales_);
+      if (!law.done) law = before;
+      CorrectForFalloff(kDefaultRatio, law.reference_depth_mm, &law);
+      if (result_.diagnostics.bench_offset_from == kFromScale)
+        result_.summary.bench_offset_mm = law.offset_mm;
+    }
+    PlaceFrames();
+    FitPeak();
+    return true;
   }
 
   std::vector<ScaleSample> Track(const std::optional<double>& known_offset_mm) {
@@ -600,6 +695,7 @@ class Calibrator {
     task.threads = options_.threads;
     task.tick = [this] { Tick(); };
     BlurEvidence evidence = MeasureBlur(task);
+    if (TakeStageErrorsOfBlur(evidence)) return MeasureAndSolve();
     BlurFitResult fit;
     const Calibration before = result_;
     SolveFocus(sweep_, &evidence, &fit, &result_, motion_);
@@ -615,7 +711,7 @@ class Calibrator {
     if (sweep_.target_period_mm && result_.diagnostics.bench_offset_from != kFromPeriod)
       CheckMagnification(sweep_, reference_, Grey(reference_), &result_);
     if (result_.summary.outcome == Outcome::kRefused) return NameContradictions(fit);
-    WidenByContradictions(evidence.setup, fit);
+    WidenByContradictions(evidence, fit);
     if (motion_ == nullptr)
       CompareWithStatements(sweep_, statements_, evidence.setup, fit, &result_);
     task.scales = scales_;
@@ -635,8 +731,39 @@ class Calibrator {
       reason = other.text + "; the immediate reason is: " + reason;
   }
 
+  // Adds the remaining error of the stage: that of the corrections or, where the cause is open,
+  // each cause. It is not known which run has the readings of a stated zero.
+  void WidenByStage(const BlurEvidence& evidence, const BlurFitResult& fit) {
+    const BlurFitSetup& setup = evidence.setup;
+    std::vector<BlurFitSetup> setups;
+    const auto add = [&](const Eigen::VectorXd& shift_mm) {
+      setups.push_back(WithShiftedReadings(sweep_, setup, evidence.frames, shift_mm, scales_,
+                                           reference_, result_));
+    };
+    if (stage_.errors.Corrected()) {
+      for (const Eigen::VectorXd& changed_mm : stage_.changed_mm) add(changed_mm - stage_.error_mm);
+    }
+    for (const ReadingPattern& pattern : stage_.open) add(pattern.error_mm - stage_.error_mm);
+    if (result_.diagnostics.bench_offset_from == kFromOffset && motion_ == nullptr) {
+      const double sign = model::DirectionSign(sweep_.direction);
+      for (const auto& step_mm : {stage_.errors.backlash_mm, stage_.errors.slip_mm}) {
+        if (!step_mm) continue;
+        for (const BlurFitSetup& other :
+             WithOffsets(setup, {setup.offset_mm.value + sign * step_mm->value}))
+          setups.push_back(other);
+      }
+    }
+    if (setups.empty()) return;
+    WidenByTrials("errors of the stage",
+                  "approach every position from the same side, and repeat the sweep with another "
+                  "step",
+                  setups, fit, &result_, known_focus_);
+  }
+
   // Widens the systematic intervals by the findings of the checks, as far as they move the results.
-  void WidenByContradictions(const BlurFitSetup& setup, const BlurFitResult& fit) {
+  void WidenByContradictions(const BlurEvidence& evidence, const BlurFitResult& fit) {
+    const BlurFitSetup& setup = evidence.setup;
+    WidenByStage(evidence, fit);
     if (result_.diagnostics.bench_offset_from == kFromScale) {
       const Eigen::Vector2d& offsets_mm = result_.diagnostics.scale.offset_of_pupil_laws_mm;
       WidenByTrials(
@@ -732,7 +859,7 @@ class Calibrator {
     return {result_.frames[*low].depth_mm, result_.frames[*high].depth_mm};
   }
 
-  const FocusSweep& sweep_;
+  FocusSweep sweep_;  // its readings are corrected for errors of the stage
   const CalibrationOptions& options_;
   const FocusMotion* motion_;
   FrameStore store_;
@@ -743,6 +870,8 @@ class Calibrator {
   ScaleCauses causes_;                         // possible causes of the scales
   std::optional<ReadingStep> slip_;
   std::optional<ScaleNonlinearity> bend_;
+  StageComparison stage_;
+  bool blur_was_compared_ = false;
   bool zero_is_settled_ = false;
   std::vector<model::StatedConjugate> statements_;  // what is stated of the plane of focus
   std::optional<model::StatedConjugate> best_statement_, known_focus_;

@@ -317,6 +317,20 @@ class Measurement {
 
 }  // namespace
 
+ReadingEvidence EvidenceOfBlur(const BlurEvidence& evidence) {
+  ReadingEvidence of_readings;
+  of_readings.is_parabola_in_reading = true;
+  const BlurSamples* most = nullptr;
+  for (const BlurSamples& estimator : evidence.setup.estimators) {
+    if (most == nullptr || estimator.frames.size() > most->frames.size()) most = &estimator;
+  }
+  if (most == nullptr) return of_readings;
+  for (const std::size_t f : most->frames) of_readings.frames.push_back(evidence.frames[f]);
+  of_readings.values = most->variances_px2;
+  of_readings.sigmas = most->covariance.diagonal().cwiseMax(0).cwiseSqrt();
+  return of_readings;
+}
+
 void ReplaceSpectralBlur(EstimatorRegion region, RelativeBlur blur, BlurEvidence* evidence) {
   const Eigen::VectorXd& by_tails = evidence->blur.variance_by_tails;
   if (blur.variance_by_tails.size() == 0 && by_tails.size() > 0) {

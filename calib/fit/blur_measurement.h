@@ -8,6 +8,7 @@
 
 #include "calib/fit/blur_fit.h"
 #include "calib/registration/image_scale.h"
+#include "calib/registration/stage_comparison.h"
 #include "calib/spectrum/spectral_estimator.h"
 #include "calib/spectrum/spectral_options.h"
 #include "calib/sweep/frame_store.h"
@@ -90,6 +91,9 @@ struct BlurEvidence {
 // Measures edges where the target has them (and is not stated to be a texture), and the relative
 // spectra of all registered frames. The other choices are left open.
 BlurEvidence MeasureBlur(const BlurTask& task);
+
+// Evidence of the blur about the readings' errors, by the estimator with the most frames.
+ReadingEvidence EvidenceOfBlur(const BlurEvidence& evidence);
 
 // Takes a region and its blur in place of those of the whole field, with the samples of the
 // spectral estimator. The effect of the tails on V, if the new blur has none, stays that of the

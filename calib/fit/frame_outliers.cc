@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calib/sweep/frame_selection.h"
 #include "thicklens/base/statistics.h"
 
 namespace thicklens::calib {
@@ -15,23 +16,36 @@ constexpr std::size_t kMinFrames = 5;
 // what the others show.
 constexpr double kScatterOfDamage = 30;
 
-// There may be two errors because both sides of focus have the same blur.
-std::string InWords(const std::vector<double>& errors_mm) {
-  if (errors_mm.empty()) return "frame damaged";
-  if (errors_mm.size() == 1)
-    return fmt::format("reading off by {:.1f} mm, or frame damaged", errors_mm[0]);
-  return fmt::format("reading off by {:.1f} mm (or {:.1f}, beyond focus), or frame damaged",
-                     errors_mm[0], errors_mm[1]);
+// Part of the median step by which the reading that a blur shows may miss that of another frame.
+constexpr double kSwappedWithin = 0.5;
+
+// A frame whose blur does not belong to its reading.
+struct OffParabola {
+  std::size_t fit_frame = 0;
+  // The written reading minus those that the blur shows: two, because both sides of focus have the
+  // same blur.
+  std::vector<double> errors_mm;
+  double deviation = 0;  // standard deviations
+};
+
+// Digits behind the point of millimetres that show a tenth of a step.
+int DigitsOfStep(double step_mm) {
+  const int digits = step_mm > 0 ? static_cast<int>(std::ceil(1 - std::log10(step_mm))) : 1;
+  return std::clamp(digits, 1, 7);
 }
 
 class Outliers {
  public:
-  Outliers(model::BenchDirection direction, BlurEvidence* evidence, Calibration* calibration)
-      : sign_(model::DirectionSign(direction)), evidence_(*evidence), result_(*calibration) {}
+  Outliers(const FocusSweep& sweep, BlurEvidence* evidence, Calibration* calibration)
+      : sweep_(sweep),
+        sign_(model::DirectionSign(sweep.direction)),
+        evidence_(*evidence),
+        result_(*calibration) {}
 
   std::optional<std::string> RejectOutlier() {
     RejectScattered();
-    for (BlurSamples& estimator : evidence_.setup.estimators) RejectOffParabola(estimator);
+    for (BlurSamples& estimator : evidence_.setup.estimators) FindOffParabola(estimator);
+    RejectOffParabola();
     for (BlurSamples& estimator : evidence_.setup.estimators) DropRejected(&estimator);
     std::size_t most = 0;
     for (const BlurSamples& estimator : evidence_.setup.estimators)
@@ -66,7 +80,7 @@ class Outliers {
 
   // On the target any blur follows a parabola in depth, whatever floor and texture. A frame that is
   // far off the parabola has a wrong reading or is damaged.
-  void RejectOffParabola(const BlurSamples& estimator) {
+  void FindOffParabola(const BlurSamples& estimator) {
     const auto n = static_cast<Eigen::Index>(estimator.frames.size());
     Eigen::VectorXd depths(n);
     for (Eigen::Index i = 0; i < n; ++i)
@@ -78,19 +92,69 @@ class Outliers {
     const double range_mm = depths.maxCoeff() - depths.minCoeff();
     for (Eigen::Index i = 0; i < n; ++i) {
       const auto s = static_cast<std::size_t>(i);
-      FrameMeasurement& frame = Frame(estimator.frames[s]);
-      if (parabola.follows[s] || !frame.rejection.empty()) continue;
-      const double off = parabola.residuals_px2[i] / parabola.sigmas_px2[i];
-      // The written reading minus that of the parabola.
-      std::vector<double> errors_mm;
+      const FrameMeasurement& frame = Frame(estimator.frames[s]);
+      const bool is_known = std::any_of(off_.begin(), off_.end(), [&](const OffParabola& one) {
+        return one.fit_frame == estimator.frames[s];
+      });
+      if (parabola.follows[s] || !frame.rejection.empty() || is_known) continue;
+      OffParabola off;
+      off.fit_frame = estimator.frames[s];
+      off.deviation = std::abs(parabola.residuals_px2[i] / parabola.sigmas_px2[i]);
       for (const double depth_mm : parabola.DepthsOf(estimator.variances_px2[i], depths[i])) {
         if (std::abs(depths[i] - depth_mm) < range_mm)
-          errors_mm.push_back(sign_ * (depths[i] - depth_mm));
+          off.errors_mm.push_back(sign_ * (depths[i] - depth_mm));
       }
-      if (!errors_mm.empty()) frame.reading_error_mm = errors_mm.front();
+      off_.push_back(std::move(off));
+    }
+  }
+
+  double StepMm() const {
+    std::vector<double> readings, steps;
+    for (const FrameMeasurement& frame : result_.frames) readings.push_back(frame.reading_mm);
+    std::sort(readings.begin(), readings.end());
+    for (std::size_t i = 1; i < readings.size(); ++i) {
+      if (readings[i] > readings[i - 1]) steps.push_back(readings[i] - readings[i - 1]);
+    }
+    return Median(steps);
+  }
+
+  // Whether the blur of one frame belongs to the reading of the other.
+  bool ShowsReadingOf(const OffParabola& one, const OffParabola& other, double step_mm) {
+    const double apart_mm = Frame(one.fit_frame).reading_mm - Frame(other.fit_frame).reading_mm;
+    return std::any_of(one.errors_mm.begin(), one.errors_mm.end(), [&](double error_mm) {
+      return std::abs(error_mm - apart_mm) < kSwappedWithin * step_mm;
+    });
+  }
+
+  void RejectOffParabola() {
+    const double step_mm = StepMm();
+    for (const OffParabola& off : off_) {
+      FrameMeasurement& frame = Frame(off.fit_frame);
+      const int digits = DigitsOfStep(step_mm);
+      const auto right = [&](std::size_t i) { return frame.reading_mm - off.errors_mm[i]; };
+      const auto error = [&](std::size_t i) {
+        return ReadingErrorInWords(sweep_, frame.reading_mm, right(i), digits);
+      };
+      const auto shown = [&](std::size_t i) { return ReadingInWords(sweep_, right(i), digits); };
+      std::string what = "frame damaged", belongs;
+      if (!off.errors_mm.empty()) {
+        frame.reading_error_mm = off.errors_mm.front();
+        const bool has_two = off.errors_mm.size() > 1;
+        what = fmt::format("reading off by {}{}, or frame damaged", error(0),
+                           has_two ? " (or " + error(1) + ", beyond focus)" : std::string());
+        belongs = fmt::format(", and belongs to the reading {}{}", shown(0),
+                              has_two ? " or " + shown(1) : std::string());
+      }
       frame.rejection = fmt::format(
-          "{}: its blur deviates by {:.0f} standard deviations from the law of the other frames",
-          InWords(errors_mm), std::abs(off));
+          "{}: its blur deviates by {:.0f} standard deviations from the law of the other frames{}",
+          what, off.deviation, belongs);
+      for (const OffParabola& other : off_) {
+        if (&other == &off || !ShowsReadingOf(off, other, step_mm) ||
+            !ShowsReadingOf(other, off, step_mm))
+          continue;
+        frame.rejection += "; swapped with " + FileName(Frame(other.fit_frame).image);
+        break;
+      }
     }
   }
 
@@ -108,16 +172,18 @@ class Outliers {
     *estimator = std::move(rest);
   }
 
+  const FocusSweep& sweep_;
   double sign_;
   BlurEvidence& evidence_;
   Calibration& result_;
+  std::vector<OffParabola> off_;
 };
 
 }  // namespace
 
-std::optional<std::string> RejectOutliers(model::BenchDirection direction, BlurEvidence* evidence,
+std::optional<std::string> RejectOutliers(const FocusSweep& sweep, BlurEvidence* evidence,
                                           Calibration* calibration) {
-  return Outliers(direction, evidence, calibration).RejectOutlier();
+  return Outliers(sweep, evidence, calibration).RejectOutlier();
 }
 
 }  // namespace thicklens::calib

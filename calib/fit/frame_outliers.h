@@ -13,7 +13,7 @@ namespace thicklens::calib {
 // `calibration->frames` by their `rejection`, with the reading's error (the written reading minus
 // that of the law, mm) where the law gives one. Returns the reason if too few frames are left for a
 // fit.
-std::optional<std::string> RejectOutliers(model::BenchDirection direction, BlurEvidence* evidence,
+std::optional<std::string> RejectOutliers(const FocusSweep& sweep, BlurEvidence* evidence,
                                           Calibration* calibration);
 
 }  // namespace thicklens::calib

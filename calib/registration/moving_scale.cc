@@ -2,7 +2,7 @@
 
 #include <ceres/ceres.h>
 
-#include <Eigen/Core>
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -173,6 +173,60 @@ MovingScale FitMovingScale(const std::vector<ScaleSample>& samples, const model:
                            model::SweepMotion moves, double sign, double focus_reading_mm,
                            double reading_sigma_mm) {
   return MovingScaleFit(samples, lens, moves, sign, focus_reading_mm, reading_sigma_mm).Run();
+}
+
+// Gauss-Newton on ln(scale) = ln(a) + ln(D/xf) - ln(z/zf) in (ln(a), g) from g = slope u.
+model::Estimate FitStepLength(const std::vector<ScaleSample>& samples, const model::ThickLens& lens,
+                              model::SweepMotion moves, double focus_count,
+                              double sensor_distance_mm) {
+  constexpr int kRounds = 20;
+  const double xf = sensor_distance_mm;
+  const double zf = model::FocusDepthMm(lens, xf + lens.lens_thickness_mm);
+  const double by_depth = moves == model::SweepMotion::kLens ? 1 / zf : 0;
+  const auto n = static_cast<Eigen::Index>(samples.size());
+  model::Estimate length{0, std::numeric_limits<double>::infinity()};
+  if (samples.size() < kMinSamples) return length;
+  Eigen::VectorXd counts(n), logs(n), sigmas(n);
+  double most = 0;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const ScaleSample& sample = samples[static_cast<std::size_t>(i)];
+    counts[i] = sample.reading_mm - focus_count;
+    logs[i] = std::log(sample.scale);
+    sigmas[i] = std::hypot(sample.registration.scale_sigma / sample.scale, kScaleBias);
+    most = std::max(most, std::abs(counts[i]));
+  }
+  if (!(most > 0)) return length;
+  Eigen::Vector2d found(0, 0);
+  Eigen::VectorXd weights = Eigen::VectorXd::Ones(n);
+  Eigen::Matrix2d normal;
+  double scatter = 1;
+  // The first step, from g = 0, is linear regression. D and z stay positive.
+  const double longest = 0.9 / (most * std::max(1 / xf, by_depth));
+  for (int round = 0; round < kRounds; ++round) {
+    normal.setZero();
+    Eigen::Vector2d right(0, 0);
+    std::vector<double> off;
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const double moved = found[1] * counts[i];
+      const double rest =
+          logs[i] - found[0] - std::log1p(moved / xf) + std::log1p(-moved * by_depth);
+      const Eigen::Vector2d by(
+          1, counts[i] / (xf + moved) + counts[i] * by_depth / (1 - moved * by_depth));
+      off.push_back(std::abs(rest) / sigmas[i]);
+      const double distance = off.back() / (kCauchyWidth * scatter);
+      weights[i] = round == 0 ? 1 : 1 / (1 + distance * distance);
+      const double weight = weights[i] / (sigmas[i] * sigmas[i]);
+      normal += weight * by * by.transpose();
+      right += weight * rest * by;
+    }
+    if (round > 0) scatter = std::max(1.0, 1.4826 * Median(off));
+    const Eigen::LDLT<Eigen::Matrix2d> solver(normal);
+    found += solver.solve(right);
+    found[1] = std::clamp(found[1], -longest, longest);
+    const double variance = solver.solve(Eigen::Vector2d::UnitY()).y();
+    length = {found[1], scatter * std::sqrt(std::max(0.0, variance))};
+  }
+  return length;
 }
 
 }  // namespace thicklens::calib

@@ -40,6 +40,12 @@ std::vector<WrongReading> FindWrongReadings(const FocusSweep& sweep,
   return wrong;
 }
 
+// Digits behind the point that an error of this size leaves: at least one.
+int DigitsOf(double sigma_mm) {
+  if (!(sigma_mm > 0)) return 1;
+  return std::clamp(static_cast<int>(std::ceil(-std::log10(sigma_mm))), 1, 7);
+}
+
 // Finds another frame such that each of the two has the other's reading.
 std::optional<std::size_t> SwappedWith(const WrongReading& one,
                                        const std::vector<WrongReading>& all,
@@ -56,7 +62,7 @@ std::optional<std::size_t> SwappedWith(const WrongReading& one,
 }
 
 // Rejects identical frames at different readings, because nothing shows which reading is theirs.
-void RejectRepeated(std::vector<FrameMeasurement>* frames) {
+void RejectRepeated(const FocusSweep& sweep, std::vector<FrameMeasurement>* frames) {
   std::map<std::uint64_t, std::vector<std::size_t>> same;
   for (std::size_t i = 0; i < frames->size(); ++i) {
     if ((*frames)[i].rejection.empty()) same[(*frames)[i].statistics.content_hash].push_back(i);
@@ -69,9 +75,9 @@ void RejectRepeated(std::vector<FrameMeasurement>* frames) {
       const std::size_t other = *std::find_if(members.begin(), members.end(), [&](std::size_t m) {
         return (*frames)[m].reading_mm != (*frames)[i].reading_mm;
       });
-      (*frames)[i].rejection =
-          fmt::format("repeated image: the same as {} at reading {:.6g} mm",
-                      FileName((*frames)[other].image), (*frames)[other].reading_mm);
+      (*frames)[i].rejection = fmt::format("repeated image: the same as {} at reading {}",
+                                           FileName((*frames)[other].image),
+                                           ReadingInWords(sweep, (*frames)[other].reading_mm));
     }
   }
 }
@@ -144,16 +150,18 @@ std::optional<std::string> ReasonAgainstScales(const std::vector<FrameMeasuremen
 
 void RejectWrongReadings(const FocusSweep& sweep, const std::vector<ScaleSample>& samples,
                          const ScaleModel& law, std::vector<FrameMeasurement>* frames) {
-  RejectRepeated(frames);
+  RejectRepeated(sweep, frames);
   const std::vector<WrongReading> wrong = FindWrongReadings(sweep, samples, law);
   for (const WrongReading& one : wrong) {
     FrameMeasurement& frame = (*frames)[one.frame];
     if (!frame.rejection.empty()) continue;
     frame.reading_error_mm = one.error_mm;
+    const int digits = DigitsOf(one.sigma_mm);
+    const double right_mm = frame.reading_mm - one.error_mm;
     frame.rejection = fmt::format(
-        "reading off by {:.1f} mm, or frame damaged: its image scale belongs to the reading {:.1f} "
-        "mm",
-        one.error_mm, frame.reading_mm - one.error_mm);
+        "reading off by {}, or frame damaged: its image scale belongs to the reading {}",
+        ReadingErrorInWords(sweep, frame.reading_mm, right_mm, digits),
+        ReadingInWords(sweep, right_mm, digits));
     if (const auto other = SwappedWith(one, wrong, sweep))
       frame.rejection += fmt::format("; swapped with {}", FileName((*frames)[*other].image));
   }

@@ -265,6 +265,7 @@ FocusSweep MakeFocusSweep(const model::SweepFile& file, const model::Camera& cam
   sweep.direction = file.direction;
   sweep.moves = file.moves;
   sweep.readings_are_focus_distances = file.readings_are_focus_distances;
+  sweep.readings_are_counts = file.readings_are_counts;
   sweep.target = file.target;
   sweep.floor = file.floor;
   sweep.target_period_mm = file.target_period_mm;

@@ -31,6 +31,23 @@ cv::Size RegionSize(const FocusSweep& sweep) {
 
 }  // namespace
 
+std::string ReadingInWords(const FocusSweep& sweep, double reading_mm, int digits) {
+  if (!sweep.shown_reading) return fmt::format("{:.{}f} mm", reading_mm, digits);
+  return fmt::format("{:.5g} {}", sweep.shown_reading(reading_mm), sweep.shown_unit);
+}
+
+std::string ReadingInWords(const FocusSweep& sweep, double reading_mm) {
+  if (!sweep.shown_reading) return fmt::format("{:.6g} mm", reading_mm);
+  return fmt::format("{:.5g} {}", sweep.shown_reading(reading_mm), sweep.shown_unit);
+}
+
+std::string ReadingErrorInWords(const FocusSweep& sweep, double written_mm, double right_mm,
+                                int digits) {
+  if (!sweep.shown_reading) return fmt::format("{:.{}f} mm", written_mm - right_mm, digits);
+  return fmt::format("{:.2g} {}", sweep.shown_reading(written_mm) - sweep.shown_reading(right_mm),
+                     sweep.shown_unit);
+}
+
 std::string FileName(const std::string& image) {
   return std::filesystem::path(image).filename().string();
 }

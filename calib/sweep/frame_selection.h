@@ -20,6 +20,14 @@ inline constexpr double kEdgeThreshold = 0.25;
 // Returns the file's name as in the table of readings, without its directory on this machine.
 std::string FileName(const std::string& image);
 
+// A reading of the sweep, and the difference of two, as messages show them: with `digits` behind
+// the point in mm, otherwise in the unit that was written (FocusSweep::shown_reading).
+std::string ReadingInWords(const FocusSweep& sweep, double reading_mm, int digits);
+std::string ReadingErrorInWords(const FocusSweep& sweep, double written_mm, double right_mm,
+                                int digits);
+// A reading as messages show it, with up to six significant digits in mm.
+std::string ReadingInWords(const FocusSweep& sweep, double reading_mm);
+
 // The frames of a sweep that are in use; the quality checks reject others one after the other.
 class FrameSelection {
  public:

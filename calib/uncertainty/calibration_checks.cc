@@ -76,13 +76,21 @@ std::optional<ScaleNonlinearity> CheckScaleNonlinearity(const FocusSweep& sweep,
   return nonlinearity;
 }
 
-void WarnOfReadingStep(const ReadingStep& reading_step, Calibration* calibration) {
+void WarnOfReadingStep(const FocusSweep& sweep, const ReadingStep& reading_step,
+                       Calibration* calibration) {
   const FrameMeasurement& frame = calibration->frames[reading_step.frame];
+  const model::Estimate& jump_mm = reading_step.jump_mm;
+  std::string jump = fmt::format("{:+.2f} +- {:.2f} mm", jump_mm.value, jump_mm.sigma);
+  if (sweep.shown_reading) {
+    const double before = sweep.shown_reading(frame.reading_mm - jump_mm.value);
+    const double change = sweep.shown_reading(frame.reading_mm) - before;
+    jump = fmt::format("{:+.2g} +- {:.1g} {}", change,
+                       std::abs(change * jump_mm.sigma / jump_mm.value), sweep.shown_unit);
+  }
   calibration->summary.warnings.push_back(
-      fmt::format("the readings jump by {:+.2f} +- {:.2f} mm against the image scale from {} "
-                  "(reading {:.6g} mm) on: check the clamp and the table of readings there",
-                  reading_step.jump_mm.value, reading_step.jump_mm.sigma, FileName(frame.image),
-                  frame.reading_mm));
+      fmt::format("the readings jump by {} against the image scale from {} (reading {}) on: check "
+                  "the clamp and the table of readings there",
+                  jump, FileName(frame.image), ReadingInWords(sweep, frame.reading_mm)));
 }
 
 std::vector<BlurFitSetup> WithOffsets(const BlurFitSetup& setup,
@@ -114,6 +122,23 @@ std::vector<BlurFitSetup> WithoutReadingStep(const FocusSweep& sweep, const Blur
   if (!law.done) return {later, earlier};
   later.offset_mm.value = law.offset_mm.value + calibration.diagnostics.scale.centre_mm;
   return {later};
+}
+
+BlurFitSetup WithShiftedReadings(const FocusSweep& sweep, const BlurFitSetup& setup,
+                                 const std::vector<std::size_t>& frames,
+                                 const Eigen::VectorXd& shift_mm, std::vector<ScaleSample> scales,
+                                 std::size_t reference, const Calibration& calibration) {
+  BlurFitSetup shifted = setup;
+  for (std::size_t f = 0; f < frames.size(); ++f)
+    shifted.frames[f].reading_mm -= shift_mm[static_cast<Eigen::Index>(frames[f])];
+  if (calibration.diagnostics.bench_offset_from != kFromScale) return shifted;
+  for (ScaleSample& sample : scales)
+    sample.reading_mm -= shift_mm[static_cast<Eigen::Index>(sample.frame)];
+  const ScaleModel law = FitScaleModel(scales, static_cast<int>(reference), setup.reading_sigma_mm,
+                                       sweep.direction, RegionCornerRadiusPx(sweep));
+  if (law.done)
+    shifted.offset_mm.value = law.offset_mm.value + calibration.diagnostics.scale.centre_mm;
+  return shifted;
 }
 
 void CheckMagnification(const FocusSweep& sweep, std::size_t reference, const cv::Mat& grey,

@@ -33,7 +33,8 @@ std::optional<ScaleNonlinearity> CheckScaleNonlinearity(const FocusSweep& sweep,
                                                         const std::vector<ScaleSample>& scales,
                                                         Calibration* calibration);
 
-void WarnOfReadingStep(const ReadingStep& reading_step, Calibration* calibration);
+void WarnOfReadingStep(const FocusSweep& sweep, const ReadingStep& reading_step,
+                       Calibration* calibration);
 
 // The setups of fits with the alternatives that the checks leave possible. WithOffsets uses other
 // bench offsets, such as that of one half of the sweep. WithoutReadingStep moves the readings
@@ -45,6 +46,14 @@ std::vector<BlurFitSetup> WithoutReadingStep(const FocusSweep& sweep, const Blur
                                              const ReadingStep& reading_step,
                                              std::vector<ScaleSample> scales, std::size_t reference,
                                              const Calibration& calibration);
+
+// The setup with readings that are smaller by `shift_mm`, for each frame of the sweep. `frames` are
+// the frames of setup.frames. Where no zero was given, it is the one that the scales of the moved
+// readings give.
+BlurFitSetup WithShiftedReadings(const FocusSweep& sweep, const BlurFitSetup& setup,
+                                 const std::vector<std::size_t>& frames,
+                                 const Eigen::VectorXd& shift_mm, std::vector<ScaleSample> scales,
+                                 std::size_t reference, const Calibration& calibration);
 
 // Compares d1 from the target's period, which must be stated, with d1 from the focus. `grey` is the
 // linear light of the frame `reference`.

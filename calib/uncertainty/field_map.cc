@@ -229,7 +229,9 @@ class Field {
           model::Estimate{surface[3] * farthest2, std::sqrt(covariance(3, 3)) * farthest2};
     }
     FindClusters(fitted, chi2);
-    WarnOfTilt();
+    const std::vector<std::string> warnings = FieldWarnings(result_);
+    result_.summary.warnings.insert(result_.summary.warnings.end(), warnings.begin(),
+                                    warnings.end());
     WidenBySpread(fitted);
   }
 
@@ -280,47 +282,6 @@ class Field {
       cluster.tiles = static_cast<int>(group.size());
       map.clusters.push_back(cluster);
     }
-    if (map.clusters.size() < 2) return;
-    std::string depths;
-    for (const DepthCluster& cluster : map.clusters) {
-      depths += fmt::format("{}{:.2f} mm ({} parts)", depths.empty() ? "" : ", ",
-                            cluster.focus_depth_mm.value, cluster.tiles);
-    }
-    const double spread_mm =
-        map.clusters.back().focus_depth_mm.value - map.clusters.front().focus_depth_mm.value;
-    result_.summary.warnings.push_back(
-        AstigmatismExplains(spread_mm, result_)
-            ? fmt::format("parts of the field come into focus at {}: the astigmatism is as large "
-                          "and has this effect if the direction of the texture varies; or the "
-                          "target is not at one depth. A target with the same texture in all "
-                          "directions distinguishes these causes",
-                          depths)
-            : fmt::format("the target is not at one depth; parts of the field come into focus at "
-                          "{}: restrict roi_px to one of them",
-                          depths));
-  }
-
-  void WarnOfTilt() {
-    const FieldMap& map = result_.diagnostics.field;
-    if (map.clusters.size() > 1) return;
-    const auto significant = [](const model::Estimate& tilt) {
-      return std::abs(tilt.value) > std::max(1.0, 4 * tilt.sigma);
-    };
-    if (!significant(*map.tilt_right_deg) && !significant(*map.tilt_down_deg)) return;
-    double nearest_mm = std::numeric_limits<double>::infinity(), farthest_mm = -nearest_mm;
-    for (const FieldTile& tile : map.tiles) {
-      if (!tile.done) continue;
-      nearest_mm = std::min(nearest_mm, tile.focus_depth_mm.value);
-      farthest_mm = std::max(farthest_mm, tile.focus_depth_mm.value);
-    }
-    result_.summary.warnings.push_back(fmt::format(
-        "{}the target is tilted against the sensor: {:+.1f} +- {:.1f} degrees toward the right, "
-        "{:+.1f} +- {:.1f} toward the bottom (positive: nearer there)",
-        AstigmatismExplains(farthest_mm - nearest_mm, result_)
-            ? "the astigmatism makes parts of the field come into focus at different depths, or "
-            : "",
-        map.tilt_right_deg->value, map.tilt_right_deg->sigma, map.tilt_down_deg->value,
-        map.tilt_down_deg->sigma));
   }
 
   // One zf for a field that has several is wrong by the spread beyond their own errors; where the
@@ -383,6 +344,47 @@ class Field {
 };
 
 }  // namespace
+
+std::vector<std::string> FieldWarnings(const Calibration& calibration) {
+  const FieldMap& map = calibration.diagnostics.field;
+  double nearest_mm = std::numeric_limits<double>::infinity(), farthest_mm = -nearest_mm;
+  if (map.clusters.size() > 1) {
+    std::string depths;
+    for (const DepthCluster& cluster : map.clusters) {
+      depths += fmt::format("{}{:.2f} mm ({} parts)", depths.empty() ? "" : ", ",
+                            cluster.focus_depth_mm.value, cluster.tiles);
+      nearest_mm = std::min(nearest_mm, cluster.focus_depth_mm.value);
+      farthest_mm = std::max(farthest_mm, cluster.focus_depth_mm.value);
+    }
+    return {AstigmatismExplains(farthest_mm - nearest_mm, calibration)
+                ? fmt::format(
+                      "parts of the field come into focus at {}: the astigmatism is as large and "
+                      "has this effect if the direction of the texture varies; or the target is "
+                      "not at one depth. A target with the same texture in all directions "
+                      "distinguishes these causes",
+                      depths)
+                : fmt::format("the target is not at one depth; parts of the field come into focus "
+                              "at {}: restrict roi_px to one of them",
+                              depths)};
+  }
+  const auto significant = [](const std::optional<model::Estimate>& tilt) {
+    return tilt && std::abs(tilt->value) > std::max(1.0, 4 * tilt->sigma);
+  };
+  if (!significant(map.tilt_right_deg) && !significant(map.tilt_down_deg)) return {};
+  for (const FieldTile& tile : map.tiles) {
+    if (!tile.done) continue;
+    nearest_mm = std::min(nearest_mm, tile.focus_depth_mm.value);
+    farthest_mm = std::max(farthest_mm, tile.focus_depth_mm.value);
+  }
+  return {fmt::format(
+      "{}the target is tilted against the sensor: {:+.1f} +- {:.1f} degrees toward the right, "
+      "{:+.1f} +- {:.1f} toward the bottom (positive: nearer there)",
+      AstigmatismExplains(farthest_mm - nearest_mm, calibration)
+          ? "the astigmatism makes parts of the field come into focus at different depths, or "
+          : "",
+      map.tilt_right_deg->value, map.tilt_right_deg->sigma, map.tilt_down_deg->value,
+      map.tilt_down_deg->sigma)};
+}
 
 void MapField(const FocusSweep& sweep, const BlurEvidence& evidence, const BlurFitResult& fit,
               FrameStore* store, Calibration* calibration) {

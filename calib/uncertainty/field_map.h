@@ -1,6 +1,9 @@
 #ifndef THICKLENS_CALIB_UNCERTAINTY_FIELD_MAP_H_
 #define THICKLENS_CALIB_UNCERTAINTY_FIELD_MAP_H_
 
+#include <string>
+#include <vector>
+
 #include "calib/fit/blur_measurement.h"
 #include "calib/sweep/frame_store.h"
 #include "thicklens/calib/calibration.h"
@@ -16,6 +19,10 @@ namespace thicklens::calib {
 // systematic interval by them.
 void MapField(const FocusSweep& sweep, const BlurEvidence& evidence, const BlurFitResult& fit,
               FrameStore* store, Calibration* calibration);
+
+// The warnings about parts of the field at several depths and about tilt that the field of a
+// calibration gives.
+std::vector<std::string> FieldWarnings(const Calibration& calibration);
 
 }  // namespace thicklens::calib
 

@@ -28,8 +28,8 @@ double FocusPositions::ImageDistanceMm(double reading) const {
 }
 
 bool FocusPositions::IsValid(std::string* why) const {
-  if (unit != "mm" && unit != kDioptreUnit)
-    return Fail(why, fmt::format("unit is '{}': it must be mm or {}", unit, kDioptreUnit));
+  if (unit != "mm" && unit != kDioptreUnit && unit != "steps")
+    return Fail(why, fmt::format("unit is '{}': it must be mm, steps or {}", unit, kDioptreUnit));
   if (positions.size() < 2)
     return Fail(why,
                 fmt::format("there are {} positions: at least 2 are needed", positions.size()));

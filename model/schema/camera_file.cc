@@ -167,7 +167,7 @@ void ReadCovariance(const YamlNode& node, CameraCalibration* calibration) {
 FocusPositions ReadFocusPositions(const YamlNode& node) {
   node.RequireKeys({"unit", "positions"});
   FocusPositions found;
-  found.unit = node.At("unit").OneOf({"mm", kDioptreUnit});
+  found.unit = node.At("unit").OneOf({"mm", kDioptreUnit, "steps"});
   for (const YamlNode& position : node.At("positions").Elements()) {
     const auto pair = position.ElementsExactly(2);
     found.positions.push_back({pair[0].Number(), pair[1].PositiveNumber()});

@@ -279,6 +279,7 @@ SweepFile SweepFromPages(const std::string& path, int pages, const ReadingSet& r
   sweep.frames = PairPages(readings, path, pages);
   sweep.readings = readings.description;
   sweep.readings_are_focus_distances = readings.in_dioptres;
+  sweep.readings_are_counts = readings.in_counts;
   if (notices != nullptr)
     notices->insert(notices->end(), readings.notices.begin(), readings.notices.end());
   NoteOrderAndRepeats(sweep, notices);

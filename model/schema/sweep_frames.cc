@@ -179,6 +179,7 @@ void TakeReadings(const SweepReading& reading, const std::string& table,
     notices->insert(notices->end(), readings.notices.begin(), readings.notices.end());
   sweep->readings = readings.description;
   sweep->readings_are_focus_distances = readings.in_dioptres;
+  sweep->readings_are_counts = readings.in_counts;
   sweep->frames = PairFrames(readings, files, folder, notices);
   if (!table.empty()) return;
   // The order of names ("z10", "z9") means nothing.

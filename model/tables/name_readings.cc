@@ -160,10 +160,11 @@ ReadingSet ReadingsOfNames(const std::vector<std::string>& files, const ReadingO
                       file, Shown(matches.front().number)));
     }
     const std::string place = file + ": ";
-    set.rows.push_back({file, ReadingInMm(*value, unit, options, place), place});
+    set.rows.push_back({file, ReadingInMmOrCounts(*value, unit, options, place), place});
   }
   const bool is_stated = !unit.empty() || !options.unit.empty() || options.scale_mm;
   set.in_dioptres = ReadingUnitName(unit, options) == kDioptres;
+  set.in_counts = AreCountsWithoutLength(unit, options);
   set.description =
       fmt::format("'{}' in the names of {} files, {}{}", Shown(options.name_pattern), files.size(),
                   ReadingUnitName(unit, options), is_stated ? "" : " (no unit is stated)");

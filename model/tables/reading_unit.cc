@@ -172,6 +172,17 @@ std::string ReadingUnitName(const std::string& stated, const ReadingOptions& opt
   return unit ? unit->name : name;
 }
 
+bool AreCountsWithoutLength(const std::string& stated, const ReadingOptions& options) {
+  const auto unit = FindUnit(ReadingUnitName(stated, options));
+  return unit && unit->kind == Kind::kScaled && !options.scale_mm;
+}
+
+double ReadingInMmOrCounts(double value, const std::string& stated, const ReadingOptions& options,
+                           const std::string& place) {
+  return AreCountsWithoutLength(stated, options) ? value
+                                                 : ReadingInMm(value, stated, options, place);
+}
+
 double ReadingInMm(double value, const std::string& stated, const ReadingOptions& options,
                    const std::string& place) {
   const std::string name = ReadingUnitName(stated, options);
@@ -220,6 +231,12 @@ bool ReadingOptions::IsValid(std::string* why) const {
   };
   if (!unit.empty()) {
     const auto found = FindUnit(unit);
+    if (Normalised(unit).rfind("lens-d", 0) == 0) {
+      return fail(
+          "unit: readings in dioptres of a lens itself, whose focal length they change, are not "
+          "supported. If the sensor stays, its focus distance in dioptres is the reading minus "
+          "that at which infinity is in focus: give these differences as dpt");
+    }
     if (!found || (found->kind == Kind::kOther && !scale_mm))
       return fail(fmt::format("unit: {} is expected, found '{}'", kUnitNames, Shown(unit)));
   }

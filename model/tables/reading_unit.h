@@ -4,6 +4,8 @@
 #include <optional>
 #include <string>
 
+#include "thicklens/model/readings.h"
+
 namespace thicklens::model {
 
 // A unit that a table of readings may state.
@@ -27,6 +29,13 @@ std::optional<ReadingUnit> FindUnit(const std::string& text);
 // it is no known unit. Several are joined by a space, which is no unit. Empty: the line states
 // none.
 std::string UnitStatedIn(const std::string& line);
+
+// Whether the readings are steps, counts or turns of a length that is not stated. They are allowed
+// where the lens or the sensor moves (SweepFile::readings_are_counts).
+bool AreCountsWithoutLength(const std::string& stated, const ReadingOptions& options);
+// ReadingInMm, or the count itself where its length is not stated.
+double ReadingInMmOrCounts(double value, const std::string& stated, const ReadingOptions& options,
+                           const std::string& place);
 
 // The units that ReadingOptions::unit may name, for messages.
 extern const char kUnitNames[];

@@ -292,15 +292,18 @@ class Reader {
                               ColumnText(columns_, columns_.reading)));
     }
     const std::string place = Place(cell.line);
-    return {
-        cell.file,
-        ReadingInMm(*value, unit_, options_, place + ColumnText(columns_, columns_.reading) + ": "),
-        place};
+    const std::string column = place + ColumnText(columns_, columns_.reading) + ": ";
+    // The frames of a video lie between those of the table, which needs a length.
+    return {cell.file,
+            options_.time_column.empty() ? ReadingInMmOrCounts(*value, unit_, options_, column)
+                                         : ReadingInMm(*value, unit_, options_, column),
+            place};
   }
 
   void Describe(const std::string& encoding, ReadingSet* set) const {
     const std::string name = ReadingUnitName(unit_, options_);
     set->in_dioptres = name == kDioptres;
+    set->in_counts = AreCountsWithoutLength(unit_, options_);
     std::string unit = name;
     if (!unit_place_.empty()) unit += fmt::format(" (as {} states)", unit_place_);
     const bool is_stated = !unit_.empty() || !options_.unit.empty() || options_.scale_mm;

@@ -119,7 +119,8 @@ json FrameJson(const calib::FrameMeasurement& frame, const calib::BlurModel* law
       {"reading_error_mm",
        has_reading_error ? NumberOrNull(frame.reading_error_mm) : json(nullptr)},
       {"reading_error_sigma_mm",
-       has_reading_error ? NumberOrNull(frame.reading_error_sigma_mm) : json(nullptr)}};
+       has_reading_error ? NumberOrNull(frame.reading_error_sigma_mm) : json(nullptr)},
+      {"stage_error_mm", NumberOrNull(frame.stage_error_mm)}};
   out["blur_model_sigma_px"] = has_law ? NumberOrNull(law->SigmaPx(frame.depth_mm)) : json(nullptr);
   out["blur_model_error_px"] =
       has_law ? NumberOrNull(law->SigmaErrorPx(frame.depth_mm)) : json(nullptr);
@@ -328,6 +329,10 @@ json FitJson(const calib::Calibration& calibration) {
           {"systematic_parts", PartsJson(calibration.diagnostics.systematic_parts)},
           {"advice", TextJson(calibration.diagnostics.advice)},
           {"moves", model::SweepMotionName(calibration.diagnostics.moves)},
+          {"step_length_mm", calibration.diagnostics.step_length_mm
+                                 ? json{{"value", calibration.diagnostics.step_length_mm->value},
+                                        {"sigma", calibration.diagnostics.step_length_mm->sigma}}
+                                 : json(nullptr)},
           {"moves_is_recognised", calibration.diagnostics.moves_is_recognised},
           {"bench_offset_from", TextJson(calibration.diagnostics.bench_offset_from)},
           {"magnification_at_focus", EstimateJson(calibration.diagnostics.magnification_at_focus)},
@@ -388,6 +393,7 @@ json CalibrationJson(const calib::FocusSweep& sweep, const calib::Calibration& c
   out["diagnoses"] = DiagnosesJson(calibration);
   out["frame_structure"] = StructureJson(calibration.diagnostics.structure);
   out["fixed_pattern"] = PatternJson(calibration.diagnostics.fixed_pattern);
+  out["stage_errors"] = StageJson(calibration.diagnostics.stage);
   out["camera_response"] = ResponseJson(calibration.diagnostics.response);
   out["magnification"] = MagnificationJson(calibration.diagnostics.magnification);
   if (truth != nullptr) out["truth"] = TruthJson(rows);

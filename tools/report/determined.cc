@@ -61,6 +61,8 @@ std::string OffsetOriginLine(const calib::Calibration& calibration) {
       calibration.summary.outcome == calib::Outcome::kRefused)
     return "";
   std::string line = "by " + diagnostics.bench_offset_from;
+  if (const auto& step = diagnostics.step_length_mm)
+    line += fmt::format("; 1 step = {}", WithError(step->value, step->sigma, "mm"));
   if (const auto& m = diagnostics.magnification_at_focus; m && calibration.summary.focus_depth_mm)
     line += fmt::format("; magnification at focus {}", WithError(m->value, m->sigma, ""));
   return line;
@@ -160,6 +162,25 @@ nlohmann::json PatternJson(const calib::FixedPattern& pattern) {
           {"filled_share", FiniteNumber(pattern.filled_share)},
           {"column_deviation", FiniteNumber(pattern.column_deviation)},
           {"row_deviation", FiniteNumber(pattern.row_deviation)}};
+}
+
+nlohmann::json StageJson(const calib::StageErrors& stage) {
+  if (!stage.compared) return nullptr;
+  nlohmann::json out = {{"message", PrintableUtf8(stage.message)},
+                        {"backlash_mm", ErrorJson(stage.backlash_mm)},
+                        {"slip_mm", ErrorJson(stage.slip_mm)}};
+  out["slip_from_frame"] =
+      stage.slip_mm ? nlohmann::json(stage.slip_from_frame) : nlohmann::json(nullptr);
+  out["periodic"] = nullptr;
+  if (stage.periodic) {
+    out["periodic"] = {{"amplitude_mm", ErrorJson(stage.periodic->amplitude_mm)},
+                       {"period_mm", ErrorJson(stage.periodic->period_mm)},
+                       {"phase_deg", FiniteNumber(stage.periodic->phase_deg)}};
+  }
+  out["also_possible"] = nlohmann::json::array();
+  for (const std::string& cause : stage.also_possible)
+    out["also_possible"].push_back(PrintableUtf8(cause));
+  return out;
 }
 
 nlohmann::json ResponseJson(const calib::CameraResponse& response) {

@@ -39,6 +39,7 @@ nlohmann::json SharpestJson(const calib::Calibration& calibration);
 nlohmann::json DiagnosesJson(const calib::Calibration& calibration);
 nlohmann::json StructureJson(const calib::FrameStructureFinding& structure);
 nlohmann::json PatternJson(const calib::FixedPattern& pattern);
+nlohmann::json StageJson(const calib::StageErrors& stage);
 nlohmann::json ResponseJson(const calib::CameraResponse& response);
 
 }  // namespace thicklens::tools

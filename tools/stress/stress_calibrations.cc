@@ -168,6 +168,46 @@ std::vector<StressCase> Readings() {
   return cases;
 }
 
+// A stage whose readings have systematic errors. The bench offset is not stated, so that it comes
+// from the image scale.
+std::vector<StressCase> Stages() {
+  const std::string required =
+      "d1, zf and kappa within 4 standard errors of the truth or of the interval, d1 within 200 um";
+  const auto open = [](const std::function<void(model::StageOptions*)>& change) {
+    StressSweep sweep = Simulated([change](model::SweepSimulationOptions* simulation) {
+      change(&simulation->stage);
+      if (!simulation->stage.there_and_back) return;
+      simulation->step_mm *= 2;
+      simulation->frame_count += simulation->frame_count % 2;
+    });
+    sweep.describe = [](model::SweepFile* file) { file->offset_mm.reset(); };
+    return sweep;
+  };
+  std::vector<StressCase> cases;
+  cases.push_back(Sweep("stage-backlash",
+                        "there and back; the readings on the way back are 0.4 mm larger", required,
+                        open([](model::StageOptions* stage) {
+                          stage->there_and_back = true;
+                          stage->backlash_mm = 0.4;
+                        }),
+                        Truth(200)));
+  cases.push_back(Sweep("stage-screw", "a lead screw of 5 mm is off by up to 0.3 mm", required,
+                        open([](model::StageOptions* stage) {
+                          stage->screw_error_mm = 0.3;
+                          stage->screw_period_mm = 5;
+                        }),
+                        Truth(200)));
+  cases.push_back(Sweep("stage-lost-steps",
+                        "there and back; from the 25th frame on the readings are 0.5 mm larger",
+                        required, open([](model::StageOptions* stage) {
+                          stage->there_and_back = true;
+                          stage->slip_mm = 0.5;
+                          stage->slip_from_frame = 24;
+                        }),
+                        Truth(200)));
+  return cases;
+}
+
 void Fill(model::EncodedImage* frame, std::uint16_t value) {
   std::fill(frame->values.begin(), frame->values.end(), value);
 }
@@ -416,8 +456,8 @@ std::vector<StressCase> FixedToTheFrame() {
 
 std::vector<StressCase> CalibrationStressCases() {
   std::vector<StressCase> all;
-  for (std::vector<StressCase> part : {Frames2To5(), Focus(), Readings(), Damages(), Optics(),
-                                       Macros(), MovingFocus(), FixedToTheFrame()}) {
+  for (std::vector<StressCase> part : {Frames2To5(), Focus(), Readings(), Stages(), Damages(),
+                                       Optics(), Macros(), MovingFocus(), FixedToTheFrame()}) {
     for (StressCase& hard : part) all.push_back(std::move(hard));
   }
   return all;

@@ -91,14 +91,40 @@ EffectSet SweepEffects() {
       Effect::kShading,       Effect::kDust,          Effect::kAberrations,   Effect::kDistortion};
 }
 
+double StageOptions::Written(double reading_mm, bool is_falling, int frame_index) const {
+  double written_mm = (1 + lead_error) * reading_mm;
+  if (screw_error_mm != 0) {
+    written_mm += screw_error_mm *
+                  std::sin(2 * kPi * reading_mm / screw_period_mm + screw_phase_deg * kPi / 180);
+  }
+  if (is_falling) written_mm += backlash_mm;
+  if (frame_index >= slip_from_frame) written_mm += slip_mm;
+  return resolution_mm > 0 ? resolution_mm * std::round(written_mm / resolution_mm) : written_mm;
+}
+
+int SweepSimulationOptions::StepsOf(int frame_index) const {
+  return stage.there_and_back ? std::min(frame_index, frame_count - 1 - frame_index) : frame_index;
+}
+
+int SweepSimulationOptions::FarthestFrame() const {
+  return stage.there_and_back ? (frame_count - 1) / 2 : frame_count - 1;
+}
+
+bool SweepSimulationOptions::IsFalling(int frame_index) const {
+  // A frame at the turn that repeats the position is not approached anew.
+  const int turn = FarthestFrame() + (stage.there_and_back && frame_count % 2 == 0 ? 1 : 0);
+  const bool is_back = stage.there_and_back && frame_index > turn;
+  return is_back != (DirectionSign(direction) * step_mm < 0);
+}
+
 double SweepSimulationOptions::ImageDistanceMm(int frame_index) const {
-  return MovesFocus(moves) ? first_image_distance_mm + frame_index * step_mm
+  return MovesFocus(moves) ? first_image_distance_mm + StepsOf(frame_index) * step_mm
                            : camera.image_distance_mm();
 }
 
 double SweepSimulationOptions::DepthMm(int frame_index) const {
   return MovesFocus(moves) ? DepthAt(ImageDistanceMm(frame_index))
-                           : first_depth_mm + frame_index * step_mm;
+                           : first_depth_mm + StepsOf(frame_index) * step_mm;
 }
 
 double SweepSimulationOptions::DepthAt(double image_distance_mm) const {
@@ -119,22 +145,23 @@ bool SweepSimulationOptions::IsValid(std::string* why) const {
   }
   const auto possible = [](double length_mm) { return length_mm > 0 && std::isfinite(length_mm); };
   const double thickness_mm = camera.lens.lens_thickness_mm;
-  const double first_mm = ImageDistanceMm(0), last_mm = ImageDistanceMm(frame_count - 1);
+  const double first_mm = ImageDistanceMm(0), last_mm = ImageDistanceMm(FarthestFrame());
   if (!possible(first_mm - thickness_mm) || !possible(last_mm - thickness_mm)) {
     return Fail(why, fmt::format("bench: the image distances run from {} to {} mm: they must be "
                                  "finite and > {}",
                                  first_mm, last_mm, std::max(0.0, thickness_mm)));
   }
-  if (!possible(DepthMm(0)) || !possible(DepthMm(frame_count - 1))) {
+  if (!possible(DepthMm(0)) || !possible(DepthMm(FarthestFrame()))) {
     return Fail(why, fmt::format("bench: the depths run from {} to {} mm: they must be finite and "
                                  "> 0",
-                                 DepthMm(0), DepthMm(frame_count - 1)));
+                                 DepthMm(0), DepthMm(FarthestFrame())));
   }
   if (!std::isfinite(bench_offset_mm)) {
     return Fail(why, fmt::format("bench.offset_mm is {}: it must be finite", bench_offset_mm));
   }
   const std::pair<const char*, double> amounts[] = {
       {"bench.reading_sigma_mm", reading_sigma_mm},
+      {"bench.stage.resolution_mm", stage.resolution_mm},
       {"drift_sigma_px", drift_sigma_px},
       {"noise.full_well_electrons", full_well_electrons},
       {"noise.read_noise_electrons", read_noise_electrons}};
@@ -142,6 +169,26 @@ bool SweepSimulationOptions::IsValid(std::string* why) const {
     if (!(value >= 0) || !std::isfinite(value)) {
       return Fail(why, fmt::format("{} is {}: it must be finite and >= 0", field, value));
     }
+  }
+  for (const auto& [field, value] :
+       {std::pair{"backlash_mm", stage.backlash_mm},
+        std::pair{"screw_error_mm", stage.screw_error_mm},
+        std::pair{"screw_phase_deg", stage.screw_phase_deg}, std::pair{"slip_mm", stage.slip_mm}}) {
+    if (!std::isfinite(value))
+      return Fail(why, fmt::format("bench.stage.{} is {}: it must be finite", field, value));
+  }
+  if (!(stage.screw_period_mm > 0) || !std::isfinite(stage.screw_period_mm)) {
+    return Fail(why, fmt::format("bench.stage.screw_period_mm is {}: it must be finite and > 0",
+                                 stage.screw_period_mm));
+  }
+  if (!(stage.slip_from_frame >= 0 && stage.slip_from_frame < frame_count)) {
+    return Fail(why, fmt::format("bench.stage.slip_from_frame is {}: it must be from 0 to {}, the "
+                                 "last frame",
+                                 stage.slip_from_frame, frame_count - 1));
+  }
+  if (!(std::abs(stage.lead_error) <= 0.5)) {
+    return Fail(why, fmt::format("bench.stage.lead_error is {}: it must be from -0.5 to 0.5",
+                                 stage.lead_error));
   }
   if (read_noise_electrons > 0 && !(full_well_electrons > 0)) {
     return Fail(why, fmt::format("noise.read_noise_electrons is {}: noise in electrons needs "

@@ -67,9 +67,25 @@ TargetOptions ReadTarget(const YamlNode& node, std::vector<std::string>* notices
   return target;
 }
 
+void ReadStage(const YamlNode& node, StageOptions* stage) {
+  node.RequireKeys({"there_and_back", "backlash_mm", "screw_error_mm", "screw_period_mm",
+                    "screw_phase_deg", "slip_mm", "slip_from_frame", "resolution_mm",
+                    "lead_error"});
+  if (const auto back = node.Find("there_and_back")) stage->there_and_back = back->Boolean();
+  ReadNumber(node, "backlash_mm", &stage->backlash_mm);
+  ReadNumber(node, "screw_error_mm", &stage->screw_error_mm);
+  ReadNumber(node, "screw_period_mm", &stage->screw_period_mm);
+  ReadNumber(node, "screw_phase_deg", &stage->screw_phase_deg);
+  ReadNumber(node, "slip_mm", &stage->slip_mm);
+  if (const auto from = node.Find("slip_from_frame"))
+    stage->slip_from_frame = from->Integer(0, 100000);
+  ReadNumber(node, "resolution_mm", &stage->resolution_mm);
+  ReadNumber(node, "lead_error", &stage->lead_error);
+}
+
 void ReadBench(const YamlNode& node, SweepSimulationOptions* options) {
   node.RequireKeys({"moves", "first_depth_mm", "first_image_distance_mm", "step_mm", "frames",
-                    "offset_mm", "direction", "reading_sigma_mm"});
+                    "offset_mm", "direction", "reading_sigma_mm", "stage"});
   if (const auto moves = node.Find("moves")) {
     options->moves = ReadNamed<SweepMotion>(
         *moves,
@@ -94,6 +110,7 @@ void ReadBench(const YamlNode& node, SweepSimulationOptions* options) {
   options->frame_count = node.At("frames").Integer(1, 100000);
   ReadNumber(node, "offset_mm", &options->bench_offset_mm);
   ReadNumber(node, "reading_sigma_mm", &options->reading_sigma_mm);
+  if (const auto stage = node.Find("stage")) ReadStage(*stage, &options->stage);
   if (const auto direction = node.Find("direction")) {
     options->direction = direction->OneOf({"away", "toward"}) == "away" ? BenchDirection::kAway
                                                                         : BenchDirection::kToward;

@@ -127,7 +127,7 @@ struct SweepSimulator::Impl {
     // All effects together cost nothing because frames are sums of waves.
     choice.kept = choice.kept.With(SweepEffects());
     const auto [near, far] =
-        std::minmax({options.DepthMm(0), options.DepthMm(options.frame_count - 1)});
+        std::minmax({options.DepthMm(0), options.DepthMm(options.FarthestFrame())});
     // The sides of a tilted target are nearer and farther than its middle.
     const auto [least, most] = Nearnesses(options.target.tilt_deg * kPi / 180);
     decision = SelectEffects(choice, Conditions(),
@@ -240,9 +240,11 @@ struct SweepSimulator::Impl {
       frame.image_distance_mm = options.ImageDistanceMm(i);
       const double position_mm =
           MovesFocus(options.moves) ? frame.image_distance_mm : frame.depth_mm;
-      frame.reading_mm =
-          DirectionSign(options.direction) * (position_mm - options.bench_offset_mm) +
-          (on.Has(Effect::kReadingError) ? options.reading_sigma_mm * bench.Normal() : 0);
+      frame.reading_mm = DirectionSign(options.direction) * (position_mm - options.bench_offset_mm);
+      if (on.Has(Effect::kReadingError)) {
+        frame.reading_mm = options.stage.Written(
+            frame.reading_mm + options.reading_sigma_mm * bench.Normal(), options.IsFalling(i), i);
+      }
       // The lamp is at the camera: the irradiance of the target is (zf/z)^2, 1 in the plane of
       // focus.
       const double falloff = options.lamp_falloff && on.Has(Effect::kLampFalloff)

@@ -285,5 +285,68 @@ TEST(SlowMovingFocus, SigmasAreTheScatter) {
   }
 }
 
+// Counts of 2.5 um, from which the image scale and a statement of the plane of focus give mm.
+SimulatedSweep InCounts(SimulatedSweep sweep) {
+  constexpr double kMmPerStep = 0.0025;
+  for (model::SweepFrame& frame : sweep.sweep.frames)
+    frame.reading_mm = 4000 + frame.reading_mm / kMmPerStep;
+  sweep.sweep.reading_sigma_mm /= kMmPerStep;
+  sweep.sweep.readings_are_counts = true;
+  return sweep;
+}
+
+TEST(CountedFocus, AStatementGivesTheLengthOfAStep) {
+  for (const SweepMotion moves : {SweepMotion::kSensor, SweepMotion::kLens}) {
+    SimulatedSweep sweep = InCounts(MovingSweep(moves, 300, 0.05));
+    sweep.sweep.stated_focus = {{model::ConjugateKind::kFocusDepth, {300, 0.5}, "focus_depth_mm"}};
+    const Calibration c = CalibrateWithoutMap(sweep);
+    ASSERT_NE(c.summary.outcome, Outcome::kRefused) << c.summary.reason;
+    ASSERT_TRUE(c.diagnostics.step_length_mm);
+    const model::Estimate& length = *c.diagnostics.step_length_mm;
+    EXPECT_NEAR(length.value, 0.0025, 4 * length.sigma);
+    EXPECT_LT(length.sigma, 0.03 * 0.0025);
+    EXPECT_NEAR(c.summary.image_distance_mm->value, sweep.truth.image_distance_mm,
+                4 * c.summary.image_distance_mm->sigma);
+    EXPECT_NEAR(c.summary.blur_ratio->value, sweep.truth.blur_ratio,
+                4 * c.summary.blur_ratio->sigma);
+    EXPECT_LT(c.summary.blur_ratio->sigma, 0.04);
+    // The reading at focus was 3 mm.
+    EXPECT_NEAR(c.diagnostics.focus_reading_mm->value, 5200,
+                5 * c.diagnostics.focus_reading_mm->sigma);
+    ASSERT_TRUE(c.diagnostics.focus_positions);
+    EXPECT_EQ(c.diagnostics.focus_positions->unit, "steps");
+    EXPECT_NEAR(c.diagnostics.focus_positions->ImageDistanceMm(5200),
+                c.summary.image_distance_mm->value, 0.01);
+    EXPECT_EQ(c.frames.front().reading_mm, sweep.sweep.frames.front().reading_mm);
+  }
+}
+
+TEST(CountedFocus, WithoutAStatementSaysWhatIsDeterminedAndWhatToState) {
+  SimulatedSweep sweep = InCounts(MovingSweep(SweepMotion::kSensor, 300, 0.05));
+  const Calibration c = CalibrateWithoutMap(sweep);
+  EXPECT_EQ(c.summary.outcome, Outcome::kRefused);
+  EXPECT_THAT(c.summary.reason, AllOf(HasSubstr("length of a step"), HasSubstr("count at focus, 5"),
+                                      HasSubstr("focus_depth_mm"), HasSubstr("--reading-scale")));
+  ASSERT_TRUE(c.diagnostics.sharpest.done);
+  EXPECT_NEAR(c.diagnostics.sharpest.reading_mm.value, 5200, 10);
+  sweep.sweep.moves.reset();
+  EXPECT_THAT(CalibrateWithoutMap(sweep).summary.reason,
+              AllOf(HasSubstr("steps"), HasSubstr("--reading-scale"), HasSubstr("moves: lens")));
+}
+
+// Messages name the position of the drive, and not that of the equivalent target.
+TEST(MovingFocus, ARejectedFrameHasTheReadingsOfTheSweep) {
+  SimulatedSweep sweep = MovingSweep(SweepMotion::kSensor, 300, 0.05);
+  const double right_mm = sweep.sweep.frames[4].reading_mm;
+  sweep.sweep.frames[4].reading_mm += 0.4;
+  const Calibration c = CalibrateWithoutMap(sweep);
+  const std::string& rejection = c.frames[4].rejection;
+  ASSERT_THAT(rejection, HasSubstr("reading off by 0."));
+  const std::string before = "belongs to the reading ";
+  const auto at = rejection.find(before);
+  ASSERT_NE(at, std::string::npos) << rejection;
+  EXPECT_NEAR(std::stod(rejection.substr(at + before.size())), right_mm, 0.03) << rejection;
+}
+
 }  // namespace
 }  // namespace thicklens::calib

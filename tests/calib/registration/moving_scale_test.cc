@@ -68,6 +68,26 @@ TEST(MovingScale, OfALensGivesTheFocalLengthAndOnlyALongSweepTheDistance) {
   EXPECT_LT(found.sensor_distance_mm->sigma, 1);
 }
 
+// The length of a step, with the error of the scatter, for either direction of the counts.
+TEST(StepLength, FollowsFromTheScaleAndAKnownDistance) {
+  constexpr int kRuns = 100;
+  constexpr double kMmPerStep = 0.0025;
+  for (const SweepMotion moves : {SweepMotion::kSensor, SweepMotion::kLens}) {
+    for (const double sign : {1.0, -1.0}) {
+      int covered = 0;
+      for (int run = 0; run < kRuns; ++run) {
+        std::vector<ScaleSample> samples = Scales(300, moves, 2, 1e-4, 100U + unsigned(run));
+        for (ScaleSample& sample : samples)
+          sample.reading_mm = 5000 + sign * (sample.reading_mm - 3) / kMmPerStep;
+        const model::Estimate length = FitStepLength(samples, kLens, moves, 5000, 60);
+        covered += std::abs(length.value - sign * kMmPerStep) < 2 * length.sigma;
+        EXPECT_LT(length.sigma, 0.01 * kMmPerStep);
+      }
+      EXPECT_GE(covered, 88);
+    }
+  }
+}
+
 TEST(MovingScale, NeedsFiveScales) {
   std::vector<ScaleSample> few = Scales(300, SweepMotion::kSensor, 0.6, 1e-4, 5);
   few.resize(4);

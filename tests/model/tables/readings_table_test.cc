@@ -85,9 +85,12 @@ TEST(ReadingsTable, MotorLogInSteps) {
   const std::string log =
       "timestamp;motor_position_steps;focus_score;image\n"
       "2024-05-01T10:00:00.1;1000;0.5;img_0001.jpg\n2024-05-01T10:00:01.2;1200;0.7;img_0002.jpg\n";
-  EXPECT_THAT(Refusal(log), AllOf(HasSubstr("t.csv:2: column 2 'motor_position_steps'"),
-                                  HasSubstr("steps"), HasSubstr("--reading-scale")));
   ReadingOptions options;
+  // Without a length they are counts, which a focus drive may have.
+  const ReadingSet counts = ReadingsOfTable(log, "t.csv", options);
+  EXPECT_TRUE(counts.in_counts);
+  EXPECT_EQ(counts.rows.at(1).reading_mm, 1200);
+  EXPECT_THAT(counts.description, HasSubstr("steps"));
   options.scale_mm = 0.0025;
   EXPECT_THAT(ValuesOf(log, options), ElementsAre(2.5, 3));
 }
@@ -207,7 +210,11 @@ TEST(ReadingsTable, UnitsThatAreRefused) {
   EXPECT_THAT(Refusal("a.png,2 mm\nb.png,3 um\n"), AllOf(HasSubstr("'um'"), HasSubstr("'mm'")));
   EXPECT_THAT(Refusal("file,z_um\na.png,2 mm\n"),
               AllOf(HasSubstr("states 'um'"), HasSubstr("'mm'"), HasSubstr("--unit")));
-  EXPECT_THAT(Refusal("a.png,2\n", WithUnit("counts")), HasSubstr("--reading-scale"));
+  EXPECT_TRUE(ReadingsOfTable("a.png,2\n", "t.csv", WithUnit("counts")).in_counts);
+  EXPECT_FALSE(ReadingsOfTable("a.png,2\n", "t.csv", WithUnit("counts", 0.1)).in_counts);
+  std::string why;
+  EXPECT_FALSE(WithUnit("lens-dioptres").IsValid(&why));
+  EXPECT_THAT(why, HasSubstr("infinity is in focus"));
   EXPECT_THAT(Refusal("file,z_um\na.png,2\n", WithUnit("", 0.1)),
               AllOf(HasSubstr("--reading-scale is for steps and counts"), HasSubstr("um")));
   EXPECT_THAT(Refusal("file,focus_dpt\na.png,0\n"), HasSubstr("0 is infinity"));
@@ -232,8 +239,8 @@ TEST(ReadingsTable, MoreUnitsOfHeaders) {
     EXPECT_DOUBLE_EQ(of_header(name), 2) << name;
   for (const char* name :
        {"z (turns)", "z_rev", "z (encoder)", "z_encoder", "z (counts)", "z [revolutions]"}) {
-    EXPECT_THAT(Refusal("file," + std::string(name) + "\na.png,2\n"),
-                AllOf(HasSubstr(name), HasSubstr("--reading-scale")));
+    EXPECT_TRUE(ReadingsOfTable("file," + std::string(name) + "\na.png,2\n", "t.csv", {}).in_counts)
+        << name;
   }
   for (const char* name :
        {"z (furlong)", "z_furlong", "z [1/10 mm]", "z (arb)", "z_10um", "z (')", "z (mm) (um)"}) {

@@ -264,6 +264,43 @@ TEST(SweepEffectsTest, SpecksTakeTheirPartOfTheLightInEveryFrame) {
   EXPECT_EQ(Largest(Frames(options)[2], plain[2]), 0);
 }
 
+// The frames do not change; the readings have the closed form of each error.
+TEST(SweepEffectsTest, TheStageWritesItsErrors) {
+  SweepSimulationOptions options = WideSweep();
+  options.reading_sigma_mm = 0;
+  options.frame_count = 8;
+  options.stage.there_and_back = true;
+  const SweepTruth right = SweepSimulator(options, {}).truth();
+  options.stage.backlash_mm = 0.4;
+  options.stage.screw_error_mm = 0.2;
+  options.stage.screw_period_mm = 3;
+  options.stage.screw_phase_deg = 90;
+  options.stage.slip_mm = -0.5;
+  options.stage.slip_from_frame = 6;
+  options.stage.lead_error = 0.01;
+  const SweepSimulator simulator(options, {});
+  const SweepTruth& truth = simulator.truth();
+  for (std::size_t i = 0; i < 8; ++i) {
+    const double reading_mm = right.frames[i].reading_mm;
+    EXPECT_EQ(right.frames[i].depth_mm, right.frames[7 - i].depth_mm);
+    EXPECT_EQ(truth.frames[i].depth_mm, right.frames[i].depth_mm);
+    // The fifth frame repeats the position at the turn, which is not approached anew.
+    const bool is_falling = i > 4;
+    const double back = is_falling == (options.step_mm > 0) ? 1 : 0;
+    const double expected = 1.01 * reading_mm + 0.2 * std::cos(2 * kPi * reading_mm / 3) +
+                            0.4 * back - (i >= 6 ? 0.5 : 0);
+    EXPECT_NEAR(truth.frames[i].reading_mm, expected, 1e-9) << i;
+  }
+  options.effects.without = {Effect::kReadingError};
+  EXPECT_EQ(SweepSimulator(options, {}).truth().frames[6].reading_mm, right.frames[6].reading_mm);
+  options.effects.without = {};
+  options.stage = {};
+  options.stage.resolution_mm = 0.25;
+  const SweepTruth rounded = SweepSimulator(options, {}).truth();
+  for (const SweepTruth::Frame& frame : rounded.frames)
+    EXPECT_NEAR(std::remainder(frame.reading_mm, 0.25), 0, 1e-9);
+}
+
 TEST(SweepEffectsTest, ReadingsAndNoiseAreLeftOutToo) {
   SweepSimulationOptions options = WideSweep();
   options.effects.without = {Effect::kReadingError, Effect::kShotNoise, Effect::kReadNoise,

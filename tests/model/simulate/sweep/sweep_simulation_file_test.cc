@@ -85,7 +85,10 @@ TEST_F(SweepSimulationFileTest, ReadsEveryField) {
       "target: {kind: image, image: scene.png, contrast: 0.7, feature_size_mm: 3,\n"
       "         edge_angle_deg: -4, ink_sigma_mm: 0.02}\n"
       "bench: {first_depth_mm: 310, step_mm: -1.5, frames: 12, offset_mm: 106.5,\n"
-      "        direction: toward, reading_sigma_mm: 0.07}\n"
+      "        direction: toward, reading_sigma_mm: 0.07,\n"
+      "        stage: {there_and_back: true, backlash_mm: 0.4, screw_error_mm: 0.2,\n"
+      "                screw_period_mm: 3, screw_phase_deg: 30, slip_mm: -0.5,\n"
+      "                slip_from_frame: 7, resolution_mm: 0.25, lead_error: 0.01}}\n"
       "light: {level: 0.4, lamp_falloff: false, flicker: 0.02}\n"
       "drift_sigma_px: 1.25\n"
       "fixed_to_frame: {corner_stops: -1.5, specks: 12, speck_depth: 0.6, speck_radius_px: 7}\n"
@@ -100,6 +103,15 @@ TEST_F(SweepSimulationFileTest, ReadsEveryField) {
   EXPECT_EQ(options.aberrations.distortion, -0.04);
   EXPECT_EQ(options.corner_stops, -1.5);
   EXPECT_EQ(options.speck_count, 12);
+  EXPECT_TRUE(options.stage.there_and_back);
+  EXPECT_EQ(options.stage.backlash_mm, 0.4);
+  EXPECT_EQ(options.stage.screw_error_mm, 0.2);
+  EXPECT_EQ(options.stage.screw_period_mm, 3);
+  EXPECT_EQ(options.stage.screw_phase_deg, 30);
+  EXPECT_EQ(options.stage.slip_mm, -0.5);
+  EXPECT_EQ(options.stage.slip_from_frame, 7);
+  EXPECT_EQ(options.stage.resolution_mm, 0.25);
+  EXPECT_EQ(options.stage.lead_error, 0.01);
   EXPECT_EQ(options.speck_depth, 0.6);
   EXPECT_EQ(options.speck_radius_px, 7);
   EXPECT_NEAR(options.camera.image_distance_mm(), 60, 1e-12);
@@ -193,6 +205,12 @@ TEST_F(SweepSimulationFileTest, ErrorsHaveTheirPlaceInTheFile) {
       {head + kTruth + rest + "aberrations: {distortion: -0.2}\n", "must be from -0.14 to 0.3"},
       {head + kTruth + rest + "fixed_to_frame: {speck_depth: 2}\n", "must be from 0 to 1"},
       {head + kTruth + rest + "fixed_to_frame: {specks: -1}\n", "specks"},
+      {head + kTruth + kTarget +
+           "bench: {first_depth_mm: 290, step_mm: 1, frames: 21, stage: {slip_from_frame: 21}}\n",
+       "slip_from_frame is 21: it must be from 0 to 20"},
+      {head + kTruth + kTarget +
+           "bench: {first_depth_mm: 290, step_mm: 1, frames: 21, stage: {screw_period_mm: 0}}\n",
+       "must be finite and > 0"},
       {head + kTruth + rest + "bits: 12\n", "bits is 12: it must be 8 or 16"},
       {head + kTruth + rest + "light: {lamp_falloff: 1}\n", "true, false"},
   };

@@ -11,6 +11,7 @@
 #include "thicklens/calib/diagnosis.h"
 #include "thicklens/calib/fixed_pattern.h"
 #include "thicklens/calib/frame_statistics.h"
+#include "thicklens/calib/stage_errors.h"
 #include "thicklens/model/camera.h"
 #include "thicklens/model/sweep_file.h"
 
@@ -65,6 +66,8 @@ struct FrameMeasurement {
   // difference. Both are 0 in frames that are not in the fit.
   double reading_error_mm = 0;
   double reading_error_sigma_mm = 0;  // see reading_error_mm
+  // The part of reading_error_mm that is the stage's (StageErrors); `depth_mm` is without it.
+  double stage_error_mm = 0;
 };
 
 // Result of the paper's recipe: the depth of the sharpest frame, then the mean of sigma/r_defocus.
@@ -304,6 +307,10 @@ struct CalibrationDiagnostics {
   // Shading, dust and defective pixels that were removed. `structure` describes what is left.
   FixedPattern fixed_pattern;
   CameraResponse response;  // transfer curve and processing, by the frames
+  StageErrors stage;        // systematic errors of the stage, by scale and blur of the frames
+  // Length of a step or count of the drive, mm, where the readings are counts and a statement
+  // about the plane of focus determines it.
+  std::optional<model::Estimate> step_length_mm;
 
   SourceRecipe paper_recipe;                        // the paper's method, for comparison
   SharpnessPeak sharpness;                          // in-focus distance by sharpness alone

@@ -40,6 +40,13 @@ struct FocusSweep {
   // True: the readings are the distances, mm from Ap, on which the lens is focused by its own
   // scale.
   bool readings_are_focus_distances = false;
+  // True: the readings are steps or counts of a drive of the lens or the sensor, whose length is
+  // not known. They stand where millimetres would.
+  bool readings_are_counts = false;
+  // The reading as it was written, in `shown_unit`, for a reading of this sweep that stands for
+  // another one: of an equivalent target, or of counts. Messages show it. Null: in mm, as it is.
+  std::function<double(double reading_mm)> shown_reading;
+  std::string shown_unit = "mm";                          // of shown_reading
   model::SweepTarget target = model::SweepTarget::kAuto;  // kind of the target, if it is stated
   model::FloorKnowledge floor;                            // what is known of the blur floor, px
   std::optional<double> target_period_mm;                 // period of a periodic target

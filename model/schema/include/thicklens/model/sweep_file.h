@@ -106,6 +106,9 @@ struct SweepFile {
   // True: the readings were stated in dioptres and are the distances, mm from Ap, on which the
   // lens is focused by its own scale. False: they are positions on a scale.
   bool readings_are_focus_distances = false;
+  // True: the readings are steps or counts of a drive whose length is not stated. They stand where
+  // millimetres would.
+  bool readings_are_counts = false;
   // Statements about the plane of focus (model::StatedConjugate), each > 0. They determine the
   // depths of the sweep where neither `offset_mm` nor the image scale does; otherwise they are
   // compared with them. All are absent unless they are stated.

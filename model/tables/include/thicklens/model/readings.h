@@ -58,6 +58,8 @@ struct ReadingSet {
   std::vector<std::string> notices;  // assumptions, one line each
   // True: the readings are stated in dioptres, the unit of the focus scale of a lens.
   bool in_dioptres = false;
+  // True: the readings are steps or counts of a drive whose length nothing states.
+  bool in_counts = false;
 };
 
 // The reading at one time.

@@ -52,6 +52,29 @@ struct TargetOptions {
   double tilt_deg = 0;
 };
 
+// The stage that moves the part, and its systematic errors, which belong to the effect
+// "reading-error". They change what is written down, not where the part is.
+struct StageOptions {
+  // True: the second half of the frames repeats the positions of the first half on the way back.
+  bool there_and_back = false;
+  // Reading of a position that is approached by falling readings, minus the reading of the same
+  // position approached by rising ones, mm.
+  double backlash_mm = 0;
+  // Periodic error of a lead screw: amplitude and period, mm, and phase, degrees. The reading is
+  // too large by screw_error_mm sin(2 pi reading/screw_period_mm + screw_phase_deg).
+  double screw_error_mm = 0;
+  double screw_period_mm = 1;  // of the right reading
+  double screw_phase_deg = 0;  // at reading 0
+  double slip_mm = 0;          // added to the readings from a frame on: lost steps, a loose clamp
+  int slip_from_frame = 0;     // the first such frame, in the order of exposure
+  double resolution_mm = 0;    // readings are rounded to multiples of it; 0: they are not
+  double lead_error = 0;       // relative error of all readings: 0.01 for a lead that is 1 % wrong
+
+  // The written reading for the right one. `is_falling`: the position was approached by falling
+  // readings.
+  THICKLENS_EXPORT double Written(double reading_mm, bool is_falling, int frame_index) const;
+};
+
 // What SweepSimulator simulates. The defaults are those of the file's schema.
 struct SweepSimulationOptions {
   Camera camera;         // image size, pitch, lens; its calibration gives d1, kappa and the floor
@@ -69,6 +92,7 @@ struct SweepSimulationOptions {
   double bench_offset_mm = 0;          // z (or d1) = offset + reading, or offset - reading
   BenchDirection direction = BenchDirection::kAway;  // sign of the reading in z (or d1)
   double reading_sigma_mm = 0;                       // sd of the error of each written reading
+  StageOptions stage;                                // order of the positions; systematic errors
 
   double light_level = 0.5;         // mean linear grey at the plane of focus, of full scale
   bool lamp_falloff = true;         // the irradiance of the target is proportional to (zf/z)^2
@@ -96,6 +120,12 @@ struct SweepSimulationOptions {
   std::uint64_t seed = 1;            // of textures, noise and errors
   std::vector<std::string> notices;  // of the file, one line each: names that are deprecated
 
+  // The number of steps from the first position at which a frame is taken.
+  THICKLENS_EXPORT int StepsOf(int frame_index) const;
+  // The frame that is farthest from the first one.
+  THICKLENS_EXPORT int FarthestFrame() const;
+  // Whether the position of a frame is approached by falling readings.
+  THICKLENS_EXPORT bool IsFalling(int frame_index) const;
   // Distance d1 of the sensor from Ap in a frame, mm.
   THICKLENS_EXPORT double ImageDistanceMm(int frame_index) const;
   // Depth z of the target from Ap in a frame, mm.
