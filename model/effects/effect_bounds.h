@@ -113,6 +113,10 @@ EffectImpact ShadingImpact(const EffectOptics& optics, const EffectSite& place,
                            const EffectSet& others);
 EffectImpact DustImpact(const EffectOptics& optics, const EffectSite& place,
                         const EffectSet& others);
+EffectImpact BandsImpact(const EffectOptics& optics, const EffectSite& place,
+                         const EffectSet& others);
+EffectImpact ExposureDriftImpact(const EffectOptics& optics, const EffectSite& place,
+                                 const EffectSet& others);
 
 }  // namespace thicklens::model
 

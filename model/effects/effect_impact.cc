@@ -62,6 +62,10 @@ Section SectionOf(Effect effect) {
       return ShadingImpact;
     case Effect::kDust:
       return DustImpact;
+    case Effect::kBands:
+      return BandsImpact;
+    case Effect::kExposureDrift:
+      return ExposureDriftImpact;
   }
   throw Error("no such effect");
 }
@@ -127,10 +131,15 @@ bool EffectConditions::IsValid(std::string* why) const {
     amounts.insert(amounts.end(), {{"bench.flicker", bench->flicker},
                                    {"bench.drift_sigma_px", bench->drift_sigma_px},
                                    {"bench.reading_sigma_mm", bench->reading_sigma_mm},
-                                   {"bench.speck_depth", bench->speck_depth}});
+                                   {"bench.speck_depth", bench->speck_depth},
+                                   {"bench.band_amplitude", bench->band_amplitude}});
     if (!std::isfinite(bench->corner_stops)) {
       return Fail(why,
                   fmt::format("bench.corner_stops is {}: it must be finite", bench->corner_stops));
+    }
+    if (!std::isfinite(bench->exposure_drift_stops)) {
+      return Fail(why, fmt::format("bench.exposure_drift_stops is {}: it must be finite",
+                                   bench->exposure_drift_stops));
     }
     if (!(std::abs(bench->tilt_deg) < 90)) {
       return Fail(

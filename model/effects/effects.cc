@@ -73,6 +73,12 @@ const std::vector<EffectFacts>& AllEffects() {
        "the light that the lens alone gives", EffectUnit::kRelative, false},
       {Effect::kDust, "dust", "specks on the sensor's cover take a part of the light",
        "a clean sensor", EffectUnit::kRelative, false},
+      {Effect::kBands, "bands",
+       "a lamp that flickers while the shutter rolls makes rows brighter and darker",
+       "an even light", EffectUnit::kRelative, true},
+      {Effect::kExposureDrift, "exposure-drift",
+       "the exposure of the camera changes evenly over the sweep", "one exposure",
+       EffectUnit::kRelative, false},
   };
   return facts;
 }

@@ -11,11 +11,11 @@ namespace thicklens::tools {
 
 // Returns the machine-readable summary, with every number of the report. `status`, `reason`,
 // `method` and the results are always present, and so are `sharpest_reading`, `diagnoses` (the
-// causes that were compared), `frame_structure`, `fixed_pattern` and `camera_response` (null if
-// they were not examined). A result that does not exist, a number that was not measured, and a
-// number that is not finite is null. `scale_model`, `covariance`, `blur_fit`, `sides`, `field` and
-// the entries of `other_methods` are present with `done: false` or null numbers if they were not
-// reached. `truth` is left out if none is known.
+// causes that were compared), `frame_structure`, `fixed_pattern`, `frame_light` and
+// `camera_response` (null if they were not examined). A result that does not exist, a number that
+// was not measured, and a number that is not finite is null. `scale_model`, `covariance`,
+// `blur_fit`, `sides`, `field` and the entries of `other_methods` are present with `done: false` or
+// null numbers if they were not reached. `truth` is left out if none is known.
 //
 // With `use_source_recipe` the results are those of the paper's recipe, with null sigma and with
 // the recipe's own status and reason. The results of the fit are then in `other_methods.fit` alone,

@@ -83,12 +83,13 @@ std::string TargetKindName(TargetKind kind) {
 }
 
 EffectSet SweepEffects() {
-  return {Effect::kThickness,     Effect::kDefocus,     Effect::kApertureShape,
-          Effect::kFalloff,       Effect::kPixelBox,    Effect::kLensFloor,
-          Effect::kShotNoise,     Effect::kReadNoise,   Effect::kQuantisation,
-          Effect::kTransferCurve, Effect::kLampFalloff, Effect::kFlicker,
-          Effect::kMagnification, Effect::kDrift,       Effect::kTilt,
-          Effect::kReadingError,  Effect::kShading,     Effect::kDust};
+  return {Effect::kThickness,     Effect::kDefocus,      Effect::kApertureShape,
+          Effect::kFalloff,       Effect::kPixelBox,     Effect::kLensFloor,
+          Effect::kShotNoise,     Effect::kReadNoise,    Effect::kQuantisation,
+          Effect::kTransferCurve, Effect::kLampFalloff,  Effect::kFlicker,
+          Effect::kMagnification, Effect::kDrift,        Effect::kTilt,
+          Effect::kReadingError,  Effect::kShading,      Effect::kDust,
+          Effect::kBands,         Effect::kExposureDrift};
 }
 
 double SweepSimulationOptions::ImageDistanceMm(int frame_index) const {
@@ -171,6 +172,17 @@ bool SweepSimulationOptions::IsValid(std::string* why) const {
     return Fail(why,
                 fmt::format("fixed_to_frame.speck_radius_px is {}: it must be from 0.5 to 1000",
                             speck_radius_px));
+  }
+  if (!(band_amplitude >= 0 && band_amplitude <= 1)) {
+    return Fail(why, fmt::format("bands.amplitude is {}: it must be from 0 to 1", band_amplitude));
+  }
+  if (!(band_period_px >= 2 && band_period_px <= 1e6)) {
+    return Fail(why,
+                fmt::format("bands.period_px is {}: it must be from 2 to 1e6", band_period_px));
+  }
+  if (!(std::abs(exposure_drift_stops) <= 10)) {
+    return Fail(why, fmt::format("light.exposure_drift_stops is {}: it must be from -10 to 10",
+                                 exposure_drift_stops));
   }
   if (bits != 8 && bits != 16) {
     return Fail(why, fmt::format("bits is {}: it must be 8 or 16", bits));

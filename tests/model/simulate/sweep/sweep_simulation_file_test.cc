@@ -86,9 +86,10 @@ TEST_F(SweepSimulationFileTest, ReadsEveryField) {
       "         edge_angle_deg: -4, ink_sigma_mm: 0.02}\n"
       "bench: {first_depth_mm: 310, step_mm: -1.5, frames: 12, offset_mm: 106.5,\n"
       "        direction: toward, reading_sigma_mm: 0.07}\n"
-      "light: {level: 0.4, lamp_falloff: false, flicker: 0.02}\n"
+      "light: {level: 0.4, lamp_falloff: false, flicker: 0.02, exposure_drift_stops: -1}\n"
       "drift_sigma_px: 1.25\n"
       "fixed_to_frame: {corner_stops: -1.5, specks: 12, speck_depth: 0.6, speck_radius_px: 7}\n"
+      "bands: {amplitude: 0.15, period_px: 24.5, wave: square, along: columns}\n"
       "noise: {full_well_electrons: 9000, read_noise_electrons: 5}\n"
       "bits: 16\n"
       "seed: 77\n");
@@ -96,6 +97,11 @@ TEST_F(SweepSimulationFileTest, ReadsEveryField) {
   EXPECT_EQ(options.speck_count, 12);
   EXPECT_EQ(options.speck_depth, 0.6);
   EXPECT_EQ(options.speck_radius_px, 7);
+  EXPECT_EQ(options.band_amplitude, 0.15);
+  EXPECT_EQ(options.band_period_px, 24.5);
+  EXPECT_TRUE(options.bands_are_square);
+  EXPECT_TRUE(options.bands_are_columns);
+  EXPECT_EQ(options.exposure_drift_stops, -1);
   EXPECT_NEAR(options.camera.image_distance_mm(), 60, 1e-12);
   EXPECT_EQ(options.camera.blur_ratio(), 0.4);
   EXPECT_EQ(options.camera.calibration->blur_floor_px->value, 0.6);
@@ -186,6 +192,10 @@ TEST_F(SweepSimulationFileTest, ErrorsHaveTheirPlaceInTheFile) {
       {head + kTruth + rest + "fixed_to_frame: {corner_stops: -7}\n", "must be from -6 to 2"},
       {head + kTruth + rest + "fixed_to_frame: {speck_depth: 2}\n", "must be from 0 to 1"},
       {head + kTruth + rest + "fixed_to_frame: {specks: -1}\n", "specks"},
+      {head + kTruth + rest + "bands: {amplitude: 2}\n", "must be from 0 to 1"},
+      {head + kTruth + rest + "bands: {period_px: 1}\n", "must be from 2 to 1e6"},
+      {head + kTruth + rest + "bands: {wave: triangle}\n", "square"},
+      {head + kTruth + rest + "light: {exposure_drift_stops: 11}\n", "must be from -10 to 10"},
       {head + kTruth + rest + "bits: 12\n", "bits is 12: it must be 8 or 16"},
       {head + kTruth + rest + "light: {lamp_falloff: 1}\n", "true, false"},
   };

@@ -37,6 +37,8 @@ enum class Effect {
   kReadingError,   // error of the bench's readings
   kShading,        // light lost toward the corners by the mount or by filters
   kDust,           // specks on the sensor's cover
+  kBands,          // rows that brighten together: a lamp under a rolling shutter
+  kExposureDrift,  // the exposure changes over the sweep
 };
 
 // Unit of an impact.
