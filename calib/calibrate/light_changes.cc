@@ -75,7 +75,7 @@ double RangeOf(const std::vector<double>& values) {
 
 void MeasureLightChanges(const FocusSweep& sweep, const std::vector<ScaleSample>& samples,
                          const std::vector<FrameMeasurement>& frames, bool depths_are_known,
-                         FrameStore* store, FrameLight* light) {
+                         double exponent, FrameStore* store, FrameLight* light) {
   std::vector<const ScaleSample*> chosen;
   for (const ScaleSample& sample : samples) {
     if (!sample.scale_is_from_reading && frames[sample.frame].rejection.empty())
@@ -107,10 +107,10 @@ void MeasureLightChanges(const FocusSweep& sweep, const std::vector<ScaleSample>
     readings.push_back(sample->reading_mm);
     depths.push_back(depths_are_known && depth_mm > 0 ? std::log2(depth_mm) : 0);
     // The green of a colour frame, which is the least affected by a white balance.
-    exposure.push_back(std::log2(means[means.size() >= 3 ? 1 : 0]));
+    exposure.push_back(exponent * std::log2(means[means.size() >= 3 ? 1 : 0]));
     if (means.size() < 3) continue;
-    red.push_back(std::log(means[0] / means[1]));
-    blue.push_back(std::log(means[2] / means[1]));
+    red.push_back(exponent * std::log(means[0] / means[1]));
+    blue.push_back(exponent * std::log(means[2] / means[1]));
   }
   const double power = std::clamp(SlopeOf(depths, exposure), kMinPower, kMaxPower);
   for (std::size_t i = 0; i < exposure.size(); ++i) exposure[i] -= power * depths[i];

@@ -136,7 +136,9 @@ class Calibrator {
       }
     }
     FindSharpest();
+    const CameraResponse& response = result_.diagnostics.response;
     MeasureLightChanges(sweep_, scales_, result_.frames, !zero_is_open_ && motion_ == nullptr,
+                        response.ContradictsTransfer() ? response.light_exponent->value : 1,
                         &store_, &result_.diagnostics.light);
     for (const std::string& text : result_.diagnostics.light.InWords())
       result_.summary.warnings.push_back(text);

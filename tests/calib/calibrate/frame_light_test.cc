@@ -86,6 +86,19 @@ TEST(FrameLight, ADriftOfTheExposureIsNamedAndChangesNothing) {
   EXPECT_THAT(c.summary.warnings, Contains(HasSubstr("set exposure and gain by hand")));
 }
 
+// A wrong transfer makes the fall-off of a lamp at the camera look like a change of the exposure.
+TEST(FrameLight, AWrongTransferIsNoDriftOfTheExposure) {
+  SimulatedSweep s = WithLight([](model::SweepSimulationOptions* options) {
+    options->camera.sensor.transfer = model::TransferCurve::Linear();
+  });
+  s.sweep.camera.sensor.transfer = model::TransferCurve::Srgb();
+  const Calibration c = CalibrateWithoutMap(s);
+  ASSERT_TRUE(c.diagnostics.response.ContradictsTransfer());
+  ASSERT_TRUE(c.diagnostics.light.exposure_range_stops);
+  EXPECT_LT(*c.diagnostics.light.exposure_range_stops, 0.15);
+  EXPECT_THAT(c.summary.warnings, Each(Not(HasSubstr("set exposure and gain by hand"))));
+}
+
 TEST(FrameLight, AChangeOfTheWhiteBalanceIsNamed) {
   SimulatedSweep s = WithLight([](auto*) {});
   const model::TransferCurve& transfer = s.sweep.camera.sensor.transfer;
