@@ -25,6 +25,14 @@ constexpr double kMinNoiseSteps = 0.6;  // noise that rounding does not hide, st
 constexpr double kAgrees = 0.1;         // |ln exponent| of a curve that describes the frames
 constexpr double kReachOfCurve = 3;     // standard deviations within which a usual curve is named
 constexpr double kReachOfLoss = 2;      // standard deviations
+constexpr double kSmoothnessOfDemosaicing = 0.45;  // of a bilinear one, the smoothest
+constexpr double kMinSmoothness = 0.38;            // smaller values are reported
+constexpr double kSmoothingOnRatio = 0.03;         // relative change of kappa, at most
+constexpr double kMinContrastPower = 0.09;         // |ln power| that is reported
+constexpr double kPowerOfSmoothing = 0.15;  // ln power that smoothing of encoded values may cause
+constexpr double kDoubtfulSigmas =
+    2.5;  // standard deviations at which a large power is not excluded
+constexpr double kPowerToRatio = 0.15;        // relative change of kappa per |ln power|, at most
 constexpr double kLargestRatioChange = 0.5;   // of kappa
 constexpr double kClippingMargin = 1.0 / 64;  // of full scale, over which a clipped value spreads
 
@@ -41,6 +49,8 @@ BlurTask TaskWith(const BlurTask& task, const FocusSweep& sweep, FrameStore& sto
   other.reading_sigma_is_known = task.reading_sigma_is_known;
   other.start_focus_depth_mm = task.start_focus_depth_mm;
   other.pixel_noise = task.pixel_noise;
+  other.rows_had_bands = task.rows_had_bands;
+  other.columns_had_bands = task.columns_had_bands;
   other.threads = task.threads;
   other.tick = task.tick;
   return other;
@@ -60,12 +70,17 @@ class ResponseCheck {
     CameraResponse& response = result_.diagnostics.response;
     response.measured = true;
     response.light_exponent = MeasureLightExponent(frames_, size_);
-    if (response.ContradictsTransfer()) ReportTransfer();
-    response.weak_detail_loss = MeasureWeakDetailLoss(InTrueLight(), size_);
     response.noise_rise = MeasureNoiseRise(frames_, size_, LeastNoise());
+    if (response.ContradictsTransfer() && !MayBeSharpening()) {
+      ReportTransfer();
+    } else if (response.ContradictsTransfer() || ChangesContrast()) {
+      ReportContrast();
+    }
+    response.weak_detail_loss = MeasureWeakDetailLoss(InTrueLight(), size_);
     response.block_grid = MeasureBlockGrid(frames_, size_);
     if (response.LosesWeakDetail() || response.IsCompressed()) ReportProcessing();
     if (response.IsSharpened()) ReportSharpening();
+    if (!response.LosesWeakDetail() && !response.IsCompressed()) ReportSmoothing();
   }
 
  private:
@@ -218,12 +233,76 @@ class ResponseCheck {
           better ? "the blur could not be fitted with transfer " + better->Name()
                  : "no transfer that could be tried describes the frames");
     }
+    // A power that is no usual curve may be local tone mapping.
+    const bool is_usual = better && (*better == model::TransferCurve::Linear() ||
+                                     *better == model::TransferCurve::Srgb());
+    if (!is_usual) WidenByContrast();
     text += better ? fmt::format(". State transfer: {} in the camera file, use ", better->Name())
                    : ". Use ";
     text +=
         "frames whose transfer is known (raw), or measure the transfer (a camera that changes "
         "the contrast of each part of an image by itself looks the same)";
     result_.summary.warnings.push_back(text);
+  }
+
+  // ---- contrast ----
+  // Whether the noise shows some sharpening, and no usual curve describes the frames. A wide
+  // unsharp mask raises the noise of 4 x 4 px nearly as much as that of single pixels.
+  bool MayBeSharpening() const {
+    constexpr double kMinWideRise = 0.05;
+    const auto& rise = result_.diagnostics.response.noise_rise;
+    if (!rise ||
+        !(rise->value > kMinWideRise && rise->value > CameraResponse::kSignificant * rise->sigma))
+      return false;
+    const std::optional<model::TransferCurve> better = BetterCurve();
+    return !better ||
+           !(*better == model::TransferCurve::Linear() || *better == model::TransferCurve::Srgb());
+  }
+
+  double LogPower() const {
+    const auto& power = result_.diagnostics.response.light_exponent;
+    return power && power->value > 0 ? std::log(power->value) : 0;
+  }
+
+  // Whether the power of the light differs from 1 by more than sharpening alone by the same filter
+  // everywhere, a Gaussian filter of encoded values or demosaicing explain, though by less than a
+  // wrong transfer of the usual ones makes. Sharpening that depends on the contrast and local tone
+  // mapping do that.
+  bool ChangesContrast() const {
+    const CameraResponse& response = result_.diagnostics.response;
+    const auto& power = response.light_exponent;
+    if (!power || !(power->value > 0)) return false;
+    const double sigma = power->sigma / power->value;
+    const double off = std::abs(LogPower());
+    const double rise = response.noise_rise ? std::max(0.0, response.noise_rise->value) : 0;
+    const double unexplained =
+        LogPower() < 0 ? off - 0.2 * rise - 0.17 * rise * rise : off - kPowerOfSmoothing;
+    if (unexplained > kMinContrastPower && off > CameraResponse::kSignificant * sigma) return true;
+    return unexplained > CameraResponse::kMinExponent && off > kDoubtfulSigmas * sigma;
+  }
+
+  double RatioOfContrast() const {
+    return std::min(kLargestRatioChange, kPowerToRatio * std::abs(LogPower()));
+  }
+
+  void WidenByContrast() {
+    const double move = RatioOfContrast() * result_.summary.blur_ratio->value;
+    WidenRatio("contrast changed by the camera", {-move, move},
+               "use raw frames, or switch sharpening and local tone mapping off", &result_);
+  }
+
+  void ReportContrast() {
+    const model::Estimate& power = *result_.diagnostics.response.light_exponent;
+    result_.summary.warnings.push_back(fmt::format(
+        "the camera, or a program, changed the contrast of detail: out of focus the mean of "
+        "textured parts changes against that of flat parts, by a power of the light of {:.3g} +- "
+        "{:.2g} (1 for a lens alone). Sharpening that depends on the contrast and local tone "
+        "mapping "
+        "have this effect, and a slightly wrong sensor.transfer as well; these frames do not "
+        "distinguish them. kappa may be wrong by {:.2g} %, by simulated sweeps, which the interval "
+        "of kappa contains: use raw frames, or switch sharpening and local tone mapping off",
+        power.value, power.sigma, 100 * RatioOfContrast()));
+    WidenByContrast();
   }
 
   // ---- processing ----
@@ -311,6 +390,22 @@ class ResponseCheck {
       WidenRatio("removed weak detail",
                  {-most * kappa, loses && !IsTransferDecided() ? most * kappa : 0},
                  "use frames without noise reduction and compression", &result_);
+  }
+
+  void ReportSmoothing() {
+    const auto smoothness = MeasureNoiseSmoothness(frames_, size_, LeastNoise() / kMinNoiseSteps);
+    if (!smoothness ||
+        !(smoothness->value + CameraResponse::kSignificant * smoothness->sigma < kMinSmoothness))
+      return;
+    result_.summary.warnings.push_back(fmt::format(
+        "the frames are smoothed: the noise of 2 x 2 px has {:.2f} +- {:.2f} of the power that "
+        "that of 4 x 4 px gives, a sensor has 1, and demosaicing leaves {:.2f} or more. Noise "
+        "reduction or compression does this. A filter that is the same everywhere changes the blur "
+        "floor alone; one that keeps edges makes kappa too large, by up to {:.2g} % in simulated "
+        "sweeps, which the interval of kappa contains: use frames without noise reduction (raw)",
+        smoothness->value, smoothness->sigma, kSmoothnessOfDemosaicing, 100 * kSmoothingOnRatio));
+    WidenRatio("noise reduction", {-kSmoothingOnRatio * result_.summary.blur_ratio->value, 0},
+               "use frames without noise reduction", &result_);
   }
 
   void ReportSharpening() {

@@ -11,6 +11,7 @@
 #include "calib/calibrate/fixed_pattern.h"
 #include "calib/calibrate/focus_motion.h"
 #include "calib/calibrate/focus_solution.h"
+#include "calib/calibrate/light_changes.h"
 #include "calib/calibrate/response_effects.h"
 #include "calib/calibrate/zero_choice.h"
 #include "calib/edges/edge_blur.h"
@@ -19,6 +20,7 @@
 #include "calib/fit/source_recipe.h"
 #include "calib/registration/axis_contrast.h"
 #include "calib/registration/change_of_reference.h"
+#include "calib/registration/frame_bands.h"
 #include "calib/registration/frame_structure.h"
 #include "calib/registration/radial_causes.h"
 #include "calib/registration/reading_checks.h"
@@ -50,6 +52,8 @@ constexpr double kFewRegistered = 0.8;  // share of the used frames; below it th
 // Rounds of finding structure fixed to the frame: the second one, with better scales, finds the
 // remainder of a strong shading.
 constexpr int kPatternRounds = 2;
+// Rounds of measuring bands: the second one has better registrations.
+constexpr int kBandPasses = 2;
 constexpr char kNoOffset[] = "nothing determines the bench offset";
 
 class Calibrator {
@@ -58,6 +62,7 @@ class Calibrator {
   Calibrator(const FocusSweep& sweep, const CalibrationOptions& options,
              const FocusMotion* motion = nullptr)
       : sweep_(sweep), options_(options), motion_(motion), store_(sweep_), result_(Begun(sweep)) {
+    profiles_.resize(sweep_.frames.size());
     total_steps_ = 4 * static_cast<int>(sweep.frames.size());
   }
 
@@ -90,7 +95,7 @@ class Calibrator {
       Refuse(why);
     } else if (RegionSidePx(sweep_) < kSmallestRegionPx) {
       Refuse(RegionAdvice(sweep_));
-    } else if (MeasureAndCheck() && MeasureSharpness()) {
+    } else if (MeasureAndCheck() && MeasureSharpness() && RemoveBands({})) {
       preview.samples = Track(std::nullopt);
       preview.passed = RemoveFixedPattern(std::nullopt, &preview.samples);
       preview.reference = reference_;
@@ -122,7 +127,7 @@ class Calibrator {
 
   void Measure() {
     const bool needs_scale = options_.fit_blur || !sweep_.offset_mm;
-    if (MeasureAndCheck() && MeasureSharpness() &&
+    if (MeasureAndCheck() && MeasureSharpness() && RemoveBands({}) &&
         (needs_scale ? FindDepths() : UseGivenOffset())) {
       result_.diagnostics.paper_recipe = RunSourceRecipe(sweep_.camera, result_.frames, used());
       FitPeak();
@@ -133,6 +138,12 @@ class Calibrator {
       }
     }
     FindSharpest();
+    const CameraResponse& response = result_.diagnostics.response;
+    MeasureLightChanges(sweep_, scales_, result_.frames, !zero_is_open_ && motion_ == nullptr,
+                        response.ContradictsTransfer() ? response.light_exponent->value : 1,
+                        &store_, &result_.diagnostics.light);
+    for (const std::string& text : result_.diagnostics.light.InWords())
+      result_.summary.warnings.push_back(text);
     ReportRootCause();
     if (zero_is_open_) ForgetOffset();
     RestoreReadings();
@@ -222,8 +233,77 @@ class Calibrator {
   }
 
   void MeasureStatistics(std::size_t frame) {
+    const cv::Mat grey = store_.Grey(frame);
     result_.frames[frame].statistics =
-        MeasureFrame(RegionOf(store_.Stored(frame), sweep_, frame), store_.Grey(frame));
+        MeasureFrame(RegionOf(store_.Stored(frame), sweep_, frame), grey);
+    profiles_[frame] = ProfilesOf(grey);
+  }
+
+  // Finds the bands of a lamp that flickers under a rolling shutter and divides them out, and
+  // measures sharpness again. `samples` are the registrations, if there are any yet. Without them
+  // the frames are registered with their lines made even, which bands have no effect on. Returns
+  // false after a refusal.
+  bool RemoveBands(const std::vector<ScaleSample>& samples) {
+    FrameLight& light = result_.diagnostics.light;
+    if (light.bands_removed || sweep_.target == model::SweepTarget::kKnifeEdge ||
+        sweep_.target == model::SweepTarget::kPrintedEdge)
+      return true;
+    const std::optional<BandAxis> axis = AxisOfBands(samples);
+    if (!axis) return true;
+    const std::optional<double> known_mm =
+        sweep_.offset_mm ? std::optional(sweep_.offset_mm->value) : std::nullopt;
+    std::vector<ScaleSample> places = samples;
+    std::vector<std::vector<double>> log_gain;
+    FrameBands bands;
+    for (int pass = 0; pass < kBandPasses; ++pass) {
+      if (pass == 0 && samples.empty()) {
+        places = TrackScale(
+            sweep_, [&](std::size_t frame) { return WithEvenLines(Grey(frame), *axis); }, used(),
+            reference_, known_mm, options_.threads, [] { ThrowIfCancelled(); });
+      } else if (pass > 0) {
+        places = Track(known_mm);
+      }
+      FrameBands more = MeasureBands(PlacesOf(places), *axis, options_.threads);
+      if (!more.done) break;
+      if (pass == 0) {
+        if (!more.is_significant) return true;
+        bands = more;
+        log_gain = more.log_gain;
+      } else {
+        for (std::size_t i = 0; i < log_gain.size(); ++i) {
+          for (std::size_t k = 0; k < log_gain[i].size() && !more.log_gain[i].empty(); ++k)
+            log_gain[i][k] += more.log_gain[i][k];
+        }
+      }
+      store_.SetLineGains(log_gain, *axis == BandAxis::kColumns);
+    }
+    if (log_gain.empty()) return true;
+    light.bands = bands.deviation;
+    light.bands_are_columns = *axis == BandAxis::kColumns;
+    light.band_period_px = bands.period_px;
+    light.bands_removed = true;
+    ForEachUsed([&](std::size_t frame) { MeasureStatistics(frame); });
+    return MeasureSharpness();
+  }
+
+  // Compares the light of the lines of all used frames.
+  std::optional<BandAxis> AxisOfBands(const std::vector<ScaleSample>& samples) const {
+    std::vector<std::size_t> order = used();
+    std::stable_sort(order.begin(), order.end(), [this](std::size_t a, std::size_t b) {
+      return sweep_.frames[a].reading_mm < sweep_.frames[b].reading_mm;
+    });
+    std::vector<const LightProfiles*> profiles;
+    std::vector<const ScaleSample*> places;
+    for (const std::size_t frame : order) {
+      profiles.push_back(&profiles_[frame]);
+      if (samples.empty()) continue;
+      const auto found =
+          std::find_if(samples.begin(), samples.end(), [&](const ScaleSample& sample) {
+            return sample.frame == frame && !sample.scale_is_from_reading;
+          });
+      places.push_back(found == samples.end() ? nullptr : &*found);
+    }
+    return SuspectedBands(profiles, places, RegionCentre(sweep_));
   }
 
   bool MeasureSharpness() {
@@ -267,6 +347,11 @@ class Calibrator {
       known_mm = OffsetOfFocusAt(model::FocusDepthOf(sweep_.camera.lens, *best_statement_).value);
     }
     std::vector<ScaleSample> samples = Track(known_mm);
+    // Registered frames show weaker bands.
+    if (!result_.diagnostics.light.bands_removed) {
+      if (!RemoveBands(samples)) return false;
+      if (result_.diagnostics.light.bands_removed) samples = Track(known_mm);
+    }
     result_.diagnostics.scale = LawOf(samples);
     if (!RemoveFixedPattern(known_mm, &samples)) return false;
     if (TakeStageErrors(EvidenceOfScales(samples), &samples))
@@ -692,6 +777,9 @@ class Calibrator {
     const auto [nearest, farthest] = DepthRange();
     task.start_focus_depth_mm = std::clamp(start_mm, nearest, farthest);
     task.pixel_noise = SweepNoise();
+    const FrameLight& light = result_.diagnostics.light;
+    task.rows_had_bands = light.bands_removed && !light.bands_are_columns;
+    task.columns_had_bands = light.bands_removed && light.bands_are_columns;
     task.threads = options_.threads;
     task.tick = [this] { Tick(); };
     BlurEvidence evidence = MeasureBlur(task);
@@ -866,6 +954,7 @@ class Calibrator {
   Calibration result_;
   FrameSelection selection_{&result_.frames};  // frames that passed the quality checks
   std::size_t reference_ = 0;                  // the sharpest of them, normalised
+  std::vector<LightProfiles> profiles_;        // by the index in the sweep
   std::vector<ScaleSample> scales_;            // registered frames
   ScaleCauses causes_;                         // possible causes of the scales
   std::optional<ReadingStep> slip_;

@@ -252,6 +252,8 @@ class Measurement {
     // The time of the fit grows with the square of the frames: with many, each needs fewer modes.
     estimator.modes_per_ring = std::clamp(
         static_cast<int>(kModesOfAll / static_cast<double>(task_.frames.size())), 24, 200);
+    estimator.without_row_modes = task_.rows_had_bands;
+    estimator.without_column_modes = task_.columns_had_bands;
     estimator.tick = task_.tick;
     estimator.read_grey = [&store = task_.store](std::size_t frame) { return store.Grey(frame); };
     evidence_.fit_index.clear();

@@ -41,6 +41,8 @@ struct BlurTask {
   bool reading_sigma_is_known = true;
   double start_focus_depth_mm = 0;
   double pixel_noise = 0;  // standard deviation of a pixel, for the whole sweep
+  // Bands were divided out of the rows (columns): their modes are not used.
+  bool rows_had_bands = false, columns_had_bands = false;
   int threads = 0;
   std::function<void()> tick;  // called once per frame and pass
 };

@@ -84,6 +84,37 @@ std::optional<model::Estimate> MeasureNoiseRise(const ResponseFrames& frames, cv
   return MeanOf(rises);
 }
 
+std::optional<model::Estimate> MeasureNoiseSmoothness(const ResponseFrames& frames, cv::Size size,
+                                                      double step) {
+  constexpr double kAboveRounding = 4;  // ratio of the noise power of 4 x 4 px to that of rounding
+  // Largest ratio of the power of 8 x 8 px, where the target may still be seen, to that of 4 x 4
+  // px. Of what is left of the target a disc passes 1/64 from there to 4 x 4 px, and a Gaussian
+  // nothing.
+  const double max_of_target = frames.psf == model::Psf::kDisc ? 10 : 50;
+  const ResponseCrop crop(frames, size);
+  if (std::min(crop.size().width, crop.size().height) < 16 * kCoarse) return std::nullopt;
+  const double rounding = step * step / 12;
+  std::vector<std::size_t> blurred;
+  for (const std::size_t i : BySharpness(frames)) {
+    if (frames.frames[i].variance_px2 > kMinTraceBlurPx * kMinTraceBlurPx) blurred.push_back(i);
+  }
+  std::vector<double> ratios;
+  for (const std::size_t i : Spread(blurred, kTraceFrames)) {
+    const cv::Mat image = crop.Read(i);
+    const auto power_of = [&](int side) {
+      cv::Mat coarse;
+      const cv::Rect whole(0, 0, image.cols / side * side, image.rows / side * side);
+      cv::resize(image(whole), coarse, whole.size() / side, 0, 0, cv::INTER_AREA);
+      return side * side * NoisePower(coarse);
+    };
+    const double of_two = power_of(2), of_four = power_of(kCoarse),
+                 of_eight = power_of(2 * kCoarse);
+    if (!(of_four > kAboveRounding * rounding) || !(of_eight < max_of_target * of_four)) continue;
+    ratios.push_back(std::max(0.0, of_two - rounding) / (of_four - rounding));
+  }
+  return MeanOf(ratios);
+}
+
 std::optional<model::Estimate> MeasureBlockGrid(const ResponseFrames& frames, cv::Size size) {
   const ResponseCrop crop(frames, size);
   if (std::min(crop.size().width, crop.size().height) < 8 * kGrid) return std::nullopt;

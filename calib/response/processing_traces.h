@@ -18,6 +18,15 @@ namespace thicklens::calib {
 std::optional<model::Estimate> MeasureNoiseRise(const ResponseFrames& frames, cv::Size size,
                                                 double least_noise);
 
+// Measures the noise power of 2 x 2 px over that of 4 x 4 px, relative to white noise, in frames
+// whose blur is at least 6 px [D142]. `step` is a step of the file in linear light: the variance of
+// rounding, step^2/12, is taken out. A sensor has 1, demosaicing leaves 0.45 or more, and noise
+// reduction, which averages over more pixels, leaves less. A frame is left out if rounding hides
+// the noise of 4 x 4 px, or if 8 x 8 px have so much more power that it is the target's. Returns
+// nothing for fewer than 3 frames.
+std::optional<model::Estimate> MeasureNoiseSmoothness(const ResponseFrames& frames, cv::Size size,
+                                                      double step);
+
 // Measures the mean second difference across the borders of blocks of 8 x 8 px over that of other
 // pixels, minus 1, at the place of the grid where it is largest [D125]. The smaller one of those of
 // rows and columns counts, because a sensor that is read out in groups of columns has only one.

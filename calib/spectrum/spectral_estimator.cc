@@ -17,7 +17,9 @@ constexpr std::size_t kMinFrames = 5;
 constexpr double kWindowOverBlur[] = {35, 25, 16};
 constexpr std::size_t kEnoughFrames = 9;
 constexpr double kLonelyGain = 1.25;
-constexpr double kLowestMode = 2.5;         // cycles per window: the Hann window's own width
+constexpr double kLowestMode = 2.5;  // cycles per window: the Hann window's own width
+// Orders up to which a line is seen: the spectrum of the Hann window is 0 from 2 on.
+constexpr int kWidthOfWindow = 2;
 constexpr double kHighestFrequency = 0.33;  // cycles per px of the reference
 constexpr double kHighestInFrame = 0.38;    // cycles per px of any frame
 constexpr double kBandMargin = 3.2;         // 2 pi^2 dV nu^2 up to which modes are measured
@@ -79,7 +81,14 @@ cv::Mat Derotated(const cv::Mat& grey, const SpectralEstimatorSetup& setup,
 // Modes with power in the sharpest frames: the reference and its two sharpest companions.
 std::vector<Mode> ChooseModes(const SpectralEstimatorSetup& setup, const EstimatorRegion& region) {
   const double least = kLowestMode / std::min(region.window.size_px.x(), region.window.size_px.y());
-  const std::vector<Mode> all = ModesBetween(region.window, least, kHighestFrequency);
+  std::vector<Mode> all = ModesBetween(region.window, least, kHighestFrequency);
+  all.erase(
+      std::remove_if(all.begin(), all.end(),
+                     [&](const Mode& mode) {
+                       return (setup.without_row_modes && std::abs(mode.jx) < kWidthOfWindow) ||
+                              (setup.without_column_modes && std::abs(mode.jy) < kWidthOfWindow);
+                     }),
+      all.end());
   std::vector<std::size_t> sharpest = region.frames;
   std::stable_sort(sharpest.begin(), sharpest.end(), [&](std::size_t a, std::size_t b) {
     return setup.frames[a].expected_variance_px2 < setup.frames[b].expected_variance_px2;

@@ -40,6 +40,9 @@ struct SpectralEstimatorSetup {
   Eigen::Vector2d size_px{0, 0};  // size of the frames
   model::Psf psf = model::Psf::kGaussian;
   int modes_per_ring = 200;
+  // Leaves out the modes that are constant along the rows (or the columns): those of bands that
+  // were divided out, with the errors of that.
+  bool without_row_modes = false, without_column_modes = false;
   int threads = 0;
   std::function<cv::Mat(std::size_t frame)> read_grey;  // argument: index into the sweep
   std::function<void()> tick;                           // called once per frame

@@ -33,6 +33,11 @@ class FrameStore {
   // The correction that is set; null: none.
   const FixedPatternRemoval* correction() const { return correction_.get(); }
 
+  // Divides the light of frame i by exp(log_gain[i][line]) from now on, where the lines are the
+  // rows (or columns) of the region of interest; a frame without values is not changed. It replaces
+  // what was set before. Must not be called while another thread reads.
+  void SetLineGains(const std::vector<std::vector<double>>& log_gain, bool are_columns);
+
   // Returns the region of interest in linear light, CV_32F, corrected.
   cv::Mat Grey(std::size_t index);
   // Returns one colour channel, corrected: 0 red, 1 green, 2 blue; a frame with one channel has 0
@@ -48,6 +53,9 @@ class FrameStore {
   std::vector<cv::Mat> kept_;  // empty where a frame is not kept
   std::size_t kept_bytes_ = 0;
   std::unique_ptr<const FixedPatternRemoval> correction_;
+  std::vector<cv::Mat> line_factors_;  // one row or column for each frame; empty: none
+
+  void Correct(std::size_t index, cv::Mat* light) const;
 };
 
 }  // namespace thicklens::calib

@@ -22,7 +22,8 @@ class THICKLENS_EXPORT RandomDraws {  // the library of model uses it as well
     kSensor = 5,
     kEncodedNoise = 6,
     kReadout = 7,
-    kSpecks = 8
+    kSpecks = 8,
+    kBands = 9
   };
 
   // `item` is the index of the frame, so that a frame does not depend on the frames before it.

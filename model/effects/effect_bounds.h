@@ -117,6 +117,10 @@ EffectImpact AberrationsImpact(const EffectOptics& optics, const EffectSite& pla
                                const EffectSet& others);
 EffectImpact DistortionImpact(const EffectOptics& optics, const EffectSite& place,
                               const EffectSet& others);
+EffectImpact BandsImpact(const EffectOptics& optics, const EffectSite& place,
+                         const EffectSet& others);
+EffectImpact ExposureDriftImpact(const EffectOptics& optics, const EffectSite& place,
+                                 const EffectSet& others);
 
 }  // namespace thicklens::model
 

@@ -66,6 +66,10 @@ Section SectionOf(Effect effect) {
       return AberrationsImpact;
     case Effect::kDistortion:
       return DistortionImpact;
+    case Effect::kBands:
+      return BandsImpact;
+    case Effect::kExposureDrift:
+      return ExposureDriftImpact;
   }
   throw Error("no such effect");
 }
@@ -131,7 +135,8 @@ bool EffectConditions::IsValid(std::string* why) const {
     amounts.insert(amounts.end(), {{"bench.flicker", bench->flicker},
                                    {"bench.drift_sigma_px", bench->drift_sigma_px},
                                    {"bench.reading_sigma_mm", bench->reading_sigma_mm},
-                                   {"bench.speck_depth", bench->speck_depth}});
+                                   {"bench.speck_depth", bench->speck_depth},
+                                   {"bench.band_amplitude", bench->band_amplitude}});
     if (!std::isfinite(bench->corner_stops)) {
       return Fail(why,
                   fmt::format("bench.corner_stops is {}: it must be finite", bench->corner_stops));
@@ -139,6 +144,10 @@ bool EffectConditions::IsValid(std::string* why) const {
     if (camera.calibration && camera.calibration->image_distance_mm &&
         !bench->aberrations.IsValid(camera.lens, camera.focus_depth_mm(), why))
       return false;
+    if (!std::isfinite(bench->exposure_drift_stops)) {
+      return Fail(why, fmt::format("bench.exposure_drift_stops is {}: it must be finite",
+                                   bench->exposure_drift_stops));
+    }
     if (!(std::abs(bench->tilt_deg) < 90)) {
       return Fail(
           why, fmt::format("bench.tilt_deg is {}: it must be between -90 and 90", bench->tilt_deg));

@@ -78,6 +78,12 @@ const std::vector<EffectFacts>& AllEffects() {
        EffectUnit::kMm, false},
       {Effect::kDistortion, "distortion", "the lens displaces the image toward the corners",
        "a lens without distortion", EffectUnit::kPx, false},
+      {Effect::kBands, "bands",
+       "a lamp that flickers while the shutter rolls makes rows brighter and darker",
+       "an even light", EffectUnit::kRelative, true},
+      {Effect::kExposureDrift, "exposure-drift",
+       "the exposure of the camera changes evenly over the sweep", "one exposure",
+       EffectUnit::kRelative, false},
   };
   return facts;
 }

@@ -190,4 +190,32 @@ EffectImpact DistortionImpact(const EffectOptics& optics, const EffectSite& plac
                                   ShiftChange(place, shift_px, optics.SmoothingBy(others, place)))};
 }
 
+double BandFactor(double amplitude, double phase, bool is_square) {
+  const double wave = std::sin(2 * kPi * phase);
+  return 1 + amplitude * (is_square ? (wave < 0 ? -1.0 : 1.0) : wave);
+}
+
+// Bands. Formula: BandFactor of the row (or column), with another phase in each frame. Bound: the
+// scaling of the brightest light from a bright to a dark band. Enters: a factor of each row of each
+// frame. A calibration that does not know of it cannot register the frames, and takes the bands for
+// detail that does not blur.
+EffectImpact BandsImpact(const EffectOptics& optics, const EffectSite& place,
+                         const EffectSet& /*others*/) {
+  const auto& bench = optics.conditions().bench;
+  if (!bench) return {};
+  return {bench->band_amplitude,
+          EncodedScaling(optics, place, std::min(1.0, bench->band_amplitude))};
+}
+
+// Exposure drift. Formula: 2^(stops (i/(n - 1) - 1/2)) in frame i of n. Bound: the scaling of the
+// brightest light in the first or last frame. Enters: a factor of each frame. A calibration
+// compares each frame with its own mean: the drift costs it nothing until values are clipped.
+EffectImpact ExposureDriftImpact(const EffectOptics& optics, const EffectSite& place,
+                                 const EffectSet& /*others*/) {
+  const auto& bench = optics.conditions().bench;
+  if (!bench) return {};
+  const double change = 1 - std::exp2(-0.5 * std::abs(bench->exposure_drift_stops));
+  return {change, EncodedScaling(optics, place, change)};
+}
+
 }  // namespace thicklens::model

@@ -33,7 +33,8 @@ SweepTruth ReadSweepTruth(const std::string& path) {
   root.RequireSchema(kTruthSchema);
   root.RequireKeys({"schema", "image_distance_mm", "focus_depth_mm", "blur_ratio", "blur_floor_px",
                     "bench_offset_mm", "moves", "tilt_deg", "corner_stops", "specks", "aberrations",
-                    "pupil_law", "effects", "left_out_grey_levels", "frames"});
+                    "band_amplitude", "exposure_drift_stops", "pupil_law", "effects",
+                    "left_out_grey_levels", "frames"});
   SweepTruth truth;
   truth.image_distance_mm = root.At("image_distance_mm").PositiveNumber();
   truth.focus_depth_mm = root.At("focus_depth_mm").PositiveNumber();
@@ -50,6 +51,9 @@ SweepTruth ReadSweepTruth(const std::string& path) {
   if (const auto stops = root.Find("corner_stops")) truth.corner_stops = stops->Number();
   if (const auto specks = root.Find("specks")) truth.specks = specks->Integer(0, 10000);
   if (const auto lens = root.Find("aberrations")) truth.aberrations = ReadAberrations(*lens);
+  if (const auto bands = root.Find("band_amplitude")) truth.band_amplitude = bands->Number();
+  if (const auto drift = root.Find("exposure_drift_stops"))
+    truth.exposure_drift_stops = drift->Number();
   if (const auto law = root.Find("pupil_law")) {
     truth.pupil_law = PupilLawName(ReadNamed(*law, AllPupilLaws(), PupilLawName));
   }
@@ -76,6 +80,9 @@ std::string SweepTruthToYaml(const SweepTruth& truth) {
   if (truth.corner_stops != 0) out.Number("corner_stops", truth.corner_stops);
   if (truth.specks != 0) out.Number("specks", truth.specks);
   WriteAberrations(truth.aberrations, &out);
+  if (truth.band_amplitude != 0) out.Number("band_amplitude", truth.band_amplitude);
+  if (truth.exposure_drift_stops != 0)
+    out.Number("exposure_drift_stops", truth.exposure_drift_stops);
   out.TextIfAny("pupil_law", truth.pupil_law);
   WriteEffects(truth.effects, &out);
   out.BeginList("frames");

@@ -392,6 +392,7 @@ json CalibrationJson(const calib::FocusSweep& sweep, const calib::Calibration& c
   out["sharpest_reading"] = SharpestJson(calibration);
   out["diagnoses"] = DiagnosesJson(calibration);
   out["frame_structure"] = StructureJson(calibration.diagnostics.structure);
+  out["frame_light"] = LightJson(calibration.diagnostics.light);
   out["fixed_pattern"] = PatternJson(calibration.diagnostics.fixed_pattern);
   out["stage_errors"] = StageJson(calibration.diagnostics.stage);
   out["camera_response"] = ResponseJson(calibration.diagnostics.response);

@@ -11,7 +11,7 @@ namespace thicklens::tools {
 
 // Returns the machine-readable summary, with every number of the report. `status`, `reason`,
 // `method` and the results are always present, and so are `sharpest_reading`, `diagnoses` (the
-// causes that were compared), `frame_structure`, `fixed_pattern`, `stage_errors` and
+// causes that were compared), `frame_structure`, `fixed_pattern`, `frame_light`, `stage_errors` and
 // `camera_response` (null if they were not examined). A result that does not exist, a number that
 // was not measured, and a number that is not finite is null. `scale_model`, `covariance`,
 // `blur_fit`, `sides`, `field` and the entries of `other_methods` are present with `done: false` or

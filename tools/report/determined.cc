@@ -183,6 +183,25 @@ nlohmann::json StageJson(const calib::StageErrors& stage) {
   return out;
 }
 
+nlohmann::json LightJson(const calib::FrameLight& light) {
+  const auto number = [](const std::optional<double>& value) {
+    return value ? FiniteNumber(*value) : nlohmann::json(nullptr);
+  };
+  nlohmann::json out = {
+      {"bands", ErrorJson(light.bands)},
+      {"bands_removed", light.bands_removed},
+      {"band_period_px", number(light.band_period_px)},
+      {"exposure_range_stops", number(light.exposure_range_stops)},
+      {"exposure_trend_stops", light.exposure_range_stops ? FiniteNumber(light.exposure_trend_stops)
+                                                          : nlohmann::json(nullptr)},
+      {"red_over_green_change", number(light.red_change)},
+      {"blue_over_green_change", number(light.blue_change)}};
+  out["bands_run_along"] = !light.bands              ? nlohmann::json(nullptr)
+                           : light.bands_are_columns ? nlohmann::json("columns")
+                                                     : nlohmann::json("rows");
+  return out;
+}
+
 nlohmann::json ResponseJson(const calib::CameraResponse& response) {
   if (!response.measured) return nullptr;
   nlohmann::json out = {{"light_exponent", ErrorJson(response.light_exponent)},

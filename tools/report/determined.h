@@ -40,6 +40,8 @@ nlohmann::json DiagnosesJson(const calib::Calibration& calibration);
 nlohmann::json StructureJson(const calib::FrameStructureFinding& structure);
 nlohmann::json PatternJson(const calib::FixedPattern& pattern);
 nlohmann::json StageJson(const calib::StageErrors& stage);
+// Bands, exposure and white balance that change from frame to frame.
+nlohmann::json LightJson(const calib::FrameLight& light);
 nlohmann::json ResponseJson(const calib::CameraResponse& response);
 
 }  // namespace thicklens::tools

@@ -452,12 +452,34 @@ std::vector<StressCase> FixedToTheFrame() {
   return cases;
 }
 
+// Light that changes from frame to frame. Row bands move the scale and hide the blur.
+std::vector<StressCase> LightOfFrames() {
+  const std::string required =
+      "d1, zf and kappa within 4 standard errors of the truth, d1 within 10 um";
+  std::vector<StressCase> cases;
+  cases.push_back(Sweep("rolling-bands",
+                        "rows brighten by 15 % with a period of 24 px, at another place in each "
+                        "frame: a lamp flickers under a rolling shutter",
+                        required, Simulated([](model::SweepSimulationOptions* simulation) {
+                          simulation->band_amplitude = 0.15;
+                        }),
+                        Truth(10)));
+  cases.push_back(Sweep("exposure-drift", "the exposure grows by 1.5 stops over the sweep",
+                        required, Simulated([](model::SweepSimulationOptions* simulation) {
+                          simulation->light_level = 0.25;
+                          simulation->exposure_drift_stops = 1.5;
+                        }),
+                        Truth(10)));
+  return cases;
+}
+
 }  // namespace
 
 std::vector<StressCase> CalibrationStressCases() {
   std::vector<StressCase> all;
-  for (std::vector<StressCase> part : {Frames2To5(), Focus(), Readings(), Stages(), Damages(),
-                                       Optics(), Macros(), MovingFocus(), FixedToTheFrame()}) {
+  for (std::vector<StressCase> part :
+       {Frames2To5(), Focus(), Readings(), Stages(), Damages(), Optics(), Macros(), MovingFocus(),
+        FixedToTheFrame(), LightOfFrames()}) {
     for (StressCase& hard : part) all.push_back(std::move(hard));
   }
   return all;

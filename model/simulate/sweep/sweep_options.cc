@@ -88,7 +88,8 @@ EffectSet SweepEffects() {
       Effect::kPixelBox,      Effect::kLensFloor,     Effect::kShotNoise,     Effect::kReadNoise,
       Effect::kQuantisation,  Effect::kTransferCurve, Effect::kLampFalloff,   Effect::kFlicker,
       Effect::kMagnification, Effect::kDrift,         Effect::kTilt,          Effect::kReadingError,
-      Effect::kShading,       Effect::kDust,          Effect::kAberrations,   Effect::kDistortion};
+      Effect::kShading,       Effect::kDust,          Effect::kAberrations,   Effect::kDistortion,
+      Effect::kBands,         Effect::kExposureDrift};
 }
 
 double StageOptions::Written(double reading_mm, bool is_falling, int frame_index) const {
@@ -220,6 +221,17 @@ bool SweepSimulationOptions::IsValid(std::string* why) const {
                             speck_radius_px));
   }
   if (!aberrations.IsValid(camera.lens, camera.focus_depth_mm(), why)) return false;
+  if (!(band_amplitude >= 0 && band_amplitude <= 1)) {
+    return Fail(why, fmt::format("bands.amplitude is {}: it must be from 0 to 1", band_amplitude));
+  }
+  if (!(band_period_px >= 2 && band_period_px <= 1e6)) {
+    return Fail(why,
+                fmt::format("bands.period_px is {}: it must be from 2 to 1e6", band_period_px));
+  }
+  if (!(std::abs(exposure_drift_stops) <= 10)) {
+    return Fail(why, fmt::format("light.exposure_drift_stops is {}: it must be from -10 to 10",
+                                 exposure_drift_stops));
+  }
   if (bits != 8 && bits != 16) {
     return Fail(why, fmt::format("bits is {}: it must be 8 or 16", bits));
   }

@@ -118,9 +118,10 @@ void ReadBench(const YamlNode& node, SweepSimulationOptions* options) {
 }
 
 void ReadLight(const YamlNode& node, SweepSimulationOptions* options) {
-  node.RequireKeys({"level", "lamp_falloff", "flicker"});
+  node.RequireKeys({"level", "lamp_falloff", "flicker", "exposure_drift_stops"});
   ReadNumber(node, "level", &options->light_level);
   ReadNumber(node, "flicker", &options->flicker);
+  ReadNumber(node, "exposure_drift_stops", &options->exposure_drift_stops);
   if (const auto falloff = node.Find("lamp_falloff")) options->lamp_falloff = falloff->Boolean();
 }
 
@@ -138,14 +139,24 @@ void ReadFixedToFrame(const YamlNode& node, SweepSimulationOptions* options) {
   ReadNumber(node, "speck_radius_px", &options->speck_radius_px);
 }
 
+void ReadBands(const YamlNode& node, SweepSimulationOptions* options) {
+  node.RequireKeys({"amplitude", "period_px", "wave", "along"});
+  ReadNumber(node, "amplitude", &options->band_amplitude);
+  ReadNumber(node, "period_px", &options->band_period_px);
+  if (const auto wave = node.Find("wave"))
+    options->bands_are_square = wave->OneOf({"sine", "square"}) == "square";
+  if (const auto along = node.Find("along"))
+    options->bands_are_columns = along->OneOf({"rows", "columns"}) == "columns";
+}
+
 }  // namespace
 
 SweepSimulationOptions ReadSweepSimulation(const std::string& path) {
   const YamlNode root = YamlNode::LoadFile(path);
   root.RequireSchema(kSchema);
   root.RequireKeys({"schema", "camera", "truth", "size_px", "target", "bench", "light",
-                    "drift_sigma_px", "noise", "fixed_to_frame", "aberrations", "bits", "pupil_law",
-                    "effects", "without", "seed"});
+                    "drift_sigma_px", "noise", "fixed_to_frame", "aberrations", "bands", "bits",
+                    "pupil_law", "effects", "without", "seed"});
   SweepSimulationOptions options;
   options.camera = ReadCamera(root.ResolvePath(root.At("camera").Text()));
   if (const auto truth = root.Find("truth")) ReadTruth(*truth, &options.camera);
@@ -157,6 +168,7 @@ SweepSimulationOptions ReadSweepSimulation(const std::string& path) {
   if (const auto noise = root.Find("noise")) ReadNoise(*noise, &options);
   if (const auto fixed = root.Find("fixed_to_frame")) ReadFixedToFrame(*fixed, &options);
   if (const auto lens = root.Find("aberrations")) options.aberrations = ReadAberrations(*lens);
+  if (const auto bands = root.Find("bands")) ReadBands(*bands, &options);
   if (const auto bits = root.Find("bits")) options.bits = bits->Integer(8, 16);
   if (const auto law = root.Find("pupil_law")) {
     options.pupil_law = ReadNamed(*law, AllPupilLaws(), PupilLawName);

@@ -84,6 +84,7 @@ struct FrameState {
   double image_distance_mm = 0;  // d1
   double reading_mm = 0;
   double lamp = 1;                 // irradiance, 1 = the mean of full scale
+  double band_phase = 0;           // of the bands in the first row, periods
   Eigen::Vector2d drift_mm{0, 0};  // displacement of the target, X right, Y down
   double pixel_mm = 0;             // one px on the target: p/|m|
   double defocus_sigma_px = 0;     // value of kappa r_defocus
@@ -118,7 +119,9 @@ struct SweepSimulator::Impl {
                                        options.target.tilt_deg,
                                        options.corner_stops,
                                        options.speck_count > 0 ? options.speck_depth : 0,
-                                       options.aberrations};
+                                       options.aberrations,
+                                       options.band_amplitude,
+                                       options.exposure_drift_stops};
     return conditions;
   }
 
@@ -251,7 +254,13 @@ struct SweepSimulator::Impl {
                                  ? std::pow(focus_depth_mm / frame.depth_mm, 2)
                                  : 1.0;
       const double flicker = on.Has(Effect::kFlicker) ? options.flicker : 0;
-      frame.lamp = options.light_level * falloff * std::max(0.0, 1 + flicker * lamp.Normal());
+      const double part =
+          options.frame_count > 1 ? static_cast<double>(i) / (options.frame_count - 1) - 0.5 : 0;
+      const double exposure =
+          on.Has(Effect::kExposureDrift) ? std::exp2(options.exposure_drift_stops * part) : 1;
+      frame.lamp =
+          options.light_level * falloff * exposure * std::max(0.0, 1 + flicker * lamp.Normal());
+      frame.band_phase = RandomDraws(options.seed, Purpose::kBands, item).Uniform();
       const double drift_sigma_mm =
           on.Has(Effect::kDrift) ? options.drift_sigma_px * focus_pixel_mm : 0;
       frame.drift_mm.x() = drift_sigma_mm * drift.Normal();
@@ -312,6 +321,8 @@ struct SweepSimulator::Impl {
     if (On(Effect::kDust)) truth.specks = options.speck_count;
     if (On(Effect::kAberrations)) truth.aberrations = options.aberrations;
     truth.aberrations.distortion = Distortion();
+    if (On(Effect::kBands)) truth.band_amplitude = options.band_amplitude;
+    if (On(Effect::kExposureDrift)) truth.exposure_drift_stops = options.exposure_drift_stops;
     for (std::size_t i = 0; i < frames.size(); ++i) {
       truth.frames.push_back({fmt::format("frames/frame_{:03d}.png", i), frames[i].depth_mm,
                               frames[i].reading_mm, std::hypot(floor_px, MeanDefocusPx(frames[i])),
@@ -477,7 +488,22 @@ struct SweepSimulator::Impl {
     const FrameState& frame = frames[static_cast<std::size_t>(frame_index)];
     LinearImage image = RenderFrame(frame);
     for (std::size_t i = 0; i < light_of_pixel.size(); ++i) image.values[i] *= light_of_pixel[i];
+    if (On(Effect::kBands) && options.band_amplitude > 0) AddBands(frame.band_phase, &image);
     return image;
+  }
+
+  // [D140] Each row (or column) is exposed at another phase of the lamp.
+  void AddBands(double first_phase, LinearImage* image) const {
+    const Sensor& sensor = options.camera.sensor;
+    for (int y = 0; y < sensor.height_px; ++y) {
+      ThrowIfCancelled();
+      for (int x = 0; x < sensor.width_px; ++x) {
+        const int line = options.bands_are_columns ? x : y;
+        image->values[static_cast<std::size_t>(y * sensor.width_px + x)] *= static_cast<float>(
+            BandFactor(options.band_amplitude, first_phase + line / options.band_period_px,
+                       options.bands_are_square));
+      }
+    }
   }
 
   // [D44] Maximum change of the blur, or of the position that the outermost rows show, from one

@@ -81,7 +81,8 @@ void ExpectNotAccused(const Calibration& c) {
   EXPECT_THAT(
       c.summary.warnings,
       Each(AllOf(Not(HasSubstr("contradict sensor.transfer")), Not(HasSubstr("weak detail")),
-                 Not(HasSubstr("are sharpened")), Not(HasSubstr("compressed: ")))));
+                 Not(HasSubstr("are sharpened")), Not(HasSubstr("are smoothed")),
+                 Not(HasSubstr("contrast of detail")), Not(HasSubstr("compressed: ")))));
 }
 
 TEST(ResponseEffects, GoodFramesAreNotAccused) {
@@ -214,6 +215,72 @@ TEST(ResponseEffects, SharpeningIsReportedAndMovesKappaLittle) {
   EXPECT_THAT(c.summary.warnings, Contains(HasSubstr("the frames are sharpened")));
   EXPECT_THAT(c.summary.warnings, Not(Contains(HasSubstr("weak detail"))));
   ExpectCoversRatio(c, s.truth);
+}
+
+// The overshoots of a sharpening filter change the mean of the light as a wrong transfer does.
+TEST(ResponseEffects, StrongSharpeningIsNotTakenForATransfer) {
+  for (const double radius_px : {1.0, 2.0}) {
+    SimulatedSweep s = SweepOf("ii", model::TransferCurve::Srgb(), 8);
+    Process(
+        [&](const cv::Mat& bytes) {
+          cv::Mat wide, sharp;
+          cv::GaussianBlur(bytes, wide, cv::Size(), radius_px);
+          cv::addWeighted(bytes, 2.5, wide, -1.5, 0, sharp);
+          return sharp;
+        },
+        &s);
+    const Calibration c = CalibrateWithoutMap(s);
+    EXPECT_THAT(c.summary.warnings, Not(Contains(HasSubstr("contradict sensor.transfer"))));
+    ExpectCoversRatio(c, s.truth);
+  }
+}
+
+// Sharpening of what exceeds the noise leaves the noise as it is, and moves kappa.
+TEST(ResponseEffects, SharpeningThatDependsOnTheContrastIsReported) {
+  SimulatedSweep s = SweepOf("ii", model::TransferCurve::Srgb(), 8);
+  Process(
+      [](const cv::Mat& bytes) {
+        cv::Mat wide, sharp, detail;
+        cv::GaussianBlur(bytes, wide, cv::Size(), 1);
+        cv::addWeighted(bytes, 2, wide, -1, 0, sharp);
+        cv::absdiff(bytes, wide, detail);
+        cv::Mat out = bytes.clone();
+        sharp.copyTo(out, detail > 3);
+        return out;
+      },
+      &s);
+  const Calibration c = CalibrateWithoutMap(s);
+  EXPECT_THAT(c.summary.warnings, Contains(HasSubstr("changed the contrast of detail")));
+  EXPECT_THAT(c.summary.warnings, Not(Contains(HasSubstr("contradict sensor.transfer"))));
+  ExpectCoversRatio(c, s.truth);
+}
+
+// Edges are kept, and the noise between them is removed. Demosaicing smooths noise as well, and
+// is not accused.
+TEST(ResponseEffects, SmoothedNoiseIsToldFromDemosaicing) {
+  for (const bool demosaicing : {true, false}) {
+    SCOPED_TRACE(demosaicing);
+    SimulatedSweep s = SweepOf("ii", model::TransferCurve::Srgb(), 8);
+    Process(
+        [&](const cv::Mat& bytes) {
+          cv::Mat out;
+          if (demosaicing) {
+            cv::cvtColor(bytes, out, cv::COLOR_BayerRG2RGB);
+            cv::cvtColor(out, out, cv::COLOR_RGB2GRAY);
+          } else {
+            cv::bilateralFilter(bytes, out, 5, 8, 1);
+          }
+          return out;
+        },
+        &s);
+    const Calibration c = CalibrateWithoutMap(s);
+    if (demosaicing) {
+      ExpectNotAccused(c);
+    } else {
+      EXPECT_THAT(c.summary.warnings, Contains(HasSubstr("the frames are smoothed")));
+    }
+    ExpectCoversRatio(c, s.truth);
+  }
 }
 
 TEST(ResponseEffects, StrongCompressionIsReported) {

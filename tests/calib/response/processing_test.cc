@@ -146,6 +146,53 @@ TEST(Processing, ClippedPartsAreLeftOut) {
   }
 }
 
+// White noise through a separable kernel, a mean over `side` px and second differences at that
+// spacing has the square of the sum of squares of the three kernels' convolution along an axis.
+double PowerOfFiltered(const std::vector<double>& kernel, int side) {
+  std::vector<double> taps(static_cast<std::size_t>(3 * side), 0);
+  const double differences[] = {1 / std::sqrt(6.0), -2 / std::sqrt(6.0), 1 / std::sqrt(6.0)};
+  for (int block = 0; block < 3; ++block) {
+    for (int i = 0; i < side; ++i)
+      taps[static_cast<std::size_t>(block * side + i)] = differences[block] / side;
+  }
+  double sum = 0;
+  for (int at = 0; at < 3 * side + static_cast<int>(kernel.size()) - 1; ++at) {
+    double value = 0;
+    for (int k = 0; k < static_cast<int>(kernel.size()); ++k) {
+      if (at - k >= 0 && at - k < 3 * side)
+        value += kernel[static_cast<std::size_t>(k)] * taps[static_cast<std::size_t>(at - k)];
+    }
+    sum += value * value;
+  }
+  return side * side * sum * sum;
+}
+
+TEST(Processing, SmoothnessIsThatOfTheFilter) {
+  for (const double sigma_px : {0.3, 0.6, 1.0}) {
+    const cv::Mat column = cv::getGaussianKernel(9, sigma_px, CV_64F);
+    const std::vector<double> kernel(column.begin<double>(), column.end<double>());
+    std::vector<cv::Mat> light;
+    cv::RNG random(7);
+    ResponseFrames frames;
+    for (std::size_t i = 0; i < 5; ++i) {
+      cv::Mat image(400, 420, CV_32F);
+      random.fill(image, cv::RNG::NORMAL, 0.5, 0.01);
+      cv::sepFilter2D(image, image, CV_32F, column, column);
+      light.push_back(image);
+      frames.frames.push_back({i, {}, 100});
+    }
+    frames.centre = {209.5, 199.5};
+    ReadFrom(light, &frames);
+    const auto found = MeasureNoiseSmoothness(frames, light.front().size(), 0);
+    ASSERT_TRUE(found);
+    EXPECT_NEAR(found->value, PowerOfFiltered(kernel, 2) / PowerOfFiltered(kernel, 4),
+                4 * found->sigma);
+    EXPECT_LT(found->sigma, 0.02);
+    // Rounding that hides the noise.
+    EXPECT_FALSE(MeasureNoiseSmoothness(frames, light.front().size(), 0.1));
+  }
+}
+
 TEST(Processing, StrongCompressionShowsItsBlocks) {
   EXPECT_TRUE(ResponseTo(Noisy(), &Compressed<15>).IsCompressed());
   EXPECT_FALSE(ResponseTo(Noisy(), &Compressed<95>).IsCompressed());

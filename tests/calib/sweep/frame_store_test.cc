@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -148,6 +149,25 @@ TEST(FrameStore, AGreyFrameHasOneChannel) {
   FrameStore store(counted.sweep);
   EXPECT_FLOAT_EQ(store.Channel(0, 0).at<float>(0, 0), 1.0F / 255);
   EXPECT_THAT(ErrorOf([&] { store.Channel(0, 1); }), HasSubstr("channel 1"));
+}
+
+TEST(FrameStore, LinesAreDividedByTheirGain) {
+  const CountedSweep counted(2);
+  for (const bool columns : {false, true}) {
+    FrameStore store(counted.sweep);
+    const cv::Mat plain = store.Grey(1).clone();
+    std::vector<double> log_gain(static_cast<std::size_t>(columns ? plain.cols : plain.rows));
+    for (std::size_t k = 0; k < log_gain.size(); ++k) log_gain[k] = 0.1 * static_cast<double>(k);
+    store.SetLineGains({{}, log_gain}, columns);
+    const cv::Mat divided = store.Grey(1);
+    for (int y = 0; y < plain.rows; ++y) {
+      for (int x = 0; x < plain.cols; ++x)
+        EXPECT_NEAR(divided.at<float>(y, x),
+                    plain.at<float>(y, x) * std::exp(-0.1 * (columns ? x : y)), 1e-6);
+    }
+    EXPECT_EQ(store.Grey(0).at<float>(2, 3), FrameStore(counted.sweep).Grey(0).at<float>(2, 3))
+        << "a frame without values is not changed";
+  }
 }
 
 TEST(FrameStore, AFrameThatCannotBeReadIsTriedAgain) {

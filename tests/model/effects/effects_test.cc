@@ -53,7 +53,7 @@ EffectSite PlaceAt(double x, double y, double depth_mm) {
 }
 
 TEST(EffectsTest, NamesAndSetsGoBothWays) {
-  EXPECT_EQ(AllEffects().size(), 23U);
+  EXPECT_EQ(AllEffects().size(), 25U);
   for (std::size_t i = 0; i < AllEffects().size(); ++i) {
     const EffectFacts& facts = AllEffects()[i];
     EXPECT_EQ(static_cast<std::size_t>(facts.effect), i);
@@ -300,10 +300,16 @@ TEST(EffectsTest, BenchMovesLightAndScaleAsItsGeometrySays) {
   conditions.bench->aberrations.distortion = 0.02;
   EXPECT_NEAR(amount(Effect::kAberrations), 3, 0.05);
   EXPECT_GT(amount(Effect::kDistortion), 0.1);
+  conditions.bench->band_amplitude = 0.3;
+  EXPECT_DOUBLE_EQ(amount(Effect::kBands), 0.3);
+  EXPECT_NEAR(BandFactor(0.3, 2.25, false), 1.3, 1e-12);
+  EXPECT_NEAR(BandFactor(0.3, 0.6, true), 0.7, 1e-12);
+  conditions.bench->exposure_drift_stops = -2;
+  EXPECT_DOUBLE_EQ(amount(Effect::kExposureDrift), 0.5);
   conditions.bench.reset();
-  for (const Effect effect :
-       {Effect::kLampFalloff, Effect::kMagnification, Effect::kTilt, Effect::kShading,
-        Effect::kDust, Effect::kAberrations, Effect::kDistortion}) {
+  for (const Effect effect : {Effect::kLampFalloff, Effect::kMagnification, Effect::kTilt,
+                              Effect::kShading, Effect::kDust, Effect::kBands,
+                              Effect::kExposureDrift, Effect::kAberrations, Effect::kDistortion}) {
     EXPECT_EQ(amount(effect), 0);
   }
 }
@@ -416,7 +422,7 @@ TEST(EffectsTest, ChoiceIsReadAndFollowed) {
   EXPECT_TRUE(on(automatic).Has(Effect::kQuantisation));
   automatic.without = automatic.kept;
   EXPECT_FALSE(on(automatic).Has(Effect::kQuantisation));
-  EXPECT_EQ(SelectEffects(automatic, conditions, places, model).findings.size(), 21U);
+  EXPECT_EQ(SelectEffects(automatic, conditions, places, model).findings.size(), 23U);
   EXPECT_THAT(ErrorOf([&] { on(EffectSelectionOptionsFromText("auto", "tilt,drift", "")); }),
               HasSubstr("effect tilt does not apply to this image: its effects are thickness"));
 }

@@ -49,6 +49,8 @@ SweepSimulationOptions WideSweep() {
   options.corner_stops = -1;
   options.speck_count = 3;
   options.speck_radius_px = 6;
+  options.band_amplitude = 0.2;
+  options.exposure_drift_stops = 0.5;
   return options;
 }
 
@@ -80,7 +82,7 @@ TEST(SweepEffectsTest, EachIsSwitchedAlone) {
                               Effect::kFalloff,       Effect::kPixelBox, Effect::kLensFloor,
                               Effect::kLampFalloff,   Effect::kFlicker,  Effect::kDrift,
                               Effect::kMagnification, Effect::kTilt,     Effect::kShading,
-                              Effect::kDust};
+                              Effect::kDust,          Effect::kBands,    Effect::kExposureDrift};
   for (const Effect effect : SweepEffects().Effects()) {
     SCOPED_TRACE(EffectName(effect));
     const std::vector<LinearImage> without = Frames(With(SweepEffects().Without({effect})));
@@ -241,6 +243,57 @@ TEST(SweepEffectsTest, ShadingIsFixedToTheFrame) {
                     std::pow(std::cos(angle), 4) * static_cast<double>(plain[i].values[at]), 1e-6);
       }
     }
+  }
+}
+
+// Each row is multiplied by one factor, which has the stated period and amplitude, and another
+// phase in each frame.
+TEST(SweepEffectsTest, BandsAreWavesOfTheRowsWithOtherPhases) {
+  const std::vector<LinearImage> plain = Frames(With({}));
+  for (const bool square : {false, true}) {
+    for (const bool columns : {false, true}) {
+      SweepSimulationOptions options = With({Effect::kBands});
+      options.band_period_px = 20;
+      options.bands_are_square = square;
+      options.bands_are_columns = columns;
+      const std::vector<LinearImage> banded = Frames(options);
+      std::vector<double> first;
+      for (std::size_t i = 0; i < plain.size(); ++i) {
+        const auto factor = [&](int x, int y) {
+          const auto at = static_cast<std::size_t>(y * 160 + x);
+          return static_cast<double>(banded[i].values[at]) /
+                 static_cast<double>(plain[i].values[at]);
+        };
+        double mean = 0, most = 0;
+        for (int line = 0; line < 100; ++line) {
+          const double here = columns ? factor(line, 3) : factor(3, line);
+          EXPECT_NEAR(here, columns ? factor(line, 90) : factor(140, line), 1e-5);
+          EXPECT_NEAR(here, columns ? factor(line + 20, 3) : factor(3, line + 20), 1e-5);
+          mean += here / 100;
+          most = std::max(most, std::abs(here - 1));
+          if (square) {
+            EXPECT_NEAR(std::abs(here - 1), 0.2, 1e-5);
+          }
+        }
+        EXPECT_NEAR(mean, 1, 0.021) << "whole periods; a square wave may split them 9 to 11";
+        EXPECT_NEAR(most, 0.2, 0.004);
+        first.push_back(factor(0, 0));
+      }
+      if (!square) {
+        EXPECT_GT(*std::max_element(first.begin(), first.end()),
+                  *std::min_element(first.begin(), first.end()) + 0.02);
+      }
+    }
+  }
+}
+
+TEST(SweepEffectsTest, TheExposureDriftsByItsStops) {
+  const std::vector<LinearImage> plain = Frames(With({}));
+  const std::vector<LinearImage> drifted = Frames(With({Effect::kExposureDrift}));
+  for (std::size_t i = 0; i < plain.size(); ++i) {
+    const double stops = 0.5 * (static_cast<double>(i) / 4 - 0.5);
+    EXPECT_NEAR(static_cast<double>(drifted[i].values[777]),
+                std::exp2(stops) * static_cast<double>(plain[i].values[777]), 1e-5);
   }
 }
 

@@ -89,11 +89,12 @@ TEST_F(SweepSimulationFileTest, ReadsEveryField) {
       "        stage: {there_and_back: true, backlash_mm: 0.4, screw_error_mm: 0.2,\n"
       "                screw_period_mm: 3, screw_phase_deg: 30, slip_mm: -0.5,\n"
       "                slip_from_frame: 7, resolution_mm: 0.25, lead_error: 0.01}}\n"
-      "light: {level: 0.4, lamp_falloff: false, flicker: 0.02}\n"
+      "light: {level: 0.4, lamp_falloff: false, flicker: 0.02, exposure_drift_stops: -1}\n"
       "drift_sigma_px: 1.25\n"
       "fixed_to_frame: {corner_stops: -1.5, specks: 12, speck_depth: 0.6, speck_radius_px: 7}\n"
       "aberrations: {field_curvature_mm: -3, field_astigmatism_mm: 2.5, astigmatism_mm: 1.5,\n"
       "              distortion: -0.04}\n"
+      "bands: {amplitude: 0.15, period_px: 24.5, wave: square, along: columns}\n"
       "noise: {full_well_electrons: 9000, read_noise_electrons: 5}\n"
       "bits: 16\n"
       "seed: 77\n");
@@ -114,6 +115,11 @@ TEST_F(SweepSimulationFileTest, ReadsEveryField) {
   EXPECT_EQ(options.stage.lead_error, 0.01);
   EXPECT_EQ(options.speck_depth, 0.6);
   EXPECT_EQ(options.speck_radius_px, 7);
+  EXPECT_EQ(options.band_amplitude, 0.15);
+  EXPECT_EQ(options.band_period_px, 24.5);
+  EXPECT_TRUE(options.bands_are_square);
+  EXPECT_TRUE(options.bands_are_columns);
+  EXPECT_EQ(options.exposure_drift_stops, -1);
   EXPECT_NEAR(options.camera.image_distance_mm(), 60, 1e-12);
   EXPECT_EQ(options.camera.blur_ratio(), 0.4);
   EXPECT_EQ(options.camera.calibration->blur_floor_px->value, 0.6);
@@ -211,6 +217,10 @@ TEST_F(SweepSimulationFileTest, ErrorsHaveTheirPlaceInTheFile) {
       {head + kTruth + kTarget +
            "bench: {first_depth_mm: 290, step_mm: 1, frames: 21, stage: {screw_period_mm: 0}}\n",
        "must be finite and > 0"},
+      {head + kTruth + rest + "bands: {amplitude: 2}\n", "must be from 0 to 1"},
+      {head + kTruth + rest + "bands: {period_px: 1}\n", "must be from 2 to 1e6"},
+      {head + kTruth + rest + "bands: {wave: triangle}\n", "square"},
+      {head + kTruth + rest + "light: {exposure_drift_stops: 11}\n", "must be from -10 to 10"},
       {head + kTruth + rest + "bits: 12\n", "bits is 12: it must be 8 or 16"},
       {head + kTruth + rest + "light: {lamp_falloff: 1}\n", "true, false"},
   };

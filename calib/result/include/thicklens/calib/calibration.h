@@ -10,6 +10,7 @@
 #include "thicklens/calib/camera_response.h"
 #include "thicklens/calib/diagnosis.h"
 #include "thicklens/calib/fixed_pattern.h"
+#include "thicklens/calib/frame_light.h"
 #include "thicklens/calib/frame_statistics.h"
 #include "thicklens/calib/stage_errors.h"
 #include "thicklens/model/camera.h"
@@ -306,6 +307,7 @@ struct CalibrationDiagnostics {
   FrameStructureFinding structure;  // vignetting, bands and dust of the frames
   // Shading, dust and defective pixels that were removed. `structure` describes what is left.
   FixedPattern fixed_pattern;
+  FrameLight light;         // bands, exposure and white balance that change from frame to frame
   CameraResponse response;  // transfer curve and processing, by the frames
   StageErrors stage;        // systematic errors of the stage, by scale and blur of the frames
   // Length of a step or count of the drive, mm, where the readings are counts and a statement

@@ -26,7 +26,14 @@ struct BenchConditions {
   double corner_stops = 0;      // light at the farthest corner over that on the axis, factors of 2
   double speck_depth = 0;       // part of the light that a speck on the sensor takes, 0 to 1
   LensAberrations aberrations = {};  // of the lens
+  double band_amplitude = 0;         // relative amplitude of bands of the light, 0 to 1
+  double exposure_drift_stops = 0;   // change of the exposure over the sweep, factors of 2
 };
+
+// Relative light of a row under a lamp that flickers while the shutter rolls [D140]:
+// 1 + amplitude sin(2 pi phase), or the sign of the sine for a lamp that is switched on and off.
+// `phase` counts periods of the lamp.
+THICKLENS_EXPORT double BandFactor(double amplitude, double phase, bool is_square);
 
 // Relative light that the shading of a camera lets through [D135]:
 // (1 + (c^(-1/2) - 1) r^2/R^2)^-2, c = 2^corner_stops, as cos^4 of an angle whose tangent is

@@ -39,6 +39,8 @@ enum class Effect {
   kDust,           // specks on the sensor's cover
   kAberrations,    // field curvature and astigmatism displace the plane of focus
   kDistortion,     // the lens displaces the image toward the corners
+  kBands,          // rows that brighten together: a lamp under a rolling shutter
+  kExposureDrift,  // the exposure changes over the sweep
 };
 
 // Unit of an impact.

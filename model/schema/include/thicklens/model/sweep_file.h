@@ -198,12 +198,14 @@ struct SweepTruth {
   double blur_ratio = 0;                     // kappa, dimensionless
   double blur_floor_px = 0;                  // sigma of the blur floor, px
   SweepMotion moves = SweepMotion::kTarget;  // the part that moves
-  double bench_offset_mm = 0;   // z of reading 0, mm from Ap; d1 where lens or sensor move
-  double tilt_deg = 0;          // tilt of the target, as in TargetOptions
-  double corner_stops = 0;      // shading: light at the farthest corner over the axis, stops
-  int specks = 0;               // number of specks on the sensor
-  LensAberrations aberrations;  // of the lens, all 0 if there are none
-  std::string pupil_law;        // PupilLawName; empty: not stated
+  double bench_offset_mm = 0;       // z of reading 0, mm from Ap; d1 where lens or sensor move
+  double tilt_deg = 0;              // tilt of the target, as in TargetOptions
+  double corner_stops = 0;          // shading: light at the farthest corner over the axis, stops
+  int specks = 0;                   // number of specks on the sensor
+  LensAberrations aberrations;      // of the lens, all 0 if there are none
+  double band_amplitude = 0;        // relative amplitude of the bands of the light
+  double exposure_drift_stops = 0;  // change of the exposure over the sweep, stops
+  std::string pupil_law;            // PupilLawName; empty: not stated
   // The true values of one frame.
   struct Frame {
     std::string image;      // file name of the frame

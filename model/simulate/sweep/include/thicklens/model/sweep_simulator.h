@@ -111,6 +111,13 @@ struct SweepSimulationOptions {
   // Field curvature, astigmatism and distortion of the lens. The plane of focus of the camera is
   // the medial focus on the axis. Distortion displaces the blurred image of a lens without it.
   LensAberrations aberrations;
+  // Bands of the light in rows or columns: a lamp that flickers while the shutter rolls. The phase
+  // is another one in each frame.
+  double band_amplitude = 0;        // relative, 0 to 1; 0: none
+  double band_period_px = 24;       // period of the bands, px
+  bool bands_are_square = false;    // the lamp is switched on and off; false: a sine
+  bool bands_are_columns = false;   // the sensor is mounted on its side; false: rows
+  double exposure_drift_stops = 0;  // change of the exposure from the first to the last frame
   // Distribution of the light of a point over the pupil; its second moment is (kappa r)^2 in any
   // case. If it is absent, the law of the paper is used where fall-off is on, and the uniform law
   // otherwise.
