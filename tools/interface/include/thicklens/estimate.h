@@ -62,6 +62,9 @@ struct EstimateOptions {
   // calibration.focus_positions, which give d1 of it. Absent: the one that the photograph's
   // metadata state in dioptres, otherwise that of the calibration.
   std::optional<double> lens_position;
+  // Whether photograph and depth map are undistorted by the camera's distortion, if it states one,
+  // before anything else; false: they are undistorted already.
+  bool undistort = true;
   ExifCheck exif = ExifCheck::kRequire;  // what a contradiction does
   ApertureOptions aperture;              // weights of the views
   // Depth of the ST plane from Ap, mm, 0 < st_depth_mm <= 1e9; absent: the plane of focus. Needs a
