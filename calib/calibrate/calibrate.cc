@@ -312,7 +312,9 @@ class Calibrator {
     if (ShowsDistortion(result_) ||
         FindScaleNonlinearity(scales_, result_.diagnostics.scale, sweep_))
       LookForStructure(scales_);
-    if (const auto refusal = CheckDistortion(&result_, SeesAstigmatism())) return Refuse(*refusal);
+    if (const auto refusal =
+            CheckDistortion(&result_, SeesAstigmatism(), sweep_.camera.distortion.has_value()))
+      return Refuse(*refusal);
     slip_ = FindReadingStep(scales_, result_.diagnostics.scale);
     if (slip_ && motion_ == nullptr) WarnOfReadingStep(*slip_, &result_);
     // The scale of an equivalent target is that of a lens that moves to second order only.

@@ -209,9 +209,9 @@ LensDistortionFile ReadColmapText(const CalibrationText& text) {
       camera.parameters.push_back(value);
     }
     cameras.push_back(std::move(camera));
-    constexpr std::size_t kMostCameras = 1000000;
-    if (cameras.size() > kMostCameras)
-      throw Error(fmt::format("{}: it has more than {} cameras", text.name, kMostCameras));
+    constexpr std::size_t kMaxCameras = 1000000;
+    if (cameras.size() > kMaxCameras)
+      throw Error(fmt::format("{}: it has more than {} cameras", text.name, kMaxCameras));
     return true;
   });
   return Chosen(text, cameras, "COLMAP cameras.txt");
@@ -228,7 +228,7 @@ LensDistortionFile ReadColmapBinary(const CalibrationText& text) {
       text.name);
   if (reader.left() < kCountBytes) throw Error(not_one);
   const std::uint64_t count = reader.Unsigned(kCountBytes);
-  // The count is not believed before the file is long enough for it.
+  // A count is used only if the file is long enough for it.
   if (count == 0 || count > reader.left() / kLeast) throw Error(not_one);
   std::vector<ColmapCamera> cameras;
   for (std::uint64_t i = 0; i < count; ++i) {

@@ -70,8 +70,8 @@ THICKLENS_EXPORT cv::Mat RegionOf(const cv::Mat& stored, const FocusSweep& sweep
                                   std::size_t index);
 
 // Returns the region as linear grey light in [0, 1], CV_32F (0.2126 R + 0.7152 G + 0.0722 B). A
-// correction of the sweep is applied, after which light may be below 0 or above 1. Throws as
-// RegionOf does.
+// correction of the sweep is applied, and then the camera's distortion is taken out, after which
+// light may be below 0 or above 1. Throws as RegionOf does.
 THICKLENS_EXPORT cv::Mat LinearGrey(const cv::Mat& stored, const FocusSweep& sweep,
                                     std::size_t index);
 

@@ -21,7 +21,8 @@ THICKLENS_EXPORT std::string DistortionModelName(DistortionModel model);
 // matrix. The centre of the top-left pixel is (0, 0), x is to the right, y down: that is the
 // convention of OpenCV and of this project. COLMAP has (0.5, 0.5) there; its reader subtracts 0.5.
 //
-// With x = (u - cx)/fx and y = (v - cy)/fy of the undistorted position (u, v), px, r^2 = x^2 + y^2:
+// The formulas, where x = (u - cx)/fx and y = (v - cy)/fy of the undistorted position (u, v), px,
+// and r^2 = x^2 + y^2, are
 //   kOpenCv [L20]: x' = x q + 2 p1 x y + p2 (r^2 + 2 x^2) + s1 r^2 + s2 r^4,
 //                  y' = y q + p1 (r^2 + 2 y^2) + 2 p2 x y + s3 r^2 + s4 r^4,
 //                  q = (1 + k1 r^2 + k2 r^4 + k3 r^6)/(1 + k4 r^2 + k5 r^4 + k6 r^6),
