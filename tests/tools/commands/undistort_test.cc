@@ -31,7 +31,7 @@ using thicklens::testing::ContentOf;
 using thicklens::testing::TemporaryFolder;
 using Arguments = std::vector<std::string>;
 
-constexpr int kWidth = 160, kHeight = 120;
+constexpr int kBarWidthPx = 160, kBarHeightPx = 120;
 constexpr double kLensPx = 150, kFirst = 0.15;  // pincushion: 6.7 % at the corner
 
 class UndistortProgram : public ::testing::Test {
@@ -61,9 +61,9 @@ class UndistortProgram : public ::testing::Test {
   }
   // A bright bar that is straight without the distortion: x = 40 + kSlope y.
   static cv::Mat Bar() {
-    cv::Mat light(kHeight, kWidth, CV_32F);
-    for (int y = 0; y < kHeight; ++y) {
-      for (int x = 0; x < kWidth; ++x) {
+    cv::Mat light(kBarHeightPx, kBarWidthPx, CV_32F);
+    for (int y = 0; y < kBarHeightPx; ++y) {
+      for (int x = 0; x < kBarWidthPx; ++x) {
         // The photograph shows at r' the place r of r' = r (1 + k r^2), by bisection.
         const double u = (x - 79.5) / kLensPx, v = (y - 59.5) / kLensPx, far = std::hypot(u, v);
         double low = 0, high = 1;
@@ -85,7 +85,7 @@ class UndistortProgram : public ::testing::Test {
     double floor = 0;
     cv::minMaxLoc(values(cv::Rect(70, 20, 60, 80)), nullptr, &floor);
     double largest = 0;
-    for (int y = 20; y < kHeight - 20; ++y) {
+    for (int y = 20; y < kBarHeightPx - 20; ++y) {
       double sum = 0, moment = 0;
       for (int x = 28; x < 64; ++x) {
         const double light = std::max(0.0, values.at<double>(y, x) - 1.05 * floor);
@@ -102,7 +102,7 @@ class UndistortProgram : public ::testing::Test {
 };
 
 TEST_F(UndistortProgram, StraightensImagesOfEachKind) {
-  const std::string calibration = PutCalibration(kWidth, kHeight, kLensPx, kFirst);
+  const std::string calibration = PutCalibration(kBarWidthPx, kBarHeightPx, kLensPx, kFirst);
   const cv::Mat light = Bar();
   cv::Mat bytes, words;
   light.convertTo(bytes, CV_8U, 255);
@@ -152,29 +152,30 @@ TEST_F(UndistortProgram, StraightensImagesOfEachKind) {
 }
 
 TEST_F(UndistortProgram, DepthMapsKeepTheirValues) {
-  const std::string calibration = PutCalibration(kWidth, kHeight, kLensPx, kFirst);
-  cv::Mat words(kHeight, kWidth, CV_16U, cv::Scalar(1000));
+  const std::string calibration = PutCalibration(kBarWidthPx, kBarHeightPx, kLensPx, kFirst);
+  cv::Mat words(kBarHeightPx, kBarWidthPx, CV_16U, cv::Scalar(1000));
   words.colRange(70, 160).setTo(2000);
   const std::string png = folder_ / "depth.png";
   WriteFileAtomically(png, io::EncodeImageFile(words, io::ImageFormat::kPng));
   model::RawDepthMap map;
-  map.width_px = kWidth;
-  map.height_px = kHeight;
-  for (int i = 0; i < kWidth * kHeight; ++i) map.values.push_back(i % kWidth < 70 ? 1.5F : 2.5F);
+  map.width_px = kBarWidthPx;
+  map.height_px = kBarHeightPx;
+  for (int i = 0; i < kBarWidthPx * kBarHeightPx; ++i)
+    map.values.push_back(i % kBarWidthPx < 70 ? 1.5F : 2.5F);
   const std::string pfm = folder_ / "float.pfm";
   WriteFileAtomically(pfm, io::EncodePfm(map));
   Json({"undistort", "--depth", "--distortion", calibration, png, pfm, "-o", folder_ / "out"});
   const cv::Mat whole = io::ReadImageData(folder_ / "out/depth.png").pixels;
   ASSERT_EQ(whole.type(), CV_16U);
   int holes = 0;
-  for (int y = 0; y < kHeight; ++y) {
-    for (int x = 0; x < kWidth; ++x) {
+  for (int y = 0; y < kBarHeightPx; ++y) {
+    for (int x = 0; x < kBarWidthPx; ++x) {
       const int value = whole.at<std::uint16_t>(y, x);
       EXPECT_TRUE(value == 0 || value == 1000 || value == 2000) << value;
       holes += value == 0 ? 1 : 0;
     }
   }
-  EXPECT_GT(holes, 0.05 * kWidth * kHeight);
+  EXPECT_GT(holes, 0.05 * kBarWidthPx * kBarHeightPx);
   int nans = 0;
   for (const float value : io::ReadDepthMap(folder_ / "out/float.pfm").values) {
     EXPECT_TRUE(std::isnan(value) || value == 1.5F || value == 2.5F) << value;
@@ -184,7 +185,7 @@ TEST_F(UndistortProgram, DepthMapsKeepTheirValues) {
 }
 
 TEST_F(UndistortProgram, RefusesWithTheFileAndTheReason) {
-  const std::string calibration = PutCalibration(kWidth, kHeight, kLensPx, kFirst);
+  const std::string calibration = PutCalibration(kBarWidthPx, kBarHeightPx, kLensPx, kFirst);
   const std::string image = folder_ / "a.png";
   WriteFileAtomically(
       image, io::EncodeImageFile(cv::Mat(100, 100, CV_8U, cv::Scalar(9)), io::ImageFormat::kPng));

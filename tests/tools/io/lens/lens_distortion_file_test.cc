@@ -32,7 +32,7 @@ LensDistortionFile Parsed(const std::string& text, const std::string& camera = "
 std::string Refused(const std::string& text, const std::string& camera = "") {
   return ErrorOf([&] { Parsed(text, camera); });
 }
-std::string Replaced(std::string text, const std::string& what, const std::string& by) {
+std::string ReplacedOnce(std::string text, const std::string& what, const std::string& by) {
   const std::size_t place = text.find(what);
   EXPECT_NE(place, std::string::npos) << what;
   return place == std::string::npos ? text : text.replace(place, what.size(), by);
@@ -80,13 +80,13 @@ TEST(LensDistortionFile, OpenCvYaml) {
               ElementsAre(-0.41802327176423804, 0.50715244063187526, 0, 0, -0.57843597214487474));
   EXPECT_EQ(d.source, "calib");
   // Older versions write no line of dashes, and fisheye calibrations state it.
-  EXPECT_EQ(Parsed(Replaced(kOpenCv, "---\n", "")).distortion.coefficients, d.coefficients);
-  std::string fisheye = Replaced(kOpenCv, "fisheye_model: 0", "fisheye_model: 1");
-  fisheye = Replaced(fisheye, "rows: 5", "rows: 4");
-  fisheye = Replaced(fisheye,
-                     "[ -4.1802327176423804e-01, 5.0715244063187526e-01, 0., 0.,\n       "
-                     "-5.7843597214487474e-01 ]",
-                     "[ -1e-2, 2e-3, -3e-3, 4e-4 ]");
+  EXPECT_EQ(Parsed(ReplacedOnce(kOpenCv, "---\n", "")).distortion.coefficients, d.coefficients);
+  std::string fisheye = ReplacedOnce(kOpenCv, "fisheye_model: 0", "fisheye_model: 1");
+  fisheye = ReplacedOnce(fisheye, "rows: 5", "rows: 4");
+  fisheye = ReplacedOnce(fisheye,
+                         "[ -4.1802327176423804e-01, 5.0715244063187526e-01, 0., 0.,\n       "
+                         "-5.7843597214487474e-01 ]",
+                         "[ -1e-2, 2e-3, -3e-3, 4e-4 ]");
   EXPECT_EQ(Parsed(fisheye).distortion.model, DistortionModel::kFisheye);
   EXPECT_THAT(Parsed(fisheye).distortion.coefficients, ElementsAre(-1e-2, 2e-3, -3e-3, 4e-4));
 }
@@ -177,25 +177,25 @@ TEST(LensDistortionFile, RosCameraInfo) {
   EXPECT_EQ(file.distortion.focal_length_px, Eigen::Vector2d(526.69, 525.75));
   EXPECT_EQ(file.distortion.principal_point_px, Eigen::Vector2d(312.33, 246.22));
   EXPECT_THAT(file.distortion.coefficients, ElementsAre(0.01864, -0.08079, 0.00067, -0.0018, 0));
-  const std::string equidistant =
-      Replaced(Replaced(Replaced(kRos, "plumb_bob", "equidistant"), "cols: 5", "cols: 4"),
-               "[0.01864, -0.08079, 0.00067, -0.0018, 0]", "[0.01864, -0.08079, 0.00067, -0.0018]");
+  const std::string equidistant = ReplacedOnce(
+      ReplacedOnce(ReplacedOnce(kRos, "plumb_bob", "equidistant"), "cols: 5", "cols: 4"),
+      "[0.01864, -0.08079, 0.00067, -0.0018, 0]", "[0.01864, -0.08079, 0.00067, -0.0018]");
   EXPECT_EQ(Parsed(equidistant).distortion.model, DistortionModel::kFisheye);
-  const std::string rational =
-      Replaced(Replaced(Replaced(kRos, "plumb_bob", "rational_polynomial"), "cols: 5", "cols: 8"),
-               "-0.0018, 0]", "-0.0018, 0, 0.02, -0.03, 0.001]");
+  const std::string rational = ReplacedOnce(
+      ReplacedOnce(ReplacedOnce(kRos, "plumb_bob", "rational_polynomial"), "cols: 5", "cols: 8"),
+      "-0.0018, 0]", "-0.0018, 0, 0.02, -0.03, 0.001]");
   EXPECT_EQ(Parsed(rational).distortion.coefficients.size(), 8U);
   // The message as rostopic echo prints it.
   const std::string echo =
       "height: 480\nwidth: 640\ndistortion_model: \"plumb_bob\"\nD: [-0.1, 0.0, 0.0, 0.0, 0.0]\n"
       "K: [500.0, 0.0, 320.0, 0.0, 500.0, 240.0, 0.0, 0.0, 1.0]\n";
   EXPECT_EQ(Parsed(echo).distortion.coefficients[0], -0.1);
-  EXPECT_THAT(Refused(Replaced(kRos, "plumb_bob", "omnidirectional")),
+  EXPECT_THAT(Refused(ReplacedOnce(kRos, "plumb_bob", "omnidirectional")),
               AllOf(HasSubstr("calib:8:"), HasSubstr("omnidirectional"), HasSubstr("OpenCV")));
-  EXPECT_THAT(Refused(Replaced(kRos, "[526.69, 0, 312.33, 0, 525.75, 246.22, 0, 0, 1]",
-                               "[0, 0, 0, 0, 0, 0, 0, 0, 0]")),
+  EXPECT_THAT(Refused(ReplacedOnce(kRos, "[526.69, 0, 312.33, 0, 525.75, 246.22, 0, 0, 1]",
+                                   "[0, 0, 0, 0, 0, 0, 0, 0, 0]")),
               HasSubstr("not calibrated"));
-  EXPECT_THAT(Refused(Replaced(kRos, "plumb_bob", "equidistant")),
+  EXPECT_THAT(Refused(ReplacedOnce(kRos, "plumb_bob", "equidistant")),
               AllOf(HasSubstr("4 coefficients"), HasSubstr("found 5")));
 }
 
@@ -255,7 +255,7 @@ TEST(LensDistortionFile, KalibrCamchain) {
   EXPECT_THAT(Refused(kKalibr, "cam2"), AllOf(HasSubstr("omni-radtan"), HasSubstr("pinhole-equi")));
   EXPECT_THAT(Refused(kKalibr, "cam3"), HasSubstr("pinhole-fov"));
   EXPECT_THAT(
-      Refused(Replaced(kKalibr, "[461.629, 460.152, 362.680, 246.049]", "[461.629]"), "cam0"),
+      Refused(ReplacedOnce(kKalibr, "[461.629, 460.152, 362.680, 246.049]", "[461.629]"), "cam0"),
       AllOf(HasSubstr("cam0.intrinsics"), HasSubstr("fu, fv, pu and pv")));
 }
 
@@ -392,15 +392,15 @@ TEST(LensDistortionFile, MrcalCameraModel) {
       "[0,0,0,0,0,0], 'imagersize': [ 640, 480 ] }";
   EXPECT_THAT(Parsed(pinhole).distortion.coefficients, ElementsAre(0, 0, 0, 0));
   EXPECT_THAT(
-      Refused(Replaced(kMrcal, "LENSMODEL_OPENCV8",
-                       "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=30_Ny=18_fov_x_deg=150")),
+      Refused(ReplacedOnce(kMrcal, "LENSMODEL_OPENCV8",
+                           "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=30_Ny=18_fov_x_deg=150")),
       AllOf(HasSubstr("LENSMODEL_SPLINED_STEREOGRAPHIC of mrcal"),
             HasSubstr("mrcal-convert-lensmodel LENSMODEL_OPENCV8")));
-  EXPECT_THAT(Refused(Replaced(kMrcal, "LENSMODEL_OPENCV8", "LENSMODEL_CAHVOR")),
+  EXPECT_THAT(Refused(ReplacedOnce(kMrcal, "LENSMODEL_OPENCV8", "LENSMODEL_CAHVOR")),
               HasSubstr("LENSMODEL_CAHVOR of mrcal"));
   EXPECT_THAT(Refused("Model = CAHVOR = perspective, distortion\nDimensions = 640 480\n"),
               HasSubstr("CAHVOR"));
-  EXPECT_THAT(Refused(Replaced(kMrcal, "LENSMODEL_OPENCV8", "LENSMODEL_OPENCV5")),
+  EXPECT_THAT(Refused(ReplacedOnce(kMrcal, "LENSMODEL_OPENCV8", "LENSMODEL_OPENCV5")),
               AllOf(HasSubstr("intrinsics"), HasSubstr("9 numbers, found 12")));
   EXPECT_THAT(Refused(kMrcal, "cam0"), HasSubstr("one camera"));
 }
@@ -425,18 +425,19 @@ TEST(LensDistortionFile, DamagedFilesAreRefusedWithTheirPlace) {
   EXPECT_THAT(Refused("hello"), StartsWith("calib"));
   EXPECT_THAT(Refused("a: 1\nb: 2\n"),
               AllOf(HasSubstr("camera_matrix"), HasSubstr("cameras.txt"), HasSubstr("mrcal")));
-  EXPECT_THAT(Refused(Replaced(kOpenCv, "6.5746697944293521e+02", ".Nan")),
+  EXPECT_THAT(Refused(ReplacedOnce(kOpenCv, "6.5746697944293521e+02", ".Nan")),
               AllOf(HasSubstr("calib:17:"), HasSubstr("camera_matrix.data[0]")));
-  EXPECT_THAT(Refused(Replaced(kOpenCv, "rows: 3", "rows: 2")),
+  EXPECT_THAT(Refused(ReplacedOnce(kOpenCv, "rows: 3", "rows: 2")),
               AllOf(HasSubstr("camera_matrix"), HasSubstr("rows times cols is 6")));
-  EXPECT_THAT(Refused(Replaced(kOpenCv, "rows: 3", "rows: 4000000000")), HasSubstr("rows"));
-  EXPECT_THAT(Refused(Replaced(kOpenCv, "image_width: 640", "image_width: -640")),
+  EXPECT_THAT(Refused(ReplacedOnce(kOpenCv, "rows: 3", "rows: 4000000000")), HasSubstr("rows"));
+  EXPECT_THAT(Refused(ReplacedOnce(kOpenCv, "image_width: 640", "image_width: -640")),
               HasSubstr("image_width"));
-  EXPECT_THAT(Refused(Replaced(kOpenCv, "image_width: 640", "image_width: [640]")),
+  EXPECT_THAT(Refused(ReplacedOnce(kOpenCv, "image_width: 640", "image_width: [640]")),
               HasSubstr("image_width"));
-  EXPECT_THAT(Refused(Replaced(kOpenCv, "distortion_coefficients:", "coefficients:")),
+  EXPECT_THAT(Refused(ReplacedOnce(kOpenCv, "distortion_coefficients:", "coefficients:")),
               HasSubstr("camera_matrix without coefficients"));
-  EXPECT_THAT(Refused(Replaced(kOpenCv, "+02, 0., 3.195", "+02, 2., 3.195")), HasSubstr("skew"));
+  EXPECT_THAT(Refused(ReplacedOnce(kOpenCv, "+02, 0., 3.195", "+02, 2., 3.195")),
+              HasSubstr("skew"));
   std::string many = "K: [500, 0, 320, 0, 500, 240, 0, 0, 1]\nimage_size: [640, 480]\nD: [0";
   for (int i = 0; i < 100000; ++i) many += ", 0";
   EXPECT_THAT(Refused(many + "]\n"), HasSubstr("at most 64 numbers"));
@@ -447,9 +448,9 @@ TEST(LensDistortionFile, DamagedFilesAreRefusedWithTheirPlace) {
       "<distortion_coefficients type_id=\"opencv-matrix\"><rows>1</rows><cols>4</cols><dt>d</dt>\n"
       "<data>-0.1 0. 0. 0.</data></distortion_coefficients>\n</opencv_storage>\n";
   EXPECT_EQ(Parsed(xml).distortion.coefficients[0], -0.1);
-  EXPECT_THAT(Refused(Replaced(xml, "-0.1 ", ".Inf ")),
+  EXPECT_THAT(Refused(ReplacedOnce(xml, "-0.1 ", ".Inf ")),
               AllOf(HasSubstr("distortion_coefficients"), HasSubstr("'.Inf'")));
-  EXPECT_THAT(Refused(Replaced(xml, "</opencv_storage>", "")), HasSubstr("not valid XML"));
+  EXPECT_THAT(Refused(ReplacedOnce(xml, "</opencv_storage>", "")), HasSubstr("not valid XML"));
   EXPECT_THAT(Refused("<!DOCTYPE a [<!ENTITY b \"cc\">]>" + xml.substr(xml.find("<opencv"))),
               HasSubstr("entities"));
   std::string deep = "<a>";
