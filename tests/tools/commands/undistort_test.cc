@@ -216,9 +216,11 @@ TEST_F(UndistortProgram, CalibrateWritesTheDistortionIntoTheCameraFile) {
   SimulateSweep(thicklens::testing::SmallBenchSimulation(), sweep);
   const std::string calibration = PutCalibration(144, 144, 11111, 0.001);
   const std::string camera = folder_ / "camera.yaml";
-  const nlohmann::json summary =
-      Json({"calibrate", sweep, "--distortion", calibration, "-o", camera});
+  const nlohmann::json summary = Json({"calibrate", sweep, "--distortion", calibration, "-o",
+                                       camera, "--report", folder_ / "report"});
   EXPECT_EQ(summary["distortion"]["source"], calibration);
+  EXPECT_THAT(ContentOf(folder_ / "report/index.html"),
+              HasSubstr("taken out of the frames: OpenCV model with 5 coefficients"));
   const std::string yaml = ContentOf(camera);
   EXPECT_THAT(yaml, AllOf(HasSubstr("distortion:"), HasSubstr("undistorted: true")));
   const ProgramResult explained = Start({"explain", camera, "--depth-range", "290:310"});
