@@ -157,8 +157,6 @@ void TakeDistortion(const CameraInitOptions& options, model::Camera* camera) {
       ReadLensDistortion(options.distortion, sensor.width_px, sensor.height_px, run.control());
   std::string why;
   if (!camera->IsValid(&why)) throw Error("--distortion: " + why);
-  const std::string doubt = DoubtOfDistortion(*camera);
-  if (!doubt.empty()) spdlog::warn("--distortion: {}", PrintableUtf8(doubt));
   if (options.camera.principal_point_px) return;
   sensor.principal_point_px =
       camera->distortion->ScaledTo(sensor.width_px, sensor.height_px).principal_point_px;
