@@ -15,6 +15,8 @@
 #include "thicklens/base/printable_text.h"
 #include "thicklens/camera.h"
 #include "thicklens/distortion.h"
+#include "thicklens/io/depth_io.h"
+#include "thicklens/io/image_file.h"
 #include "tools/commands/commands.h"
 #include "tools/options/command_frame.h"
 #include "tools/options/distortion_option.h"
@@ -53,8 +55,23 @@ void RequireDistinctNames(const UndistortOptions& options) {
   }
 }
 
+std::pair<int, int> SizeOf(const std::string& path, bool is_depth) {
+  if (is_depth) {
+    const model::RawDepthMap map = io::ReadDepthMap(path);
+    return {map.width_px, map.height_px};
+  }
+  const io::ImageFacts facts = io::ReadImageData(path).facts;
+  return {facts.width_px, facts.height_px};
+}
+
+// The distortion that is stated. A file without a size of its photographs has that of the first
+// image.
 LensDistortion DistortionFor(const UndistortOptions& options) {
-  if (options.camera_path.empty()) return ReadLensDistortion(options.distortion);
+  if (options.camera_path.empty()) {
+    const CommandRun run(options.common, {{"distortion", "--distortion"}});
+    const auto [width_px, height_px] = SizeOf(options.files.front(), options.is_depth);
+    return ReadLensDistortion(options.distortion, width_px, height_px, run.control());
+  }
   const Camera camera = ReadCamera(options.camera_path);
   if (camera.distortion) return *camera.distortion;
   throw Error(fmt::format("{}: it states no lens.distortion: --distortion FILE is needed",

@@ -164,8 +164,9 @@ LensDistortion ReadLensDistortion(const std::string& file_and_camera, int width_
   return file.distortion;
 }
 
-// The camera matrix of a lens in focus has fx = d1/p in px (D/p behind the rear principal plane).
-// Of a camera that is not calibrated, d1 is f2 at infinity and larger for near objects.
+// The camera matrix of a lens in focus has fx = D/p in px, where D is d1 behind the rear principal
+// plane. If the camera is not calibrated, D is known to be f2 at infinity and larger for near
+// objects.
 std::string DoubtOfDistortion(const Camera& camera) {
   std::string why;
   if (!camera.distortion || !camera.IsValid(&why)) return "";

@@ -135,7 +135,15 @@ TEST_F(UndistortProgram, StraightensImagesOfEachKind) {
   // Black where the photograph shows nothing.
   const cv::Mat corner = io::ReadImageData(folder_ / "out/b.png").pixels;
   EXPECT_EQ(corner.at<std::uint16_t>(0, 0), 0);
-  // By the camera file, which camera init makes, with the same result.
+  // A file without a size has that of the images, which is said.
+  const std::string bare =
+      folder_.Put("bare.yml", "K: [150, 0, 79.5, 0, 150, 59.5, 0, 0, 1]\nD: [0.15, 0, 0, 0, 0]\n");
+  const ProgramResult of_bare = Start({"undistort", images[1], "--distortion", bare, "--transfer",
+                                       "linear", "-o", folder_ / "bare"});
+  EXPECT_EQ(of_bare.exit_code, 0);
+  EXPECT_THAT(of_bare.err, AllOf(HasSubstr("bare.yml"), HasSubstr("160 x 120 px")));
+  EXPECT_EQ(ContentOf(folder_ / "bare/b.png"), ContentOf(folder_ / "out/b.png"));
+  // The camera file that camera init makes gives the same result.
   const std::string camera = folder_ / "camera.yaml";
   ASSERT_EQ(Start({"camera", "init", "--focal-mm", "1.5", "--f-number", "2", "--pitch-um", "10",
                    "--size", "160x120", "--distortion", calibration, "-o", camera})

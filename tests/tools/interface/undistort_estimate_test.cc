@@ -38,7 +38,7 @@ LensDistortion Pincushion() {
   return d;
 }
 
-// What a pixel of the photograph shows: the place r of r' = r (1 + k r^2), by bisection.
+// The place that a pixel of the photograph shows: r of r' = r (1 + k r^2), by bisection.
 std::pair<double, double> PlaceShownAt(int x, int y) {
   const double u = (x - kMiddleX) / kLengthPx, v = (y - kMiddleY) / kLengthPx;
   const double far = std::hypot(u, v);

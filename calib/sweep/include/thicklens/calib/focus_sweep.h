@@ -43,7 +43,10 @@ struct FocusSweep {
   model::SweepTarget target = model::SweepTarget::kAuto;  // kind of the target, if it is stated
   model::FloorKnowledge floor;                            // what is known of the blur floor, px
   std::optional<double> target_period_mm;                 // period of a periodic target
-  model::RegionOfInterest roi;                            // the part of the frames that is measured
+  // The part of the frames that is measured, after the camera's distortion was taken out of them.
+  // Pixels of it that the distorted frames do not show are black, and MakeFocusSweep leaves them
+  // out.
+  model::RegionOfInterest roi;
   // Dark, flat and defects that LinearGrey and LinearChannel correct the light by, of the size of
   // the frames; null: none.
   std::shared_ptr<const FrameCorrection> correction;

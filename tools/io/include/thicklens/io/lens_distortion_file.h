@@ -12,7 +12,7 @@ namespace thicklens::io {
 // A lens distortion that another program measured.
 struct LensDistortionFile {
   model::LensDistortion distortion;  // in the pixels of this project: (0, 0) is a pixel's centre
-  std::string format;                // for messages: "OpenCV FileStorage", "COLMAP cameras.txt", ..
+  std::string format;                // for messages: "OpenCV FileStorage", "COLMAP cameras.txt"
   std::string camera;                // its name or number in a file of several; empty: there is one
   // Whether the file states the size of the photographs. If it does not, the distortion has the
   // size that the caller expected.
