@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
+#include <vector>
 
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
@@ -90,6 +91,35 @@ LinearImage Undistorted(const LinearImage& image, const LensDistortion& distorti
       {0, 0, image.width_px, image.height_px}, Resampling::kLanczos, 0, out.values.data());
   if (without_source != nullptr) *without_source = count;
   return out;
+}
+
+void ContinueBeyondSource(const LensDistortion& distortion, LinearImage* image) {
+  const int width = image->width_px, height = image->height_px;
+  const std::vector<float> sources = SourcesOf(distortion, 0, 0, width, height).x;
+  const auto index = [width](int x, int y) {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+           static_cast<std::size_t>(x);
+  };
+  const Eigen::Vector2d centre =
+      distortion.principal_point_px.cwiseMax(0).cwiseMin(Eigen::Vector2d(width - 1, height - 1));
+  const auto channels = static_cast<std::size_t>(image->channels);
+  for (int y = 0; y < height; ++y) {
+    ThrowIfCancelled();
+    for (int x = 0; x < width; ++x) {
+      if (!std::isnan(sources[index(x, y)])) continue;
+      const Eigen::Vector2d way = centre - Eigen::Vector2d(x, y);
+      const int steps = static_cast<int>(std::ceil(way.cwiseAbs().maxCoeff()));
+      for (int i = 1; i <= steps; ++i) {
+        const Eigen::Vector2d at = Eigen::Vector2d(x, y) + way * i / steps;
+        const std::size_t from =
+            index(static_cast<int>(std::lround(at.x())), static_cast<int>(std::lround(at.y())));
+        if (std::isnan(sources[from])) continue;
+        std::copy_n(image->values.begin() + static_cast<std::ptrdiff_t>(from * channels), channels,
+                    image->values.begin() + static_cast<std::ptrdiff_t>(index(x, y) * channels));
+        break;
+      }
+    }
+  }
 }
 
 PixelRect RegionWithSource(const LensDistortion& distortion, const PixelRect& within) {

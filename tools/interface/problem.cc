@@ -17,6 +17,7 @@
 #include "thicklens/io/image_file.h"
 #include "thicklens/io/readings.h"
 #include "thicklens/model/effect_impact.h"
+#include "thicklens/model/undistort.h"
 #include "tools/interface/depth_causes.h"
 #include "tools/interface/depth_reports.h"
 #include "tools/interface/effects_choice.h"
@@ -99,7 +100,10 @@ std::optional<LensDistortion> DistortionOf(const std::string& photo, int width_p
                                            const std::optional<Camera>& camera,
                                            const EstimateOptions& options, RunScope* run) {
   if (!camera || !options.undistort) return std::nullopt;
-  constexpr char kNotMeasured[] = "assumed";
+  // What was assumed or simulated was measured on no frames.
+  const auto is_measured = [](const std::string& method) {
+    return method != "assumed" && method != "simulated";
+  };
   const model::CameraCalibration* const found =
       camera->calibration ? &*camera->calibration : nullptr;
   const bool was_undistorted = found != nullptr && found->evidence.undistorted;
@@ -112,7 +116,7 @@ std::optional<LensDistortion> DistortionOf(const std::string& photo, int width_p
     }
     return std::nullopt;
   }
-  if (found != nullptr && !was_undistorted && found->evidence.method != kNotMeasured) {
+  if (found != nullptr && !was_undistorted && is_measured(found->evidence.method)) {
     run->Warn(fmt::format(
         "{}: it states lens.distortion, but was calibrated on frames that were not undistorted: d1 "
         "and kappa may differ for {}, which is; calibrate with the same distortion",
@@ -129,7 +133,8 @@ std::optional<LensDistortion> DistortionOf(const std::string& photo, int width_p
 }
 
 // Takes the distortion out of photograph and depth map. The photograph becomes linear light, as it
-// would be later; a pixel that it does not show gets no depth, so that it is filled like a hole.
+// would be later. A pixel that it does not show continues the image and gets no depth, so that it
+// is filled like a hole.
 void Undistort(const LensDistortion& distortion, const TransferCurve& transfer, Image* photo,
                DepthMap* depth, EstimateDiagnostics* diagnostics, RunScope* run) {
   const std::string name = NameOf(*photo);
@@ -145,6 +150,12 @@ void Undistort(const LensDistortion& distortion, const TransferCurve& transfer, 
   const Image linear = Image::FromLight(photo->width_px(), photo->height_px(), photo->order(),
                                         photo->ToLight(transfer).values, transfer, photo->source());
   *photo = UndistortImage(linear, distortion, &missing);
+  if (missing > 0) {  // an edge to black would be light that no blur explains
+    model::LinearImage light = photo->light();
+    model::ContinueBeyondSource(distortion, &light);
+    *photo = Image::FromLight(light.width_px, light.height_px, photo->order(),
+                              std::move(light.values), transfer, photo->source());
+  }
   *depth = UndistortDepth(*depth, distortion);
   diagnostics->without_source_share =
       static_cast<double>(missing) / (static_cast<double>(photo->width_px()) * photo->height_px());

@@ -160,6 +160,33 @@ TEST(Undistort, DepthsAreThoseOfTheMap) {
   EXPECT_LE(holes, missing + 4);  // the hole of the map
 }
 
+// Beyond the photograph, the image goes on with the value at its border.
+TEST(Undistort, ContinuesBeyondItsSource) {
+  LinearImage ramp{kWidth, kHeight, 2, {}};
+  for (int i = 0; i < kWidth * kHeight; ++i) {
+    ramp.values.push_back(1 + static_cast<float>(i % kWidth));
+    ramp.values.push_back(1000 + static_cast<float>(i / kWidth));
+  }
+  const LensDistortion d = Radial(0.2);
+  std::size_t missing = 0;
+  const LinearImage straight = Undistorted(ramp, d, &missing);
+  LinearImage whole = straight;
+  ContinueBeyondSource(d, &whole);
+  ASSERT_GT(missing, 1000U);
+  const SourcePositions sources = SourcesOf(d, 0, 0, kWidth, kHeight);
+  for (std::size_t i = 0; i < sources.x.size(); ++i) {
+    if (std::isnan(sources.x[i])) {
+      EXPECT_GE(whole.values[2 * i + 1], 999) << i;  // of the second channel
+      continue;
+    }
+    EXPECT_EQ(whole.values[2 * i], straight.values[2 * i]);
+  }
+  // The corner has the value of the border on the diagonal, which is nearly that of the
+  // photograph's own corner.
+  EXPECT_NEAR(whole.at(0, 0, 0), 1, 8);
+  EXPECT_NEAR(whole.at(0, 0, 1), 1000, 8);
+}
+
 TEST(Undistort, TheRegionWithSourceHasOne) {
   const LensDistortion d = Radial(0.12);
   const PixelRect region = RegionWithSource(d, {0, 0, kWidth, kHeight});

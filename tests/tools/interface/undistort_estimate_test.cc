@@ -110,6 +110,8 @@ TEST_F(UndistortedEstimate, PhotographAndDepthAreThoseOfAPerfectLens) {
   EXPECT_GT(found.without_source_share, 0.05);
   EXPECT_EQ(found.holes_filled, static_cast<std::size_t>(std::lround(found.without_source_share *
                                                                      kPhotoWidth * kPhotoHeight)));
+  // No edge to black appears where the photograph ends.
+  EXPECT_GT(problem.photograph().at(0, 0, 0), 0.1F);
   // The edge of the depth is straight, and no depth lies between the two.
   const std::vector<float>& disparity = problem.disparity();
   const float near = disparity[45 * kPhotoWidth + 60], far = disparity[45 * kPhotoWidth + 100];

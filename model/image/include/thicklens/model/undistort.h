@@ -32,6 +32,11 @@ THICKLENS_EXPORT std::size_t UndistortInto(const LensDistortion& distortion, con
 THICKLENS_EXPORT LinearImage Undistorted(const LinearImage& image, const LensDistortion& distortion,
                                          std::size_t* without_source = nullptr);
 
+// Gives each pixel of an undistorted image that has no source the value of the first pixel with one
+// on its line to the principal point, so that no edge appears where the photograph ends. The
+// distortion must have the size of the image.
+THICKLENS_EXPORT void ContinueBeyondSource(const LensDistortion& distortion, LinearImage* image);
+
 // Returns a large rectangle inside `within` all of whose pixels have a source, found by moving the
 // border with the largest share of pixels without one inwards. Its width is 0 if there is none.
 THICKLENS_EXPORT PixelRect RegionWithSource(const LensDistortion& distortion,
