@@ -60,7 +60,8 @@ class HostileInputs : public HostileTest {
     fs::create_directory(Work("frames"));
     fs::copy(Work("picture.png"), Work("frames/a.png"));
     Put("calibration.yml",
-        "image_size: [64, 48]\nK: [90, 0, 32, 0, 90, 24, 0, 0, 1]\nD: [-0.1, 0, 0, 0]\n");
+        "image_size: [64, 48]\nK: [90, 0, 32, 0, 90, 24, 0, 0, 1]\n"
+        "D: [-0.1, 0, 0, 0]\n");
     Put("one.yaml",
         "schema: thicklens/sweep/1\ncamera: camera.yaml\nframes:\n"
         "  - {image: frames/a.png, reading_mm: 1}\n");

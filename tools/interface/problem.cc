@@ -100,7 +100,7 @@ std::optional<LensDistortion> DistortionOf(const std::string& photo, int width_p
                                            const std::optional<Camera>& camera,
                                            const EstimateOptions& options, RunScope* run) {
   if (!camera || !options.undistort) return std::nullopt;
-  // What was assumed or simulated was measured on no frames.
+  // A camera that was assumed or simulated was measured on no frames.
   const auto is_measured = [](const std::string& method) {
     return method != "assumed" && method != "simulated";
   };

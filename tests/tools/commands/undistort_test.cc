@@ -136,8 +136,9 @@ TEST_F(UndistortProgram, StraightensImagesOfEachKind) {
   const cv::Mat corner = io::ReadImageData(folder_ / "out/b.png").pixels;
   EXPECT_EQ(corner.at<std::uint16_t>(0, 0), 0);
   // A file without a size has that of the images, which is said.
-  const std::string bare =
-      folder_.Put("bare.yml", "K: [150, 0, 79.5, 0, 150, 59.5, 0, 0, 1]\nD: [0.15, 0, 0, 0, 0]\n");
+  const std::string bare = folder_.Put("bare.yml",
+                                       "K: [150, 0, 79.5, 0, 150, 59.5, 0, 0, 1]\n"
+                                       "D: [0.15, 0, 0, 0, 0]\n");
   const ProgramResult of_bare = Start({"undistort", images[1], "--distortion", bare, "--transfer",
                                        "linear", "-o", folder_ / "bare"});
   EXPECT_EQ(of_bare.exit_code, 0);

@@ -140,7 +140,9 @@ TEST(LensDistortionFile, OneOfSeveralCamerasOfOpenCv) {
 }
 
 TEST(LensDistortionFile, AFileWithoutASizeTakesTheOneOfTheImages) {
-  const std::string text = "K: [500, 0, 320, 0, 500, 240, 0, 0, 1]\nD: [-0.1, 0.01, 0, 0]\n";
+  const std::string text =
+      "K: [500, 0, 320, 0, 500, 240, 0, 0, 1]\n"
+      "D: [-0.1, 0.01, 0, 0]\n";
   EXPECT_THAT(Refused(text), AllOf(HasSubstr("calib"), HasSubstr("image_width")));
   const LensDistortionFile file = ParseLensDistortion(text, "calib", "", 640, 480);
   EXPECT_FALSE(file.states_size);
@@ -187,7 +189,8 @@ TEST(LensDistortionFile, RosCameraInfo) {
   EXPECT_EQ(Parsed(rational).distortion.coefficients.size(), 8U);
   // The message as rostopic echo prints it.
   const std::string echo =
-      "height: 480\nwidth: 640\ndistortion_model: \"plumb_bob\"\nD: [-0.1, 0.0, 0.0, 0.0, 0.0]\n"
+      "height: 480\nwidth: 640\ndistortion_model: \"plumb_bob\"\n"
+      "D: [-0.1, 0.0, 0.0, 0.0, 0.0]\n"
       "K: [500.0, 0.0, 320.0, 0.0, 500.0, 240.0, 0.0, 0.0, 1.0]\n";
   EXPECT_EQ(Parsed(echo).distortion.coefficients[0], -0.1);
   EXPECT_THAT(Refused(ReplacedOnce(kRos, "plumb_bob", "omnidirectional")),
@@ -438,7 +441,9 @@ TEST(LensDistortionFile, DamagedFilesAreRefusedWithTheirPlace) {
               HasSubstr("camera_matrix without coefficients"));
   EXPECT_THAT(Refused(ReplacedOnce(kOpenCv, "+02, 0., 3.195", "+02, 2., 3.195")),
               HasSubstr("skew"));
-  std::string many = "K: [500, 0, 320, 0, 500, 240, 0, 0, 1]\nimage_size: [640, 480]\nD: [0";
+  std::string many =
+      "K: [500, 0, 320, 0, 500, 240, 0, 0, 1]\nimage_size: [640, 480]\n"
+      "D: [0";
   for (int i = 0; i < 100000; ++i) many += ", 0";
   EXPECT_THAT(Refused(many + "]\n"), HasSubstr("at most 64 numbers"));
   const std::string xml =

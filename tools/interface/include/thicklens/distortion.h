@@ -53,9 +53,9 @@ struct UndistortedFile {
   std::string bytes;   // of a file of the same kind and type of values, if that kind is lossless
   std::string ending;  // of its name, such as ".png": a JPEG or raw file becomes PNG
   int width_px = 0, height_px = 0;  // size, px
-  std::size_t without_source = 0;  // number of pixels
-  std::string values;              // "unsigned 16-bit integers"
-  std::string remark;              // what a user should know; empty: nothing
+  std::size_t without_source = 0;   // number of pixels
+  std::string values;               // "unsigned 16-bit integers"
+  std::string remark;               // what a user should know; empty: nothing
 };
 // Reads an image or a depth map and returns it undistorted. Integers of 8 and 16 bits and floats
 // keep their type. Images of integers are interpolated in linear light. Pixels without a source are
