@@ -18,6 +18,7 @@ model::Camera CalibratedCamera(const model::Camera& camera, const Calibration& c
                                bool use_source_recipe) {
   model::Camera result = camera;
   model::CameraCalibration found;
+  found.evidence.undistorted = camera.distortion.has_value();
   found.evidence.frames_used = calibration.summary.frames_used;
   for (const FrameMeasurement& frame : calibration.frames) {
     if (!frame.rejection.empty())

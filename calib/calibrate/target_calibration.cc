@@ -394,7 +394,9 @@ class Calibrator {
     if (ShowsDistortion(result_) ||
         FindScaleNonlinearity(scales_, result_.diagnostics.scale, sweep_))
       LookForStructure(scales_);
-    if (const auto refusal = CheckDistortion(&result_, SeesAstigmatism())) return Refuse(*refusal);
+    if (const auto refusal =
+            CheckDistortion(&result_, SeesAstigmatism(), sweep_.camera.distortion.has_value()))
+      return Refuse(*refusal);
     if (!stage_.errors.compared || stage_.may_be_jump)
       slip_ = FindReadingStep(scales_, result_.diagnostics.scale);
     if (!stage_.open.empty()) slip_.reset();

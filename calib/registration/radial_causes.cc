@@ -54,7 +54,20 @@ std::string OcclusionText(const FrameStructureFinding& structure) {
                           : "Structure that stays on the sensor (dust)");
 }
 
-std::string CausesInWords(const Diagnosis& diagnosis, const FrameStructureFinding& structure) {
+// The lens as a cause. Frames from which a stated distortion was taken out show the rest.
+std::string LensInWords(bool is_undistorted) {
+  return is_undistorted ? "the lens still distorts after its stated distortion was taken out "
+                          "(which depends on "
+                          "focus and zoom and must be measured at those of the sweep)"
+                        : "the lens distorts";
+}
+
+constexpr char kRemedy[] =
+    "state the distortion of the lens by calibrate --distortion FILE, or undistort the images by "
+    "thicklens undistort";
+
+std::string CausesInWords(const Diagnosis& diagnosis, const FrameStructureFinding& structure,
+                          bool is_undistorted) {
   const std::string seen = StructureInWords(structure);
   if (diagnosis.Names(kAstigmatismShifts)) {
     return "the blur along x changes against the blur along y from one end of the sweep to the "
@@ -67,8 +80,10 @@ std::string CausesInWords(const Diagnosis& diagnosis, const FrameStructureFindin
     return fmt::format(
         "{}. This displaces the registrations in the same way. If it is not the cause, {}", seen,
         diagnosis.Names(kLensDistorts)
-            ? "the lens distorts (undistort the images), or the target is not flat"
-            : "the target is not flat: no lens distorts so much");
+            ? LensInWords(is_undistorted) +
+                  (is_undistorted ? std::string() : fmt::format(" ({})", kRemedy)) +
+                  ", or the target is not flat"
+            : std::string("the target is not flat: no lens distorts so much"));
   }
   const std::string hidden = OcclusionText(structure);
   if (!diagnosis.Names(kLensDistorts)) {
@@ -76,8 +91,11 @@ std::string CausesInWords(const Diagnosis& diagnosis, const FrameStructureFindin
            "frames do not all show the same target; photograph a flat target" +
            hidden;
   }
-  return "the lens distorts, or the target is not flat (nearer parts move more); these look alike, "
-         "and a flat target distinguishes them. If the target is flat, undistort the images" +
+  return LensInWords(is_undistorted) +
+         ", or the target is not flat (nearer parts move more); these look alike, and a flat "
+         "target "
+         "distinguishes them" +
+         (is_undistorted ? std::string() : fmt::format(". If the target is flat, {}", kRemedy)) +
          hidden;
 }
 
@@ -89,7 +107,8 @@ bool ShowsDistortion(const Calibration& calibration) {
          std::abs(distortion->value) > std::max(kWorthReporting, kSignificant * distortion->sigma);
 }
 
-std::optional<std::string> CheckDistortion(Calibration* calibration, bool is_astigmatic) {
+std::optional<std::string> CheckDistortion(Calibration* calibration, bool is_astigmatic,
+                                           bool is_undistorted) {
   if (!ShowsDistortion(*calibration)) return std::nullopt;
   const model::Estimate& distortion = *calibration->diagnostics.scale.distortion_at_corner;
   is_astigmatic = is_astigmatic && std::abs(distortion.value) < kMaxByAstigmatism;
@@ -99,7 +118,7 @@ std::optional<std::string> CheckDistortion(Calibration* calibration, bool is_ast
       "the corner ({}): {}",
       100 * distortion.value, 100 * distortion.sigma,
       distortion.value > 0 ? "pincushion" : "barrel",
-      CausesInWords(diagnosis, calibration->diagnostics.structure));
+      CausesInWords(diagnosis, calibration->diagnostics.structure, is_undistorted));
   calibration->diagnostics.diagnoses.push_back(std::move(diagnosis));
   if (std::abs(distortion.value) > kGross && !is_astigmatic) return found;
   calibration->summary.warnings.push_back(
@@ -110,7 +129,8 @@ std::optional<std::string> CheckDistortion(Calibration* calibration, bool is_ast
 std::string NonlinearityRemedy(const FrameStructureFinding& structure) {
   return structure.HasVignetting() || structure.HasFixedStructure()
              ? "measure offset_mm, divide the frames by a photograph of an evenly lit white sheet"
-             : "measure offset_mm, check the rail's scale, undistort the images";
+             : "measure offset_mm, check the rail's scale, undistort the images (thicklens "
+               "undistort)";
 }
 
 std::string NonlinearityText(const ScaleNonlinearity& nonlinearity,

@@ -24,8 +24,10 @@ bool ShowsDistortion(const Calibration& calibration);
 // instead of the warning where the distortion is too large for a result. `is_astigmatic` says that
 // the blur along x changes against that along y through the sweep (ShowsAstigmatism): this moves
 // detail in the registrations in proportion to the depth, as distortion does, so that it is a cause
-// as well, and no reason to refuse.
-std::optional<std::string> CheckDistortion(Calibration* calibration, bool is_astigmatic = false);
+// as well, and no reason to refuse. `is_undistorted` says that a stated distortion was taken out of
+// the frames.
+std::optional<std::string> CheckDistortion(Calibration* calibration, bool is_astigmatic = false,
+                                           bool is_undistorted = false);
 
 // The warning about readings that bend against the image scale. It names the structure found in
 // `calibration.structure`.

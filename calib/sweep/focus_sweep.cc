@@ -13,6 +13,7 @@
 #include "thicklens/base/error.h"
 #include "thicklens/base/validity.h"
 #include "thicklens/calib/frame_correction.h"
+#include "thicklens/model/undistort.h"
 
 namespace thicklens::calib {
 namespace {
@@ -111,6 +112,26 @@ cv::Mat CorrectedChannel(const cv::Mat& stored, const FocusSweep& sweep, int cha
   return light;
 }
 
+// The region of a whole frame without the distortion of the lens. The region lies where the frame
+// shows it (MakeFocusSweep).
+cv::Mat UndistortedRegion(const cv::Mat& light, const FocusSweep& sweep) {
+  const model::RegionOfInterest& roi = sweep.roi;
+  const model::PixelRect part = roi.width > 0
+                                    ? model::PixelRect{roi.x, roi.y, roi.width, roi.height}
+                                    : model::PixelRect{0, 0, light.cols, light.rows};
+  cv::Mat out(part.height, part.width, CV_32F);
+  model::UndistortInto(sweep.camera.distortion->ScaledTo(light.cols, light.rows),
+                       light.ptr<float>(), 1, part, model::Resampling::kLanczos, 0,
+                       out.ptr<float>());
+  return out;
+}
+
+// The region of a whole frame in linear light.
+cv::Mat RegionOfFrame(const cv::Mat& light, const FocusSweep& sweep) {
+  return sweep.camera.distortion ? UndistortedRegion(light, sweep)
+                                 : RegionOfLight(light, sweep.roi);
+}
+
 cv::Mat CorrectedGrey(const cv::Mat& stored, const FocusSweep& sweep, std::size_t index) {
   RequireCorrectionOf(stored, sweep, index);
   cv::Mat grey = CorrectedChannel(stored, sweep, 0);
@@ -119,7 +140,7 @@ cv::Mat CorrectedGrey(const cv::Mat& stored, const FocusSweep& sweep, std::size_
            0.0722 * CorrectedChannel(stored, sweep, 2);
   }
   sweep.correction->ReplaceDefects(&grey);
-  return RegionOfLight(grey, sweep.roi);
+  return RegionOfFrame(grey, sweep);
 }
 
 // Whether value and sigma are numbers that can be used.
@@ -193,6 +214,28 @@ std::vector<model::StatedConjugate> StatedFocus(const model::SweepFile& file,
   add(Kind::kMagnification, file.magnification, "magnification");
   if (camera.objective && !file.magnification) stated.push_back(MagnificationOfObjective(camera));
   return stated;
+}
+
+// The part of a region in which the undistorted frames have an image.
+model::RegionOfInterest RegionThatIsShown(const model::Camera& camera,
+                                          const model::RegionOfInterest& roi) {
+  std::string why;
+  // Whoever measures reports a camera or a region that is not valid.
+  if (!camera.distortion || !camera.IsValid(&why)) return roi;
+  const model::Sensor& sensor = camera.sensor;
+  const model::PixelRect asked = roi.width > 0
+                                     ? model::PixelRect{roi.x, roi.y, roi.width, roi.height}
+                                     : model::PixelRect{0, 0, sensor.width_px, sensor.height_px};
+  const model::PixelRect shown = model::RegionWithSource(
+      camera.distortion->ScaledTo(sensor.width_px, sensor.height_px), asked);
+  if (shown.width == asked.width && shown.height == asked.height) return roi;
+  if (shown.width == 0) {
+    throw Error(fmt::format(
+        "lens.distortion: the frames show nothing of the region {} x {} px from ({}, {}) of the "
+        "undistorted field",
+        asked.width, asked.height, asked.x, asked.y));
+  }
+  return {shown.x, shown.y, shown.width, shown.height};
 }
 
 }  // namespace
@@ -269,7 +312,7 @@ FocusSweep MakeFocusSweep(const model::SweepFile& file, const model::Camera& cam
   sweep.target = file.target;
   sweep.floor = file.floor;
   sweep.target_period_mm = file.target_period_mm;
-  sweep.roi = file.roi;
+  sweep.roi = RegionThatIsShown(camera, file.roi);
   return sweep;
 }
 
@@ -296,15 +339,17 @@ cv::Mat RegionOf(const cv::Mat& stored, const FocusSweep& sweep, std::size_t ind
 cv::Mat LinearGrey(const cv::Mat& stored, const FocusSweep& sweep, std::size_t index) {
   const cv::Mat region = RegionOf(stored, sweep, index);
   if (sweep.correction != nullptr) return CorrectedGrey(stored, sweep, index);
+  const bool is_distorted = sweep.camera.distortion.has_value();
+  const cv::Mat& decoded = is_distorted ? stored : region;
   const bool bytes = region.depth() == CV_8U;
   const auto decode = DecodeTableOf(sweep.camera.sensor.transfer, bytes ? 256 : 65536);
-  cv::Mat grey(region.size(), CV_32F);
+  cv::Mat grey(decoded.size(), CV_32F);
   if (bytes) {
-    DecodeGrey<std::uint8_t>(region, *decode, &grey);
+    DecodeGrey<std::uint8_t>(decoded, *decode, &grey);
   } else {
-    DecodeGrey<std::uint16_t>(region, *decode, &grey);
+    DecodeGrey<std::uint16_t>(decoded, *decode, &grey);
   }
-  return grey;
+  return is_distorted ? UndistortedRegion(grey, sweep) : grey;
 }
 
 cv::Mat LinearChannel(const cv::Mat& stored, const FocusSweep& sweep, std::size_t index,
@@ -316,12 +361,15 @@ cv::Mat LinearChannel(const cv::Mat& stored, const FocusSweep& sweep, std::size_
         fmt::format("{}: channel {} is requested, but the image has {} channel(s), counted from 0",
                     sweep.frames[index].Name(), channel, colours));
   }
+  const model::TransferCurve& transfer = sweep.camera.sensor.transfer;
+  if (sweep.correction == nullptr && !sweep.camera.distortion)
+    return DecodedChannel(region, transfer, channel);
   if (sweep.correction == nullptr)
-    return DecodedChannel(region, sweep.camera.sensor.transfer, channel);
+    return UndistortedRegion(DecodedChannel(stored, transfer, channel), sweep);
   RequireCorrectionOf(stored, sweep, index);
   cv::Mat light = CorrectedChannel(stored, sweep, channel);
   sweep.correction->ReplaceDefects(&light);
-  return RegionOfLight(light, sweep.roi);
+  return RegionOfFrame(light, sweep);
 }
 
 }  // namespace thicklens::calib

@@ -320,6 +320,11 @@ RawDepthMap CropDepth(const RawDepthMap& map, const PixelRect& rect) {
 Camera CropCamera(const Camera& camera, const PixelRect& rect) {
   RequireInside("sensor", rect, camera.sensor.width_px, camera.sensor.height_px);
   Camera cropped = camera;
+  if (camera.distortion) {
+    cropped.distortion =
+        camera.distortion->ScaledTo(camera.sensor.width_px, camera.sensor.height_px)
+            .OfPart(rect.x, rect.y, rect.width, rect.height);
+  }
   cropped.sensor.width_px = rect.width;
   cropped.sensor.height_px = rect.height;
   cropped.sensor.principal_point_px -= Eigen::Vector2d(rect.x, rect.y);

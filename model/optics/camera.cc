@@ -69,6 +69,14 @@ bool Camera::IsValid(std::string* why) const {
                                  *aperture_behind_front_mm));
   }
   if (!sensor.IsValid(&inner)) return Fail(why, "sensor: " + inner);
+  if (distortion) {
+    if (!distortion->IsValid(&inner)) return Fail(why, "lens.distortion: " + inner);
+    try {
+      static_cast<void>(distortion->ScaledTo(sensor.width_px, sensor.height_px));
+    } catch (const Error& error) {
+      return Fail(why, std::string("lens.distortion: ") + error.what());
+    }
+  }
   if (!calibration) return true;
   const CameraCalibration& found = *calibration;
   const auto sigma_ok = [&](const std::optional<Estimate>& estimate, const char* field) {

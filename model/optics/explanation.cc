@@ -130,6 +130,7 @@ Explanation ExplainCamera(const Camera& camera, const DepthRange& range, int cou
                                               radius_px * camera.sensor.pixel_pitch_mm);
     known.depth_of_field.push_back({radius_px, field.near_mm, field.far_mm});
   }
+  known.distortion = camera.distortion;
   known.thin = CompareWithThin(camera, known.image_distance_mm);
   // The hyperfocal depth follows from r f1/(zf - f1) = 1 px, the limit of r K |1/z - 1/zf| for z to
   // infinity.

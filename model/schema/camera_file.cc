@@ -38,6 +38,7 @@ constexpr const char* kLengthsOfLens[] = {"front_focal_length_mm", "rear_focal_l
 constexpr const char* kDataOfObjective[] = {"magnification", "numerical_aperture",
                                             "tube_lens_focal_length_mm"};
 constexpr char kApertureBehindFront[] = "aperture_behind_front_mm";
+constexpr char kDistortion[] = "distortion";
 
 // Returns the first of the keys that the map has; empty: it has none.
 template <std::size_t kCount>
@@ -75,11 +76,40 @@ void ReadObjective(const YamlNode& node, Camera* camera) {
   camera->lens = LensOfObjective(objective);
 }
 
+LensDistortion ReadDistortion(const YamlNode& node) {
+  if (!node.IsMap()) {
+    throw node.ErrorHere(
+        "a map with model, size_px, focal_length_px, principal_point_px and coefficients is "
+        "expected (thicklens camera init --distortion FILE writes it)");
+  }
+  node.RequireKeys({"model", "size_px", "focal_length_px", "principal_point_px", "coefficients"});
+  LensDistortion found;
+  found.model = node.At("model").OneOf({"opencv", "fisheye"}) == "fisheye"
+                    ? DistortionModel::kFisheye
+                    : DistortionModel::kOpenCv;
+  const auto size = node.At("size_px").ElementsExactly(2);
+  found.width_px = size[0].Integer(1, kMaxImageSizePx);
+  found.height_px = size[1].Integer(1, kMaxImageSizePx);
+  const auto focal = node.At("focal_length_px").ElementsExactly(2);
+  found.focal_length_px = {focal[0].PositiveNumber(), focal[1].PositiveNumber()};
+  const auto point = node.At("principal_point_px").ElementsExactly(2);
+  found.principal_point_px = {point[0].Number(), point[1].Number()};
+  for (const YamlNode& number : node.At("coefficients").Elements())
+    found.coefficients.push_back(number.Number());
+  found.source = node.source();
+  std::string why;
+  if (!found.IsValid(&why)) throw node.ErrorHere(why);
+  return found;
+}
+
 void ReadLens(const YamlNode& node, Camera* camera) {
   std::vector<std::string> keys(std::begin(kLengthsOfLens), std::end(kLengthsOfLens));
   keys.insert(keys.end(), std::begin(kDataOfObjective), std::end(kDataOfObjective));
   keys.emplace_back(kApertureBehindFront);
+  keys.emplace_back(kDistortion);
   node.RequireKeys(keys);
+  if (const auto distortion = node.Find(kDistortion))
+    camera->distortion = ReadDistortion(*distortion);
   if (const auto behind = node.Find(kApertureBehindFront))
     camera->aperture_behind_front_mm = ValueNode(*behind, camera).Number();
   if (IsObjective(node)) {
@@ -115,10 +145,13 @@ std::optional<Estimate> FindEstimate(const YamlNode& parent, const std::string& 
 }
 
 Evidence ReadEvidence(const YamlNode& node) {
-  node.RequireKeys({"method", "frames_used", "frames_rejected", "chi2_per_dof", "focus_depth_mm",
-                    "blur_family", "blur_band", "data_sha256", "version", "date"});
+  node.RequireKeys({"method", "undistorted", "frames_used", "frames_rejected", "chi2_per_dof",
+                    "focus_depth_mm", "blur_family", "blur_band", "data_sha256", "version",
+                    "date"});
   Evidence evidence;
   evidence.method = node.At("method").Text();
+  if (const auto undistorted = node.Find("undistorted"))
+    evidence.undistorted = undistorted->Boolean();
   if (const auto used = node.Find("frames_used")) evidence.frames_used = used->Integer(0, 1000000);
   if (const auto rejected = node.Find("frames_rejected")) {
     for (const YamlNode& frame : rejected->Elements()) {
@@ -252,6 +285,26 @@ class CameraWriter {
     }
     if (camera_.aperture_behind_front_mm)
       Stated("lens.", kApertureBehindFront, *camera_.aperture_behind_front_mm);
+    if (camera_.distortion) WriteDistortion(*camera_.distortion);
+    out_.EndMap();
+  }
+
+  void Numbers(const char* key, const double* numbers, std::size_t count) {
+    out_.BeginListInLine(key);
+    for (std::size_t i = 0; i < count; ++i) out_.Element(numbers[i]);
+    out_.EndList();
+  }
+
+  void WriteDistortion(const LensDistortion& distortion) {
+    out_.BeginMap(kDistortion);
+    out_.Text("model", DistortionModelName(distortion.model));
+    out_.BeginListInLine("size_px");
+    out_.Element(distortion.width_px);
+    out_.Element(distortion.height_px);
+    out_.EndList();
+    Numbers("focal_length_px", distortion.focal_length_px.data(), 2);
+    Numbers("principal_point_px", distortion.principal_point_px.data(), 2);
+    Numbers("coefficients", distortion.coefficients.data(), distortion.coefficients.size());
     out_.EndMap();
   }
 
@@ -331,6 +384,7 @@ class CameraWriter {
   void WriteEvidence(const Evidence& evidence) {
     out_.BeginMap("evidence");
     out_.Text("method", evidence.method);
+    if (evidence.undistorted) out_.Text("undistorted", "true");
     out_.Text("frames_used", std::to_string(evidence.frames_used));
     if (!evidence.frames_rejected.empty()) {
       out_.BeginList("frames_rejected");
@@ -375,6 +429,14 @@ Camera ParseCamera(const std::string& text, const std::string& source_name) {
   // Each number was already checked at its place. The remaining check compares the image distance
   // with the lens, so that an error belongs to the calibration if there is one.
   std::string why;
+  if (camera.distortion) {
+    try {
+      static_cast<void>(
+          camera.distortion->ScaledTo(camera.sensor.width_px, camera.sensor.height_px));
+    } catch (const Error& error) {
+      throw root.At("lens").At(kDistortion).ErrorHere(std::string("for sensor: ") + error.what());
+    }
+  }
   if (!camera.IsValid(&why)) {
     const auto place = camera.calibration ? root.At("calibration").Find("image_distance_mm")
                                           : std::optional<YamlNode>();

@@ -15,6 +15,11 @@ bool IsSimulatable(const Camera& camera, std::string* why) {
     return Fail(why, fmt::format("camera '{}': {} is missing: a simulation needs its true value",
                                  camera.name, field));
   };
+  if (camera.distortion) {
+    return Fail(why, fmt::format("camera '{}': lens.distortion is not simulated: the camera of a "
+                                 "simulation must not state it",
+                                 camera.name));
+  }
   if (!camera.calibration || !camera.calibration->image_distance_mm) {
     return missing("image_distance_mm");
   }
@@ -27,6 +32,16 @@ bool IsSimulatable(const Camera& camera, std::string* why) {
                             camera.name));
   }
   return true;
+}
+
+void TakeOutDistortion(Camera* camera, std::vector<std::string>* notices) {
+  if (!camera->distortion) return;
+  camera->distortion.reset();
+  if (camera->calibration) camera->calibration->evidence.undistorted = false;
+  notices->push_back(
+      fmt::format("camera '{}': lens.distortion is not simulated: the images are those of the same "
+                  "lens without distortion, and their camera file states none",
+                  camera->name));
 }
 
 }  // namespace thicklens::model

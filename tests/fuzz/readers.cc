@@ -11,6 +11,7 @@
 #include "thicklens/io/image_file.h"
 #include "thicklens/io/image_io.h"
 #include "thicklens/io/journal_file.h"
+#include "thicklens/io/lens_distortion_file.h"
 #include "thicklens/io/light_field_io.h"
 #include "thicklens/io/readings.h"
 #include "thicklens/io/video_file.h"
@@ -175,6 +176,10 @@ const std::vector<FuzzedReader>& FuzzedReaders() {
        }},
       OfFile("photo-exif", "photo.jpg",
              [](const std::string& path) { io::ReadPhotoExif(path, 640, 480); }),
+      {"lens-distortion",
+       [](const std::string& bytes, const TemporaryFolder&) {
+         io::ParseLensDistortion(bytes, "calibration", "", 640, 480);
+       }},
       {"block-checkpoint", ReadCheckpoint},
       OfFile("profile-json", "profile.json",
              [](const std::string& path) { tools::ReadProfile(path); }),

@@ -30,11 +30,14 @@ const std::vector<std::string>& Slots() {
       "estimate picture.png depth.pfm" + depth + "--camera @ -o new",
       "estimate @ --camera camera.yaml -o new", "depth extract @ -o new.pfm",
       "frames average @ -o new.tif", "frames defects --dark @ -o new.txt",
-      "frames defects --flat @ -o new.png", estimate + "--profile @ --within 3600s",
-      estimate + "--aperture-of @", "render @ --as-captured -o new.png", "compare @ picture.png",
-      "compare picture.png @", "compare lf lf --dibr @ depth.pfm" + depth,
-      "compare lf lf --dibr picture.png @" + depth, "calibrate @ -o new",
-      "calibrate frames --readings @ --camera camera.yaml -o new",
+      "frames defects --flat @ -o new.png", "undistort picture.png --distortion @ -o new",
+      "undistort picture.png --camera @ -o new", "undistort @ --distortion calibration.yml -o new",
+      "undistort @ --depth --distortion calibration.yml -o new",
+      "calibrate one.yaml --distortion @ -o new", estimate + "--distortion @",
+      estimate + "--profile @ --within 3600s", estimate + "--aperture-of @",
+      "render @ --as-captured -o new.png", "compare @ picture.png", "compare picture.png @",
+      "compare lf lf --dibr @ depth.pfm" + depth, "compare lf lf --dibr picture.png @" + depth,
+      "calibrate @ -o new", "calibrate frames --readings @ --camera camera.yaml -o new",
       "calibrate one.yaml --camera @ -o new", "calibrate one.yaml --truth @ -o new",
       "calibrate one.yaml --floor-from @ -o new", "simulate sweep @ -o new",
       "simulate image @ -o new", "simulate light-field @ -o new", "report @ -o new",
@@ -56,6 +59,9 @@ class HostileInputs : public HostileTest {
   HostileInputs() {
     fs::create_directory(Work("frames"));
     fs::copy(Work("picture.png"), Work("frames/a.png"));
+    Put("calibration.yml",
+        "image_size: [64, 48]\nK: [90, 0, 32, 0, 90, 24, 0, 0, 1]\n"
+        "D: [-0.1, 0, 0, 0]\n");
     Put("one.yaml",
         "schema: thicklens/sweep/1\ncamera: camera.yaml\nframes:\n"
         "  - {image: frames/a.png, reading_mm: 1}\n");

@@ -33,6 +33,7 @@
 #include "tools/report/calibration_json.h"
 #include "tools/report/calibration_report.h"
 #include "tools/report/calibration_summary.h"
+#include "tools/report/distortion_words.h"
 #include "tools/report/files_read_json.h"
 #include "tools/report/input_summary.h"
 #include "tools/report/page_style.h"
@@ -202,6 +203,7 @@ CommandResult RunCalibration(const CalibrateOptions& options, const Sweep& sweep
                                                                  : std::vector<io::FilesRead>());
   result.summary["raw"] = RawMethod(sweep, calibration);
   result.summary["correction"] = CorrectionJson(sweep);
+  result.summary["distortion"] = DistortionJson(sweep.camera.distortion);
   const auto& white = sweep.description.full_scale;
   result.summary["full_scale"] = {{"value", white ? nlohmann::json(*white) : nlohmann::json()},
                                   {"reason", PrintableUtf8(sweep.full_scale_reason)}};

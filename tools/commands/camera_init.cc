@@ -12,12 +12,16 @@
 #include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/base/printable_text.h"
+#include "thicklens/distortion.h"
 #include "thicklens/io/image_io.h"
 #include "thicklens/model/camera_file.h"
 #include "tools/commands/camera_verify.h"
 #include "tools/commands/commands.h"
 #include "tools/options/command_frame.h"
+#include "tools/options/distortion_option.h"
+#include "tools/options/interface_options.h"
 #include "tools/options/option_values.h"
+#include "tools/report/distortion_words.h"
 #include "tools/report/files_read_json.h"
 
 namespace thicklens::tools {
@@ -34,6 +38,7 @@ struct CameraInitOptions {
   std::string size;
   std::string principal_point;
   std::string photo_path;
+  std::string distortion;  // FILE or FILE:CAMERA
   std::string output;
 };
 
@@ -143,6 +148,22 @@ io::PhotoExif ReadExifOf(const std::string& path, const Eigen::Vector2i& size_px
   return photo;
 }
 
+// The distortion of the camera. It was measured with the principal point of the lens, which is
+// taken unless another one was given.
+void TakeDistortion(const CameraInitOptions& options, model::Camera* camera) {
+  const CommandRun run(options.common, {{"distortion", "--distortion"}});
+  model::Sensor& sensor = camera->sensor;
+  camera->distortion =
+      ReadLensDistortion(options.distortion, sensor.width_px, sensor.height_px, run.control());
+  std::string why;
+  if (!camera->IsValid(&why)) throw Error("--distortion: " + why);
+  if (options.camera.principal_point_px) return;
+  sensor.principal_point_px =
+      camera->distortion->ScaledTo(sensor.width_px, sensor.height_px).principal_point_px;
+  camera->statements.erase("sensor.principal_point_px[0]");
+  camera->statements.erase("sensor.principal_point_px[1]");
+}
+
 CommandResult InitCamera(const CameraInitOptions& options) {
   std::optional<OutputFile> output;
   if (!options.output.empty()) output.emplace(options.output);
@@ -156,8 +177,9 @@ CommandResult InitCamera(const CameraInitOptions& options) {
     const Eigen::Vector2i size_px = options.camera.size_px.value_or(*photo_size_px);
     photo = ReadExifOf(options.photo_path, size_px, *facts);
   }
-  const model::Camera camera =
+  model::Camera camera =
       DescribedCamera(options.camera, photo, photo_size_px, facts ? &*facts : nullptr);
+  if (!options.distortion.empty()) TakeDistortion(options, &camera);
   const SensorSources sources = SourcesOf(options.camera, photo, facts ? &*facts : nullptr);
   const std::string yaml =
       (photo ? SourcesComment(sources) : std::string()) + model::CameraToYaml(camera);
@@ -182,6 +204,7 @@ CommandResult InitCamera(const CameraInitOptions& options) {
                      {camera.sensor.principal_point_px.x(), camera.sensor.principal_point_px.y()}},
                     {"transfer", camera.sensor.transfer.Name()},
                     {"psf", model::PsfName(camera.psf)},
+                    {"distortion", DistortionJson(camera.distortion)},
                     {"read", FileReadJson(options.photo_path, facts ? &*facts : nullptr)},
                     {"assumed", model::AssumedFields(camera)}};
   return result;
@@ -320,6 +343,12 @@ void AddCameraCommand(CLI::App* program, CommandAction* action) {
   AddLensOptions(command, &options->camera);
   AddSensorOptions(command, options.get());
   command
+      ->add_option("--distortion", options->distortion,
+                   "Lens distortion of the camera, and its principal point unless "
+                   "--principal-point states another: a file of OpenCV, ROS, Kalibr, COLMAP or "
+                   "mrcal, FILE:CAMERA in a file of several")
+      ->type_name("FILE[:CAMERA]");
+  command
       ->add_option("-o,--output", options->output, "Camera file to write; default: standard output")
       ->type_name("CAMERA.yaml");
   AddCommonOptions(command, &options->common);
@@ -332,7 +361,8 @@ void AddCameraCommand(CLI::App* program, CommandAction* action) {
             "--json -: the camera file also goes to standard output; give --output FILE, or --json "
             "FILE");
       }
-      RequireDistinctFiles({options->output, options->common.json_path}, {options->photo_path});
+      RequireDistinctFiles({options->output, options->common.json_path},
+                           {options->photo_path, FileOfDistortion(options->distortion)});
       RunCommand(options->common, [&] { return InitCamera(*options); });
     };
   });

@@ -67,7 +67,10 @@ std::string ParameterLine(const calib::ComparedParameter& parameter) {
 CameraVerification Verify(const CameraVerifyOptions& options, std::string* readings_line) {
   const CommandRun run(options.common, SweepOptionNames());
   const model::Camera stored = ReadCamera(options.camera_path);
-  const Sweep sweep = ReadSweepInput(options.sweep, run.control());
+  SweepArguments arguments = options.sweep;
+  // Frames of a camera whose calibration holds for undistorted images are undistorted alike.
+  if (arguments.distortion.empty() && stored.distortion) arguments.distortion = options.camera_path;
+  const Sweep sweep = ReadSweepInput(arguments, run.control());
   *readings_line = ReadingsLine(sweep);
   return VerifyCamera(stored, sweep, options.verification, run.control());
 }

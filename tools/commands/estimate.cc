@@ -27,6 +27,7 @@
 #include "tools/commands/commands.h"
 #include "tools/commands/estimate_run.h"
 #include "tools/options/command_frame.h"
+#include "tools/options/distortion_option.h"
 #include "tools/options/estimate_call.h"
 #include "tools/options/estimate_options.h"
 #include "tools/options/estimate_plan.h"
@@ -313,10 +314,11 @@ void AddEstimateCommand(CLI::App* program, CommandAction* action) {
   command->callback([options, action] {
     *action = [options] {
       CheckEstimateUsage(*options);
-      RequireDistinctFiles({options->common.json_path, options->output_folder,
-                            options->report_path(), options->checkpoint_path},
-                           {options->image_path, options->depth_path, options->camera_path,
-                            options->aperture_of, options->profile_path});
+      RequireDistinctFiles(
+          {options->common.json_path, options->output_folder, options->report_path(),
+           options->checkpoint_path},
+          {options->image_path, options->depth_path, options->camera_path, options->aperture_of,
+           options->profile_path, FileOfDistortion(options->distortion)});
       RunCommand(options->common, [&] { return RunEstimate(*options); });
     };
   });

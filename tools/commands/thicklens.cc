@@ -127,9 +127,10 @@ struct Command {
   void (*add)(CLI::App* program, tools::CommandAction* action);
 };
 // In the order of work, as --help lists them.
-constexpr std::array<Command, 13> kCommands = {{{"target", tools::AddTargetCommand},
+constexpr std::array<Command, 14> kCommands = {{{"target", tools::AddTargetCommand},
                                                 {"camera", tools::AddCameraCommand},
                                                 {"frames", tools::AddFramesCommand},
+                                                {"undistort", tools::AddUndistortCommand},
                                                 {"calibrate", tools::AddCalibrateCommand},
                                                 {"explain", tools::AddExplainCommand},
                                                 {"depth", tools::AddDepthCommand},

@@ -4,6 +4,7 @@
 
 #include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
+#include "thicklens/distortion.h"
 #include "thicklens/model/camera_file.h"
 
 namespace thicklens {
@@ -25,6 +26,8 @@ std::vector<std::string> NoticesOf(const Camera& camera) {
                     "them up and edit the camera file, or ignore this for a first try",
                     camera.name, fmt::join(assumed, ", ")));
   }
+  const std::string doubt = DoubtOfDistortion(camera);
+  if (!doubt.empty()) notices.push_back(fmt::format("camera '{}': {}", camera.name, doubt));
   return notices;
 }
 

@@ -9,6 +9,7 @@
 #include <memory>
 #include <utility>
 
+#include "thicklens/distortion.h"
 #include "thicklens/estimator/aperture_blur.h"
 #include "thicklens/estimator/depth_noise.h"
 #include "thicklens/estimator/estimate_checks.h"
@@ -16,6 +17,7 @@
 #include "thicklens/io/image_file.h"
 #include "thicklens/io/readings.h"
 #include "thicklens/model/effect_impact.h"
+#include "thicklens/model/undistort.h"
 #include "tools/interface/depth_causes.h"
 #include "tools/interface/depth_reports.h"
 #include "tools/interface/effects_choice.h"
@@ -90,7 +92,85 @@ void CutToCrop(const std::optional<PixelRect>& crop, Image* photo, DepthMap* dep
   }
 }
 
-// ---- 2. The camera of this photograph.
+// ---- 2. The distortion of the lens.
+
+// The distortion of this photograph, of which the camera's sensor may show more; absent: it is
+// taken as undistorted.
+std::optional<LensDistortion> DistortionOf(const std::string& photo, int width_px, int height_px,
+                                           const std::optional<Camera>& camera,
+                                           const EstimateOptions& options, RunScope* run) {
+  if (!camera || !options.undistort) return std::nullopt;
+  // A camera that was assumed or simulated was measured on no frames.
+  const auto is_measured = [](const std::string& method) {
+    return method != "assumed" && method != "simulated";
+  };
+  const model::CameraCalibration* const found =
+      camera->calibration ? &*camera->calibration : nullptr;
+  const bool was_undistorted = found != nullptr && found->evidence.undistorted;
+  if (!camera->distortion) {
+    if (was_undistorted) {
+      run->Warn(fmt::format(
+          "{}: it was calibrated on undistorted frames, but states no lens.distortion any more: {} "
+          "is taken as undistorted",
+          NameOf(*camera), photo));
+    }
+    return std::nullopt;
+  }
+  if (found != nullptr && !was_undistorted && is_measured(found->evidence.method)) {
+    run->Warn(fmt::format(
+        "{}: it states lens.distortion, but was calibrated on frames that were not undistorted: d1 "
+        "and kappa may differ for {}, which is; calibrate with the same distortion",
+        NameOf(*camera), photo));
+  }
+  const std::string doubt = DoubtOfDistortion(*camera);
+  if (!doubt.empty()) run->Warn(fmt::format("{}: {}", NameOf(*camera), doubt));
+  return WithFileContext(photo, [&] {
+    const LensDistortion& stated = *camera->distortion;
+    if (!options.sensor_origin) return stated.ScaledTo(width_px, height_px);
+    return stated.ScaledTo(camera->sensor.width_px, camera->sensor.height_px)
+        .OfPart(options.sensor_origin->x, options.sensor_origin->y, width_px, height_px);
+  });
+}
+
+// Takes the distortion out of photograph and depth map. The photograph becomes linear light, as it
+// would be later. A pixel that it does not show continues the image and gets no depth, so that it
+// is filled like a hole.
+void Undistort(const LensDistortion& distortion, const TransferCurve& transfer, Image* photo,
+               DepthMap* depth, EstimateDiagnostics* diagnostics, RunScope* run) {
+  const std::string name = NameOf(*photo);
+  if (depth->width_px != photo->width_px() || depth->height_px != photo->height_px()) {
+    throw Error(fmt::format(
+        "{}: it is {}x{} px, the image {} is {}x{} px: both are undistorted, for which the whole "
+        "field of the same size is needed; undistort them before (thicklens undistort) and state "
+        "that they are ({})",
+        NameOf(*depth), depth->width_px, depth->height_px, name, photo->width_px(),
+        photo->height_px(), run->Option("undistort")));
+  }
+  std::size_t missing = 0;
+  const Image linear = Image::FromLight(photo->width_px(), photo->height_px(), photo->order(),
+                                        photo->ToLight(transfer).values, transfer, photo->source());
+  *photo = UndistortImage(linear, distortion, &missing);
+  if (missing > 0) {  // an edge to black would be light that no blur explains
+    model::LinearImage light = photo->light();
+    model::ContinueBeyondSource(distortion, &light);
+    *photo = Image::FromLight(light.width_px, light.height_px, photo->order(),
+                              std::move(light.values), transfer, photo->source());
+  }
+  *depth = UndistortDepth(*depth, distortion);
+  diagnostics->without_source_share =
+      static_cast<double>(missing) / (static_cast<double>(photo->width_px()) * photo->height_px());
+  diagnostics->undistorted = distortion.Description();
+  constexpr double kPercent = 100;
+  run->Inform(fmt::format(
+      "{}: photograph and depth map are undistorted by the {} of {}, by up to {:.3g} px{}", name,
+      distortion.Description(), distortion.source.empty() ? "the camera" : distortion.source,
+      distortion.LargestShiftPx(),
+      missing == 0 ? ""
+                   : fmt::format("; {:.2g} % of the pixels have no source and no depth",
+                                 kPercent * diagnostics->without_source_share)));
+}
+
+// ---- 3. The camera of this photograph.
 
 void CheckExif(const PhotoFile& photo, const Camera& camera, const PhotoSize& size, ExifCheck check,
                EstimateDiagnostics* diagnostics, RunScope* run) {
@@ -206,32 +286,32 @@ Camera CameraFor(const PhotoFile& photo, const std::optional<TransferCurve>& tra
 }
 
 // `facts` may be null.
-TransferCurve TransferFor(const Image& photo, const io::ImageFacts* facts,
-                          const std::optional<Camera>& camera, EstimateDiagnostics* diagnostics,
-                          RunScope* run) {
-  diagnostics->transfer_from = photo.transfer() ? "image" : camera ? "camera" : "assumed";
+TransferCurve TransferFor(const std::string& photo, const std::optional<TransferCurve>& given,
+                          const io::ImageFacts* facts, const std::optional<Camera>& camera,
+                          EstimateDiagnostics* diagnostics, RunScope* run) {
+  diagnostics->transfer_from = given ? "image" : camera ? "camera" : "assumed";
   if (camera) {
     const std::string contradiction =
-        photo.transfer() || facts == nullptr ? "" : TransferContradiction(*facts, *camera);
+        given || facts == nullptr ? "" : TransferContradiction(*facts, *camera);
     if (!contradiction.empty()) {
-      run->Warn(fmt::format("{}: {}, or state it by {}", NameOf(photo), contradiction,
+      run->Warn(fmt::format("{}: {}, or state it by {}", photo, contradiction,
                             run->Option("photo.transfer")));
     }
     return camera->sensor.transfer;
   }
-  if (photo.transfer()) return *photo.transfer();
+  if (given) return *given;
   if (facts != nullptr && !StatedTransferName(*facts).empty()) {
     const auto stated = StatedTransferOf(*facts);
     if (!stated) {
       throw Error(fmt::format(
           "{}: the file states the transfer curve {}, which cannot be decoded: convert the image "
           "to sRGB or linear light, or state another curve by {}",
-          NameOf(photo), StatedTransferName(*facts), run->Option("photo.transfer")));
+          photo, StatedTransferName(*facts), run->Option("photo.transfer")));
     }
     diagnostics->transfer_from = "file";
     return *stated;
   }
-  run->Inform(fmt::format("{}: encoded values are assumed to be sRGB ({})", NameOf(photo),
+  run->Inform(fmt::format("{}: encoded values are assumed to be sRGB ({})", photo,
                           run->Option("photo.transfer")));
   return TransferCurve::Srgb();
 }
@@ -250,7 +330,7 @@ void FindStorageErrors(const Image& photo, const io::ImageFacts* facts,
   diagnostics->compression_sigma_of_mean = facts->jpeg_error->mean_levels / kLevels;
 }
 
-// ---- 3. The grid of the light field.
+// ---- 4. The grid of the light field.
 
 // UV on the aperture, where each view has one transmission; ST in the plane of focus unless a depth
 // is given.
@@ -282,7 +362,7 @@ void CheckViewCounts(const Eigen::ArrayXXd& weights, RunScope* run) {
   }
 }
 
-// ---- 4. The depth.
+// ---- 5. The depth.
 
 // A depth far from what the camera is focused at is possible, but more often its unit is wrong.
 void WarnOfUnlikelyDepth(const DepthMap& map, const Camera& camera,
@@ -371,7 +451,7 @@ void SmoothNoisyDepth(const EstimateOptions& options, estimator::DisparityMap* d
   diagnostics->depth_noise_left_px = smoothed.noise_left_px;
 }
 
-// ---- 5. The effects.
+// ---- 6. The effects.
 
 EffectSet EffectsOfModel(const AnySolver& solver, bool camera) {
   EffectSet effects = {Effect::kDefocus, Effect::kApertureShape};
@@ -426,6 +506,11 @@ PreparedProblem Prepare(Image photo, DepthMap map, const std::optional<Camera>& 
   if (photo.channels() == 4) run->Warn(file.name + ": its alpha channel is ignored");
   Image part = photo.channels() == 4 ? photo.WithoutAlpha() : std::move(photo);
   FindStorageErrors(part, facts.get(), diagnostics);
+  const std::optional<TransferCurve> given = part.transfer();
+  if (const auto distortion =
+          DistortionOf(file.name, part.width_px(), part.height_px(), camera, options, run)) {
+    Undistort(*distortion, given.value_or(camera->sensor.transfer), &part, &map, diagnostics, run);
+  }
   const int full_width_px = std::max(part.width_px(), map.width_px);
   const int full_height_px = std::max(part.height_px(), map.height_px);
   CutToCrop(options.crop, &part, &map, run);
@@ -440,10 +525,12 @@ PreparedProblem Prepare(Image photo, DepthMap map, const std::optional<Camera>& 
   prepared.input = std::make_shared<estimator::EstimateInput>();
   estimator::EstimateInput& input = *prepared.input;
   if (camera) {
-    input.camera = CameraFor(file, part.transfer(), full_width_px, full_height_px, *camera, options,
-                             diagnostics, run);
+    Camera undistorted = *camera;
+    undistorted.distortion.reset();  // from here on, there is none
+    input.camera = CameraFor(file, given, full_width_px, full_height_px, std::move(undistorted),
+                             options, diagnostics, run);
   }
-  input.transfer = TransferFor(part, facts.get(), input.camera, diagnostics, run);
+  input.transfer = TransferFor(file.name, given, facts.get(), input.camera, diagnostics, run);
   diagnostics->transfer = input.transfer;
   if (facts != nullptr && StatedTransferOf(*facts) == input.transfer)
     prepared.colour_profile = facts->icc_profile;

@@ -16,6 +16,7 @@
 #include "thicklens/base/output_file.h"
 #include "thicklens/base/yaml_reader.h"
 #include "thicklens/calib/focus_sweep.h"
+#include "thicklens/distortion.h"
 #include "thicklens/frames.h"
 #include "thicklens/io/frame_files.h"
 #include "thicklens/io/full_scale.h"
@@ -29,6 +30,7 @@
 #include "tools/interface/run_scope.h"
 #include "tools/interface/stated_transfer.h"
 #include "tools/interface/validation.h"
+#include "tools/interface/with_file_context.h"
 
 namespace thicklens {
 namespace {
@@ -37,6 +39,7 @@ namespace fs = std::filesystem;
 
 constexpr char kSweepName[] = "sweep.yaml";
 constexpr char kTruthName[] = "truth.yaml";
+constexpr char kNoDistortion[] = "none";
 
 void ApplyOverrides(const SweepOverrides& overrides, const RunScope& run, model::SweepFile* file) {
   if (overrides.offset_unknown) file->offset_mm.reset();
@@ -257,6 +260,41 @@ std::optional<std::string> StackOf(const std::string& input) {
   return path;
 }
 
+// The distortion of the frames: that of the overrides, or of the camera file.
+void TakeDistortion(const std::string& stated, const RunScope& run, Sweep* sweep) {
+  Camera& camera = sweep->camera;
+  if (stated == kNoDistortion) {
+    if (camera.distortion) {
+      sweep->notices.push_back(
+          fmt::format("{}: its lens.distortion is not used: the frames are undistorted already ({} "
+                      "{}), and the "
+                      "camera file that is written states none",
+                      camera.source, run.Option("distortion"), kNoDistortion));
+    }
+    camera.distortion.reset();
+  } else if (!stated.empty()) {
+    RunControl control = run.control();
+    control.notice = [sweep](const Notice& notice) { sweep->notices.push_back(notice.text); };
+    camera.distortion = WithFileContext(run.Option("distortion"), [&] {
+      return ReadLensDistortion(stated, camera.sensor.width_px, camera.sensor.height_px, control);
+    });
+    std::string why;
+    if (!camera.IsValid(&why)) throw Error(fmt::format("{}: {}", run.Option("distortion"), why));
+  }
+}
+
+// Says which part of the undistorted frames is measured, if it is not the whole.
+void NoteRegionWithSource(const model::RegionOfInterest& stated, Sweep* sweep) {
+  if (!sweep->camera.distortion) return;
+  const model::RegionOfInterest roi = calib::MakeFocusSweep(sweep->description, sweep->camera).roi;
+  if (roi.width == stated.width && roi.height == stated.height) return;
+  sweep->notices.push_back(
+      fmt::format("the frames do not show the whole field of their undistorted images: {} x {} px "
+                  "from ({}, {}) "
+                  "are measured",
+                  roi.width, roi.height, roi.x, roi.y));
+}
+
 Sweep Finish(model::SweepFile file, const std::string& sweep_yaml, const SweepOverrides& overrides,
              const RunScope& run, Sweep sweep) {
   ApplyOverrides(overrides, run, &file);
@@ -270,6 +308,7 @@ Sweep Finish(model::SweepFile file, const std::string& sweep_yaml, const SweepOv
   NoteCompression(file.frames, &sweep.notices);
   sweep.truth = ReadTruth(overrides.truth_path, sweep_yaml, &sweep.notices);
   sweep.camera = model::ReadCamera(file.camera_path);
+  TakeDistortion(overrides.distortion, run, &sweep);
   calib::MakeFocusSweep(file, sweep.camera);  // throws if the floor is of another camera
   if (!sweep.truth) {                         // the parameters of a simulated camera are exact
     const std::string missing = MissingTolerancesLine(sweep.camera);
@@ -279,6 +318,7 @@ Sweep Finish(model::SweepFile file, const std::string& sweep_yaml, const SweepOv
     if (!objective.empty()) sweep.notices.push_back(objective);
   }
   sweep.description = std::move(file);
+  NoteRegionWithSource(sweep.description.roi, &sweep);
   return sweep;
 }
 

@@ -7,7 +7,9 @@
 #include <utility>
 #include <variant>
 
+#include "thicklens/distortion.h"
 #include "thicklens/model/light_field_grid.h"
+#include "tools/options/distortion_option.h"
 #include "tools/options/embedded_depth.h"
 #include "tools/options/estimate_plan.h"
 #include "tools/options/option_values.h"
@@ -94,6 +96,8 @@ OptionNames EstimateOptionNames() {
           {"camera", "--camera"},
           {"sensor_origin", "--sensor-origin"},
           {"lens_position", "--lens-position"},
+          {"undistort", "--distortion none"},
+          {"distortion", "--distortion"},
           {"exif", "--ignore-exif"},
           {"photo.transfer", "--transfer"},
           {"photo.orientation", "--orientation displayed"},
@@ -156,6 +160,7 @@ thicklens::EstimateOptions SettingsOf(const EstimateOptions& options) {
   settings.crop = CropRect(options.crop);
   settings.sensor_origin = SensorOriginOf(options.sensor_origin);
   settings.lens_position = options.lens_position;
+  settings.undistort = options.distortion != kUndistorted;
   if (options.ignore_exif) settings.exif = ExifCheck::kIgnore;
   if (!options.aperture_shape.empty()) {
     settings.aperture.shape = model::ApertureShapeFromName(options.aperture_shape);
@@ -190,6 +195,13 @@ EstimateCall ReadEstimateCall(const EstimateOptions& options, const RunControl& 
                                DepthReadOptionsOf(options.depth),
                                DepthRun("the same command without a depth map"));
   if (!options.camera_path.empty()) call.camera = ReadCamera(options.camera_path);
+  if (call.settings.undistort && !options.distortion.empty()) {
+    const model::Sensor& sensor = call.camera->sensor;
+    call.camera->distortion =
+        ReadLensDistortion(options.distortion, sensor.width_px, sensor.height_px, run);
+    std::string why;
+    if (!call.camera->IsValid(&why)) throw Error("--distortion: " + why);
+  }
   if (options.aperture_of.empty()) return call;
   LightFieldReadOptions reading;
   reading.hci_grid = options.grid;

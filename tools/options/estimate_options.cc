@@ -92,6 +92,12 @@ void AddInputOptions(CLI::App* command, EstimateOptions* options) {
                    "focus_positions; default: as the photograph's metadata state it, or that of "
                    "the calibration")
       ->type_name("P");
+  command
+      ->add_option("--distortion", options->distortion,
+                   "Lens distortion that is taken out of photograph and depth map: a file of "
+                   "OpenCV, ROS, Kalibr, COLMAP or mrcal, FILE:CAMERA in a file of several, or "
+                   "none for images that are undistorted already; default: that of the camera file")
+      ->type_name("FILE[:CAMERA]");
   command->add_flag("--ignore-exif", options->ignore_exif,
                     "Continue even if the EXIF of the photograph states another lens, setting or "
                     "sensor than the camera file");
@@ -404,6 +410,8 @@ void CheckEstimateUsage(const EstimateOptions& options) {
                     options.depth.kind));
   needs(!options.sensor_origin.empty(), camera, "--sensor-origin needs a --camera");
   needs(options.lens_position.has_value(), camera, "--lens-position needs a --camera");
+  needs(!options.distortion.empty(), camera,
+        "--distortion needs a --camera; without one, use thicklens undistort");
   needs(options.ignore_exif, camera, "--ignore-exif needs a --camera, with which EXIF is compared");
   needs(options.st_depth_mm.has_value(), camera, "--st-depth-mm needs a --camera");
   needs(options.grid > 0 || options.sparse, aperture_of, "--grid and --sparse need --aperture-of");

@@ -26,6 +26,7 @@ struct EstimateOptions {
   bool sparse = false;
   std::string sensor_origin;
   std::optional<double> lens_position;
+  std::string distortion;    // FILE, FILE:CAMERA or "none"; empty: that of the camera file
   bool ignore_exif = false;  // for a photograph whose EXIF contradicts the camera file
   std::optional<double> st_depth_mm;
   std::string transfer;

@@ -6,6 +6,7 @@
 #include <system_error>
 
 #include "thicklens/io/video_file.h"
+#include "tools/options/distortion_option.h"
 #include "tools/options/option_values.h"
 
 namespace thicklens::tools {
@@ -157,6 +158,7 @@ std::vector<std::string> SweepArguments::Files() const {
   std::vector<std::string> files = {input, readings_csv, camera_path, truth_path, floor_from};
   for (const auto* more : {&correction.dark, &correction.flat, &correction.defects})
     files.insert(files.end(), more->begin(), more->end());
+  files.push_back(FileOfDistortion(distortion));
   return files;
 }
 
@@ -176,6 +178,7 @@ SweepOverrides SweepOverridesOf(const SweepArguments& arguments) {
     if (arguments.raw == model::SweepRawName(raw)) overrides.raw = raw;
   }
   overrides.correction = arguments.correction;
+  overrides.distortion = arguments.distortion;
   overrides.readings = arguments.readings;
   overrides.video = arguments.video;
   for (const auto direction : {model::BenchDirection::kAway, model::BenchDirection::kToward}) {
@@ -217,6 +220,7 @@ OptionNames SweepOptionNames() {
           {"correction.dark", "--dark"},
           {"correction.flat", "--flat"},
           {"correction.defects", "--defects"},
+          {"distortion", "--distortion"},
           {"readings", "--readings"},
           {"readings.column", "--column"},
           {"readings.file_column", "--file-column"},

@@ -32,6 +32,7 @@ struct SweepArguments {
   std::optional<int> full_scale;
   std::string raw;  // "demosaiced" or "green"
   model::CorrectionFiles correction;
+  std::string distortion;  // FILE, FILE:CAMERA or "none"
   model::ReadingOptions readings;
   model::VideoSelection video;
 

@@ -127,8 +127,9 @@ static void AddFocusStatements(CLI::App* command, SweepArguments* sweep,
 }
 
 // The options for what corrects the frames.
-static void AddCorrectionFiles(CLI::App* command, model::CorrectionFiles* files,
+static void AddCorrectionFiles(CLI::App* command, SweepArguments* sweep,
                                const std::string& instead) {
+  model::CorrectionFiles* files = &sweep->correction;
   command
       ->add_option("--dark", files->dark,
                    "Exposures without light, which are averaged and subtracted from each frame in "
@@ -148,6 +149,12 @@ static void AddCorrectionFiles(CLI::App* command, model::CorrectionFiles* files,
                    "list of x and y" +
                        instead)
       ->type_name("FILE...");
+  command
+      ->add_option("--distortion", sweep->distortion,
+                   "Lens distortion that is taken out of the frames: a file of OpenCV, ROS, "
+                   "Kalibr, COLMAP or mrcal, FILE:CAMERA in a file of several, or none for frames "
+                   "that are undistorted already; overrides the camera file")
+      ->type_name("FILE[:CAMERA]");
 }
 
 void AddSweepStatements(CLI::App* command, SweepArguments* sweep) {
@@ -215,7 +222,7 @@ void AddSweepStatements(CLI::App* command, SweepArguments* sweep) {
                        instead)
       ->check(CLI::IsMember({"demosaiced", "green"}))
       ->type_name("KIND");
-  AddCorrectionFiles(command, &sweep->correction, instead);
+  AddCorrectionFiles(command, sweep, instead);
 }
 
 }  // namespace thicklens::tools

@@ -10,7 +10,7 @@ namespace thicklens::tools {
 // Adds the options that override statements of a sweep's file: --offset-mm, --offset-sigma-mm,
 // --focus-depth-mm, --working-distance-mm, --image-distance-mm, --tube-length-mm, --magnification,
 // --direction, --reading-sigma-mm, --floor-px, --floor-from, --target, --target-period-mm, --roi,
-// --full-scale, --raw, --dark, --flat, --defects.
+// --full-scale, --raw, --dark, --flat, --defects, --distortion.
 void AddSweepStatements(CLI::App* command, SweepArguments* sweep);
 
 // Adds the options that say where the readings are: --readings, --column, --file-column, --unit,

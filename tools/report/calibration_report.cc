@@ -7,6 +7,7 @@
 
 #include "thicklens/base/printable_text.h"
 #include "tools/report/calibration_figures.h"
+#include "tools/report/distortion_words.h"
 #include "tools/report/page_style.h"
 #include "tools/report/svg_plot.h"
 
@@ -101,6 +102,10 @@ std::string HowItWasMade(const FocusSweep& sweep, const Calibration& calibration
   item(fmt::format("Camera {}: {} × {} px, transfer {}, point spread function {}.", camera.name,
                    camera.sensor.width_px, camera.sensor.height_px, camera.sensor.transfer.Name(),
                    model::PsfName(camera.psf)));
+  if (camera.distortion) {
+    item(fmt::format("The distortion of the lens was taken out of the frames: {}.",
+                     DistortionWords(*camera.distortion)));
+  }
   if (!sweep.frames.empty()) {
     const auto [lo, hi] =
         std::minmax_element(sweep.frames.begin(), sweep.frames.end(),

@@ -282,6 +282,8 @@ json EstimateJson(const EstimateOptions& options, const EstimateOutcome& outcome
                                 : options.transfer.empty()     ? "file"
                                                                : "option"},
               {"read", FileReadJson(options.image_path, outcome.photo_facts.get())},
+              {"undistorted", TextOrNull(found.undistorted)},
+              {"without_source_share", found.without_source_share},
               {"embedded_depth", TextOrNull(outcome.embedded_depth)},
               {"aperture", ApertureJson(options, found)},
               {"exif", ExifJson(options, found)},
@@ -360,6 +362,13 @@ std::string EstimateText(const EstimateOptions& options, const EstimateOutcome& 
     text += fmt::format("photograph   {}\n", PrintableUtf8(outcome.photo_facts->OneLine()));
   if (!outcome.embedded_depth.empty())
     text += fmt::format("depth map    {}\n", PrintableUtf8(outcome.embedded_depth));
+  if (!found.undistorted.empty()) {
+    text += fmt::format("undistorted  {}{}\n", PrintableUtf8(found.undistorted),
+                        found.without_source_share > 0
+                            ? fmt::format("; {:.2g} % of the pixels have no source",
+                                          100 * found.without_source_share)
+                            : "");
+  }
   text += DepthText(found);
   text += fmt::format("light field  {} x {} views of {} x {} px, {} channel(s)\n", summary.u_count,
                       summary.v_count, summary.width_px, summary.height_px, summary.channels);

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "thicklens/base/printable_text.h"
+#include "tools/report/distortion_words.h"
 
 namespace thicklens::tools {
 namespace {
@@ -27,12 +28,15 @@ std::string HeadText(const model::Explanation& known) {
       "image distance d1     {} mm\n"
       "in-focus distance zf  {}\n"
       "blur ratio kappa      {}\n"
-      "blur floor            {}\n\n",
+      "blur floor            {}\n{}\n",
       PrintableUtf8(known.camera_name),
       with_sigma(known.image_distance_mm, known.image_distance_sigma_mm),
       DepthWithUnit(known.focus_depth_mm), with_sigma(known.blur_ratio, known.blur_ratio_sigma),
       known.blur_floor_px ? fmt::format("{:.4g} px", *known.blur_floor_px)
-                          : "unknown, assumed to be 0 below");
+                          : "unknown, assumed to be 0 below",
+      known.distortion ? fmt::format("lens distortion       {}; images are undistorted first\n",
+                                     DistortionWords(*known.distortion))
+                       : "");
 }
 
 // The column of the thin lens is left out if the lens is thin: it would repeat the blur radius.
@@ -134,6 +138,7 @@ nlohmann::json ExplanationJson(const model::Explanation& explanation) {
         {"scale_ratio", thin.scale_ratio},
         {"corner_shift_px", thin.corner_shift_px},
         {"alike_up_to_mm", Number(thin.alike_up_to_mm)}}},
+      {"distortion", DistortionJson(explanation.distortion)},
       {"hyperfocal_mm", explanation.hyperfocal_mm},
       {"working_f_number", explanation.working_f_number}};
   for (const model::DepthRow& row : explanation.rows) json["depths"].push_back(RowJson(row));

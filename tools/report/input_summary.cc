@@ -17,6 +17,7 @@
 #include "thicklens/calib/frame_correction.h"
 #include "thicklens/model/conjugates.h"
 #include "thicklens/opencv.h"
+#include "tools/report/distortion_words.h"
 
 namespace thicklens::tools {
 namespace {
@@ -165,6 +166,8 @@ std::string CorrectionText(const Sweep& sweep) {
   std::string text;
   for (const std::string& line : sweep.correction_lines)
     text += fmt::format("{:<10} {}\n", text.empty() ? "corrected" : "", PrintableUtf8(line));
+  if (sweep.camera.distortion)
+    text += fmt::format("distortion {}\n", DistortionWords(*sweep.camera.distortion));
   return text;
 }
 
@@ -226,6 +229,7 @@ nlohmann::json UnderstandingJson(const Sweep& sweep, const Understanding& found,
                          {"target", model::SweepTargetName(sweep.description.target)},
                          {"raw", model::SweepRawName(sweep.description.raw)},
                          {"correction", CorrectionJson(sweep)},
+                         {"distortion", DistortionJson(sweep.camera.distortion)},
                          {"stated_focus", StatedFocusJson(sweep)},
                          {"target_period_mm", nullptr},
                          {"offset_mm", nullptr},

@@ -10,6 +10,7 @@
 #include "model/schema/renamed_keys.h"
 #include "model/schema/yaml_fields.h"
 #include "model/schema/yaml_writer.h"
+#include "model/simulate/simulated_camera.h"
 #include "thicklens/base/yaml_reader.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/scene_simulator.h"
@@ -182,6 +183,7 @@ SceneSimulationOptions ReadSceneSimulation(const std::string& path) {
   constexpr int kAny = std::numeric_limits<int>::max();  // IsValid checks the upper bound
   SceneSimulationOptions options;
   options.camera = ReadCamera(root.ResolvePath(root.At("camera").Text()));
+  TakeOutDistortion(&options.camera, &options.notices);
   if (const auto truth = root.Find("truth")) ReadTruth(*truth, &options.camera);
   if (const auto size = root.Find("size_px")) options.camera = ReadCrop(*size, options.camera);
   for (const YamlNode& layer : root.At("layers").Elements()) {

@@ -8,6 +8,7 @@
 #include "model/schema/effect_yaml.h"
 #include "model/schema/renamed_keys.h"
 #include "model/schema/yaml_fields.h"
+#include "model/simulate/simulated_camera.h"
 #include "thicklens/base/yaml_reader.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/sweep_simulator.h"
@@ -159,6 +160,7 @@ SweepSimulationOptions ReadSweepSimulation(const std::string& path) {
                     "pupil_law", "effects", "without", "seed"});
   SweepSimulationOptions options;
   options.camera = ReadCamera(root.ResolvePath(root.At("camera").Text()));
+  TakeOutDistortion(&options.camera, &options.notices);
   if (const auto truth = root.Find("truth")) ReadTruth(*truth, &options.camera);
   if (const auto size = root.Find("size_px")) options.camera = ReadCrop(*size, options.camera);
   options.target = ReadTarget(root.At("target"), &options.notices);

@@ -51,6 +51,17 @@ TEST(CheckDistortion, NamesLensAndTargetWhereNothingElseIsSeen) {
                c.diagnostics.diagnoses[0].Names(kFixedStructureShifts));
 }
 
+// The message names the commands that do it, unless it was done.
+TEST(CheckDistortion, NamesTheCommandsThatTakeADistortionOut) {
+  Calibration c = Distorted(-0.14, 0.03);
+  EXPECT_THAT(CheckDistortion(&c).value_or(""),
+              AllOf(HasSubstr("calibrate --distortion FILE"), HasSubstr("thicklens undistort")));
+  Calibration undistorted = Distorted(-0.14, 0.03);
+  EXPECT_THAT(CheckDistortion(&undistorted, false, true).value_or(""),
+              AllOf(HasSubstr("after its stated distortion was taken out"),
+                    Not(HasSubstr("thicklens undistort"))));
+}
+
 // Causes that a small sweep cannot exclude stay in the list.
 TEST(CheckDistortion, WhatIsNotExcludedIsNamedToo) {
   Calibration c = Distorted(0.02, 0.001);

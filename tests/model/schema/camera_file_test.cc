@@ -73,6 +73,52 @@ TEST(CameraFile, ReadsWhatIsThere) {
   EXPECT_EQ(ParseCamera(Text(""), "c.yaml").psf, Psf::kGaussian);
 }
 
+constexpr char kDistortedLens[] =
+    "lens: {front_focal_length_mm: 12.5, rear_focal_length_mm: 12.8, lens_thickness_mm: 3.0, "
+    "aperture_radius_mm: 4.46,\n"
+    "  distortion: {model: opencv, size_px: [1280, 960], focal_length_px: [4266.1, 4266.7],\n"
+    "    principal_point_px: [640.3, 478.9], coefficients: [-0.21, 0.07, 0.0011, -7e-4, 0.013]}}\n";
+
+TEST(CameraFile, LensDistortionIsReadAndWritten) {
+  const Camera camera = ParseCamera(Text("", kDistortedLens), "c.yaml");
+  ASSERT_TRUE(camera.distortion);
+  EXPECT_EQ(camera.distortion->model, DistortionModel::kOpenCv);
+  EXPECT_EQ(camera.distortion->width_px, 1280);
+  EXPECT_EQ(camera.distortion->height_px, 960);
+  EXPECT_EQ(camera.distortion->focal_length_px, Eigen::Vector2d(4266.1, 4266.7));
+  EXPECT_EQ(camera.distortion->principal_point_px, Eigen::Vector2d(640.3, 478.9));
+  EXPECT_THAT(camera.distortion->coefficients, ElementsAre(-0.21, 0.07, 0.0011, -7e-4, 0.013));
+  const std::string yaml = CameraToYaml(camera);
+  const Camera again = ParseCamera(yaml, "again.yaml");
+  ASSERT_TRUE(again.distortion);
+  EXPECT_EQ(again.distortion->coefficients, camera.distortion->coefficients);
+  EXPECT_EQ(CameraToYaml(again), yaml);
+  EXPECT_THAT(CameraToYaml(ParseCamera(Text(""), "c.yaml")), Not(HasSubstr("distortion")));
+  const std::string fisheye =
+      Replaced(Replaced(kDistortedLens, "opencv", "fisheye"), ", 0.013", "");
+  EXPECT_EQ(ParseCamera(Text("", fisheye), "c.yaml").distortion->model, DistortionModel::kFisheye);
+}
+
+TEST(CameraFile, ErrorsOfTheLensDistortionNameItsFields) {
+  const auto error = [](const std::string& what, const std::string& by) {
+    return ErrorOfText(Text("", Replaced(kDistortedLens, what, by)));
+  };
+  EXPECT_THAT(error("-0.21, 0.07, 0.0011, ", ""),
+              AllOf(StartsWith("c.yaml:4:"), HasSubstr("lens.distortion: coefficients"),
+                    HasSubstr("4, 5, 8, 12, 14"), HasSubstr("found 2")));
+  EXPECT_THAT(error("0.0011", ".nan"), HasSubstr("lens.distortion.coefficients[2]"));
+  EXPECT_THAT(error("model: opencv", "model: brown"),
+              AllOf(HasSubstr("lens.distortion.model"), HasSubstr("opencv, fisheye")));
+  EXPECT_THAT(error("focal_length_px", "focal_lenght_px"),
+              HasSubstr("did you mean 'focal_length_px'?"));
+  EXPECT_THAT(error("[1280, 960]", "[1280]"), HasSubstr("lens.distortion.size_px"));
+  EXPECT_THAT(error("[1280, 960]", "[1280, 720]"),
+              AllOf(HasSubstr("lens.distortion"), HasSubstr("1280 x 720 px"),
+                    HasSubstr("640 x 480 px"), HasSubstr("aspect ratio")));
+  EXPECT_THAT(error("[4266.1, 4266.7]", "[0, 4266.7]"),
+              HasSubstr("lens.distortion.focal_length_px[0]"));
+}
+
 TEST(CameraFile, EveryErrorNamesItsPlace) {
   EXPECT_EQ(ErrorWith("aperture_radius_mm", "aperture_raduis_mm"),
             "c.yaml:3:89: lens: unknown key 'aperture_raduis_mm'; did you mean "

@@ -59,6 +59,36 @@ const char kTruth[] = "truth: {focus_depth_mm: 300, blur_ratio: 0.4, blur_floor_
 const char kTarget[] = "target: {kind: dead-leaves}\n";
 const char kBench[] = "bench: {first_depth_mm: 290, step_mm: 1, frames: 21}\n";
 
+// The simulator's lens has no distortion, so that its frames must not be undistorted.
+TEST_F(SweepSimulationFileTest, ADistortionOfTheCameraIsTakenOutAndReported) {
+  const std::string text = std::string(kHead) + kTruth + kTarget + kBench;
+  EXPECT_TRUE(Read(text).notices.empty());
+  WriteFileAtomically((folder_ / "camera.yaml").string(),
+                      "schema: thicklens/camera/2\n"
+                      "name: macro\n"
+                      "lens: {front_focal_length_mm: 50, rear_focal_length_mm: 50, "
+                      "lens_thickness_mm: 0, aperture_radius_mm: 9, distortion: {model: opencv, "
+                      "size_px: [640, 481], focal_length_px: [11111, 11111], principal_point_px: "
+                      "[319.5, 240], coefficients: [10, 0, 0, 0]}}\n"
+                      "sensor: {width_px: 640, height_px: 481, pixel_pitch_mm: 0.0045, "
+                      "principal_point_px: [319.5, 240], transfer: srgb}\n");
+  SweepSimulationOptions options = Read(text);
+  EXPECT_FALSE(options.camera.distortion);
+  ASSERT_EQ(options.notices.size(), 1U);
+  EXPECT_THAT(options.notices[0], HasSubstr("lens.distortion is not simulated"));
+  std::string why;
+  EXPECT_TRUE(options.IsValid(&why)) << why;
+  LensDistortion distortion;
+  distortion.width_px = 640;
+  distortion.height_px = 481;
+  distortion.focal_length_px = {11111, 11111};
+  distortion.principal_point_px = {319.5, 240};
+  distortion.coefficients = {10, 0, 0, 0};
+  options.camera.distortion = distortion;
+  EXPECT_FALSE(options.IsValid(&why));
+  EXPECT_THAT(why, HasSubstr("lens.distortion"));
+}
+
 TEST_F(SweepSimulationFileTest, ReadsAMovingLensOrSensor) {
   const std::string head = std::string(kHead) + kTruth + kTarget;
   EXPECT_EQ(Read(head + kBench).moves, SweepMotion::kTarget);

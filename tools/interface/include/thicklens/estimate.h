@@ -62,6 +62,9 @@ struct EstimateOptions {
   // calibration.focus_positions, which give d1 of it. Absent: the one that the photograph's
   // metadata state in dioptres, otherwise that of the calibration.
   std::optional<double> lens_position;
+  // Whether photograph and depth map are first undistorted by the camera's distortion, if it states
+  // one; false: they are undistorted already.
+  bool undistort = true;
   ExifCheck exif = ExifCheck::kRequire;  // what a contradiction does
   ApertureOptions aperture;              // weights of the views
   // Depth of the ST plane from Ap, mm, 0 < st_depth_mm <= 1e9; absent: the plane of focus. Needs a
@@ -165,10 +168,13 @@ struct UnexplainedPatch {
 struct EstimateDiagnostics {
   TransferCurve transfer = TransferCurve::Srgb();  // curve by which the photograph was decoded
   std::string transfer_from;                       // "image", "camera", "file" or "assumed"
-  bool has_exif = false;                           // EXIF was found and compared
-  std::vector<ExifComparison> exif;                // one per compared quantity
-  std::string aperture_shape;                      // "uniform", "gaussian", "disc", ...
-  std::string aperture_from;                       // "option", "light-field", "camera", "assumed"
+  // The distortion that was taken out of photograph and depth map, in words; empty: none.
+  std::string undistorted;
+  double without_source_share = 0;   // share of the pixels that the distorted photograph lacks
+  bool has_exif = false;             // EXIF was found and compared
+  std::vector<ExifComparison> exif;  // one per compared quantity
+  std::string aperture_shape;        // "uniform", "gaussian", "disc", ...
+  std::string aperture_from;         // "option", "light-field", "camera", "assumed"
   std::optional<double> aperture_calibrated_sigma_mm;  // kappa r, with a camera
   Eigen::Vector2d aperture_sigma_mm{0, 0};             // that the views have, along u and v [D30]
   Eigen::Vector2d aperture_corner_change{0, 0};  // relative change of it in the corners, largest

@@ -85,6 +85,9 @@ struct SweepOverrides {
   std::optional<model::SweepRaw> raw;  // what is measured of raw files
   // Files by which the frames are corrected. Each list that is not empty replaces that of the file.
   model::CorrectionFiles correction;
+  // File with the lens distortion of the frames, "FILE" or "FILE:CAMERA" (thicklens/distortion.h),
+  // instead of that of the camera file; "none": the frames are undistorted already.
+  std::string distortion;
   // Which readings are read, and in which unit (thicklens/model/readings.h).
   model::ReadingOptions readings;
   // Which frames of a video are used, and its constant speed: for ReadSweepFolder of a video, and

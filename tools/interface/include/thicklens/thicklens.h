@@ -11,6 +11,7 @@
 #include "thicklens/camera.h"       // IWYU pragma: export
 #include "thicklens/compare.h"      // IWYU pragma: export
 #include "thicklens/depth.h"        // IWYU pragma: export
+#include "thicklens/distortion.h"   // IWYU pragma: export
 #include "thicklens/effects.h"      // IWYU pragma: export
 #include "thicklens/estimate.h"     // IWYU pragma: export
 #include "thicklens/explain.h"      // IWYU pragma: export

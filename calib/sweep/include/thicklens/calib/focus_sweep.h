@@ -50,7 +50,10 @@ struct FocusSweep {
   model::SweepTarget target = model::SweepTarget::kAuto;  // kind of the target, if it is stated
   model::FloorKnowledge floor;                            // what is known of the blur floor, px
   std::optional<double> target_period_mm;                 // period of a periodic target
-  model::RegionOfInterest roi;                            // the part of the frames that is measured
+  // The part of the frames that is measured, after the camera's distortion was taken out of them.
+  // Pixels of it that the distorted frames do not show are black, and MakeFocusSweep leaves them
+  // out.
+  model::RegionOfInterest roi;
   // Dark, flat and defects that LinearGrey and LinearChannel correct the light by, of the size of
   // the frames; null: none.
   std::shared_ptr<const FrameCorrection> correction;
@@ -77,8 +80,8 @@ THICKLENS_EXPORT cv::Mat RegionOf(const cv::Mat& stored, const FocusSweep& sweep
                                   std::size_t index);
 
 // Returns the region as linear grey light in [0, 1], CV_32F (0.2126 R + 0.7152 G + 0.0722 B). A
-// correction of the sweep is applied, after which light may be below 0 or above 1. Throws as
-// RegionOf does.
+// correction of the sweep is applied, and then the camera's distortion is taken out, after which
+// light may be below 0 or above 1. Throws as RegionOf does.
 THICKLENS_EXPORT cv::Mat LinearGrey(const cv::Mat& stored, const FocusSweep& sweep,
                                     std::size_t index);
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "thicklens/base/export.h"
+#include "thicklens/model/lens_distortion.h"
 #include "thicklens/model/objective.h"
 #include "thicklens/model/thick_lens.h"
 #include "thicklens/model/transfer_curve.h"
@@ -58,7 +59,9 @@ struct RejectedFrame {
 
 // Origin of a calibration.
 struct Evidence {
-  std::string method;                          // "assumed": nothing was measured
+  std::string method;  // "assumed": nothing was measured
+  // Whether the frames were undistorted by the camera's distortion before they were measured.
+  bool undistorted = false;
   int frames_used = 0;                         // number of frames in the fit
   std::vector<RejectedFrame> frames_rejected;  // in the order of the sweep
   std::optional<double> chi2_per_dof;          // chi^2 of the blur fit per degree of freedom
@@ -121,6 +124,9 @@ struct Camera {
   // Distance from the front of the lens's barrel to Ap behind it, mm. It converts working distances
   // to depths. Absent: not stated.
   std::optional<double> aperture_behind_front_mm;
+  // The distortion of frames and photographs as they come from the camera. They are undistorted by
+  // it before they are used; all other members describe undistorted images. Absent: none.
+  std::optional<LensDistortion> distortion;
   Sensor sensor;             // size, pitch, principal point, transfer curve
   Psf psf = Psf::kGaussian;  // shape of the defocus blur
   // The key is the path of the field in the file, e.g. "lens.aperture_radius_mm"; an element of a

@@ -66,6 +66,8 @@ struct Explanation {
   double hyperfocal_mm = 0;     // plane of focus whose blur radius at infinity is 1 px
   double working_f_number = 0;  // D/(2 r)
   ThinComparison thin;          // the camera as a thin lens
+  // The distortion that is taken out of the camera's images before they are used; absent: none.
+  std::optional<LensDistortion> distortion;
 };
 
 // Returns `count` depths (>= 2), equally spaced in 1/z, where the blur changes by equal steps.
