@@ -127,8 +127,9 @@ struct Command {
   void (*add)(CLI::App* program, tools::CommandAction* action);
 };
 // In the order of work, as --help lists them.
-constexpr std::array<Command, 13> kCommands = {{{"target", tools::AddTargetCommand},
+constexpr std::array<Command, 14> kCommands = {{{"target", tools::AddTargetCommand},
                                                 {"camera", tools::AddCameraCommand},
+                                                {"plan", tools::AddPlanCommand},
                                                 {"frames", tools::AddFramesCommand},
                                                 {"calibrate", tools::AddCalibrateCommand},
                                                 {"explain", tools::AddExplainCommand},
