@@ -178,6 +178,20 @@ TEST(PlanSweep, WarnsOfAnUndersampledLens) {
               ::testing::Not(::testing::Contains(HasSubstr("undersamples"))));
 }
 
+TEST(PlanSweep, SaysThatAnOffsetOfTheImageScaleIsPredictedLessExactly) {
+  PlanConditions conditions = PlanFor("case-iii", 112, 400);
+  PlanWishes wishes;
+  wishes.frames = 11;
+  wishes.nearest_mm = 330;
+  wishes.farthest_mm = 470;
+  wishes.feature_size_mm = 0.4;
+  const std::string text = "predicted less exactly";
+  EXPECT_THAT(PlanSweep(conditions, wishes).warnings,
+              ::testing::Not(::testing::Contains(HasSubstr(text))));
+  conditions.offset_sigma_mm.reset();
+  EXPECT_THAT(PlanSweep(conditions, wishes).warnings, ::testing::Contains(HasSubstr(text)));
+}
+
 TEST(PlanSweep, RefusesWhatCannotBePlanned) {
   const PlanConditions good = Bench();
   PlanWishes wishes;
