@@ -30,9 +30,10 @@ constexpr int kRefinements = 8;
 // The nearest frame is beyond the focal length by this part of zf - f1, and the farthest is at most
 // so many times as far as the plane of focus.
 constexpr double kBeyondFocalPoint = 0.1, kFarthest = 3;
-// Sizes of the texture that are tried: radius of the smallest leaf, or half of a period, px at
+// Sizes of the texture that are tried, none finer than a px in the nearest frame, which neither a
+// camera nor the simulator resolves: radius of the smallest leaf, or half of a period, px at
 // focus.
-constexpr double kFeaturesPx[] = {0.7, 1, 1.4, 2, 2.8, 4, 5.6, 8, 11, 16};
+constexpr double kFeaturesPx[] = {1.2, 1.6, 2, 2.8, 4, 5.6, 8, 11, 16};
 constexpr double kUsualFeaturePx = 2;
 constexpr double kMuchWorse = 1.25;  // ratio of errors that is worth a warning
 constexpr double kMargin = 1.1;      // of the target's size

@@ -257,7 +257,7 @@ std::string WantedText(const std::optional<double>& wanted, const char* unit) {
   return wanted ? fmt::format(" (wanted {:.3g}{})", *wanted, unit) : "";
 }
 
-std::string PlanText(const PlanOptions& options, const SweepPlan& plan) {
+std::string TextOfPlan(const PlanOptions& options, const SweepPlan& plan) {
   const ExpectedSweep& expected = plan.expected;
   const SweepDesign& design = expected.design;
   const PlanConditions& conditions = options.conditions;
@@ -341,7 +341,7 @@ CommandResult Plan(PlanOptions options) {
   CommandResult result;
   result.summary = PlanJson(options, plan);
   if (!plan.reached) {
-    PrintResult(options.common, PlanText(options, plan));
+    PrintResult(options.common, TextOfPlan(options, plan));
     result.refusal = plan.reason;
     return result;
   }
@@ -352,7 +352,7 @@ CommandResult Plan(PlanOptions options) {
   }
   if (readings) readings->Commit(PlannedReadingsCsv(plan.expected.design));
   result.is_written = output || readings;
-  PrintResult(options.common, PlanText(options, plan) + CommandsText(options, plan.expected) +
+  PrintResult(options.common, TextOfPlan(options, plan) + CommandsText(options, plan.expected) +
                                   WrittenText({options.output, options.readings_output}));
   return result;
 }

@@ -43,8 +43,7 @@ class PlanProgram : public ::testing::Test {
   }
 
   static Arguments Small(const Arguments& more) {
-    Arguments arguments = {"--focus-mm", "300",      "--region",     "128x112",
-                           "--floor",    "0.5,0.02", "--feature-mm", "0.05"};
+    Arguments arguments = {"--focus-mm", "300", "--region", "128x112", "--floor", "0.5,0.02"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return arguments;
   }
