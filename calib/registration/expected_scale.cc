@@ -41,7 +41,7 @@ std::vector<double> SharedErrors(int size_px) {
 }
 
 // Factor by which the errors that neighbouring tiles share widen the variance of the scale, whose
-// fit weights the shift of a tile by its place [D142].
+// fit weights the shift of a tile by its place [D154].
 double OverlapOf(const TileLayout& layout, const std::vector<TileShift>& shifts) {
   const std::vector<double> shared = SharedErrors(layout.size_px);
   const auto at = [&shared](int distance_px) {

@@ -27,7 +27,7 @@ struct ExpectedField {
 };
 
 // The scales that TrackScale is expected to find: those that are true, with the errors that the
-// noise and the texture give the registration of each tile [D142]. Frames whose registration would
+// noise and the texture give the registration of each tile [D154]. Frames whose registration would
 // fail are left out.
 struct ExpectedScales {
   std::vector<ScaleSample> samples;  // with the errors that TrackScale states

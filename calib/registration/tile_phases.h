@@ -42,7 +42,7 @@ class TilePhases {
     double texture = 0, frame_noise = 0, reference_noise = 0;
   };
   // The inverse variance, px^-2 along each axis, that the shift of a tile of random texture has on
-  // average [D142]. `powers` is a function of the frequency, cycles per px.
+  // average [D154]. `powers` is a function of the frequency, cycles per px.
   double ExpectedInformation(const std::function<Powers(double frequency)>& powers) const;
 
   // Correlation coefficient after Solve, over the frequencies that agree at all; 1 where the images

@@ -25,7 +25,7 @@ struct ExpectedBlur {
   std::vector<int> modes_used;  // number of modes of each frame in its band
 };
 
-// The inverse of the Fisher information about V, with the gains and the texture eliminated [D140]:
+// The inverse of the Fisher information about V, with the gains and the texture eliminated [D152]:
 // for the spectra G_i(k) = g_i H_i(k) T(k) + noise, with P_k = sum_i |H_i|^2/N_i, it is
 //   sum_k |T|^2 (delta_ij |H_i|^2/N_i - |H_i|^2/N_i |H_j|^2/N_j/P_k) d_i d_j, d = (1, d ln H/dV).
 // `power` is |T|^2 of each mode, the texture's without any blur. It is the same information that

@@ -20,7 +20,7 @@ struct Texture {
 bool HasSpectrum(model::TargetKind kind);
 
 // Mean power density of the light of a texture relative to its mean, mm^2 of the target, without
-// blur [D141]. Its integral over the frequencies is the variance of the relative light.
+// blur [D153]. Its integral over the frequencies is the variance of the relative light.
 //
 // Dead leaves: of two points at a distance x, the leaf in front that covers any of them covers both
 // with the probability b(x) = g/(2 - g), g(x) = E(area that a leaf shares with itself moved by x)/

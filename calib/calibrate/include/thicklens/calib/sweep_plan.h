@@ -99,7 +99,7 @@ struct ExpectedSweep {
 
 // Returns what is expected of a sweep, by the same steps as Calibrate: the largest window that the
 // frames share, the modes of the texture above the noise, the information of the spectra about each
-// frame's blur [D140], the registrations' about its scale [D142], and the joint fit with its
+// frame's blur [D152], the registrations' about its scale [D154], and the joint fit with its
 // Jacobian. Throws Error for conditions or a design that are not valid.
 THICKLENS_EXPORT ExpectedSweep ExpectSweep(const PlanConditions& conditions,
                                            const SweepDesign& design);
