@@ -16,12 +16,9 @@
 namespace thicklens::calib {
 namespace {
 
-constexpr std::size_t kMinFrames = 5;
-constexpr int kMinModesOfFrame = 16;
+constexpr std::size_t kMinFrames = kMinFramesOfFit;
 constexpr double kDefaultFloor = 0.25;  // S0 at the start, px^2
-constexpr double kWholeField = 0.98;
 constexpr std::size_t kFramesForBound = 9;
-constexpr double kModesOfAll = 30000;  // per ring, times frames
 constexpr int kPasses = 3;
 // No further pass follows if every frame's blur was predicted to within this part of the largest.
 constexpr double kExpectedWell = 0.3;
@@ -201,7 +198,7 @@ class Measurement {
       std::vector<EstimatorRegion> regions = {std::move(*region)};
       MeasureRegions(evidence_.spectral, &regions);
       region_ = std::move(regions.front());
-      if (region_.frames.size() < kMinFrames || region_.modes.size() < 12) {
+      if (region_.frames.size() < kMinFrames || region_.modes.size() < kMinModesOfFit) {
         NoteNoSpectrum("the target shows too little texture above the noise");
         return;
       }
@@ -249,9 +246,7 @@ class Measurement {
                                       : Eigen::Vector2d(sensor.width_px, sensor.height_px);
     estimator.psf = task_.sweep.camera.psf;
     estimator.threads = task_.threads;
-    // The time of the fit grows with the square of the frames: with many, each needs fewer modes.
-    estimator.modes_per_ring = std::clamp(
-        static_cast<int>(kModesOfAll / static_cast<double>(task_.frames.size())), 24, 200);
+    estimator.modes_per_ring = ModesPerRing(task_.frames.size());
     estimator.without_row_modes = task_.rows_had_bands;
     estimator.without_column_modes = task_.columns_had_bands;
     estimator.tick = task_.tick;
@@ -331,6 +326,11 @@ ReadingEvidence EvidenceOfBlur(const BlurEvidence& evidence) {
   of_readings.values = most->variances_px2;
   of_readings.sigmas = most->covariance.diagonal().cwiseMax(0).cwiseSqrt();
   return of_readings;
+}
+
+int ModesPerRing(std::size_t frames) {
+  constexpr double kModesOfAll = 30000;  // per ring, times frames
+  return std::clamp(static_cast<int>(kModesOfAll / static_cast<double>(frames)), 24, 200);
 }
 
 void ReplaceSpectralBlur(EstimatorRegion region, RelativeBlur blur, BlurEvidence* evidence) {

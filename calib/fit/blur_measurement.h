@@ -18,6 +18,14 @@
 
 namespace thicklens::calib {
 
+// The least numbers of frames and of modes of a fit, and of modes of each of its frames.
+inline constexpr std::size_t kMinFramesOfFit = 5, kMinModesOfFit = 12;
+inline constexpr int kMinModesOfFrame = 16;
+// The part of what all frames show that is measured, along each axis.
+inline constexpr double kWholeField = 0.98;
+// The time of the fit grows with the square of the frames: with many, each needs fewer modes.
+int ModesPerRing(std::size_t frames);
+
 inline constexpr double kDefaultRatio = 0.45;  // kappa at the start of a fit
 
 // The input for the measurement of a sweep's blur.

@@ -85,6 +85,24 @@ Registration FreeRegistration::WithCubic(double cubic, double cubic_sigma) const
   return result;
 }
 
+FreeRegistration DescribeFreely(const FrameMap& map, const DisplacementField& field) {
+  FreeRegistration result;
+  result.free = Describe(Followed(map, field.shift_px, field.linear, 0));
+  Registration& free = result.free;
+  free.scale_sigma = free.scale * std::hypot(std::sqrt(field.stretch_variance), kScaleBias);
+  free.cubic = map.cubic + field.cubic;
+  free.cubic_sigma = std::sqrt(field.cubic_variance);
+  result.scale_per_cubic = -free.scale * field.stretch_cubic_covariance / field.cubic_variance;
+  return result;
+}
+
+int FactorOfPass(const cv::Rect2d& shared, double added_variance_px2) {
+  const double field_px = std::min(shared.width, shared.height);
+  const int finest = TileFactor(std::max(shared.width, shared.height), 0);
+  const int coarser = std::max(finest, std::min(2 * finest, TileFactor(field_px, 1e9)));
+  return std::clamp(TileFactor(field_px, std::sqrt(std::abs(added_variance_px2))), finest, coarser);
+}
+
 std::optional<FreeRegistration> RegisterFreely(const cv::Mat& reference, const cv::Mat& frame,
                                                double expected_scale, cv::Point2d centre) {
   const std::optional<FrameMap> coarse = RegisterCoarsely(reference, frame, expected_scale, centre);
@@ -113,24 +131,18 @@ std::optional<FreeRegistration> RegisterFreely(const cv::Mat& reference, const c
     if (is_close && std::abs(variance_px2 - before_px2) < kCloseBlur * (1 + std::abs(variance_px2)))
       break;
   }
-  const int factor =
-      std::clamp(TileFactor(field_px, std::sqrt(std::abs(variance_px2))), finest, coarser);
-  const auto pass = MeasureTiles(reference, frame, map, factor, variance_px2);
+  const auto pass =
+      MeasureTiles(reference, frame, map, FactorOfPass(shared, variance_px2), variance_px2);
   if (!pass || !(pass->agreement > kMinAgreement)) return std::nullopt;
   const auto fitted = FitDisplacement(pass->shifts, pass->weight_variance_px2);
   if (!fitted) return std::nullopt;
   const DisplacementField& field = *fitted;
   const double alone = Scale(Corrected(map, field));
   if (!(std::abs(alone / Scale(*coarse) - 1) < kMaxDisagreement)) return std::nullopt;
-  FreeRegistration result;
-  result.free = Describe(Followed(map, field.shift_px, field.linear, 0));
+  FreeRegistration result = DescribeFreely(map, field);
   Registration& free = result.free;
   if (!(std::abs(free.scale_x / free.scale_y - 1) < kMaxAnisotropy)) return std::nullopt;
-  free.scale_sigma = free.scale * std::hypot(std::sqrt(field.stretch_variance), kScaleBias);
   free.added_variance_px2 = pass->added_variance_px2;
-  free.cubic = map.cubic + field.cubic;
-  free.cubic_sigma = std::sqrt(field.cubic_variance);
-  result.scale_per_cubic = -free.scale * field.stretch_cubic_covariance / field.cubic_variance;
   if (!(result.WithCubic(0, 0).scale_sigma < kMaxScaleSigma * free.scale)) return std::nullopt;
   return result;
 }

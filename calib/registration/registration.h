@@ -4,7 +4,9 @@
 #include <opencv2/core/mat.hpp>
 #include <optional>
 
+#include "calib/registration/coarse_registration.h"
 #include "calib/registration/image_scale.h"
+#include "calib/registration/tile_map.h"
 
 namespace thicklens::calib {
 
@@ -20,6 +22,13 @@ struct FreeRegistration {
   // cubic term remains in the result.
   Registration WithCubic(double cubic, double cubic_sigma) const;
 };
+
+// The registration that a displacement beyond a map gives, with its errors. The added blur is open.
+FreeRegistration DescribeFreely(const FrameMap& map, const DisplacementField& field);
+
+// Factor by which the field that two frames share is shrunk in the last pass over its tiles, for a
+// difference of their blurs, px^2.
+int FactorOfPass(const cv::Rect2d& shared, double added_variance_px2);
 
 // Registers as Register does, for callers that know the cubic term better than one pair of frames
 // shows it. Throws Interrupted after a request to stop.

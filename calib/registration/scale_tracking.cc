@@ -82,27 +82,6 @@ std::optional<FreeRegistration> RegisterAnyhow(const cv::Mat& reference, const c
   return std::nullopt;
 }
 
-// All frames share the radial distortion, so that together they determine it better than each one.
-void TakeOutDistortion(double corner_px, const std::vector<FreeRegistration>& registrations,
-                       std::vector<ScaleSample>* samples) {
-  const double likely = kLikelyDistortion / (corner_px * corner_px);
-  double k = 0, variance = likely * likely;
-  if (const auto fitted = FitRadialDistortion(*samples)) {
-    // The fitted value is weighted against the expectation of no distortion.
-    const double part = variance / (variance + fitted->sigma * fitted->sigma);
-    k = part * fitted->value;
-    variance = part * fitted->sigma * fitted->sigma;
-  }
-  for (std::size_t i = 0; i < samples->size(); ++i) {
-    ScaleSample& sample = (*samples)[i];
-    const double response = CubicPerDistortion(sample.scale);
-    sample.registration = registrations[i].WithCubic(
-        k * response,
-        std::min(std::sqrt(variance) * std::abs(response), registrations[i].free.cubic_sigma));
-    sample.scale = sample.registration.scale;
-  }
-}
-
 // Takes the scales from the readings and measures the shifts. Returns only the reference where the
 // depths are not known.
 std::vector<ScaleSample> TrackShifts(const FocusSweep& sweep,
@@ -149,6 +128,31 @@ double RegionCornerRadiusPx(const FocusSweep& sweep) {
   const double right = (is_whole ? sweep.camera.sensor.width_px : sweep.roi.width) - 1;
   const double bottom = (is_whole ? sweep.camera.sensor.height_px : sweep.roi.height) - 1;
   return std::hypot(std::max(centre.x, right - centre.x), std::max(centre.y, bottom - centre.y));
+}
+
+double PartOfDistortion(double corner_px, double sigma) {
+  const double likely = kLikelyDistortion / (corner_px * corner_px);
+  return likely * likely / (likely * likely + sigma * sigma);
+}
+
+void TakeOutDistortion(double corner_px, const std::vector<FreeRegistration>& registrations,
+                       std::vector<ScaleSample>* samples) {
+  const double likely = kLikelyDistortion / (corner_px * corner_px);
+  double k = 0, variance = likely * likely;
+  if (const auto fitted = FitRadialDistortion(*samples)) {
+    // The fitted value is weighted against the expectation of no distortion.
+    const double part = PartOfDistortion(corner_px, fitted->sigma);
+    k = part * fitted->value;
+    variance = part * fitted->sigma * fitted->sigma;
+  }
+  for (std::size_t i = 0; i < samples->size(); ++i) {
+    ScaleSample& sample = (*samples)[i];
+    const double response = CubicPerDistortion(sample.scale);
+    sample.registration = registrations[i].WithCubic(
+        k * response,
+        std::min(std::sqrt(variance) * std::abs(response), registrations[i].free.cubic_sigma));
+    sample.scale = sample.registration.scale;
+  }
 }
 
 std::vector<ScaleSample> TrackScale(const FocusSweep& sweep,

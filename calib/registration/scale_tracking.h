@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "calib/registration/image_scale.h"
+#include "calib/registration/registration.h"
 #include "thicklens/calib/focus_sweep.h"
 
 namespace thicklens::calib {
@@ -29,6 +30,15 @@ std::vector<ScaleSample> TrackScale(const FocusSweep& sweep,
                                     const std::vector<std::size_t>& frames, std::size_t reference,
                                     std::optional<double> known_offset_mm, int threads,
                                     const std::function<void()>& tick);
+
+// All frames share the radial distortion, so that together they determine it better than each one.
+// Removes what they show from the scales, weighted against the expectation of a usual lens, and
+// adds its uncertainty to their errors. There is one registration for each sample.
+void TakeOutDistortion(double corner_px, const std::vector<FreeRegistration>& registrations,
+                       std::vector<ScaleSample>* samples);
+
+// The part of a fitted distortion of that standard deviation, px^-2, that is removed.
+double PartOfDistortion(double corner_px, double sigma);
 
 // Pixel of the region of interest on the optical axis, and the distance of the farthest corner from
 // it.

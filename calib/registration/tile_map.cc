@@ -14,9 +14,6 @@ constexpr int kRounds = 8;
 constexpr double kCut = 5;  // cut of Tukey's weights, in standard deviations
 // Minimum error of a shift, independent of its spectrum: interpolation and sampling of the blur.
 constexpr double kMinShiftSigmaPx = 0.002;
-// Factor for the variance, because tiles overlap and neighbours share a part of their errors. It
-// was measured on simulated sweeps.
-constexpr double kOverlap = 1.5;
 constexpr double kMedianOfChi2 = 1.386;  // two degrees of freedom
 constexpr double kMinCondition = 1e-9;
 

@@ -20,6 +20,10 @@ struct DisplacementField {
   int tiles = 0;  // tiles that agree with the field
 };
 
+// Factor for the variances of a fit, because tiles overlap and neighbours share a part of their
+// errors. It was measured on simulated sweeps, and leaves a margin.
+inline constexpr double kOverlap = 1.5;
+
 // Fits the field to the shifts of tiles, whose centres are relative to the centre of the map. Each
 // tile has the weight of its own error and of the additional scatter of the tiles; outliers lose
 // their weight. `weight_variance_px2` is the second moment of a tile, because the mean of the cubic

@@ -39,19 +39,37 @@ void MatchBlur(double variance_px2, cv::Mat* reference, cv::Mat* frame) {
 
 }  // namespace
 
-std::optional<TilePass> MeasureTiles(const cv::Mat& reference, const cv::Mat& frame,
-                                     const FrameMap& map, int factor, double variance_px2) {
-  const cv::Rect2d shared = SharedField(map, reference.size(), frame.size());
-  const double blur_px = std::sqrt(std::abs(variance_px2)) / factor;
-  const cv::Rect whole(0, 0, frame.cols / factor, frame.rows / factor);
+std::optional<TileLayout> LayOutTiles(const FrameMap& map, cv::Size reference, cv::Size frame,
+                                      int factor) {
+  const cv::Rect2d shared = SharedField(map, reference, frame);
+  const cv::Rect whole(0, 0, frame.width / factor, frame.height / factor);
   const int left = static_cast<int>(std::ceil((shared.x + 0.5) / factor));
   const int top = static_cast<int>(std::ceil((shared.y + 0.5) / factor));
-  const cv::Rect field =
+  TileLayout layout;
+  layout.field =
       cv::Rect(left, top, static_cast<int>((shared.x + shared.width + 0.5) / factor) - left,
                static_cast<int>((shared.y + shared.height + 0.5) / factor) - top) &
       whole;
-  const int size = TileSize(std::min(field.width, field.height));
-  if (std::min(field.width, field.height) < size + kTilesAcross) return std::nullopt;
+  const cv::Rect& field = layout.field;
+  layout.size_px = TileSize(std::min(field.width, field.height));
+  if (std::min(field.width, field.height) < layout.size_px + kTilesAcross) return std::nullopt;
+  for (int j = 0; j < kTilesAcross; ++j) {
+    for (int i = 0; i < kTilesAcross; ++i) {
+      layout.corners.emplace_back(
+          field.x + (field.width - layout.size_px) * i / (kTilesAcross - 1),
+          field.y + (field.height - layout.size_px) * j / (kTilesAcross - 1));
+    }
+  }
+  return layout;
+}
+
+std::optional<TilePass> MeasureTiles(const cv::Mat& reference, const cv::Mat& frame,
+                                     const FrameMap& map, int factor, double variance_px2) {
+  const auto layout = LayOutTiles(map, reference.size(), frame.size(), factor);
+  if (!layout) return std::nullopt;
+  const cv::Rect& field = layout->field;
+  const cv::Rect whole(0, 0, frame.cols / factor, frame.rows / factor);
+  const double blur_px = std::sqrt(std::abs(variance_px2)) / factor;
   // The margin contains the surroundings, because the blur moves their light into the field.
   const int margin = static_cast<int>(std::ceil(3 * blur_px));
   const cv::Rect region = cv::Rect(field.x - margin, field.y - margin, field.width + 2 * margin,
@@ -61,14 +79,8 @@ std::optional<TilePass> MeasureTiles(const cv::Mat& reference, const cv::Mat& fr
   cv::Mat seen = Shrunk(frame, factor)(region);
   MatchBlur(variance_px2 / (factor * factor), &expected, &seen);
 
-  TilePhases phases(size);
-  for (int j = 0; j < kTilesAcross; ++j) {
-    for (int i = 0; i < kTilesAcross; ++i) {
-      const cv::Point corner(field.x + (field.width - size) * i / (kTilesAcross - 1),
-                             field.y + (field.height - size) * j / (kTilesAcross - 1));
-      phases.Add(expected, seen, corner - region.tl());
-    }
-  }
+  TilePhases phases(layout->size_px);
+  for (const cv::Point& corner : layout->corners) phases.Add(expected, seen, corner - region.tl());
   TilePass pass;
   pass.shifts = phases.Solve();
   for (TileShift& tile : pass.shifts) {

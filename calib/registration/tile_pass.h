@@ -20,6 +20,17 @@ struct TilePass {
   std::optional<double> added_variance_px2;  // blur of the frame minus that of the reference
 };
 
+// The tiles of a frame shrunk by a factor, in shrunk px.
+struct TileLayout {
+  cv::Rect field;                  // the part that both frames show
+  int size_px = 0;                 // side of a tile
+  std::vector<cv::Point> corners;  // top left corner of each tile
+};
+
+// Returns std::nullopt where the shared field is too small for tiles.
+std::optional<TileLayout> LayOutTiles(const FrameMap& map, cv::Size reference, cv::Size frame,
+                                      int factor);
+
 // Measures the tiles with the frame shrunk by `factor`. The blur added by `variance_px2`, the
 // present estimate, is applied to the sharper image. Returns std::nullopt where the shared field is
 // too small for tiles.

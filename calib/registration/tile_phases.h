@@ -2,6 +2,7 @@
 #define THICKLENS_CALIB_REGISTRATION_TILE_PHASES_H_
 
 #include <Eigen/Core>
+#include <functional>
 #include <opencv2/core/mat.hpp>
 #include <opencv2/core/types.hpp>
 #include <optional>
@@ -34,6 +35,15 @@ class TilePhases {
   // coherence of all tiles at its radius. That accounts for noise, and for the parts that the
   // window cuts off a blurred image but not off a sharp one. Tiles without texture are left out.
   std::vector<TileShift> Solve();
+
+  // Powers of one frequency in a tile, relative to each other: of the texture in both images, whose
+  // blurs have been matched, and of their noise.
+  struct Powers {
+    double texture = 0, frame_noise = 0, reference_noise = 0;
+  };
+  // The inverse variance, px^-2 along each axis, that the shift of a tile of random texture has on
+  // average [D154]. `powers` is a function of the frequency, cycles per px.
+  double ExpectedInformation(const std::function<Powers(double frequency)>& powers) const;
 
   // Correlation coefficient after Solve, over the frequencies that agree at all; 1 where the images
   // differ only by a linear filter.

@@ -17,12 +17,6 @@ namespace {
 
 constexpr double kTwoPiSquared = 2 * kPi * kPi;
 constexpr int kMaxSteps = 30;
-// Factor by which neighbouring modes widen the variances of independent ones. They share a sixth of
-// their noise and of the texture's amplitude (the transform of the squared Hann window), so that it
-// is (1 + 2/36)^2.
-constexpr double kSharedNoise = 1.114;
-// N is the noise of a complex value. The derivatives are affected only by its real part.
-constexpr double kRealPart = 0.5;
 
 // The leakage for one variance in all directions, or for one along each axis.
 template <int kAxes>

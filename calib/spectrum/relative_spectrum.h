@@ -61,6 +61,14 @@ struct RelativeBlur {
   Eigen::ArrayXcd texture;            // T
 };
 
+// Factor by which neighbouring modes widen the variances of independent ones. They share a sixth of
+// their noise and of the texture's amplitude (the transform of the squared Hann window), so that it
+// is (1 + 2/36)^2.
+inline constexpr double kSharedNoise = 1.114;
+// The noise of a spectrum is that of a complex value. The derivatives by gains and blurs are
+// affected only by its real part.
+inline constexpr double kRealPart = 0.5;
+
 RelativeBlur FitRelativeBlur(const std::vector<SpectrumSample>& samples, std::size_t reference,
                              const TargetWindow& window, const std::vector<Mode>& modes,
                              const WindowLeakage& leakage, const RelativeBlurOptions& options);

@@ -27,7 +27,6 @@ constexpr double kLeakageMargin = 1.4;      // relative to the largest expected 
 // Maximum product of rotation and field for which the rotation is not corrected. It blurs by
 // (rotation size)^2/30 px^2, less than resampling the frame would.
 constexpr double kSmallRotationPx = 0.17;
-constexpr double kSignalToNoise = 4;
 
 // The part of the target that all frames show, as X of its corners.
 struct Box {
@@ -54,16 +53,6 @@ double LeastVariance(const SpectralEstimatorSetup& setup) {
   return least;
 }
 
-std::size_t ModesInBand(const std::vector<Mode>& modes, const TargetWindow& window, double scale,
-                        double added_variance_px2) {
-  double limit = kHighestInFrame * scale;
-  if (added_variance_px2 > 0)
-    limit = std::min(limit, std::sqrt(kBandMargin / (2 * kPi * kPi * added_variance_px2)));
-  std::size_t count = 0;
-  while (count < modes.size() && ModeFrequency(modes[count], window).norm() < limit) ++count;
-  return count;
-}
-
 // Removes the rotation about the point where the frame shows the origin.
 cv::Mat Derotated(const cv::Mat& grey, const SpectralEstimatorSetup& setup,
                   const EstimatorFrame& frame) {
@@ -80,8 +69,7 @@ cv::Mat Derotated(const cv::Mat& grey, const SpectralEstimatorSetup& setup,
 
 // Modes with power in the sharpest frames: the reference and its two sharpest companions.
 std::vector<Mode> ChooseModes(const SpectralEstimatorSetup& setup, const EstimatorRegion& region) {
-  const double least = kLowestMode / std::min(region.window.size_px.x(), region.window.size_px.y());
-  std::vector<Mode> all = ModesBetween(region.window, least, kHighestFrequency);
+  std::vector<Mode> all = CandidateModes(region.window);
   all.erase(
       std::remove_if(all.begin(), all.end(),
                      [&](const Mode& mode) {
@@ -89,15 +77,9 @@ std::vector<Mode> ChooseModes(const SpectralEstimatorSetup& setup, const Estimat
                               (setup.without_column_modes && std::abs(mode.jy) < kWidthOfWindow);
                      }),
       all.end());
-  std::vector<std::size_t> sharpest = region.frames;
-  std::stable_sort(sharpest.begin(), sharpest.end(), [&](std::size_t a, std::size_t b) {
-    return setup.frames[a].expected_variance_px2 < setup.frames[b].expected_variance_px2;
-  });
-  sharpest.resize(std::min<std::size_t>(sharpest.size(), 3));
-  sharpest.push_back(setup.reference);
   Eigen::ArrayXd power = Eigen::ArrayXd::Zero(static_cast<Eigen::Index>(all.size()));
   double noise = 0;
-  for (const std::size_t f : sharpest) {
+  for (const std::size_t f : FramesThatShowModes(setup, region)) {
     const EstimatorFrame& frame = setup.frames[f];
     const cv::Mat grey = Derotated(setup.read_grey(frame.frame), setup, frame);
     const auto spectrum =
@@ -166,6 +148,32 @@ std::optional<EstimatorRegion> PlanRegion(const SpectralEstimatorSetup& setup, d
 }
 
 }  // namespace
+
+std::vector<Mode> CandidateModes(const TargetWindow& window) {
+  const double least = kLowestMode / std::min(window.size_px.x(), window.size_px.y());
+  return ModesBetween(window, least, kHighestFrequency);
+}
+
+std::size_t ModesInBand(const std::vector<Mode>& modes, const TargetWindow& window, double scale,
+                        double added_variance_px2) {
+  double limit = kHighestInFrame * scale;
+  if (added_variance_px2 > 0)
+    limit = std::min(limit, std::sqrt(kBandMargin / (2 * kPi * kPi * added_variance_px2)));
+  std::size_t count = 0;
+  while (count < modes.size() && ModeFrequency(modes[count], window).norm() < limit) ++count;
+  return count;
+}
+
+std::vector<std::size_t> FramesThatShowModes(const SpectralEstimatorSetup& setup,
+                                             const EstimatorRegion& region) {
+  std::vector<std::size_t> sharpest = region.frames;
+  std::stable_sort(sharpest.begin(), sharpest.end(), [&](std::size_t a, std::size_t b) {
+    return setup.frames[a].expected_variance_px2 < setup.frames[b].expected_variance_px2;
+  });
+  sharpest.resize(std::min<std::size_t>(sharpest.size(), 3));
+  sharpest.push_back(setup.reference);
+  return sharpest;
+}
 
 std::optional<EstimatorRegion> PlanRegion(const SpectralEstimatorSetup& setup, double part,
                                           const Eigen::Vector2d& place) {

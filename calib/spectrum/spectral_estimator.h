@@ -56,6 +56,18 @@ struct SpectralEstimatorSetup {
 std::optional<EstimatorRegion> PlanRegion(const SpectralEstimatorSetup& setup, double part,
                                           const Eigen::Vector2d& place);
 
+// The modes of a window among which those of a region are chosen, in the order of |nu|, and the
+// least power of a chosen one, relative to the noise.
+std::vector<Mode> CandidateModes(const TargetWindow& window);
+inline constexpr double kSignalToNoise = 4;
+// The frames that show which modes have power: the reference and its sharpest companions.
+std::vector<std::size_t> FramesThatShowModes(const SpectralEstimatorSetup& setup,
+                                             const EstimatorRegion& region);
+// The number of leading modes that are measured in a frame of that scale, whose V is larger than
+// the least one by `added_variance_px2`.
+std::size_t ModesInBand(const std::vector<Mode>& modes, const TargetWindow& window, double scale,
+                        double added_variance_px2);
+
 // Reads every frame once and measures its spectrum in every region. Frames that a region does not
 // see are removed from it.
 void MeasureRegions(const SpectralEstimatorSetup& setup, std::vector<EstimatorRegion>* regions);

@@ -19,7 +19,6 @@
 namespace thicklens::calib {
 namespace {
 
-constexpr double kWholeField = 0.98;
 constexpr double kSmallField = 240;  // px; three tiles per side below, five above
 constexpr int kModesPerRing = 48;
 constexpr std::size_t kMinTiles = 5;

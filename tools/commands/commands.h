@@ -21,6 +21,7 @@ void AddCameraCommand(CLI::App* program, CommandAction* action);
 void AddDepthCommand(CLI::App* program, CommandAction* action);
 void AddFramesCommand(CLI::App* program, CommandAction* action);
 void AddUndistortCommand(CLI::App* program, CommandAction* action);
+void AddPlanCommand(CLI::App* program, CommandAction* action);
 void AddTargetCommand(CLI::App* program, CommandAction* action);
 void AddBenchCommand(CLI::App* program, CommandAction* action);
 

@@ -129,6 +129,7 @@ struct Command {
 // In the order of work, as --help lists them.
 constexpr std::array<Command, 14> kCommands = {{{"target", tools::AddTargetCommand},
                                                 {"camera", tools::AddCameraCommand},
+                                                {"plan", tools::AddPlanCommand},
                                                 {"frames", tools::AddFramesCommand},
                                                 {"undistort", tools::AddUndistortCommand},
                                                 {"calibrate", tools::AddCalibrateCommand},

@@ -1,9 +1,10 @@
 #ifndef THICKLENS_THICKLENS_H_
 #define THICKLENS_THICKLENS_H_
 
-// The public interface of thicklens: read, calibrate, verify, estimate, render, compare, simulate,
-// explain, write. A program includes this file and links thicklens::thicklens. Values are in the
-// unit that their name ends with; depths are positive from the aperture plane Ap toward the scene.
+// The public interface of thicklens: read, plan, calibrate, verify, estimate, render, compare,
+// simulate, explain, write. A program includes this file and links thicklens::thicklens. Values are
+// in the unit that their name ends with; depths are positive from the aperture plane Ap toward the
+// scene.
 //
 // Errors: a wrong file, option or device throws thicklens::Error (options: OptionError). The
 // outcome of an operation is in its summary. A cancelled call throws thicklens::Interrupted.
@@ -17,6 +18,7 @@
 #include "thicklens/explain.h"      // IWYU pragma: export
 #include "thicklens/image.h"        // IWYU pragma: export
 #include "thicklens/light_field.h"  // IWYU pragma: export
+#include "thicklens/plan.h"         // IWYU pragma: export
 #include "thicklens/render.h"       // IWYU pragma: export
 #include "thicklens/run.h"          // IWYU pragma: export
 #include "thicklens/simulate.h"     // IWYU pragma: export
