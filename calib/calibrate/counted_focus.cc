@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -71,6 +72,7 @@ Calibration Refused(Calibration found, model::SweepMotion moves, const std::stri
   found.summary.outcome = Outcome::kRefused;
   found.summary.reason = reason;
   found.diagnostics.moves = moves;
+  found.diagnostics.step_length_mm = model::Estimate{0, std::numeric_limits<double>::infinity()};
   return found;
 }
 

@@ -28,8 +28,8 @@ MovingScale FitMovingScale(const std::vector<ScaleSample>& samples, const model:
                            model::SweepMotion moves, double sign, double focus_reading_mm,
                            double reading_sigma_mm);
 
-// The length of a step where the readings are counts: g in D = xf + g (count - focus_count) of the
-// same law, for an xf that is known, robustly (Cauchy). It is negative where D falls with the
+// Length of a step where the readings are counts [D147]: g in D = xf + g (count - focus_count) of
+// the same law, for an xf that is known, robustly (Cauchy). It is negative where D falls with the
 // count. The error includes the scatter of the scales and their common error; 0 +- infinity for too
 // few scales.
 model::Estimate FitStepLength(const std::vector<ScaleSample>& samples, const model::ThickLens& lens,

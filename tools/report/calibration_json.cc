@@ -329,7 +329,8 @@ json FitJson(const calib::Calibration& calibration) {
           {"systematic_parts", PartsJson(calibration.diagnostics.systematic_parts)},
           {"advice", TextJson(calibration.diagnostics.advice)},
           {"moves", model::SweepMotionName(calibration.diagnostics.moves)},
-          {"step_length_mm", calibration.diagnostics.step_length_mm
+          {"step_length_mm", calibration.diagnostics.step_length_mm &&
+                                     std::isfinite(calibration.diagnostics.step_length_mm->sigma)
                                  ? json{{"value", calibration.diagnostics.step_length_mm->value},
                                         {"sigma", calibration.diagnostics.step_length_mm->sigma}}
                                  : json(nullptr)},

@@ -30,6 +30,11 @@ std::string SharpestImage(const calib::Calibration& calibration) {
   return calibration.frames[static_cast<std::size_t>(index)].image;
 }
 
+// Unit of the readings in words; counts of unknown length have no other.
+const char* UnitOfReadings(const calib::Calibration& calibration) {
+  return calibration.diagnostics.step_length_mm ? "steps" : "mm";
+}
+
 }  // namespace
 
 std::string SharpestLine(const calib::Calibration& calibration) {
@@ -39,19 +44,22 @@ std::string SharpestLine(const calib::Calibration& calibration) {
   const std::string frame =
       image.empty() ? "" : fmt::format("; {} is the sharpest", FrameName(image));
   if (!sharpest.done) return fmt::format("no peak, {}{}", sharpest.message, frame);
-  return fmt::format("reading {}, by {} frames{}",
-                     WithError(sharpest.reading_mm.value, sharpest.reading_mm.sigma, "mm"),
-                     sharpest.frames_used, frame);
+  return fmt::format(
+      "reading {}, by {} frames{}",
+      WithError(sharpest.reading_mm.value, sharpest.reading_mm.sigma, UnitOfReadings(calibration)),
+      sharpest.frames_used, frame);
 }
 
 std::string FocusReadingLine(const calib::Calibration& calibration) {
   if (!calibration.diagnostics.focus_reading_mm) return "";
-  std::string line = fmt::format("reading {}, from the blur, without the error of the bench offset",
-                                 WithError(calibration.diagnostics.focus_reading_mm->value,
-                                           calibration.diagnostics.focus_reading_mm->sigma, "mm"));
+  std::string line = fmt::format(
+      "reading {}, from the blur, without the error of the bench offset",
+      WithError(calibration.diagnostics.focus_reading_mm->value,
+                calibration.diagnostics.focus_reading_mm->sigma, UnitOfReadings(calibration)));
   if (const auto& slope = calibration.diagnostics.blur_slope_px_per_mm)
-    line += fmt::format("; the blur grows by {} per mm of reading",
-                        WithError(slope->value, slope->sigma, "px"));
+    line +=
+        fmt::format("; the blur grows by {} per {}", WithError(slope->value, slope->sigma, "px"),
+                    calibration.diagnostics.step_length_mm ? "step" : "mm of reading");
   return line;
 }
 

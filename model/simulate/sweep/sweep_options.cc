@@ -92,6 +92,7 @@ EffectSet SweepEffects() {
       Effect::kBands,         Effect::kExposureDrift};
 }
 
+// [D146] The errors of a stage, each on top of the right reading.
 double StageOptions::Written(double reading_mm, bool is_falling, int frame_index) const {
   double written_mm = (1 + lead_error) * reading_mm;
   if (screw_error_mm != 0) {

@@ -311,7 +311,8 @@ struct CalibrationDiagnostics {
   CameraResponse response;  // transfer curve and processing, by the frames
   StageErrors stage;        // systematic errors of the stage, by scale and blur of the frames
   // Length of a step or count of the drive, mm, where the readings are counts and a statement
-  // about the plane of focus determines it.
+  // about the plane of focus determines it; 0 +- infinity where nothing does. The readings of the
+  // result are then counts, and blur_slope_px_per_mm is per count.
   std::optional<model::Estimate> step_length_mm;
 
   SourceRecipe paper_recipe;                        // the paper's method, for comparison

@@ -85,7 +85,7 @@ struct FocusPositions {
     double reading = 0;            // as the scale or the drive shows it, in `unit`
     double image_distance_mm = 0;  // d1, from Ap to the sensor
   };
-  std::string unit = "mm";          // of the readings: "mm" or "dpt"
+  std::string unit = "mm";          // of the readings: "mm", "dpt", "steps"
   std::vector<Position> positions;  // at least two, in rising order of the reading
 
   // d1 at a position, mm from Ap, by linear interpolation. Throws Error, which names the range, for
