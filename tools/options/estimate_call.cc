@@ -7,6 +7,7 @@
 #include <utility>
 #include <variant>
 
+#include "thicklens/frames.h"
 #include "thicklens/model/light_field_grid.h"
 #include "tools/options/embedded_depth.h"
 #include "tools/options/estimate_plan.h"
@@ -92,6 +93,10 @@ OptionNames EstimateOptionNames() {
           {"allow_missing_views", "--sparse"},
           {"inner_views", "--views"},
           {"camera", "--camera"},
+          {"correction", "--dark, --flat, --defects"},
+          {"correction.dark", "--dark"},
+          {"correction.flat", "--flat"},
+          {"correction.defects", "--defects"},
           {"sensor_origin", "--sensor-origin"},
           {"lens_position", "--lens-position"},
           {"exif", "--ignore-exif"},
@@ -190,6 +195,7 @@ EstimateCall ReadEstimateCall(const EstimateOptions& options, const RunControl& 
                                DepthReadOptionsOf(options.depth),
                                DepthRun("the same command without a depth map"));
   if (!options.camera_path.empty()) call.camera = ReadCamera(options.camera_path);
+  call.photo = CorrectPhotograph(call.photo, options.correction, TransferOf(call), run);
   if (options.aperture_of.empty()) return call;
   LightFieldReadOptions reading;
   reading.hci_grid = options.grid;
