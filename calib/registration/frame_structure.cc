@@ -418,7 +418,8 @@ std::string StructureInWords(const FrameStructureFinding& structure) {
     const double corner = std::exp(structure.vignetting->value) - 1;
     found.push_back(fmt::format(
         "in every frame the corners are {:.2g} % {} than the centre (vignetting, or a lamp that "
-        "moves with the camera); divide the frames by a photograph of an evenly lit white sheet",
+        "moves with the camera); divide the frames by a photograph of an evenly lit white sheet "
+        "(--flat)",
         100 * std::abs(corner), corner < 0 ? "darker" : "brighter"));
   }
   if (structure.HasFixedStructure()) {

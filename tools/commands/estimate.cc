@@ -314,11 +314,15 @@ void AddEstimateCommand(CLI::App* program, CommandAction* action) {
   command->callback([options, action] {
     *action = [options] {
       CheckEstimateUsage(*options);
-      RequireDistinctFiles(
-          {options->common.json_path, options->output_folder, options->report_path(),
-           options->checkpoint_path},
-          {options->image_path, options->depth_path, options->camera_path, options->aperture_of,
-           options->profile_path, FileOfDistortion(options->distortion)});
+      std::vector<std::string> inputs = {
+          options->image_path,  options->depth_path,   options->camera_path,
+          options->aperture_of, options->profile_path, FileOfDistortion(options->distortion)};
+      const model::CorrectionFiles& correction = options->correction;
+      for (const auto* more : {&correction.dark, &correction.flat, &correction.defects})
+        inputs.insert(inputs.end(), more->begin(), more->end());
+      RequireDistinctFiles({options->common.json_path, options->output_folder,
+                            options->report_path(), options->checkpoint_path},
+                           inputs);
       RunCommand(options->common, [&] { return RunEstimate(*options); });
     };
   });

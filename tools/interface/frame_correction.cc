@@ -321,4 +321,44 @@ FrameCorrectionFiles ReadFrameCorrection(const model::CorrectionFiles& files,
   return result;
 }
 
+Image CorrectPhotograph(const Image& photo, const model::CorrectionFiles& files,
+                        const TransferCurve& transfer, const RunControl& control) {
+  if (files.IsEmpty()) return photo;
+  RunScope run(control);
+  const std::string name = photo.source().empty() ? "photo" : photo.source();
+  if (photo.is_linear()) {
+    throw OptionError(
+        "correction",
+        fmt::format("{}: {}: the values of the photograph are floats of linear light, "
+                    "and an 8 or 16 bit file is expected",
+                    run.Option("correction"), name));
+  }
+  const model::EncodedImage& encoded = photo.encoded();
+  CorrectedFrame frame;
+  frame.name = name;
+  frame.transfer = photo.transfer().value_or(transfer);
+  if (photo.facts() != nullptr) {
+    frame.stated_transfer = StatedTransferName(*photo.facts());
+    frame.sensor = SensorTextOf(*photo.facts());
+  }
+  const int channels = photo.channels();
+  const cv::Mat values(photo.height_px(), photo.width_px(), CV_16UC(channels),
+                       const_cast<std::uint16_t*>(encoded.values.data()));
+  values.convertTo(frame.stored, encoded.bits == 8 ? CV_8U : CV_16U);
+  const FrameCorrectionFiles found = ReadFrameCorrection(files, frame, {}, control);
+  for (const std::string& line : found.lines) run.Inform(fmt::format("{}: {}", name, line));
+  for (const std::string& notice : found.notices) run.Warn(notice);
+  model::LinearImage light = photo.ToLight(frame.transfer);
+  cv::Mat pixels(light.height_px, light.width_px, CV_32FC(channels), light.values.data());
+  for (int channel = 0; channel < std::min(channels, 3); ++channel) {
+    ThrowIfCancelled();
+    cv::Mat plane;
+    cv::extractChannel(pixels, plane, channel);
+    found.correction->Apply(channel, &plane);
+    found.correction->ReplaceDefects(&plane);
+    cv::insertChannel(plane, pixels, channel);
+  }
+  return photo.WithLight(std::move(light.values));
+}
+
 }  // namespace thicklens

@@ -241,6 +241,13 @@ Image Image::WithoutAlpha() const {
   return opaque;
 }
 
+Image Image::WithLight(std::vector<float> values) const {
+  Image other = *this;
+  // It checks the values.
+  other.pixels_ = FromLight(width_px(), height_px(), order(), std::move(values)).pixels_;
+  return other;
+}
+
 Image Image::Cropped(const model::PixelRect& rect) const {
   Image cropped;
   cropped.transfer_ = transfer_;

@@ -8,6 +8,7 @@
 #include <variant>
 
 #include "thicklens/distortion.h"
+#include "thicklens/frames.h"
 #include "thicklens/model/light_field_grid.h"
 #include "tools/options/distortion_option.h"
 #include "tools/options/embedded_depth.h"
@@ -94,6 +95,10 @@ OptionNames EstimateOptionNames() {
           {"allow_missing_views", "--sparse"},
           {"inner_views", "--views"},
           {"camera", "--camera"},
+          {"correction", "--dark, --flat, --defects"},
+          {"correction.dark", "--dark"},
+          {"correction.flat", "--flat"},
+          {"correction.defects", "--defects"},
           {"sensor_origin", "--sensor-origin"},
           {"lens_position", "--lens-position"},
           {"undistort", "--distortion none"},
@@ -202,6 +207,7 @@ EstimateCall ReadEstimateCall(const EstimateOptions& options, const RunControl& 
     std::string why;
     if (!call.camera->IsValid(&why)) throw Error("--distortion: " + why);
   }
+  call.photo = CorrectPhotograph(call.photo, options.correction, TransferOf(call), run);
   if (options.aperture_of.empty()) return call;
   LightFieldReadOptions reading;
   reading.hci_grid = options.grid;

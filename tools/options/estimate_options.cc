@@ -98,6 +98,20 @@ void AddInputOptions(CLI::App* command, EstimateOptions* options) {
                    "OpenCV, ROS, Kalibr, COLMAP or mrcal, FILE:CAMERA in a file of several, or "
                    "none for images that are undistorted already; default: that of the camera file")
       ->type_name("FILE[:CAMERA]");
+  ->add_option("--dark", options->correction.dark,
+               "Exposures without light, which are averaged and subtracted from the photograph "
+               "in linear light; IMAGE and DEPTH are given before it")
+      ->type_name("FILE...");
+  command
+      ->add_option("--flat", options->correction.flat,
+                   "Exposures of an even surface, which are averaged, less the dark, and divided "
+                   "by their mean; the photograph is divided by them")
+      ->type_name("FILE...");
+  command
+      ->add_option("--defects", options->correction.defects,
+                   "Defective pixels, which are interpolated: an image that is not 0 there, or a "
+                   "list of x and y")
+      ->type_name("FILE...");
   command->add_flag("--ignore-exif", options->ignore_exif,
                     "Continue even if the EXIF of the photograph states another lens, setting or "
                     "sensor than the camera file");
@@ -400,6 +414,9 @@ void CheckEstimateUsage(const EstimateOptions& options) {
   needs(options.orientation == "displayed", !camera,
         "--orientation displayed: excludes --camera, which describes the sensor as stored; turn "
         "the depth map instead");
+  needs(!options.correction.IsEmpty(), options.orientation != "displayed",
+        "--dark, --flat and --defects describe the sensor as stored and exclude --orientation "
+        "displayed");
   const bool has_depth = !options.depth_path.empty();
   needs(options.orientation == "displayed", has_depth,
         "--orientation displayed: the depth map inside a photograph is stored like its pixels, and "

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "thicklens/estimator/plan_choice.h"
+#include "thicklens/model/sweep_file.h"
 #include "tools/options/command_frame.h"
 #include "tools/options/effect_options.h"
 #include "tools/options/light_field_options.h"
@@ -29,6 +30,7 @@ struct EstimateOptions {
   std::string distortion;    // FILE, FILE:CAMERA or "none"; empty: that of the camera file
   bool ignore_exif = false;  // for a photograph whose EXIF contradicts the camera file
   std::optional<double> st_depth_mm;
+  model::CorrectionFiles correction;  // of the photograph
   std::string transfer;
   std::string orientation;  // "stored" or "displayed"
   std::string solver = "scene";

@@ -201,6 +201,36 @@ TEST_F(EstimateTest, ThePositionOfAMovingLensGivesTheImageDistance) {
   EXPECT_THAT(Refusal(With(rest, {"--lens-position", "1"}), 2), HasSubstr("--camera"));
 }
 
+// A flat that is twice as bright on the right makes the light half as bright there.
+TEST_F(EstimateTest, ThePhotographIsCorrectedByAFlat) {
+  const auto constant = [&](const std::string& name, int width, int left, int right) {
+    model::EncodedImage image{width, kHeight, 3, 8, {}};
+    for (int i = 0; i < width * kHeight * 3; ++i)
+      image.values.push_back(static_cast<std::uint16_t>(i / 3 % width < width / 2 ? left : right));
+    return folder_.Put(name, io::EncodePng(image));
+  };
+  const Arguments rest = {constant("photo.png", kWidth, 100, 100),
+                          Depth([](int, int) { return 0; }),
+                          "--depth-kind",
+                          "disparity",
+                          "--views",
+                          "3x3",
+                          "--transfer",
+                          "linear"};
+  const std::string flat = constant("flat.png", kWidth, 100, 200);
+  const model::LightField found = Estimated(With(rest, {"--flat", flat}));
+  const auto at = [&](int x) {
+    return static_cast<double>(
+        found.values[found.ViewStart(1, 1, 0) + static_cast<std::size_t>(5 * kWidth + x)]);
+  };
+  EXPECT_NEAR(at(4) / at(kWidth - 5), 2, 0.1);
+  fs::remove_all(Output());
+  EXPECT_THAT(Refusal(With(rest, {"--flat", constant("other.png", 20, 100, 100)})),
+              AllOf(HasSubstr("other.png"), HasSubstr("20x28")));
+  EXPECT_THAT(Refusal(With(rest, {"--orientation", "displayed", "--flat", flat}), 2),
+              HasSubstr("describe the sensor as stored"));
+}
+
 TEST_F(EstimateTest, AnImageOfAPartOfTheSensor) {
   const std::string camera = folder_.Put("large.yaml", CameraYaml(kWidth + 20, kHeight + 8));
   const std::string depth = Depth([](int, int) { return 900; });

@@ -100,6 +100,38 @@ class FrameFilesForCorrection : public ::testing::Test {
   std::string flat_ = Put("flat.png", 0.6 * Shading() + 0.05);
 };
 
+TEST_F(FrameFilesForCorrection, APhotographIsCorrectedAsAFrameIs) {
+  const Image photo = ReadImage(Put("photo.png", Target(0.3).mul(Shading()) + 0.05, 0));
+  const model::CorrectionFiles files{
+      {Put("d.png", Level(0.05), 0)}, {Put("f.png", 0.6 * Shading() + 0.05, 0)}, {}};
+  const Image corrected = CorrectPhotograph(photo, files, TransferCurve::Linear());
+  ASSERT_TRUE(corrected.is_linear());
+  EXPECT_EQ(corrected.facts(), photo.facts());
+  EXPECT_EQ(corrected.is_from_file(), photo.is_from_file());
+  EXPECT_EQ(corrected.source(), photo.source());
+  // The flat is divided by its mean.
+  const double gain = cv::mean(Shading())[0];
+  const cv::Mat target = Target(0.3);
+  for (int y = 0; y < kSensorSidePx; y += 5) {
+    for (int x = 0; x < kSensorSidePx; x += 5) {
+      EXPECT_NEAR(static_cast<double>(
+                      corrected.light().values[static_cast<std::size_t>(y * kSensorSidePx + x)]),
+                  gain * static_cast<double>(target.at<float>(y, x)), 1e-4);
+    }
+  }
+}
+
+TEST_F(FrameFilesForCorrection, APhotographWithoutFilesStaysAndFloatsAreRefused) {
+  const Image photo = ReadImage(frame_);
+  EXPECT_FALSE(CorrectPhotograph(photo, {}, TransferCurve::Linear()).is_linear());
+  const Image floats = Image::FromLight(2, 1, ChannelOrder::kGrey, {0.1F, 0.2F});
+  EXPECT_THAT(ErrorOf([&] {
+                CorrectPhotograph(floats, {{dark_}, {}, {}}, TransferCurve::Srgb());
+              }),
+              HasSubstr("an 8 or 16 bit file is expected"));
+  EXPECT_THAT(ErrorOf([&] { photo.WithLight({0.5F}); }), HasSubstr("1"));
+}
+
 TEST_F(FrameFilesForCorrection, DarkAndFlatGiveTheLightOfTheTarget) {
   Files darks, flats;
   for (int i = 0; i < 6; ++i) {

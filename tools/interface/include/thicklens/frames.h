@@ -96,6 +96,13 @@ THICKLENS_EXPORT FrameCorrectionFiles ReadFrameCorrection(const model::Correctio
                                                           const FrameAverageOptions& options = {},
                                                           const RunControl& run = {});
 
+// Returns a photograph, decoded by `transfer` unless it states its own curve, freed of what stays
+// in place on the sensor, as ReadFrameCorrection frees frames; alpha is not changed. What was
+// applied and doubts are notices. Without files the photograph is returned as it is. Throws Error
+// as ReadFrameCorrection does, and OptionError for a photograph that is linear light already.
+THICKLENS_EXPORT Image CorrectPhotograph(const Image& photo, const model::CorrectionFiles& files,
+                                         const TransferCurve& transfer, const RunControl& run = {});
+
 }  // namespace thicklens
 
 #endif  // THICKLENS_FRAMES_H_

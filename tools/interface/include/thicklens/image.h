@@ -115,6 +115,10 @@ class THICKLENS_EXPORT Image {
   Image Encoded(int bits) const;
   // Returns a copy without the alpha channel.
   Image WithoutAlpha() const;
+  // Returns the image with `values` as its linear light, of the same size and channels. The rest,
+  // as what its file states, stays. Throws Error if the number of values is another or one is not
+  // finite.
+  Image WithLight(std::vector<float> values) const;
   // Returns a rectangle of the image. Throws Error if it is empty or not inside.
   Image Cropped(const model::PixelRect& rect) const;
 
