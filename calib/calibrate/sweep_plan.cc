@@ -20,11 +20,11 @@
 namespace thicklens::calib {
 namespace {
 
-constexpr int kFewestFrames = 9;  // below, one bad frame may leave too few
+constexpr int kMinPlannedFrames = 9;  // below, one bad frame may leave too few
 constexpr int kUsualFrames = 31;
-constexpr int kMostFrames = 400;
+constexpr int kMaxPlannedFrames = 400;
 // Ends of the search for the defocus at the ends of the sweep, px of sigma.
-constexpr double kLeastEndBlurPx = 0.4, kMostEndBlurPx = 16;
+constexpr double kMinEndBlurPx = 0.4, kMaxEndBlurPx = 16;
 constexpr int kEndBlurs = 10;  // steps of the search, before it is refined
 constexpr int kRefinements = 8;
 // The nearest frame is beyond the focal length by this part of zf - f1, and the farthest is at most
@@ -176,8 +176,8 @@ class Search {
       return Between(near, far, frames, feature_mm);
     };
     const auto merit_of = [&](double log_blur) { return MeritOf(design_of(log_blur)); };
-    const double first = std::log(kLeastEndBlurPx);
-    const double step = (std::log(kMostEndBlurPx) - first) / (kEndBlurs - 1);
+    const double first = std::log(kMinEndBlurPx);
+    const double step = (std::log(kMaxEndBlurPx) - first) / (kEndBlurs - 1);
     double best = first, least = kInfinite;
     for (int i = 0; i < kEndBlurs; ++i) {
       const double merit = merit_of(first + i * step);
@@ -232,7 +232,7 @@ class Search {
     const auto with = [&](int frames) {
       return Between(usual.nearest_mm, usual.farthest_mm(), frames, usual.feature_size_mm);
     };
-    int low = kFewestFrames, high = std::max(wishes_.most_frames, kFewestFrames);
+    int low = kMinPlannedFrames, high = std::max(wishes_.most_frames, kMinPlannedFrames);
     if (MeritOf(with(high)) > 1) return with(high);
     while (low < high) {
       const int middle = (low + high) / 2;
@@ -320,7 +320,7 @@ class Search {
                       conditions_.contrast),
           changed, now.design);
     }
-    const int twice = std::min(2 * now.design.frames, kMostFrames);
+    const int twice = std::min(2 * now.design.frames, kMaxPlannedFrames);
     add(fmt::format("{} frames in place of {}", twice, now.design.frames), conditions_,
         Between(now.design.nearest_mm, now.design.farthest_mm(), twice,
                 now.design.feature_size_mm));
@@ -591,13 +591,13 @@ bool PlanWishes::IsValid(std::string* why) const {
     return Fail(why, fmt::format("nearest_mm is {}: it must be below farthest_mm, {}", *nearest_mm,
                                  *farthest_mm));
   }
-  if (frames && !(*frames >= kFewestFrames && *frames <= kMostFrames)) {
-    return Fail(why, fmt::format("frames is {}: it must be from {} to {}", *frames, kFewestFrames,
-                                 kMostFrames));
+  if (frames && !(*frames >= kMinPlannedFrames && *frames <= kMaxPlannedFrames)) {
+    return Fail(why, fmt::format("frames is {}: it must be from {} to {}", *frames,
+                                 kMinPlannedFrames, kMaxPlannedFrames));
   }
-  return (most_frames >= kFewestFrames && most_frames <= kMostFrames) ||
+  return (most_frames >= kMinPlannedFrames && most_frames <= kMaxPlannedFrames) ||
          Fail(why, fmt::format("most_frames is {}: it must be from {} to {}", most_frames,
-                               kFewestFrames, kMostFrames));
+                               kMinPlannedFrames, kMaxPlannedFrames));
 }
 
 SweepPlan PlanSweep(const PlanConditions& conditions, const PlanWishes& wishes) {

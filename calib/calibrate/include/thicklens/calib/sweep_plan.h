@@ -66,7 +66,7 @@ struct PlannedErrors {
 // whole.
 struct PlannedErrorPart {
   std::string name;     // "noise", "readings", "bench offset" or "blur floor"
-  PlannedErrors sigma;  // what the source adds
+  PlannedErrors sigma;  // what it adds
 };
 
 // What is expected of one frame.
