@@ -242,7 +242,7 @@ class Search {
     return with(high);
   }
 
-  // With a step and a first depth that can be set. Rounding must not miss the wishes.
+  // The design with a step and a first depth that can be set. Rounding must not miss the wishes.
   SweepDesign Settable(const SweepDesign& exact) {
     if (wishes_.nearest_mm) return exact;
     SweepDesign design = exact;
@@ -270,7 +270,7 @@ class Search {
     return most;
   }
 
-  // What one change alone would do to one of the errors.
+  // The effect of each change alone on one of the errors.
   std::vector<Remedy> Remedies(const Wish& wish) {
     const ExpectedSweep& now = plan_.expected;
     std::vector<Remedy> remedies;

@@ -31,7 +31,7 @@ struct ExpectedField {
 // fail are left out.
 struct ExpectedScales {
   std::vector<ScaleSample> samples;  // with the errors that TrackScale states
-  // Of each sample: the error of its own, and the change by one standard deviation of the radial
+  // For each sample, the error of its own and the change by one standard deviation of the radial
   // distortion that all frames show together, which all of them have in common.
   std::vector<double> own_sigmas, by_distortion;
 

@@ -127,7 +127,7 @@ struct Command {
   void (*add)(CLI::App* program, tools::CommandAction* action);
 };
 // In the order of work, as --help lists them.
-constexpr std::array<Command, 14> kCommands = {{{"target", tools::AddTargetCommand},
+constexpr std::array<Command, 15> kCommands = {{{"target", tools::AddTargetCommand},
                                                 {"camera", tools::AddCameraCommand},
                                                 {"plan", tools::AddPlanCommand},
                                                 {"frames", tools::AddFramesCommand},

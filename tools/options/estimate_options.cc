@@ -98,9 +98,10 @@ void AddInputOptions(CLI::App* command, EstimateOptions* options) {
                    "OpenCV, ROS, Kalibr, COLMAP or mrcal, FILE:CAMERA in a file of several, or "
                    "none for images that are undistorted already; default: that of the camera file")
       ->type_name("FILE[:CAMERA]");
-  ->add_option("--dark", options->correction.dark,
-               "Exposures without light, which are averaged and subtracted from the photograph "
-               "in linear light; IMAGE and DEPTH are given before it")
+  command
+      ->add_option("--dark", options->correction.dark,
+                   "Exposures without light, which are averaged and subtracted from the photograph "
+                   "in linear light; IMAGE and DEPTH are given before it")
       ->type_name("FILE...");
   command
       ->add_option("--flat", options->correction.flat,

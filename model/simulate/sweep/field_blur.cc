@@ -16,8 +16,8 @@ namespace {
 
 // Most places along a side, and their least distance in samples. The outermost places lie beyond
 // the image, for the interpolation of the weights.
-constexpr int kMostPlaces = 37;
-constexpr double kLeastDistance = 5;
+constexpr int kMaxPlaces = 37;
+constexpr double kMinDistance = 5;
 constexpr int kCandidateStep = 3;  // every third place may be one of the sum
 constexpr int kFrequencies = 24;   // along each half axis, up to one cycle per px
 constexpr double kMaxError = 5e-5;
@@ -54,7 +54,7 @@ std::vector<Eigen::Vector2d> Frequencies() {
 // first and the last pixel.
 struct SideOfGrid {
   explicit SideOfGrid(int length)
-      : places(std::min(kMostPlaces, 4 + static_cast<int>(length / kLeastDistance))),
+      : places(std::min(kMaxPlaces, 4 + static_cast<int>(length / kMinDistance))),
         distance(std::max(1, length - 1) / (places - 3.0)) {}
 
   double Position(int place) const { return (place - 1) * distance; }

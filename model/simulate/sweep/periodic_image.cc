@@ -93,7 +93,7 @@ AxisPlan PlanAxis(const AxisSampling& axis, int max_frequency, double gaussian_s
   return plan;
 }
 
-// The same positions, with the step of one px. A px has `pixel_steps` steps.
+// Returns the same positions with the step of one px, which has `pixel_steps` steps.
 AxisSampling InPixels(AxisSampling axis, double pixel_steps) {
   if (pixel_steps == 1) return axis;
   if (axis.at.empty()) {

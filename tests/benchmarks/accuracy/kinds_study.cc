@@ -40,7 +40,7 @@ constexpr double kWidestInterval = 3;  // half of it over the 90 % quantile of t
 struct Kind {
   std::string name;
   bool disturbed = false, gives_offset = true, measures_floor = false;
-  std::optional<double> reading_sigma_mm;  // what the calibration is told, if it is not the truth
+  std::optional<double> reading_sigma_mm;  // stated to the calibration, if not the truth
   std::vector<std::string> may_refuse;
   YAML::Node simulate;
 };
@@ -167,7 +167,7 @@ double SigmasBeyond(const Measured& m) {
   return m.sigma > 0 ? beyond / m.sigma : beyond > 0 ? HUGE_VAL : 0;
 }
 
-// What one of the results shows over all sweeps of a kind.
+// The errors of one of the results over all sweeps of a kind.
 struct Row {
   double median = 0, quantile_90 = 0;     // of the magnitude of the error
   double goal_median = 0, goal_90 = 0;    // limits of these
@@ -238,7 +238,7 @@ Json Report(const Kind& kind, const std::vector<KindTrial>& trials,
   }
   const auto covered = [&](const Row& row) {
     const int inside = kind.disturbed ? row.inside_all : row.inside_sigmas;
-    // Of a disturbed kind, only too little coverage is a fault.
+    // Too much coverage is no fault of a disturbed kind.
     const bool fails = row.trials > 0 &&
                        testing::BinomialTestP(inside, row.trials, kLevel) < kRejectionP &&
                        (!kind.disturbed || inside < kLevel * row.trials);

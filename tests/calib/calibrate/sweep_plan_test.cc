@@ -146,7 +146,7 @@ TEST(PlanSweep, SaysWhatImpossibleWishesWouldNeed) {
   EXPECT_THAT(plan.reason, HasSubstr("not 0.02 mm; needed would be a stated bench offset that is "
                                      "known to 0.0"));
   EXPECT_THAT(plan.advice, HasSubstr("is that of the bench offset"));
-  // With what is said to be needed, it is reached.
+  // The wish is reached with what is said to be needed.
   const auto at = plan.reason.find("known to ");
   conditions.offset_sigma_mm = std::stod(plan.reason.substr(at + 9));
   EXPECT_TRUE(PlanSweep(conditions, wishes).reached);

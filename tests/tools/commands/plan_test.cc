@@ -33,7 +33,7 @@ class PlanProgram : public ::testing::Test {
   }
 
   void SetUp() override {
-    // As from a data sheet.
+    // A data sheet gives these values.
     const ProgramResult result =
         ChildProgram({"camera", "init", "--focal-mm", "50", "--f-number", "2.8", "--pitch-um",
                       "4.5", "--size", "640x480", "-o", folder_ / "camera.yaml"},

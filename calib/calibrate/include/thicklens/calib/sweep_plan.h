@@ -69,7 +69,7 @@ struct PlannedErrorPart {
   PlannedErrors sigma;  // what it adds
 };
 
-// What is expected of one frame.
+// The values that are expected of one frame.
 struct PlannedFrame {
   double depth_mm = 0;             // from Ap
   double blur_sigma_px = 0;        // sigma of floor and defocus, px
@@ -84,9 +84,9 @@ struct ExpectedSweep {
   std::string message = "not run";  // how it ended; without a result, the reason
   SweepDesign design;               // what was asked for
   PlannedErrors sigma;              // that calibrate is expected to state
-  // Of repeated sweeps. It is smaller than `sigma` where the bench offset comes from the image
-  // scale, because calibrate allows for what repeats have in common: the errors of the method and
-  // the distortion of the lens.
+  // The scatter of repeated sweeps. It is smaller than `sigma` where the bench offset comes from
+  // the image scale, because calibrate allows for what repeats have in common: the errors of the
+  // method and the distortion of the lens.
   PlannedErrors scatter;
   std::vector<PlannedErrorPart> parts;  // of `sigma`
   // Half of the intervals that calibrate gives besides, because the floor is not known; 0: it is.
@@ -104,7 +104,7 @@ struct ExpectedSweep {
 THICKLENS_EXPORT ExpectedSweep ExpectSweep(const PlanConditions& conditions,
                                            const SweepDesign& design);
 
-// What is wanted of a plan, and what of it is given.
+// The errors that a plan shall reach, and the parts of the sweep that are given.
 struct PlanWishes {
   // Standard deviations that are to be reached; absent: any.
   std::optional<double> focus_depth_mm, image_distance_mm, blur_ratio;

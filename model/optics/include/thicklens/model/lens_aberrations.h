@@ -19,7 +19,7 @@ struct LensAberrations {
   // In that corner, the depth at which the blur along the tangent is smallest minus that for the
   // blur along the radius (sagittal minus tangential focus), mm; it is proportional to rho^2.
   double field_astigmatism_mm = 0;
-  // The same for the blur along x minus the blur along y, everywhere in the field, mm: a tilted or
+  // Depth of least blur along x minus that along y, everywhere in the field, mm: a tilted or
   // squeezed element.
   double astigmatism_mm = 0;
   // Relative displacement of the image point of that corner away from the axis, dimensionless;
