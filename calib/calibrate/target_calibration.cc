@@ -850,10 +850,24 @@ class Calibrator {
                   setups, fit, &result_, known_focus_);
   }
 
+  // A lens with the distortion d at the corner magnifies a place by 1 + 3 d rho^2 along the radius
+  // and by 1 + d rho^2 along the tangent, and the blur there alike. The mean over a rectangle, on
+  // which rho^2 has the mean 1/3, is 1 + 2 d/3 [D155]. The blur that was measured is between that
+  // of the axis, to which kappa refers, and this mean.
+  void WidenByDistortion() {
+    if (!ShowsDistortion(result_) || !result_.summary.blur_ratio) return;
+    const model::Estimate& corner = *result_.diagnostics.scale.distortion_at_corner;
+    const double most = corner.value + std::copysign(kZeroReach * corner.sigma, corner.value);
+    const double move = result_.summary.blur_ratio->value * (1 / (1 + 2 * most / 3) - 1);
+    WidenRatio("distortion of the lens", {std::min(0.0, move), std::max(0.0, move)},
+               "state the distortion of the lens by --distortion FILE", &result_);
+  }
+
   // Widens the systematic intervals by the findings of the checks, as far as they move the results.
   void WidenByContradictions(const BlurEvidence& evidence, const BlurFitResult& fit) {
     const BlurFitSetup& setup = evidence.setup;
     WidenByStage(evidence, fit);
+    WidenByDistortion();
     if (result_.diagnostics.bench_offset_from == kFromScale) {
       const Eigen::Vector2d& offsets_mm = result_.diagnostics.scale.offset_of_pupil_laws_mm;
       WidenByTrials(

@@ -473,13 +473,41 @@ std::vector<StressCase> LightOfFrames() {
   return cases;
 }
 
+// Aberrations of which the calibration does not know.
+std::vector<StressCase> Aberrations() {
+  const auto lens = [](const char* name, const char* why,
+                       const model::LensAberrations& aberrations) {
+    return Sweep(name, why,
+                 "d1, zf and kappa within 4 standard errors of the truth, d1 within 50 um",
+                 Simulated([aberrations](model::SweepSimulationOptions* simulation) {
+                   simulation->aberrations = aberrations;
+                 }),
+                 Truth(50));
+  };
+  std::vector<StressCase> cases;
+  model::LensAberrations aberrations;
+  aberrations.distortion = -0.03;
+  cases.push_back(lens("distorting-lens", "barrel of 3 % at the corner: the blur is smaller there",
+                       aberrations));
+  aberrations = {};
+  aberrations.astigmatism_mm = -4;
+  cases.push_back(lens("astigmatic-lens",
+                       "the blur along x is smallest 4 mm nearer than the blur along y",
+                       aberrations));
+  aberrations = {};
+  aberrations.field_curvature_mm = -2;
+  cases.push_back(
+      lens("curved-field", "the corners are in focus 2 mm nearer than the axis", aberrations));
+  return cases;
+}
+
 }  // namespace
 
 std::vector<StressCase> CalibrationStressCases() {
   std::vector<StressCase> all;
   for (std::vector<StressCase> part :
        {Frames2To5(), Focus(), Readings(), Stages(), Damages(), Optics(), Macros(), MovingFocus(),
-        FixedToTheFrame(), LightOfFrames()}) {
+        FixedToTheFrame(), LightOfFrames(), Aberrations()}) {
     for (StressCase& hard : part) all.push_back(std::move(hard));
   }
   return all;
