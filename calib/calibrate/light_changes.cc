@@ -20,31 +20,31 @@ struct SharedPart {
   Eigen::Vector2d low{-1e300, -1e300}, high{1e300, 1e300};
 };
 
-// Linear light of the colours (or of grey), means over the shared part.
-std::vector<double> LightOfPart(const cv::Mat& stored, const FocusSweep& sweep,
-                                const Registration& registration, const SharedPart& part) {
+// Linear light of the colours (or of grey), means over the shared part. What is fixed to the frame
+// is taken out, because frames at other scales show the part at other pixels.
+std::vector<double> LightOfPart(std::size_t frame, const FocusSweep& sweep,
+                                const Registration& registration, const SharedPart& part,
+                                FrameStore* store) {
   const cv::Point2d centre = RegionCentre(sweep);
-  const model::TransferCurve& curve = sweep.camera.sensor.transfer;
-  const int channels = stored.channels();
-  const double full_scale = stored.depth() == CV_8U ? 255 : 65535;
-  std::vector<double> sums(static_cast<std::size_t>(channels));
+  std::vector<cv::Mat> light;
+  if (store->Stored(frame).channels() >= 3) {
+    for (int c = 0; c < 3; ++c) light.push_back(store->Channel(frame, c));
+  } else {
+    light.push_back(store->Grey(frame));
+  }
+  std::vector<double> sums(light.size());
   int count = 0;
   for (int j = 0; j < kPlacesPerSide; ++j) {
     for (int i = 0; i < kPlacesPerSide; ++i) {
       const Eigen::Vector2d share((i + 0.5) / kPlacesPerSide, (j + 0.5) / kPlacesPerSide);
       const Eigen::Vector2d q = part.low + share.cwiseProduct(part.high - part.low);
       const Eigen::Vector2d p = registration.shift_px + registration.scale * q;
-      const int x = static_cast<int>(std::lround(p.x() + centre.x)) + sweep.roi.x;
-      const int y = static_cast<int>(std::lround(p.y() + centre.y)) + sweep.roi.y;
-      if (x < 0 || y < 0 || x >= stored.cols || y >= stored.rows) continue;
+      const int x = static_cast<int>(std::lround(p.x() + centre.x));
+      const int y = static_cast<int>(std::lround(p.y() + centre.y));
+      if (x < 0 || y < 0 || x >= light.front().cols || y >= light.front().rows) continue;
       ++count;
-      for (int c = 0; c < channels; ++c) {
-        const int at = x * channels + c;
-        const double value = stored.depth() == CV_8U
-                                 ? static_cast<double>(stored.ptr<std::uint8_t>(y)[at])
-                                 : static_cast<double>(stored.ptr<std::uint16_t>(y)[at]);
-        sums[static_cast<std::size_t>(c)] += curve.Decode(value / full_scale);
-      }
+      for (std::size_t c = 0; c < light.size(); ++c)
+        sums[c] += static_cast<double>(light[c].at<float>(y, x));
     }
   }
   for (double& sum : sums) sum = std::max(kDarkestValue, sum / std::max(1, count));
@@ -101,8 +101,7 @@ void MeasureLightChanges(const FocusSweep& sweep, const std::vector<ScaleSample>
     ThrowIfCancelled();
     Registration registration = sample->registration;
     registration.scale = sample->scale;
-    const std::vector<double> means =
-        LightOfPart(store->Stored(sample->frame), sweep, registration, part);
+    const std::vector<double> means = LightOfPart(sample->frame, sweep, registration, part, store);
     const double depth_mm = frames[sample->frame].depth_mm;
     readings.push_back(sample->reading_mm);
     depths.push_back(depths_are_known && depth_mm > 0 ? std::log2(depth_mm) : 0);

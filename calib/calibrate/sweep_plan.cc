@@ -247,7 +247,7 @@ class Search {
     if (wishes_.nearest_mm) return exact;
     SweepDesign design = exact;
     for (int more = 0; more < 3; ++more) {
-      design.frames = exact.frames + more;
+      design.frames = std::min(exact.frames + more, std::max(exact.frames, wishes_.most_frames));
       design.step_mm = Rounded((exact.farthest_mm() - exact.nearest_mm) / (design.frames - 1));
       const double middle_mm = 0.5 * (exact.nearest_mm + exact.farthest_mm());
       const double first_mm = middle_mm - 0.5 * design.step_mm * (design.frames - 1);

@@ -248,6 +248,8 @@ class Calibrator {
     if (light.bands_removed || sweep_.target == model::SweepTarget::kKnifeEdge ||
         sweep_.target == model::SweepTarget::kPrintedEdge)
       return true;
+    // Undistorted frames show the rows of the sensor as curves, whose light has no one factor.
+    if (sweep_.camera.distortion) return true;
     const std::optional<BandAxis> axis = AxisOfBands(samples);
     if (!axis) return true;
     const std::optional<double> known_mm =
@@ -355,7 +357,7 @@ class Calibrator {
     result_.diagnostics.scale = LawOf(samples);
     if (!RemoveFixedPattern(known_mm, &samples)) return false;
     if (TakeStageErrors(EvidenceOfScales(samples), &samples))
-      result_.diagnostics.scale = LawOf(samples);
+      result_.diagnostics.scale = LawWithShading(samples);
     CorrectForFalloff(kDefaultRatio, result_.diagnostics.scale.reference_depth_mm,
                       &result_.diagnostics.scale);
     const bool is_lone_edge =
@@ -407,35 +409,18 @@ class Calibrator {
     return PlacedWithinReach();
   }
 
-  // The readings of the stage where those of the sweep are of an equivalent target.
-  StageReadings ReadingsOfStage(const FocusSweep& written) const {
-    StageReadings stage;
-    if (motion_ == nullptr) return stage;
-    constexpr double kPart = 1e-4;  // of a depth, for the derivative
-    const auto n = static_cast<Eigen::Index>(written.frames.size());
-    stage.readings_mm.resize(n);
-    stage.gains.resize(n);
-    for (Eigen::Index f = 0; f < n; ++f) {
-      const double depth_mm = written.frames[static_cast<std::size_t>(f)].reading_mm;
-      const auto at = motion_->ReadingAt(depth_mm),
-                 above = motion_->ReadingAt((1 + kPart) * depth_mm),
-                 below = motion_->ReadingAt((1 - kPart) * depth_mm);
-      if (!at || !above || !below || *above == *below) return {};
-      stage.readings_mm[f] = *at;
-      stage.gains[f] = 2 * kPart * depth_mm / (*above - *below);
-    }
-    return stage;
-  }
-
   // Finds systematic errors of the stage in the readings as they were written, corrects those of
   // sweep, frames and samples for them, and says so. Returns whether the readings were changed.
   bool TakeStageErrors(const ReadingEvidence& evidence, std::vector<ScaleSample>* samples) {
+    // The distance of a lens or sensor that moves was found from the readings as they are written.
+    if (motion_ != nullptr) return false;
     FocusSweep written = sweep_;
     for (std::size_t i = 0; i < written.frames.size(); ++i)
       written.frames[i].reading_mm += result_.frames[i].stage_error_mm;
-    const StageComparison found = CompareStageErrors(evidence, written, ReadingsOfStage(written));
+    const StageComparison found = CompareStageErrors(evidence, written);
     // A finding of one kind of evidence stays where another kind shows nothing.
-    if (stage_.errors.compared && !found.errors.Corrected()) return false;
+    const bool is_open = !found.open.empty() && !stage_.errors.Corrected();
+    if (stage_.errors.compared && !found.errors.Corrected() && !is_open) return false;
     auto& warnings = result_.summary.warnings;
     warnings.erase(std::remove(warnings.begin(), warnings.end(), stage_.errors.InWords()),
                    warnings.end());
@@ -484,7 +469,7 @@ class Calibrator {
     ScaleModel& law = result_.diagnostics.scale;
     if (law.done) {
       const ScaleModel before = law;
-      law = LawOf(scales_);
+      law = LawWithShading(scales_);
       if (!law.done) law = before;
       CorrectForFalloff(kDefaultRatio, law.reference_depth_mm, &law);
       if (result_.diagnostics.bench_offset_from == kFromScale)
@@ -532,8 +517,19 @@ class Calibrator {
       *samples = Track(known_offset_mm);
       result_.diagnostics.scale = LawOf(*samples);
     }
-    AddErrorOfShading(pattern, before, &result_.diagnostics.scale);
+    ScaleModel& law = result_.diagnostics.scale;
+    const double without_mm = law.offset_mm.sigma;
+    AddErrorOfShading(pattern, before, &law);
+    shading_sigma_mm_ = std::sqrt(
+        std::max(0.0, law.offset_mm.sigma * law.offset_mm.sigma - without_mm * without_mm));
     return true;
+  }
+
+  // The law of other readings, with the error that a removed shading leaves in its offset.
+  ScaleModel LawWithShading(const std::vector<ScaleSample>& samples) const {
+    ScaleModel law = LawOf(samples);
+    law.offset_mm.sigma = std::hypot(law.offset_mm.sigma, shading_sigma_mm_);
+    return law;
   }
 
   FramePlaces PlacesOf(const std::vector<ScaleSample>& samples) {
@@ -978,6 +974,7 @@ class Calibrator {
   StageComparison stage_;
   bool blur_was_compared_ = false;
   bool zero_is_settled_ = false;
+  double shading_sigma_mm_ = 0;  // error of the scale's offset by the error of a removed shading
   std::vector<model::StatedConjugate> statements_;  // what is stated of the plane of focus
   std::optional<model::StatedConjugate> best_statement_, known_focus_;
   bool zero_is_open_ = false;  // nothing determines the bench offset

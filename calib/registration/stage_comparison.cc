@@ -442,7 +442,8 @@ class Comparison {
     // A bend or a jump alone is examined elsewhere.
     if (close.size() < 2) return false;
     for (const Cause* cause : close) {
-      result->errors.also_possible.push_back(InWords(*cause));
+      // They would come in addition to a cause that was accepted, and not in its place.
+      if (accepted_.empty()) result->errors.also_possible.push_back(InWords(*cause));
       result->open.push_back(
           {InWords(*cause), OfSweep(error_mm_ + OnFrames(*cause, cause->amplitudes))});
     }

@@ -226,6 +226,9 @@ model::RegionOfInterest RegionThatIsShown(const model::Camera& camera,
   const model::PixelRect asked = roi.width > 0
                                      ? model::PixelRect{roi.x, roi.y, roi.width, roi.height}
                                      : model::PixelRect{0, 0, sensor.width_px, sensor.height_px};
+  if (asked.x < 0 || asked.y < 0 || asked.width > sensor.width_px - asked.x ||
+      asked.height > sensor.height_px - asked.y)
+    return roi;
   const model::PixelRect shown = model::RegionWithSource(
       camera.distortion->ScaledTo(sensor.width_px, sensor.height_px), asked);
   if (shown.width == asked.width && shown.height == asked.height) return roi;

@@ -279,7 +279,11 @@ std::string LensDistortion::Description() const {
 SourcePositions SourcesOf(const LensDistortion& distortion, int x, int y, int width_px,
                           int height_px) {
   std::string why;
-  if (!distortion.IsValid(&why)) throw Error("lens distortion: " + why);
+  // The axis of a small part may be far outside of it.
+  LensDistortion checked = distortion;
+  if (distortion.principal_point_px.allFinite())
+    checked.principal_point_px = Eigen::Vector2d(distortion.width_px, distortion.height_px) / 2;
+  if (!checked.IsValid(&why)) throw Error("lens distortion: " + why);
   SourcePositions sources;
   if (width_px < 1 || height_px < 1) return sources;
   const auto width = static_cast<std::size_t>(width_px);

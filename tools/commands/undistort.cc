@@ -93,6 +93,8 @@ nlohmann::json UndistortOne(const UndistortOptions& options, const LensDistortio
   UndistortFileOptions how;
   how.is_depth = options.is_depth;
   if (!options.transfer.empty()) how.transfer = TransferCurve::FromName(options.transfer);
+  if (!options.camera_path.empty())
+    how.assumed_transfer = ReadCamera(options.camera_path).sensor.transfer;
   const UndistortedFile file = UndistortFile(path, distortion, how);
   const std::string output = StemOf(options, path) + file.ending;
   ThrowIfCancelled();

@@ -98,10 +98,11 @@ UndistortedFile UndistortImageFile(const std::string& path, const LensDistortion
     file.bytes = Encode(out, file.ending, writing);
     return file;
   }
-  const TransferCurve transfer = options.transfer ? *options.transfer
-                                 : facts.raw
-                                     ? TransferCurve::Linear()
-                                     : StatedTransferOf(facts).value_or(TransferCurve::Srgb());
+  const TransferCurve transfer =
+      options.transfer ? *options.transfer
+      : facts.raw      ? TransferCurve::Linear()
+                       : StatedTransferOf(facts).value_or(
+                             options.assumed_transfer.value_or(TransferCurve::Srgb()));
   const int bits = pixels.depth() == CV_8U ? 8 : 16;
   const model::LinearImage light = WithFileContext(path, [&] {
     return model::Undistorted(model::ToLinear(io::ToEncodedImage(pixels), transfer), distortion,

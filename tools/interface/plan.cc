@@ -47,6 +47,7 @@ SweepPlan ProposeSweep(const PlanConditions& conditions, const PlanWishes& wishe
 SweepSimulation PlannedSimulation(const PlanConditions& conditions, const SweepDesign& design) {
   SweepSimulation simulation;
   simulation.camera = conditions.camera;
+  simulation.camera.distortion.reset();  // its frames are undistorted before they are measured
   model::CameraCalibration truth;
   truth.image_distance_mm =
       Measured{model::ImageDistanceMm(conditions.camera.lens, conditions.focus_depth_mm), 0};

@@ -170,7 +170,15 @@ LensDistortionFile FromMatrices(const CalibrationFields& fields, const char* for
   return file;
 }
 
-LensDistortionFile ReadRos(const CalibrationFields& fields) {
+// Refuses another camera of a file that has only one, which may have a name.
+void RequireOnlyCamera(const CalibrationText& text, const std::string& only) {
+  if (text.camera.empty() || text.camera == only) return;
+  throw Error(fmt::format("{}: it has one camera{}, not '{}': leave the colon out", text.name,
+                          only.empty() ? "" : fmt::format(", '{}'", only), text.camera));
+}
+
+LensDistortionFile ReadRos(const CalibrationText& text, const CalibrationFields& fields) {
+  RequireOnlyCamera(text, fields.Has("camera_name") ? fields.Text("camera_name") : "");
   const std::string name = fields.Has("distortion_model") ? fields.Text("distortion_model") : "";
   const std::string matrix = NameIn(fields, kMatrixNames);
   const std::string coefficients = NameIn(fields, kCoefficientNames);
@@ -262,6 +270,7 @@ LensDistortionFile ReadKalibr(const CalibrationText& text, const YamlNode& root,
 
 LensDistortionFile ReadOwnCamera(const CalibrationText& text, const std::string& yaml) {
   const model::Camera camera = model::ParseCamera(yaml, text.name);
+  RequireOnlyCamera(text, camera.name);
   if (!camera.distortion) {
     throw Error(fmt::format("{}: the camera file states no lens.distortion", text.name));
   }
@@ -344,13 +353,15 @@ LensDistortionFile ReadYamlCalibration(const CalibrationText& text) {
     return ReadOwnCamera(text, yaml);
   const std::vector<std::string> kalibr = KalibrCameras(root);
   if (!kalibr.empty()) return ReadKalibr(text, root, kalibr);
-  if (root.Has("intrinsics") && root.Has("camera_model") && root.Has("distortion_coeffs"))
+  if (root.Has("intrinsics") && root.Has("camera_model") && root.Has("distortion_coeffs")) {
+    RequireOnlyCamera(text, "");
     return ReadKalibrCamera(*YamlFields(root), text.name);
+  }
   const auto info = root.Find("camera_info");
   const std::unique_ptr<CalibrationFields> fields =
       YamlFields(info && info->IsMap() ? *info : root);
   if (fields->Has("distortion_model") && !NameIn(*fields, kMatrixNames).empty())
-    return ReadRos(*fields);
+    return ReadRos(text, *fields);
   return ReadOpenCvFields(text, *fields);
 }
 
