@@ -74,7 +74,7 @@ class ExplainEffectsTest : public ::testing::Test {
 
 TEST_F(ExplainEffectsTest, TheLargestImpactOfEachEffectHasItsPlace) {
   const nlohmann::json effects = EffectsOf({"--depth-range", "250:330"});
-  EXPECT_EQ(effects.size(), 23U);
+  EXPECT_EQ(effects.size(), 25U);
   EXPECT_NEAR(effects["defocus"]["impact"], SigmaPx(250), 1e-9);
   EXPECT_EQ(effects["defocus"]["unit"], "px");
   EXPECT_EQ(effects["defocus"]["where"]["depth_mm"], 250);
