@@ -120,7 +120,7 @@ json FrameJson(const calib::FrameMeasurement& frame, const calib::BlurModel* law
        has_reading_error ? NumberOrNull(frame.reading_error_mm) : json(nullptr)},
       {"reading_error_sigma_mm",
        has_reading_error ? NumberOrNull(frame.reading_error_sigma_mm) : json(nullptr)},
-      {"stage_error_mm", NumberOrNull(frame.stage_error_mm)}};
+      {"stage_error_mm", Measured(frame.stage_error_mm)}};
   out["blur_model_sigma_px"] = has_law ? NumberOrNull(law->SigmaPx(frame.depth_mm)) : json(nullptr);
   out["blur_model_error_px"] =
       has_law ? NumberOrNull(law->SigmaErrorPx(frame.depth_mm)) : json(nullptr);

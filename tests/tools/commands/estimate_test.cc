@@ -226,7 +226,7 @@ TEST_F(EstimateTest, ThePhotographIsCorrectedByAFlat) {
   EXPECT_NEAR(at(4) / at(kWidth - 5), 2, 0.1);
   fs::remove_all(Output());
   EXPECT_THAT(Refusal(With(rest, {"--flat", constant("other.png", 20, 100, 100)})),
-              AllOf(HasSubstr("other.png"), HasSubstr("20x28")));
+              AllOf(HasSubstr("other.png"), HasSubstr("20 x 28")));
   EXPECT_THAT(Refusal(With(rest, {"--orientation", "displayed", "--flat", flat}), 2),
               HasSubstr("describe the sensor as stored"));
 }
