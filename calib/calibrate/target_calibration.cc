@@ -420,6 +420,7 @@ class Calibrator {
     const StageComparison found = CompareStageErrors(evidence, written);
     // A finding of one kind of evidence stays where another kind shows nothing.
     const bool is_open = !found.open.empty() && !stage_.errors.Corrected();
+    if (stage_.errors.compared && IsContradicted(found, written)) return false;
     if (stage_.errors.compared && !found.errors.Corrected() && !is_open) return false;
     auto& warnings = result_.summary.warnings;
     warnings.erase(std::remove(warnings.begin(), warnings.end(), stage_.errors.InWords()),
@@ -437,6 +438,22 @@ class Calibrator {
     }
     for (ScaleSample& sample : *samples) sample.reading_mm = sweep_.frames[sample.frame].reading_mm;
     return true;
+  }
+
+  // Whether the image scale, which was compared before, contradicts a finding of the blur.
+  bool IsContradicted(const StageComparison& found, const FocusSweep& written) const {
+    const auto n = static_cast<Eigen::Index>(written.frames.size());
+    Eigen::VectorXd now_mm(n), written_mm(n);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      now_mm[i] = sweep_.frames[static_cast<std::size_t>(i)].reading_mm;
+      written_mm[i] = written.frames[static_cast<std::size_t>(i)].reading_mm;
+    }
+    if (found.errors.Corrected()) {
+      return ScalesContradict(scales_, now_mm, written_mm - found.error_mm);
+    }
+    return std::any_of(found.open.begin(), found.open.end(), [&](const auto& cause) {
+      return ScalesContradict(scales_, now_mm, written_mm - cause.error_mm);
+    });
   }
 
   // The frames of the result have the readings as they were written.

@@ -664,4 +664,31 @@ StageComparison CompareStageErrors(const ReadingEvidence& evidence, const FocusS
   return Comparison(evidence, sweep, stage).Run();
 }
 
+bool ScalesContradict(const std::vector<ScaleSample>& samples, const Eigen::VectorXd& before_mm,
+                      const Eigen::VectorXd& after_mm) {
+  constexpr double kContradicts = 2;
+  constexpr Eigen::Index kMinSamples = 6;
+  std::vector<const ScaleSample*> measured;
+  for (const ScaleSample& sample : samples) {
+    if (!sample.scale_is_from_reading) measured.push_back(&sample);
+  }
+  const auto n = static_cast<Eigen::Index>(measured.size());
+  if (n < kMinSamples) return false;
+  Eigen::MatrixXd law(n, 3);
+  Eigen::VectorXd before(n), after(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const ScaleSample& sample = *measured[static_cast<std::size_t>(i)];
+    const double x = 1 / sample.scale - 1;
+    law.row(i) << 1, x, x * x;
+    before[i] = before_mm[static_cast<Eigen::Index>(sample.frame)];
+    after[i] = after_mm[static_cast<Eigen::Index>(sample.frame)];
+  }
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> solver(law);
+  const auto sum_of_squares = [&](const Eigen::VectorXd& readings) {
+    return (readings - law * solver.solve(readings)).squaredNorm();
+  };
+  const double rss_before = sum_of_squares(before), rss_after = sum_of_squares(after);
+  return rss_before > 0 && static_cast<double>(n) * std::log(rss_after / rss_before) > kContradicts;
+}
+
 }  // namespace thicklens::calib

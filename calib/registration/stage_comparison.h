@@ -73,6 +73,13 @@ std::vector<bool> ApproachedFalling(const Eigen::VectorXd& readings_mm);
 StageComparison CompareStageErrors(const ReadingEvidence& evidence, const FocusSweep& sweep,
                                    const StageReadings& stage = {});
 
+// Whether the measured scales contradict a change of the readings that other evidence asks for: the
+// scatter of the readings about a parabola in 1/scale grows, n ln(rss after/rss before) > 2. A blur
+// that processing or aberrations bend may look like a periodic error of the stage. Both lists have
+// the readings of each frame of the sweep in mm.
+bool ScalesContradict(const std::vector<ScaleSample>& samples, const Eigen::VectorXd& before_mm,
+                      const Eigen::VectorXd& after_mm);
+
 // Difference of the costs, 2 ln(odds), that decides between two causes: odds of 20 to 1; and
 // between a cause and none: odds of 150 to 1, because most stages are good.
 inline constexpr double kDecisiveOdds = 6, kDecisiveAgainstNone = 10;

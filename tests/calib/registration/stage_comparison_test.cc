@@ -230,5 +230,31 @@ TEST(ApproachedFalling, FollowsTheRunsAndForgivesAWrongRow) {
                                                                   false, true, true, true, true));
 }
 
+// A correction that the scales see is confirmed or contradicted by them, and one that is far below
+// their errors is neither.
+TEST(ScalesContradict, OnlyACorrectionThatTheyWouldSee) {
+  const auto contradicts = [](double sigma_mm, double error_mm, double corrected_mm) {
+    std::mt19937 engine(11);
+    std::normal_distribution<double> normal;
+    std::vector<ScaleSample> samples;
+    Eigen::VectorXd before(31), after(31);
+    for (int i = 0; i < 31; ++i) {
+      const double wave = std::sin(2 * 3.14159265358979 * i / 7.0);
+      ScaleSample sample;
+      sample.frame = static_cast<std::size_t>(i);
+      sample.scale = 315 / (300.0 + i);
+      samples.push_back(sample);
+      before[i] = i + error_mm * wave + sigma_mm * normal(engine);
+      after[i] = before[i] - corrected_mm * wave;
+    }
+    return ScalesContradict(samples, before, after);
+  };
+  EXPECT_FALSE(contradicts(0.05, 0.1, 0.1)) << "a true error";
+  EXPECT_TRUE(contradicts(0.05, 0, 0.1)) << "an error that is none";
+  EXPECT_TRUE(contradicts(0.05, 0.1, -0.1)) << "the wrong direction";
+  EXPECT_FALSE(contradicts(2, 0.05, 0.05));
+  EXPECT_FALSE(contradicts(2, 0, 0.05)) << "the scales do not see it";
+}
+
 }  // namespace
 }  // namespace thicklens::calib
