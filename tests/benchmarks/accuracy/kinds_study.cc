@@ -218,8 +218,8 @@ Json Report(const Kind& kind, const std::vector<KindTrial>& trials,
   Row focus = RowOf(trials, &Trial::focus_depth_mm, std::abs(options.step_mm));
   Row ratio = RowOf(trials, &Trial::blur_ratio, options.camera.blur_ratio());
   const Row distance = RowOf(trials, &Trial::image_distance_mm, 1);
-  // The figures are for a step of depth and for a stated bench offset: without one, zf has the error
-  // of the offset, and its goal is that its interval covers the truth.
+  // The figures are for a step of depth and for a stated bench offset: without one, zf has the
+  // error of the offset, and its goal is that its interval covers the truth.
   const bool moves_focus = model::MovesFocus(options.moves);
   const Bound bound = moves_focus ? Bound{} : BoundsOf(options, kFloorSigmaPx2).together;
   const double allowed = kind.disturbed ? 2 : 1;

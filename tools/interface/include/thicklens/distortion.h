@@ -47,7 +47,7 @@ struct UndistortFileOptions {
   bool is_depth = false;  // the file is a depth map
   // Transfer curve of an image of integers; absent: the one that the file states, or sRGB.
   std::optional<TransferCurve> transfer;
-  // That of an image whose file states none, in place of sRGB.
+  // Transfer curve of an image whose file states none, in place of sRGB.
   std::optional<TransferCurve> assumed_transfer;
 };
 // A file whose image was undistorted.

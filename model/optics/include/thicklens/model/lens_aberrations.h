@@ -26,6 +26,7 @@ struct LensAberrations {
   // negative: barrel. A point at the distance r is displaced by distortion r rho^2.
   double distortion = 0;
 
+  // Whether any of them but the distortion differs from 0.
   bool DisplaceFocus() const {
     return field_curvature_mm != 0 || field_astigmatism_mm != 0 || astigmatism_mm != 0;
   }
