@@ -120,10 +120,8 @@ EffectImpact ReadingErrorImpact(const EffectOptics& optics, const EffectSite& pl
 }
 
 double ShadingAt(const Sensor& sensor, double corner_stops, const Eigen::Vector2d& position_px) {
-  const Eigen::Vector2d& axis_px = sensor.principal_point_px;
-  const Eigen::Vector2d far_px(std::max(axis_px.x(), sensor.width_px - 1 - axis_px.x()),
-                               std::max(axis_px.y(), sensor.height_px - 1 - axis_px.y()));
-  const double part = (position_px - axis_px).squaredNorm() / std::max(1.0, far_px.squaredNorm());
+  const double part = (position_px - sensor.principal_point_px).squaredNorm() /
+                      std::pow(std::max(1.0, FarthestCornerPx(sensor)), 2);
   return std::pow(1 + (std::exp2(-corner_stops / 2) - 1) * part, -2);
 }
 

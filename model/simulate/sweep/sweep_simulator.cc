@@ -340,10 +340,8 @@ struct SweepSimulator::Impl {
     const EffectOptics optics(conditions, decision.on);
     const Aperture aperture = ApertureOf(optics, decision.on);
     const Eigen::Vector2d& axis_px = sensor.principal_point_px;
-    const Eigen::Vector2d far_px(std::max(axis_px.x(), sensor.width_px - 1 - axis_px.x()),
-                                 std::max(axis_px.y(), sensor.height_px - 1 - axis_px.y()));
     constexpr int kSteps = 1024;
-    const double step_px = std::max(far_px.norm(), 1.0) / kSteps;
+    const double step_px = std::max(FarthestCornerPx(sensor), 1.0) / kSteps;
     std::vector<double> at_step;
     for (int i = 0; i <= kSteps + 1; ++i) {
       at_step.push_back(IrradianceAt(optics, axis_px + Eigen::Vector2d(i * step_px, 0),
