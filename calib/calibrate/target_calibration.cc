@@ -873,7 +873,11 @@ class Calibrator {
     const double most = corner.value + std::copysign(kZeroReach * corner.sigma, corner.value);
     const double move = result_.summary.blur_ratio->value * (1 / (1 + 2 * most / 3) - 1);
     WidenRatio("distortion of the lens", {std::min(0.0, move), std::max(0.0, move)},
-               "state the distortion of the lens by --distortion FILE", &result_);
+               sweep_.camera.distortion
+                   ? "measure the distortion at the focus of the sweep: what is left was found in "
+                     "undistorted frames"
+                   : "state the distortion of the lens by --distortion FILE",
+               &result_);
   }
 
   // Widens the systematic intervals by the findings of the checks, as far as they move the results.
