@@ -79,20 +79,14 @@ Solved SolveAt(const Eigen::MatrixXd& columns, const Eigen::VectorXd& values,
 
 class Comparison {
  public:
-  Comparison(const ReadingEvidence& evidence, const FocusSweep& sweep, const StageReadings& stage)
+  Comparison(const ReadingEvidence& evidence, const FocusSweep& sweep)
       : sweep_(sweep), evidence_(evidence), n_(evidence.values.size()) {
     const auto frames = static_cast<Eigen::Index>(sweep.frames.size());
     error_mm_ = Eigen::VectorXd::Zero(frames);
-    gain_ = Eigen::VectorXd::Ones(frames);
     of_sweep_.resize(frames);
     for (Eigen::Index f = 0; f < frames; ++f)
       of_sweep_[f] = sweep.frames[static_cast<std::size_t>(f)].reading_mm;
-    of_stage_ = of_sweep_;
-    if (stage.readings_mm.size() == frames) {
-      of_stage_ = stage.readings_mm;
-      gain_ = stage.gains;
-    }
-    falling_ = ApproachedFalling(of_stage_);
+    falling_ = ApproachedFalling(of_sweep_);
     readings_.resize(n_);
     for (Eigen::Index i = 0; i < n_; ++i) readings_[i] = of_sweep_[FrameOf(i)];
     lowest_mm_ = n_ > 0 ? readings_.minCoeff() : 0;
@@ -117,7 +111,7 @@ class Comparison {
     }
     if (!accepted_.empty()) {
       errors.message = "the readings were corrected";
-      result.error_mm = OfSweep(error_mm_);
+      result.error_mm = error_mm_;
       Report(&result);
     }
     return result;
@@ -147,13 +141,8 @@ class Comparison {
   void Prepare() {
     law_.resize(n_, 3);
     bend_.resize(n_, 2);
-    Eigen::ArrayXd corrected(n_);
     corrected_.resize(n_);
-    for (Eigen::Index i = 0; i < n_; ++i) {
-      const Eigen::Index f = FrameOf(i);
-      corrected[i] = readings_[i] - gain_[f] * error_mm_[f];
-      corrected_[i] = of_stage_[f] - error_mm_[f];
-    }
+    for (Eigen::Index i = 0; i < n_; ++i) corrected_[i] = readings_[i] - error_mm_[FrameOf(i)];
     double typical = Median({evidence_.sigmas.begin(), evidence_.sigmas.end()});
     if (evidence_.is_parabola_in_reading) {
       values_ = evidence_.values;
@@ -161,7 +150,7 @@ class Comparison {
       variances_ = evidence_.sigmas.array().max(1e-3 * typical).square() +
                    std::pow(kModelError * range, 2) + 1e-30;
       for (Eigen::Index i = 0; i < n_; ++i) {
-        const double u = Place(corrected[i]);
+        const double u = Place(corrected_[i]);
         law_.row(i) << 1, u, u * u;
         bend_.row(i) << u * u * u, u * u * u * u;
       }
@@ -175,7 +164,7 @@ class Comparison {
         law_.row(i) << 1, x, x * x;
         bend_.row(i) << x * x * x, x * x * x * x;
       }
-      values_ = corrected.matrix();
+      values_ = corrected_.matrix();
       gains_ = Eigen::ArrayXd::Ones(n_);
       // The slope of the readings against 1/scale converts the errors of the scales. The reference
       // has no error of its own, but those of all others are relative to it.
@@ -187,9 +176,7 @@ class Comparison {
 
   // The change of the values by errors of the stage's readings.
   Eigen::MatrixXd ColumnsOf(const Eigen::MatrixXd& errors) const {
-    Eigen::MatrixXd columns = gains_.matrix().asDiagonal() * errors;
-    for (Eigen::Index i = 0; i < n_; ++i) columns.row(i) *= gain_[FrameOf(i)];
-    return columns;
+    return gains_.matrix().asDiagonal() * errors;
   }
 
   // Law, accepted causes, and `more`.
@@ -444,15 +431,10 @@ class Comparison {
     for (const Cause* cause : close) {
       // They would come in addition to a cause that was accepted, and not in its place.
       if (accepted_.empty()) result->errors.also_possible.push_back(InWords(*cause));
-      result->open.push_back(
-          {InWords(*cause), OfSweep(error_mm_ + OnFrames(*cause, cause->amplitudes))});
+      result->open.push_back({InWords(*cause), error_mm_ + OnFrames(*cause, cause->amplitudes)});
     }
     if (accepted_.empty()) result->errors.message = "several causes remain";
     return false;
-  }
-
-  Eigen::VectorXd OfSweep(const Eigen::VectorXd& error_mm) const {
-    return (gain_.array() * error_mm.array()).matrix();
   }
 
   // The change by a cause that the law does not take up, for each sample.
@@ -477,7 +459,7 @@ class Comparison {
     Eigen::VectorXd errors = Eigen::VectorXd::Zero(error_mm_.size());
     for (Eigen::Index f = 0; f < errors.size(); ++f) {
       const auto frame = static_cast<std::size_t>(f);
-      const double reading_mm = of_stage_[f] - error_mm_[f];
+      const double reading_mm = of_sweep_[f] - error_mm_[f];
       switch (cause.kind) {
         case Kind::kBacklash:
           errors[f] = falling_[frame] ? amplitudes[0] : 0;
@@ -559,7 +541,7 @@ class Comparison {
         for (const double side : {-kAmplitudeReach, kAmplitudeReach}) {
           const Eigen::VectorXd change = Eigen::VectorXd::Unit(cause.amplitudes.size(), k) * side *
                                          std::sqrt(cause.covariance(k, k));
-          result->changed_mm.push_back(OfSweep(error_mm_ + OnFrames(cause, change)));
+          result->changed_mm.push_back(error_mm_ + OnFrames(cause, change));
         }
       }
     }
@@ -602,7 +584,7 @@ class Comparison {
   const ReadingEvidence& evidence_;
   std::vector<bool> falling_;
   Eigen::Index n_;
-  Eigen::VectorXd of_sweep_, of_stage_, gain_;  // for each frame of the sweep
+  Eigen::VectorXd of_sweep_;  // for each frame of the sweep
   Eigen::VectorXd readings_, error_mm_, values_;
   Eigen::ArrayXd corrected_, gains_, variances_, screen_roots_;
   Eigen::MatrixXd law_, bend_;
@@ -633,7 +615,7 @@ ReadingEvidence EvidenceOfScales(const std::vector<ScaleSample>& samples) {
 }
 
 double ReadingErrorOf(const ReadingEvidence& evidence, const FocusSweep& sweep) {
-  return Comparison(evidence, sweep, {}).ReadingErrorMm();
+  return Comparison(evidence, sweep).ReadingErrorMm();
 }
 
 std::vector<bool> ApproachedFalling(const Eigen::VectorXd& readings_mm) {
@@ -659,9 +641,8 @@ std::vector<bool> ApproachedFalling(const Eigen::VectorXd& readings_mm) {
   return falling;
 }
 
-StageComparison CompareStageErrors(const ReadingEvidence& evidence, const FocusSweep& sweep,
-                                   const StageReadings& stage) {
-  return Comparison(evidence, sweep, stage).Run();
+StageComparison CompareStageErrors(const ReadingEvidence& evidence, const FocusSweep& sweep) {
+  return Comparison(evidence, sweep).Run();
 }
 
 bool ScalesContradict(const std::vector<ScaleSample>& samples, const Eigen::VectorXd& before_mm,

@@ -25,13 +25,6 @@ struct ReadingEvidence {
 // The evidence of the measured scales.
 ReadingEvidence EvidenceOfScales(const std::vector<ScaleSample>& samples);
 
-// The readings of the stage where those of the sweep are of an equivalent target (FocusMotion).
-// Both are empty where they are the same.
-struct StageReadings {
-  Eigen::VectorXd readings_mm;  // for each frame of the sweep
-  Eigen::VectorXd gains;        // change of the sweep's reading per change of the stage's
-};
-
 // Standard deviation of a reading that the evidence shows of one frame, the median, in mm; infinite
 // where it shows none.
 double ReadingErrorOf(const ReadingEvidence& evidence, const FocusSweep& sweep);
@@ -70,8 +63,7 @@ std::vector<bool> ApproachedFalling(const Eigen::VectorXd& readings_mm);
 // it wins by kDecisiveOdds against none and against every other; causes that win less are named
 // together. Where they mean the same correction, it is taken; otherwise none is. Errors of several
 // kinds are found one after the other, the largest first.
-StageComparison CompareStageErrors(const ReadingEvidence& evidence, const FocusSweep& sweep,
-                                   const StageReadings& stage = {});
+StageComparison CompareStageErrors(const ReadingEvidence& evidence, const FocusSweep& sweep);
 
 // Whether the measured scales contradict a change of the readings that other evidence asks for: the
 // scatter of the readings about a parabola in 1/scale grows, n ln(rss after/rss before) > 2. A blur

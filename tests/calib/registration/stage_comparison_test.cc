@@ -202,27 +202,6 @@ TEST(StageComparison, ShuffledReadingsShowNothing) {
   EXPECT_EQ(CompareStageErrors(bench.scales, bench.sweep).errors.InWords(), "");
 }
 
-// An equivalent target whose reading is the square of that of the stage.
-TEST(StageComparison, TheErrorIsThatOfTheStageWhereTheReadingsAreOfAnEquivalentTarget) {
-  Bench bench =
-      MakeBench(Order::kTwice, 4, 0.03, [](double, int, bool back) { return back ? 0.3 : 0.0; });
-  StageReadings stage;
-  const auto n = static_cast<Eigen::Index>(bench.sweep.frames.size());
-  stage.readings_mm.resize(n);
-  stage.gains.resize(n);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    double& reading_mm = bench.sweep.frames[static_cast<std::size_t>(i)].reading_mm;
-    stage.readings_mm[i] = reading_mm;
-    stage.gains[i] = 2 * reading_mm / 200;
-    bench.scales.values[i] = std::pow(bench.right_mm[i], 2) / 200;
-    reading_mm = reading_mm * reading_mm / 200;
-  }
-  bench.scales.sigmas.setConstant(0.02);
-  const StageComparison found = CompareStageErrors(bench.scales, bench.sweep, stage);
-  ASSERT_TRUE(found.errors.backlash_mm) << found.errors.InWords();
-  EXPECT_NEAR(found.errors.backlash_mm->value, 0.3, 4 * found.errors.backlash_mm->sigma);
-}
-
 TEST(ApproachedFalling, FollowsTheRunsAndForgivesAWrongRow) {
   Eigen::VectorXd readings(10);
   readings << 1, 2, 3, 9, 5, 6, 5, 4, 3, 2;
