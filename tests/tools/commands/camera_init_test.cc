@@ -45,7 +45,9 @@ CameraDescription DataSheet() {
 
 // A photograph of 32 x 24 px with the EXIF data that a test needs.
 std::string WritePhoto(const std::string& name, const Exiv2::ExifData& exif) {
-  const std::string path = ::testing::TempDir() + "/" + name;
+  // A folder for each test, because the tests run side by side.
+  static const TemporaryFolder folder;
+  const std::string path = folder / name;
   model::EncodedImage image{32, 24, 1, 8, {}};
   image.values.assign(32 * 24, 128);
   WriteFileAtomically(path, io::EncodePng(image));

@@ -14,6 +14,7 @@
 #include "thicklens/base/output_file.h"
 #include "thicklens/io/data_hash.h"
 #include "thicklens/io/frame_files.h"
+#include "support/temporary_folder.h"
 #include "tools/support/image_file_bytes.h"
 
 namespace thicklens::io {
@@ -23,6 +24,7 @@ using ::testing::AllOf;
 using ::testing::AnyOf;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
+using thicklens::testing::TemporaryFolder;
 using tools::Encoded;
 
 std::string MessageOf(const std::string& bytes) {
@@ -126,10 +128,10 @@ TEST(Sha256Hex, AgreesWithTheStandard) {
 }
 
 TEST(FrameFiles, DigestDoesNotDependOnWhatWasReadFirst) {
-  const std::string folder = ::testing::TempDir();
+  const TemporaryFolder folder;
   std::vector<model::SweepFrame> frames;
   for (int i = 0; i < 3; ++i) {
-    frames.push_back({folder + "/digest_" + std::to_string(i) + ".png", 10.5 + i});
+    frames.push_back({folder / ("digest_" + std::to_string(i) + ".png"), 10.5 + i});
     WriteFileAtomically(frames.back().image, Encoded(cv::Mat(4, 4, CV_8U, cv::Scalar(i)), ".png"));
   }
   std::string lines;
