@@ -1,10 +1,10 @@
 #include "calib/spectrum/frame_spectrum.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <utility>
 
+#include "calib/spectrum/gridded_sum.h"
 #include "thicklens/base/pi.h"
 #include "thicklens/model/blur_transfer.h"
 
@@ -13,46 +13,57 @@ namespace {
 
 constexpr int kModeStep = 2;
 
-// One axis of the separable sum: the pixels that the window covers, and w cos and w sin of every
-// step-th order there.
+// One axis of the separable sum: the pixels that the window covers and the window's weights there.
 struct Axis {
   int first = 0, count = 0;
   double weight_sum = 0, weight_square_sum = 0;
-  Eigen::VectorXf weights;
-  Eigen::MatrixXf waves;  // count x 2 (orders): w cos and w sin alternate
+  Eigen::VectorXd weights;
+  double origin_px = 0;  // of the target coordinates, in the frame
+  double cycles = 0;     // of the first order per frame px
 };
 
-std::optional<Axis> MakeAxis(int pixels, double origin_px, double shift_px, double scale,
-                             double centre_px, double size_px, int order, int step_of_orders) {
-  const double middle = origin_px + shift_px + scale * centre_px;
+std::optional<Axis> MakeAxis(int pixels, double origin_px, double scale, double centre_px,
+                             double size_px) {
+  const double middle = origin_px + scale * centre_px;
   const double half = 0.5 * scale * size_px;
   Axis axis;
   axis.first = static_cast<int>(std::ceil(middle - half));
   const int last = static_cast<int>(std::floor(middle + half));
   axis.count = last - axis.first + 1;
   if (axis.first < 0 || last >= pixels || axis.count < 8) return std::nullopt;
+  axis.origin_px = origin_px;
+  axis.cycles = 1 / (scale * size_px);
   axis.weights.resize(axis.count);
-  const int orders = order / step_of_orders + 1;
-  axis.waves.resize(axis.count, 2 * orders);
   for (int i = 0; i < axis.count; ++i) {
-    const double x = (axis.first + i - origin_px - shift_px) / scale;  // target px
-    const double c = std::cos(kPi * (x - centre_px) / size_px);
-    const double w = c * c;
-    axis.weights[i] = static_cast<float>(w);
-    axis.weight_sum += w;
-    axis.weight_square_sum += w * w;
-    // exp(-2 pi i j x/size) by recurrence, in double.
-    const double angle = -2 * kPi * step_of_orders * x / size_px;
-    const std::complex<double> step(std::cos(angle), std::sin(angle));
-    std::complex<double> wave(w, 0);
-    for (int j = 0; j < orders; ++j) {
-      axis.waves(i, 2 * j) = static_cast<float>(wave.real());
-      axis.waves(i, 2 * j + 1) = static_cast<float>(wave.imag());
-      wave *= step;
-    }
+    const double c = std::cos(kPi * (axis.first + i - middle) / (scale * size_px));
+    axis.weights[i] = c * c;
   }
+  axis.weight_sum = axis.weights.sum();
+  axis.weight_square_sum = axis.weights.squaredNorm();
   return axis;
 }
+
+// The orders that modes have along one axis, each once, and their frequencies and phases.
+struct Orders {
+  Orders(const Axis& axis, const GriddedAxis& gridded, std::vector<int> of_modes) {
+    std::sort(of_modes.begin(), of_modes.end());
+    of_modes.erase(std::unique(of_modes.begin(), of_modes.end()), of_modes.end());
+    orders = std::move(of_modes);
+    const double middle_px = axis.first + gridded.middle() - axis.origin_px;
+    for (const int order : orders) {
+      frequencies.push_back(order * axis.cycles);
+      phases.push_back(std::polar(1.0, -2 * kPi * order * axis.cycles * middle_px));
+    }
+  }
+  int IndexOf(int order) const {
+    return static_cast<int>(std::lower_bound(orders.begin(), orders.end(), order) - orders.begin());
+  }
+  std::complex<double> PhaseAt(int index) const { return phases[static_cast<std::size_t>(index)]; }
+
+  std::vector<int> orders;
+  std::vector<double> frequencies;           // cycles per frame px
+  std::vector<std::complex<double>> phases;  // from the middle pixel to the origin of the target
+};
 
 }  // namespace
 
@@ -82,49 +93,57 @@ double BoxTransfer(const Mode& mode, const TargetWindow& window, double scale) {
   return model::PixelBoxTransfer(nu.x(), nu.y());
 }
 
-std::optional<FrameSpectrum> MeasureSpectrum(const cv::Mat& grey, const Eigen::Vector2d& origin_px,
-                                             const FramePlace& place, const TargetWindow& window,
-                                             const std::vector<Mode>& modes, std::size_t count) {
-  int order_x = 0, order_y = 0;
-  int step = 0;  // common divisor of all requested orders
-  for (std::size_t k = 0; k < count; ++k) {
-    order_x = std::max(order_x, modes[k].jx);
-    order_y = std::max(order_y, std::abs(modes[k].jy));
-    step = std::gcd(step, std::gcd(modes[k].jx, modes[k].jy));
-  }
-  step = std::max(step, 1);
-  const auto x = MakeAxis(grey.cols, origin_px.x(), place.shift_px.x(), place.scale,
-                          window.centre_px.x(), window.size_px.x(), order_x, step);
-  const auto y = MakeAxis(grey.rows, origin_px.y(), place.shift_px.y(), place.scale,
-                          window.centre_px.y(), window.size_px.y(), order_y, step);
+std::optional<FrameSpectrum> MeasureSums(const cv::Mat& image, const Eigen::Vector2d& origin_px,
+                                         const Eigen::Vector2d& scale, const TargetWindow& window,
+                                         const std::vector<Mode>& modes, std::size_t count) {
+  const auto x =
+      MakeAxis(image.cols, origin_px.x(), scale.x(), window.centre_px.x(), window.size_px.x());
+  const auto y =
+      MakeAxis(image.rows, origin_px.y(), scale.y(), window.centre_px.y(), window.size_px.y());
   if (!x || !y) return std::nullopt;
-
-  using RowMajor = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-  const Eigen::Map<const RowMajor, 0, Eigen::OuterStride<>> pixels(
-      grey.ptr<float>(y->first) + x->first, y->count, x->count,
-      Eigen::OuterStride<>(static_cast<Eigen::Index>(grey.step1())));
+  const cv::Mat pixels = image(cv::Rect(x->first, y->first, x->count, y->count));
   const double total = x->weight_sum * y->weight_sum;
+  double light = 0;
+  for (int row = 0; row < y->count; ++row) {
+    const Eigen::Map<const Eigen::VectorXf> values(pixels.ptr<float>(row), x->count);
+    light += y->weights[row] * x->weights.dot(values.cast<double>());
+  }
   FrameSpectrum spectrum;
-  spectrum.mean = (y->weights.transpose() * pixels * x->weights).cast<double>().value() / total;
+  spectrum.mean = light / total;
   if (!(spectrum.mean > 0)) return std::nullopt;
   spectrum.noise_gain =
       x->weight_square_sum * y->weight_square_sum / (total * total * spectrum.mean * spectrum.mean);
 
-  // The mean is subtracted before the sums, because a later subtraction would leave float rounding.
-  const RowMajor centred = pixels.array() - static_cast<float>(spectrum.mean);
-  const Eigen::MatrixXf rows = centred * x->waves;           // y pixels x 2 orders
-  const Eigen::MatrixXf sums = y->waves.transpose() * rows;  // 2 orders x 2 orders
-  const double scale = 1 / (total * spectrum.mean);
-  spectrum.values.resize(static_cast<Eigen::Index>(count));
+  std::vector<int> of_x, of_y;
   for (std::size_t k = 0; k < count; ++k) {
-    const int jx = modes[k].jx / step, jy = std::abs(modes[k].jy) / step;
-    const double sign = modes[k].jy < 0 ? -1 : 1;  // conjugate wave along y
-    const double cc = sums(2 * jy, 2 * jx), cs = sums(2 * jy, 2 * jx + 1);
-    const double sc = sign * sums(2 * jy + 1, 2 * jx), ss = sign * sums(2 * jy + 1, 2 * jx + 1);
-    const double box = BoxTransfer(modes[k], window, place.scale);
-    spectrum.values[static_cast<Eigen::Index>(k)] =
-        std::complex<double>(cc - ss, cs + sc) * (scale / box);
+    of_x.push_back(modes[k].jx);
+    of_y.push_back(modes[k].jy);
   }
+  const GriddedAxis along_x(x->weights), along_y(y->weights);
+  const Orders orders_x(*x, along_x, std::move(of_x)), orders_y(*y, along_y, std::move(of_y));
+  std::vector<std::pair<int, int>> pairs;
+  pairs.reserve(count);
+  for (std::size_t k = 0; k < count; ++k)
+    pairs.emplace_back(orders_x.IndexOf(modes[k].jx), orders_y.IndexOf(modes[k].jy));
+  // The mean is subtracted before the sums, because a later subtraction would leave float rounding.
+  spectrum.values = GriddedSums(pixels, static_cast<float>(spectrum.mean), along_x, along_y,
+                                orders_x.frequencies, orders_y.frequencies, pairs);
+  for (std::size_t k = 0; k < count; ++k) {
+    spectrum.values[static_cast<Eigen::Index>(k)] *= orders_x.PhaseAt(pairs[k].first) *
+                                                     orders_y.PhaseAt(pairs[k].second) /
+                                                     (total * spectrum.mean);
+  }
+  return spectrum;
+}
+
+std::optional<FrameSpectrum> MeasureSpectrum(const cv::Mat& grey, const Eigen::Vector2d& origin_px,
+                                             const FramePlace& place, const TargetWindow& window,
+                                             const std::vector<Mode>& modes, std::size_t count) {
+  auto spectrum = MeasureSums(grey, origin_px + place.shift_px,
+                              Eigen::Vector2d::Constant(place.scale), window, modes, count);
+  if (!spectrum) return spectrum;
+  for (std::size_t k = 0; k < count; ++k)
+    spectrum->values[static_cast<Eigen::Index>(k)] /= BoxTransfer(modes[k], window, place.scale);
   return spectrum;
 }
 

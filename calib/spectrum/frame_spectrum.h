@@ -51,6 +51,12 @@ std::optional<FrameSpectrum> MeasureSpectrum(const cv::Mat& grey, const Eigen::V
                                              const FramePlace& place, const TargetWindow& window,
                                              const std::vector<Mode>& modes, std::size_t count);
 
+// The same of an image whose pixel p shows the target at X = (p - origin)/scale, with a scale along
+// each axis, and without the division by the box of a pixel.
+std::optional<FrameSpectrum> MeasureSums(const cv::Mat& image, const Eigen::Vector2d& origin_px,
+                                         const Eigen::Vector2d& scale, const TargetWindow& window,
+                                         const std::vector<Mode>& modes, std::size_t count);
+
 // Transfer function of the pixel's box at a mode, for a frame of that scale.
 double BoxTransfer(const Mode& mode, const TargetWindow& window, double scale);
 

@@ -15,6 +15,85 @@ namespace {
 constexpr double kTwoPiSquared = 2 * kPi * kPi;
 constexpr int kLeakageNodes = 12;
 constexpr double kLeakageBand = 4;  // H below exp(-4): no frame uses such a mode
+// Frequencies beyond the modes of a node that still reach them through the window: a share of the
+// highest mode, and orders of the window, whose transform falls with their third power.
+constexpr double kReachOfBand = 1.5;
+constexpr double kReachOfWindow = 32;
+// Step of tabulated transfer functions in t = 2 pi f R. The error of the straight lines between the
+// entries is at most 1/32 of its square, because the second derivative is at most 1/4.
+constexpr double kStepOfTable = 0.002;
+
+// The transfer function of the defocus against |f|, which is smooth, as a table.
+class TransferTable {
+ public:
+  TransferTable(model::Psf psf, double sigma_px, double most)
+      : per_step_(2 * kPi * 2 * sigma_px / kStepOfTable) {
+    const auto entries = static_cast<std::size_t>(most * per_step_) + 3;
+    values_.reserve(entries);
+    for (std::size_t i = 0; i < entries; ++i)
+      values_.push_back(static_cast<float>(
+          model::DefocusTransfer(psf, sigma_px, static_cast<double>(i) / per_step_, 0)));
+  }
+  float At(double f) const {
+    const double place = f * per_step_;
+    const auto i = static_cast<std::size_t>(place);
+    const auto part = static_cast<float>(place - static_cast<double>(i));
+    return values_[i] + part * (values_[i + 1] - values_[i]);
+  }
+
+ private:
+  double per_step_;
+  std::vector<float> values_;
+};
+
+// Length of the FFT that holds the frequencies up to `reach`, in cycles per sample, of one that has
+// `length` samples.
+int ReducedLength(int length, double reach) {
+  if (!(reach < 0.5)) return length;
+  return std::min(length, 2 * cv::getOptimalDFTSize(static_cast<int>(reach * length) + 2));
+}
+
+// Index in the transform of `length` samples of the frequency that one of `reduced` samples has at
+// `index`, and that frequency in cycles per sample of the former.
+int IndexOfSameFrequency(int index, int reduced, int length) {
+  return index <= reduced / 2 ? index : index - reduced + length;
+}
+double FrequencyAt(int index, int length) {
+  return static_cast<double>(index <= length / 2 ? index : index - length) / length;
+}
+
+// An image with the frequencies up to `reach` along each axis of `transform`, times the transfer
+// function; sampled as coarsely as these allow.
+cv::Mat BlurredImage(const cv::Mat& transform, const TransferTable& transfer,
+                     const Eigen::Vector2d& axes, const Eigen::Vector2d& reach) {
+  const int cols = ReducedLength(transform.cols, reach.x());
+  const int rows = ReducedLength(transform.rows, reach.y());
+  const double share = static_cast<double>(cols) * rows / static_cast<double>(transform.total());
+  std::vector<double> square_x;
+  for (int u = 0; u < cols; ++u) {
+    const double f =
+        axes.x() * FrequencyAt(IndexOfSameFrequency(u, cols, transform.cols), transform.cols);
+    square_x.push_back(f * f);
+  }
+  cv::Mat blurred(rows, cols, CV_32FC2), image;
+  for (int v = 0; v < rows; ++v) {
+    ThrowIfCancelled();
+    const int from_v = IndexOfSameFrequency(v, rows, transform.rows);
+    const double fy = axes.y() * FrequencyAt(from_v, transform.rows);
+    const auto* from = transform.ptr<cv::Vec2f>(from_v);
+    auto* row = blurred.ptr<cv::Vec2f>(v);
+    for (int u = 0; u < cols; ++u) {
+      const auto factor = static_cast<float>(share) *
+                          transfer.At(std::sqrt(square_x[static_cast<std::size_t>(u)] + fy * fy));
+      row[u] = factor * from[IndexOfSameFrequency(u, cols, transform.cols)];
+    }
+    // The highest frequency of a smaller transform is that of both signs.
+    if (cols < transform.cols) row[cols / 2] = 0;
+    if (rows < transform.rows && v == rows / 2) blurred.row(v).setTo(0);
+  }
+  cv::dft(blurred, image, cv::DFT_INVERSE | cv::DFT_SCALE | cv::DFT_REAL_OUTPUT);
+  return image;
+}
 
 }  // namespace
 
@@ -36,50 +115,45 @@ WindowLeakage::WindowLeakage(const cv::Mat& reference, const Eigen::Vector2d& or
           cv::Size(static_cast<int>(window.size_px.x()) + 2 * pad + 3,
                    static_cast<int>(window.size_px.y()) + 2 * pad + 3)) &
       cv::Rect(cv::Point(0, 0), reference.size());
-  const Eigen::Vector2d part_origin_px = origin_px - Eigen::Vector2d(part.x, part.y);
   const cv::Size size(cv::getOptimalDFTSize(part.width + 2 * pad),
                       cv::getOptimalDFTSize(part.height + 2 * pad));
-  cv::Mat padded, transform;
-  // Pixels beyond the part are not read: the borders are mirrored instead.
-  cv::copyMakeBorder(reference(part), padded, pad, size.height - part.height - pad, pad,
-                     size.width - part.width - pad, cv::BORDER_REFLECT_101 | cv::BORDER_ISOLATED);
-  cv::dft(padded, transform, cv::DFT_COMPLEX_OUTPUT);
+  const Eigen::Vector2d padded_origin_px =
+      origin_px - Eigen::Vector2d(part.x, part.y) + Eigen::Vector2d::Constant(pad);
+  cv::Mat transform;
+  {
+    cv::Mat padded;
+    // Pixels beyond the part are not read: the borders are mirrored instead.
+    cv::copyMakeBorder(reference(part), padded, pad, size.height - part.height - pad, pad,
+                       size.width - part.width - pad, cv::BORDER_REFLECT_101 | cv::BORDER_ISOLATED);
+    cv::dft(padded, transform, cv::DFT_COMPLEX_OUTPUT);
+  }
   nodes_.resize(kLeakageNodes);
   nodes_[0] = Eigen::ArrayXcd::Zero(static_cast<Eigen::Index>(modes.size()));
   ParallelFor(kLeakageNodes - 1, threads, [&](int index) {
     const double sigma = step_px_ * (index + 1);
     // A blur along one axis leaves modes of every frequency in the band.
-    std::size_t count = axes.minCoeff() > 0 ? 0 : modes.size();
-    while (count < modes.size() &&
-           kTwoPiSquared * sigma * sigma * ModeFrequency(modes[count], window).squaredNorm() <
-               kLeakageBand)
-      ++count;
-    cv::Mat blurred = transform.clone();
-    for (int v = 0; v < blurred.rows; ++v) {
-      ThrowIfCancelled();
-      const double fy =
-          static_cast<double>(v <= blurred.rows / 2 ? v : v - blurred.rows) / blurred.rows;
-      auto* row = blurred.ptr<cv::Vec2f>(v);
-      for (int u = 0; u < blurred.cols; ++u) {
-        const double fx =
-            static_cast<double>(u <= blurred.cols / 2 ? u : u - blurred.cols) / blurred.cols;
-        row[u] *=
-            static_cast<float>(model::DefocusTransfer(psf, sigma, axes.x() * fx, axes.y() * fy));
-      }
-    }
-    cv::Mat image;
-    cv::dft(blurred, image, cv::DFT_INVERSE | cv::DFT_SCALE | cv::DFT_REAL_OUTPUT);
-    const cv::Mat inner = image(cv::Rect(pad, pad, part.width, part.height));
-    const auto seen = MeasureSpectrum(inner, part_origin_px, {}, window, modes, count);
+    const bool is_round = axes.minCoeff() > 0;
+    const double highest = std::sqrt(kLeakageBand / kTwoPiSquared) / sigma;
+    std::size_t count = is_round ? 0 : modes.size();
+    while (count < modes.size() && ModeFrequency(modes[count], window).norm() < highest) ++count;
+    Eigen::Vector2d reach = Eigen::Vector2d::Constant(0.5);
+    if (is_round)
+      reach = (highest + kReachOfWindow / window.size_px.array()).max(kReachOfBand * highest);
+    const cv::Mat image =
+        BlurredImage(transform, TransferTable(psf, sigma, std::sqrt(0.5)), axes, reach);
+    const Eigen::Vector2d scale(static_cast<double>(image.cols) / size.width,
+                                static_cast<double>(image.rows) / size.height);
+    const auto seen =
+        MeasureSums(image, padded_origin_px.cwiseProduct(scale), scale, window, modes, count);
     Eigen::ArrayXcd& node = nodes_[static_cast<std::size_t>(index + 1)];
     node = Eigen::ArrayXcd::Zero(static_cast<Eigen::Index>(count));
     if (!seen) return;
     for (std::size_t k = 0; k < count; ++k) {
       const Eigen::Vector2d nu = ModeFrequency(modes[k], window);
       const auto i = static_cast<Eigen::Index>(k);
-      node[i] = seen->values[i] - spectrum.values[i] * model::DefocusTransfer(psf, sigma,
-                                                                              axes.x() * nu.x(),
-                                                                              axes.y() * nu.y());
+      node[i] = seen->values[i] / BoxTransfer(modes[k], window, 1) -
+                spectrum.values[i] *
+                    model::DefocusTransfer(psf, sigma, axes.x() * nu.x(), axes.y() * nu.y());
     }
   });
 }
