@@ -131,14 +131,17 @@ WindowLeakage::WindowLeakage(const cv::Mat& reference, const Eigen::Vector2d& or
   nodes_[0] = Eigen::ArrayXcd::Zero(static_cast<Eigen::Index>(modes.size()));
   ParallelFor(kLeakageNodes - 1, threads, [&](int index) {
     const double sigma = step_px_ * (index + 1);
-    // A blur along one axis leaves modes of every frequency in the band.
-    const bool is_round = axes.minCoeff() > 0;
     const double highest = std::sqrt(kLeakageBand / kTwoPiSquared) / sigma;
-    std::size_t count = is_round ? 0 : modes.size();
-    while (count < modes.size() && ModeFrequency(modes[count], window).norm() < highest) ++count;
-    Eigen::Vector2d reach = Eigen::Vector2d::Constant(0.5);
-    if (is_round)
-      reach = (highest + kReachOfWindow / window.size_px.array()).max(kReachOfBand * highest);
+    const auto is_left = [&](const Mode& mode) {
+      return axes.cwiseProduct(ModeFrequency(mode, window)).norm() < highest;
+    };
+    // A blur along one axis leaves modes of every |nu|.
+    std::size_t count = axes.minCoeff() > 0 ? 0 : modes.size();
+    while (count < modes.size() && is_left(modes[count])) ++count;
+    const Eigen::Vector2d reach =
+        (axes.array() > 0)
+            .select((highest + kReachOfWindow / window.size_px.array()).max(kReachOfBand * highest),
+                    0.5);
     const cv::Mat image =
         BlurredImage(transform, TransferTable(psf, sigma, std::sqrt(0.5)), axes, reach);
     const Eigen::Vector2d scale(static_cast<double>(image.cols) / size.width,
@@ -149,6 +152,7 @@ WindowLeakage::WindowLeakage(const cv::Mat& reference, const Eigen::Vector2d& or
     node = Eigen::ArrayXcd::Zero(static_cast<Eigen::Index>(count));
     if (!seen) return;
     for (std::size_t k = 0; k < count; ++k) {
+      if (!is_left(modes[k])) continue;
       const Eigen::Vector2d nu = ModeFrequency(modes[k], window);
       const auto i = static_cast<Eigen::Index>(k);
       node[i] = seen->values[i] / BoxTransfer(modes[k], window, 1) -
