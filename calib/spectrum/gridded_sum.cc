@@ -87,7 +87,11 @@ cv::Mat SumsAlongRows(const cv::Mat& pixels, float less, const GriddedAxis& x, c
     for (int r = 0; r < rows; ++r) {
       const auto* from = pixels.ptr<float>(begin + r);
       auto* to = block.ptr<float>(r);
-      for (int i = 0; i < x.samples(); ++i) to[x.PlaceOf(i)] = x.FactorOf(i) * (from[i] - less);
+      // The samples before the middle lie at the end.
+      auto* to_end = to + x.length() - x.middle();
+      for (int i = 0; i < x.middle(); ++i) to_end[i] = x.FactorOf(i) * (from[i] - less);
+      to -= x.middle();
+      for (int i = x.middle(); i < x.samples(); ++i) to[i] = x.FactorOf(i) * (from[i] - less);
     }
     cv::dft(block.rowRange(0, rows), transform, cv::DFT_ROWS);
     for (int r = 0; r < rows; ++r) {
