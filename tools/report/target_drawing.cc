@@ -247,7 +247,9 @@ std::string TargetSvg(const model::TargetPage& page, const std::vector<model::Ta
         "fill=\"#000000\"/>\n",
         patch.x, patch.y, page.EdgeX(patch.y), page.EdgeX(bottom_mm), bottom_mm);
   }
-  for (const model::SheetRectangle& white : WhiteOfMarks(page)) add_rectangle("mark", white, 255);
+  int mark = 0;
+  for (const model::SheetRectangle& white : WhiteOfMarks(page))
+    add_rectangle(fmt::format("mark-{}", mark++).c_str(), white, 255);
   add("<g fill=\"#000000\">\n");
   for (const model::GridShape& shape : BlackOnSheet(page)) {
     if (shape.is_disc) {
