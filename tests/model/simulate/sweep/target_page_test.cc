@@ -45,7 +45,7 @@ TEST(LayOutTarget, FillsAnA4SheetAndSaysSo) {
   EXPECT_DOUBLE_EQ(page.pattern.height, 240);
   EXPECT_DOUBLE_EQ(page.feature_mm, 0.5);
   EXPECT_DOUBLE_EQ(page.bar.width, 100);
-  ASSERT_EQ(page.caption.size(), 2U);
+  ASSERT_EQ(page.caption.size(), 3U);
   EXPECT_EQ(page.caption[0],
             "thicklens target, pattern 180.0 x 240.0 mm, smallest feature 0.5 mm, edge 5 degrees, "
             "seed 1");
@@ -104,7 +104,7 @@ TEST(LayOutTarget, OverfillsTheFieldOfACamera) {
   EXPECT_DOUBLE_EQ(page.feature_mm, 0.6);
   EXPECT_THAT(page.choice, AllOf(HasSubstr("0.6 mm (3.0 px"), HasSubstr("2 to 6 px"),
                                  HasSubstr("128.0 x 96.0 mm plus 15 %")));
-  EXPECT_THAT(page.caption.back(), HasSubstr("sees 128.0 x 96.0 mm at 1000 mm"));
+  EXPECT_THAT(page.caption[2], HasSubstr("sees 128.0 x 96.0 mm at 1000 mm"));
 }
 
 TEST(LayOutTarget, TurnsASheetThatHoldsThePatternOnlyLying) {
@@ -241,16 +241,16 @@ TEST(LayOutTarget, AGridHasItsSizeAndIsStated) {
   request.grid->pattern = GridPattern::kCharuco;
   request.grid->columns = 11;
   request.grid->rows = 8;
-  request.grid->square_mm = 20;
-  request.grid->marker_mm = 14;
+  request.grid->square_mm = 18;
+  request.grid->marker_mm = 12;
   const TargetPage page = LayOutTarget(request);
   EXPECT_EQ(page.width_mm, 297) << "turned";
-  EXPECT_EQ(page.pattern.width, 220);
-  EXPECT_EQ(page.pattern.height, 160);
+  EXPECT_EQ(page.pattern.width, 198);
+  EXPECT_EQ(page.pattern.height, 144);
   EXPECT_TRUE(page.marks.empty());
-  EXPECT_THAT(page.caption[0], HasSubstr("ChArUco board of 11 x 8 squares of 20 mm"));
+  EXPECT_THAT(page.caption[0], HasSubstr("ChArUco board of 11 x 8 squares of 18 mm"));
   EXPECT_EQ(page.caption[1],
-            "target_grid: {pattern: charuco, columns: 11, rows: 8, square_mm: 20, marker_mm: 14, "
+            "target_grid: {pattern: charuco, columns: 11, rows: 8, square_mm: 18, marker_mm: 12, "
             "dictionary: 4x4_250}");
 }
 
@@ -270,7 +270,7 @@ TEST(LayOutTarget, AGridFillsTheSheetOrTheField) {
   EXPECT_LE(field.pattern.width, 0.9 * 128);
   EXPECT_LE(field.pattern.height, 0.9 * 96);
   request.grid->square_mm = 40;
-  EXPECT_THAT(RefusalOf(request), HasSubstr("rows must be from 3 to 200"));
+  EXPECT_THAT(RefusalOf(request), HasSubstr("columns must be from 3 to 200, found 1"));
   request.view.reset();
   request.grid->columns = request.grid->rows = 9;
   EXPECT_THAT(RefusalOf(request), HasSubstr("does not fit the sheet"));
