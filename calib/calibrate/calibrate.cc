@@ -10,10 +10,13 @@
 #include "calib/calibrate/counted_focus.h"
 #include "calib/calibrate/focus_solution.h"
 #include "calib/calibrate/moving_focus.h"
+#include "calib/calibrate/size_statements.h"
 #include "calib/calibrate/target_calibration.h"
 #include "calib/fit/known_focus.h"
+#include "calib/grid/grid_geometry.h"
 #include "calib/registration/scale_causes.h"
 #include "calib/sweep/frame_selection.h"
+#include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/validity.h"
 
@@ -98,6 +101,42 @@ Calibration Recognised(const FocusSweep& sweep, const CalibrationOptions& option
   return found;
 }
 
+// Calibrates frames as they are, or as the camera's distortion says.
+Calibration CalibrateFrames(const FocusSweep& sweep, const CalibrationOptions& options) {
+  if (sweep.moves && model::MovesFocus(*sweep.moves))
+    return CalibrateWithMotion(sweep, *sweep.moves, options);
+  if (sweep.readings_are_counts) return RefuseCounts(sweep);
+  if (!sweep.moves && sweep.readings_are_focus_distances) {
+    Calibration found = CalibrateWithMotion(sweep, model::SweepMotion::kLens, options);
+    found.diagnostics.moves_is_recognised = true;
+    found.summary.warnings.insert(
+        found.summary.warnings.begin(),
+        "the readings are in dioptres, which is the unit of a focus drive: the sweep is taken as "
+        "moves: lens; state moves to confirm or to correct it");
+    return found;
+  }
+  Calibration found = CalibrateTarget(sweep, options);
+  if (!sweep.moves && options.fit_blur && ShowsMovingFocus(found))
+    found = Recognised(sweep, options, std::move(found));
+  if (sweep.moves) found.diagnostics.moves = *sweep.moves;
+  return found;
+}
+
+// Measures the grid first: its size states the magnification, and a distortion that it shows is
+// taken out of the frames.
+Calibration CalibrateOnGrid(const FocusSweep& sweep, const CalibrationOptions& options) {
+  GridGeometry grid = MeasureGrid(sweep, options.threads, [] { ThrowIfCancelled(); });
+  FocusSweep used = sweep;
+  if (grid.follows_readings) used.grid_scales = grid.scales;
+  if (grid.distortion_is_used) used = WithDistortion(std::move(used), *grid.lens, sweep.roi);
+  Calibration found = CalibrateFrames(used, options);
+  if (!grid.message.empty() && !(grid.done && grid.follows_readings))
+    found.summary.warnings.push_back(grid.message);
+  CompareWithGrid(grid, &found.summary);
+  found.diagnostics.grid = std::move(grid);
+  return found;
+}
+
 }  // namespace
 
 bool HasEnoughFrames(const FocusSweep& sweep, std::string* why) {
@@ -130,23 +169,7 @@ Calibration Calibrate(const FocusSweep& sweep, const CalibrationOptions& options
   std::string why;
   if (!options.IsValid(&why)) throw Error("calibration options: " + why);
   if (!sweep.IsValid(&why)) throw Error("sweep: " + why);
-  if (sweep.moves && model::MovesFocus(*sweep.moves))
-    return CalibrateWithMotion(sweep, *sweep.moves, options);
-  if (sweep.readings_are_counts) return RefuseCounts(sweep);
-  if (!sweep.moves && sweep.readings_are_focus_distances) {
-    Calibration found = CalibrateWithMotion(sweep, model::SweepMotion::kLens, options);
-    found.diagnostics.moves_is_recognised = true;
-    found.summary.warnings.insert(
-        found.summary.warnings.begin(),
-        "the readings are in dioptres, which is the unit of a focus drive: the sweep is taken as "
-        "moves: lens; state moves to confirm or to correct it");
-    return found;
-  }
-  Calibration found = CalibrateTarget(sweep, options);
-  if (!sweep.moves && options.fit_blur && ShowsMovingFocus(found))
-    found = Recognised(sweep, options, std::move(found));
-  if (sweep.moves) found.diagnostics.moves = *sweep.moves;
-  return found;
+  return sweep.target_grid ? CalibrateOnGrid(sweep, options) : CalibrateFrames(sweep, options);
 }
 
 }  // namespace thicklens::calib

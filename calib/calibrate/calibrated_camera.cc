@@ -18,7 +18,9 @@ model::Camera CalibratedCamera(const model::Camera& camera, const Calibration& c
                                bool use_source_recipe) {
   model::Camera result = camera;
   model::CameraCalibration found;
-  found.evidence.undistorted = camera.distortion.has_value();
+  if (calibration.diagnostics.grid.distortion_is_used)
+    result.distortion = calibration.diagnostics.grid.lens;
+  found.evidence.undistorted = result.distortion.has_value();
   found.evidence.frames_used = calibration.summary.frames_used;
   for (const FrameMeasurement& frame : calibration.frames) {
     if (!frame.rejection.empty())

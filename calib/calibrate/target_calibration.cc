@@ -13,11 +13,13 @@
 #include "calib/calibrate/focus_solution.h"
 #include "calib/calibrate/light_changes.h"
 #include "calib/calibrate/response_effects.h"
+#include "calib/calibrate/size_statements.h"
 #include "calib/calibrate/zero_choice.h"
 #include "calib/edges/edge_blur.h"
 #include "calib/fit/blur_measurement.h"
 #include "calib/fit/known_focus.h"
 #include "calib/fit/source_recipe.h"
+#include "calib/grid/sheet_marks.h"
 #include "calib/registration/axis_contrast.h"
 #include "calib/registration/change_of_reference.h"
 #include "calib/registration/frame_bands.h"
@@ -605,7 +607,28 @@ class Calibrator {
       if (const auto measured = MagnificationOfPeriod(sweep_, Grey(reference_), beyond_mm))
         statements_.push_back(*measured);
     }
+    if (motion_ == nullptr) {
+      result_.diagnostics.marks = FindSheetMarks(sweep_, SharpestFrames());
+      const SizeStatements sizes =
+          StatementsOfSizes(sweep_, result_.diagnostics.marks, SharpestReadingMm());
+      statements_.insert(statements_.end(), sizes.found.begin(), sizes.found.end());
+      result_.summary.warnings.insert(result_.summary.warnings.end(), sizes.warnings.begin(),
+                                      sizes.warnings.end());
+    }
     best_statement_ = MostPrecise(sweep_.camera, statements_);
+  }
+
+  // Frames that show marks best.
+  std::vector<MarkedFrame> SharpestFrames() {
+    constexpr std::size_t kCount = 3;
+    std::vector<std::size_t> order = used();
+    std::stable_sort(order.begin(), order.end(), [this](std::size_t a, std::size_t b) {
+      return result_.frames[a].normalised_edge_slope > result_.frames[b].normalised_edge_slope;
+    });
+    order.resize(std::min(order.size(), kCount));
+    std::vector<MarkedFrame> frames;
+    for (const std::size_t i : order) frames.push_back({sweep_.frames[i].reading_mm, Grey(i)});
+    return frames;
   }
 
   // Whether a statement of the plane of focus, or the image scale by far, is more precise than the

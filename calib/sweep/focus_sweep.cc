@@ -315,7 +315,17 @@ FocusSweep MakeFocusSweep(const model::SweepFile& file, const model::Camera& cam
   sweep.target = file.target;
   sweep.floor = file.floor;
   sweep.target_period_mm = file.target_period_mm;
+  sweep.target_grid = file.target_grid;
+  sweep.grid_views = file.grid_views;
+  sweep.stage_alignment_deg = file.stage_alignment_deg;
   sweep.roi = RegionThatIsShown(camera, file.roi);
+  return sweep;
+}
+
+FocusSweep WithDistortion(FocusSweep sweep, const model::LensDistortion& distortion,
+                          const model::RegionOfInterest& region) {
+  sweep.camera.distortion = distortion;
+  sweep.roi = RegionThatIsShown(sweep.camera, region);
   return sweep;
 }
 

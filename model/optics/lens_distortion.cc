@@ -167,7 +167,7 @@ bool LensDistortion::IsValid(std::string* why) const {
                     CountsText(), count));
   }
   for (std::size_t i = 0; i < count; ++i) {
-    constexpr double kMax = 1e6;
+    constexpr double kMax = 1e12;  // k3 of a narrow field is that large
     if (!(std::abs(coefficients[i]) <= kMax)) {
       return Fail(why, fmt::format("coefficients[{}] must be finite and at most {}, found {}", i,
                                    kMax, coefficients[i]));
@@ -183,6 +183,13 @@ bool LensDistortion::IsValid(std::string* why) const {
                       i, kMaxTilt, coefficients[i]));
     }
   }
+  const auto unknowns = static_cast<Eigen::Index>(3 + count);
+  if (covariance.size() > 0 &&
+      (covariance.rows() != unknowns || covariance.cols() != unknowns || !covariance.allFinite())) {
+    return Fail(why, fmt::format("covariance: {} x {} finite numbers are expected (focal length, "
+                                 "principal point and coefficients), found {} x {}",
+                                 unknowns, unknowns, covariance.rows(), covariance.cols()));
+  }
   const Turn turn = TurnOf(*this);
   const double turn_px = turn.distorted * std::min(focal_length_px.x(), focal_length_px.y());
   const double near_px = 0.25 * std::min(width_px, height_px);
@@ -195,6 +202,19 @@ bool LensDistortion::IsValid(std::string* why) const {
                     turn_px, width_px, height_px));
   }
   return true;
+}
+
+std::vector<std::string> LensDistortion::CovarianceOrder() const {
+  static constexpr std::array<const char*, 14> kNames = {
+      "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "tau_x", "tau_y"};
+  static constexpr std::array<const char*, kFisheyeCount> kFisheyeNames = {"k1", "k2", "k3", "k4"};
+  std::vector<std::string> order = {"focal_length_px", "principal_point_x_px",
+                                    "principal_point_y_px"};
+  const bool is_fisheye = model == DistortionModel::kFisheye;
+  const std::size_t most = is_fisheye ? kFisheyeNames.size() : kNames.size();
+  for (std::size_t i = 0; i < std::min(coefficients.size(), most); ++i)
+    order.emplace_back(is_fisheye ? kFisheyeNames[i] : kNames[i]);
+  return order;
 }
 
 LensDistortion LensDistortion::ScaledTo(int width, int height) const {
@@ -226,6 +246,10 @@ LensDistortion LensDistortion::ScaledTo(int width, int height) const {
   scaled.focal_length_px = s * focal_length_px;
   scaled.principal_point_px =
       s * (principal_point_px + Eigen::Vector2d::Constant(0.5)) - Eigen::Vector2d::Constant(0.5);
+  if (scaled.covariance.size() > 0) {
+    scaled.covariance.topRows(3) *= s;
+    scaled.covariance.leftCols(3) *= s;
+  }
   return scaled;
 }
 

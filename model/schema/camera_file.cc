@@ -76,13 +76,33 @@ void ReadObjective(const YamlNode& node, Camera* camera) {
   camera->lens = LensOfObjective(objective);
 }
 
+void ReadDistortionCovariance(const YamlNode& node, LensDistortion* distortion) {
+  node.RequireKeys({"order", "rows"});
+  const std::vector<std::string> order = distortion->CovarianceOrder();
+  const auto names = node.At("order").ElementsExactly(order.size());
+  for (std::size_t i = 0; i < order.size(); ++i) names[i].OneOf({order[i]});
+  const auto rows = node.At("rows").ElementsExactly(order.size());
+  const auto n = static_cast<Eigen::Index>(order.size());
+  distortion->covariance.resize(n, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const auto cells = rows[static_cast<std::size_t>(i)].ElementsExactly(order.size());
+    for (Eigen::Index j = 0; j < n; ++j)
+      distortion->covariance(i, j) = cells[static_cast<std::size_t>(j)].Number();
+  }
+  constexpr double kRounding = 1e-6;
+  const Eigen::MatrixXd& c = distortion->covariance;
+  if (!c.isApprox(c.transpose(), kRounding) || (c.diagonal().array() < 0).any())
+    throw node.ErrorHere("a covariance must be symmetric, with variances >= 0");
+}
+
 LensDistortion ReadDistortion(const YamlNode& node) {
   if (!node.IsMap()) {
     throw node.ErrorHere(
         "a map with model, size_px, focal_length_px, principal_point_px and coefficients is "
         "expected (thicklens camera init --distortion FILE writes it)");
   }
-  node.RequireKeys({"model", "size_px", "focal_length_px", "principal_point_px", "coefficients"});
+  node.RequireKeys(
+      {"model", "size_px", "focal_length_px", "principal_point_px", "coefficients", "covariance"});
   LensDistortion found;
   found.model = node.At("model").OneOf({"opencv", "fisheye"}) == "fisheye"
                     ? DistortionModel::kFisheye
@@ -96,6 +116,8 @@ LensDistortion ReadDistortion(const YamlNode& node) {
   found.principal_point_px = {point[0].Number(), point[1].Number()};
   for (const YamlNode& number : node.At("coefficients").Elements())
     found.coefficients.push_back(number.Number());
+  if (const auto covariance = node.Find("covariance"))
+    ReadDistortionCovariance(*covariance, &found);
   found.source = node.source();
   std::string why;
   if (!found.IsValid(&why)) throw node.ErrorHere(why);
@@ -305,6 +327,12 @@ class CameraWriter {
     Numbers("focal_length_px", distortion.focal_length_px.data(), 2);
     Numbers("principal_point_px", distortion.principal_point_px.data(), 2);
     Numbers("coefficients", distortion.coefficients.data(), distortion.coefficients.size());
+    if (distortion.covariance.size() > 0) {
+      out_.BeginMap("covariance");
+      out_.List("order", distortion.CovarianceOrder());
+      WriteRows(distortion.covariance);
+      out_.EndMap();
+    }
     out_.EndMap();
   }
 
@@ -369,16 +397,18 @@ class CameraWriter {
   void WriteCovariance(const CameraCalibration& calibration) {
     out_.BeginMap("covariance");
     out_.List("order", calibration.covariance_order);
+    WriteRows(calibration.covariance);
+    out_.EndMap();
+  }
+
+  void WriteRows(const Eigen::MatrixXd& matrix) {
     out_.BeginList("rows");
-    for (Eigen::Index i = 0; i < calibration.covariance.rows(); ++i) {
+    for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
       out_.BeginListInLine();
-      for (Eigen::Index j = 0; j < calibration.covariance.cols(); ++j) {
-        out_.Element(calibration.covariance(i, j));
-      }
+      for (Eigen::Index j = 0; j < matrix.cols(); ++j) out_.Element(matrix(i, j));
       out_.EndList();
     }
     out_.EndList();
-    out_.EndMap();
   }
 
   void WriteEvidence(const Evidence& evidence) {

@@ -7,6 +7,7 @@
 
 #include "model/schema/frame_pairing.h"
 #include "model/schema/sweep_frames.h"
+#include "model/schema/sweep_grid.h"
 #include "model/schema/yaml_fields.h"
 #include "model/schema/yaml_writer.h"
 #include "thicklens/base/yaml_reader.h"
@@ -185,6 +186,9 @@ SweepFile ReadSweep(const std::string& path, const SweepReading& reading,
                     "moves",
                     "target",
                     "target_period_mm",
+                    "target_grid",
+                    "grid_views",
+                    "stage_alignment_deg",
                     "blur_floor_px",
                     "roi_px",
                     "full_scale",
@@ -234,6 +238,7 @@ SweepFile ReadSweep(const std::string& path, const SweepReading& reading,
   }
   if (const auto period = root.Find("target_period_mm"))
     sweep.target_period_mm = period->PositiveNumber();
+  ReadGrid(root, &sweep);
   ReadFloor(root, &sweep);
   if (const auto roi = root.Find("roi_px")) {
     const auto numbers = roi->ElementsExactly(4);
@@ -302,6 +307,7 @@ std::string SweepToYaml(const SweepFile& sweep) {
   if (sweep.moves) out.Text("moves", SweepMotionName(*sweep.moves));
   out.Text("target", SweepTargetName(sweep.target));
   out.NumberIfAny("target_period_mm", sweep.target_period_mm);
+  WriteGrid(sweep, &out);
   if (sweep.floor.given_px) {
     out.Measured("blur_floor_px", *sweep.floor.given_px);
   } else if (sweep.floor.from_px) {

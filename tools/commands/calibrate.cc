@@ -176,7 +176,11 @@ nlohmann::json RawMethod(const Sweep& sweep, const Calibration& calibration) {
 CommandResult RunCalibration(const CalibrateOptions& options, const Sweep& sweep) {
   Outputs outputs(options);
   const Calibration calibration = Measure(options, sweep);
-  const calib::FocusSweep focus_sweep = FocusSweepOf(sweep);
+  calib::FocusSweep focus_sweep = FocusSweepOf(sweep);
+  // Figures show the frames as they were measured.
+  const calib::GridGeometry& grid = calibration.diagnostics.grid;
+  if (grid.distortion_is_used)
+    focus_sweep = calib::WithDistortion(std::move(focus_sweep), *grid.lens, focus_sweep.roi);
   WriteOutputs(options, sweep, focus_sweep, calibration, &outputs);
   if (options.common.quiet) {  // otherwise they are part of the text
     for (const std::string& warning : calibration.summary.warnings)
@@ -203,7 +207,7 @@ CommandResult RunCalibration(const CalibrateOptions& options, const Sweep& sweep
                                                                  : std::vector<io::FilesRead>());
   result.summary["raw"] = RawMethod(sweep, calibration);
   result.summary["correction"] = CorrectionJson(sweep);
-  result.summary["distortion"] = DistortionJson(sweep.camera.distortion);
+  result.summary["distortion"] = DistortionJson(focus_sweep.camera.distortion);
   const auto& white = sweep.description.full_scale;
   result.summary["full_scale"] = {{"value", white ? nlohmann::json(*white) : nlohmann::json()},
                                   {"reason", PrintableUtf8(sweep.full_scale_reason)}};

@@ -53,6 +53,12 @@ struct TargetOptions {
   double dots_per_inch = 600;
   std::optional<double> feature_mm;
   std::int64_t seed = 1;
+  std::string pattern = "texture";
+  std::string squares;  // COLUMNSxROWS; empty: as many as fit
+  double square_mm = 10;
+  std::optional<double> marker_mm;
+  std::string dictionary;
+  bool no_marks = false;
   model::TargetRequest request;
 };
 
@@ -87,8 +93,64 @@ model::SheetSize ParseSheet(const std::string& text) {
   return {sides_mm[0], sides_mm[1], false};
 }
 
+// The grid that was asked for; its number of squares is 0 where it is chosen. Absent: a texture.
+std::optional<model::TargetGrid> GridOf(const TargetOptions& options) {
+  const bool is_texture = options.pattern == "texture";
+  const bool is_charuco = options.pattern == "charuco";
+  const auto only = [](bool is_given, bool may_be, const char* option, const char* pattern) {
+    if (is_given && !may_be)
+      throw UsageError(fmt::format("{} is for --pattern {}", option, pattern));
+  };
+  only(!options.squares.empty(), !is_texture, "--squares", "chequerboard, charuco or circles");
+  only(options.marker_mm.has_value(), is_charuco, "--marker-mm", "charuco");
+  only(!options.dictionary.empty(), is_charuco, "--dictionary", "charuco");
+  only(options.feature_mm.has_value(), is_texture, "--feature-mm", "texture");
+  only(options.no_marks, is_texture, "--no-marks", "texture");
+  if (is_texture) return std::nullopt;
+  model::TargetGrid grid;
+  grid.pattern = *model::GridPatternOf(options.pattern);
+  grid.square_mm = options.square_mm;
+  if (!options.squares.empty()) {
+    const auto counts = SplitPixels("--squares", options.squares, 'x', "COLUMNSxROWS");
+    if (counts.size() != 2 || counts[0] < 1 || counts[1] < 1) {
+      throw UsageError(fmt::format("--squares: COLUMNSxROWS, such as 11x8, is expected, found '{}'",
+                                   options.squares));
+    }
+    grid.columns = counts[0];
+    grid.rows = counts[1];
+  }
+  if (is_charuco) {
+    grid.marker_mm = options.marker_mm.value_or(model::kMarkerPart * grid.square_mm);
+    if (!options.dictionary.empty()) grid.dictionary = LowerCase(options.dictionary);
+    constexpr char kPrefix[] = "dict_";
+    if (grid.dictionary.rfind(kPrefix, 0) == 0) grid.dictionary.erase(0, sizeof(kPrefix) - 1);
+  }
+  return grid;
+}
+
+nlohmann::json TargetGridJson(const std::optional<model::TargetGrid>& grid) {
+  if (!grid) return nullptr;
+  const bool is_charuco = grid->pattern == model::GridPattern::kCharuco;
+  return {{"pattern", model::GridPatternName(grid->pattern)},
+          {"columns", grid->columns},
+          {"rows", grid->rows},
+          {"square_mm", grid->square_mm},
+          {"marker_mm", is_charuco ? nlohmann::json(grid->marker_mm) : nlohmann::json()},
+          {"dictionary", is_charuco ? nlohmann::json(grid->dictionary) : nlohmann::json()}};
+}
+
 nlohmann::json RectangleJson(const model::SheetRectangle& area) {
   return {{"x_mm", area.x}, {"y_mm", area.y}, {"width_mm", area.width}, {"height_mm", area.height}};
+}
+
+nlohmann::json PlacedMarksJson(const std::vector<model::PlacedMark>& marks) {
+  nlohmann::json rows = nlohmann::json::array();
+  for (const model::PlacedMark& mark : marks) {
+    rows.push_back({{"dictionary", model::kSheetDictionary},
+                    {"number", mark.number},
+                    {"area", RectangleJson(mark.area)}});
+  }
+  return rows;
 }
 
 nlohmann::json Summary(const TargetOptions& options, const model::TargetRequest& request,
@@ -107,6 +169,8 @@ nlohmann::json Summary(const TargetOptions& options, const model::TargetRequest&
                             {"two_tone", page.two_tone},
                             {"seed", page.seed},
                             {"leaves", leaves},
+                            {"grid", TargetGridJson(page.grid)},
+                            {"marks", PlacedMarksJson(page.marks)},
                             {"caption", page.caption},
                             {"choice", page.choice}};
   if (request.view) {
@@ -138,7 +202,8 @@ CommandResult MakeTarget(const TargetOptions& options, Format format,
   if (format == Format::kPng) png_size = TargetPngSize(page, options.dots_per_inch);
 
   OutputFile output(options.output_path);
-  const std::vector<model::TargetLeaf> leaves = model::DeadLeaves(page);
+  const std::vector<model::TargetLeaf> leaves =
+      page.grid ? std::vector<model::TargetLeaf>() : model::DeadLeaves(page);
   const std::string bytes = format == Format::kPdf   ? TargetPdf(page, leaves)
                             : format == Format::kSvg ? TargetSvg(page, leaves)
                                                      : TargetPng(page, leaves, *png_size);
@@ -155,11 +220,18 @@ CommandResult MakeTarget(const TargetOptions& options, Format format,
     result.summary["pixels_per_metre"] = png_size->pixels_per_metre;
     size += fmt::format(", {} x {} px", png_size->width_px, png_size->height_px);
   }
+  std::string facts;
+  if (page.grid) {
+    facts = "state it to calibrate by: " + page.caption[1];
+  } else {
+    facts = fmt::format("edge {:.1f} mm high, {:g} degrees from the vertical", page.patch.height,
+                        page.edge_angle_deg);
+    if (!page.marks.empty()) facts += "\n" + page.caption.back();
+  }
   PrintResult(options.common,
-              fmt::format("{}: {}\n{}\nedge {:.1f} mm high, {:g} degrees from the vertical\nprint "
-                          "at 100 %, without scaling; the bar must then measure {:.1f} mm\n",
-                          options.output_path, size, page.choice, page.patch.height,
-                          page.edge_angle_deg, page.bar.width));
+              fmt::format("{}: {}\n{}\n{}\nprint at 100 %, without scaling; the bar must then "
+                          "measure {:.1f} mm\n",
+                          options.output_path, size, page.choice, facts, page.bar.width));
   return result;
 }
 
@@ -173,6 +245,36 @@ void AddTargetOptions(CLI::App* command, TargetOptions* options) {
   AddDeprecatedOptions(
       command, "--paper", [options](const std::string& text) { options->paper = text; },
       &options->common);
+  command
+      ->add_option("--pattern", options->pattern,
+                   "texture, or a grid, by which calibrate finds the distortion of the lens: "
+                   "chequerboard (or checkerboard), charuco or circles")
+      ->check(CLI::IsMember(
+          {"texture", "chequerboard", "checkerboard", "chessboard", "charuco", "circles"}))
+      ->capture_default_str()
+      ->type_name("NAME");
+  command
+      ->add_option("--squares", options->squares,
+                   "Numbers of squares (or circles) of a grid along x and y; default: as many as "
+                   "fit the sheet or, with --camera, nine tenths of the field")
+      ->type_name("COLUMNSxROWS");
+  command
+      ->add_option("--square-mm", options->square_mm,
+                   "Side of a square of a grid, or distance of the circles' centres")
+      ->check(Between(0, kMaxFeatureMm * 10, "mm on the sheet"))
+      ->capture_default_str()
+      ->type_name("MM");
+  command
+      ->add_option("--marker-mm", options->marker_mm,
+                   "Side of a marker of a ChArUco board; default 0.7 of --square-mm")
+      ->check(Between(0, kMaxFeatureMm * 10, "mm on the sheet"))
+      ->type_name("MM");
+  command
+      ->add_option("--dictionary", options->dictionary,
+                   "Dictionary of a ChArUco board, as OpenCV names it; default 4x4_250")
+      ->type_name("NAME");
+  command->add_flag("--no-marks", options->no_marks,
+                    "Leave out the marks at the corners of a texture, which state its scale");
   CLI::Option* camera =
       command
           ->add_option("--camera", options->camera_path,
@@ -228,6 +330,8 @@ void AddTargetCommand(CLI::App* program, CommandAction* action) {
       model::TargetRequest request = options->request;
       request.sheet = ParseSheet(options->paper);
       request.feature_mm = options->feature_mm;
+      request.grid = GridOf(*options);
+      request.has_marks = !options->no_marks;
       request.seed = static_cast<std::uint64_t>(options->seed);
       RequireDistinctFiles({options->output_path, options->common.json_path},
                            {options->camera_path});

@@ -177,6 +177,14 @@ calib::FocusSweep FocusSweepOf(const Sweep& sweep) {
                                   sweep.description.frames, sweep.description.full_scale)](
                                  std::size_t i) { return files->Read(i); };
   }
+  if (!focus_sweep.grid_views.empty()) {
+    std::vector<model::SweepFrame> views;
+    for (const std::string& view : focus_sweep.grid_views) views.push_back({view, 0});
+    focus_sweep.read_grid_view = [files = std::make_shared<io::FrameFiles>(
+                                      views, sweep.description.full_scale)](std::size_t i) {
+      return files->Read(i);
+    };
+  }
   return focus_sweep;
 }
 

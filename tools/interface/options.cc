@@ -201,6 +201,13 @@ bool SweepOverrides::IsValid(std::string* why) const {
          IsPositiveStatement(why, "magnification", magnification) &&
          IfGiven(target_period_mm,
                  [why](double period) { return Positive(why, "target_period_mm", period); }) &&
+         IfGiven(target_grid,
+                 [why](const model::TargetGrid& grid) {
+                   std::string inner;
+                   return grid.IsValid(&inner) || Fail(why, "target_grid", inner);
+                 }) &&
+         IfGiven(stage_alignment_deg,
+                 [why](double angle) { return Positive(why, "stage_alignment_deg", angle); }) &&
          IfGiven(floor_px,
                  [why](const Measured& floor) { return IsStatement(why, "floor_px", floor); }) &&
          IfGiven(roi,

@@ -67,6 +67,19 @@ void ApplyOverrides(const SweepOverrides& overrides, const RunScope& run, model:
     file->optical_tube_length_mm = overrides.optical_tube_length_mm;
   if (overrides.magnification) file->magnification = overrides.magnification;
   if (overrides.target_period_mm) file->target_period_mm = overrides.target_period_mm;
+  if (overrides.target_grid) file->target_grid = overrides.target_grid;
+  if (!overrides.grid_views.empty()) {
+    if (!file->target_grid) {
+      throw OptionError(
+          "grid_views",
+          fmt::format("grid_views: the grid that these images show is missing, give {}",
+                      run.Option("target_grid")));
+    }
+    file->grid_views = model::ImagesOfFolder(overrides.grid_views);
+    if (file->grid_views.empty())
+      throw Error(fmt::format("{}: the folder contains no image", overrides.grid_views));
+  }
+  if (overrides.stage_alignment_deg) file->stage_alignment_deg = overrides.stage_alignment_deg;
   if (overrides.roi) file->roi = *overrides.roi;
   if (overrides.full_scale) file->full_scale = overrides.full_scale;
   if (overrides.raw) file->raw = *overrides.raw;
@@ -313,8 +326,8 @@ Sweep Finish(model::SweepFile file, const std::string& sweep_yaml, const SweepOv
   if (!sweep.truth) {                         // the parameters of a simulated camera are exact
     const std::string missing = MissingTolerancesLine(sweep.camera);
     if (!missing.empty()) sweep.notices.push_back(missing);
-    const std::string objective =
-        ObjectiveLine(sweep.camera, file.magnification || file.target_period_mm);
+    const std::string objective = ObjectiveLine(
+        sweep.camera, file.magnification || file.target_period_mm || file.target_grid);
     if (!objective.empty()) sweep.notices.push_back(objective);
   }
   sweep.description = std::move(file);

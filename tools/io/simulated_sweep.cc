@@ -32,6 +32,7 @@ model::SweepFile DescribeSweep(const model::SweepSimulationOptions& simulation,
                                const model::SweepSimulator& simulator, bool unknown_offset) {
   const model::SweepTruth& truth = simulator.truth();
   model::SweepFile sweep;
+  sweep.target_grid = simulation.target.grid;
   sweep.camera_path = "camera.yaml";
   if (simulator.effects().on.Has(model::Effect::kReadingError)) {
     sweep.reading_sigma_mm = simulation.reading_sigma_mm;

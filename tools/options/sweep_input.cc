@@ -67,6 +67,15 @@ void TakeFocus(const SweepArguments& arguments, SweepOverrides* overrides) {
   overrides->optical_tube_length_mm = FocusStatement("--tube-length-mm", arguments.tube_length_mm);
   overrides->magnification = FocusStatement("--magnification", arguments.magnification);
   overrides->target_period_mm = arguments.target_period_mm;
+  if (!arguments.target_grid.empty()) {
+    try {
+      overrides->target_grid = model::ParseTargetGrid(arguments.target_grid);
+    } catch (const Error& error) {
+      throw UsageError(std::string("--grid: ") + error.what());
+    }
+  }
+  overrides->grid_views = arguments.grid_views;
+  overrides->stage_alignment_deg = arguments.stage_alignment_deg;
 }
 
 void TakeRoi(const std::string& text, SweepOverrides* overrides) {
@@ -155,7 +164,8 @@ void CheckInput(const SweepArguments& arguments) {
 }  // namespace
 
 std::vector<std::string> SweepArguments::Files() const {
-  std::vector<std::string> files = {input, readings_csv, camera_path, truth_path, floor_from};
+  std::vector<std::string> files = {input,      readings_csv, camera_path,
+                                    truth_path, floor_from,   grid_views};
   for (const auto* more : {&correction.dark, &correction.flat, &correction.defects})
     files.insert(files.end(), more->begin(), more->end());
   files.push_back(FileOfDistortion(distortion));
@@ -208,6 +218,9 @@ OptionNames SweepOptionNames() {
           {"optical_tube_length_mm", "--tube-length-mm"},
           {"magnification", "--magnification"},
           {"target_period_mm", "--target-period-mm"},
+          {"target_grid", "--grid"},
+          {"grid_views", "--grid-views"},
+          {"stage_alignment_deg", "--stage-alignment-deg"},
           {"direction", "--direction"},
           {"moves", "--moves"},
           {"reading_sigma_mm", "--reading-sigma-mm"},

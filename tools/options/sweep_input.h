@@ -25,6 +25,9 @@ struct SweepArguments {
   // VALUE or VALUE:SIGMA
   std::string focus_depth_mm, working_distance_mm, image_distance_mm, tube_length_mm, magnification;
   std::optional<double> target_period_mm;
+  std::string target_grid;  // PATTERN:COLUMNSxROWS:SQUARE_MM
+  std::string grid_views;   // a folder
+  std::optional<double> stage_alignment_deg;
   std::string floor_px;    // VALUE, VALUE:SIGMA or "unknown"
   std::string floor_from;  // a camera file
   std::string target;

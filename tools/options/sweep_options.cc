@@ -205,6 +205,28 @@ void AddSweepStatements(CLI::App* command, SweepArguments* sweep) {
                    "Period of a periodic target, measured on it" + instead)
       ->check(Between(0, 1e9, "millimetres on the target"))
       ->type_name("MM");
+  command
+      ->add_option(
+          "--grid", sweep->target_grid,
+          "Grid on the target, by which image distance, principal point and distortion are "
+          "found: chequerboard:11x8:10 (squares along x and y, their side in mm), "
+          "charuco:11x8:10[:MARKER_MM[:DICTIONARY]] or circles:9x7:12" +
+              instead)
+      ->type_name("GRID");
+  command
+      ->add_option("--grid-views", sweep->grid_views,
+                   "Folder of further images of the same grid with the same focus, tilted by 20 to "
+                   "40 degrees about several axes" +
+                       instead)
+      ->type_name("DIR");
+  command
+      ->add_option(
+          "--stage-alignment-deg", sweep->stage_alignment_deg,
+          "Standard deviation of the angle between the motion of the sweep and the optical "
+          "axis, if the stage was aligned" +
+              instead)
+      ->check(Between(0, 45, "degrees"))
+      ->type_name("DEG");
   command->add_option("--roi", sweep->roi, "Part of the frames that is measured" + instead)
       ->type_name("X,Y,WIDTH,HEIGHT");
   constexpr int kMaxValue = 65535;

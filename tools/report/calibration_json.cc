@@ -13,6 +13,7 @@
 #include "tools/report/calibration_summary.h"
 #include "tools/report/calibration_text.h"
 #include "tools/report/determined.h"
+#include "tools/report/grid_words.h"
 
 namespace thicklens::tools {
 namespace {
@@ -398,6 +399,8 @@ json CalibrationJson(const calib::FocusSweep& sweep, const calib::Calibration& c
   out["stage_errors"] = StageJson(calibration.diagnostics.stage);
   out["camera_response"] = ResponseJson(calibration.diagnostics.response);
   out["magnification"] = MagnificationJson(calibration.diagnostics.magnification);
+  out["grid"] = GridJson(calibration.diagnostics.grid);
+  out["sheet_marks"] = MarksJson(calibration.diagnostics.marks);
   if (truth != nullptr) out["truth"] = TruthJson(rows);
   return out;
 }

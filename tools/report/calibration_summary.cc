@@ -10,6 +10,7 @@
 #include "thicklens/base/printable_text.h"
 #include "tools/report/calibration_text.h"
 #include "tools/report/determined.h"
+#include "tools/report/grid_words.h"
 #include "tools/report/rejection_words.h"
 
 namespace thicklens::tools {
@@ -143,6 +144,9 @@ std::string SecondaryLines(const calib::Calibration& calibration,
   const calib::BlurFit& blur = calibration.diagnostics.blur;
   AddLine("image scale", DistortionLine(scale), &text);
   AddLine("magnification", MagnificationLine(calibration), &text);
+  for (const std::string& line : GridLines(calibration.diagnostics.grid))
+    AddLine("grid", line, &text);
+  AddLine("sheet", MarksLine(calibration), &text);
   text +=
       blur.done
           ? fmt::format("blur fit: chi2/dof {:.2f}, {} frames{}\n", blur.chi2_per_dof,

@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <string>
+#include <vector>
 
 #include "thicklens/base/printable_text.h"
 #include "tools/interface/missing_tolerances.h"
 #include "tools/report/calibration_sections.h"
 #include "tools/report/calibration_text.h"
+#include "tools/report/grid_words.h"
 #include "tools/report/page_style.h"
 #include "tools/report/rounding.h"
 
@@ -262,6 +265,12 @@ std::string OtherWaysSection(const Calibration& calibration, const std::vector<R
        {MagnificationLine(calibration), DistortionLine(calibration.diagnostics.scale)})
     if (!line.empty())
       html += fmt::format("<p class=\"soft\">From the image scale: {}.</p>\n",
+                          EscapeXml(Typeset(line)));
+  std::vector<std::string> seen = GridLines(calibration.diagnostics.grid);
+  seen.push_back(MarksLine(calibration));
+  for (const std::string& line : seen)
+    if (!line.empty())
+      html += fmt::format("<p class=\"soft\">From the grid or the marks of the target: {}.</p>\n",
                           EscapeXml(Typeset(line)));
   if (!missing.empty()) html += "<p>Without a result:</p>\n<ul>\n" + missing + "</ul>\n";
   return html.empty() ? "" : "<h2>Results of other methods</h2>\n" + html;

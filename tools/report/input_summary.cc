@@ -119,6 +119,12 @@ std::string BenchText(const Sweep& sweep, const Understanding& found) {
 }
 
 std::string PeriodText(const model::SweepFile& description) {
+  if (description.target_grid) {
+    return ", " + description.target_grid->Description() +
+           (description.grid_views.empty()
+                ? ""
+                : fmt::format(", {} further views", description.grid_views.size()));
+  }
   if (!description.target_period_mm) return "";
   return fmt::format(", period {:.6g} mm", *description.target_period_mm);
 }
@@ -232,12 +238,16 @@ nlohmann::json UnderstandingJson(const Sweep& sweep, const Understanding& found,
                          {"distortion", DistortionJson(sweep.camera.distortion)},
                          {"stated_focus", StatedFocusJson(sweep)},
                          {"target_period_mm", nullptr},
+                         {"target_grid", nullptr},
+                         {"grid_views", sweep.description.grid_views.size()},
                          {"offset_mm", nullptr},
                          {"depth_range_mm", nullptr}};
   if (sweep.description.offset_mm) {
     json["offset_mm"] = {{"value", sweep.description.offset_mm->value},
                          {"sigma", sweep.description.offset_mm->sigma}};
   }
+  if (sweep.description.target_grid)
+    json["target_grid"] = sweep.description.target_grid->Description();
   if (sweep.description.target_period_mm)
     json["target_period_mm"] = *sweep.description.target_period_mm;
   if (const auto depths = DepthRangeMm(sweep, found))

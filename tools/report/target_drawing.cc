@@ -14,9 +14,11 @@
 
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/pi.h"
 #include "thicklens/base/printable_text.h"
 #include "thicklens/io/image_io.h"
 #include "thicklens/model/scene.h"
+#include "thicklens/model/target_grid.h"
 #include "tools/io/png_check.h"
 
 namespace thicklens::tools {
@@ -30,6 +32,7 @@ constexpr int kLongestSidePx = 32767;  // the limit of cairo
 constexpr double kMinFeaturePx = 2;
 constexpr double kFullGrey = 255;
 constexpr int kLeavesPerLook = 4096;
+constexpr double kModulesOfMark = 8;
 
 struct DestroySurface {
   void operator()(cairo_surface_t* surface) const { cairo_surface_destroy(surface); }
@@ -95,6 +98,61 @@ void DrawEdge(const model::TargetPage& page, cairo_t* context) {
   cairo_fill(context);
 }
 
+// Black modules of the marks, on white with a border of one module.
+std::vector<model::SheetRectangle> WhiteOfMarks(const model::TargetPage& page) {
+  std::vector<model::SheetRectangle> white;
+  for (const model::PlacedMark& mark : page.marks) {
+    const double border_mm = mark.area.width / kModulesOfMark;
+    white.push_back({mark.area.x - border_mm, mark.area.y - border_mm,
+                     mark.area.width + 2 * border_mm, mark.area.height + 2 * border_mm});
+  }
+  return white;
+}
+
+// The rectangles of the marks and the shapes of a grid, mm on the sheet.
+std::vector<model::GridShape> BlackOnSheet(const model::TargetPage& page) {
+  std::vector<model::GridShape> black;
+  if (page.grid) {
+    for (model::GridShape shape : model::BlackShapes(*page.grid)) {
+      shape.x += page.pattern.x;
+      shape.y += page.pattern.y;
+      black.push_back(shape);
+    }
+  }
+  for (const model::PlacedMark& mark : page.marks) {
+    const auto modules = model::MarkerModules(model::kSheetDictionary, mark.number);
+    const double module_mm = mark.area.width / static_cast<double>(modules.size());
+    for (std::size_t i = 0; i < modules.size(); ++i) {
+      for (std::size_t j = 0; j < modules[i].size();) {
+        std::size_t end = j;
+        while (end < modules[i].size() && modules[i][end]) ++end;
+        if (end > j) {
+          black.push_back({false, mark.area.x + static_cast<double>(j) * module_mm,
+                           mark.area.y + static_cast<double>(i) * module_mm,
+                           static_cast<double>(end - j) * module_mm, module_mm});
+        }
+        j = end + 1;
+      }
+    }
+  }
+  return black;
+}
+
+void DrawBlack(const model::TargetPage& page, cairo_t* context) {
+  for (const model::SheetRectangle& white : WhiteOfMarks(page)) FillRectangle(white, 255, context);
+  SetGrey(context, 0);
+  // One path for everything, so that no seam shows where shapes touch.
+  for (const model::GridShape& shape : BlackOnSheet(page)) {
+    if (shape.is_disc) {
+      cairo_new_sub_path(context);
+      cairo_arc(context, shape.x, shape.y, 0.5 * shape.width, 0, 2 * kPi);
+    } else {
+      cairo_rectangle(context, shape.x, shape.y, shape.width, shape.height);
+    }
+  }
+  cairo_fill(context);
+}
+
 void DrawCaption(const model::TargetPage& page, cairo_antialias_t antialias, cairo_t* context) {
   FillRectangle(page.bar, 0, context);
   // Letters are placed exactly as the page states, and not aligned to the pixels of a screen.
@@ -121,8 +179,11 @@ void DrawPage(const model::TargetPage& page, const std::vector<model::TargetLeaf
   const cairo_antialias_t antialias = page.two_tone ? CAIRO_ANTIALIAS_NONE : CAIRO_ANTIALIAS_GRAY;
   cairo_set_antialias(context.get(), antialias);
   FillRectangle({0, 0, page.width_mm, page.height_mm}, 255, context.get());
-  DrawTexture(page, leaves, context.get());
-  DrawEdge(page, context.get());
+  if (!page.grid) {
+    DrawTexture(page, leaves, context.get());
+    DrawEdge(page, context.get());
+  }
+  DrawBlack(page, context.get());
   DrawCaption(page, antialias, context.get());
   RequireSuccess(cairo_status(context.get()));
 }
@@ -167,23 +228,39 @@ std::string TargetSvg(const model::TargetPage& page, const std::vector<model::Ta
       "viewBox=\"0 0 {0} {1}\">\n<title>thicklens target</title>\n<desc>{2}</desc>\n",
       page.width_mm, page.height_mm, EscapeXml(JoinedCaption(page)));
   add_rectangle("sheet", {0, 0, page.width_mm, page.height_mm}, 255);
-  add("<clipPath id=\"clip\"><rect x=\"{:.4f}\" y=\"{:.4f}\" width=\"{:.4f}\" "
-      "height=\"{:.4f}\"/></clipPath>\n",
-      pattern.x, pattern.y, pattern.width, pattern.height);
-  add_rectangle("pattern", pattern, model::GreyBehindLeaves(page));
-  add("<g clip-path=\"url(#clip)\">\n");
-  int drawn = 0;
-  for (const model::TargetLeaf& leaf : leaves) {
-    if (drawn++ % kLeavesPerLook == 0) ThrowIfCancelled();
-    add("<circle cx=\"{0:.4f}\" cy=\"{1:.4f}\" r=\"{2:.4f}\" fill=\"#{3:02x}{3:02x}{3:02x}\"/>\n",
-        leaf.x_mm, leaf.y_mm, leaf.radius_mm, leaf.grey);
+  if (!page.grid) {
+    add("<clipPath id=\"clip\"><rect x=\"{:.4f}\" y=\"{:.4f}\" width=\"{:.4f}\" "
+        "height=\"{:.4f}\"/></clipPath>\n",
+        pattern.x, pattern.y, pattern.width, pattern.height);
+    add_rectangle("pattern", pattern, model::GreyBehindLeaves(page));
+    add("<g clip-path=\"url(#clip)\">\n");
+    int drawn = 0;
+    for (const model::TargetLeaf& leaf : leaves) {
+      if (drawn++ % kLeavesPerLook == 0) ThrowIfCancelled();
+      add("<circle cx=\"{0:.4f}\" cy=\"{1:.4f}\" r=\"{2:.4f}\" fill=\"#{3:02x}{3:02x}{3:02x}\"/>\n",
+          leaf.x_mm, leaf.y_mm, leaf.radius_mm, leaf.grey);
+    }
+    add("</g>\n");
+    add_rectangle("patch", patch, 255);
+    const double bottom_mm = patch.y + patch.height;
+    add("<path id=\"edge\" d=\"M{0:.4f} {1:.4f}L{2:.4f} {1:.4f}L{3:.4f} {4:.4f}L{0:.4f} {4:.4f}Z\" "
+        "fill=\"#000000\"/>\n",
+        patch.x, patch.y, page.EdgeX(patch.y), page.EdgeX(bottom_mm), bottom_mm);
+  }
+  int mark = 0;
+  for (const model::SheetRectangle& white : WhiteOfMarks(page))
+    add_rectangle(fmt::format("mark-{}", mark++).c_str(), white, 255);
+  add("<g fill=\"#000000\">\n");
+  for (const model::GridShape& shape : BlackOnSheet(page)) {
+    if (shape.is_disc) {
+      add("<circle cx=\"{:.4f}\" cy=\"{:.4f}\" r=\"{:.4f}\"/>\n", shape.x, shape.y,
+          0.5 * shape.width);
+    } else {
+      add("<rect x=\"{:.4f}\" y=\"{:.4f}\" width=\"{:.4f}\" height=\"{:.4f}\"/>\n", shape.x,
+          shape.y, shape.width, shape.height);
+    }
   }
   add("</g>\n");
-  add_rectangle("patch", patch, 255);
-  const double bottom_mm = patch.y + patch.height;
-  add("<path id=\"edge\" d=\"M{0:.4f} {1:.4f}L{2:.4f} {1:.4f}L{3:.4f} {4:.4f}L{0:.4f} {4:.4f}Z\" "
-      "fill=\"#000000\"/>\n",
-      patch.x, patch.y, page.EdgeX(patch.y), page.EdgeX(bottom_mm), bottom_mm);
   add_rectangle("bar", page.bar, 0);
   double baseline_y_mm = page.first_baseline_y_mm;
   for (const std::string& line : page.caption) {

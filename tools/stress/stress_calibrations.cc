@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "thicklens/model/objective.h"
+#include "thicklens/model/target_grid.h"
 #include "tools/stress/stress_suite.h"
 #include "tools/stress/stress_sweeps.h"
 
@@ -502,6 +503,24 @@ std::vector<StressCase> Aberrations() {
   aberrations.distortion = -0.03;
   cases.push_back(lens("distorting-lens", "barrel of 3 % at the corner: the blur is smaller there",
                        aberrations));
+  // The grid shows the distortion, which is taken out.
+  cases.push_back(
+      Sweep("grid-of-a-distorting-lens",
+            "barrel of 6 % at the corner, beyond what a texture leaves of a result; the "
+            "target is a ChArUco board",
+            "d1, zf and kappa within 4 standard errors of the truth, d1 within 50 um",
+            Simulated([](model::SweepSimulationOptions* simulation) {
+              constexpr int kSidePx = 512;
+              model::Sensor& sensor = simulation->camera.sensor;
+              sensor.width_px = sensor.height_px = kSidePx;
+              sensor.principal_point_px.setConstant(0.5 * (kSidePx - 1));
+              simulation->target = {};
+              simulation->target.kind = model::TargetKind::kGrid;
+              simulation->target.grid = model::ParseTargetGrid("charuco:11x9:1");
+              simulation->aberrations.distortion = -0.06;
+              simulation->bits = 16;
+            }),
+            Truth(50)));
   aberrations = {};
   aberrations.astigmatism_mm = -4;
   cases.push_back(lens("astigmatic-lens",

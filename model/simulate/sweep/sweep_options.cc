@@ -17,6 +17,10 @@ namespace thicklens::model {
 namespace {
 
 bool IsValidTarget(const TargetOptions& target, std::string* why) {
+  std::string inner;
+  if (target.kind == TargetKind::kGrid && !target.grid)
+    return Fail(why, "target.grid is missing: it is needed for the kind 'grid'");
+  if (target.grid && !target.grid->IsValid(&inner)) return Fail(why, "target.grid: " + inner);
   if (!(target.contrast > 0 && target.contrast <= 1)) {
     return Fail(why, fmt::format("target.contrast is {}: it must be above 0 and at most 1",
                                  target.contrast));
@@ -74,6 +78,8 @@ std::string TargetKindName(TargetKind kind) {
       return "siemens-star";
     case TargetKind::kImage:
       return "image";
+    case TargetKind::kGrid:
+      return "grid";
     case TargetKind::kPrintedEdge:
       return "printed-edge";
     case TargetKind::kKnifeEdge:

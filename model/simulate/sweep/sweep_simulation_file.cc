@@ -7,6 +7,7 @@
 
 #include "model/schema/effect_yaml.h"
 #include "model/schema/renamed_keys.h"
+#include "model/schema/sweep_grid.h"
 #include "model/schema/yaml_fields.h"
 #include "model/simulate/simulated_camera.h"
 #include "thicklens/base/yaml_reader.h"
@@ -40,13 +41,13 @@ TargetKind ReadKind(const YamlNode& node, std::vector<std::string>* notices) {
       node,
       {TargetKind::kDeadLeaves, TargetKind::kPinkNoise, TargetKind::kWhiteNoise,
        TargetKind::kCheckerboard, TargetKind::kSiemensStar, TargetKind::kImage,
-       TargetKind::kPrintedEdge, TargetKind::kKnifeEdge},
+       TargetKind::kGrid, TargetKind::kPrintedEdge, TargetKind::kKnifeEdge},
       TargetKindName, RenamedImage(), notices);
 }
 
 TargetOptions ReadTarget(const YamlNode& node, std::vector<std::string>* notices) {
   node.RequireKeys({"kind", "contrast", "feature_size_mm", "edge_angle_deg", "ink_sigma_mm",
-                    "tilt_deg", "image"},
+                    "tilt_deg", "image", "grid"},
                    {RenamedImage()});
   TargetOptions target;
   const YamlNode kind = node.At("kind");
@@ -64,6 +65,15 @@ TargetOptions ReadTarget(const YamlNode& node, std::vector<std::string>* notices
     target.image_path = node.ResolvePath(image->Text());
   } else if (target.kind == TargetKind::kImage) {
     throw kind.ErrorHere("the kind 'image' requires the image's path in target.image");
+  }
+  if (const auto grid = node.Find("grid")) {
+    if (target.kind != TargetKind::kGrid) {
+      throw grid->ErrorHere("this key is only for a target of the kind 'grid', found kind '" +
+                            TargetKindName(target.kind) + "'");
+    }
+    target.grid = ReadTargetGrid(*grid);
+  } else if (target.kind == TargetKind::kGrid) {
+    throw kind.ErrorHere("the kind 'grid' requires target.grid (pattern, columns, rows, square_mm)");
   }
   return target;
 }

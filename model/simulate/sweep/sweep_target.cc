@@ -256,6 +256,63 @@ TargetTile DrawImage(const TargetOptions& options, const TileRequest& request,
   return canvas.Finish();
 }
 
+// The part of the interval [from, to] that lies in [first, last].
+double PartWithin(double from, double to, double first, double last) {
+  return std::max(0.0, std::min(to, last) - std::max(from, first)) / (to - from);
+}
+
+// The grid once, in the middle of the tile, black on white. Each sample is the mean over its cell;
+// the border of a disc is taken for straight within a cell.
+TargetTile DrawGrid(const TargetOptions& options, const TileRequest& asked) {
+  const TargetGrid& grid = *options.grid;
+  const Eigen::Vector2d size_mm = grid.SizeMm();
+  TileRequest request = asked;
+  // White paper around it: a tile is repeated.
+  request.width_mm = std::max(asked.width_mm, size_mm.x() + 2 * grid.square_mm);
+  request.height_mm = std::max(asked.height_mm, size_mm.y() + 2 * grid.square_mm);
+  Canvas canvas(request, 0);
+  const double step_x = canvas.spacing_x_mm(), step_y = canvas.spacing_y_mm();
+  if (!(grid.square_mm >= 4 * std::max(step_x, step_y))) {
+    throw Error(fmt::format(
+        "target.grid: squares of {} mm are below four samples of the field ({:.4g} mm): "
+        "choose larger squares or a nearer target",
+        grid.square_mm, 4 * std::max(step_x, step_y)));
+  }
+  cv::Mat& samples = canvas.samples();
+  samples.setTo(1 + options.contrast);
+  // The sample (i, j) is at (j step - width/2, i step - height/2) from the tile's centre.
+  const double left_mm = 0.5 * canvas.width_mm() - 0.5 * size_mm.x();
+  const double top_mm = 0.5 * canvas.height_mm() - 0.5 * size_mm.y();
+  for (const GridShape& shape : BlackShapes(grid)) {
+    ThrowIfCancelled();
+    const double reach_x = shape.is_disc ? 0.5 * shape.width : 0;
+    const double reach_y = shape.is_disc ? 0.5 * shape.height : 0;
+    const double from_x = left_mm + shape.x - reach_x, to_x = from_x + shape.width;
+    const double from_y = top_mm + shape.y - reach_y, to_y = from_y + shape.height;
+    const int first_j = std::max(0, static_cast<int>(from_x / step_x - 1));
+    const int last_j = std::min(samples.cols - 1, static_cast<int>(to_x / step_x + 2));
+    const int first_i = std::max(0, static_cast<int>(from_y / step_y - 1));
+    const int last_i = std::min(samples.rows - 1, static_cast<int>(to_y / step_y + 2));
+    for (int i = first_i; i <= last_i; ++i) {
+      auto* row = samples.ptr<double>(i);
+      const double y = i * step_y;
+      for (int j = first_j; j <= last_j; ++j) {
+        const double x = j * step_x;
+        const double covered =
+            shape.is_disc ? std::clamp((0.5 * shape.width -
+                                        std::hypot(x - left_mm - shape.x, y - top_mm - shape.y)) /
+                                               std::sqrt(step_x * step_y) +
+                                           0.5,
+                                       0.0, 1.0)
+                          : PartWithin(x - 0.5 * step_x, x + 0.5 * step_x, from_x, to_x) *
+                                PartWithin(y - 0.5 * step_y, y + 0.5 * step_y, from_y, to_y);
+        row[j] -= 2 * options.contrast * covered;
+      }
+    }
+  }
+  return canvas.Finish();
+}
+
 }  // namespace
 
 TargetTile DrawTargetTile(const TargetOptions& options, const TileRequest& request,
@@ -272,6 +329,8 @@ TargetTile DrawTargetTile(const TargetOptions& options, const TileRequest& reque
       return DrawSiemensStar(options, request);
     case TargetKind::kImage:
       return DrawImage(options, request, image);
+    case TargetKind::kGrid:
+      return DrawGrid(options, request);
     case TargetKind::kPrintedEdge:
     case TargetKind::kKnifeEdge:
       break;

@@ -40,6 +40,16 @@ constexpr double kFeaturesAcross = 360;
 constexpr double kMinFeaturesAcross = 30;
 constexpr double kMaxFeatures = 5e6;
 constexpr double kRoundingSlack = 1e-9;
+// The part of the camera's field that a grid takes, so that all of it is in view.
+constexpr double kGridPart = 0.9;
+// A square is at least so many times as wide as what the print method resolves.
+constexpr double kFinestSquares = 10;
+// Modules along a marker of the usual dictionaries with their border, about.
+constexpr double kMarkerModules = 8;
+// Marks of a sheet at least 210 mm wide: distance from the texture and from the sheet's edge.
+constexpr double kMarkGapMm = 2, kMarkEdgeMm = 4;
+// In the camera's field: the largest side of a mark, and the part within the outermost marks.
+constexpr double kMarkPart = 0.1, kMarkedPart = 0.94;
 
 double RoundToTwoDigits(double value) {
   const double unit = std::pow(10, std::floor(std::log10(value)) - 1);
@@ -189,6 +199,119 @@ double LongestBarMm(double room_mm) {
   return 10;
 }
 
+// The number of a grid's squares that fit, one of them odd and the other one even, so that a
+// chequerboard looks different upside down.
+int Fitting(double room_mm, double square_mm, bool odd) {
+  const int most = static_cast<int>(room_mm / square_mm + 1e-9);
+  return (most % 2 == 1) == odd ? most : most - 1;
+}
+
+// The grid with the numbers of squares that are not stated (0) chosen, and where it lies.
+void PlaceGrid(const TargetRequest& request, const SheetSize& sheet, TargetPage* page) {
+  TargetGrid grid = *request.grid;
+  const SheetRectangle free = FreeArea(sheet);
+  double width_mm = free.width, height_mm = free.height;
+  if (request.view) {
+    width_mm = std::min(width_mm, kGridPart * request.view->width_mm);
+    height_mm = std::min(height_mm, kGridPart * request.view->height_mm);
+  }
+  // Circles need less than their number times their distance.
+  const double more_mm =
+      grid.pattern == GridPattern::kCircles ? (1 - 2 * kCirclePart) * grid.square_mm : 0;
+  const bool is_wide = width_mm >= height_mm;
+  if (grid.columns == 0) grid.columns = Fitting(width_mm + more_mm, grid.square_mm, is_wide);
+  if (grid.rows == 0) grid.rows = Fitting(height_mm + more_mm, grid.square_mm, !is_wide);
+  std::string why;
+  if (!grid.IsValid(&why)) {
+    throw Error(fmt::format("a grid with squares of {:g} mm in {:.1f} x {:.1f} mm{}: {}",
+                            grid.square_mm, width_mm, height_mm,
+                            request.view ? ", nine tenths of the camera's field" : "", why));
+  }
+  const Eigen::Vector2d size_mm = grid.SizeMm();
+  if (!Holds(free, size_mm.x(), size_mm.y())) {
+    throw Error(fmt::format(
+        "a grid of {:.1f} x {:.1f} mm does not fit the sheet of {:g} x {:g} mm "
+        "({:.1f} x {:.1f} mm are free): choose fewer or smaller squares, or a "
+        "larger sheet",
+        size_mm.x(), size_mm.y(), sheet.width_mm, sheet.height_mm, free.width, free.height));
+  }
+  if (!(grid.square_mm >= kFinestSquares * request.finest_mm)) {
+    throw Error(
+        fmt::format("squares of {:g} mm are below ten times the {:g} mm that the print "
+                    "method resolves: choose larger squares, or state a smaller finest_mm",
+                    grid.square_mm, request.finest_mm));
+  }
+  page->grid = grid;
+  page->pattern = {free.x + (free.width - size_mm.x()) / 2,
+                   free.y + (free.height - size_mm.y()) / 2, size_mm.x(), size_mm.y()};
+  page->choice = grid.Description();
+  if (request.view) {
+    page->choice += fmt::format(", {:.1f} px of the image each at {:g} mm",
+                                grid.square_mm / request.view->px_mm, request.view->distance_mm);
+  }
+}
+
+// The marks of one side, or none if the sheet has no room for them.
+std::vector<PlacedMark> MarksOf(int number, const TargetRequest& request, const SheetSize& sheet,
+                                const SheetRectangle& pattern) {
+  const double scale = SheetScale(sheet);
+  const double side_mm = SheetMarkOf(number)->side_mm, step_mm = kMarkStep * side_mm;
+  const double gap_mm = std::max(kMarkGapMm * scale, side_mm / kMarkerModules);
+  const auto apart = [&](double pattern_mm, double view_mm) {
+    return step_mm * (request.view
+                          ? std::floor((kMarkedPart * view_mm - side_mm) / step_mm)
+                          : std::ceil((pattern_mm + 2 * gap_mm + side_mm) / step_mm - 1e-9));
+  };
+  const double apart_x = apart(pattern.width, request.view ? request.view->width_mm : 0);
+  const double apart_y = apart(pattern.height, request.view ? request.view->height_mm : 0);
+  const double left_mm = pattern.x + (pattern.width - apart_x - side_mm) / 2;
+  const double top_mm = request.view ? pattern.y + (pattern.height - apart_y - side_mm) / 2
+                                     : pattern.y - gap_mm - side_mm;
+  const double edge_mm = kMarkEdgeMm * scale;
+  if (!(apart_x > 0) || !(apart_y > 0) || left_mm < edge_mm || top_mm < edge_mm ||
+      left_mm + apart_x + side_mm > sheet.width_mm - edge_mm ||
+      top_mm + apart_y + side_mm > sheet.height_mm - edge_mm)
+    return {};
+  std::vector<PlacedMark> marks;
+  for (int corner = 0; corner < 4; ++corner) {
+    marks.push_back(
+        {number + corner,
+         {left_mm + (corner % 2) * apart_x, top_mm + (corner / 2) * apart_y, side_mm, side_mm}});
+  }
+  return marks;
+}
+
+// The largest marks that fit: outside of a texture that fills the sheet, or inside of the camera's
+// field, so that they are in view.
+std::vector<PlacedMark> PlaceMarks(const TargetRequest& request, const SheetSize& sheet,
+                                   const SheetRectangle& pattern) {
+#ifndef THICKLENS_HAS_ARUCO
+  return {};  // nothing could draw them
+#endif
+  double side_mm = (kMarginMm - kMarkGapMm - kMarkEdgeMm) * SheetScale(sheet);
+  if (request.view) side_mm = kMarkPart * std::min(request.view->width_mm, request.view->height_mm);
+  while (const std::optional<int> number = NumberOfSheetMark(0, side_mm)) {
+    const std::vector<PlacedMark> marks = MarksOf(*number, request, sheet, pattern);
+    if (!marks.empty()) return marks;
+    side_mm = SheetMarkOf(*number)->side_mm * (1 - 1e-6);
+  }
+  return {};
+}
+
+std::string GridStatement(const TargetGrid& grid) {
+  std::string text =
+      fmt::format("target_grid: {{pattern: {}, columns: {}, rows: {}, square_mm: {:g}",
+                  GridPatternName(grid.pattern), grid.columns, grid.rows, grid.square_mm);
+  if (grid.pattern == GridPattern::kCharuco)
+    text += fmt::format(", marker_mm: {:g}, dictionary: {}", grid.marker_mm, grid.dictionary);
+  return text + "}";
+}
+
+std::vector<std::string> CaptionOfGrid(const TargetPage& page) {
+  return {"thicklens target, " + page.grid->Description(), GridStatement(*page.grid),
+          fmt::format("measure this bar: {:.1f} mm; print at 100 %, no scaling", page.bar.width)};
+}
+
 std::vector<std::string> CaptionOf(const TargetPage& page, const std::optional<CameraView>& view) {
   std::vector<std::string> lines = {
       fmt::format("thicklens target, pattern {:.1f} x {:.1f} mm, smallest feature {:g} mm, edge "
@@ -200,6 +323,12 @@ std::vector<std::string> CaptionOf(const TargetPage& page, const std::optional<C
     lines.push_back(fmt::format("for a camera that sees {:.1f} x {:.1f} mm at {:g} mm",
                                 view->width_mm, view->height_mm, view->distance_mm));
   }
+  if (!page.marks.empty()) {
+    lines.push_back(fmt::format(
+        "marks {} {} to {}, side {:g} mm, {:g} x {:g} mm apart", kSheetDictionary,
+        page.marks.front().number, page.marks.back().number, page.marks.front().area.width,
+        page.marks[1].area.x - page.marks[0].area.x, page.marks[2].area.y - page.marks[0].area.y));
+  }
   return lines;
 }
 
@@ -208,7 +337,7 @@ void AddCaption(const SheetSize& sheet, const std::optional<CameraView>& view, T
   const SheetRectangle free = FreeArea(sheet);
   page->bar = {free.x, free.y + free.height + kBarGapMm * scale, LongestBarMm(free.width),
                kBarHeightMm * scale};
-  page->caption = CaptionOf(*page, view);
+  page->caption = page->grid ? CaptionOfGrid(*page) : CaptionOf(*page, view);
   std::size_t most_letters = 0;
   for (const std::string& line : page->caption) most_letters = std::max(most_letters, line.size());
   page->text_size_mm = std::min(kTextSizeMm * scale,
@@ -234,18 +363,34 @@ double TargetPage::EdgeX(double y_mm) const {
 }
 
 TargetPage LayOutTarget(const TargetRequest& request) {
-  const SheetSize sheet = SheetFor(request.sheet, request.view);
   TargetPage page;
+  SheetSize sheet = request.sheet;
+  if (request.grid) {
+    const bool turns = sheet.may_turn && request.grid->columns > request.grid->rows &&
+                       sheet.width_mm < sheet.height_mm;
+    if (turns) sheet = Turned(sheet);
+  } else {
+    sheet = SheetFor(request.sheet, request.view);
+  }
   page.width_mm = sheet.width_mm;
   page.height_mm = sheet.height_mm;
+  page.two_tone = request.two_tone;
+  page.seed = request.seed;
+  if (request.grid) {
+    PlaceGrid(request, sheet, &page);
+    page.feature_mm = page.grid->pattern == GridPattern::kCharuco
+                          ? page.grid->marker_mm / kMarkerModules
+                          : page.grid->square_mm;
+    AddCaption(sheet, request.view, &page);
+    return page;
+  }
   page.pattern = PatternFor(sheet, request.view);
   const Feature feature = ChooseFeature(request, page.pattern);
   RequirePossibleTexture(page.pattern, feature.size_mm);
   page.patch = PatchOf(page.pattern);
   page.edge_angle_deg = request.edge_angle_deg;
   page.feature_mm = feature.size_mm;
-  page.two_tone = request.two_tone;
-  page.seed = request.seed;
+  if (request.has_marks) page.marks = PlaceMarks(request, sheet, page.pattern);
   page.choice =
       fmt::format("smallest feature {:g} mm ({}); pattern {:.1f} x {:.1f} mm ({})", feature.size_mm,
                   feature.why, page.pattern.width, page.pattern.height,

@@ -17,6 +17,7 @@
 #include "support/temporary_folder.h"
 #include "thicklens/base/error.h"
 #include "thicklens/io/image_io.h"
+#include "thicklens/model/target_grid.h"
 #include "thicklens/model/target_page.h"
 #include "thicklens/model/target_texture.h"
 #include "tools/io/png_check.h"
@@ -43,6 +44,7 @@ model::TargetRequest SmallRequest() {
   model::TargetRequest request;
   request.sheet = {148, 120, false};
   request.feature_mm = 0.5;
+  request.has_marks = false;
   return request;
 }
 
@@ -75,7 +77,7 @@ struct Drawn {
 Drawn Draw(const model::TargetRequest& request, double dpi) {
   Drawn drawn;
   drawn.page = model::LayOutTarget(request);
-  drawn.leaves = model::DeadLeaves(drawn.page);
+  if (!drawn.page.grid) drawn.leaves = model::DeadLeaves(drawn.page);
   const std::string png = TargetPng(drawn.page, drawn.leaves, TargetPngSize(drawn.page, dpi));
   drawn.image = io::DecodeImage(png, "target.png");
   drawn.px_per_mm = static_cast<double>(StatedResolution(png)[0]) / 1000;
@@ -229,6 +231,53 @@ TEST(TargetPng, ShowsTheCaption) {
   const cv::Mat beside =
       drawn.Part({page.width_mm - page.bar.x + 0.2, 0, page.bar.x - 1, page.height_mm - 1});
   EXPECT_EQ(cv::countNonZero(beside != 255), 0);
+}
+
+// Each module of each mark has its colour, and the paper around them is white.
+TEST(TargetPng, ShowsTheMarks) {
+  model::TargetRequest request = SmallRequest();
+  request.has_marks = true;
+  const Drawn drawn = Draw(request, 300);
+  ASSERT_EQ(drawn.page.marks.size(), 4U);
+  for (const model::PlacedMark& mark : drawn.page.marks) {
+    const auto modules = model::MarkerModules(model::kSheetDictionary, mark.number);
+    const double side_mm = mark.area.width / static_cast<double>(modules.size());
+    const auto grey = [&](double row, double column) {
+      return drawn.image.at<std::uint8_t>(drawn.Px(mark.area.y + (row + 0.5) * side_mm),
+                                          drawn.Px(mark.area.x + (column + 0.5) * side_mm));
+    };
+    for (std::size_t i = 0; i < modules.size(); ++i) {
+      for (std::size_t j = 0; j < modules.size(); ++j)
+        EXPECT_EQ(grey(static_cast<double>(i), static_cast<double>(j)), modules[i][j] ? 0 : 255);
+      EXPECT_EQ(grey(static_cast<double>(i), -1), 255);
+      EXPECT_EQ(grey(-1, static_cast<double>(i)), 255);
+    }
+  }
+}
+
+// The squares of a board lie where its points say, at the true scale.
+TEST(TargetPng, ShowsTheGrid) {
+  for (const char* pattern : {"chequerboard:9x6:8", "charuco:9x6:8", "circles:9x6:8"}) {
+    model::TargetRequest request = SmallRequest();
+    request.grid = model::ParseTargetGrid(pattern);
+    const Drawn drawn = Draw(request, 300);
+    const model::SheetRectangle& area = drawn.page.pattern;
+    for (const Eigen::Vector2d& at : model::GridPoints(*request.grid)) {
+      const auto grey = [&](double x_mm, double y_mm) {
+        return drawn.image.at<std::uint8_t>(drawn.Px(area.y + at.y() + y_mm),
+                                            drawn.Px(area.x + at.x() + x_mm));
+      };
+      if (request.grid->pattern == model::GridPattern::kCircles) {
+        EXPECT_EQ(grey(2.2, 0), 0);
+        EXPECT_EQ(grey(2.6, 0), 255);
+        continue;
+      }
+      EXPECT_EQ(grey(0.4, 0.4), grey(-0.4, -0.4));
+      EXPECT_EQ(grey(0.4, -0.4), grey(-0.4, 0.4));
+      EXPECT_EQ(std::abs(grey(0.4, 0.4) - grey(0.4, -0.4)), 255);
+    }
+    EXPECT_EQ(drawn.image.at<std::uint8_t>(drawn.Px(area.y - 1), drawn.Px(area.x - 1)), 255);
+  }
 }
 
 TEST(TargetPng, TwoTonesAreTwo) {

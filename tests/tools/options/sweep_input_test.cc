@@ -292,6 +292,26 @@ TEST_F(SweepInputTest, ThePeriodOfTheTargetMayBeGiven) {
   EXPECT_THROW(ReadSweepInput(arguments_), UsageError);
 }
 
+TEST_F(SweepInputTest, TheGridOfTheTargetMayBeGiven) {
+  Sweep("target_grid: {pattern: chequerboard, columns: 9, rows: 6, square_mm: 5}\n");
+  arguments_.target_grid = "charuco:11x8:10";
+  arguments_.stage_alignment_deg = 0.2;
+  const model::SweepFile file = ReadSweepInput(arguments_).description;
+  EXPECT_EQ(file.target_grid->Description(),
+            "ChArUco board of 11 x 8 squares of 10 mm, markers of 7 mm, 4x4_250");
+  EXPECT_EQ(file.stage_alignment_deg.value(), 0.2);
+  arguments_.target_grid = "charuco:11x8";
+  EXPECT_THAT(ErrorOf([&] { ReadSweepInput(arguments_); }),
+              AllOf(StartsWith("--grid: "), HasSubstr("PATTERN:COLUMNSxROWS:SQUARE_MM")));
+  EXPECT_THROW(ReadSweepInput(arguments_), UsageError);
+}
+
+TEST_F(SweepInputTest, ViewsOfAGridNeedTheGrid) {
+  Sweep("");
+  arguments_.grid_views = "tilted";
+  EXPECT_THAT(ErrorOf([&] { ReadSweepInput(arguments_); }), HasSubstr("give --grid"));
+}
+
 // The command line as CLI11 reads it.
 TEST(SweepStatements, AreReadFromTheCommandLine) {
   CLI::App app;

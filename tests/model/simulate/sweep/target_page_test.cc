@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <optional>
 #include <string>
 
 #include "support/test_cameras.h"
@@ -43,7 +45,7 @@ TEST(LayOutTarget, FillsAnA4SheetAndSaysSo) {
   EXPECT_DOUBLE_EQ(page.pattern.height, 240);
   EXPECT_DOUBLE_EQ(page.feature_mm, 0.5);
   EXPECT_DOUBLE_EQ(page.bar.width, 100);
-  ASSERT_EQ(page.caption.size(), 2U);
+  ASSERT_EQ(page.caption.size(), 3U);
   EXPECT_EQ(page.caption[0],
             "thicklens target, pattern 180.0 x 240.0 mm, smallest feature 0.5 mm, edge 5 degrees, "
             "seed 1");
@@ -102,7 +104,7 @@ TEST(LayOutTarget, OverfillsTheFieldOfACamera) {
   EXPECT_DOUBLE_EQ(page.feature_mm, 0.6);
   EXPECT_THAT(page.choice, AllOf(HasSubstr("0.6 mm (3.0 px"), HasSubstr("2 to 6 px"),
                                  HasSubstr("128.0 x 96.0 mm plus 15 %")));
-  EXPECT_THAT(page.caption.back(), HasSubstr("sees 128.0 x 96.0 mm at 1000 mm"));
+  EXPECT_THAT(page.caption[2], HasSubstr("sees 128.0 x 96.0 mm at 1000 mm"));
 }
 
 TEST(LayOutTarget, TurnsASheetThatHoldsThePatternOnlyLying) {
@@ -182,6 +184,98 @@ TEST(ViewOfTarget, IsWhatAThickLensSeesInFocus) {
   EXPECT_THAT(RefusalOf(request), HasSubstr("laid out"));
   request.view = ViewOfTarget(camera, named_mm - 2);
   EXPECT_THAT(RefusalOf(request), HasSubstr("larger distance"));
+}
+
+// The marks stand outside of the texture, with a white border, at whole multiples of four sides.
+TEST(LayOutTarget, MarksStandAroundTheTexture) {
+  TargetRequest request;
+  for (const SheetSize& sheet : {kA4, SheetSize{297, 420, true}, SheetSize{215.9, 279.4, true}}) {
+    request.sheet = sheet;
+    const TargetPage page = LayOutTarget(request);
+    ASSERT_EQ(page.marks.size(), 4U);
+    const double side = page.marks[0].area.width;
+    for (const PlacedMark& mark : page.marks) {
+      const std::optional<SheetMark> known = SheetMarkOf(mark.number);
+      ASSERT_TRUE(known);
+      EXPECT_EQ(known->side_mm, side);
+      const double border = side / 8;
+      const SheetRectangle& at = mark.area;
+      const bool beside = at.x + side + border <= page.pattern.x ||
+                          at.x - border >= page.pattern.x + page.pattern.width ||
+                          at.y + side + border <= page.pattern.y ||
+                          at.y - border >= page.pattern.y + page.pattern.height;
+      EXPECT_TRUE(beside) << mark.number;
+      EXPECT_GT(at.x - border, 0);
+      EXPECT_LT(at.y + side + border, page.height_mm);
+      const double columns = (at.x - page.marks[0].area.x) / (4 * side);
+      const double rows = (at.y - page.marks[0].area.y) / (4 * side);
+      EXPECT_NEAR(columns, std::round(columns), 1e-9);
+      EXPECT_NEAR(rows, std::round(rows), 1e-9);
+    }
+    EXPECT_THAT(page.caption.back(), HasSubstr("apriltag_36h11"));
+    EXPECT_GT(page.marks[3].area.x, page.marks[0].area.x);
+  }
+  request.has_marks = false;
+  EXPECT_TRUE(LayOutTarget(request).marks.empty());
+}
+
+// The marks for a camera are in its field, where they replace the texture.
+TEST(LayOutTarget, MarksOfACameraAreInItsField) {
+  TargetRequest request;
+  request.sheet = kA4;
+  request.view = MadeUpView(640, 480, 0.2);
+  const TargetPage page = LayOutTarget(request);
+  ASSERT_EQ(page.marks.size(), 4U);
+  const double left = page.pattern.x + (page.pattern.width - request.view->width_mm) / 2;
+  const double top = page.pattern.y + (page.pattern.height - request.view->height_mm) / 2;
+  EXPECT_GT(page.marks[0].area.x, left);
+  EXPECT_GT(page.marks[0].area.y, top);
+  EXPECT_LT(page.marks[3].area.x + page.marks[3].area.width, left + request.view->width_mm);
+  EXPECT_LT(page.marks[3].area.y + page.marks[3].area.height, top + request.view->height_mm);
+}
+
+TEST(LayOutTarget, AGridHasItsSizeAndIsStated) {
+  TargetRequest request;
+  request.sheet = kA4;
+  request.grid = TargetGrid();
+  request.grid->pattern = GridPattern::kCharuco;
+  request.grid->columns = 11;
+  request.grid->rows = 8;
+  request.grid->square_mm = 18;
+  request.grid->marker_mm = 12;
+  const TargetPage page = LayOutTarget(request);
+  EXPECT_EQ(page.width_mm, 297) << "turned";
+  EXPECT_EQ(page.pattern.width, 198);
+  EXPECT_EQ(page.pattern.height, 144);
+  EXPECT_TRUE(page.marks.empty());
+  EXPECT_THAT(page.caption[0], HasSubstr("ChArUco board of 11 x 8 squares of 18 mm"));
+  EXPECT_EQ(page.caption[1],
+            "target_grid: {pattern: charuco, columns: 11, rows: 8, square_mm: 18, marker_mm: 12, "
+            "dictionary: 4x4_250}");
+}
+
+// One number is odd and the other even, so that a chequerboard has one upright position.
+TEST(LayOutTarget, AGridFillsTheSheetOrTheField) {
+  TargetRequest request;
+  request.sheet = kA4;
+  request.grid = TargetGrid();
+  request.grid->square_mm = 12;
+  const TargetPage sheet = LayOutTarget(request);
+  ASSERT_TRUE(sheet.grid);
+  EXPECT_EQ((sheet.grid->columns + sheet.grid->rows) % 2, 1);
+  EXPECT_GE(sheet.grid->columns, 14);
+  EXPECT_GE(sheet.grid->rows, 19);
+  request.view = MadeUpView(640, 480, 0.2);  // 128 x 96 mm
+  const TargetPage field = LayOutTarget(request);
+  EXPECT_LE(field.pattern.width, 0.9 * 128);
+  EXPECT_LE(field.pattern.height, 0.9 * 96);
+  request.grid->square_mm = 40;
+  EXPECT_THAT(RefusalOf(request), HasSubstr("columns must be from 3 to 200, found 1"));
+  request.view.reset();
+  request.grid->columns = request.grid->rows = 9;
+  EXPECT_THAT(RefusalOf(request), HasSubstr("does not fit the sheet"));
+  request.grid->square_mm = 0.5;
+  EXPECT_THAT(RefusalOf(request), HasSubstr("ten times the 0.1 mm"));
 }
 
 }  // namespace

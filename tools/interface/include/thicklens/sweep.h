@@ -72,6 +72,9 @@ struct SweepOverrides {
   std::optional<Measured> optical_tube_length_mm;  // from the rear focal plane to the sensor
   std::optional<Measured> magnification;           // in the plane of focus, dimensionless
   std::optional<double> target_period_mm;          // period of a periodic target, finite, > 0
+  std::optional<model::TargetGrid> target_grid;    // the grid on the target
+  std::string grid_views;                          // folder of further views of the grid
+  std::optional<double> stage_alignment_deg;       // finite, > 0; see model::SweepFile
   std::optional<model::BenchDirection> direction;  // sign of the reading in z
   std::optional<model::SweepMotion> moves;         // the part that moves
   std::optional<double> reading_sigma_mm;          // finite, >= 0

@@ -12,6 +12,7 @@
 #include "thicklens/calib/fixed_pattern.h"
 #include "thicklens/calib/frame_light.h"
 #include "thicklens/calib/frame_statistics.h"
+#include "thicklens/calib/grid_geometry.h"
 #include "thicklens/calib/stage_errors.h"
 #include "thicklens/model/camera.h"
 #include "thicklens/model/sweep_file.h"
@@ -309,6 +310,8 @@ struct CalibrationDiagnostics {
   FixedPattern fixed_pattern;
   FrameLight light;         // bands, exposure and white balance that change from frame to frame
   CameraResponse response;  // transfer curve and processing, by the frames
+  GridGeometry grid;        // focal length, principal point and distortion by a grid
+  SheetMarks marks;         // of the target's sheet
   StageErrors stage;        // systematic errors of the stage, by scale and blur of the frames
   // Length of a step or count of the drive, mm, where the readings are counts and a statement
   // about the plane of focus determines it; 0 +- infinity where nothing does. The readings of the

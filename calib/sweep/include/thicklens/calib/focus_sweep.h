@@ -10,9 +10,11 @@
 #include <vector>
 
 #include "thicklens/base/export.h"
+#include "thicklens/calib/grid_geometry.h"
 #include "thicklens/model/camera.h"
 #include "thicklens/model/conjugates.h"
 #include "thicklens/model/sweep_file.h"
+#include "thicklens/model/target_grid.h"
 
 namespace thicklens::calib {
 
@@ -50,6 +52,14 @@ struct FocusSweep {
   model::SweepTarget target = model::SweepTarget::kAuto;  // kind of the target, if it is stated
   model::FloorKnowledge floor;                            // what is known of the blur floor, px
   std::optional<double> target_period_mm;                 // period of a periodic target
+  std::optional<model::TargetGrid> target_grid;           // the grid on the target
+  // Names of further views of the grid, for messages, and their reader, as `read_frame`.
+  std::vector<std::string> grid_views;
+  FrameReader read_grid_view;  // set by the caller if there are views
+  // Standard deviation of the angle between the motion and the optical axis, degrees, if stated.
+  std::optional<double> stage_alignment_deg;
+  // The size of the grid in the frames, which Calibrate finds.
+  std::vector<GridScale> grid_scales;
   // The part of the frames that is measured, after the camera's distortion was taken out of them.
   // Pixels of it that the distorted frames do not show are black, and MakeFocusSweep leaves them
   // out.
@@ -73,6 +83,12 @@ struct FocusSweep {
 // distance cannot be converted.
 THICKLENS_EXPORT FocusSweep MakeFocusSweep(const model::SweepFile& file,
                                            const model::Camera& camera);
+
+// Returns the sweep with frames that are undistorted by `distortion` before they are measured. Its
+// region is the part of `region` that they then show. Throws Error if they show nothing of it.
+THICKLENS_EXPORT FocusSweep WithDistortion(FocusSweep sweep,
+                                           const model::LensDistortion& distortion,
+                                           const model::RegionOfInterest& region);
 
 // Returns the region of interest of a stored frame. Throws an Error that names the frame if its
 // size is not the sensor's, or if its depth or channels are not those of FrameReader.

@@ -39,12 +39,18 @@ struct LensDistortion {
   // dimensionless and the angles in radians: 4, 5, 8, 12 or 14 numbers. kFisheye: k1 to k4.
   std::vector<double> coefficients;
   std::string source;  // where it was read from, for messages; not written to files
+  // Covariance of the focal length (fx = fy), px, the principal point (cx, cy), px, and the
+  // coefficients, in this order; empty: not known.
+  Eigen::MatrixXd covariance = {};
 
   // Returns whether the numbers describe a distortion of such photographs: sizes and focal lengths
   // above 0, everything finite, the number of coefficients one of the list, the principal point
   // not farther from the image than its size, and a polynomial that does not turn back within half
   // of the way to the nearer border. Otherwise `why`, if not null, gets the field and the value.
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
+  // The names of rows and columns of the covariance: "focal_length_px", "principal_point_x_px",
+  // "principal_point_y_px" and those of the coefficients, "k1", ..
+  THICKLENS_EXPORT std::vector<std::string> CovarianceOrder() const;
 
   // Returns the same lens for photographs of another size of the whole field, as they come from
   // binning or scaling: pixel positions are multiplied as those of areas, c' = (c + 0.5) s - 0.5.

@@ -10,6 +10,7 @@
 #include "thicklens/model/effect_selection.h"
 #include "thicklens/model/lens_aberrations.h"
 #include "thicklens/model/readings.h"
+#include "thicklens/model/target_grid.h"
 #include "thicklens/model/video_selection.h"
 
 namespace thicklens::model {
@@ -122,7 +123,14 @@ struct SweepFile {
   FloorKnowledge floor;                              // what is known of the blur floor
   std::optional<FloorOrigin> floor_origin;  // present if another calibration gave the floor
   std::optional<double> target_period_mm;   // period of a periodic target (docs/file-formats.md)
-  RegionOfInterest roi;                     // the part that is measured
+  // The grid on the target, by which focal length, principal point and distortion are found.
+  std::optional<TargetGrid> target_grid;
+  // Images of the same grid with the same focus, tilted, as paths that can be opened.
+  std::vector<std::string> grid_views;
+  // Standard deviation of the angle between the motion of the sweep and the optical axis, degrees,
+  // which is 0 otherwise. Absent: the stage may be mounted anyhow.
+  std::optional<double> stage_alignment_deg;
+  RegionOfInterest roi;  // the part that is measured
   // The value in the files that stands for white, 1 to 65535; absent: that of their container, the
   // one that they state, or the one that their values show.
   std::optional<int> full_scale;

@@ -14,6 +14,7 @@
 #include "thicklens/model/pupil_law.h"
 #include "thicklens/model/scene.h"
 #include "thicklens/model/sweep_file.h"
+#include "thicklens/model/target_grid.h"
 
 namespace thicklens::model {
 
@@ -25,6 +26,7 @@ enum class TargetKind {
   kCheckerboard,  // bright and dark squares
   kSiemensStar,   // bright and dark sectors around the middle
   kImage,         // an image of the user
+  kGrid,          // a grid of known size, black on white, once
   kPrintedEdge,   // a slanted edge blurred by its ink: a Gaussian of ink_sigma_mm on the target
   kKnifeEdge,     // a slanted sharp edge
 };
@@ -43,6 +45,7 @@ struct TargetOptions {
   // or width of the whole image (kImage). The value 0 selects it from the field of view: 2 px, 2
   // px, 24 px, 36 cycles, or the width that the frames see.
   double feature_size_mm = 0;
+  std::optional<TargetGrid> grid;  // kGrid only
   // Angle of an edge from the vertical; positive: the upper end leans right. The bright side is on
   // the right.
   double edge_angle_deg = 5;

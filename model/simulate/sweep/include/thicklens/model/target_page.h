@@ -8,6 +8,7 @@
 
 #include "thicklens/base/export.h"
 #include "thicklens/model/camera.h"
+#include "thicklens/model/target_grid.h"
 
 namespace thicklens::model {
 
@@ -38,12 +39,20 @@ struct TargetRequest {
   double edge_angle_deg = 5;         // from the vertical; positive: the upper end leans right
   bool two_tone = false;             // only black and white
   std::uint64_t seed = 1;            // of the texture
+  std::optional<TargetGrid> grid;    // drawn in place of texture and edge; absent: texture
+  bool has_marks = true;             // marks at the corners of a texture, where there is room
   std::optional<CameraView> view;    // the field that the pattern must fill; absent: no camera
 };
 
 // A rectangle on the sheet, mm from its top left corner, y down.
 struct SheetRectangle {
   double x = 0, y = 0, width = 0, height = 0;  // top left corner, and size, mm
+};
+
+// A mark of the sheet.
+struct PlacedMark {
+  int number = 0;       // of kSheetDictionary
+  SheetRectangle area;  // its black square
 };
 
 // A calibration target before it is drawn: a texture, a patch with an edge in its middle, and below
@@ -54,6 +63,8 @@ struct TargetPage {
   SheetRectangle pattern;            // where the texture is
   SheetRectangle patch;              // black on the left of the edge, white on its right
   double edge_angle_deg = 0;         // from the vertical; positive: the upper end leans right
+  std::optional<TargetGrid> grid;    // in `pattern`, in place of texture and edge
+  std::vector<PlacedMark> marks;     // at the corners of a texture, or none
   SheetRectangle bar;                // the bar of exact length
   std::vector<std::string> caption;  // lines that describe the sheet
   double text_size_mm = 0;           // size of the letters' em square

@@ -1,0 +1,23 @@
+#ifndef THICKLENS_TOOLS_REPORT_GRID_WORDS_H_
+#define THICKLENS_TOOLS_REPORT_GRID_WORDS_H_
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "thicklens/calib/calibration.h"
+
+namespace thicklens::tools {
+
+// What the grid on the target shows, one line each; empty: there is none.
+std::vector<std::string> GridLines(const calib::GridGeometry& grid);
+// What the marks of the target's sheet show, one line; empty: there are none in view.
+std::string MarksLine(const calib::Calibration& calibration);
+
+// The same for --json; null: no grid was stated, or no marks are in view.
+nlohmann::json GridJson(const calib::GridGeometry& grid);
+nlohmann::json MarksJson(const calib::SheetMarks& marks);
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_REPORT_GRID_WORDS_H_
