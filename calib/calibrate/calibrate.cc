@@ -10,6 +10,7 @@
 #include "calib/calibrate/counted_focus.h"
 #include "calib/calibrate/focus_solution.h"
 #include "calib/calibrate/moving_focus.h"
+#include "calib/calibrate/relief_region.h"
 #include "calib/calibrate/target_calibration.h"
 #include "calib/fit/known_focus.h"
 #include "calib/registration/scale_causes.h"
@@ -142,7 +143,9 @@ Calibration Calibrate(const FocusSweep& sweep, const CalibrationOptions& options
         "moves: lens; state moves to confirm or to correct it");
     return found;
   }
-  Calibration found = CalibrateTarget(sweep, options);
+  Calibration found =
+      WithoutRelief(sweep, options, CalibrateTarget(sweep, options),
+                    [&](const FocusSweep& part) { return CalibrateTarget(part, options); });
   if (!sweep.moves && options.fit_blur && ShowsMovingFocus(found))
     found = Recognised(sweep, options, std::move(found));
   if (sweep.moves) found.diagnostics.moves = *sweep.moves;
