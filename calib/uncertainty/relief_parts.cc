@@ -201,6 +201,24 @@ std::vector<Depth> TakeParts(const ReliefFinding& finding, double step_mm,
   return depths;
 }
 
+// The number of neighbouring zones that belong to different parts.
+int BordersBetweenParts(const ReliefFinding& finding) {
+  int borders = 0;
+  for (int y = 0; y < finding.rows; ++y) {
+    for (int x = 0; x < finding.columns; ++x) {
+      const auto of = [&](int column, int row) {
+        return finding.part_of_zone[static_cast<std::size_t>(row * finding.columns + column)];
+      };
+      if (of(x, y) < 0) continue;
+      const bool ends_right =
+          x + 1 < finding.columns && of(x + 1, y) >= 0 && of(x + 1, y) != of(x, y);
+      const bool ends_below = y + 1 < finding.rows && of(x, y + 1) >= 0 && of(x, y + 1) != of(x, y);
+      borders += (ends_right ? 1 : 0) + (ends_below ? 1 : 0);
+    }
+  }
+  return borders;
+}
+
 }  // namespace
 
 void DivideByDepth(double step_mm, double toward_camera, ReliefFinding* finding) {
@@ -219,9 +237,10 @@ void DivideByDepth(double step_mm, double toward_camera, ReliefFinding* finding)
   const auto n = static_cast<double>(zones.size());
   const double smooth = CostOfSmoothField(zones);
   const std::vector<Depth> depths = TakeParts(*finding, step_mm, &zones);
-  double steps = 2 * n * std::log(std::max<double>(1, static_cast<double>(depths.size())));
+  for (const Zone& zone : zones) finding->part_of_zone[zone.index] = zone.part;
+  double steps = 2 * BordersBetweenParts(*finding) *
+                 std::log(std::max<double>(1, static_cast<double>(depths.size())));
   for (const Zone& zone : zones) {
-    finding->part_of_zone[zone.index] = zone.part;
     steps += zone.part < 0
                  ? kCeiling
                  : CostOfDeviation(

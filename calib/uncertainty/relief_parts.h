@@ -12,12 +12,12 @@ namespace thicklens::calib {
 // that grows over the field are smooth. With the deviations r of the zones, each in units of its
 // error e (at least a tenth of a step, and the scatter of neighbours), and n zones, the costs
 //   C_smooth = sum min(r^2, 16) about a polynomial of the second order in x and y, robustly fitted,
-//   C_steps = sum min(r^2, 16) about k depths + 2 n ln k                                     [D169]
-// are compared: relief is C_steps < C_smooth/2, C_smooth > 3 n, and k > 1. A depth is that of at
-// least three zones, of which each has a neighbour, and lies at least 0.7 steps and six errors from
-// the next one. Fills in the rest of `finding` except the region. `step_mm` is the mean distance of
-// the readings; `toward_camera` is +1 if a part that is nearer to the camera is sharpest at a
-// larger reading, -1 otherwise.
+//   C_steps = sum min(r^2, 16) about k depths + 2 b ln k                                     [D169]
+// with b pairs of neighbours of different depths, are compared: relief is C_steps < C_smooth/2,
+// C_smooth > 3 n, and k > 1. A depth is that of at least three zones, of which each has a
+// neighbour, and lies at least 0.7 steps and six errors from the next one. Fills in the rest of
+// `finding` except the region. `step_mm` is the mean distance of the readings; `toward_camera` is
+// +1 if a part that is nearer to the camera is sharpest at a larger reading, -1 otherwise.
 void DivideByDepth(double step_mm, double toward_camera, ReliefFinding* finding);
 
 // The largest rectangle of zones that belong to one part, in zones; empty where there are no parts.
