@@ -10,6 +10,7 @@
 #include "calib/calibrate/counted_focus.h"
 #include "calib/calibrate/focus_solution.h"
 #include "calib/calibrate/moving_focus.h"
+#include "calib/calibrate/relief_region.h"
 #include "calib/calibrate/size_statements.h"
 #include "calib/calibrate/target_calibration.h"
 #include "calib/fit/known_focus.h"
@@ -115,7 +116,9 @@ Calibration CalibrateFrames(const FocusSweep& sweep, const CalibrationOptions& o
         "moves: lens; state moves to confirm or to correct it");
     return found;
   }
-  Calibration found = CalibrateTarget(sweep, options);
+  Calibration found =
+      WithoutRelief(sweep, options, CalibrateTarget(sweep, options),
+                    [&](const FocusSweep& part) { return CalibrateTarget(part, options); });
   if (!sweep.moves && options.fit_blur && ShowsMovingFocus(found))
     found = Recognised(sweep, options, std::move(found));
   if (sweep.moves) found.diagnostics.moves = *sweep.moves;

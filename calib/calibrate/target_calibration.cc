@@ -12,6 +12,7 @@
 #include "calib/calibrate/focus_motion.h"
 #include "calib/calibrate/focus_solution.h"
 #include "calib/calibrate/light_changes.h"
+#include "calib/calibrate/recognised_target.h"
 #include "calib/calibrate/response_effects.h"
 #include "calib/calibrate/size_statements.h"
 #include "calib/calibrate/zero_choice.h"
@@ -28,6 +29,7 @@
 #include "calib/registration/reading_checks.h"
 #include "calib/registration/scale_causes.h"
 #include "calib/registration/scale_tracking.h"
+#include "calib/registration/spot_tracking.h"
 #include "calib/registration/stage_comparison.h"
 #include "calib/sharpness/sharpest_reading.h"
 #include "calib/sharpness/sharpness.h"
@@ -229,9 +231,8 @@ class Calibrator {
       MeasureStatistics(static_cast<std::size_t>(i));
       Tick();
     });
-    QualityCheckOptions checks = options_.checks;
-    checks.edge_target |= sweep_.target == model::SweepTarget::kKnifeEdge;
-    return Passed(selection_.KeepMeasurable(checks));
+    RecogniseTarget([this](std::size_t frame) { return Grey(frame); }, &sweep_, &result_);
+    return Passed(selection_.KeepMeasurable(ChecksFor(sweep_.target, options_.checks)));
   }
 
   void MeasureStatistics(std::size_t frame) {
@@ -247,9 +248,7 @@ class Calibrator {
   // false after a refusal.
   bool RemoveBands(const std::vector<ScaleSample>& samples) {
     FrameLight& light = result_.diagnostics.light;
-    if (light.bands_removed || sweep_.target == model::SweepTarget::kKnifeEdge ||
-        sweep_.target == model::SweepTarget::kPrintedEdge)
-      return true;
+    if (light.bands_removed || IsSparse(sweep_.target)) return true;
     // Undistorted frames show the rows of the sensor as curves, whose light has no one factor.
     if (sweep_.camera.distortion) return true;
     const std::optional<BandAxis> axis = AxisOfBands(samples);
@@ -330,7 +329,8 @@ class Calibrator {
         frame.source_blur_sigma_px = blur->sigma_px;
     });
     reference_ = SharpestUsed();
-    if (!Passed(selection_.KeepThoseWithEdges())) return false;
+    if (sweep_.target != model::SweepTarget::kPoints && !Passed(selection_.KeepThoseWithEdges()))
+      return false;
     FindSharpest();
     return true;
   }
@@ -500,6 +500,11 @@ class Calibrator {
   }
 
   std::vector<ScaleSample> Track(const std::optional<double>& known_offset_mm) {
+    if (sweep_.target == model::SweepTarget::kPoints) {
+      return ScalesOfSpots(sweep_, FollowSpots(
+                                       sweep_, [this](std::size_t frame) { return Grey(frame); },
+                                       used(), reference_, [this] { Tick(); }));
+    }
     return TrackScale(
         sweep_, [this](std::size_t frame) { return Grey(frame); }, used(), reference_,
         known_offset_mm, options_.threads, [this] { Tick(); });
@@ -515,9 +520,8 @@ class Calibrator {
   bool RemoveFixedPattern(const std::optional<double>& known_offset_mm,
                           std::vector<ScaleSample>* samples) {
     FixedPattern& pattern = result_.diagnostics.fixed_pattern;
-    if (sweep_.target == model::SweepTarget::kKnifeEdge ||
-        sweep_.target == model::SweepTarget::kPrintedEdge) {
-      pattern.message = "an edge does not show what is fixed to the frame";
+    if (IsSparse(sweep_.target)) {
+      pattern.message = "an edge or points do not show what is fixed to the frame";
       return true;
     }
     std::vector<double> sharpness;

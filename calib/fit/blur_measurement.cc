@@ -54,8 +54,12 @@ class Measurement {
   }
 
   BlurEvidence Run() {
-    MeasureSpectra();
-    MeasureEdges();
+    if (task_.sweep.target == model::SweepTarget::kPoints) {
+      MeasurePoints();
+    } else {
+      MeasureSpectra();
+      MeasureEdges();
+    }
     evidence_.region = std::move(region_);
     if (evidence_.setup.estimators.empty() && evidence_.message.empty())
       evidence_.message = "neither edges nor texture could be measured";
@@ -93,12 +97,47 @@ class Measurement {
     return place;
   }
 
+  // ---- points ----
+  void MeasurePoints() {
+    const SpotTracks tracks = FollowSpots(
+        task_.sweep, [this](std::size_t frame) { return task_.store.Grey(frame); }, task_.frames,
+        task_.reference, task_.tick);
+    evidence_.spots = tracks.finding;
+    if (!tracks.finding.done) {
+      evidence_.message = tracks.finding.message;
+      return;
+    }
+    BlurSamples samples;
+    std::vector<double> variances, errors;
+    for (const std::size_t frame : task_.frames)
+      evidence_.without_points[frame] = "too few of its points were found";
+    for (const SpotFrame& frame : tracks.frames) {
+      const auto at = std::find(task_.frames.begin(), task_.frames.end(), frame.frame);
+      if (at == task_.frames.end()) continue;
+      evidence_.without_points[frame.frame] = frame.without_variance;
+      if (!frame.variance_px2) continue;
+      const auto index = static_cast<std::size_t>(at - task_.frames.begin());
+      const double s2 = std::pow(evidence_.setup.frames[index].scale, 2);
+      samples.frames.push_back(index);
+      variances.push_back(frame.variance_px2->value / s2);
+      errors.push_back(frame.variance_px2->sigma / s2);
+    }
+    const auto n = static_cast<Eigen::Index>(variances.size());
+    samples.variances_px2 = Eigen::Map<Eigen::VectorXd>(variances.data(), n);
+    samples.covariance =
+        Eigen::Map<Eigen::VectorXd>(errors.data(), n).array().square().matrix().asDiagonal();
+    evidence_.by_points = true;
+    evidence_.edges = static_cast<int>(evidence_.setup.estimators.size());
+    evidence_.setup.estimators.push_back(std::move(samples));
+  }
+
   // ---- edges ----
   // Unstated edges may belong to a texture, and the relative spectra measure a printed edge's blur
   // better. Such edges only limit the floor: where there are spectra, the frames around focus
   // suffice for that.
   void MeasureEdges() {
-    if (task_.sweep.target == model::SweepTarget::kTexture) return;
+    // A stated texture that is a lone edge has no spectra.
+    if (task_.sweep.target == model::SweepTarget::kTexture && evidence_.spectrum >= 0) return;
     const bool is_sharp = task_.sweep.target == model::SweepTarget::kKnifeEdge;
     const bool for_bound_alone = evidence_.spectrum >= 0 && !is_sharp;
     const model::Psf psf = task_.sweep.camera.psf;

@@ -2,12 +2,14 @@
 #define THICKLENS_CALIB_FIT_BLUR_MEASUREMENT_H_
 
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "calib/fit/blur_fit.h"
 #include "calib/registration/image_scale.h"
+#include "calib/registration/spot_tracking.h"
 #include "calib/registration/stage_comparison.h"
 #include "calib/spectrum/spectral_estimator.h"
 #include "calib/spectrum/spectral_options.h"
@@ -73,7 +75,13 @@ struct BlurEvidence {
   std::optional<model::StatedConjugate> known_focus;  // as in BlurTask
   bool zero_is_open = false;                          // as in BlurTask
   std::vector<std::size_t> frames;  // indices into the sweep, for each of setup.frames
-  int edges = -1, spectrum = -1;    // indices into setup.estimators; -1: absent
+  // Indices into setup.estimators; -1: absent. Points take the place of edges: both measure the
+  // blur itself, with the softness of the target.
+  int edges = -1, spectrum = -1;
+  bool by_points = false;  // true: `edges` are points
+  SpotFinding spots;       // of a target of points
+  // Why the points of a frame of the sweep have no blur, by its index.
+  std::map<std::size_t, std::string> without_points;
   // Edges of a target that is not stated to be an edge, where its texture is fitted. They give an
   // upper limit of the blur floor.
   std::optional<BlurSamples> unstated_edges;

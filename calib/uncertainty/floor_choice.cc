@@ -64,9 +64,9 @@ Eigen::Vector2d UnknownFloor(const BlurEvidence& evidence, std::vector<std::stri
   if (const auto softness_px2 = EdgeSoftness(evidence, sensor_px_per_px)) {
     // The interval is from none of the edge's softness to all of it.
     warnings->push_back(fmt::format(
-        "the edges have a blur of {:.2f} px at focus; the shares of the lens and of the target in "
+        "the {} have a blur of {:.2f} px at focus; the shares of the lens and of the target in "
         "it are not known: photograph a knife edge, or state blur_floor_px",
-        sensor_px_per_px * std::sqrt(*softness_px2)));
+        evidence.by_points ? "points" : "edges", sensor_px_per_px * std::sqrt(*softness_px2)));
     return {0, *softness_px2};
   }
   double to_px = kUnknownFloorToPx;

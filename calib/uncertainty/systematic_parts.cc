@@ -305,7 +305,8 @@ class Parts {
       }
     }
     const bool is_possible = optics.sigma_mm <= model::kWidestPupil * optics.image_distance_mm;
-    if (evidence_.edges >= 0 && is_possible) {
+    // The second moment of a point's image does not depend on the law.
+    if (evidence_.edges >= 0 && !evidence_.by_points && is_possible) {
       const Eigen::Vector2d ratios = EdgeRatiosOfPupilLaws(optics);
       part.blur_ratio.x() = std::min(part.blur_ratio.x(), kappa * (1 / ratios.y() - 1));
       part.blur_ratio.y() = std::max(part.blur_ratio.y(), kappa * (1 / ratios.x() - 1));

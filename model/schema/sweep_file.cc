@@ -159,6 +159,8 @@ std::string SweepTargetName(SweepTarget target) {
       return "printed-edge";
     case SweepTarget::kKnifeEdge:
       return "knife-edge";
+    case SweepTarget::kPoints:
+      return "points";
     default:
       return "auto";
   }
@@ -230,9 +232,10 @@ SweepFile ReadSweep(const std::string& path, const SweepReading& reading,
     }
   }
   if (const auto target = root.Find("target")) {
-    const std::string name = target->OneOf({"auto", "texture", "printed-edge", "knife-edge"});
-    for (const SweepTarget kind :
-         {SweepTarget::kTexture, SweepTarget::kPrintedEdge, SweepTarget::kKnifeEdge}) {
+    const std::string name =
+        target->OneOf({"auto", "texture", "printed-edge", "knife-edge", "points"});
+    for (const SweepTarget kind : {SweepTarget::kTexture, SweepTarget::kPrintedEdge,
+                                   SweepTarget::kKnifeEdge, SweepTarget::kPoints}) {
       if (name == SweepTargetName(kind)) sweep.target = kind;
     }
   }

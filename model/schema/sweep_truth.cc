@@ -32,8 +32,8 @@ SweepTruth ReadSweepTruth(const std::string& path) {
   const YamlNode root = YamlNode::LoadFile(path);
   root.RequireSchema(kTruthSchema);
   root.RequireKeys({"schema", "image_distance_mm", "focus_depth_mm", "blur_ratio", "blur_floor_px",
-                    "bench_offset_mm", "moves", "tilt_deg", "corner_stops", "specks", "aberrations",
-                    "band_amplitude", "exposure_drift_stops", "pupil_law", "effects",
+                    "bench_offset_mm", "moves", "tilt_deg", "relief_mm", "corner_stops", "specks",
+                    "aberrations", "band_amplitude", "exposure_drift_stops", "pupil_law", "effects",
                     "left_out_grey_levels", "frames"});
   SweepTruth truth;
   truth.image_distance_mm = root.At("image_distance_mm").PositiveNumber();
@@ -48,6 +48,9 @@ SweepTruth ReadSweepTruth(const std::string& path) {
         SweepMotionName);
   }
   if (const auto tilt = root.Find("tilt_deg")) truth.tilt_deg = tilt->Number();
+  if (const auto relief = root.Find("relief_mm")) {
+    for (const YamlNode& height : relief->Elements()) truth.relief_mm.push_back(height.Number());
+  }
   if (const auto stops = root.Find("corner_stops")) truth.corner_stops = stops->Number();
   if (const auto specks = root.Find("specks")) truth.specks = specks->Integer(0, 10000);
   if (const auto lens = root.Find("aberrations")) truth.aberrations = ReadAberrations(*lens);
@@ -77,6 +80,11 @@ std::string SweepTruthToYaml(const SweepTruth& truth) {
   out.Number("bench_offset_mm", truth.bench_offset_mm);
   if (truth.moves != SweepMotion::kTarget) out.Text("moves", SweepMotionName(truth.moves));
   if (truth.tilt_deg != 0) out.Number("tilt_deg", truth.tilt_deg);
+  if (!truth.relief_mm.empty()) {
+    out.BeginListInLine("relief_mm");
+    for (const double height_mm : truth.relief_mm) out.Element(height_mm);
+    out.EndList();
+  }
   if (truth.corner_stops != 0) out.Number("corner_stops", truth.corner_stops);
   if (truth.specks != 0) out.Number("specks", truth.specks);
   WriteAberrations(truth.aberrations, &out);

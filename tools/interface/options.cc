@@ -229,7 +229,7 @@ bool SweepOverrides::IsValid(std::string* why) const {
                    return OneOf(why, "moves", model::SweepMotion::kSensor, given);
                  }) &&
          IfGiven(target, [why](model::SweepTarget given) {
-           return OneOf(why, "target", model::SweepTarget::kKnifeEdge, given);
+           return OneOf(why, "target", model::SweepTarget::kPoints, given);
          });
 }
 

@@ -14,6 +14,9 @@ model::SweepTarget SweepTargetOf(model::TargetKind kind) {
       return model::SweepTarget::kPrintedEdge;
     case model::TargetKind::kKnifeEdge:
       return model::SweepTarget::kKnifeEdge;
+    case model::TargetKind::kPinholes:
+    case model::TargetKind::kBeads:
+      return model::SweepTarget::kPoints;
     default:
       return model::SweepTarget::kTexture;
   }

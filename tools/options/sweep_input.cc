@@ -200,8 +200,9 @@ SweepOverrides SweepOverridesOf(const SweepArguments& arguments) {
                           model::SweepMotion::kLens, model::SweepMotion::kSensor}) {
     if (arguments.moves == model::SweepMotionName(part)) overrides.moves = part;
   }
-  for (const auto target : {model::SweepTarget::kAuto, model::SweepTarget::kTexture,
-                            model::SweepTarget::kPrintedEdge, model::SweepTarget::kKnifeEdge}) {
+  for (const auto target :
+       {model::SweepTarget::kAuto, model::SweepTarget::kTexture, model::SweepTarget::kPrintedEdge,
+        model::SweepTarget::kKnifeEdge, model::SweepTarget::kPoints}) {
     if (arguments.target == model::SweepTargetName(target)) overrides.target = target;
   }
   return overrides;

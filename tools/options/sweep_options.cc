@@ -198,7 +198,7 @@ void AddSweepStatements(CLI::App* command, SweepArguments* sweep) {
               instead)
       ->type_name("CAMERA.yaml");
   command->add_option("--target", sweep->target, "Target that is photographed" + instead)
-      ->check(CLI::IsMember({"auto", "texture", "printed-edge", "knife-edge"}))
+      ->check(CLI::IsMember({"auto", "texture", "printed-edge", "knife-edge", "points"}))
       ->type_name("KIND");
   command
       ->add_option("--target-period-mm", sweep->target_period_mm,

@@ -14,6 +14,7 @@
 #include "tools/report/calibration_text.h"
 #include "tools/report/determined.h"
 #include "tools/report/grid_words.h"
+#include "tools/report/target_words.h"
 
 namespace thicklens::tools {
 namespace {
@@ -396,6 +397,7 @@ json CalibrationJson(const calib::FocusSweep& sweep, const calib::Calibration& c
   out["frame_structure"] = StructureJson(calibration.diagnostics.structure);
   out["frame_light"] = LightJson(calibration.diagnostics.light);
   out["fixed_pattern"] = PatternJson(calibration.diagnostics.fixed_pattern);
+  out["target"] = TargetJson(calibration.diagnostics.target);
   out["stage_errors"] = StageJson(calibration.diagnostics.stage);
   out["camera_response"] = ResponseJson(calibration.diagnostics.response);
   out["magnification"] = MagnificationJson(calibration.diagnostics.magnification);

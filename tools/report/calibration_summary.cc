@@ -12,6 +12,7 @@
 #include "tools/report/determined.h"
 #include "tools/report/grid_words.h"
 #include "tools/report/rejection_words.h"
+#include "tools/report/target_words.h"
 
 namespace thicklens::tools {
 namespace {
@@ -163,6 +164,7 @@ std::string SecondaryLines(const calib::Calibration& calibration,
 // The additional findings of the frames: shape of the blur, sides, field, colours.
 std::string DetailLines(const calib::FocusSweep& sweep, const calib::Calibration& calibration) {
   std::string text;
+  AddLine("target", TargetLine(calibration.diagnostics.target), &text);
   AddLine("blur shape", ShapeLine(sweep, calibration.diagnostics.blur), &text);
   if (calibration.diagnostics.nearer.done || calibration.diagnostics.farther.done)
     AddLine("sides of focus", SidesLine(calibration), &text);
@@ -246,10 +248,12 @@ std::string CalibrationText(const calib::FocusSweep& sweep, const calib::Calibra
       std::count_if(calibration.frames.begin(), calibration.frames.end(),
                     [](const calib::FrameMeasurement& frame) { return !frame.not_in_fit.empty(); });
   if (not_in_fit > 0) {
-    text += fmt::format(
-        "  {} more give no information about the blur: too strongly blurred, or too different in "
-        "scale, for the part of the target that all frames share\n",
-        not_in_fit);
+    text += fmt::format("  {} more give no information about the blur: {}\n", not_in_fit,
+                        calibration.diagnostics.target.measured_as == "points"
+                            ? "too few of their points can be measured"
+                            : "too strongly blurred, or too different in scale, for the part of "
+                              "the target that all "
+                              "frames share");
   }
   text += RejectionLines(calibration.frames) + '\n';
   if (std::any_of(rows.begin(), rows.end(),

@@ -8,6 +8,7 @@
 #include "tools/report/calibration_text.h"
 #include "tools/report/determined.h"
 #include "tools/report/rounding.h"
+#include "tools/report/target_words.h"
 
 namespace thicklens::tools {
 namespace {
@@ -85,6 +86,7 @@ std::string DeterminedInWords(const Calibration& calibration) {
     add("The sweep is sharpest at the ", SharpestLine(calibration));
   add("Focus lies at the ", FocusReadingLine(calibration));
   add("The bench offset is determined ", OffsetOriginLine(calibration));
+  add("The target was ", TargetLine(calibration.diagnostics.target));
   add("", PatternLine(calibration.diagnostics.fixed_pattern));
   if (calibration.summary.outcome != calib::Outcome::kRefused) return html;
   add("", ScaleChangeLine(calibration.diagnostics.scale));

@@ -533,13 +533,70 @@ std::vector<StressCase> Aberrations() {
   return cases;
 }
 
+// A block that stands out of the target, in a field of 4.3 x 4.3 mm.
+model::ReliefPartOptions Block(double x_mm, double y_mm, double side_mm, double height_mm) {
+  model::ReliefPartOptions block;
+  block.centre_mm = {x_mm, y_mm};
+  block.size_mm = {side_mm, side_mm};
+  block.height_mm = height_mm;
+  return block;
+}
+
+// Kinds of targets, and targets that are not flat.
+std::vector<StressCase> Targets() {
+  const auto of_kind = [](model::TargetKind kind, double light_level) {
+    return Simulated([kind, light_level](model::SweepSimulationOptions* simulation) {
+      simulation->target.kind = kind;
+      simulation->target.contrast = 0.95;
+      simulation->target.feature_size_mm = 0.15;
+      simulation->target.spacing_mm = 1;
+      simulation->light_level = light_level;
+      simulation->bits = 16;
+    });
+  };
+  std::vector<StressCase> cases;
+  const char near_truth[] =
+      "d1, zf and kappa within 4 standard errors of the truth, d1 within 50 um";
+  cases.push_back(Sweep("pinholes", "bright points on a ground that is almost black", near_truth,
+                        of_kind(model::TargetKind::kPinholes, 0.05), Truth(50)));
+  cases.push_back(Sweep("beads", "dark points on a bright ground, which fade out of focus",
+                        near_truth, of_kind(model::TargetKind::kBeads, 0.5), Truth(50)));
+  cases.push_back(Sweep("ground-glass", "speckle, of which few grains are bright", near_truth,
+                        of_kind(model::TargetKind::kGroundGlass, 0.3), Truth(50)));
+  StressSweep mesh = Simulated([](model::SweepSimulationOptions* simulation) {
+    simulation->target.kind = model::TargetKind::kMesh;
+    simulation->target.feature_size_mm = 0.9;
+  });
+  cases.push_back(Sweep("mesh", "wires that repeat every 40 px", near_truth, mesh, Truth(50)));
+  StressSweep edge = of_kind(model::TargetKind::kPrintedEdge, 0.5);
+  edge.describe = [](model::SweepFile* file) { file->target = model::SweepTarget::kTexture; };
+  cases.push_back(Sweep("edge-as-texture", "a lone slanted edge that is stated to be a texture",
+                        near_truth, edge, Truth(50)));
+  cases.push_back(Sweep("block-on-a-plate", "a third of the field is 4 mm nearer than the rest",
+                        near_truth, Simulated([](model::SweepSimulationOptions* simulation) {
+                          simulation->target.relief = {Block(2.6, 0, 3, 4)};
+                          simulation->target.relief[0].size_mm.y() = 8;
+                        }),
+                        Truth(50)));
+  cases.push_back(Sweep("blocks-everywhere", "no rectangle of the field is at one depth",
+                        "refused: the target has relief, with a map of the depths",
+                        Simulated([](model::SweepSimulationOptions* simulation) {
+                          for (const double x_mm : {-1.2, 1.2}) {
+                            for (const double y_mm : {-1.2, 1.2})
+                              simulation->target.relief.push_back(Block(x_mm, y_mm, 1.2, 5));
+                          }
+                        }),
+                        Refusal({"the target has relief", "Map of the zones"})));
+  return cases;
+}
+
 }  // namespace
 
 std::vector<StressCase> CalibrationStressCases() {
   std::vector<StressCase> all;
   for (std::vector<StressCase> part :
        {Frames2To5(), Focus(), Readings(), Stages(), Damages(), Optics(), Macros(), MovingFocus(),
-        FixedToTheFrame(), LightOfFrames(), Aberrations()}) {
+        FixedToTheFrame(), LightOfFrames(), Aberrations(), Targets()}) {
     for (StressCase& hard : part) all.push_back(std::move(hard));
   }
   return all;

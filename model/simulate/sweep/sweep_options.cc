@@ -44,6 +44,62 @@ bool IsValidTarget(const TargetOptions& target, std::string* why) {
     return Fail(
         why, fmt::format("target.tilt_deg is {}: it must be between -80 and 80", target.tilt_deg));
   }
+  if (!(target.spacing_mm >= 0) || !std::isfinite(target.spacing_mm)) {
+    return Fail(why, fmt::format("target.spacing_mm is {}: it must be > 0, or 0 for one chosen by "
+                                 "the program",
+                                 target.spacing_mm));
+  }
+  return true;
+}
+
+bool IsValidPart(const ReliefPartOptions& part, double nearest_depth_mm, std::string* why) {
+  if (!part.centre_mm.allFinite()) {
+    return Fail(why, "target.relief: centre_mm must be two finite numbers");
+  }
+  if (!(part.size_mm.minCoeff() > 0) || !part.size_mm.allFinite()) {
+    return Fail(why, fmt::format("target.relief: size_mm is [{}, {}]: both must be > 0",
+                                 part.size_mm.x(), part.size_mm.y()));
+  }
+  if (part.shape != ReliefPartOptions::Shape::kRectangle && part.size_mm.x() != part.size_mm.y()) {
+    return Fail(why, fmt::format("target.relief: size_mm of a disc or gear is [{}, {}]: both must "
+                                 "be its diameter",
+                                 part.size_mm.x(), part.size_mm.y()));
+  }
+  // A part that stands nearer than half of the target's depth is no relief but another object.
+  if (!(part.height_mm > 0 && part.height_mm < 0.5 * nearest_depth_mm)) {
+    return Fail(why,
+                fmt::format("target.relief: height_mm is {}: it must be > 0 and less than half "
+                            "of the nearest depth, {} mm",
+                            part.height_mm, nearest_depth_mm));
+  }
+  return true;
+}
+
+// Parts hide the target, but not one another.
+bool IsValidRelief(const SweepSimulationOptions& options, std::string* why) {
+  const std::vector<ReliefPartOptions>& parts = options.target.relief;
+  if (parts.empty()) return true;
+  const bool is_edge = options.target.kind == TargetKind::kPrintedEdge ||
+                       options.target.kind == TargetKind::kKnifeEdge;
+  if (is_edge || options.target.tilt_deg != 0 || options.aberrations.DisplaceFocus() ||
+      options.aberrations.distortion != 0) {
+    return Fail(why,
+                "target.relief is stated: the target must be no edge and have tilt_deg 0, and "
+                "the lens no aberrations");
+  }
+  const double nearest_mm = std::min(options.DepthMm(0), options.DepthMm(options.FarthestFrame()));
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    if (!IsValidPart(parts[i], nearest_mm, why)) return false;
+    for (std::size_t j = 0; j < i; ++j) {
+      const Eigen::Vector2d apart_mm = (parts[i].centre_mm - parts[j].centre_mm).cwiseAbs();
+      const Eigen::Vector2d reach_mm = 0.5 * (parts[i].size_mm + parts[j].size_mm);
+      if (apart_mm.x() < reach_mm.x() && apart_mm.y() < reach_mm.y()) {
+        return Fail(why, fmt::format("target.relief: parts {} and {} overlap: their rectangles "
+                                     "must be apart",
+                                     j + 1, i + 1));
+      }
+    }
+  }
   return true;
 }
 
@@ -84,6 +140,14 @@ std::string TargetKindName(TargetKind kind) {
       return "printed-edge";
     case TargetKind::kKnifeEdge:
       return "knife-edge";
+    case TargetKind::kMesh:
+      return "mesh";
+    case TargetKind::kGroundGlass:
+      return "ground-glass";
+    case TargetKind::kPinholes:
+      return "pinholes";
+    case TargetKind::kBeads:
+      return "beads";
   }
   throw Error("no such kind of target");
 }
@@ -239,6 +303,7 @@ bool SweepSimulationOptions::IsValid(std::string* why) const {
     return Fail(why, fmt::format("light.exposure_drift_stops is {}: it must be from -10 to 10",
                                  exposure_drift_stops));
   }
+  if (!IsValidRelief(*this, why)) return false;
   if (bits != 8 && bits != 16) {
     return Fail(why, fmt::format("bits is {}: it must be 8 or 16", bits));
   }

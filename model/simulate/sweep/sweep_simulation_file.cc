@@ -40,14 +40,27 @@ TargetKind ReadKind(const YamlNode& node, std::vector<std::string>* notices) {
   return ReadNamed<TargetKind>(
       node,
       {TargetKind::kDeadLeaves, TargetKind::kPinkNoise, TargetKind::kWhiteNoise,
-       TargetKind::kCheckerboard, TargetKind::kSiemensStar, TargetKind::kImage,
-       TargetKind::kGrid, TargetKind::kPrintedEdge, TargetKind::kKnifeEdge},
+       TargetKind::kCheckerboard, TargetKind::kSiemensStar, TargetKind::kImage, TargetKind::kGrid,
+       TargetKind::kPrintedEdge, TargetKind::kKnifeEdge, TargetKind::kMesh,
+       TargetKind::kGroundGlass, TargetKind::kPinholes, TargetKind::kBeads},
       TargetKindName, RenamedImage(), notices);
+}
+
+ReliefPartOptions ReadReliefPart(const YamlNode& node) {
+  node.RequireKeys({"shape", "centre_mm", "size_mm", "height_mm"});
+  ReliefPartOptions part;
+  const std::string shape = node.At("shape").OneOf({"rectangle", "disc", "gear"});
+  if (shape == "disc") part.shape = ReliefPartOptions::Shape::kDisc;
+  if (shape == "gear") part.shape = ReliefPartOptions::Shape::kGear;
+  if (const auto centre = node.Find("centre_mm")) part.centre_mm = ReadPair(*centre);
+  part.size_mm = ReadPair(node.At("size_mm"));
+  part.height_mm = node.At("height_mm").PositiveNumber();
+  return part;
 }
 
 TargetOptions ReadTarget(const YamlNode& node, std::vector<std::string>* notices) {
   node.RequireKeys({"kind", "contrast", "feature_size_mm", "edge_angle_deg", "ink_sigma_mm",
-                    "tilt_deg", "image", "grid"},
+                    "tilt_deg", "spacing_mm", "relief", "image", "grid"},
                    {RenamedImage()});
   TargetOptions target;
   const YamlNode kind = node.At("kind");
@@ -57,6 +70,10 @@ TargetOptions ReadTarget(const YamlNode& node, std::vector<std::string>* notices
   ReadNumber(node, "edge_angle_deg", &target.edge_angle_deg);
   ReadNumber(node, "ink_sigma_mm", &target.ink_sigma_mm);
   ReadNumber(node, "tilt_deg", &target.tilt_deg);
+  ReadNumber(node, "spacing_mm", &target.spacing_mm);
+  if (const auto relief = node.Find("relief")) {
+    for (const YamlNode& part : relief->Elements()) target.relief.push_back(ReadReliefPart(part));
+  }
   if (const auto image = node.Find(RenamedImage(), notices)) {
     if (target.kind != TargetKind::kImage) {
       throw image->ErrorHere("this key is only for a target of the kind 'image', found kind '" +
@@ -73,7 +90,8 @@ TargetOptions ReadTarget(const YamlNode& node, std::vector<std::string>* notices
     }
     target.grid = ReadTargetGrid(*grid);
   } else if (target.kind == TargetKind::kGrid) {
-    throw kind.ErrorHere("the kind 'grid' requires target.grid (pattern, columns, rows, square_mm)");
+    throw kind.ErrorHere(
+        "the kind 'grid' requires target.grid (pattern, columns, rows, square_mm)");
   }
   return target;
 }

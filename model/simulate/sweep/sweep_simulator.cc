@@ -15,11 +15,13 @@
 #include "model/simulate/sweep/edge_spread.h"
 #include "model/simulate/sweep/field_blur.h"
 #include "model/simulate/sweep/periodic_image.h"
+#include "model/simulate/sweep/relief_image.h"
 #include "model/simulate/sweep/sweep_target.h"
 #include "model/simulate/sweep/tilted_target.h"
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/pi.h"
+#include "thicklens/model/blur_transfer.h"
 
 namespace thicklens::model {
 namespace {
@@ -89,6 +91,7 @@ struct FrameState {
   double pixel_mm = 0;             // one px on the target: p/|m|
   double defocus_sigma_px = 0;     // value of kappa r_defocus
   bool in_focus = false;           // true: without defocus
+  bool is_bare = false;            // true: without blur floor and pixel box
 };
 
 }  // namespace
@@ -317,6 +320,8 @@ struct SweepSimulator::Impl {
     truth.pupil_law = PupilLawName(law);
     truth.moves = options.moves;
     if (On(Effect::kTilt)) truth.tilt_deg = options.target.tilt_deg;
+    for (const ReliefPartOptions& part : options.target.relief)
+      truth.relief_mm.push_back(part.height_mm);
     if (On(Effect::kShading)) truth.corner_stops = options.corner_stops;
     if (On(Effect::kDust)) truth.specks = options.speck_count;
     if (On(Effect::kAberrations)) truth.aberrations = options.aberrations;
@@ -555,8 +560,9 @@ struct SweepSimulator::Impl {
                          grid.step_px * down_mm / tile_frame.height_mm, grid.rows};
     return tile_texture->Evaluate(
         x, y,
-        {floor_px, stored_camera.psf, SeenDefocusPx(frame, target.DepthMm(node_px)),
-         On(Effect::kPixelBox), profile ? &*profile : nullptr, 1 / grid.step_px});
+        {frame.is_bare ? 0 : floor_px, stored_camera.psf,
+         SeenDefocusPx(frame, target.DepthMm(node_px)), !frame.is_bare && On(Effect::kPixelBox),
+         profile ? &*profile : nullptr, 1 / grid.step_px});
   }
 
   // The light of a grid of pixels of a texture, without the factors of each pixel, CV_64F.
@@ -594,8 +600,9 @@ struct SweepSimulator::Impl {
   LinearImage RenderFrame(const FrameState& frame) const {
     const Sensor& sensor = options.camera.sensor;
     const PixelGrid pixels{-sensor.principal_point_px, 1, sensor.width_px, sensor.height_px};
-    const cv::Mat light = DisplacesFocus() || Distortion() != 0 ? RenderAberrated(frame, pixels)
-                                                                : RenderGrid(frame, pixels);
+    const cv::Mat light = !options.target.relief.empty()          ? RenderRelief(frame, pixels)
+                          : DisplacesFocus() || Distortion() != 0 ? RenderAberrated(frame, pixels)
+                                                                  : RenderGrid(frame, pixels);
     LinearImage image{sensor.width_px, sensor.height_px, 1, {}};
     image.values.reserve(light.total());
     for (int y = 0; y < light.rows; ++y) {
@@ -606,6 +613,84 @@ struct SweepSimulator::Impl {
   }
   cv::Mat RenderGrid(const FrameState& frame, const PixelGrid& grid) const {
     return tile_texture ? RenderTile(frame, grid) : RenderEdge(frame, grid);
+  }
+
+  // A part of a relief in a frame, without blur floor and pixel box.
+  FrameState StateOfPart(const FrameState& frame, double height_mm) const {
+    FrameState part = frame;
+    part.depth_mm = frame.depth_mm - height_mm;
+    part.lamp = LampAt(frame, part.depth_mm);
+    part.pixel_mm = PixelMm(part.depth_mm, part.image_distance_mm, decision.on);
+    if (On(Effect::kDefocus))
+      part.defocus_sigma_px = DefocusPx(part.depth_mm, part.image_distance_mm);
+    part.is_bare = true;
+    return part;
+  }
+  // The defocus with its sign: points nearer than the plane of focus have a positive one.
+  double SignedDefocusPx(const FrameState& frame) const {
+    return std::copysign(
+        frame.defocus_sigma_px,
+        DefocusPerAperture(options.camera.lens, frame.image_distance_mm, frame.depth_mm));
+  }
+
+  // Computes the target and the parts in front of it on a fine grid, and lets each spread its light
+  // by its own defocus. Blur floor and pixel box belong to the sensor's side and come last.
+  cv::Mat RenderRelief(const FrameState& frame, const PixelGrid& pixels) const {
+    const std::vector<ReliefPartOptions>& heights = options.target.relief;
+    std::vector<FrameState> states = {StateOfPart(frame, 0)};
+    double most_px = states[0].defocus_sigma_px;
+    for (const ReliefPartOptions& part : heights) {
+      states.push_back(StateOfPart(frame, part.height_mm));
+      most_px = std::max(most_px, states.back().defocus_sigma_px);
+    }
+    const double border = kFineBorder + std::ceil(kBlurReach * most_px / kFinePx);
+    const int twice = static_cast<int>(2 * border);
+    const PixelGrid fine{pixels.first_px - Eigen::Vector2d::Constant(kFinePx * border), kFinePx,
+                         static_cast<int>(std::lround((pixels.columns - 1) / kFinePx)) + 1 + twice,
+                         static_cast<int>(std::lround((pixels.rows - 1) / kFinePx)) + 1 + twice};
+    const Eigen::Vector2d centre_mm = TargetCentreMm(decision.on);
+    std::vector<ReliefLayer> layers;
+    for (std::size_t k = 0; k < states.size(); ++k) {
+      ReliefLayer layer;
+      FrameState still = states[k];
+      still.in_focus = true;
+      layer.light = RenderTile(still, fine);
+      layer.defocus_px = SignedDefocusPx(states[k]);
+      if (k == 0) layer.blurred = RenderTile(states[k], fine);
+      if (k > 0) {
+        layer.cover = cv::Mat(fine.rows, fine.columns, CV_64F);
+        const double px_mm = SeenTarget(states[k], 0).PixelDownMm(0);
+        for (int y = 0; y < fine.rows; ++y) {
+          ThrowIfCancelled();
+          for (int x = 0; x < fine.columns; ++x) {
+            const Eigen::Vector2d place_mm =
+                px_mm * Eigen::Vector2d(fine.XPx(x), fine.YPx(y)) - frame.drift_mm - centre_mm;
+            layer.cover.at<double>(y, x) = CoverAt(heights[k - 1], place_mm, kFinePx * px_mm);
+          }
+        }
+      }
+      layers.push_back(layer);
+    }
+    const auto transfer = [this](double sigma_px, const Eigen::Vector2d& f) {
+      return profile ? profile->Transfer(2 * kPi * sigma_px * f.norm())
+                     : DefocusTransfer(stored_camera.psf, sigma_px, f.x(), f.y());
+    };
+    const cv::Mat light =
+        Filtered(ReliefImage(layers[0], {layers.begin() + 1, layers.end()}, kFinePx,
+                             stored_camera.psf, transfer),
+                 kFinePx, [this](const Eigen::Vector2d& f) {
+                   return GaussianTransfer(floor_px, f.x(), f.y()) *
+                          (On(Effect::kPixelBox) ? PixelBoxTransfer(f.x(), f.y()) : 1);
+                 });
+    cv::Mat image(pixels.rows, pixels.columns, CV_64F);
+    const int steps = static_cast<int>(std::lround(1 / kFinePx));
+    for (int y = 0; y < image.rows; ++y) {
+      for (int x = 0; x < image.cols; ++x) {
+        image.at<double>(y, x) = light.at<double>(static_cast<int>(border) + steps * y,
+                                                  static_cast<int>(border) + steps * x);
+      }
+    }
+    return image;
   }
 
   // Computes the image of a lens without distortion on a fine grid, in focus, lets each point of it

@@ -20,6 +20,12 @@ constexpr double kLeafRadiusPx = 2;
 constexpr double kNoisePeriodPx = 2;
 constexpr double kSquarePx = 24;
 constexpr int kStarCycles = 36;
+constexpr double kMeshPeriodPx = 24;
+constexpr double kMeshOpening = 2.0 / 3;  // part of a period between two wires
+constexpr double kGrainPx = 4;
+constexpr double kSpotPx = 3;
+constexpr double kSpotSpacingPx = 36;
+constexpr double kSpotDisplacement = 0.2;  // of the spacing, along each axis
 // The largest leaf, as a fraction of the field.
 constexpr double kLargestLeaf = 1.0 / 6;
 
@@ -215,6 +221,104 @@ TargetTile DrawSiemensStar(const TargetOptions& options, const TileRequest& requ
   return canvas.Finish();
 }
 
+// Mean over [x - width/2, x + width/2] of the openings between wires: 1 in the first part of each
+// period, 0 in the rest.
+double OpeningMean(double x, double period, double width) {
+  const auto opened = [period](double to) {
+    const double periods = std::floor(to / period);
+    return kMeshOpening * period * periods + std::min(to - period * periods, kMeshOpening * period);
+  };
+  return (opened(x + width / 2) - opened(x - width / 2)) / width;
+}
+
+// Wires of a third of a period, which cross.
+TargetTile DrawMesh(const TargetOptions& options, const TileRequest& request) {
+  const double period_mm = FeatureSizeMm(options, kMeshPeriodPx * request.pixel_mm,
+                                         2 * request.pixel_mm, request.field_mm);
+  Canvas canvas(request, period_mm);
+  canvas.Fill([&](double x, double y) {
+    return 1 + options.contrast * (2 * OpeningMean(x, period_mm, canvas.spacing_x_mm()) *
+                                       OpeningMean(y, period_mm, canvas.spacing_y_mm()) -
+                                   1);
+  });
+  return canvas.Finish();
+}
+
+// Speckle, |u|^2 with the mean 1, where u is complex Gaussian noise up to half a cycle per grain,
+// so that the light has frequencies up to one. Its distribution is exponential; `contrast` is its
+// relative standard deviation.
+TargetTile DrawGroundGlass(const TargetOptions& options, const TileRequest& request,
+                           RandomDraws* draws) {
+  Canvas canvas(request, 0);
+  const double grain_mm = FeatureSizeMm(options, kGrainPx * request.pixel_mm,
+                                        2 * canvas.spacing_x_mm(), request.field_mm);
+  cv::Mat& samples = canvas.samples();
+  cv::Mat wave(samples.size(), CV_64FC2, cv::Scalar::all(0));
+  for (int i = 0; i < wave.rows; ++i) {
+    ThrowIfCancelled();
+    auto* row = wave.ptr<cv::Vec2d>(i);
+    const double fy = std::min(i, wave.rows - i) / canvas.height_mm();
+    for (int j = 0; j < wave.cols; ++j) {
+      const double fx = std::min(j, wave.cols - j) / canvas.width_mm();
+      if (2 * grain_mm * std::hypot(fx, fy) <= 1) row[j] = {draws->Normal(), draws->Normal()};
+    }
+  }
+  cv::dft(wave, wave, cv::DFT_INVERSE);
+  for (int i = 0; i < samples.rows; ++i) {
+    for (int j = 0; j < samples.cols; ++j) {
+      const cv::Vec2d& u = wave.at<cv::Vec2d>(i, j);
+      samples.at<double>(i, j) = u.dot(u);
+    }
+  }
+  samples = 1 + options.contrast * (samples / cv::mean(samples)[0] - 1);
+  return canvas.Finish();
+}
+
+// Discs near the points of a square grid, bright ones on a dark ground or dark ones on a bright
+// one.
+TargetTile DrawPoints(const TargetOptions& options, const TileRequest& request,
+                      RandomDraws* draws) {
+  const double diameter_mm =
+      FeatureSizeMm(options, kSpotPx * request.pixel_mm, request.pixel_mm, request.field_mm);
+  const double spacing_mm =
+      options.spacing_mm > 0 ? options.spacing_mm : kSpotSpacingPx * request.pixel_mm;
+  if (!(spacing_mm >= 2 * diameter_mm && spacing_mm <= request.field_mm)) {
+    throw Error(
+        fmt::format("target.spacing_mm is {:.4g}: it must be from {:.4g}, twice the "
+                    "diameter of the points, to {:.4g}, the field of view",
+                    spacing_mm, 2 * diameter_mm, request.field_mm));
+  }
+  Canvas canvas(request, spacing_mm);
+  const int columns = static_cast<int>(std::lround(canvas.width_mm() / spacing_mm));
+  const int rows = static_cast<int>(std::lround(canvas.height_mm() / spacing_mm));
+  std::vector<cv::Point2d> displacements_mm;
+  for (int i = 0; i < rows * columns; ++i) {
+    const double x_mm = (2 * draws->Uniform() - 1) * kSpotDisplacement * spacing_mm;
+    displacements_mm.emplace_back(x_mm,
+                                  (2 * draws->Uniform() - 1) * kSpotDisplacement * spacing_mm);
+  }
+  const double sign = options.kind == TargetKind::kPinholes ? 1 : -1;
+  constexpr int kParts = 5;  // a cell is sampled so many times along each axis
+  canvas.Fill([&](double x_mm, double y_mm) {
+    const double x = x_mm + canvas.width_mm() / 2, y = y_mm + canvas.height_mm() / 2;
+    const int column = std::min(static_cast<int>(x / spacing_mm), columns - 1);
+    const int row = std::min(static_cast<int>(y / spacing_mm), rows - 1);
+    const cv::Point2d& beside_mm =
+        displacements_mm[static_cast<std::size_t>(row * columns + column)];
+    const double dx = x - (column + 0.5) * spacing_mm - beside_mm.x;
+    const double dy = y - (row + 0.5) * spacing_mm - beside_mm.y;
+    if (std::hypot(dx, dy) > diameter_mm) return 1 - sign * options.contrast;
+    int inside = 0;
+    for (int i = 0; i < kParts * kParts; ++i) {
+      const double cell_x = ((i % kParts + 0.5) / kParts - 0.5) * canvas.spacing_x_mm();
+      const double cell_y = ((i / kParts + 0.5) / kParts - 0.5) * canvas.spacing_y_mm();
+      inside += std::hypot(dx + cell_x, dy + cell_y) <= diameter_mm / 2 ? 1 : 0;
+    }
+    return 1 + sign * options.contrast * (2.0 * inside / (kParts * kParts) - 1);
+  });
+  return canvas.Finish();
+}
+
 // The user's image, upright and centred, mirrored at its sides where the tile is larger. Its width
 // is the feature size or, by default, such that it covers all that the frames see. The contrast is
 // its own.
@@ -327,6 +431,13 @@ TargetTile DrawTargetTile(const TargetOptions& options, const TileRequest& reque
       return DrawCheckerboard(options, request);
     case TargetKind::kSiemensStar:
       return DrawSiemensStar(options, request);
+    case TargetKind::kMesh:
+      return DrawMesh(options, request);
+    case TargetKind::kGroundGlass:
+      return DrawGroundGlass(options, request, draws);
+    case TargetKind::kPinholes:
+    case TargetKind::kBeads:
+      return DrawPoints(options, request, draws);
     case TargetKind::kImage:
       return DrawImage(options, request, image);
     case TargetKind::kGrid:

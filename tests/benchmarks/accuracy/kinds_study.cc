@@ -40,6 +40,7 @@ constexpr double kWidestInterval = 3;  // half of it over the 90 % quantile of t
 struct Kind {
   std::string name;
   bool disturbed = false, gives_offset = true, measures_floor = false;
+  bool mixes = true;                       // with other disturbances
   std::optional<double> reading_sigma_mm;  // stated to the calibration, if not the truth
   std::vector<std::string> may_refuse;
   YAML::Node simulate;
@@ -69,6 +70,8 @@ Kind ReadKind(const YAML::Node& node) {
       kind.name = value.as<std::string>();
     } else if (key == "disturbed") {
       kind.disturbed = value.as<bool>();
+    } else if (key == "mixes") {
+      kind.mixes = value.as<bool>();
     } else if (key == "offset") {
       kind.gives_offset = value.as<bool>();
     } else if (key == "floor") {
@@ -316,7 +319,7 @@ Json RunKindsStudy(const KindsOptions& options) {
   std::vector<Kind> disturbed;
   std::uint64_t seed = options.first_seed;
   for (const Kind& kind : study.kinds) {
-    if (kind.disturbed) disturbed.push_back(kind);
+    if (kind.disturbed && kind.mixes) disturbed.push_back(kind);
     const std::uint64_t first = seed;
     seed += 100000;  // the seeds of a kind do not depend on the others that run
     if (!options.names.empty() &&

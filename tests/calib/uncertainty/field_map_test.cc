@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "calib/calibrate/target_calibration.h"
 #include "tests/calib/known_texture.h"
 #include "tests/calib/simulated_sweep.h"
 #include "thicklens/calib/calibrate.h"
@@ -142,7 +143,7 @@ TEST(FieldMap, SlowALongSweepIsMappedFromAPartOfItsFrames) {
 TEST(FieldMap, DepthsOfATargetInStepsAreParted) {
   constexpr double kStepMm = 12;
   const SimulatedSweep s = InStrips(2, [](double x_px) { return x_px < 0 ? 0.0 : kStepMm; });
-  const Calibration c = Calibrate(s.sweep, {});
+  const Calibration c = CalibrateTarget(s.sweep, {});  // before it looks for one depth
   ASSERT_TRUE(c.diagnostics.field.done) << c.diagnostics.field.message << c.summary.reason;
   ASSERT_GE(c.diagnostics.field.clusters.size(), 2U);
   EXPECT_THAT(c.summary.warnings, Contains(HasSubstr("not at one depth")));
@@ -154,6 +155,18 @@ TEST(FieldMap, DepthsOfATargetInStepsAreParted) {
   ASSERT_TRUE(c.summary.focus_depth_mm->systematic);
   EXPECT_LT(c.summary.focus_depth_mm->systematic->x(), truth - kStepMm + 1.5);
   EXPECT_GT(c.summary.focus_depth_mm->systematic->y(), truth - 1.5);
+}
+
+TEST(FieldMap, OneOfTheDepthsIsMeasuredAlone) {
+  constexpr double kStepMm = 12;
+  const SimulatedSweep s = InStrips(2, [](double x_px) { return x_px < 0 ? 0.0 : kStepMm; });
+  const Calibration c = Calibrate(s.sweep, {});
+  const ReliefFinding& relief = c.diagnostics.target.relief;
+  ASSERT_TRUE(relief.region) << c.summary.reason << "\n" << c.diagnostics.target.ReliefMap();
+  EXPECT_NEAR(std::abs(relief.parts[1].nearer_mm.value), kStepMm, 1.5);
+  const bool is_left = relief.region->x + relief.region->width / 2 < kSizePx / 2;
+  EXPECT_NEAR(c.summary.focus_depth_mm->value, s.truth.focus_depth_mm - (is_left ? 0 : kStepMm), 1);
+  EXPECT_EQ(c.diagnostics.field.clusters.size(), 1U);
 }
 
 constexpr double kMiddleMm = 300, kRatio = 0.45;

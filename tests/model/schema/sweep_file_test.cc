@@ -254,7 +254,7 @@ TEST_F(SweepFolder, RoiDirectionTarget) {
   EXPECT_THAT(ErrorWith(frames_ + "direction: left\n"), HasSubstr("away, toward"));
   EXPECT_THAT(ErrorWith(frames_ + "target: edge\n"), HasSubstr("printed-edge"));
   EXPECT_THAT(ErrorWith(frames_ + "reading_sigma_mm: -1\n"), HasSubstr("must be >= 0"));
-  for (const char* name : {"auto", "texture", "printed-edge", "knife-edge"})
+  for (const char* name : {"auto", "texture", "printed-edge", "knife-edge", "points"})
     EXPECT_EQ(SweepTargetName(Read(frames_ + "target: " + name + "\n").target), name);
 }
 

@@ -201,17 +201,38 @@ TEST_F(SweepSimulationFileTest, ImageDistanceMayStandForTheFocusDepth) {
 }
 
 TEST_F(SweepSimulationFileTest, EveryKindOfTargetHasItsName) {
-  const std::pair<const char*, TargetKind> kinds[] = {
-      {"dead-leaves", TargetKind::kDeadLeaves},   {"pink-noise", TargetKind::kPinkNoise},
-      {"white-noise", TargetKind::kWhiteNoise},   {"checkerboard", TargetKind::kCheckerboard},
-      {"siemens-star", TargetKind::kSiemensStar}, {"printed-edge", TargetKind::kPrintedEdge},
-      {"knife-edge", TargetKind::kKnifeEdge}};
+  const std::pair<const char*, TargetKind> kinds[] = {{"dead-leaves", TargetKind::kDeadLeaves},
+                                                      {"pink-noise", TargetKind::kPinkNoise},
+                                                      {"white-noise", TargetKind::kWhiteNoise},
+                                                      {"checkerboard", TargetKind::kCheckerboard},
+                                                      {"siemens-star", TargetKind::kSiemensStar},
+                                                      {"printed-edge", TargetKind::kPrintedEdge},
+                                                      {"knife-edge", TargetKind::kKnifeEdge},
+                                                      {"mesh", TargetKind::kMesh},
+                                                      {"ground-glass", TargetKind::kGroundGlass},
+                                                      {"pinholes", TargetKind::kPinholes},
+                                                      {"beads", TargetKind::kBeads}};
   for (const auto& [name, kind] : kinds) {
     const auto options =
         Read(std::string(kHead) + kTruth + "target: {kind: " + name + "}\n" + kBench);
     EXPECT_EQ(options.target.kind, kind);
     EXPECT_EQ(TargetKindName(kind), name);
   }
+}
+
+TEST_F(SweepSimulationFileTest, PartsOfAReliefAreRead) {
+  const auto options = Read(
+      std::string(kHead) + kTruth +
+      "target: {kind: beads, spacing_mm: 2, relief: [{shape: gear, size_mm: [3, 3], height_mm: "
+      "2}, {shape: rectangle, centre_mm: [5, -1], size_mm: [2, 1], height_mm: 0.5}]}\n" +
+      kBench);
+  EXPECT_EQ(options.target.spacing_mm, 2);
+  ASSERT_EQ(options.target.relief.size(), 2U);
+  EXPECT_EQ(options.target.relief[0].shape, ReliefPartOptions::Shape::kGear);
+  EXPECT_EQ(options.target.relief[0].height_mm, 2);
+  EXPECT_EQ(options.target.relief[1].shape, ReliefPartOptions::Shape::kRectangle);
+  EXPECT_EQ(options.target.relief[1].centre_mm, Eigen::Vector2d(5, -1));
+  EXPECT_EQ(options.target.relief[1].size_mm, Eigen::Vector2d(2, 1));
 }
 
 TEST_F(SweepSimulationFileTest, ErrorsHaveTheirPlaceInTheFile) {

@@ -14,6 +14,7 @@
 #include "thicklens/calib/frame_statistics.h"
 #include "thicklens/calib/grid_geometry.h"
 #include "thicklens/calib/stage_errors.h"
+#include "thicklens/calib/target_finding.h"
 #include "thicklens/model/camera.h"
 #include "thicklens/model/sweep_file.h"
 
@@ -318,13 +319,14 @@ struct CalibrationDiagnostics {
   // result are then counts, and blur_slope_px_per_mm is per count.
   std::optional<model::Estimate> step_length_mm;
 
-  SourceRecipe paper_recipe;                        // the paper's method, for comparison
-  SharpnessPeak sharpness;                          // in-focus distance by sharpness alone
-  ScaleModel scale;                                 // the bench offset from the image scale
-  BlurFit blur;                                     // the fit behind the results
-  SideFit nearer, farther;                          // fits of the frames on each side of focus
-  FieldMap field;                                   // focus over the field
-  std::vector<ChannelFocus> channels;               // of colour frames
+  TargetFinding target;                // what was measured on the target, and its depths
+  SourceRecipe paper_recipe;           // the paper's method, for comparison
+  SharpnessPeak sharpness;             // in-focus distance by sharpness alone
+  ScaleModel scale;                    // the bench offset from the image scale
+  BlurFit blur;                        // the fit behind the results
+  SideFit nearer, farther;             // fits of the frames on each side of focus
+  FieldMap field;                      // focus over the field
+  std::vector<ChannelFocus> channels;  // of colour frames
   std::optional<MagnificationCheck> magnification;  // present if the target's period is stated
   std::vector<SystematicPart> systematic_parts;     // sorted by their part of d1, the largest first
   std::string advice;                               // how to shrink the largest error, and to what

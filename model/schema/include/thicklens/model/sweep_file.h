@@ -40,8 +40,9 @@ enum class SweepTarget {
   kTexture,      // a flat pattern with detail everywhere
   kPrintedEdge,  // one straight edge, which is blurred by its ink
   kKnifeEdge,    // one straight edge that is sharp
+  kPoints,       // pinholes or beads, apart from one another
 };
-// Name of the kind: "auto", "texture", "printed-edge" or "knife-edge".
+// Name of the kind: "auto", "texture", "printed-edge", "knife-edge" or "points".
 THICKLENS_EXPORT std::string SweepTargetName(SweepTarget target);
 
 // Choice of the light that is measured of raw files.
@@ -208,6 +209,7 @@ struct SweepTruth {
   SweepMotion moves = SweepMotion::kTarget;  // the part that moves
   double bench_offset_mm = 0;       // z of reading 0, mm from Ap; d1 where lens or sensor move
   double tilt_deg = 0;              // tilt of the target, as in TargetOptions
+  std::vector<double> relief_mm;    // heights of the parts above the target, toward the camera, mm
   double corner_stops = 0;          // shading: light at the farthest corner over the axis, stops
   int specks = 0;                   // number of specks on the sensor
   LensAberrations aberrations;      // of the lens, all 0 if there are none

@@ -1,6 +1,7 @@
 #ifndef THICKLENS_MODEL_SWEEP_SIMULATOR_H_
 #define THICKLENS_MODEL_SWEEP_SIMULATOR_H_
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -29,8 +30,23 @@ enum class TargetKind {
   kGrid,          // a grid of known size, black on white, once
   kPrintedEdge,   // a slanted edge blurred by its ink: a Gaussian of ink_sigma_mm on the target
   kKnifeEdge,     // a slanted sharp edge
+  kMesh,          // dark wires that cross, on a bright ground
+  kGroundGlass,   // speckle: light whose distribution is that of a sum of random waves
+  kPinholes,      // bright discs on a dark ground, apart from one another
+  kBeads,         // dark discs on a bright ground, apart from one another
 };
 THICKLENS_EXPORT std::string TargetKindName(TargetKind kind);  // "dead-leaves", "pink-noise", ...
+
+// A part that stands out of the plane of the target and shows the pattern, too. It hides what is
+// behind it.
+struct ReliefPartOptions {
+  // kGear is a disc with 12 teeth, whose depth is a fifth of its radius.
+  enum class Shape { kRectangle, kDisc, kGear };
+  Shape shape = Shape::kRectangle;  // outline
+  Eigen::Vector2d centre_mm{0, 0};  // from the target's centre, X right, Y down
+  Eigen::Vector2d size_mm{0, 0};    // width and height; of a round part equal, the diameter
+  double height_mm = 0;             // above the target, toward the camera, > 0
+};
 
 // The flat target: its pattern, and how it stands.
 struct TargetOptions {
@@ -43,7 +59,8 @@ struct TargetOptions {
   // Size of the detail on the target: radius of the smallest leaf, shortest period of the noise,
   // side of a square, width of a star's sector (at half the field's shorter side from its centre)
   // or width of the whole image (kImage). The value 0 selects it from the field of view: 2 px, 2
-  // px, 24 px, 36 cycles, or the width that the frames see.
+  // px, 24 px, 36 cycles, or the width that the frames see. Of a mesh it is the period (24 px), of
+  // ground glass the width of a grain (4 px), and of pinholes and beads the diameter (3 px).
   double feature_size_mm = 0;
   std::optional<TargetGrid> grid;  // kGrid only
   // Angle of an edge from the vertical; positive: the upper end leans right. The bright side is on
@@ -53,6 +70,12 @@ struct TargetOptions {
   // Angle about the vertical line through the axis; positive: the right side is nearer to the
   // camera.
   double tilt_deg = 0;
+  // Distance of the pinholes or beads from their neighbours, mm; each is displaced at random by up
+  // to a fifth of it. 0: 36 px.
+  double spacing_mm = 0;
+  // Parts of a relief, which do not touch one another. A target with relief is not tilted and no
+  // edge, and the lens has no aberrations.
+  std::vector<ReliefPartOptions> relief;
 };
 
 // The stage that moves the part, and its systematic errors, which belong to the effect
@@ -160,7 +183,9 @@ THICKLENS_EXPORT SweepSimulationOptions ReadSweepSimulation(const std::string& p
 // through the exact transfer functions of defocus, blur floor and pixel box, at the image scale of
 // its chief rays. Each effect can be left out. Textures are periodic and band-limited by
 // definition: beyond the tile a frame sees its repetition. Edges have a closed form. Each column of
-// a tilted target is at its own depth, within about 0.01 px of its blur and position.
+// a tilted target is at its own depth, within about 0.01 px of its blur and position. Parts of a
+// relief have the scale and the blur of their own depths, and hide what is behind them from a part
+// of the aperture.
 class THICKLENS_EXPORT SweepSimulator {
  public:
   // `target_image` is linear light; only kImage uses it. Throws Error if the options are not

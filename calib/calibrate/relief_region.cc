@@ -1,0 +1,163 @@
+#include "calib/calibrate/relief_region.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "calib/registration/scale_tracking.h"
+#include "calib/sharpness/zone_focus.h"
+#include "calib/sweep/frame_selection.h"
+#include "calib/sweep/frame_store.h"
+#include "calib/uncertainty/relief_parts.h"
+#include "thicklens/base/error.h"
+
+namespace thicklens::calib {
+namespace {
+
+constexpr double kSmallestSidePx = 64;  // of a rectangle that is measured alone
+constexpr double kMostLost = 0.5;       // of its sides, to the parts that move into it
+constexpr double kLeastShare = 0.02;    // of the region of interest
+constexpr double kBlurReach = 2;        // blurs, by which the light of another part reaches
+
+// Frames with their image scale. A frame that was not registered has the scale of the nearest
+// reading that was.
+std::vector<ZoneFrame> FramesOf(const Calibration& found, bool with_rejected) {
+  std::vector<ZoneFrame> frames;
+  for (std::size_t i = 0; i < found.frames.size(); ++i) {
+    const FrameMeasurement& frame = found.frames[i];
+    if (!(frame.statistics.mean_linear > 0)) continue;
+    if (!with_rejected && !frame.rejection.empty()) continue;
+    ZoneFrame entry{i, frame.reading_mm, 1};
+    double nearest_mm = -1;
+    for (const FrameMeasurement& other : found.frames) {
+      if (!other.image_scale) continue;
+      const double apart_mm = std::abs(other.reading_mm - frame.reading_mm);
+      if (nearest_mm >= 0 && apart_mm >= nearest_mm) continue;
+      nearest_mm = apart_mm;
+      entry.scale = *other.image_scale;
+    }
+    frames.push_back(entry);
+  }
+  return frames;
+}
+
+double StepMm(const std::vector<ZoneFrame>& frames) {
+  const auto [low, high] = std::minmax_element(
+      frames.begin(), frames.end(),
+      [](const ZoneFrame& a, const ZoneFrame& b) { return a.reading_mm < b.reading_mm; });
+  return (high->reading_mm - low->reading_mm) / static_cast<double>(frames.size() - 1);
+}
+
+bool IsPattern(const FocusSweep& sweep) {
+  return sweep.target == model::SweepTarget::kAuto || sweep.target == model::SweepTarget::kTexture;
+}
+
+// The pixels that show the rectangle, and nothing else, in every frame.
+cv::Rect2d SeenByAll(const cv::Rect2d& rectangle, const std::vector<ZoneFrame>& frames,
+                     const cv::Point2d& centre_px) {
+  cv::Rect2d seen = rectangle;
+  for (const ZoneFrame& frame : frames) {
+    const cv::Point2d first = centre_px + frame.scale * (rectangle.tl() - centre_px);
+    const cv::Point2d last = centre_px + frame.scale * (rectangle.br() - centre_px);
+    seen &= cv::Rect2d(first, last);
+  }
+  return seen;
+}
+
+// The frame's own borders end no part.
+cv::Rect2d WithoutSeams(const cv::Rect2d& rectangle, double margin_px, cv::Size image) {
+  const double left = rectangle.x > 0 ? margin_px : 0;
+  const double top = rectangle.y > 0 ? margin_px : 0;
+  const double right = rectangle.x + rectangle.width < image.width - 0.5 ? margin_px : 0;
+  const double bottom = rectangle.y + rectangle.height < image.height - 0.5 ? margin_px : 0;
+  return {rectangle.x + left, rectangle.y + top, rectangle.width - left - right,
+          rectangle.height - top - bottom};
+}
+
+// The blur of the frame in the middle between the sharpest and the most blurred one, px.
+double TypicalBlurPx(const Calibration& found) {
+  double most_px = 0;
+  for (const FrameMeasurement& frame : found.frames)
+    most_px = std::max(most_px, frame.source_blur_sigma_px);
+  return 0.5 * most_px;
+}
+
+Calibration Refused(Calibration found, const std::string& why) {
+  CalibrationSummary& summary = found.summary;
+  summary.outcome = Outcome::kRefused;
+  summary.reason = fmt::format(
+      "the target has relief: zones of the field are sharpest at different readings ({}); {}; take "
+      "a flat target, or state roi_px with one depth. Map of the zones:\n{}",
+      PartsInWords(found.diagnostics.target.relief), why, found.diagnostics.target.ReliefMap());
+  while (!summary.reason.empty() && summary.reason.back() == '\n') summary.reason.pop_back();
+  summary.image_distance_mm.reset();
+  summary.focus_depth_mm.reset();
+  summary.blur_ratio.reset();
+  summary.blur_floor_px.reset();
+  return found;
+}
+
+}  // namespace
+
+Calibration WithoutRelief(const FocusSweep& sweep, const CalibrationOptions& options,
+                          Calibration found,
+                          const std::function<Calibration(const FocusSweep&)>& run) {
+  const bool was_refused = found.summary.outcome == Outcome::kRefused;
+  const std::vector<ZoneFrame> frames = FramesOf(found, was_refused);
+  ReliefFinding& relief = found.diagnostics.target.relief;
+  if (!IsPattern(sweep) || !options.fit_blur || frames.size() < kMinFrames) return found;
+  FrameStore store(sweep);
+  const ZoneFocus zones = FindZoneFocus({[&store](std::size_t frame) { return store.Grey(frame); },
+                                         frames, RegionCentre(sweep), options.threads});
+  relief.columns = zones.columns;
+  relief.rows = zones.rows;
+  relief.sharpest_mm = zones.sharpest_mm;
+  DivideByDepth(StepMm(frames), model::DirectionSign(sweep.direction), &relief);
+  if (!relief.is_relief) return found;
+  int part = 0;
+  const cv::Rect rectangle = LargestRectangle(relief, &part);
+  MakeFirst(part, &relief);
+  const cv::Size size = store.Grey(frames.front().frame).size();
+  const cv::Rect2d whole = zones.Pixels(rectangle, size);
+  const cv::Rect2d seen = WithoutSeams(SeenByAll(whole, frames, RegionCentre(sweep)),
+                                       kBlurReach * TypicalBlurPx(found), size);
+  const double share = seen.area() / (static_cast<double>(size.width) * size.height);
+  if (!(std::min(seen.width, seen.height) >= kSmallestSidePx) || !(share >= kLeastShare) ||
+      !(seen.area() >= kMostLost * kMostLost * whole.area())) {
+    return Refused(std::move(found),
+                   fmt::format("no rectangle of at least {:.0f} x {:.0f} px is at one depth in all "
+                               "frames",
+                               kSmallestSidePx, kSmallestSidePx));
+  }
+  FocusSweep part_of_it = sweep;
+  part_of_it.roi = {sweep.roi.x + static_cast<int>(std::ceil(seen.x)),
+                    sweep.roi.y + static_cast<int>(std::ceil(seen.y)),
+                    static_cast<int>(std::floor(seen.width)) - 1,
+                    static_cast<int>(std::floor(seen.height)) - 1};
+  Calibration again = run(part_of_it);
+  const std::string words = PartsInWords(relief);
+  if (again.summary.outcome == Outcome::kRefused) {
+    return Refused(std::move(found),
+                   fmt::format("the largest part at one depth, roi_px [{}, {}, {}, {}], does not "
+                               "suffice: {}",
+                               part_of_it.roi.x, part_of_it.roi.y, part_of_it.roi.width,
+                               part_of_it.roi.height, again.summary.reason));
+  }
+  again.diagnostics.target.relief = relief;
+  again.diagnostics.target.relief.region = part_of_it.roi;
+  again.diagnostics.target.relief.region_share = share;
+  again.summary.seconds += found.summary.seconds;
+  again.summary.warnings.insert(
+      again.summary.warnings.begin(),
+      fmt::format("the target has relief; everything is measured on its largest part at one depth, "
+                  "roi_px [{}, {}, {}, {}], {:.0f} % of the region ({})",
+                  part_of_it.roi.x, part_of_it.roi.y, part_of_it.roi.width, part_of_it.roi.height,
+                  100 * share, words));
+  return again;
+}
+
+}  // namespace thicklens::calib

@@ -1,0 +1,155 @@
+#include "calib/sharpness/zone_focus.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <opencv2/imgproc.hpp>
+#include <utility>
+
+#include "calib/sharpness/edge_pixels.h"
+#include "thicklens/base/parallel.h"
+
+namespace thicklens::calib {
+namespace {
+
+constexpr double kZonePx = 20;
+constexpr int kMostZones = 16;
+constexpr double kSmoothingPx = 1;
+constexpr std::size_t kMinOfTop = 4;
+constexpr double kTop = 0.5;
+// A zone whose sharpest frame exceeds the least sharp ones by less than this shows noise alone.
+constexpr double kLeastRise = 1.3;
+constexpr double kLeastSigma = 0.05;  // of a step: two zones never agree better
+constexpr double kMostSigma = 1.5;    // of a step
+
+struct Sample {
+  double reading_mm = 0, sharpness = 0;
+};
+
+// Sharpness of all zones of a frame; 0 where the frame does not show the whole zone.
+std::vector<double> SharpnessOfZones(const cv::Mat& grey, const ZoneFocus& grid,
+                                     const ZoneFrame& frame, const cv::Point2d& centre_px) {
+  const Gradient gradient = CentralGradient(Smoothed(grey, kSmoothingPx));
+  cv::Mat squares, sums, lights;
+  cv::multiply(gradient.magnitude, gradient.magnitude, squares);
+  cv::integral(squares, sums, CV_64F);
+  cv::integral(grey, lights, CV_64F);
+  std::vector<double> sharpness;
+  for (int row = 0; row < grid.rows; ++row) {
+    for (int column = 0; column < grid.columns; ++column) {
+      const cv::Rect2d at_one = grid.Pixels({column, row, 1, 1}, grey.size());
+      const cv::Point2d first =
+          centre_px + frame.scale * (cv::Point2d(at_one.x, at_one.y) - centre_px);
+      const int left = std::max(0, static_cast<int>(std::lround(first.x)));
+      const int top = std::max(0, static_cast<int>(std::lround(first.y)));
+      const int right =
+          std::min(grey.cols, static_cast<int>(std::lround(first.x + frame.scale * at_one.width)));
+      const int bottom =
+          std::min(grey.rows, static_cast<int>(std::lround(first.y + frame.scale * at_one.height)));
+      const double area = static_cast<double>(right - left) * (bottom - top);
+      if (right <= left || bottom <= top ||
+          area < 0.5 * frame.scale * frame.scale * at_one.area()) {
+        sharpness.push_back(0);
+        continue;
+      }
+      const auto sum = [&](const cv::Mat& of) {
+        return of.at<double>(bottom, right) - of.at<double>(top, right) -
+               of.at<double>(bottom, left) + of.at<double>(top, left);
+      };
+      const double light = sum(lights) / area;
+      sharpness.push_back(light > 0 ? frame.scale * frame.scale * sum(sums) / area / (light * light)
+                                    : 0);
+    }
+  }
+  return sharpness;
+}
+
+// The vertex of a parabola through the logarithms over the top of the curve.
+std::optional<model::Estimate> PeakOf(const std::vector<Sample>& samples) {
+  if (samples.size() < kMinOfTop + 1) return std::nullopt;
+  const auto top =
+      std::max_element(samples.begin(), samples.end(),
+                       [](const Sample& a, const Sample& b) { return a.sharpness < b.sharpness; });
+  if (top == samples.begin() || top + 1 == samples.end()) return std::nullopt;
+  const auto least =
+      std::min_element(samples.begin(), samples.end(),
+                       [](const Sample& a, const Sample& b) { return a.sharpness < b.sharpness; });
+  if (!(top->sharpness > kLeastRise * least->sharpness)) return std::nullopt;
+  // What the noise adds to every frame is below the smallest value.
+  const double half = least->sharpness + kTop * (top->sharpness - least->sharpness);
+  auto first = top, last = top + 1;
+  while (first != samples.begin() && (first - 1)->sharpness >= half) --first;
+  while (last != samples.end() && last->sharpness >= half) ++last;
+  while (static_cast<std::size_t>(last - first) < kMinOfTop) {
+    if (first != samples.begin()) --first;
+    if (last != samples.end()) ++last;
+    if (first == samples.begin() && last == samples.end()) break;
+  }
+  const auto n = static_cast<Eigen::Index>(last - first);
+  const double middle_mm = top->reading_mm;
+  const double half_mm =
+      std::max(middle_mm - first->reading_mm, (last - 1)->reading_mm - middle_mm);
+  if (!(half_mm > 0)) return std::nullopt;
+  Eigen::MatrixXd design(n, 3);
+  Eigen::VectorXd logs(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const double x = ((first + i)->reading_mm - middle_mm) / half_mm;
+    design.row(i) << 1, x, x * x;
+    logs[i] = std::log(std::max((first + i)->sharpness, 1e-12));
+  }
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(design);
+  const Eigen::Vector3d c = qr.solve(logs);
+  if (qr.rank() < 3 || !(c[2] < 0)) return std::nullopt;
+  const double x_peak = -c[1] / (2 * c[2]);
+  if (!(std::abs(x_peak) <= 1)) return std::nullopt;
+  const double variance =
+      (design * c - logs).squaredNorm() / static_cast<double>(std::max<Eigen::Index>(1, n - 3));
+  const Eigen::Vector3d slope(0, -1 / (2 * c[2]), c[1] / (2 * c[2] * c[2]));
+  const double x_sigma = std::sqrt(
+      std::max(0.0, variance * slope.dot((design.transpose() * design).inverse() * slope)));
+  const double step_mm = (samples.back().reading_mm - samples.front().reading_mm) /
+                         static_cast<double>(samples.size() - 1);
+  const double sigma_mm = std::hypot(half_mm * x_sigma, kLeastSigma * step_mm);
+  if (!(sigma_mm < kMostSigma * step_mm)) return std::nullopt;
+  return model::Estimate{middle_mm + half_mm * x_peak, sigma_mm};
+}
+
+}  // namespace
+
+cv::Rect2d ZoneFocus::Pixels(const cv::Rect& zones, cv::Size image) const {
+  const double width = static_cast<double>(image.width) / columns;
+  const double height = static_cast<double>(image.height) / rows;
+  return {zones.x * width, zones.y * height, zones.width * width, zones.height * height};
+}
+
+ZoneFocus FindZoneFocus(const ZoneSetup& setup) {
+  ZoneFocus grid;
+  if (setup.frames.empty()) return grid;
+  std::vector<ZoneFrame> frames = setup.frames;
+  std::stable_sort(frames.begin(), frames.end(), [](const ZoneFrame& a, const ZoneFrame& b) {
+    return a.reading_mm < b.reading_mm;
+  });
+  const cv::Size size = setup.read_grey(frames.front().frame).size();
+  const auto count = [](int length_px) {
+    return std::clamp(static_cast<int>(length_px / kZonePx), 1, kMostZones);
+  };
+  grid.columns = count(size.width);
+  grid.rows = count(size.height);
+  std::vector<std::vector<double>> sharpness(frames.size());
+  ParallelFor(static_cast<int>(frames.size()), setup.threads, [&](int i) {
+    const auto index = static_cast<std::size_t>(i);
+    sharpness[index] = SharpnessOfZones(setup.read_grey(frames[index].frame), grid, frames[index],
+                                        setup.centre_px);
+  });
+  for (std::size_t zone = 0; zone < sharpness.front().size(); ++zone) {
+    std::vector<Sample> samples;
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      if (sharpness[i][zone] > 0) samples.push_back({frames[i].reading_mm, sharpness[i][zone]});
+    }
+    grid.sharpest_mm.push_back(PeakOf(samples));
+  }
+  return grid;
+}
+
+}  // namespace thicklens::calib
