@@ -14,8 +14,10 @@
 #include "calib/fit/known_focus.h"
 #include "calib/registration/scale_causes.h"
 #include "calib/sweep/frame_selection.h"
+#include "calib/uncertainty/systematic_advice.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/validity.h"
+#include "thicklens/calib/error_budget.h"
 
 namespace thicklens::calib {
 namespace {
@@ -98,6 +100,27 @@ Calibration Recognised(const FocusSweep& sweep, const CalibrationOptions& option
   return found;
 }
 
+// Calibrates by the part that moves, stated or recognised.
+Calibration CalibrateByMotion(const FocusSweep& sweep, const CalibrationOptions& options) {
+  if (sweep.moves && model::MovesFocus(*sweep.moves))
+    return CalibrateWithMotion(sweep, *sweep.moves, options);
+  if (sweep.readings_are_counts) return RefuseCounts(sweep);
+  if (!sweep.moves && sweep.readings_are_focus_distances) {
+    Calibration found = CalibrateWithMotion(sweep, model::SweepMotion::kLens, options);
+    found.diagnostics.moves_is_recognised = true;
+    found.summary.warnings.insert(
+        found.summary.warnings.begin(),
+        "the readings are in dioptres, which is the unit of a focus drive: the sweep is taken as "
+        "moves: lens; state moves to confirm or to correct it");
+    return found;
+  }
+  Calibration found = CalibrateTarget(sweep, options);
+  if (!sweep.moves && options.fit_blur && ShowsMovingFocus(found))
+    found = Recognised(sweep, options, std::move(found));
+  if (sweep.moves) found.diagnostics.moves = *sweep.moves;
+  return found;
+}
+
 }  // namespace
 
 bool HasEnoughFrames(const FocusSweep& sweep, std::string* why) {
@@ -130,22 +153,10 @@ Calibration Calibrate(const FocusSweep& sweep, const CalibrationOptions& options
   std::string why;
   if (!options.IsValid(&why)) throw Error("calibration options: " + why);
   if (!sweep.IsValid(&why)) throw Error("sweep: " + why);
-  if (sweep.moves && model::MovesFocus(*sweep.moves))
-    return CalibrateWithMotion(sweep, *sweep.moves, options);
-  if (sweep.readings_are_counts) return RefuseCounts(sweep);
-  if (!sweep.moves && sweep.readings_are_focus_distances) {
-    Calibration found = CalibrateWithMotion(sweep, model::SweepMotion::kLens, options);
-    found.diagnostics.moves_is_recognised = true;
-    found.summary.warnings.insert(
-        found.summary.warnings.begin(),
-        "the readings are in dioptres, which is the unit of a focus drive: the sweep is taken as "
-        "moves: lens; state moves to confirm or to correct it");
-    return found;
-  }
-  Calibration found = CalibrateTarget(sweep, options);
-  if (!sweep.moves && options.fit_blur && ShowsMovingFocus(found))
-    found = Recognised(sweep, options, std::move(found));
-  if (sweep.moves) found.diagnostics.moves = *sweep.moves;
+  Calibration found = CalibrateByMotion(sweep, options);
+  // The results may have been converted to a lens or a sensor that moves.
+  CountFrames(&found);
+  SortAndAdvise(&found);
   return found;
 }
 
