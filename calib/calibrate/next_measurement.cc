@@ -87,8 +87,8 @@ class Proposal {
     return linear + std::sqrt(squares);
   }
 
-  // What is left of one side of an interval without one of its parts. Where the parts do not make
-  // the side as they are known to be added, hypot(part, rest) = whole leaves the most [D165].
+  // Returns the rest of one side of an interval without one of its parts. Where the parts do not
+  // make the side as they are known to be added, hypot(part, rest) = whole leaves the most [D165].
   static double Left(double whole, const std::string& without,
                      std::vector<std::pair<std::string, double>> parts) {
     const double made = SideOf(parts);

@@ -255,7 +255,7 @@ void FolderWatch::Impl::TakeChangedReadings() {
   }
 }
 
-// What value stands for white, and by what the frames are corrected, is found once.
+// Finds once which value stands for white, and by what the frames are corrected.
 bool FolderWatch::Impl::Examine() {
   if (examined) return true;
   try {

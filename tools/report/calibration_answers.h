@@ -12,8 +12,8 @@
 
 namespace thicklens::tools {
 
-// What a calibration answers, in the order in which it is asked: where is focus, what is the blur,
-// can I trust it, what is the largest error, what next.
+// The answers of a calibration, in the order in which they are asked for: where is focus, what is
+// the blur, can I trust it, what is the largest error, what next.
 struct CalibrationAnswers {
   std::string focus, blur, trust, error, next;  // one line each; empty: there is nothing to say
 };

@@ -20,8 +20,8 @@ std::string ScaleKindWords(calib::ScaleKind kind);
 std::vector<std::string> FieldLines(const calib::FieldMap& field);
 // The axial colour: each channel's in-focus object distance.
 std::string ChannelLine(const std::vector<calib::ChannelFocus>& channels);
-// In-focus object distance of the far side minus that of the near side; nothing unless both sides are
-// done.
+// In-focus object distance of the far side minus that of the near side; nothing unless both sides
+// are done.
 std::optional<model::Estimate> SidesApartMm(const calib::Calibration& calibration);
 std::string SidesLine(const calib::Calibration& calibration);
 // The point spread function that fits the frames better, and whether the camera file agrees.

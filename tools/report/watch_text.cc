@@ -11,6 +11,9 @@
 namespace thicklens::tools {
 namespace {
 
+// Every file waits for a moment; what keeps waiting is reported.
+constexpr int kLooksOfWait = 6;
+
 std::string FocusSoFar(const calib::SharpestReading& sharpest) {
   if (!sharpest.done) return "focus not determined yet";
   return "focus at reading " +
@@ -24,6 +27,13 @@ std::string FrameLine(const calib::ProgressFrame& frame) {
   return head + (frame.sharpness > 0 ? fmt::format("sharpness {:.4f} per px", frame.sharpness)
                                      : std::string("no edges as steep as those of the sharpest "
                                                    "frame"));
+}
+
+// A prediction is about noise, readings and bench offset alone.
+std::string NothingInWords(const calib::SweepProgressReport& progress) {
+  if (!progress.blur_ratio_error) return "nothing";
+  return fmt::format("nothing: kappa is expected to {:.2g} %, without systematic errors",
+                     100 * *progress.blur_ratio_error);
 }
 
 }  // namespace
@@ -48,14 +58,15 @@ std::string WatchText::Lines(const WatchUpdate& update) {
     text += fmt::format("{}: left out: {}\n", FrameName(file.image), PrintableUtf8(file.reason));
   if (!update.added.empty()) {
     const std::string missing = progress.is_enough
-                                    ? std::string("nothing")
+                                    ? NothingInWords(progress)
                                     : fmt::format("{}", fmt::join(progress.missing, "; "));
     if (missing != missing_) text += fmt::format("  missing: {}\n", PrintableUtf8(missing));
     missing_ = missing;
   }
-  if (update.waiting_reason != waiting_ && update.added.empty() && update.waiting > 0)
-    text += fmt::format("  waiting: {}\n", PrintableUtf8(update.waiting_reason));
+  looks_ = update.waiting > 0 && update.waiting_reason == waiting_ ? looks_ + 1 : 0;
   waiting_ = update.waiting_reason;
+  if (looks_ == kLooksOfWait)
+    text += fmt::format("  waiting: {}\n", PrintableUtf8(update.waiting_reason));
   return text;
 }
 

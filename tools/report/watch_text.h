@@ -13,15 +13,17 @@ namespace thicklens::tools {
 class WatchText {
  public:
   // Returns a line for each frame that was added or is rejected now, and one for each file that was
-  // given up. Where it has changed, a line follows that says what is missing, and one that says
-  // which file is waited for. Empty if nothing is new.
+  // given up. Where it has changed, a line follows that says what is missing; a file that is waited
+  // for during several looks has a line, too. Empty if nothing is new.
   std::string Lines(const WatchUpdate& update);
 
  private:
-  std::string missing_, waiting_;  // as printed last
+  std::string missing_;  // as printed last
+  std::string waiting_;  // of the last look
+  int looks_ = 0;        // for how many looks it has not changed
 };
 
-// What was seen while the frames arrived, for --json.
+// The findings while the frames arrived, for --json.
 nlohmann::json WatchJson(const calib::SweepProgressReport& progress,
                          const std::vector<LeftOutFile>& left_out, const std::string& ended_by);
 

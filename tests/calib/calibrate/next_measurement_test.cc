@@ -70,7 +70,7 @@ TEST(NextMeasurement, AgainstNoiseIsAChangeOfTheSweep) {
             0.8);
 }
 
-// What is left without a part lies between whole - part and sqrt(whole^2 - part^2). The latter is
+// The rest without a part lies between whole - part and sqrt(whole^2 - part^2). The latter is
 // stated where the parts in the list are not those that make the interval.
 TEST(NextMeasurement, WithoutASystematicPartItBoundsTheRest) {
   Calibration c;

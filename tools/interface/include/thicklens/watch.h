@@ -34,12 +34,12 @@ struct LeftOutFile {
   std::string reason;  // one line
 };
 
-// What one look at the folder found.
+// The findings of one look at the folder.
 struct WatchUpdate {
   std::vector<std::size_t> added;     // frames that were measured: indices into `progress.frames`
   std::vector<std::size_t> rejected;  // frames that a check rejects now and did not before
   std::vector<LeftOutFile> left_out;  // files that were given up
-  // What the frames so far show; as before where nothing was added.
+  // The findings in the frames so far; as before where nothing was added.
   calib::SweepProgressReport progress;
   std::size_t waiting = 0;     // files that are not whole yet, or have no reading yet
   std::string waiting_reason;  // why the first of them waits; empty if none does
@@ -50,25 +50,25 @@ struct WatchUpdate {
 // A sweep of the frames in a folder that are still being written, in any order, with a table of
 // readings that grows, or with readings in the files or their names. Nothing is printed, and no
 // clock is read.
-class THICKLENS_EXPORT FolderWatch {
+class FolderWatch {
  public:
   // As ReadSweepFolder. The folder must exist; the table and the frames may come later. Throws
   // OptionError and Error.
-  FolderWatch(const std::string& folder, const std::string& readings_csv,
-              const SweepOverrides& overrides, const WatchOptions& options,
-              const RunControl& run = {});
-  ~FolderWatch();
+  THICKLENS_EXPORT FolderWatch(const std::string& folder, const std::string& readings_csv,
+                               const SweepOverrides& overrides, const WatchOptions& options,
+                               const RunControl& run = {});
+  THICKLENS_EXPORT ~FolderWatch();
   FolderWatch(const FolderWatch&) = delete;
   FolderWatch& operator=(const FolderWatch&) = delete;
 
   // Looks at the folder at a time that does not fall, and measures the frames that are new and
   // whole. A file named "done" in the folder ends the sweep as soon as no file is incomplete.
   // Throws Error for a folder, table or camera that cannot be used at all, and Interrupted.
-  WatchUpdate Look(double now_s);
+  THICKLENS_EXPORT WatchUpdate Look(double now_s);
 
   // Returns the sweep of the frames that were measured, as ReadSweepFolder reads it. Its notices
   // name the files that were left out. Throws Error if there is no frame.
-  Sweep Finish() const;
+  THICKLENS_EXPORT Sweep Finish() const;
 
  private:
   struct Impl;

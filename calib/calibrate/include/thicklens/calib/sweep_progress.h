@@ -51,24 +51,24 @@ struct SweepProgressReport {
 
 // A sweep whose frames arrive one after the other, in any order. Each frame is measured once, when
 // it is added; a report compares the measurements.
-class THICKLENS_EXPORT SweepProgress {
+class SweepProgress {
  public:
   // `conditions` has camera, region, target and what is stated of offset and focus; its frames and
   // its reader are not used. Throws Error if the options are not valid.
-  SweepProgress(const FocusSweep& conditions, const SweepProgressOptions& options);
-  ~SweepProgress();
-  SweepProgress(SweepProgress&&) noexcept;
-  SweepProgress& operator=(SweepProgress&&) noexcept;
+  THICKLENS_EXPORT SweepProgress(const FocusSweep& conditions, const SweepProgressOptions& options);
+  THICKLENS_EXPORT ~SweepProgress();
+  THICKLENS_EXPORT SweepProgress(SweepProgress&&) noexcept;
+  THICKLENS_EXPORT SweepProgress& operator=(SweepProgress&&) noexcept;
 
   // Measures a frame as its file stores it (FrameReader). Throws Error that names the frame if it
   // does not fit the camera; the frame is then not added.
-  void Add(const model::SweepFrame& frame, const cv::Mat& stored);
+  THICKLENS_EXPORT void Add(const model::SweepFrame& frame, const cv::Mat& stored);
   // Gives the frame of an index, in the order in which they were added, another reading.
-  void SetReading(std::size_t index, double reading_mm);
+  THICKLENS_EXPORT void SetReading(std::size_t index, double reading_mm);
   // The number of frames that were added.
-  std::size_t size() const;
+  THICKLENS_EXPORT std::size_t size() const;
   // Compares the frames so far.
-  SweepProgressReport Report() const;
+  THICKLENS_EXPORT SweepProgressReport Report() const;
 
  private:
   struct Impl;
