@@ -17,9 +17,11 @@
 #include "calib/grid/grid_geometry.h"
 #include "calib/registration/scale_causes.h"
 #include "calib/sweep/frame_selection.h"
+#include "calib/uncertainty/systematic_advice.h"
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/validity.h"
+#include "thicklens/calib/error_budget.h"
 
 namespace thicklens::calib {
 namespace {
@@ -102,7 +104,8 @@ Calibration Recognised(const FocusSweep& sweep, const CalibrationOptions& option
   return found;
 }
 
-// Calibrates frames as they are, or as the camera's distortion says.
+// Calibrates frames as they are, or as the camera's distortion says, by the part that moves, stated
+// or recognised.
 Calibration CalibrateFrames(const FocusSweep& sweep, const CalibrationOptions& options) {
   if (sweep.moves && model::MovesFocus(*sweep.moves))
     return CalibrateWithMotion(sweep, *sweep.moves, options);
@@ -172,7 +175,12 @@ Calibration Calibrate(const FocusSweep& sweep, const CalibrationOptions& options
   std::string why;
   if (!options.IsValid(&why)) throw Error("calibration options: " + why);
   if (!sweep.IsValid(&why)) throw Error("sweep: " + why);
-  return sweep.target_grid ? CalibrateOnGrid(sweep, options) : CalibrateFrames(sweep, options);
+  Calibration found =
+      sweep.target_grid ? CalibrateOnGrid(sweep, options) : CalibrateFrames(sweep, options);
+  // The results may have been converted to a lens or a sensor that moves.
+  CountFrames(&found);
+  SortAndAdvise(&found);
+  return found;
 }
 
 }  // namespace thicklens::calib

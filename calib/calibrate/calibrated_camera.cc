@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "thicklens/calib/calibrate.h"
+#include "thicklens/calib/frame_checks.h"
 
 namespace thicklens::calib {
 namespace {
@@ -24,7 +25,9 @@ model::Camera CalibratedCamera(const model::Camera& camera, const Calibration& c
   found.evidence.frames_used = calibration.summary.frames_used;
   for (const FrameMeasurement& frame : calibration.frames) {
     if (!frame.rejection.empty())
-      found.evidence.frames_rejected.push_back({FileName(frame.image), frame.rejection});
+      // The numbers of the reason are in the report: the file is for the values.
+      found.evidence.frames_rejected.push_back(
+          {FileName(frame.image), FailedCheck(frame.rejection)});
   }
   const auto estimate = [](const std::optional<Result>& r) -> std::optional<model::Estimate> {
     if (!r) return std::nullopt;

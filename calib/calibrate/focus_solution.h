@@ -8,7 +8,7 @@
 
 namespace thicklens::calib {
 
-// Standard deviations by which the in-focus distance must exceed the focal length, and kappa 0, so
+// Standard deviations by which the in-focus object distance must exceed the focal length, and kappa 0, so
 // that d1 and kappa are determined.
 inline constexpr double kKnownSigmas = 3;
 

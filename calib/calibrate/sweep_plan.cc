@@ -53,7 +53,7 @@ struct Wish {
   std::optional<double> PlanWishes::*wanted;
 };
 constexpr Wish kWishes[] = {
-    {"the in-focus distance zf", " mm", &PlannedErrors::focus_depth_mm,
+    {"the in-focus object distance zf", " mm", &PlannedErrors::focus_depth_mm,
      &PlanWishes::focus_depth_mm},
     {"the image distance d1", " mm", &PlannedErrors::image_distance_mm,
      &PlanWishes::image_distance_mm},

@@ -42,6 +42,7 @@
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/calib/error_budget.h"
 #include "thicklens/model/pupil_law.h"
 
 namespace thicklens::calib {
@@ -80,12 +81,7 @@ class Calibrator {
     } else {
       Measure();
     }
-    result_.summary.frames_used = result_.diagnostics.blur.done
-                                      ? result_.diagnostics.blur.frames_used
-                                      : static_cast<int>(used().size());
-    result_.summary.frames_rejected = static_cast<int>(
-        std::count_if(result_.frames.begin(), result_.frames.end(),
-                      [](const FrameMeasurement& frame) { return !frame.rejection.empty(); }));
+    CountFrames(&result_);
     result_.summary.chi2_per_dof = result_.diagnostics.blur.chi2_per_dof;
     result_.summary.seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

@@ -20,7 +20,8 @@ std::string CausesOfMisfit(const FocusSweep& sweep, const BlurEvidence& evidence
 // errors, by an amount that matters to the sweep.
 bool IsAstigmatic(const Calibration& calibration);
 
-// Returns the warning about astigmatism, with both depths of focus; empty where there is none.
+// Returns the warning about astigmatism, with both in-focus object distances; empty where there is
+// none.
 std::string AstigmatismInWords(const Calibration& calibration);
 
 // Whether astigmatism may also explain depths of parts of the field that differ by `spread_mm`: it

@@ -11,7 +11,7 @@ namespace thicklens::calib {
 
 // Growth of the blur sigma, px, per relative change of the image scale, from the blurs that the
 // registrations measured. It is good to about 15 %. It does not depend on readings or the bench
-// zero, and therefore holds for any readings.
+// offset, and therefore holds for any readings.
 //
 // For frames of scale s relative to the sharpest frame (derived here, [D65]; p is the pixel pitch,
 // s is near 1):

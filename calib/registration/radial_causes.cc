@@ -136,8 +136,18 @@ std::string NonlinearityRemedy(const FrameStructureFinding& structure) {
 std::string NonlinearityText(const ScaleNonlinearity& nonlinearity,
                              const Calibration& calibration) {
   const std::string seen = StructureInWords(calibration.diagnostics.structure);
+  const std::vector<std::string>& warnings = calibration.summary.warnings;
+  const bool is_named =
+      !seen.empty() &&
+      std::any_of(warnings.begin(), warnings.end(), [&seen](const std::string& warning) {
+        return warning.find(seen) != std::string::npos;
+      });
   const std::string causes =
-      seen.empty()
+      is_named ? std::string(
+                     "The structure fixed to the frame, named above, biases the image scale. If it "
+                     "is not the cause, the rail's scale is not linear, the images are distorted, "
+                     "the target is not flat, or the lens breathes")
+      : seen.empty()
           ? std::string(
                 "The rail's scale is not linear, the images are distorted, the target is not flat, "
                 "or the lens breathes; these look alike. A rail of known steps (a micrometer "

@@ -5,76 +5,25 @@
 #include <algorithm>
 #include <cmath>
 
+#include "thicklens/calib/error_budget.h"
+
 namespace thicklens::calib {
-namespace {
-
-double Width(const Eigen::Vector2d& interval) { return interval.y() - interval.x(); }
-
-// A part's name in a sentence: "the blur floor", but "lens.front_focal_length_mm".
-std::string WithArticle(const std::string& name) {
-  return name.find('.') == std::string::npos ? "the " + name : name;
-}
-
-constexpr char kNoRemedy[] = "no remedy";  // begins the remedy of a part that has none
-
-// A clearly wrong shape changes kappa, whatever the shares of d1 are.
-std::optional<std::string> WrongShape(const Calibration& calibration) {
-  for (const SystematicPart& part : calibration.diagnostics.systematic_parts) {
-    if (part.name == kShapePart && Width(part.blur_ratio) > 0 &&
-        part.remedy.rfind(kNoRemedy, 0) != 0)
-      return part.remedy;
-  }
-  return std::nullopt;
-}
-
-// Returns the action that makes the bench offset more precise. A statement can only be made more
-// exactly.
-std::string RemedyOfOffset(const std::string& origin) {
-  if (!origin.empty() && origin != kFromScale) return fmt::format("state {} more exactly", origin);
-  return "state the magnification (by target_period_mm with a grid or ruler in view), "
-         "image_distance_mm, focus_depth_mm or offset_mm; or sweep over a longer range, so that "
-         "the image scale determines it better";
-}
-
-}  // namespace
 
 void SortAndAdvise(Calibration* calibration) {
-  std::vector<SystematicPart>& parts = calibration->diagnostics.systematic_parts;
-  std::stable_sort(parts.begin(), parts.end(),
-                   [](const SystematicPart& a, const SystematicPart& b) {
-                     return Width(a.image_distance_mm) > Width(b.image_distance_mm);
-                   });
-  const double zf_sigma_mm = calibration->summary.focus_depth_mm->sigma;
-  const double zero_sigma_mm =
-      calibration->summary.bench_offset_mm
-          ? std::min(calibration->summary.bench_offset_mm->sigma, zf_sigma_mm)
-          : 0;
-  const double d1_per_zf =
-      zf_sigma_mm > 0 ? calibration->summary.image_distance_mm->sigma / zf_sigma_mm : 0;
-  const double zero_mm = 2 * 1.96 * d1_per_zf * zero_sigma_mm;
-  const double noise_mm =
-      2 * 1.96 * d1_per_zf * std::sqrt(zf_sigma_mm * zf_sigma_mm - zero_sigma_mm * zero_sigma_mm);
-  double all_mm = noise_mm + zero_mm;
-  for (const SystematicPart& part : parts) all_mm += Width(part.image_distance_mm);
-  if (!(all_mm > 0)) return;
-  const double worst_mm = parts.empty() ? 0 : Width(parts.front().image_distance_mm);
-  if (const auto wrong = WrongShape(*calibration)) {
-    calibration->diagnostics.advice = *wrong;
-    return;
-  }
-  const auto due_to = [&](double part_mm, const std::string& cause) {
-    return fmt::format("{:.0f} % of the error of d1 is due to {}: ", 100 * part_mm / all_mm, cause);
+  const std::vector<ErrorTerm> terms = ErrorTerms(*calibration);
+  if (terms.empty()) return;
+  const auto rank = [&terms](const SystematicPart& part) {
+    return std::find_if(terms.begin(), terms.end(),
+                        [&part](const ErrorTerm& term) {
+                          return !term.is_statistical && term.name == part.name;
+                        }) -
+           terms.begin();
   };
-  if (worst_mm > noise_mm && worst_mm > zero_mm) {
-    calibration->diagnostics.advice =
-        due_to(worst_mm, WithArticle(parts.front().name)) + parts.front().remedy;
-  } else if (zero_mm > noise_mm) {
-    calibration->diagnostics.advice = due_to(zero_mm, "the bench offset") +
-                                      RemedyOfOffset(calibration->diagnostics.bench_offset_from);
-  } else {
-    calibration->diagnostics.advice =
-        due_to(noise_mm, "noise and readings") + "take more frames, or use a finer bench scale";
-  }
+  std::vector<SystematicPart>& parts = calibration->diagnostics.systematic_parts;
+  std::stable_sort(
+      parts.begin(), parts.end(),
+      [&rank](const SystematicPart& a, const SystematicPart& b) { return rank(a) < rank(b); });
+  calibration->diagnostics.advice = LargestErrorInWords(terms);
 }
 
 void WidenFocus(const std::string& name, double move_mm, const std::string& remedy,

@@ -20,10 +20,8 @@ inline constexpr char kFromScale[] = "the image scale";
 // Its value where offset_mm is stated.
 inline constexpr char kFromOffset[] = "offset_mm";
 
-// Sorts the parts, the largest first, and gives the advice: how to shrink the largest share of the
-// error of d1. The statistical part counts at its 95 %, without the share of the bench offset,
-// which counts separately (0 without a zero). A wrong shape of the blur has priority over all
-// shares.
+// Sorts the parts by their effect and gives the advice: the largest term of the error, statistical
+// or systematic (ErrorTerms), and what makes it smaller.
 void SortAndAdvise(Calibration* calibration);
 
 // Adds a part that moves zf by up to `move_mm` in either direction to the table and to the

@@ -247,7 +247,8 @@ class Parts {
   std::string RemedyOfShape(bool other_is_right) const {
     if (NeitherShapeFits()) {
       return fmt::format(
-          "neither blur shape fits the frames (chi2/dof {:.3g} for gaussian, {:.3g} for disc): "
+          "neither blur shape fits the frames (misfit {:.3g} for gaussian, {:.3g} for disc, 1 is "
+          "expected): "
           "check sensor.transfer in the camera file, sharpening or denoising in the camera, and "
           "aberrations of the lens, none of which these frames exclude",
           *evidence_.gaussian_misfit, *evidence_.disc_misfit);

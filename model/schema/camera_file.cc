@@ -253,10 +253,11 @@ class CameraWriter {
 
   std::string Write() {
     out_.Text("name", camera_.name);
+    // A reader of the file looks for the measured values first.
+    if (camera_.calibration) WriteCalibration(*camera_.calibration);
     WriteLens();
     WriteSensor();
     out_.Text("psf", PsfName(camera_.psf));
-    if (camera_.calibration) WriteCalibration(*camera_.calibration);
     return out_.Finish();
   }
 
@@ -416,6 +417,13 @@ class CameraWriter {
     out_.Text("method", evidence.method);
     if (evidence.undistorted) out_.Text("undistorted", "true");
     out_.Text("frames_used", std::to_string(evidence.frames_used));
+    out_.NumberIfAny("chi2_per_dof", evidence.chi2_per_dof);
+    MeasuredIfAny("focus_depth_mm", evidence.focus_depth_mm);
+    out_.TextIfAny("blur_family", evidence.blur_family);
+    out_.NumberIfAny("blur_band", evidence.blur_band);
+    out_.TextIfAny("data_sha256", evidence.data_sha256);
+    out_.TextIfAny("version", evidence.version);
+    out_.TextIfAny("date", evidence.date);
     if (!evidence.frames_rejected.empty()) {
       out_.BeginList("frames_rejected");
       for (const RejectedFrame& frame : evidence.frames_rejected) {
@@ -426,13 +434,6 @@ class CameraWriter {
       }
       out_.EndList();
     }
-    out_.NumberIfAny("chi2_per_dof", evidence.chi2_per_dof);
-    MeasuredIfAny("focus_depth_mm", evidence.focus_depth_mm);
-    out_.TextIfAny("blur_family", evidence.blur_family);
-    out_.NumberIfAny("blur_band", evidence.blur_band);
-    out_.TextIfAny("data_sha256", evidence.data_sha256);
-    out_.TextIfAny("version", evidence.version);
-    out_.TextIfAny("date", evidence.date);
     out_.EndMap();
   }
 

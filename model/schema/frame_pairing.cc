@@ -261,6 +261,26 @@ std::vector<SweepFrame> PairFrames(const ReadingSet& readings,
   return frames;
 }
 
+std::vector<std::string> ImagesOfRows(const ReadingSet& readings,
+                                      const std::vector<std::string>& files,
+                                      const std::string& folder) {
+  Images images(files, folder);
+  std::set<std::string> known;
+  for (const std::string& file : files) known.insert(fs::path(file).lexically_normal().string());
+  std::vector<std::string> found;
+  for (const FileReading& row : readings.rows) {
+    bool is_by_name = false;
+    std::string path;
+    try {
+      path = images.Find(row, readings.folder, &is_by_name);
+    } catch (const Error&) {
+      path.clear();  // it names no image of these
+    }
+    found.push_back(known.count(path) > 0 ? path : "");
+  }
+  return found;
+}
+
 std::map<int, const FileReading*> RowsOfFrames(const ReadingSet& readings, const std::string& path,
                                                int frames, std::vector<std::string>* notices) {
   const std::string name = fs::path(path).filename().string();

@@ -17,6 +17,11 @@ std::vector<SweepFrame> PairFrames(const ReadingSet& readings,
                                    const std::vector<std::string>& files, const std::string& folder,
                                    std::vector<std::string>* notices);
 
+// Returns the image of each row, a normal path; empty for a row whose image is not among `files`.
+std::vector<std::string> ImagesOfRows(const ReadingSet& readings,
+                                      const std::vector<std::string>& files,
+                                      const std::string& folder);
+
 // Pairs the rows with the pages of one file: "stack.tif[3]" counts them from 0, and numbers alone
 // count from 0 or from 1. Throws Error with the place for a row or a page without its partner.
 std::vector<SweepFrame> PairPages(const ReadingSet& readings, const std::string& path, int pages);

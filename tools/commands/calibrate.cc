@@ -23,6 +23,7 @@
 #include "thicklens/model/camera_file.h"
 #include "thicklens/opencv.h"
 #include "thicklens/sweep.h"
+#include "tools/commands/calibrate_watch.h"
 #include "tools/commands/commands.h"
 #include "tools/options/command_frame.h"
 #include "tools/options/deprecated_names.h"
@@ -53,6 +54,8 @@ struct CalibrateOptions {
   std::string method = "fit";
   bool no_field = false;
   bool dry_run = false;
+  bool watch = false;
+  std::optional<double> watch_pause_s;
 
   bool by_paper() const { return method == "paper"; }
   std::string report_path() const {
@@ -236,18 +239,33 @@ CommandResult RunDry(const CalibrateOptions& options, const Sweep& sweep) {
   return {UnderstandingJson(sweep, found, options.by_paper() ? "source" : options.method), ""};
 }
 
-// Reads the sweep and, unless it has too few frames, what their values show.
-Sweep Examined(const CalibrateOptions& options) {
+// Adds what the values of the frames show, unless there are too few frames.
+Sweep Examined(const CalibrateOptions& options, Sweep sweep) {
   const CommandRun run(options.common, SweepOptionNames());
-  Sweep sweep = ReadSweepInput(options.sweep, run.control());
   std::string why;
   if (!calib::HasEnoughFrames(FocusSweepOf(sweep), &why)) return sweep;
   return WithOptionNames(run.names(),
                          [&] { return ExamineFrames(std::move(sweep), run.control()); });
 }
 
+Sweep ReadSweepOf(const CalibrateOptions& options) {
+  const CommandRun run(options.common, SweepOptionNames());
+  return ReadSweepInput(options.sweep, run.control());
+}
+
+// An output that cannot be written is reported before the first frame arrives.
+CommandResult CalibrateWatched(const CalibrateOptions& options) {
+  { const Outputs could_be_written(options); }
+  WatchedSweep watched = WatchSweep(options.sweep, options.watch_pause_s, options.common);
+  CommandResult result = RunCalibration(options, Examined(options, std::move(watched.sweep)));
+  result.summary["watch"] = std::move(watched.summary);
+  return result;
+}
+
 CommandResult Calibrate(const CalibrateOptions& options) {
-  const Sweep sweep = Examined(options);
+  if (options.watch) return CalibrateWatched(options);
+  if (options.watch_pause_s) throw UsageError("--watch-pause requires --watch");
+  const Sweep sweep = Examined(options, ReadSweepOf(options));
   return options.dry_run ? RunDry(options, sweep) : RunCalibration(options, sweep);
 }
 
@@ -288,8 +306,17 @@ void AddCalibrateCommand(CLI::App* program, CommandAction* action) {
   AcceptDeprecatedValues(method, &options->common);
   command->add_flag("--no-field", options->no_field,
                     "Skip the maps over the field and the colours; faster");
-  command->add_flag("--dry-run", options->dry_run,
-                    "Report what the sweep file says, and measure nothing");
+  CLI::Option* dry_run = command->add_flag("--dry-run", options->dry_run,
+                                           "Report what the sweep file says, and measure nothing");
+  command
+      ->add_flag("--watch", options->watch,
+                 "SWEEP is a folder into which the frames are being written: print a line for each "
+                 "frame, and what is still missing. Enter, a file named done in the folder or "
+                 "Ctrl-C ends the sweep, and its result follows")
+      ->excludes(dry_run);
+  AddNumberWithUnit(command, "--watch-pause", "s", "60s",
+                    "With --watch: also end the sweep if nothing arrives for that time",
+                    &options->watch_pause_s);
   AddCommonOptions(command, &options->common);
   command->callback([options, action] {
     *action = [options] {

@@ -24,11 +24,13 @@
 #include "thicklens/io/readings.h"
 #include "thicklens/io/video_file.h"
 #include "thicklens/model/camera_file.h"
+#include "thicklens/model/growing_sweep.h"
 #include "thicklens/opencv.h"
 #include "tools/interface/frame_light.h"
 #include "tools/interface/missing_tolerances.h"
 #include "tools/interface/run_scope.h"
 #include "tools/interface/stated_transfer.h"
+#include "tools/interface/sweep_of_frames.h"
 #include "tools/interface/validation.h"
 #include "tools/interface/with_file_context.h"
 
@@ -501,6 +503,22 @@ Sweep ReadSweepFolder(const std::string& folder, const std::string& readings_csv
   model::SweepFile file = model::SweepFromFolder(folder, readings_csv, overrides.camera_path,
                                                  ReadingOf(overrides), &sweep.notices);
   return Finish(std::move(file), "", overrides, run, std::move(sweep));
+}
+
+SweepOfFrames ReadSweepOfFrames(const std::string& folder, const std::vector<std::string>& images,
+                                const std::string& readings_csv, const SweepOverrides& overrides,
+                                const RunControl& control) {
+  checks::RequireValid(control);
+  checks::RequireValid(overrides);
+  const RunScope run(control);
+  RequireNoVideoOptions(folder, overrides);
+  SweepOfFrames found;
+  model::GrowingSweep growing =
+      model::SweepOfImages(folder, images, readings_csv, overrides.camera_path,
+                           ReadingOf(overrides), &found.sweep.notices);
+  found.without_reading = std::move(growing.without_reading);
+  found.sweep = Finish(std::move(growing.sweep), "", overrides, run, std::move(found.sweep));
+  return found;
 }
 
 Sweep ExamineFrames(Sweep sweep, const RunControl& control) {

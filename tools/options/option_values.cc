@@ -41,6 +41,16 @@ UsageError WrongForm(const std::string& option, const std::string& text, const s
   return UsageError(fmt::format("{}: {} is expected, found '{}'", option, form, text));
 }
 
+// Parses a number of at least 0 with its unit, which may be left out.
+std::optional<double> NumberWithUnit(const std::string& text, const std::string& unit) {
+  double value = 0;
+  const char* end = text.data() + text.size();
+  const auto [read, failure] = std::from_chars(text.data(), end, value);
+  if (failure != std::errc() || !std::isfinite(value) || value < 0) return std::nullopt;
+  const std::string rest(read, end);
+  return rest.empty() || rest == unit ? std::optional(value) : std::nullopt;
+}
+
 }  // namespace
 
 CLI::Validator Finite() {
@@ -107,6 +117,23 @@ std::vector<int> SplitWhole(const std::string& option, const std::string& text, 
 std::vector<int> SplitPixels(const std::string& option, const std::string& text, char separator,
                              const std::string& form) {
   return SplitWhole(option, text, separator, form + " in px", 0, kMaxPixels);
+}
+
+CLI::Option* AddNumberWithUnit(CLI::App* command, const std::string& name, const std::string& unit,
+                               const std::string& example, const std::string& help,
+                               std::optional<double>* value) {
+  return command
+      ->add_option_function<std::string>(
+          name,
+          [=](const std::string& text) {
+            *value = NumberWithUnit(text, unit);
+            if (!*value) {
+              throw CLI::ValidationError(
+                  name, fmt::format("a number such as {} is expected, found '{}'", example, text));
+            }
+          },
+          help)
+      ->type_name(example);
 }
 
 }  // namespace thicklens::tools

@@ -2,6 +2,7 @@
 #define THICKLENS_TOOLS_OPTIONS_OPTION_VALUES_H_
 
 #include <CLI/CLI.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -36,6 +37,12 @@ std::vector<int> SplitWhole(const std::string& option, const std::string& text, 
 // Returns whole numbers from 0 to 100000 px, likewise.
 std::vector<int> SplitPixels(const std::string& option, const std::string& text, char separator,
                              const std::string& form);
+
+// Adds an option whose value is a number of at least 0, with its unit or without: "2s", "2".
+// `example` is its type in the help.
+CLI::Option* AddNumberWithUnit(CLI::App* command, const std::string& name, const std::string& unit,
+                               const std::string& example, const std::string& help,
+                               std::optional<double>* value);
 
 }  // namespace thicklens::tools
 

@@ -2,43 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
-#include <cmath>
-#include <optional>
-#include <system_error>
+#include "tools/options/option_values.h"
 
 namespace thicklens::tools {
-namespace {
-
-// Parses a number of at least 0 with its unit, which may be left out.
-std::optional<double> NumberWithUnit(const std::string& text, const std::string& unit) {
-  double value = 0;
-  const char* end = text.data() + text.size();
-  const auto [read, failure] = std::from_chars(text.data(), end, value);
-  if (failure != std::errc() || !std::isfinite(value) || value < 0) return std::nullopt;
-  const std::string rest(read, end);
-  return rest.empty() || rest == unit ? std::optional(value) : std::nullopt;
-}
-
-CLI::Option* AddNumberWithUnit(CLI::App* command, const std::string& name, const std::string& unit,
-                               const std::string& example, const std::string& help,
-                               std::optional<double>* value) {
-  return command
-      ->add_option_function<std::string>(
-          name,
-          [=](const std::string& text) {
-            *value = NumberWithUnit(text, unit);
-            if (!*value) {
-              throw CLI::ValidationError(
-                  name, fmt::format("a number such as {} is expected, found '{}'", example, text));
-            }
-          },
-          help)
-      ->type_name(example);
-}
-
-}  // namespace
-
 std::string QualityTargetText(const estimator::QualityTarget& target) {
   std::string text;
   const auto add = [&](const std::string& option) { text += (text.empty() ? "" : " ") + option; };

@@ -166,7 +166,8 @@ ReportFigure FieldFigure(const FieldMap& field) {
   const double width_px = std::max(layout.X(field.columns) + 8, kLeftPx + 420);
   std::string svg = fmt::format(
       "<svg class=\"plot\" viewBox=\"0 0 {0:.0f} {1:.0f}\" width=\"{0:.0f}\" height=\"{1:.0f}\" "
-      "role=\"img\" aria-labelledby=\"field-title\">\n<title id=\"field-title\">In-focus distance "
+      "role=\"img\" aria-labelledby=\"field-title\">\n<title id=\"field-title\">In-focus object "
+      "distance "
       "over the field, {2} to {3} mm</title>\n",
       width_px, bar_top + 18, RoundedTo(range.lo, (range.hi - range.lo) / 20),
       RoundedTo(range.hi, (range.hi - range.lo) / 20));
@@ -175,12 +176,13 @@ ReportFigure FieldFigure(const FieldMap& field) {
   svg += Margins(field, layout);
   if (colours.hi > colours.lo) svg += ColourBar(colours, bar_top);
   svg += "</svg>\n";
-  return {{{"field", svg}},
-          "In-focus distance zf [mm], fitted separately for each part of the image, with its "
-          "standard deviation. One side brighter than the other: the target is tilted; brightness "
-          "changing from the centre outward: the field is curved. The colours span at least ± 3 "
-          "median standard deviations.",
-          false};
+  return {
+      {{"field", svg}},
+      "In-focus object distance zf [mm], fitted separately for each part of the image, with its "
+      "standard deviation. One side brighter than the other: the target is tilted; brightness "
+      "changing from the centre outward: the field is curved. The colours span at least ± 3 "
+      "median standard deviations.",
+      false};
 }
 
 }  // namespace thicklens::tools

@@ -38,7 +38,7 @@ ReportFigure ReadingErrorFigure(const calib::FocusSweep& sweep,
                                 const calib::Calibration& calibration, const Abscissa& abscissa);
 ReportFigure ScaleFigure(const calib::FocusSweep& sweep, const calib::Calibration& calibration);
 ReportFigure ExampleFigure(const calib::Calibration& calibration);
-// The in-focus distance of each tile as a colour.
+// The in-focus object distance of each tile as a colour.
 ReportFigure FieldFigure(const calib::FieldMap& field);
 
 // Names that drawings of a calibration can have.

@@ -10,6 +10,9 @@
 
 #include "thicklens/base/printable_text.h"
 #include "thicklens/calib/blur_model.h"
+#include "thicklens/calib/error_budget.h"
+#include "thicklens/calib/next_measurement.h"
+#include "tools/report/calibration_answers.h"
 #include "tools/report/calibration_summary.h"
 #include "tools/report/calibration_text.h"
 #include "tools/report/determined.h"
@@ -341,6 +344,7 @@ json FitJson(const calib::Calibration& calibration) {
           {"magnification_at_focus", EstimateJson(calibration.diagnostics.magnification_at_focus)},
           {"examples", ExamplesJson(calibration)},
           {"frames_used", calibration.summary.frames_used},
+          {"error_terms", ErrorTermsJson(calib::ErrorTerms(calibration))},
           {"status", calib::OutcomeName(calibration.summary.outcome)},
           {"reason", calibration.summary.outcome == calib::Outcome::kOk
                          ? ""
@@ -362,6 +366,16 @@ json RejectedJson(const calib::Calibration& calibration) {
       rejected.push_back(
           {{"image", PrintableUtf8(frame.image)}, {"reason", PrintableUtf8(frame.rejection)}});
   return rejected;
+}
+
+json LeftOutJson(const calib::Calibration& calibration) {
+  json left_out = json::array();
+  for (const calib::FrameMeasurement& frame : calibration.frames) {
+    if (frame.rejection.empty() && !frame.not_in_fit.empty())
+      left_out.push_back(
+          {{"image", PrintableUtf8(frame.image)}, {"reason", PrintableUtf8(frame.not_in_fit)}});
+  }
+  return left_out;
 }
 
 }  // namespace
@@ -387,6 +401,8 @@ json CalibrationJson(const calib::FocusSweep& sweep, const calib::Calibration& c
   out["method"] = use_source_recipe ? "source" : "fit";
   out["frames"] = FramesJson(sweep, calibration);
   out["frames_rejected"] = RejectedJson(calibration);
+  out["frames_left_out"] = LeftOutJson(calibration);
+  out["next_measurement"] = NextMeasurementJson(calib::ProposeNext(sweep, calibration));
   out["seconds"] = NumberOrNull(calibration.summary.seconds);
   out["camera"] = PrintableUtf8(sweep.camera.name);
   out["assumed_fields"] = TextsJson(model::AssumedFields(sweep.camera));

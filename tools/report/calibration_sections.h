@@ -20,11 +20,11 @@ std::string VerdictSection(const calib::FocusSweep& sweep, const calib::Calibrat
 
 // The results with both kinds of error, and with the true errors if there is a truth.
 std::string ResultsSection(const std::vector<ResultRow>& rows, bool has_truth);
-// Each source of systematic error, largest first, with what would reduce it, and the tolerances
-// that are not stated. With a truth the camera's numbers are exact.
+// Each source of error, statistical or systematic, the largest first, with what would reduce it,
+// and the tolerances that are not stated. With a truth the camera's numbers are exact.
 std::string SystematicSection(const calib::FocusSweep& sweep, const calib::Calibration& calibration,
                               bool has_truth);
-// The in-focus distance by every other method that measures it.
+// The in-focus object distance by every other method that measures it.
 std::string OtherWaysSection(const calib::Calibration& calibration,
                              const std::vector<ResultRow>& rows);
 // Text on the field map and the colours, shown below the map.

@@ -8,6 +8,8 @@
 #include <filesystem>
 
 #include "thicklens/base/printable_text.h"
+#include "thicklens/calib/error_budget.h"
+#include "tools/report/calibration_answers.h"
 #include "tools/report/calibration_text.h"
 #include "tools/report/determined.h"
 #include "tools/report/grid_words.h"
@@ -18,7 +20,7 @@ namespace thicklens::tools {
 namespace {
 
 constexpr char kNotRun[] = "not run";
-constexpr std::size_t kReportedParts = 3;  // systematic parts in the text; the rest is in the JSON
+constexpr std::size_t kReportedTerms = 4;  // of the error in the text; the rest is in the JSON
 
 std::optional<std::string> ImageOf(const calib::Calibration& calibration, int index) {
   if (index < 0 || index >= static_cast<int>(calibration.frames.size())) return std::nullopt;
@@ -96,12 +98,16 @@ void AddLine(const char* about, const std::string& line, std::string* text) {
   if (!line.empty()) *text += fmt::format("{}: {}\n", about, PrintableUtf8(line));
 }
 
-std::string NormalisedSharpest(const calib::Calibration& calibration) {
-  const calib::SourceRecipe& source = calibration.diagnostics.paper_recipe;
-  const auto image = ImageOf(calibration, source.sharpest_normalised_frame);
-  if (!image || !(source.normalised_focus_depth_mm > 0)) return "";
-  return fmt::format("; over mean grey {}, at {:.5g} mm", FrameName(*image),
-                     source.normalised_focus_depth_mm);
+// The five answers, one line each, and an empty line behind them.
+std::string AnswersText(const calib::FocusSweep& sweep, const calib::Calibration& calibration) {
+  const CalibrationAnswers answers = AnswersOf(sweep, calibration);
+  std::string text;
+  AddLine("focus", answers.focus, &text);
+  AddLine("blur", answers.blur, &text);
+  AddLine("trust", answers.trust, &text);
+  AddLine("largest error", answers.error, &text);
+  AddLine("next", answers.next, &text);
+  return text + '\n';
 }
 
 std::string SecondaryLines(const calib::Calibration& calibration,
@@ -110,9 +116,9 @@ std::string SecondaryLines(const calib::Calibration& calibration,
   const calib::SourceRecipe& source = calibration.diagnostics.paper_recipe;
   text +=
       source.done
-          ? fmt::format("paper's recipe: sharpest frame {}, blur ratio from {} frames{}\n",
+          ? fmt::format("paper's recipe: zf is the depth of {}, blur ratio from {} frames\n",
                         FrameName(ImageOf(calibration, source.sharpest_frame).value_or("unknown")),
-                        source.ratio_frames, NormalisedSharpest(calibration))
+                        source.ratio_frames)
           : fmt::format("paper's recipe: none, {}\n", PrintableUtf8(source.message));
   for (const ResultRow& row : rows) {
     if (row.key != "focus_depth_mm") continue;
@@ -130,7 +136,6 @@ std::string SecondaryLines(const calib::Calibration& calibration,
     text += '\n';
   }
   AddLine("sharpest", SharpestLine(calibration), &text);
-  AddLine("focus", FocusReadingLine(calibration), &text);
   AddLine("bench offset", OffsetOriginLine(calibration), &text);
   const calib::ScaleModel& scale = calibration.diagnostics.scale;
   if (!scale.done) AddLine("image scale", ScaleChangeLine(scale), &text);
@@ -175,14 +180,11 @@ std::string DetailLines(const calib::FocusSweep& sweep, const calib::Calibration
   AddLine("colours", ChannelLine(calibration.diagnostics.channels), &text);
   AddLine("fixed to the frame", PatternLine(calibration.diagnostics.fixed_pattern), &text);
   AddLine("camera response", ResponseLine(calibration.diagnostics.response), &text);
-  const std::vector<calib::SystematicPart>& parts = calibration.diagnostics.systematic_parts;
-  for (std::size_t i = 0; i < std::min(parts.size(), kReportedParts); ++i)
-    AddLine("systematic",
-            fmt::format("{}: zf {} mm, d1 {} mm, kappa {}", parts[i].name,
-                        PartRange(parts[i].focus_depth_mm), PartRange(parts[i].image_distance_mm),
-                        PartRange(parts[i].blur_ratio)),
-            &text);
-  AddLine("advice", calibration.diagnostics.advice, &text);
+  const std::vector<calib::ErrorTerm> terms = calib::ErrorTerms(calibration);
+  for (std::size_t i = 0; i < std::min(terms.size(), kReportedTerms); ++i) {
+    const std::string errors = TermErrors(terms[i]);
+    if (!errors.empty()) AddLine("error", fmt::format("{}: {}", terms[i].name, errors), &text);
+  }
   if (calibration.summary.outcome == calib::Outcome::kRefused)
     for (const std::string& line : DiagnosisLines(calibration)) AddLine("compared", line, &text);
   return text;
@@ -201,7 +203,7 @@ std::vector<ResultRow> ResultRows(const calib::Calibration& calibration,
              {},
              {}};
   rows[1] = {"focus_depth_mm",
-             "in-focus distance zf",
+             "in-focus object distance zf",
              "mm",
              calibration.summary.focus_depth_mm,
              {},
@@ -238,23 +240,10 @@ std::string FrameName(const std::string& image) {
 std::string CalibrationText(const calib::FocusSweep& sweep, const calib::Calibration& calibration,
                             const model::SweepTruth* truth, const std::string& camera_file) {
   const std::vector<ResultRow> rows = ResultRows(calibration, truth);
-  const auto rejected =
-      std::count_if(calibration.frames.begin(), calibration.frames.end(),
-                    [](const calib::FrameMeasurement& frame) { return !frame.rejection.empty(); });
-  std::string text =
-      fmt::format("camera {}, {} frames: {} used, {} rejected\n", PrintableUtf8(sweep.camera.name),
-                  sweep.frames.size(), calibration.summary.frames_used, rejected);
-  const auto not_in_fit =
-      std::count_if(calibration.frames.begin(), calibration.frames.end(),
-                    [](const calib::FrameMeasurement& frame) { return !frame.not_in_fit.empty(); });
-  if (not_in_fit > 0) {
-    text += fmt::format("  {} more give no information about the blur: {}\n", not_in_fit,
-                        calibration.diagnostics.target.measured_as == "points"
-                            ? "too few of their points can be measured"
-                            : "too strongly blurred, or too different in scale, for the part of "
-                              "the target that all "
-                              "frames share");
-  }
+  std::string text = AnswersText(sweep, calibration);
+  text +=
+      fmt::format("camera {}, {}\n", PrintableUtf8(sweep.camera.name), FrameCountText(calibration));
+  for (const std::string& line : LeftOutLines(calibration)) text += fmt::format("  {}\n", line);
   text += RejectionLines(calibration.frames) + '\n';
   if (std::any_of(rows.begin(), rows.end(),
                   [](const ResultRow& row) { return row.fit || row.source || row.peak; }))

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "thicklens/base/printable_text.h"
+#include "thicklens/calib/error_budget.h"
 #include "tools/interface/missing_tolerances.h"
 #include "tools/report/calibration_sections.h"
 #include "tools/report/calibration_text.h"
@@ -42,6 +43,19 @@ std::string RowHead(const std::string& name) {
   return fmt::format("<tr><th scope=\"row\">{}</th>", EscapeXml(name));
 }
 
+// The ranges of zf, d1 and kappa that a cause of error makes.
+std::vector<std::string> RangesOf(const calib::ErrorTerm& term, const Calibration& calibration) {
+  for (const calib::SystematicPart& part : calibration.diagnostics.systematic_parts) {
+    if (!term.is_statistical && part.name == term.name)
+      return {PartRange(part.focus_depth_mm), PartRange(part.image_distance_mm),
+              PartRange(part.blur_ratio)};
+  }
+  std::vector<std::string> ranges;
+  for (const double half : {term.focus_depth_mm, term.image_distance_mm, term.blur_ratio})
+    ranges.push_back(PartRange({-half, half}));
+  return ranges;
+}
+
 std::string RowName(const ResultRow& row) {
   return RowHead(row.label + (row.unit.empty() ? "" : fmt::format(" [{}]", row.unit)));
 }
@@ -72,7 +86,7 @@ std::string ErrorsTable(const std::vector<ResultRow>& rows) {
   return html + kTableEnd;
 }
 
-// Another method for the in-focus distance.
+// Another method for the in-focus object distance.
 struct Way {
   std::string name;
   bool done = false;
@@ -97,18 +111,18 @@ Way SideWay(const std::string& name, const calib::SideFit& side) {
 std::vector<Way> OtherWays(const Calibration& calibration) {
   std::vector<Way> ways;
   const calib::SourceRecipe& source = calibration.diagnostics.paper_recipe;
-  Way raw{"sharpest frame, raw (paper's recipe)", source.done, source.message, {}, {}};
+  Way raw{"paper's recipe", source.done, source.message, {}, {}};
   if (source.done) {
-    raw.remark = fmt::format("{}; κ from {} frames",
+    raw.remark = fmt::format("depth of {}; κ from {} frames",
                              NameOfFrame(calibration, source.sharpest_frame), source.ratio_frames);
     raw.focus_depth_mm = model::Estimate{source.focus_depth_mm, 0};
     raw.blur_ratio = model::Estimate{source.blur_ratio, 0};
   }
   ways.push_back(raw);
   if (source.done && source.normalised_focus_depth_mm > 0)
-    ways.push_back({"sharpest frame, over mean grey",
+    ways.push_back({"paper's recipe, over mean grey",
                     true,
-                    NameOfFrame(calibration, source.sharpest_normalised_frame),
+                    "depth of " + NameOfFrame(calibration, source.sharpest_normalised_frame),
                     model::Estimate{source.normalised_focus_depth_mm, 0},
                     {}});
   const calib::SharpnessPeak& peak = calibration.diagnostics.sharpness;
@@ -216,22 +230,28 @@ std::string ResultsSection(const std::vector<ResultRow>& rows, bool has_truth) {
 
 std::string SystematicSection(const FocusSweep& sweep, const Calibration& calibration,
                               bool has_truth) {
-  if (calibration.diagnostics.systematic_parts.empty()) return "";
+  const std::vector<calib::ErrorTerm> terms = calib::ErrorTerms(calibration);
+  if (terms.empty()) return "";
   const std::string missing = has_truth ? "" : MissingTolerancesLine(sweep.camera);
+  double all = 0;
+  for (const calib::ErrorTerm& term : terms) all += term.effect;
   std::string html =
-      "<h2>Where the systematic error comes from</h2>\n" +
-      TableBegin(
-          {{"cause", false}, {"zf [mm]"}, {"d1 [mm]"}, {"κ"}, {"what would reduce it", false}});
-  for (const calib::SystematicPart& part : calibration.diagnostics.systematic_parts) {
-    html += RowHead(part.name);
-    for (const Eigen::Vector2d& range :
-         {part.focus_depth_mm, part.image_distance_mm, part.blur_ratio})
-      html += TableCell(Typeset(PartRange(range)));
-    html += TableCell(Typeset(part.remedy), "words") + "</tr>\n";
+      "<h2>Where the error comes from</h2>\n" + TableBegin({{"cause", false},
+                                                            {"share"},
+                                                            {"zf [mm]"},
+                                                            {"d1 [mm]"},
+                                                            {"κ"},
+                                                            {"what would reduce it", false}});
+  for (const calib::ErrorTerm& term : terms) {
+    html += RowHead(term.name) +
+            TableCell(all > 0 ? fmt::format("{:.0f} %", 100 * term.effect / all) : kNone);
+    for (const std::string& range : RangesOf(term, calibration)) html += TableCell(Typeset(range));
+    html += TableCell(Typeset(term.remedy), "words") + "</tr>\n";
   }
   return html + kTableEnd +
-         "<p class=\"soft\">Largest change of each result due to the cause, largest "
-         "first.</p>\n" +
+         "<p class=\"soft\">Change of each result due to the cause: the largest of a systematic "
+         "cause, 1.96 standard deviations of noise, readings and bench offset. The share compares "
+         "what the causes do to the blur at the ends of the sweep.</p>\n" +
          (missing.empty() ? "" : fmt::format("<p>{}</p>\n", EscapeXml(AsSentence(missing))));
 }
 

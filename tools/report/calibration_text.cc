@@ -138,11 +138,11 @@ std::string ShapeLine(const calib::FocusSweep& sweep, const calib::BlurFit& blur
       std::min(*blur.gaussian_misfit, *blur.disc_misfit) >= calib::kLargestMisfitOfShape;
   if (neither_fits) {
     return fmt::format(
-        "neither a Gaussian nor a disc fits the frames (chi2/dof {:.3g} and {:.3g}, 1 is expected)",
+        "neither a Gaussian nor a disc fits the frames (misfit {:.3g} and {:.3g}, 1 is expected)",
         *blur.gaussian_misfit, *blur.disc_misfit);
   }
   std::string line =
-      fmt::format("a {} describes the frames better than a {} (chi2/dof {:.3g} against {:.3g})",
+      fmt::format("a {} describes the frames better than a {} (misfit {:.3g} against {:.3g})",
                   disc ? "disc" : "Gaussian", disc ? "Gaussian" : "disc",
                   disc ? *blur.disc_misfit : *blur.gaussian_misfit,
                   disc ? *blur.gaussian_misfit : *blur.disc_misfit);
@@ -192,7 +192,7 @@ std::string OutcomeLine(const calib::Calibration& calibration, const std::string
 
 std::string WithNamesForKeys(std::string text) {
   for (const auto& [key, name] : {std::pair("image_distance_mm", "the image distance d1"),
-                                  std::pair("focus_depth_mm", "the in-focus distance zf"),
+                                  std::pair("focus_depth_mm", "the in-focus object distance zf"),
                                   std::pair("blur_ratio", "the blur ratio kappa"),
                                   std::pair("blur_floor_px", "the blur floor"),
                                   std::pair("bench_offset_mm", "the bench offset")}) {

@@ -18,10 +18,10 @@ std::string ScaleKindWords(calib::ScaleKind kind);
 
 // Tilt, curvature, astigmatism and depths of the field, one line each.
 std::vector<std::string> FieldLines(const calib::FieldMap& field);
-// The axial colour: each channel's in-focus distance.
+// The axial colour: each channel's in-focus object distance.
 std::string ChannelLine(const std::vector<calib::ChannelFocus>& channels);
-// In-focus distance of the far side minus that of the near side; nothing unless both sides are
-// done.
+// In-focus object distance of the far side minus that of the near side; nothing unless both sides
+// are done.
 std::optional<model::Estimate> SidesApartMm(const calib::Calibration& calibration);
 std::string SidesLine(const calib::Calibration& calibration);
 // The point spread function that fits the frames better, and whether the camera file agrees.

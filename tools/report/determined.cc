@@ -50,19 +50,6 @@ std::string SharpestLine(const calib::Calibration& calibration) {
       sharpest.frames_used, frame);
 }
 
-std::string FocusReadingLine(const calib::Calibration& calibration) {
-  if (!calibration.diagnostics.focus_reading_mm) return "";
-  std::string line = fmt::format(
-      "reading {}, from the blur, without the error of the bench offset",
-      WithError(calibration.diagnostics.focus_reading_mm->value,
-                calibration.diagnostics.focus_reading_mm->sigma, UnitOfReadings(calibration)));
-  if (const auto& slope = calibration.diagnostics.blur_slope_px_per_mm)
-    line +=
-        fmt::format("; the blur grows by {} per {}", WithError(slope->value, slope->sigma, "px"),
-                    calibration.diagnostics.step_length_mm ? "step" : "mm of reading");
-  return line;
-}
-
 std::string OffsetOriginLine(const calib::Calibration& calibration) {
   const calib::CalibrationDiagnostics& diagnostics = calibration.diagnostics;
   if (diagnostics.bench_offset_from.empty() ||

@@ -15,9 +15,6 @@ namespace thicklens::tools {
 
 // "reading 110.03 +- 0.11 mm, by 5 frames; frame_015.png is the sharpest", or why there is none.
 std::string SharpestLine(const calib::Calibration& calibration);
-// "reading 109.9984 +- 0.0004 mm, from the blur, without the error of the bench offset; the blur
-// grows by 5.25 +- 0.01 px per mm of reading"; empty if it was not measured.
-std::string FocusReadingLine(const calib::Calibration& calibration);
 // "by the image scale; magnification at focus 1.000 +- 0.017"; empty if nothing determines the
 // bench offset, or if the calibration is refused.
 std::string OffsetOriginLine(const calib::Calibration& calibration);

@@ -25,18 +25,19 @@ std::string HeadText(const model::Explanation& known) {
   };
   return fmt::format(
       "camera {}\n"
-      "image distance d1     {} mm\n"
-      "in-focus distance zf  {}\n"
-      "blur ratio kappa      {}\n"
-      "blur floor            {}\n{}\n",
+      "image distance d1            {} mm\n"
+      "in-focus object distance zf  {}\n"
+      "blur ratio kappa             {}\n"
+      "blur floor                   {}\n{}\n",
       PrintableUtf8(known.camera_name),
       with_sigma(known.image_distance_mm, known.image_distance_sigma_mm),
       DepthWithUnit(known.focus_depth_mm), with_sigma(known.blur_ratio, known.blur_ratio_sigma),
       known.blur_floor_px ? fmt::format("{:.4g} px", *known.blur_floor_px)
                           : "unknown, assumed to be 0 below",
-      known.distortion ? fmt::format("lens distortion       {}; images are undistorted first\n",
-                                     DistortionWords(*known.distortion))
-                       : "");
+      known.distortion
+          ? fmt::format("lens distortion              {}; images are undistorted first\n",
+                        DistortionWords(*known.distortion))
+          : "");
 }
 
 // The column of the thin lens is left out if the lens is thin: it would repeat the blur radius.

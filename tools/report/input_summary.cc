@@ -102,12 +102,14 @@ std::string CameraText(const model::Camera& camera) {
 std::string BenchText(const Sweep& sweep, const Understanding& found) {
   const auto depths = DepthRangeMm(sweep, found);
   return fmt::format(
-             "readings   {:.6g} to {:.6g} mm, {} distinct, step {:.4g} mm (median), sigma {:.3g} "
-             "mm\n"
+             "readings   {:.6g} to {:.6g} mm, {} distinct, step {:.4g} mm (median), {}\n"
              "bench      direction {}, offset {}\n"
              "depths     {}\n",
              found.min_reading_mm, found.max_reading_mm, found.distinct_readings,
-             found.median_step_mm, sweep.description.reading_sigma_mm,
+             found.median_step_mm,
+             sweep.description.reading_sigma_stated
+                 ? fmt::format("sigma {:.3g} mm", sweep.description.reading_sigma_mm)
+                 : std::string("sigma not stated"),
              model::BenchDirectionName(sweep.description.direction),
              EstimateText(sweep.description.offset_mm, "mm"),
              depths ? fmt::format("{:.6g} to {:.6g} mm from the aperture", depths->first,
@@ -193,7 +195,7 @@ std::string UnderstandingText(const Sweep& sweep, const Understanding& found,
                               const std::string& method, const std::string& outputs) {
   const model::RegionOfInterest& roi = sweep.description.roi;
   return fmt::format(
-      "frames     {}, the first {} x {} px, {} bit, {} channel{}\n{}{}{}"
+      "frames     {} (the first one has {} x {} px, {} bit, {} channel{})\n{}{}{}"
       "region     {}\n"
       "target     {}{}, blur floor {}\n"
       "method     {}\n"
@@ -215,33 +217,36 @@ std::string UnderstandingText(const Sweep& sweep, const Understanding& found,
 
 nlohmann::json UnderstandingJson(const Sweep& sweep, const Understanding& found,
                                  const std::string& method) {
-  nlohmann::json json = {{"status", "ok"},
-                         {"reason", ""},
-                         {"dry_run", true},
-                         {"method", method},
-                         {"camera", sweep.camera.name},
-                         {"frames", sweep.description.frames.size()},
-                         {"readings", PrintableUtf8(sweep.description.readings)},
-                         {"width_px", found.frame_size_px.width},
-                         {"height_px", found.frame_size_px.height},
-                         {"bits", found.frame_bits},
-                         {"channels", found.frame_channels},
-                         {"min_reading_mm", found.min_reading_mm},
-                         {"max_reading_mm", found.max_reading_mm},
-                         {"median_step_mm", found.median_step_mm},
-                         {"distinct_readings", found.distinct_readings},
-                         {"reading_sigma_mm", sweep.description.reading_sigma_mm},
-                         {"direction", model::BenchDirectionName(sweep.description.direction)},
-                         {"target", model::SweepTargetName(sweep.description.target)},
-                         {"raw", model::SweepRawName(sweep.description.raw)},
-                         {"correction", CorrectionJson(sweep)},
-                         {"distortion", DistortionJson(sweep.camera.distortion)},
-                         {"stated_focus", StatedFocusJson(sweep)},
-                         {"target_period_mm", nullptr},
-                         {"target_grid", nullptr},
-                         {"grid_views", sweep.description.grid_views.size()},
-                         {"offset_mm", nullptr},
-                         {"depth_range_mm", nullptr}};
+  nlohmann::json json = {
+      {"status", "ok"},
+      {"reason", ""},
+      {"dry_run", true},
+      {"method", method},
+      {"camera", sweep.camera.name},
+      {"frames", sweep.description.frames.size()},
+      {"readings", PrintableUtf8(sweep.description.readings)},
+      {"width_px", found.frame_size_px.width},
+      {"height_px", found.frame_size_px.height},
+      {"bits", found.frame_bits},
+      {"channels", found.frame_channels},
+      {"min_reading_mm", found.min_reading_mm},
+      {"max_reading_mm", found.max_reading_mm},
+      {"median_step_mm", found.median_step_mm},
+      {"distinct_readings", found.distinct_readings},
+      {"reading_sigma_mm", sweep.description.reading_sigma_stated
+                               ? nlohmann::json(sweep.description.reading_sigma_mm)
+                               : nlohmann::json(nullptr)},
+      {"direction", model::BenchDirectionName(sweep.description.direction)},
+      {"target", model::SweepTargetName(sweep.description.target)},
+      {"raw", model::SweepRawName(sweep.description.raw)},
+      {"correction", CorrectionJson(sweep)},
+      {"distortion", DistortionJson(sweep.camera.distortion)},
+      {"stated_focus", StatedFocusJson(sweep)},
+      {"target_period_mm", nullptr},
+      {"target_grid", nullptr},
+      {"grid_views", sweep.description.grid_views.size()},
+      {"offset_mm", nullptr},
+      {"depth_range_mm", nullptr}};
   if (sweep.description.offset_mm) {
     json["offset_mm"] = {{"value", sweep.description.offset_mm->value},
                          {"sigma", sweep.description.offset_mm->sigma}};

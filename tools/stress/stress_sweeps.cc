@@ -95,9 +95,42 @@ StressRun CalibrationOf(Requirement required) {
   return run;
 }
 
+namespace {
+
+// Throws Error unless the largest term of the error, the advice and the measurement that is
+// proposed are about the same thing.
+void RequireAdviceAgrees(const nlohmann::json& summary) {
+  const nlohmann::json& terms = summary.at("error_terms");
+  if (terms.empty()) return;
+  const auto has_remedy = [](const nlohmann::json& term) {
+    return term.at("effect").get<double>() > 0 &&
+           term.at("remedy").get<std::string>().rfind("no remedy", 0) != 0;
+  };
+  const std::string advice = summary.at("advice").is_null() ? "" : summary.at("advice");
+  const std::string largest = terms.front().at("name");
+  const auto chosen = std::find_if(terms.begin(), terms.end(), has_remedy);
+  const nlohmann::json& next = summary.at("next_measurement");
+  if (chosen == terms.end() && next.is_null()) return;
+  for (std::size_t i = 1; i < terms.size(); ++i) {
+    if (terms[i].at("effect") > terms[i - 1].at("effect"))
+      throw Error("the terms of the error are not in their order: " + terms.dump());
+  }
+  if (chosen == terms.end() || next.is_null() || next.at("term") != chosen->at("name") ||
+      next.at("larger_term") !=
+          (chosen == terms.begin() ? nlohmann::json(nullptr) : nlohmann::json(largest)))
+    throw Error("next_measurement is not about the largest term of the error: " + next.dump());
+  if (advice.find(largest) == std::string::npos ||
+      advice.find(chosen->at("name").get<std::string>()) == std::string::npos)
+    throw Error(
+        fmt::format("the largest term of the error is '{}', the advice is '{}'", largest, advice));
+}
+
+}  // namespace
+
 Requirement FindsTruth(const model::SweepTruth& truth, double most_um) {
   return Solved(
       [=](const fs::path&, const nlohmann::json& summary) {
+        RequireAdviceAgrees(summary);
         const double off =
             std::max({OffInSigmas(summary, "image_distance_mm", truth.image_distance_mm),
                       OffInSigmas(summary, "focus_depth_mm", truth.focus_depth_mm),
@@ -115,6 +148,7 @@ Requirement FindsTruth(const model::SweepTruth& truth, double most_um) {
 Requirement Warned(const std::vector<std::string>& words) {
   return Solved(
       [words](const fs::path&, const nlohmann::json& summary) {
+        RequireAdviceAgrees(summary);
         for (const nlohmann::json& warning : summary.at("warnings")) {
           const std::string text = warning.get<std::string>();
           if (std::all_of(words.begin(), words.end(), [&](const std::string& word) {

@@ -39,7 +39,10 @@ constexpr auto kLastMessage = std::chrono::milliseconds(200);
 CancelToken program_token;
 std::atomic<int> signal_count{0};
 std::atomic<bool> is_watched{false};
-sem_t arrived;                       // counts the signals for the thread
+sem_t arrived;  // counts the signals for the thread
+// Whether the first SIGINT asks a command to finish with what it has.
+enum class FinishState { kOff, kArmed, kAsked };
+std::atomic<FinishState> finish_state{FinishState::kOff};
 std::atomic<int> end_code{kNobody};  // set by the thread that ends the process
 std::timed_mutex words_mutex;        // protects the following variables
 std::function<std::string()> last_words;
@@ -48,6 +51,8 @@ std::function<std::string()> last_words;
 void TakeSignal(int signal) {
   // The system repeats this warning by itself: a repetition is not a second request.
   if (signal == SIGXCPU && program_token.IsCancelled()) return;
+  FinishState armed = FinishState::kArmed;
+  if (signal == SIGINT && finish_state.compare_exchange_strong(armed, FinishState::kAsked)) return;
   const int saved = errno;
   program_token.Cancel();
   const int count = signal_count.fetch_add(1) + 1;
@@ -176,6 +181,10 @@ void BeginEnd(int exit_code) {
   if (end_code.compare_exchange_strong(nobody, exit_code)) return;
   for (;;) ::pause();
 }
+
+FinishOnInterrupt::FinishOnInterrupt() { finish_state = FinishState::kArmed; }
+FinishOnInterrupt::~FinishOnInterrupt() { finish_state = FinishState::kOff; }
+bool FinishOnInterrupt::IsAsked() const { return finish_state == FinishState::kAsked; }
 
 LastWords::LastWords(std::function<std::string()> words) {
   const std::lock_guard<std::timed_mutex> lock(words_mutex);

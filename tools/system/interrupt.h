@@ -36,6 +36,20 @@ std::string InterruptedText(const std::vector<std::string>& outputs_in_place);
 // thread has already started to end the process.
 void BeginEnd(int exit_code);
 
+// While an object of this class exists, the first SIGINT does not end the program: it asks the
+// command to finish with what it has. The next one ends the program as usual. Only one object may
+// exist at a time.
+class FinishOnInterrupt {
+ public:
+  FinishOnInterrupt();
+  ~FinishOnInterrupt();
+  FinishOnInterrupt(const FinishOnInterrupt&) = delete;
+  FinishOnInterrupt& operator=(const FinishOnInterrupt&) = delete;
+
+  // Whether SIGINT has arrived.
+  bool IsAsked() const;
+};
+
 // While an object of this class exists, the thread prints the returned words (one line; empty:
 // none) as a warning when it ends the process. Only one object may exist at a time. The function is
 // called from that thread.

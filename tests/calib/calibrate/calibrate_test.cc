@@ -226,7 +226,7 @@ TEST(Calibrate, AWrongFocalLengthIsRefusedAsUnphysical) {
   ExpectRefused(Calibrated(s), "which no lens has");
 }
 
-// With several threads, the others go on with their frames until the exception has been noted, for
+// Other threads go on with their frames until the exception has been noted, for
 // as long as the machine lets the throwing thread wait.
 TEST(Calibrate, StopsWhenProgressThrows) {
   const SimulatedSweep s = Good();

@@ -148,7 +148,7 @@ TEST(SolveFocus, AFocusThatTheBlurDoesNotFixIsRefused) {
   // If the blur ratio is even less certain, it is the stated reason.
   EXPECT_EQ(c.calibration.summary.outcome, Outcome::kRefused);
   EXPECT_THAT(c.calibration.summary.reason,
-              AnyOf(HasSubstr("the blur does not determine the in-focus distance"),
+              AnyOf(HasSubstr("the blur does not determine the in-focus object distance"),
                     HasSubstr("the blur does not change over the sweep")));
   EXPECT_FALSE(c.calibration.diagnostics.focus_reading_mm) << "it is not determined";
 }

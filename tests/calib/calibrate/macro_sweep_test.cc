@@ -153,7 +153,7 @@ TEST(MacroSweep, TheMorePreciseOfScaleAndStatementIsUsed) {
   EXPECT_EQ(c.diagnostics.bench_offset_from, "offset_mm");
   EXPECT_NEAR(c.summary.focus_depth_mm->value, 200, 0.1);
   EXPECT_THAT(c.summary.warnings,
-              Contains(AllOf(StartsWith("focus_depth_mm puts the in-focus distance at 205"),
+              Contains(AllOf(StartsWith("focus_depth_mm puts the in-focus object distance at 205"),
                              HasSubstr("+5 mm from that by offset_mm"))));
   EXPECT_GT(c.summary.focus_depth_mm->systematic->y(), 204.9);
   EXPECT_GT(c.summary.focus_depth_mm->systematic->x(), 199) << "nothing lies on the other side";
@@ -170,7 +170,7 @@ TEST(MacroSweep, AStatementThatTheImageScaleContradictsGivesAWarning) {
   ASSERT_NE(c.summary.outcome, Outcome::kRefused) << c.summary.reason;
   EXPECT_NEAR(c.summary.focus_depth_mm->value, 100 + 100 / 0.85, 1e-3);
   EXPECT_THAT(c.summary.warnings,
-              Contains(AllOf(StartsWith("the image scale puts the in-focus distance at"),
+              Contains(AllOf(StartsWith("the image scale puts the in-focus object distance at"),
                              HasSubstr("from that by magnification (217.65"),
                              HasSubstr("entrance pupil"))));
   EXPECT_LT(c.summary.focus_depth_mm->systematic->x(), 204) << "the interval includes both";
@@ -179,7 +179,7 @@ TEST(MacroSweep, AStatementThatTheImageScaleContradictsGivesAWarning) {
   c = CalibrateWithoutMap(sweep);
   ASSERT_EQ(c.summary.outcome, Outcome::kRefused);
   EXPECT_THAT(c.summary.reason,
-              AllOf(StartsWith("the image scale puts the in-focus distance at"),
+              AllOf(StartsWith("the image scale puts the in-focus object distance at"),
                     HasSubstr("from that by magnification (300 "),
                     HasSubstr("; the immediate reason is: the blur ratio would have to be"),
                     HasSubstr("which no lens has")));
@@ -191,7 +191,7 @@ TEST(MacroSweep, AStatementThatTheImageScaleContradictsGivesAWarning) {
       {model::ConjugateKind::kFocusDepth, {200, 0.1}, "focus_depth_mm"});
   c = CalibrateWithoutMap(sweep);
   ASSERT_EQ(c.summary.outcome, Outcome::kRefused);
-  EXPECT_THAT(c.summary.reason, StartsWith("focus_depth_mm puts the in-focus distance at 200 "));
+  EXPECT_THAT(c.summary.reason, StartsWith("focus_depth_mm puts the in-focus object distance at 200 "));
 }
 
 // A rough bench offset beside a more precise statement only has to agree with it.
@@ -207,7 +207,7 @@ TEST(MacroSweep, ARoughOffsetOnlyHasToAgree) {
   sweep.sweep.offset_mm = model::Estimate{180, 15};
   c = CalibrateWithoutMap(sweep);
   EXPECT_EQ(c.diagnostics.bench_offset_from, "magnification");
-  EXPECT_THAT(c.summary.warnings, Contains(StartsWith("offset_mm puts the in-focus distance")));
+  EXPECT_THAT(c.summary.warnings, Contains(StartsWith("offset_mm puts the in-focus object distance")));
   // The image scale takes its place only if it is much more precise.
   sweep.sweep.stated_focus.clear();
   sweep.sweep.offset_mm = model::Estimate{112, 15};

@@ -95,7 +95,9 @@ TEST(Contradiction, ADiscThatIsStatedToBeAGaussianIsReported) {
     const Calibration c = CalibrateWithoutMap(s);
     ASSERT_TRUE(c.summary.blur_ratio) << c.summary.reason;
     ExpectCovers(c, s.truth);
-    EXPECT_EQ(c.diagnostics.advice, "state psf: disc in the camera file: this shape fits better");
+    EXPECT_THAT(c.diagnostics.advice,
+                HasSubstr("due to the shape of the blur: state psf: disc in the "
+                          "camera file: this shape fits better"));
     EXPECT_THAT(c.summary.warnings, Contains(HasSubstr("the blur is a disc, not the gaussian")));
   }
 }

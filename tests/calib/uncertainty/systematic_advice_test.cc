@@ -120,16 +120,15 @@ TEST(WidenFocus, TheAdviceNamesTheLargestShare) {
   };
   // WidenFocus itself adds 2.131e-6 mm.
   const Case cases[] = {
-      {0.001, 0.004, 0.3, "50 % of the error of d1 is due to the second: fix second"},
-      {0.004, 0.001, 0.3, "50 % of the error of d1 is due to the first: fix first"},
-      {0.001, 0.001, 0.3, "34 % of the error of d1 is due to noise and readings: take more frames"},
-      {0.0016, 0.001, 0.3, "30 % of the error of d1 is due to noise and readings"},
-      {0.0017, 0.001, 0.3, "30 % of the error of d1 is due to the first"},
-      {0.0014, 0.001, 0.4,
-       "31 % of the error of d1 is due to the bench offset: state the magnification"},
-      {0.0018, 0.001, 0.4, "31 % of the error of d1 is due to the first"},
+      {0.001, 0.004, 0.3, "50 % of the error is due to the second: fix second"},
+      {0.004, 0.001, 0.3, "50 % of the error is due to the first: fix first"},
+      {0.001, 0.001, 0.3, "34 % of the error is due to noise and readings: take more frames"},
+      {0.0016, 0.001, 0.3, "30 % of the error is due to noise and readings"},
+      {0.0017, 0.001, 0.3, "30 % of the error is due to the first"},
+      {0.0014, 0.001, 0.4, "31 % of the error is due to the bench offset: state the magnification"},
+      {0.0018, 0.001, 0.4, "31 % of the error is due to the first"},
       // The share of the zero is not larger than the whole error of zf.
-      {0.001, 0.001, 7, "51 % of the error of d1 is due to the bench offset"},
+      {0.001, 0.001, 7, "51 % of the error is due to the bench offset"},
   };
   const model::ThickLens lens = BlurBench().lens;
   Calibration stated = Plain(400, 0.5, 7, lens);
@@ -164,7 +163,7 @@ TEST(WidenFocus, WithoutAZeroItHasNoShare) {
   without.summary.bench_offset_mm.reset();
   for (Calibration* each : {&c, &without}) WidenFocus("a hair", 0.001, "nothing", lens, each);
   EXPECT_THAT(without.diagnostics.advice,
-              StartsWith("100 % of the error of d1 is due to noise and readings"));
+              StartsWith("100 % of the error is due to noise and readings"));
   EXPECT_EQ(without.diagnostics.advice, c.diagnostics.advice);
 }
 

@@ -302,7 +302,7 @@ TEST(AddSystematicParts, AShapeIsAdvisedOnlyWhereItFitsAndTheStatedOneFitsMarked
     const char* remedy;
   };
   const Case cases[] = {
-      {46, 45.8, 0, "neither blur shape fits the frames (chi2/dof 46 for gaussian, 45.8 for disc)"},
+      {46, 45.8, 0, "neither blur shape fits the frames (misfit 46 for gaussian, 45.8 for disc"},
       {46, 40, 1000, "neither blur shape fits"},  // better beyond doubt, and still bad
       {1.3, 1.0, 1000, "state psf: disc"},
       {1.02, 1.0, 1000, "state psf: disc"},  // 20 in chi^2

@@ -421,6 +421,19 @@ void ExpectSame(const std::optional<Estimate>& a, const std::optional<Estimate>&
   EXPECT_TRUE(SameBits(a->sigma, b->sigma)) << a->sigma << " " << b->sigma;
 }
 
+// A reader sees the calibration first, and the list of rejected frames last of it.
+TEST(CameraToYaml, BeginsWithTheCalibration) {
+  const std::string text = CameraToYaml(FullCamera());
+  const std::size_t calibration = text.find("\ncalibration:");
+  ASSERT_NE(calibration, std::string::npos);
+  EXPECT_LT(calibration, text.find("\nlens:"));
+  const std::size_t rejected = text.find("frames_rejected:");
+  ASSERT_NE(rejected, std::string::npos);
+  for (const char* earlier : {"chi2_per_dof:", "data_sha256:", "date:"})
+    EXPECT_LT(text.find(earlier), rejected) << earlier;
+  EXPECT_LT(rejected, text.find("\nlens:"));
+}
+
 TEST(CameraToYaml, CalibrationComesBackWhole) {
   const Camera camera = FullCamera();
   const Camera back = ParseCamera(CameraToYaml(camera), "c.yaml");

@@ -51,6 +51,16 @@ class PicamSweep : public ::testing::Test {
     }
     // The peak of the sharpness is shifted to the near side; it shows roughly where the focus is.
     EXPECT_NEAR(others.at("sharpness_peak").at("focus_depth_mm").at("value").get<double>(), 54, 8);
+    // Every frame is used, rejected or left out.
+    EXPECT_EQ(result.at("frames_used").get<std::size_t>() + result.at("frames_rejected").size() +
+                  result.at("frames_left_out").size(),
+              result.at("frames").size());
+    // The advice is about the largest term of the error.
+    const auto& terms = result.at("error_terms");
+    ASSERT_FALSE(terms.empty());
+    EXPECT_THAT(result.at("advice").get<std::string>(),
+                ::testing::HasSubstr(terms[0].at("name").get<std::string>()));
+    EXPECT_EQ(result.at("next_measurement").at("term"), terms[0].at("name"));
     // Below -95 mm the lens rests on the bed.
     std::vector<std::string> rejected;
     for (const auto& frame : result.at("frames_rejected"))

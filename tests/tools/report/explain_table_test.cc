@@ -45,7 +45,7 @@ TEST(ExplanationText, SaysUpToWhichDepthThinIsAsGoodAsThick) {
 
 TEST(ExplanationText, NamesTheDepthOfFieldAndTheInFocusDistance) {
   const std::string near = ExplanationText(model::ExplainCamera(ExplainedCamera(), {500, 2000}, 2));
-  EXPECT_THAT(near, HasSubstr("in-focus distance zf  1000 mm\n"));
+  EXPECT_THAT(near, HasSubstr("in-focus object distance zf  1000 mm\n"));
   EXPECT_THAT(near, HasSubstr("depth of field (blur radius up to 1.0 px): from "));
   model::Explanation known = model::ExplainCamera(ExplainedCamera(), {500, 2000}, 2);
   known.depth_of_field = {{0.5, 299.1, kInfinity}};

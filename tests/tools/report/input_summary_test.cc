@@ -42,6 +42,17 @@ TEST(UnderstandingText, ShowsNoFocusThatIsNotStated) {
   EXPECT_TRUE(summary.Json().at("target_period_mm").is_null());
 }
 
+// A sigma of 0 would claim readings without an error, and "the first 400 x 400 px" a crop.
+TEST(UnderstandingText, ClaimsNoSigmaThatIsNotStated) {
+  SummaryCase summary;
+  EXPECT_THAT(summary.Text(), HasSubstr("(median), sigma not stated\n"));
+  EXPECT_THAT(summary.Text(), HasSubstr("(the first one has "));
+  EXPECT_TRUE(summary.Json().at("reading_sigma_mm").is_null());
+  summary.sweep.description.reading_sigma_mm = 0.05;
+  summary.sweep.description.reading_sigma_stated = true;
+  EXPECT_THAT(summary.Text(), HasSubstr("(median), sigma 0.05 mm\n"));
+}
+
 TEST(UnderstandingText, ShowsWhatIsStatedOfTheFocusAndTheDepthThatFollows) {
   SummaryCase summary;
   summary.sweep.camera.aperture_behind_front_mm = 20;

@@ -26,5 +26,6 @@
 #include "thicklens/sweep.h"        // IWYU pragma: export
 #include "thicklens/verify.h"       // IWYU pragma: export
 #include "thicklens/version.h"      // IWYU pragma: export
+#include "thicklens/watch.h"        // IWYU pragma: export
 
 #endif  // THICKLENS_THICKLENS_H_

@@ -181,17 +181,17 @@ struct FieldTile {
   model::Estimate focus_depth_mm;   // zf of the tile, from Ap
   int cluster = 0;                  // index into FieldMap::clusters
 };
-// Tiles whose in-focus distances agree: a part of the target at one depth.
+// Tiles whose in-focus object distances agree: a part of the target at one depth.
 struct DepthCluster {
   model::Estimate focus_depth_mm;  // weighted mean of the tiles, from Ap
   int tiles = 0;                   // number of tiles
 };
-// In-focus distance and blur ratio of the blur along one axis of the image.
+// In-focus object distance and blur ratio of the blur along one axis of the image.
 struct AxisFocus {
   model::Estimate focus_depth_mm;  // zf from Ap, without the error of the bench offset
   model::Estimate blur_ratio;      // kappa, dimensionless
 };
-// In-focus distance over the field of view.
+// In-focus object distance over the field of view.
 struct FieldMap {
   bool done = false;                // true if enough tiles were fitted
   std::string message = "not run";  // how it ended; without a result, the reason
@@ -272,7 +272,10 @@ struct CalibrationSummary {
   // In the blur fit, or, before the fit, the frames that passed the quality checks.
   int frames_used = 0;
   int frames_rejected = 0;  // frames that failed a check
-  double seconds = 0;       // time of the calibration
+  // Frames that passed the checks and are not in the blur fit. With those that are used and those
+  // that were rejected they are all frames of the sweep.
+  int frames_left_out = 0;
+  double seconds = 0;  // time of the calibration
 
   // One line: outcome, d1, zf and kappa with their sigmas, frames, time.
   THICKLENS_EXPORT std::string BriefReport() const;
@@ -321,15 +324,16 @@ struct CalibrationDiagnostics {
 
   TargetFinding target;                // what was measured on the target, and its depths
   SourceRecipe paper_recipe;           // the paper's method, for comparison
-  SharpnessPeak sharpness;             // in-focus distance by sharpness alone
+  SharpnessPeak sharpness;             // in-focus object distance by sharpness alone
   ScaleModel scale;                    // the bench offset from the image scale
   BlurFit blur;                        // the fit behind the results
   SideFit nearer, farther;             // fits of the frames on each side of focus
   FieldMap field;                      // focus over the field
   std::vector<ChannelFocus> channels;  // of colour frames
   std::optional<MagnificationCheck> magnification;  // present if the target's period is stated
-  std::vector<SystematicPart> systematic_parts;     // sorted by their part of d1, the largest first
-  std::string advice;                               // how to shrink the largest error, and to what
+  // In the order of ErrorTerms (thicklens/calib/error_budget.h), the largest first.
+  std::vector<SystematicPart> systematic_parts;
+  std::string advice;  // the largest term of the error, and how to make it smaller
 };
 
 // Everything that a calibration found.
