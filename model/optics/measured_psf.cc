@@ -10,7 +10,7 @@
 namespace thicklens::model {
 namespace {
 
-constexpr Eigen::Index kLeastSide = 3, kLargestSide = 255;
+constexpr Eigen::Index kMinSide = 3, kMaxSide = 255;
 constexpr double kSumTolerance = 1e-6;
 constexpr double kOffCentre = 0.05;  // of sigma
 
@@ -50,9 +50,9 @@ bool MeasuredPsf::IsValid(std::string* why) const {
     return Fail(why, fmt::format("light has {} rows of {} numbers: it must be square", light.rows(),
                                  light.cols()));
   }
-  if (light.rows() < kLeastSide || light.rows() > kLargestSide || light.rows() % 2 == 0) {
+  if (light.rows() < kMinSide || light.rows() > kMaxSide || light.rows() % 2 == 0) {
     return Fail(why, fmt::format("light has {} rows: an odd number from {} to {} is expected",
-                                 light.rows(), kLeastSide, kLargestSide));
+                                 light.rows(), kMinSide, kMaxSide));
   }
   if (!(step > 0) || !std::isfinite(step))
     return Fail(why, fmt::format("step is {}: it must be finite and > 0", step));

@@ -13,13 +13,13 @@ namespace thicklens::model {
 namespace {
 
 constexpr char kPsfSchema[] = "thicklens/psf/1";
-constexpr std::size_t kMostRows = 255;
+constexpr std::size_t kMaxRows = 255;
 
 Eigen::ArrayXXd ReadRows(const YamlNode& node) {
   const std::vector<YamlNode> rows = node.Elements();
-  if (rows.empty() || rows.size() > kMostRows) {
+  if (rows.empty() || rows.size() > kMaxRows) {
     throw node.ErrorHere(fmt::format("found {} rows: an odd number from 3 to {} is expected",
-                                     rows.size(), kMostRows));
+                                     rows.size(), kMaxRows));
   }
   const auto side = static_cast<Eigen::Index>(rows.size());
   Eigen::ArrayXXd values(side, side);

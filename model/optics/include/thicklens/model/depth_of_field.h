@@ -34,7 +34,8 @@ struct FocusLimits {
   // The plane of focus, from Ap, whose far limit just reaches infinity, mm; its near limit is half
   // of it. It depends on the lens and the circle alone.
   double hyperfocal_mm = 0;
-  // By the stated tolerances of the focal length and of the aperture radius; 0: none is stated.
+  // Its change by the stated tolerances of the focal length and of the aperture radius; 0: none is
+  // stated.
   double hyperfocal_tolerance_mm = 0;
   // Sigma per axis of the blur of a point at a limit, kappa c/(2 p), without the blur floor, px.
   Estimate blur_sigma_px;
