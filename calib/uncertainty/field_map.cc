@@ -108,9 +108,13 @@ class Field {
     return {std::move(fitted.region), MeanOfAxes(fitted.blur)};
   }
 
-  // Returns zf of one region, with the corrected readings and the fitted floor.
-  std::optional<model::Estimate> FocusOf(const EstimatorRegion& region,
-                                         std::string* message) const {
+  // The in-focus distance and the blur ratio of one region.
+  struct RegionFocus {
+    model::Estimate focus_depth_mm, blur_ratio;
+  };
+
+  // Returns zf and kappa of one region, with the corrected readings and the fitted floor.
+  std::optional<RegionFocus> FocusOf(const EstimatorRegion& region, std::string* message) const {
     if (region.frames.size() < 5 || region.modes.size() < 8) {
       *message = "it has too little texture, or too few frames show it";
       return std::nullopt;
@@ -132,8 +136,11 @@ class Field {
     const BlurFitResult fit = FitBlur(setup);
     *message = fit.message;
     if (!fit.done) return std::nullopt;
-    return model::Estimate{fit.values[kFocusDepth],
-                           std::sqrt(fit.covariance(kFocusDepth, kFocusDepth))};
+    const auto estimate = [&fit](BlurParameter parameter) {
+      return model::Estimate{fit.values[parameter],
+                             std::sqrt(fit.covariance(parameter, parameter))};
+    };
+    return RegionFocus{estimate(kFocusDepth), estimate(kBlurRatio)};
   }
 
   void MapTiles() {
@@ -170,7 +177,8 @@ class Field {
       FieldTile& tile = map.tiles[tile_of[index]];
       if (const auto focus = FocusOf(regions[index], &tile.message)) {
         tile.done = true;
-        tile.focus_depth_mm = *focus;
+        tile.focus_depth_mm = focus->focus_depth_mm;
+        tile.blur_ratio = focus->blur_ratio;
       }
     });
     std::vector<std::size_t> fitted;
@@ -327,7 +335,8 @@ class Field {
         MeasureRegions(setup_, &regions);
         if (const auto found = FocusOf(regions[0], &focus.message)) {
           focus.done = true;
-          focus.focus_depth_mm = *found;
+          focus.focus_depth_mm = found->focus_depth_mm;
+          focus.blur_ratio = found->blur_ratio;
         }
       }
       result_.diagnostics.channels.push_back(focus);

@@ -5,12 +5,16 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <memory>
+#include <utility>
 
 #include "model/schema/former_blur_ratio.h"
 #include "model/schema/yaml_fields.h"
 #include "model/schema/yaml_writer.h"
 #include "thicklens/base/input_file.h"
 #include "thicklens/base/yaml_reader.h"
+#include "thicklens/model/measured_psf.h"
+#include "thicklens/model/psf_file.h"
 
 namespace thicklens::model {
 namespace {
@@ -39,6 +43,7 @@ constexpr const char* kDataOfObjective[] = {"magnification", "numerical_aperture
                                             "tube_lens_focal_length_mm"};
 constexpr char kApertureBehindFront[] = "aperture_behind_front_mm";
 constexpr char kDistortion[] = "distortion";
+constexpr char kMeasuredPsf[] = "measured", kPsfFile[] = "psf_file", kPsfLike[] = "psf_like";
 
 // Returns the first of the keys that the map has; empty: it has none.
 template <std::size_t kCount>
@@ -247,6 +252,29 @@ CameraCalibration ReadCalibration(const YamlNode& node) {
   return calibration;
 }
 
+// `psf: measured` has its shape in `psf_file`, and in `psf_like` the one of the two shapes that
+// stands for it in closed forms.
+void ReadPsfOf(const YamlNode& root, Camera* camera) {
+  const auto psf = root.Find("psf");
+  const std::string shape =
+      psf ? psf->OneOf({"gaussian", "disc", kMeasuredPsf}) : PsfName(Psf::kGaussian);
+  const auto file = root.Find(kPsfFile), like = root.Find(kPsfLike);
+  if (shape == kMeasuredPsf) {
+    const YamlNode path = root.At(kPsfFile);
+    MeasuredPsf measured = ReadPsf(path.ResolvePath(path.Text()));
+    measured.file = path.Text();
+    camera->measured_psf = std::make_shared<const MeasuredPsf>(std::move(measured));
+    camera->psf =
+        like && like->OneOf({"gaussian", "disc"}) == "gaussian" ? Psf::kGaussian : Psf::kDisc;
+    return;
+  }
+  if (file || like) {
+    throw(file ? *file : *like)
+        .ErrorHere(fmt::format("psf is {}: this key is for psf: {}", shape, kMeasuredPsf));
+  }
+  camera->psf = shape == "disc" ? Psf::kDisc : Psf::kGaussian;
+}
+
 class CameraWriter {
  public:
   explicit CameraWriter(const Camera& camera) : camera_(camera) {}
@@ -257,7 +285,7 @@ class CameraWriter {
     if (camera_.calibration) WriteCalibration(*camera_.calibration);
     WriteLens();
     WriteSensor();
-    out_.Text("psf", PsfName(camera_.psf));
+    WritePsf();
     return out_.Finish();
   }
 
@@ -265,6 +293,17 @@ class CameraWriter {
   const Provenance* StatementOf(const std::string& field) const {
     const auto statement = camera_.statements.find(field);
     return statement == camera_.statements.end() ? nullptr : &statement->second;
+  }
+
+  // A measured PSF that has no file cannot be named; its shape is then the one that stands for it.
+  void WritePsf() {
+    if (camera_.measured_psf == nullptr || camera_.measured_psf->file.empty()) {
+      out_.Text("psf", PsfName(camera_.psf));
+      return;
+    }
+    out_.Text("psf", kMeasuredPsf);
+    out_.Text(kPsfFile, camera_.measured_psf->file);
+    out_.Text(kPsfLike, PsfName(camera_.psf));
   }
 
   // Writes the entries of the map {value: .., tolerance: .., assumed: ..} that is open, and ends
@@ -447,14 +486,13 @@ Camera ParseCamera(const std::string& text, const std::string& source_name) {
   const YamlNode root = YamlNode::Parse(text, source_name);
   const bool is_former = root.HasSchema(kFormerSchema);
   if (!is_former) root.RequireSchema(kSchema);
-  root.RequireKeys({"schema", "name", "lens", "sensor", "psf", "calibration"});
+  root.RequireKeys(
+      {"schema", "name", "lens", "sensor", "psf", "psf_file", "psf_like", "calibration"});
   Camera camera;
   camera.name = root.At("name").Text();
   ReadLens(root.At("lens"), &camera);
   ReadSensor(root.At("sensor"), &camera);
-  if (const auto psf = root.Find("psf")) {
-    camera.psf = psf->OneOf({"gaussian", "disc"}) == "disc" ? Psf::kDisc : Psf::kGaussian;
-  }
+  ReadPsfOf(root, &camera);
   if (const auto calibration = root.Find("calibration"))
     camera.calibration = ReadCalibration(*calibration);
   // Each number was already checked at its place. The remaining check compares the image distance
@@ -484,5 +522,10 @@ Camera ReadCamera(const std::string& path) {
 }
 
 std::string CameraToYaml(const Camera& camera) { return CameraWriter(camera).Write(); }
+
+Camera WithoutMeasuredPsf(Camera camera) {
+  camera.measured_psf.reset();
+  return camera;
+}
 
 }  // namespace thicklens::model

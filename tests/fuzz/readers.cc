@@ -17,6 +17,7 @@
 #include "thicklens/io/video_file.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/light_field_file.h"
+#include "thicklens/model/psf_file.h"
 #include "thicklens/model/readings.h"
 #include "thicklens/model/scene_simulator.h"
 #include "thicklens/model/sweep_file.h"
@@ -97,6 +98,7 @@ const std::vector<FuzzedReader>& FuzzedReaders() {
   static const std::vector<FuzzedReader> readers = {
       OfFile("camera-yaml", "camera.yaml",
              [](const std::string& path) { model::ReadCamera(path); }),
+      OfFile("psf-yaml", "psf.yaml", [](const std::string& path) { model::ReadPsf(path); }),
       OfFile("sweep-yaml", "sweep.yaml",
              [](const std::string& path) {
                std::vector<std::string> notices;

@@ -25,6 +25,8 @@
 #include "thicklens/sweep.h"
 #include "tools/commands/calibrate_watch.h"
 #include "tools/commands/commands.h"
+#include "tools/commands/sweep_outputs.h"
+#include "tools/options/circle_option.h"
 #include "tools/options/command_frame.h"
 #include "tools/options/deprecated_names.h"
 #include "tools/options/interface_options.h"
@@ -39,6 +41,7 @@
 #include "tools/report/input_summary.h"
 #include "tools/report/page_style.h"
 #include "tools/report/report_folder.h"
+#include "tools/report/sweep_imaging.h"
 #include "tools/system/build_info.h"
 
 namespace thicklens::tools {
@@ -56,6 +59,8 @@ struct CalibrateOptions {
   bool dry_run = false;
   bool watch = false;
   std::optional<double> watch_pause_s;
+  CircleOption circle;
+  SweepOutputPaths more;  // images and the PSF
 
   bool by_paper() const { return method == "paper"; }
   std::string report_path() const {
@@ -81,6 +86,7 @@ std::vector<std::string> OwnFigureFiles() {
 struct Outputs {
   explicit Outputs(const CalibrateOptions& options) : folder(options.report_folder) {
     if (!options.camera_output.empty()) camera.emplace(options.camera_output);
+    more = ClaimSweepOutputs(options.more);
     if (options.report_folder.empty()) return;
     RequireOwnPage(options.report_path(), kCalibrationPage);
     report.emplace(options.report_path());
@@ -89,6 +95,7 @@ struct Outputs {
 
   ReportFolder folder;
   std::optional<OutputFile> camera;
+  SweepOutputFiles more;
   std::optional<OutputFile> report;
   std::optional<OutputFolder> figures;
 };
@@ -107,8 +114,32 @@ Calibration Measure(const CalibrateOptions& options, const Sweep& sweep) {
   return thicklens::Calibrate(sweep, asked, run.control());
 }
 
+// Measures the MTF and makes the images and the PSF that were asked for. The camera of the
+// calibration gets the measured PSF.
+SweepImaging Imaging(const CalibrateOptions& options, const calib::FocusSweep& focus_sweep,
+                     Calibration* calibration, SweepOutputBytes* bytes) {
+  SweepImaging imaging;
+  if (!calibration->refusal.empty()) {
+    imaging.transfer.message = calibration->refusal;
+    return imaging;
+  }
+  const Camera& camera = calibration->camera;
+  imaging.units = calib::TransferUnitsOf(camera);
+  const CommandRun run(options.common, SweepOptionNames());
+  imaging.transfer = calib::MeasureSweepTransfer(focus_sweep, *calibration, run.control().threads);
+  if (camera.calibration && camera.calibration->image_distance_mm &&
+      camera.calibration->blur_ratio) {
+    imaging.limits =
+        model::FocusLimitsOf(camera, CircleOfConfusionMm(options.circle, camera.sensor));
+  }
+  MakeSweepOutputs(options.more, options.camera_output, focus_sweep, run.control(), calibration,
+                   &imaging, bytes);
+  return imaging;
+}
+
 CalibrationReport Report(const CalibrateOptions& options, const Sweep& sweep,
-                         const calib::FocusSweep& focus_sweep, const Calibration& calibration) {
+                         const calib::FocusSweep& focus_sweep, const Calibration& calibration,
+                         const SweepImaging& imaging) {
   const auto& calibrated = calibration.camera.calibration;
   std::vector<std::string> notices = sweep.notices;
   if (sweep.description.raw == model::SweepRaw::kGreen)
@@ -117,24 +148,26 @@ CalibrationReport Report(const CalibrateOptions& options, const Sweep& sweep,
                             calibrated ? calibrated->evidence.date : NowIso8601(), notices,
                             sweep.description.reading_sigma_stated};
   return MakeCalibrationReport(focus_sweep, calibration, TruthOf(sweep), origin,
-                               focus_sweep.read_frame);
+                               focus_sweep.read_frame, &imaging);
 }
 
 // All texts are made, and the figures written to temporary files, before the first file is put in
 // place.
 void WriteOutputs(const CalibrateOptions& options, const Sweep& sweep,
                   const calib::FocusSweep& focus_sweep, const Calibration& calibration,
-                  Outputs* outputs) {
+                  const SweepImaging& imaging, const SweepOutputBytes& more, Outputs* outputs) {
   std::string camera;
   CalibrationReport report;
   if (outputs->camera && calibration.refusal.empty()) {
     camera = model::CameraToYaml(calibration.camera);
   }
   if (outputs->report) {
-    report = Report(options, sweep, focus_sweep, calibration);
+    report = Report(options, sweep, focus_sweep, calibration, imaging);
     for (const ReportFile& figure : report.figures)
       outputs->figures->Write(figure.name, figure.content);
     outputs->figures->Write(kCaptions, report.captions);
+    if (imaging.transfer.done)
+      outputs->figures->Write(kTransferTable, TransferCsv(imaging, calibration));
   }
   ThrowIfCancelled();
   if (outputs->report) {
@@ -148,6 +181,7 @@ void WriteOutputs(const CalibrateOptions& options, const Sweep& sweep,
                    PrintableUtf8(older.string()), PrintableUtf8(options.report_path()));
     }
   }
+  CommitSweepOutputs(more, &outputs->more);
   if (!camera.empty()) {
     outputs->camera->Commit(camera);
     spdlog::debug("{} written", options.camera_output);
@@ -178,13 +212,15 @@ nlohmann::json RawMethod(const Sweep& sweep, const Calibration& calibration) {
 
 CommandResult RunCalibration(const CalibrateOptions& options, const Sweep& sweep) {
   Outputs outputs(options);
-  const Calibration calibration = Measure(options, sweep);
+  Calibration calibration = Measure(options, sweep);
   calib::FocusSweep focus_sweep = FocusSweepOf(sweep);
-  // Figures show the frames as they were measured.
+  // Figures and images show the frames as they were measured.
   const calib::GridGeometry& grid = calibration.diagnostics.grid;
   if (grid.distortion_is_used)
     focus_sweep = calib::WithDistortion(std::move(focus_sweep), *grid.lens, focus_sweep.roi);
-  WriteOutputs(options, sweep, focus_sweep, calibration, &outputs);
+  SweepOutputBytes more;
+  const SweepImaging imaging = Imaging(options, focus_sweep, &calibration, &more);
+  WriteOutputs(options, sweep, focus_sweep, calibration, imaging, more, &outputs);
   if (options.common.quiet) {  // otherwise they are part of the text
     for (const std::string& warning : calibration.summary.warnings)
       spdlog::warn("{}", PrintableUtf8(warning));
@@ -194,17 +230,23 @@ CommandResult RunCalibration(const CalibrateOptions& options, const Sweep& sweep
     PrintResult(options.common,
                 FramesLines(sweep, calibration) + ReadingsLine(sweep) +
                     CalibrationText(focus_sweep, calibration, TruthOf(sweep),
-                                    options.by_paper() ? "" : options.camera_output));
+                                    options.by_paper() ? "" : options.camera_output) +
+                    SweepImagingText(imaging, calibration));
   if (options.by_paper() && outputs.camera && calibration.refusal.empty()) {
     PrintResult(options.common,
                 fmt::format("{} has the results of the paper's method, not of the fit\n",
                             PrintableUtf8(options.camera_output)));
   }
-  PrintResult(options.common, WrittenText({calibration.refusal.empty() ? options.camera_output : "",
-                                           options.report_path()}));
+  PrintResult(options.common,
+              WrittenText({calibration.refusal.empty() ? options.camera_output : "",
+                           options.report_path(), more.image.empty() ? "" : options.more.image,
+                           more.focus_map.empty() ? "" : options.more.focus_map,
+                           more.psf.empty() ? "" : options.more.psf}));
   CommandResult result;
-  result.is_written = outputs.camera || outputs.report;
+  result.is_written = outputs.camera || outputs.report || !more.image.empty() ||
+                      !more.focus_map.empty() || !more.psf.empty();
   result.summary = CalibrationJson(focus_sweep, calibration, TruthOf(sweep), options.by_paper());
+  AddSweepImaging(imaging, calibration, &result.summary);
   result.summary["readings"] = PrintableUtf8(sweep.description.readings);
   result.summary["read"] = FilesReadJson(calibration.frames_read ? *calibration.frames_read
                                                                  : std::vector<io::FilesRead>());
@@ -222,8 +264,9 @@ CommandResult RunCalibration(const CalibrateOptions& options, const Sweep& sweep
 
 std::string OutputsText(const CalibrateOptions& options) {
   std::vector<std::string> outputs;
-  for (const std::string& path : {options.camera_output, options.report_path(),
-                                  options.figures_path(), options.common.json_path}) {
+  for (const std::string& path :
+       {options.camera_output, options.report_path(), options.figures_path(), options.more.image,
+        options.more.focus_map, options.more.psf, options.common.json_path}) {
     if (!path.empty()) outputs.push_back(PrintableUtf8(path));
   }
   return outputs.empty() ? "nothing" : fmt::format("{}", fmt::join(outputs, ", "));
@@ -304,6 +347,8 @@ void AddCalibrateCommand(CLI::App* program, CommandAction* action) {
           ->check(CLI::IsMember({"fit", "paper"}))
           ->type_name("NAME");
   AcceptDeprecatedValues(method, &options->common);
+  AddCircleOptions(command, &options->circle);
+  AddSweepOutputOptions(command, &options->more);
   command->add_flag("--no-field", options->no_field,
                     "Skip the maps over the field and the colours; faster");
   CLI::Option* dry_run = command->add_flag("--dry-run", options->dry_run,
@@ -321,8 +366,10 @@ void AddCalibrateCommand(CLI::App* program, CommandAction* action) {
   command->callback([options, action] {
     *action = [options] {
       RequireDistinctFiles({options->camera_output, options->report_path(), options->figures_path(),
+                            options->more.image, options->more.focus_map, options->more.psf,
                             options->common.json_path},
                            options->sweep.Files());
+      CheckSweepOutputs(options->more);
       RunCommand(options->common, [&] { return Calibrate(*options); });
     };
   });

@@ -20,6 +20,7 @@ void AddDoctorCommand(CLI::App* program, CommandAction* action);
 void AddCameraCommand(CLI::App* program, CommandAction* action);
 void AddDepthCommand(CLI::App* program, CommandAction* action);
 void AddFramesCommand(CLI::App* program, CommandAction* action);
+void AddMtfCommand(CLI::App* program, CommandAction* action);
 void AddUndistortCommand(CLI::App* program, CommandAction* action);
 void AddPlanCommand(CLI::App* program, CommandAction* action);
 void AddTargetCommand(CLI::App* program, CommandAction* action);

@@ -14,7 +14,9 @@
 #include "thicklens/base/output_file.h"
 #include "thicklens/camera.h"
 #include "thicklens/depth.h"
+#include "thicklens/model/depth_of_field.h"
 #include "tools/commands/commands.h"
+#include "tools/options/circle_option.h"
 #include "tools/options/command_frame.h"
 #include "tools/options/effect_options.h"
 #include "tools/options/embedded_depth.h"
@@ -23,6 +25,7 @@
 #include "tools/options/option_values.h"
 #include "tools/report/explain_figure.h"
 #include "tools/report/explain_table.h"
+#include "tools/report/focus_limits.h"
 
 namespace thicklens::tools {
 namespace {
@@ -43,6 +46,7 @@ struct ExplainOptions {
   std::optional<double> uv_depth_mm;  // of the plane UV of a light field
   bool costs = false;
   std::string figure_path;
+  CircleOption circle;
 };
 
 DepthRange ParseDepthRange(const std::string& text) {
@@ -152,12 +156,19 @@ CommandResult Explain(const ExplainOptions& options) {
   const CameraExplanation found = ExplanationOf(options, camera);
   CommandResult result{ExplanationJson(found.camera), ""};
   result.summary["effects"] = EffectsJson(found.effects);
+  std::string limits_text;
+  if (options.circle.is_given()) {
+    const model::FocusLimits limits =
+        model::FocusLimitsOf(camera, CircleOfConfusionMm(options.circle, camera.sensor));
+    result.summary["focus_limits"] = FocusLimitsJson(limits);
+    for (const std::string& line : FocusLimitsLines(limits)) limits_text += line + '\n';
+  }
   if (found.costs) AddCosts(*found.costs, &result.summary);
   ThrowIfCancelled();
   if (figure) figure->Commit(BlurCurveSvg(camera, found.depth_range));
   result.is_written = figure.has_value();
   PrintResult(options.common,
-              ExplanationText(found.camera) +
+              ExplanationText(found.camera) + limits_text +
                   "\nlargest impact of each effect here on edges between black and white\n" +
                   EffectsTable(found.effects, found.costs ? &found.costs->of_effect : nullptr) +
                   (found.costs ? CostsText(*found.costs) : ""));
@@ -221,6 +232,7 @@ void AddExplainCommand(CLI::App* program, CommandAction* action) {
       ->check(CLI::Range(2, kMaxSteps))
       ->capture_default_str()
       ->type_name("N");
+  AddCircleOptions(command, &options->circle);
   AddEffectOptions(command, &options->effects);
   AddFormerEffectTolerance(command, &options->effects, &options->common);
   command->add_option("--bits", options->bits, "Bits per value of the encoded image")

@@ -137,7 +137,7 @@ CommandResult SimulateImage(const SceneOptions& options) {
       fmt::format("simulated; effects: {}", model::JoinedNames(simulated.effects.on));
   folder.Write("picture.png", EncodeImage(simulated.photo, file).bytes);
   folder.Write("depth.pfm", EncodeDepth(simulated.depth));
-  folder.Write("camera.yaml", model::CameraToYaml(simulated.camera));
+  folder.Write("camera.yaml", model::CameraToYaml(model::WithoutMeasuredPsf(simulated.camera)));
   folder.Write(kImageMarker, model::SceneTruthToYaml(simulated.truth));
   simulated.photo = Image();  // an ablation needs memory
   simulated.depth = DepthMap();

@@ -127,10 +127,11 @@ struct Command {
   void (*add)(CLI::App* program, tools::CommandAction* action);
 };
 // In the order of work, as --help lists them.
-constexpr std::array<Command, 15> kCommands = {{{"target", tools::AddTargetCommand},
+constexpr std::array<Command, 16> kCommands = {{{"target", tools::AddTargetCommand},
                                                 {"camera", tools::AddCameraCommand},
                                                 {"plan", tools::AddPlanCommand},
                                                 {"frames", tools::AddFramesCommand},
+                                                {"mtf", tools::AddMtfCommand},
                                                 {"undistort", tools::AddUndistortCommand},
                                                 {"calibrate", tools::AddCalibrateCommand},
                                                 {"explain", tools::AddExplainCommand},

@@ -6,11 +6,13 @@
 #include <cmath>
 
 #include "thicklens/io/aperture_statement.h"
+#include "thicklens/model/measured_aperture.h"
 
 namespace thicklens {
 namespace {
 
 constexpr int kDefaultViewCount = 7;
+constexpr char kMeasured[] = "measured";
 constexpr double kRoundedWeight = 1e-6;  // weights of files are rounded
 
 struct ShapeAndSource {
@@ -26,6 +28,12 @@ ShapeAndSource ShapeFor(const EstimateOptions& options, const Camera* camera) {
   }
   if (camera != nullptr) return {model::ApertureShapeOf(camera->psf), "camera"};
   return {model::ApertureShape::kUniform, "assumed"};
+}
+
+// Whether the camera's measured PSF gives the weights of views that no light field places.
+bool UsesMeasuredPsf(const EstimateOptions& options, const Camera* camera) {
+  return camera != nullptr && camera->measured_psf != nullptr && !options.aperture.shape &&
+         options.aperture.views_of == nullptr && !options.effects.LeavesOut(Effect::kApertureShape);
 }
 
 void WarnOfCameraPsf(const ApertureViews& views, const Camera& camera, RunScope* run) {
@@ -54,6 +62,13 @@ PreparedAperture PrepareAperture(const EstimateOptions& options, const Camera* c
   if (options.aperture.views_of == nullptr) {
     const ViewCounts views =
         options.views.value_or(ViewCounts{kDefaultViewCount, kDefaultViewCount});
+    if (UsesMeasuredPsf(options, camera)) {
+      aperture.measured = model::SampleAperture(*camera->measured_psf, camera->blur_ratio(),
+                                                camera->lens.aperture_radius_mm, views.u, views.v);
+      aperture.weights = aperture.measured->weights;
+      aperture.shape = kMeasured;
+      return aperture;
+    }
     aperture.weights = model::ApertureWeights(unstated.shape, views.u, views.v);
     return aperture;
   }

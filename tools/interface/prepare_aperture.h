@@ -6,6 +6,7 @@
 #include <string>
 
 #include "thicklens/estimate.h"
+#include "thicklens/model/light_field_grid.h"
 #include "tools/interface/run_scope.h"
 
 namespace thicklens {
@@ -13,14 +14,17 @@ namespace thicklens {
 // The weights that the photograph's aperture gives the views of an estimate, and their origin.
 struct PreparedAperture {
   Eigen::ArrayXXd weights;  // V x U, sum 1; 0 for absent views
-  std::string shape;        // "uniform", "gaussian", "disc" or "weights of no known shape"
-  std::string from;         // "option", "light-field", "camera" or "assumed"
+  // "uniform", "gaussian", "disc", "measured" or "weights of no known shape"
+  std::string shape;
+  std::string from;  // "option", "light-field", "camera" or "assumed"
   // Distance of the views of `views_of` on the aperture, mm, if it has a camera.
   std::optional<Eigen::Vector2d> step_mm;
+  // The samples of the camera's measured PSF, if the weights are its own.
+  std::optional<model::ApertureSamples> measured;
 };
 // The weights are, in this order, those of options.aperture.shape, those that views_of states,
-// those of the camera's psf, or equal ones. Throws Error if views_of states other weights than the
-// shape. `camera` may be null.
+// those of the camera's psf (measured or of a shape), or equal ones. Throws Error if views_of
+// states other weights than the shape. `camera` may be null.
 PreparedAperture PrepareAperture(const EstimateOptions& options, const Camera* camera,
                                  RunScope* run);
 

@@ -335,9 +335,11 @@ void FindStorageErrors(const Image& photo, const io::ImageFacts* facts,
 // UV on the aperture, where each view has one transmission; ST in the plane of focus unless a depth
 // is given.
 model::LightFieldGrid GridFor(const EstimateOptions& options, const Camera& camera,
-                              const Eigen::ArrayXXd& weights, const RunScope& run) {
+                              const PreparedAperture& aperture, const RunScope& run) {
   const model::ApertureSamples samples =
-      model::SampleAperture(weights, camera.blur_ratio(), camera.lens.aperture_radius_mm);
+      aperture.measured ? *aperture.measured
+                        : model::SampleAperture(aperture.weights, camera.blur_ratio(),
+                                                camera.lens.aperture_radius_mm);
   const double st_depth_mm = options.st_depth_mm.value_or(camera.focus_depth_mm());
   if (std::isinf(st_depth_mm)) {
     throw Error(fmt::format(
@@ -470,7 +472,8 @@ model::EffectSelection SelectEffects(const EstimateOptions& options,
   // Effects of the solution itself, which cost the time that they take.
   choice.kept = EffectsOfModel(options.solver, false);
   const bool is_gaussian = !options.aperture.shape && options.aperture.views_of == nullptr &&
-                           camera && camera->psf == model::Psf::kGaussian;
+                           camera && camera->psf == model::Psf::kGaussian &&
+                           camera->measured_psf == nullptr;
   if (is_gaussian) choice.kept.Remove(Effect::kApertureShape);
   if (options.effects.LeavesOut(Effect::kDefocus)) {
     throw OptionError("effects",
@@ -543,7 +546,7 @@ PreparedProblem Prepare(Image photo, DepthMap map, const std::optional<Camera>& 
   input.weights = aperture.weights;
   CheckViewCounts(input.weights, run);
   if (input.camera) {
-    input.grid = GridFor(options, *input.camera, input.weights, *run);
+    input.grid = GridFor(options, *input.camera, aperture, *run);
     WarnOfOtherSteps(options, aperture, *input.grid, *input.camera, run);
   }
   ReportReading(map, run);  // also where the map is refused

@@ -62,7 +62,7 @@ SimulatedSweep SimulateSweep(const SweepSimulation& simulation, OutputFolder* fo
   });
   Camera camera = simulator.camera();
   camera.calibration.reset();  // a calibration of this sweep must find it
-  folder->Write("camera.yaml", model::CameraToYaml(camera));
+  folder->Write("camera.yaml", model::CameraToYaml(model::WithoutMeasuredPsf(camera)));
   folder->Write("sweep.yaml",
                 model::SweepToYaml(io::DescribeSweep(simulation, simulator, unknown_offset)));
   folder->Write(kTruthFile, model::SweepTruthToYaml(simulator.truth()));

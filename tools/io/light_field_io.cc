@@ -157,7 +157,9 @@ std::size_t LightFieldWriter::Finish(const model::LightField& light_field) {
   description.has_confidence = has_confidence_;
   if (light_field.camera) {
     description.camera_file = kCameraFile;
-    folder_->Write(kCameraFile, model::CameraToYaml(*light_field.camera));
+    // The weights of the views state the aperture.
+    folder_->Write(kCameraFile,
+                   model::CameraToYaml(model::WithoutMeasuredPsf(*light_field.camera)));
   }
   description.light_field = model::DescriptionOf(light_field);
   folder_->Write(kLightFieldMarker, model::LightFieldDescriptionToYaml(description));

@@ -41,7 +41,7 @@ Layout LayoutOf(const FieldMap& field) {
     if (steps_px.x() > 0 && steps_px.y() > 0) ratio = steps_px.y() / steps_px.x();
   }
   layout.tile_height_px =
-      std::clamp(ratio * layout.tile_width_px, 3.4 * kLineHeightPx, 1.2 * kWidestTilePx);
+      std::clamp(ratio * layout.tile_width_px, 4.4 * kLineHeightPx, 1.2 * kWidestTilePx);
   return layout;
 }
 
@@ -101,6 +101,9 @@ std::string TileDrawing(const FieldMap& field, const FieldTile& tile, const Layo
   const std::string css_class = position < kDarkWordsFrom ? "on-dark" : "on-light";
   std::vector<std::string> lines = {RoundedTo(focus.value, digits_mm)};
   if (UsableSigma(focus.sigma)) lines.push_back("± " + RoundedTo(focus.sigma, digits_mm));
+  if (UsableSigma(tile.blur_ratio.sigma)) {
+    lines.push_back("κ " + RoundedTo(tile.blur_ratio.value, tile.blur_ratio.sigma));
+  }
   if (field.clusters.size() > 1) lines.push_back(fmt::format("depth {}", tile.cluster + 1));
   std::string words;
   const double first_y = middle_y + 4 - kLineHeightPx * (static_cast<double>(lines.size()) - 1) / 2;
@@ -108,8 +111,10 @@ std::string TileDrawing(const FieldMap& field, const FieldTile& tile, const Layo
     words += Word(middle_x, first_y + kLineHeightPx * static_cast<double>(i), css_class, lines[i]);
   return fmt::format(
       "<g><title>{}</title><rect fill=\"{}\" {}/>{}</g>\n",
-      EscapeXml(fmt::format("{}: zf = {} ± {} mm", where, RoundedTo(focus.value, focus.sigma),
-                            RoundedSigma(focus.sigma))),
+      EscapeXml(fmt::format("{}: zf = {} ± {} mm, κ = {} ± {}", where,
+                            RoundedTo(focus.value, focus.sigma), RoundedSigma(focus.sigma),
+                            RoundedTo(tile.blur_ratio.value, tile.blur_ratio.sigma),
+                            RoundedSigma(tile.blur_ratio.sigma))),
       MapColourCss(position), box, words);
 }
 
@@ -179,7 +184,8 @@ ReportFigure FieldFigure(const FieldMap& field) {
   return {
       {{"field", svg}},
       "In-focus object distance zf [mm], fitted separately for each part of the image, with its "
-      "standard deviation. One side brighter than the other: the target is tilted; brightness "
+      "standard deviation, and the blur ratio κ of the part. One side brighter than the other: "
+      "the target is tilted; brightness "
       "changing from the centre outward: the field is curved. The colours span at least ± 3 "
       "median standard deviations.",
       false};

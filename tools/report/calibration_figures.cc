@@ -254,9 +254,19 @@ ReportFigure ExampleFigure(const Calibration& calibration) {
 }
 
 const std::vector<std::string>& DrawingNames() {
-  static const std::vector<std::string> names = {
-      "sharpness",       "blur",  "blur-residuals", "reading-errors", "scale",
-      "scale-residuals", "field", "example-1",      "example-2",      "example-3"};
+  static const std::vector<std::string> names = {"sharpness",
+                                                 "blur",
+                                                 "blur-residuals",
+                                                 "reading-errors",
+                                                 "scale",
+                                                 "scale-residuals",
+                                                 "field",
+                                                 "example-1",
+                                                 "example-2",
+                                                 "example-3",
+                                                 "mtf-through-focus",
+                                                 "mtf-in-focus",
+                                                 "psf"};
   return names;
 }
 

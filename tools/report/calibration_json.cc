@@ -257,6 +257,7 @@ json FieldJson(const calib::FieldMap& field) {
          {"done", tile.done},
          {"message", PrintableUtf8(tile.message)},
          {"focus_depth_mm", tile.done ? EstimateJson(tile.focus_depth_mm) : json(nullptr)},
+         {"blur_ratio", tile.done ? EstimateJson(tile.blur_ratio) : json(nullptr)},
          {"cluster", Count(tile.done, tile.cluster)}});
   for (const calib::DepthCluster& cluster : field.clusters)
     clusters.push_back(
@@ -282,7 +283,8 @@ json ChannelsJson(const std::vector<calib::ChannelFocus>& channels) {
         {{"name", PrintableUtf8(channel.name)},
          {"done", channel.done},
          {"message", PrintableUtf8(channel.message)},
-         {"focus_depth_mm", channel.done ? EstimateJson(channel.focus_depth_mm) : json(nullptr)}});
+         {"focus_depth_mm", channel.done ? EstimateJson(channel.focus_depth_mm) : json(nullptr)},
+         {"blur_ratio", channel.done ? EstimateJson(channel.blur_ratio) : json(nullptr)}});
   return out;
 }
 

@@ -155,6 +155,14 @@ std::string FieldSection(const Calibration& calibration, Figures* figures) {
                      EscapeXml(calibration.diagnostics.field.message));
 }
 
+std::string ImagingSection(const Calibration& calibration, const SweepImaging& imaging,
+                           Figures* figures) {
+  figures->Add(TransferFigure(imaging, calibration, AbscissaOf(calibration)));
+  figures->Add(PsfFigure(imaging));
+  const std::string content = SweepImagingWords(imaging, calibration) + figures->TakeHtml();
+  return content.empty() ? "" : "<h2>Resolution and depth of field</h2>\n" + content;
+}
+
 std::string MeasuredSection(const FocusSweep& sweep, const Calibration& calibration,
                             const std::vector<ResultRow>& rows, const model::SweepTruth* truth,
                             Figures* figures) {
@@ -173,7 +181,7 @@ std::string MeasuredSection(const FocusSweep& sweep, const Calibration& calibrat
 
 CalibrationReport MakeCalibrationReport(const FocusSweep& sweep, const Calibration& calibration,
                                         const model::SweepTruth* truth, const ReportOrigin& origin,
-                                        const FrameImages& images) {
+                                        const FrameImages& images, const SweepImaging* imaging) {
   const std::vector<ResultRow> rows = ResultRows(calibration, truth);
   const std::string title = "Calibration of " + sweep.camera.name;
   const std::string about = fmt::format("Focus sweep {}, {} frames · {}", origin.sweep_name,
@@ -189,6 +197,7 @@ CalibrationReport MakeCalibrationReport(const FocusSweep& sweep, const Calibrati
   report.html += OtherWaysSection(calibration, rows);
   report.html += MeasuredSection(sweep, calibration, rows, truth, &figures);
   report.html += FieldSection(calibration, &figures);
+  if (imaging != nullptr) report.html += ImagingSection(calibration, *imaging, &figures);
   report.html += RejectedSection(sweep, calibration, images);
   report.html += CorrelationSection(calibration);
   report.html += HowItWasMade(sweep, calibration, origin);
@@ -202,6 +211,7 @@ CalibrationReport MakeCalibrationReport(const FocusSweep& sweep, const Calibrati
 std::vector<std::string> ReportFigureNames() {
   std::vector<std::string> names;
   for (const std::string& name : DrawingNames()) names.push_back(name + ".svg");
+  names.emplace_back(kTransferTable);
   return names;
 }
 

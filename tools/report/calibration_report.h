@@ -8,6 +8,7 @@
 #include "thicklens/calib/focus_sweep.h"
 #include "thicklens/model/sweep_file.h"
 #include "tools/report/calibration_sections.h"
+#include "tools/report/sweep_imaging.h"
 
 namespace thicklens::tools {
 
@@ -33,11 +34,12 @@ struct CalibrationReport {
   std::string captions;             // plain text: the file and the content of each figure
 };
 
-// `truth` may be null and `images` empty. Figures without data are left out.
+// `truth` and `imaging` may be null and `images` empty. Figures without data are left out.
 CalibrationReport MakeCalibrationReport(const calib::FocusSweep& sweep,
                                         const calib::Calibration& calibration,
                                         const model::SweepTruth* truth, const ReportOrigin& origin,
-                                        const FrameImages& images = {});
+                                        const FrameImages& images = {},
+                                        const SweepImaging* imaging = nullptr);
 
 // Names that figures of a report can have.
 std::vector<std::string> ReportFigureNames();

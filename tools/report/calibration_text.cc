@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdlib>
+#include <limits>
 #include <utility>
 
 #include "tools/report/rounding.h"
@@ -40,6 +41,31 @@ std::string ClusterLine(const std::vector<calib::DepthCluster>& clusters) {
                     cluster.tiles, cluster.tiles == 1 ? "" : "s"));
   return fmt::format("parts of the field are in focus at {} different readings: zf = {}",
                      clusters.size(), fmt::join(depths, ", "));
+}
+
+// The range of kappa over the parts of the field, and whether it is more than their errors explain.
+std::string RatioLine(const calib::FieldMap& field) {
+  Estimate least{std::numeric_limits<double>::infinity(), 0}, most{0, 0};
+  double sum = 0, weights = 0, squares = 0;
+  int parts = 0;
+  for (const calib::FieldTile& tile : field.tiles) {
+    if (!tile.done || !(tile.blur_ratio.sigma > 0)) continue;
+    if (tile.blur_ratio.value < least.value) least = tile.blur_ratio;
+    if (tile.blur_ratio.value > most.value) most = tile.blur_ratio;
+    const double weight = 1 / (tile.blur_ratio.sigma * tile.blur_ratio.sigma);
+    sum += weight * tile.blur_ratio.value;
+    squares += weight * tile.blur_ratio.value * tile.blur_ratio.value;
+    weights += weight;
+    ++parts;
+  }
+  if (parts < 2) return "";
+  const double chi2_per_dof = (squares - sum * sum / weights) / (parts - 1);
+  constexpr double kBeyondErrors = 4;
+  const auto text = [](const Estimate& ratio) {
+    return fmt::format("{} +- {}", RoundedTo(ratio.value, ratio.sigma), RoundedSigma(ratio.sigma));
+  };
+  return fmt::format("kappa of the parts from {} to {}, {} than their errors explain", text(least),
+                     text(most), chi2_per_dof > kBeyondErrors ? "more" : "not more");
 }
 
 }  // namespace
@@ -94,16 +120,24 @@ std::vector<std::string> FieldLines(const calib::FieldMap& field) {
     lines.push_back(fmt::format("astigmatism {}, horizontal blur against vertical",
                                 Signed(*field.astigmatism_mm, "mm")));
   if (field.clusters.size() > 1) lines.push_back(ClusterLine(field.clusters));
+  if (std::string line = RatioLine(field); !line.empty()) lines.push_back(std::move(line));
   return lines;
 }
 
 std::string ChannelLine(const std::vector<calib::ChannelFocus>& channels) {
   std::vector<std::string> parts;
-  for (const calib::ChannelFocus& channel : channels)
-    parts.push_back(channel.done ? fmt::format("{} {}", channel.name,
-                                               WithError(channel.focus_depth_mm.value,
-                                                         channel.focus_depth_mm.sigma, "mm"))
-                                 : fmt::format("{} none ({})", channel.name, channel.message));
+  for (const calib::ChannelFocus& channel : channels) {
+    if (!channel.done) {
+      parts.push_back(fmt::format("{} none ({})", channel.name, channel.message));
+      continue;
+    }
+    const Estimate &focus = channel.focus_depth_mm, &ratio = channel.blur_ratio;
+    parts.push_back(fmt::format(
+        "{} {}{}", channel.name, WithError(focus.value, focus.sigma, "mm"),
+        ratio.sigma > 0 ? fmt::format(" (kappa {} +- {})", RoundedTo(ratio.value, ratio.sigma),
+                                      RoundedSigma(ratio.sigma))
+                        : ""));
+  }
   return fmt::format("{}", fmt::join(parts, ", "));
 }
 

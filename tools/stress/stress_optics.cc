@@ -158,6 +158,42 @@ StressCase CameraRefused(std::string name, std::string why, std::string required
                 });
 }
 
+// Explains cameras whose measured PSF is none; each is named by its file.
+StressCase PsfRefused() {
+  return Optics(
+      "measured-psf-that-is-none",
+      "psf_file has rows of unequal length, a negative share, no light, and light on one side",
+      "refused with the place in the file and what would be right",
+      [](const fs::path& folder, const Capabilities&) {
+        struct Wrong {
+          const char* name;
+          const char* light;
+          std::vector<std::string> words;
+        };
+        const std::vector<Wrong> wrong = {
+            {"not-square", "[[0, 1, 0], [1, 1], [0, 1, 0]]", {"psf.yaml:3", "must be square"}},
+            {"negative", "[[0, 1, 0], [1, -1, 1], [0, 1, 0]]", {"psf.yaml:3", "light[1][1]"}},
+            {"dark", "[[0, 0, 0], [0, 0, 0], [0, 0, 0]]", {"psf.yaml:3", "a sum > 0"}},
+            {"off-centre", "[[1, 0, 0], [1, 0, 0], [1, 0, 0]]", {"psf.yaml:3", "off-centre"}}};
+        std::vector<StressRun> runs;
+        for (const Wrong& one : wrong) {
+          const std::string camera = std::string(one.name) + "-camera.yaml";
+          const std::string psf = std::string(one.name) + "-psf.yaml";
+          WriteCamera(folder, StressCamera(), camera);
+          WriteFileAtomically((folder / camera).string(),
+                              ReadWholeFile((folder / camera).string()) +
+                                  fmt::format("psf: measured\npsf_file: {}\n", psf));
+          WriteFileAtomically(
+              (folder / psf).string(),
+              fmt::format("schema: thicklens/psf/1\nstep: 0.5\nlight: {}\n", one.light));
+          StressRun run = ExplainRefused(one.words);
+          run.arguments[1] = camera;
+          runs.push_back(std::move(run));
+        }
+        return runs;
+      });
+}
+
 template <typename Change>
 StressCamera Changed(const Change& change) {
   StressCamera camera;
@@ -311,6 +347,7 @@ StressCase EstimateRefused(std::string name, std::string why, std::string requir
 std::vector<StressCase> Estimates() {
   const StressCamera usual;
   std::vector<StressCase> cases;
+  cases.push_back(PsfRefused());
   cases.push_back(EstimatedPlane("estimate-usual", "the camera of the cases below: not hard", usual,
                                  900, 0.025));
   cases.push_back(EstimatedPlane("estimate-in-focus", "the scene lies in the plane of focus", usual,

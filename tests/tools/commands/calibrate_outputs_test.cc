@@ -79,16 +79,72 @@ TEST_F(CalibrateOutputs, FiguresLieBesideThePageAndAreReplaced) {
   const std::vector<std::string> figures = Names("out/report/figures");
   EXPECT_THAT(figures, Contains("sharpness.svg"));
   EXPECT_THAT(figures, Contains("blur.svg"));
+  EXPECT_THAT(figures, Contains("mtf-through-focus.svg"));
+  EXPECT_THAT(ContentOf(folder_ / "out/report/figures/mtf.csv"),
+              HasSubstr("frequency_cycles_per_px,frequency_lp_per_mm_on_sensor,in focus,"));
   EXPECT_THAT(figures, Not(Contains("field.svg"))) << "it is not of this run";
   for (const std::string& name : figures) {
     const std::string content = ContentOf(folder_ / ("out/report/figures/" + name));
-    if (name != "captions.txt") {
+    if (name != "captions.txt" && name != "mtf.csv") {
       EXPECT_EQ(ParseXml(content).error, "") << name;
     }
   }
   EXPECT_THAT(ContentOf(folder_ / "out/report/figures/captions.txt"), HasSubstr("blur.svg"));
   const auto json = nlohmann::json::parse(ContentOf(folder_ / "result.json"));
   EXPECT_FALSE(json.at("field").at("done").get<bool>());
+}
+
+// The depth of field that the camera file gives is that of the calibration.
+TEST_F(CalibrateOutputs, DepthOfFieldAgreesWithExplain) {
+  fs::create_directories(folder_ / "out");
+  const std::string camera = folder_ / "camera.yaml";
+  const ProgramResult result =
+      Calibrate({"--no-field", "-o", camera, "--coc-um", "20", "--json", folder_ / "result.json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("depth of field for a circle of confusion of 20 um"));
+  EXPECT_THAT(result.out, HasSubstr("modelled from the fitted blur, not measured"));
+  const ProgramResult explained = Run({"explain", camera, "--depth-range", "280:320", "--coc-um",
+                                       "20", "--json", folder_ / "explained.json"},
+                                      scratch_);
+  ASSERT_EQ(explained.exit_code, 0) << explained.err;
+  const auto found = nlohmann::json::parse(ContentOf(folder_ / "result.json"));
+  const auto again = nlohmann::json::parse(ContentOf(folder_ / "explained.json"));
+  EXPECT_EQ(found.at("focus_limits"), again.at("focus_limits"));
+  EXPECT_GT(found["focus_limits"].at("near_mm").at("sigma").get<double>(), 0);
+  EXPECT_EQ(found.at("mtf").at("frames").size(), 11U);
+  EXPECT_EQ(found["mtf"]["in_focus"].at("origin"), "modelled");
+  EXPECT_GT(found["mtf"]["in_focus"]["mtf50"].at("object_lp_per_mm").at("value").get<double>(), 0);
+}
+
+TEST_F(CalibrateOutputs, MergesTheFramesAndMeasuresTheShapeOfTheBlur) {
+  fs::create_directories(folder_ / "out");
+  fs::create_directories(folder_ / "psf");
+  const std::string camera = folder_ / "camera.yaml";
+  const ProgramResult result =
+      Calibrate({"--no-field", "-o", camera, "--all-in-focus", folder_ / "merged.png",
+                 "--focus-map", folder_ / "height.pfm", "--write-psf", folder_ / "psf/shape.yaml",
+                 "--json", folder_ / "result.json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto found = nlohmann::json::parse(ContentOf(folder_ / "result.json"));
+  EXPECT_TRUE(found.at("all_in_focus").at("done").get<bool>());
+  EXPECT_TRUE(fs::exists(folder_ / "merged.png"));
+  EXPECT_TRUE(fs::exists(folder_ / "height.pfm"));
+  ASSERT_TRUE(found.at("measured_psf").at("done").get<bool>()) << found["measured_psf"];
+  EXPECT_THAT(ContentOf(camera), HasSubstr("psf: measured\npsf_file: psf/shape.yaml\n"));
+  EXPECT_THAT(ContentOf(folder_ / "psf/shape.yaml"), HasSubstr("schema: thicklens/psf/1"));
+  // The camera file can be read from anywhere.
+  EXPECT_EQ(Run({"explain", camera, "--depth-range", "280:320"}, scratch_).exit_code, 0);
+}
+
+TEST_F(CalibrateOutputs, RefusesNamesThatHoldNoImage) {
+  fs::create_directories(folder_ / "out");
+  ProgramResult result = Calibrate({"--all-in-focus", folder_ / "merged.txt"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("--all-in-focus"));
+  result = Calibrate({"--focus-map", folder_ / "map.png"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("--focus-map"));
+  EXPECT_THAT(result.err, HasSubstr(".pfm or .tif is expected"));
 }
 
 // The field of so small an image may have no map. The output shows whether one was tried.

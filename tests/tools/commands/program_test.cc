@@ -176,7 +176,8 @@ TEST_F(ProgramTest, EveryCommandHasHelp) {
   for (const Arguments& command :
        {Arguments{"simulate", "sweep"}, Arguments{"calibrate"}, Arguments{"explain"},
         Arguments{"camera", "init"}, Arguments{"depth", "extract"}, Arguments{"frames", "average"},
-        Arguments{"frames", "defects"}, Arguments{"undistort"}, Arguments{"plan"}}) {
+        Arguments{"frames", "defects"}, Arguments{"undistort"}, Arguments{"mtf"},
+        Arguments{"plan"}}) {
     Arguments arguments = command;
     arguments.emplace_back("--help");
     const ProgramResult result = Run(arguments);

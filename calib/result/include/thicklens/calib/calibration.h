@@ -179,6 +179,7 @@ struct FieldTile {
   bool done = false;                // true if the tile was fitted
   std::string message = "not run";  // how it ended; without a result, the reason
   model::Estimate focus_depth_mm;   // zf of the tile, from Ap
+  model::Estimate blur_ratio;       // kappa of the tile, dimensionless
   int cluster = 0;                  // index into FieldMap::clusters
 };
 // Tiles whose in-focus object distances agree: a part of the target at one depth.
@@ -215,6 +216,7 @@ struct ChannelFocus {
   bool done = false;                // true if the channel was fitted
   std::string message = "not run";  // how it ended; without a result, the reason
   model::Estimate focus_depth_mm;   // zf of this colour, from Ap
+  model::Estimate blur_ratio;       // kappa of this colour, dimensionless
 };
 
 // The largest chi^2 per degree of freedom at which a shape of the blur counts as one that fits the

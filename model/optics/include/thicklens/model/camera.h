@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -14,6 +15,8 @@
 #include "thicklens/model/transfer_curve.h"
 
 namespace thicklens::model {
+
+struct MeasuredPsf;  // thicklens/model/measured_psf.h
 
 // The sensor: its size, its pixels and the curve by which it encodes light.
 struct Sensor {
@@ -129,6 +132,9 @@ struct Camera {
   std::optional<LensDistortion> distortion;
   Sensor sensor;             // size, pitch, principal point, transfer curve
   Psf psf = Psf::kGaussian;  // shape of the defocus blur
+  // The measured shape of the defocus blur (`psf: measured`), which estimates use in place of `psf`
+  // with the same sigma; `psf` stands for it in closed forms. Null: none.
+  std::shared_ptr<const MeasuredPsf> measured_psf;
   // The key is the path of the field in the file, e.g. "lens.aperture_radius_mm"; an element of a
   // list is "sensor.principal_point_px[0]". Only fields with a statement are present.
   std::map<std::string, Provenance> statements;

@@ -16,8 +16,12 @@ THICKLENS_EXPORT Camera ReadCamera(const std::string& path);
 // ReadCamera does.
 THICKLENS_EXPORT Camera ParseCamera(const std::string& text, const std::string& source_name);
 
-// The YAML text of a camera. Numbers read back from it have the same bits.
+// The YAML text of a camera. Numbers read back from it have the same bits. A measured PSF is named
+// by MeasuredPsf::file, relative to the folder of the camera file; without a name it is left out.
 THICKLENS_EXPORT std::string CameraToYaml(const Camera& camera);
+
+// The camera without its measured PSF, for a file in a folder where the PSF's file is not.
+THICKLENS_EXPORT Camera WithoutMeasuredPsf(Camera camera);
 
 }  // namespace thicklens::model
 
