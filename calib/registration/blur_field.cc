@@ -14,8 +14,8 @@ namespace {
 constexpr std::size_t kMinBlurTiles = 9;
 constexpr Eigen::Index kFieldTerms = 7;
 constexpr double kMinFieldCondition = 1e-12;
-// Relative error of the stretch that the exponent of the texture leaves. Simulated dead leaves and
-// noise show 0.15, a checkerboard 0.25.
+// Relative error of the stretch that the exponent of the texture leaves. Simulated dead leaves,
+// noise and a checkerboard show about that much.
 constexpr double kStretchError = 0.15;
 
 // Textures between white noise and isolated edges. The line of the exponents is used this far
