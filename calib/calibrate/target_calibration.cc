@@ -844,7 +844,7 @@ class Calibrator {
     task.offset_mm = evidence.setup.offset_mm;
     task.tick = [] { ThrowIfCancelled(); };
     CheckCameraResponse(task, evidence, fit, &result_);
-    if (options_.map_field) MapField(sweep_, evidence, fit, &store_, &result_);
+    (options_.map_field ? MapField : CompareZones)(sweep_, evidence, fit, &store_, &result_);
   }
 
   // A statement that is grossly wrong makes the blur impossible. The contradiction is the reason.

@@ -27,6 +27,9 @@ struct Registration {
   // Difference between the blur variance of the frame and that of the reference brought to the
   // frame's scale, px^2 of the frame. It is a rough estimate from the spectra of the tiles.
   std::optional<double> added_variance_px2;
+  // Relative change of `scale` by the change of the blur over the field, which was taken out
+  // (TakeOutStretchByBlur).
+  std::optional<model::Estimate> stretch_by_blur;
 };
 
 // Registers `frame` to `reference`, both CV_32F and of one size. The illumination may differ by
@@ -52,6 +55,9 @@ struct ScaleSample {
   // depth of the reference divided by the depth of this frame, from the readings and a stated
   // offset. No law can be fitted to it.
   bool scale_is_from_reading = false;
+  // Error of the relative change of scale per (scale - 1) that the samples share: what the change
+  // of the blur over the field leaves open (TakeOutStretchByBlur).
+  double shared_stretch_sigma = 0;
 };
 
 // Determines the law by which the scale depends on the readings (ScaleKind). If the law is 1/z,

@@ -14,12 +14,10 @@ constexpr int kRounds = 20;
 constexpr double kDefined = 16;     // sum of squares of the responses over that of their errors
 constexpr double kCauchyWidth = 2;  // in standard deviations
 
-struct Term {
-  double response, cubic, sigma;
-};
+using Term = ProportionalTerm;
 
 double Distance(const Term& term, double k) {
-  return (term.cubic - k * term.response) / term.sigma;
+  return (term.value - k * term.response) / term.sigma;
 }
 
 // k and its standard deviation, from robust weights; std::nullopt where no term determines it.
@@ -30,7 +28,7 @@ std::optional<model::Estimate> Solve(const std::vector<Term>& terms) {
   for (const Term& t : terms) {
     if (t.response == 0) continue;
     const double weight = std::abs(t.response) / t.sigma;
-    slopes.emplace_back(t.cubic / t.response, weight);
+    slopes.emplace_back(t.value / t.response, weight);
     total += weight;
   }
   if (slopes.empty()) return std::nullopt;
@@ -52,7 +50,7 @@ std::optional<model::Estimate> Solve(const std::vector<Term>& terms) {
     for (const Term& t : terms) {
       const double d = Distance(t, k) / (kCauchyWidth * spread);
       const double weight = 1 / (1 + d * d) / (t.sigma * t.sigma);
-      right += weight * t.response * t.cubic;
+      right += weight * t.response * t.value;
       information += weight * t.response * t.response;
     }
     if (!(information > 0)) return std::nullopt;
@@ -87,6 +85,13 @@ double JackknifeSigma(std::vector<Term> terms) {
 
 double CubicPerDistortion(double scale) { return 1 - 1 / (scale * scale); }
 
+std::optional<model::Estimate> FitProportion(const std::vector<ProportionalTerm>& terms) {
+  if (terms.size() < kMinSamples) return std::nullopt;
+  auto result = Solve(terms);
+  if (result) result->sigma = std::max(result->sigma, JackknifeSigma(terms));
+  return result;
+}
+
 std::optional<model::Estimate> FitRadialDistortion(const std::vector<ScaleSample>& samples) {
   std::vector<Term> terms;
   for (const ScaleSample& s : samples) {
@@ -94,7 +99,6 @@ std::optional<model::Estimate> FitRadialDistortion(const std::vector<ScaleSample
     if (s.registration.cubic_sigma > 0 && response != 0)
       terms.push_back({response, s.registration.cubic, s.registration.cubic_sigma});
   }
-  if (terms.size() < kMinSamples) return std::nullopt;
   // Where the scales differ by no more than their own errors, the response consists of these
   // errors.
   double squares = 0, errors = 0;
@@ -103,9 +107,7 @@ std::optional<model::Estimate> FitRadialDistortion(const std::vector<ScaleSample
     errors += std::pow(2 * s.registration.scale_sigma / std::pow(s.scale, 3), 2);
   }
   if (!(squares > kDefined * errors)) return std::nullopt;
-  auto result = Solve(terms);
-  if (result) result->sigma = std::max(result->sigma, JackknifeSigma(terms));
-  return result;
+  return FitProportion(terms);
 }
 
 }  // namespace thicklens::calib

@@ -15,6 +15,16 @@ namespace thicklens::calib {
 // pincushion distortion. At s = 1 the distortion is not visible.
 double CubicPerDistortion(double scale);
 
+// A measured value that is proportional to a response.
+struct ProportionalTerm {
+  double response, value, sigma;
+};
+
+// Fits the factor k of value = k response, robust against single outliers, with the larger of its
+// formal error and of a jackknife over runs of terms with neighbouring responses: frames of nearly
+// equal scale share the errors of the reference. Returns std::nullopt for fewer than five terms.
+std::optional<model::Estimate> FitProportion(const std::vector<ProportionalTerm>& terms);
+
 // Fits k to the cubic terms of a sweep's registrations, robust against single outliers. Returns
 // std::nullopt for fewer than five samples.
 std::optional<model::Estimate> FitRadialDistortion(const std::vector<ScaleSample>& samples);

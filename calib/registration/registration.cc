@@ -143,6 +143,7 @@ std::optional<FreeRegistration> RegisterFreely(const cv::Mat& reference, const c
   Registration& free = result.free;
   if (!(std::abs(free.scale_x / free.scale_y - 1) < kMaxAnisotropy)) return std::nullopt;
   free.added_variance_px2 = pass->added_variance_px2;
+  result.blur = {FitBlurField(pass->blurs), pass->texture};
   if (!(result.WithCubic(0, 0).scale_sigma < kMaxScaleSigma * free.scale)) return std::nullopt;
   return result;
 }

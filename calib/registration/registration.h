@@ -4,6 +4,7 @@
 #include <opencv2/core/mat.hpp>
 #include <optional>
 
+#include "calib/registration/blur_field.h"
 #include "calib/registration/coarse_registration.h"
 #include "calib/registration/image_scale.h"
 #include "calib/registration/tile_map.h"
@@ -17,6 +18,7 @@ struct FreeRegistration {
   // d scale/d cubic along the valley of the fit, px^2. The scale for a known cubic term c is
   // free.scale + scale_per_cubic (free.cubic - c).
   double scale_per_cubic = 0;
+  BlurOverField blur;  // how the added blur changes over the field
 
   // The registration for a cubic term that is known to be `cubic` with `cubic_sigma`. The measured
   // cubic term remains in the result.

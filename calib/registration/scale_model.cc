@@ -468,6 +468,10 @@ ScaleModel FitScaleModel(const std::vector<ScaleSample>& samples, int reference_
        std::abs(distortion->value) > kSignificant * distortion->sigma))
     result.distortion_at_corner = distortion;
   if (result.kind != ScaleKind::kInverseDepth || !finder.Solve(distortion, &result)) return result;
+  double shared = 0;
+  for (const ScaleSample& s : samples) shared = std::max(shared, s.shared_stretch_sigma);
+  // A change of every scale s by gamma (s - 1) moves the zero by -gamma z_reference.
+  result.offset_mm.sigma = std::hypot(result.offset_mm.sigma, shared * result.reference_depth_mm);
   result.done = true;
   result.message = "converged";
   return result;

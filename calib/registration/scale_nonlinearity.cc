@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 
+#include "thicklens/base/statistics.h"
+
 namespace thicklens::calib {
 namespace {
 
@@ -12,12 +14,14 @@ constexpr std::size_t kMinSamples = 9;
 constexpr double kSignificant = 5;  // standard deviations
 constexpr int kBlocks = 8;          // runs of neighbours in the jackknife
 constexpr int kRounds = 10;
-constexpr double kCauchyWidth = 3;  // in standard deviations
+constexpr double kCauchyWidth = 3;     // in standard deviations
+constexpr double kSamePosition = 0.3;  // of the mean distance of neighbours
 
 // u is the depth that the scale gives, from -1 at the nearest frame to 1 at the farthest.
 struct Point {
   double u = 0, reading_mm = 0;
-  double sigma_mm = 0;  // stated error of the reading against the law
+  double sigma_mm = 0;        // stated error of the reading against the law
+  double scale_sigma_mm = 0;  // the part of it that is the error of the scale
 };
 using Points = std::vector<Point>;
 
@@ -27,6 +31,35 @@ struct Curve {
 };
 
 Eigen::Vector3d Powers(double u) { return {1, u, u * u}; }
+
+// One point for all frames at one position of the stage, as in a sweep there and back. They show
+// the same detail with the same blur, so that their scales have the same error, and only their
+// readings have errors of their own. Taken as independent, the errors of two runs look like a bend.
+// `points` is in the order of u.
+Points AtOnePosition(const Points& points, double reading_sigma_mm) {
+  const double within = kSamePosition * 2 / static_cast<double>(points.size() - 1);
+  Points merged;
+  for (std::size_t i = 0; i < points.size();) {
+    std::vector<double> readings;
+    Point sum;
+    std::size_t end = i;
+    for (; end < points.size() && points[end].u - points[i].u < within; ++end) {
+      sum.u += points[end].u;
+      sum.scale_sigma_mm += points[end].scale_sigma_mm;
+      readings.push_back(points[end].reading_mm);
+    }
+    const auto count = static_cast<double>(end - i);
+    sum.u /= count;
+    sum.scale_sigma_mm /= count;
+    // Of three and more, one may be wrong.
+    sum.reading_mm = Median(readings);
+    sum.sigma_mm =
+        std::max(std::hypot(reading_sigma_mm / std::sqrt(count), sum.scale_sigma_mm), 1e-6);
+    merged.push_back(sum);
+    i = end;
+  }
+  return merged;
+}
 
 // Weighted least squares. Outliers among the readings have less weight (Cauchy).
 Curve FitCurve(const Points& points) {
@@ -109,10 +142,13 @@ std::optional<ScaleNonlinearity> FindScaleNonlinearity(const std::vector<ScaleSa
     point.u = (depth_mm - middle_mm) / half_mm;
     point.reading_mm = sample.reading_mm;
     const double from_scale_mm = depth_mm * sample.registration.scale_sigma / sample.scale;
+    point.scale_sigma_mm = from_scale_mm;
     point.sigma_mm = std::max(std::hypot(sweep.reading_sigma_mm, from_scale_mm), 1e-6);
     points.push_back(point);
   }
   std::sort(points.begin(), points.end(), [](const Point& a, const Point& b) { return a.u < b.u; });
+  points = AtOnePosition(points, sweep.reading_sigma_mm);
+  if (points.size() < kMinSamples) return std::nullopt;
   const Curve curve = FitCurve(points);
   const double curvature_mm = curve.coefficients.z();
   const double sigma_mm = curve.curvature_sigma * NeighbourFactor(points, curve);

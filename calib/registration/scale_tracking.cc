@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calib/registration/blur_field.h"
 #include "calib/registration/coarse_registration.h"
 #include "calib/registration/radial_distortion.h"
 #include "calib/registration/registration.h"
@@ -200,6 +201,9 @@ std::vector<ScaleSample> TrackScale(const FocusSweep& sweep,
     done += count;
   }
   TakeOutDistortion(RegionCornerRadiusPx(sweep), registrations, &samples);
+  std::vector<BlurOverField> blurs;
+  for (const FreeRegistration& registration : registrations) blurs.push_back(registration.blur);
+  TakeOutStretchByBlur(blurs, &samples);
   return samples;
 }
 

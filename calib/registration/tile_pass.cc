@@ -89,6 +89,17 @@ std::optional<TilePass> MeasureTiles(const cv::Mat& reference, const cv::Mat& fr
     tile.shift_px *= factor;
     tile.information /= factor * factor;
   }
+  const double factor2 = factor * factor;
+  pass.blurs = phases.Blurs(variance_px2 / factor2);
+  for (TileBlur& tile : pass.blurs) {
+    const Eigen::Vector2d shrunk = tile.centre_px + Eigen::Vector2d(region.x, region.y);
+    tile.centre_px = (factor * (shrunk.array() + 0.5) - 0.5).matrix() - map.centre;
+    tile.added_px2 *= factor2;
+    tile.information /= factor2 * factor2;
+  }
+  pass.texture = phases.PowerOfTexture(variance_px2 / factor2);
+  pass.texture.log_frequency -= std::log(factor);
+  if (pass.texture.exponent) pass.texture.exponent->log_frequency -= std::log(factor);
   pass.weight_variance_px2 = phases.weight_variance_px2() * factor * factor;
   pass.agreement = phases.agreement();
   // The blur matched before is added.

@@ -18,6 +18,9 @@ struct TilePass {
   double weight_variance_px2 = 0;            // second moment of a tile, as in TilePhases
   double agreement = 0;                      // correlation, 0 to 1
   std::optional<double> added_variance_px2;  // blur of the frame minus that of the reference
+  // How the added blur changes over the field, and what the texture makes of it.
+  std::vector<TileBlur> blurs;
+  TexturePower texture;  // frequencies in cycles per px of full resolution
 };
 
 // The tiles of a frame shrunk by a factor, in shrunk px.

@@ -1,5 +1,6 @@
 #include "calib/registration/tile_phases.h"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -18,7 +19,18 @@ constexpr double kMinCoherence = 0.1;      // minimum coherence of a frequency t
 constexpr double kBlurCoherence = 0.2;  // minimum coherence of a frequency that determines the blur
 // Variance of a phase, rad^2, in addition to the part that follows from the coherence.
 constexpr double kPhaseVariance = 1e-3;
-constexpr float kLargestSine = 0.9F;  // sine of the remaining phase
+// Part of the power of agreeing frequencies that the window and the interpolation leave open.
+constexpr double kAgreementError = 1e-3;
+// Frequencies count for the blur up to this value of 2 pi^2 sigma^2 k^2, where sigma is the blur
+// that the smoother image got.
+constexpr double kLargestExponent = 1.5;
+constexpr int kMinRings = 4;
+// With fewer frequencies in a tile, all of them contain what the window cut off.
+constexpr int kMinBlurFrequencies = 24;
+constexpr int kBlurRounds = 4;
+constexpr double kMostLogRatio = 5;          // of the amplitudes in a tile
+constexpr double kMinTileCondition = 1e-10;  // of the normal equations of a tile's blur
+constexpr float kLargestSine = 0.9F;         // sine of the remaining phase
 constexpr int kMinFrequencies = 12;
 // Maximum radii of the first rounds, in cycles per px. Their phases are small.
 constexpr float kFirstRounds[] = {0.06F, 0.12F, 0.24F};
@@ -243,6 +255,109 @@ void TilePhases::Summarise() {
   const double from_reference = (wxy - wx * wy / w) / xx;
   const double from_frame = (wxz - wx * wz / w) / xx;
   added_variance_px2_ = from_reference + from_frame > 0 ? from_reference : from_frame;
+}
+
+// Gauss-Newton for F = g exp(-2 pi^2 k.V k) R over the frequencies of a tile that agree, in ln g
+// and V. The noise of a ring is what does not agree there.
+std::vector<TileBlur> TilePhases::Blurs(double blur_px2) const {
+  // The image that was blurred has less noise; its spectrum is the one that is divided by.
+  const bool reference_is_smoother = blur_px2 >= 0;
+  struct Entry {
+    Eigen::Vector4d terms;
+    double smooth, cross, other, weight;
+  };
+  std::vector<TileBlur> blurs;
+  for (const Tile& tile : tiles_) {
+    const Turns turns(size_px_, tile.shift.shift_px);
+    std::vector<Entry> entries;
+    for (std::size_t i = 0; i < frequencies_.size(); ++i) {
+      const Frequency& k = frequencies_[i];
+      const Bin& bin = tile.bins[i];
+      const Ring& ring = rings_[static_cast<std::size_t>(k.ring)];
+      const double coherence = ring.Coherence();
+      const double x = static_cast<double>(k.x), y = static_cast<double>(k.y);
+      if (!(coherence > kBlurCoherence) ||
+          !(2 * kPi * kPi * std::abs(blur_px2) * (x * x + y * y) < kLargestExponent))
+        continue;
+      float real = 0, sine = 0;
+      turns.At(k, bin, &real, &sine);
+      const auto of_reference = static_cast<double>(bin.reference);
+      const auto of_frame = static_cast<double>(bin.frame);
+      const double power = (reference_is_smoother ? ring.frame : ring.reference) / ring.count;
+      entries.push_back(
+          {{1, -2 * kPi * kPi * x * x, -2 * kPi * kPi * y * y, -4 * kPi * kPi * x * y},
+           reference_is_smoother ? of_reference : of_frame,
+           static_cast<double>(real) * std::sqrt(of_frame * of_reference),
+           reference_is_smoother ? of_frame : of_reference,
+           1 / (power * (1 - coherence + kAgreementError))});
+    }
+    const auto used = static_cast<int>(entries.size());
+    if (used < kMinBlurFrequencies) continue;
+    Eigen::Vector4d solution = Eigen::Vector4d::Zero();
+    Eigen::Matrix4d inverse;
+    double squares = 0;
+    bool is_defined = true;
+    for (int round = 0; round < kBlurRounds && is_defined; ++round) {
+      Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();
+      Eigen::Vector4d right = Eigen::Vector4d::Zero();
+      squares = 0;
+      for (const Entry& e : entries) {
+        const double ratio =
+            std::exp(std::clamp(e.terms.dot(solution), -kMostLogRatio, kMostLogRatio));
+        normal += e.weight * e.smooth * ratio * ratio * e.terms * e.terms.transpose();
+        right += e.weight * ratio * (e.cross - ratio * e.smooth) * e.terms;
+        squares += e.weight * (e.other - 2 * ratio * e.cross + ratio * ratio * e.smooth);
+      }
+      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> eigen(normal);
+      const Eigen::Vector4d values = eigen.eigenvalues();
+      is_defined = values[0] > kMinTileCondition * values[3];
+      if (!is_defined) break;
+      inverse = eigen.eigenvectors() * values.cwiseInverse().asDiagonal() *
+                eigen.eigenvectors().transpose();
+      solution += inverse * right;
+    }
+    if (!is_defined || !solution.allFinite()) continue;
+    // Half of the power that is left belongs to the phases.
+    const double variance = std::max(1e-6, 0.5 * squares / (used - 4)) * kSharedByNeighbours;
+    TileBlur blur;
+    blur.centre_px = tile.shift.centre_px;
+    blur.added_px2 = (reference_is_smoother ? 1 : -1) * solution.tail<3>();
+    blur.information = (variance * inverse.bottomRightCorner<3, 3>()).inverse();
+    if (blur.information.allFinite()) blurs.push_back(blur);
+  }
+  return blurs;
+}
+
+TexturePower TilePhases::PowerOfTexture(double blur_px2) const {
+  const double blur_of_reference_px2 = std::max(0.0, blur_px2);
+  TexturePower power;
+  double all = 0, w = 0, wx = 0, wy = 0, wxx = 0, wxy = 0;
+  int count = 0;
+  for (std::size_t i = 0; i < rings_.size(); ++i) {
+    const Ring& ring = rings_[i];
+    if (!(ring.count > 0)) continue;
+    const double coherence = ring.Coherence();
+    if (!(coherence > kMinCoherence)) continue;
+    const double variance = 0.5 * (1 / coherence - 1);
+    if (!(variance < 1)) continue;
+    const double k = (static_cast<double>(i) + 0.5) / size_px_;
+    const double weight = ring.count * k * k / (variance + kPhaseVariance);
+    const double x = std::log(k);
+    all += weight;
+    power.log_frequency += weight * x;
+    const double exponent = 2 * kPi * kPi * blur_of_reference_px2 * k * k;
+    if (!(exponent < kLargestExponent)) continue;
+    const double y = std::log(ring.reference / ring.count) + 2 * exponent;
+    w += weight;
+    wx += weight * x;
+    wy += weight * y;
+    wxx += weight * x * x;
+    wxy += weight * x * y;
+    ++count;
+  }
+  if (all > 0) power.log_frequency /= all;
+  if (count >= kMinRings) power.exponent = {{(wxy - wx * wy / w) / (wxx - wx * wx / w), wx / w}};
+  return power;
 }
 
 double TilePhases::ExpectedInformation(

@@ -8,6 +8,8 @@
 #include <optional>
 #include <vector>
 
+#include "calib/registration/blur_field.h"
+
 namespace thicklens::calib {
 
 // Shift of one tile of a frame relative to the same tile of a reference that was brought to the
@@ -44,6 +46,15 @@ class TilePhases {
   // The inverse variance, px^-2 along each axis, that the shift of a tile of random texture has on
   // average [D154]. `powers` is a function of the frequency, cycles per px.
   double ExpectedInformation(const std::function<Powers(double frequency)>& powers) const;
+
+  // The blur of the tiles along both axes after Solve, relative to that which the images were
+  // brought to by a Gaussian of the variance `blur_px2` on the reference or, where it is negative,
+  // on the frame. Frequencies that it attenuates much show what the window cut off, and are not
+  // used. Tiles with too few frequencies are left out.
+  std::vector<TileBlur> Blurs(double blur_px2) const;
+  // The power of the texture over the frequencies that determine the shifts, after Solve. The
+  // blur that the reference got, as in Blurs, is taken out.
+  TexturePower PowerOfTexture(double blur_px2) const;
 
   // Correlation coefficient after Solve, over the frequencies that agree at all; 1 where the images
   // differ only by a linear filter.

@@ -29,6 +29,13 @@ constexpr double kColourDifference = 0.01;  // part of the mean; below it the ch
 // At most this many frames of a longer sweep are mapped, evenly spread: the time to fit one part
 // grows with the square of its frames, and all parts' spectra are in memory at once.
 constexpr std::size_t kMaxFrames = 128;
+// The coarse map in place of the whole one.
+constexpr std::size_t kMaxCoarseFrames = 24;
+constexpr int kCoarseSide = 3, kCoarseModesPerRing = 24;
+constexpr double kCurved = 3;  // standard deviations of a curvature
+// Second moment along one axis of the square of a tile's window, cos^2, over the square of its
+// side.
+constexpr double kWindowMoment = 0.02;
 
 class Field {
  public:
@@ -40,6 +47,18 @@ class Field {
     KeepUsedFrames();
   }
 
+  // A few large tiles of a few frames, which cost a small part of the map. Only the interval of zf,
+  // and the warnings if the tiles differ, remain of them.
+  void RunCoarsely() {
+    if (evidence_.spectrum < 0 || setup_.frames.size() < 5) return;
+    ThinOut(kMaxCoarseFrames);
+    setup_.modes_per_ring = kCoarseModesPerRing;
+    setup_.read_grey = [this](std::size_t frame) { return store_.Grey(frame); };
+    MapTiles(kCoarseSide);
+    result_.diagnostics.field = {};
+    result_.diagnostics.field.message = "the map was not requested";
+  }
+
   void Run() {
     FieldMap& map = result_.diagnostics.field;
     if (evidence_.spectrum < 0 || setup_.frames.size() < 5) {
@@ -49,7 +68,7 @@ class Field {
     setup_.read_grey = [this](std::size_t frame) { return store_.Grey(frame); };
     // Astigmatism comes first, because it may cause different in-focus object distances over the field.
     if (!evidence_.axial) MeasureAstigmatism(sweep_, evidence_, fit_, &result_);
-    MapTiles();
+    MapTiles(setup_.size_px.minCoeff() < kSmallField ? 3 : 5);
     MeasureChannels();
   }
 
@@ -73,13 +92,13 @@ class Field {
     if (setup_.frames.empty() || setup_.frames[setup_.reference].frame != reference)
       setup_.frames.clear();
     else
-      ThinOut();
+      ThinOut(kMaxFrames);
   }
 
-  void ThinOut() {
+  void ThinOut(std::size_t most) {
     std::vector<EstimatorFrame> kept;
     std::size_t reference = 0;
-    for (const std::size_t f : EvenlySpread(setup_.frames.size(), setup_.reference, kMaxFrames)) {
+    for (const std::size_t f : EvenlySpread(setup_.frames.size(), setup_.reference, most)) {
       if (f == setup_.reference) reference = kept.size();
       kept.push_back(setup_.frames[f]);
     }
@@ -143,9 +162,8 @@ class Field {
     return RegionFocus{estimate(kFocusDepth), estimate(kBlurRatio)};
   }
 
-  void MapTiles() {
+  void MapTiles(int side) {
     FieldMap& map = result_.diagnostics.field;
-    const int side = setup_.size_px.minCoeff() < kSmallField ? 3 : 5;
     const double part = 2.0 / (side + 1);  // neighbours overlap by half
     map.columns = map.rows = side;
     std::vector<EstimatorRegion> regions;
@@ -189,13 +207,13 @@ class Field {
     map.message = map.done ? "done"
                            : fmt::format("{} parts of the field could be fitted, but {} are needed",
                                          fitted.size(), kMinTiles);
-    if (map.done) DescribeSurface(fitted);
+    if (map.done) DescribeSurface(fitted, part);
   }
 
   // [D85] zf = c + gx X + gy Y + q R^2, X and Y mm on the target. Tilt can be measured only
   // together with curvature: without the quadratic term an off-centre field would resemble a tilted
   // one.
-  void DescribeSurface(const std::vector<std::size_t>& fitted) {
+  void DescribeSurface(const std::vector<std::size_t>& fitted, double part) {
     FieldMap& map = result_.diagnostics.field;
     const bool with_curvature = fitted.size() >= 6;
     const Eigen::Index terms = with_curvature ? 4 : 3;
@@ -239,7 +257,16 @@ class Field {
     const std::vector<std::string> warnings = FieldWarnings(result_);
     result_.summary.warnings.insert(result_.summary.warnings.end(), warnings.begin(),
                                     warnings.end());
-    WidenBySpread(fitted);
+    std::optional<CurvedField> curved;
+    if (with_curvature && std::abs(surface[3]) > kCurved * std::sqrt(covariance(3, 3))) {
+      // A tile shows the mean of its window, on which R^2 is larger than at the centre [D157].
+      const double moment_mm2 = kWindowMoment * std::pow(mm_per_px * kWholeField * part, 2) *
+                                setup_.size_px.squaredNorm();
+      curved = CurvedField{surface[0] - surface[3] * moment_mm2, std::sqrt(covariance(0, 0)), {}};
+      for (Eigen::Index i = 0; i < n; ++i)
+        curved->without_mm.push_back(value[i] - surface[3] * design(i, 3));
+    }
+    WidenBySpread(fitted, curved);
   }
 
   // Returns the size of a reference pixel on the target: p z f2/(f1 D).
@@ -291,27 +318,48 @@ class Field {
     }
   }
 
+  // A field that is curved beyond doubt: zf on the axis with its error, and that of each tile
+  // without the curvature.
+  struct CurvedField {
+    double axis_mm = 0, axis_sigma_mm = 0;
+    std::vector<double> without_mm;
+  };
+
   // One zf for a field that has several is wrong by the spread beyond their own errors; where the
-  // target has several depths, by the largest difference.
-  void WidenBySpread(const std::vector<std::size_t>& fitted) {
+  // target has several depths, by the largest difference. The fit gives the mean over a curved
+  // field, and zf means that on the axis: the interval contains both.
+  void WidenBySpread(const std::vector<std::size_t>& fitted,
+                     const std::optional<CurvedField>& curved) {
     const FieldMap& map = result_.diagnostics.field;
     const double zf = fit_.values[kFocusDepth];
+    const bool is_flat = map.clusters.size() < 2;
+    const bool has_axis = is_flat && curved;
+    const double middle_mm = has_axis ? curved->axis_mm : zf;
     double farthest_mm = 0, squares = 0, errors = 0;
-    for (const std::size_t t : fitted) {
-      const model::Estimate& focus = map.tiles[t].focus_depth_mm;
+    for (std::size_t i = 0; i < fitted.size(); ++i) {
+      const model::Estimate& focus = map.tiles[fitted[i]].focus_depth_mm;
+      const double off_mm = (has_axis ? curved->without_mm[i] : focus.value) - middle_mm;
       farthest_mm = std::max(farthest_mm, std::abs(focus.value - zf));
-      squares += (focus.value - zf) * (focus.value - zf) / static_cast<double>(fitted.size());
+      squares += off_mm * off_mm / static_cast<double>(fitted.size());
       errors += focus.sigma * focus.sigma / static_cast<double>(fitted.size());
     }
-    const bool is_flat = map.clusters.size() < 2;
-    const double spread_mm = is_flat ? std::sqrt(std::max(0.0, squares - errors)) : farthest_mm;
-    if (is_flat && !(squares > kSpreadOverErrors * errors)) return;
-    WidenFocus(is_flat ? "zf over the field" : "depths of the target", spread_mm,
-               is_flat
-                   ? "restrict roi_px to the middle of the field, and set the target parallel to "
-                     "the sensor"
-                   : "restrict roi_px to a part of the target at one depth",
-               sweep_.camera.lens, &result_);
+    const bool is_spread = squares > kSpreadOverErrors * errors;
+    if (is_flat && !is_spread && !has_axis) return;
+    double spread_mm = is_flat ? std::sqrt(std::max(0.0, squares - errors)) : farthest_mm;
+    if (is_flat && !is_spread) spread_mm = 0;
+    const std::string remedy = is_flat ? "restrict roi_px to the middle of the field, and set the "
+                                         "target parallel to the sensor"
+                                       : "restrict roi_px to a part of the target at one depth";
+    if (!has_axis) {
+      WidenFocus(is_flat ? "zf over the field" : "depths of the target", spread_mm, remedy,
+                 sweep_.camera.lens, &result_);
+      return;
+    }
+    const double move_mm = curved->axis_mm - zf;
+    const double reach_mm = spread_mm + 2 * curved->axis_sigma_mm;
+    WidenFocusAndRatio("zf over the field",
+                       {std::min(0.0, move_mm - reach_mm), std::max(0.0, move_mm + reach_mm)},
+                       {0, 0}, remedy, sweep_.camera.lens, &result_);
   }
 
   void MeasureChannels() {
@@ -397,6 +445,11 @@ std::vector<std::string> FieldWarnings(const Calibration& calibration) {
 void MapField(const FocusSweep& sweep, const BlurEvidence& evidence, const BlurFitResult& fit,
               FrameStore* store, Calibration* calibration) {
   Field(sweep, evidence, fit, store, calibration).Run();
+}
+
+void CompareZones(const FocusSweep& sweep, const BlurEvidence& evidence, const BlurFitResult& fit,
+                  FrameStore* store, Calibration* calibration) {
+  Field(sweep, evidence, fit, store, calibration).RunCoarsely();
 }
 
 }  // namespace thicklens::calib

@@ -20,6 +20,12 @@ namespace thicklens::calib {
 void MapField(const FocusSweep& sweep, const BlurEvidence& evidence, const BlurFitResult& fit,
               FrameStore* store, Calibration* calibration);
 
+// A cheap part of MapField for calibrations without the map: compares nine large zones on at most
+// 24 frames. Widens the systematic interval and warns as MapField does, so that a curved field or a
+// tilted target is not silent, and leaves `field` empty.
+void CompareZones(const FocusSweep& sweep, const BlurEvidence& evidence, const BlurFitResult& fit,
+                  FrameStore* store, Calibration* calibration);
+
 // The warnings about parts of the field at several depths and about tilt that the field of a
 // calibration gives.
 std::vector<std::string> FieldWarnings(const Calibration& calibration);

@@ -530,6 +530,23 @@ std::vector<StressCase> Aberrations() {
   aberrations.field_curvature_mm = -2;
   cases.push_back(
       lens("curved-field", "the corners are in focus 2 mm nearer than the axis", aberrations));
+  const auto curved = [aberrations](bool knows_zero) {
+    StressSweep sweep = Simulated([aberrations](model::SweepSimulationOptions* simulation) {
+      simulation->aberrations = aberrations;
+    });
+    if (!knows_zero) sweep.describe = [](model::SweepFile* file) { file->offset_mm.reset(); };
+    return sweep;
+  };
+  cases.push_back(Sweep("curved-field-without-map",
+                        "the same with --no-field: a few zones must show it",
+                        "d1, zf and kappa within 4 standard errors of the truth, d1 within 50 um",
+                        curved(true), Truth(50)));
+  cases.push_back(WithField(
+      Sweep("curved-field-without-offset",
+            "the same, with the bench offset from the image scale, which the change of the blur "
+            "over the field stretches",
+            "d1, zf and kappa within 4 standard errors of the truth, d1 within 400 um",
+            curved(false), Truth(400))));
   return cases;
 }
 

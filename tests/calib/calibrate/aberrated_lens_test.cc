@@ -15,6 +15,7 @@ namespace {
 
 using ::testing::Contains;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using thicklens::testing::GiveFloor;
 using thicklens::testing::Simulate;
 using thicklens::testing::SimulatedSweep;
@@ -30,14 +31,23 @@ double SigmasBeyond(const Result& result, double truth) {
   return std::max({0.0, low - truth, truth - high}) / result.sigma;
 }
 
-Calibration Calibrated(const model::LensAberrations& aberrations, std::uint64_t seed) {
+Calibration Calibrated(const model::LensAberrations& aberrations, std::uint64_t seed,
+                       bool knows_zero = true, bool maps_field = true) {
   model::SweepSimulationOptions options = SweepCase("ii", 0, seed);
   options.camera = model::CropCamera(options.camera, {96, 136, 320, 240});
   options.bits = 16;
   options.aberrations = aberrations;
   SimulatedSweep simulated = Simulate(options);
   GiveFloor(&simulated);
-  return Calibrate(simulated.sweep, {});
+  if (!knows_zero) simulated.sweep.offset_mm.reset();
+  CalibrationOptions how;
+  how.map_field = maps_field;
+  return Calibrate(simulated.sweep, how);
+}
+
+double HalfWidth(const Result& result) {
+  return (result.systematic ? 0.5 * (result.systematic->y() - result.systematic->x()) : 0) +
+         2 * result.sigma;
 }
 
 // The distortion is reported, and kappa, which a barrel makes too small, has the truth within the
@@ -66,6 +76,53 @@ TEST(AberratedLens, AstigmatismIsFoundWithTheMedialFocus) {
   EXPECT_NEAR(found.summary.focus_depth_mm->value, 300, 0.1);
   ASSERT_TRUE(found.diagnostics.field.astigmatism_mm);
   EXPECT_NEAR(found.diagnostics.field.astigmatism_mm->value, -4, 0.15);
+}
+
+// The right offset is stated. The change of blur over the field moves the zero of the image scale
+// by 10 mm and more, which is no contradiction; zf is the mean over the field, and the interval has
+// that of the axis.
+TEST(AberratedLens, ACurvedFieldDoesNotContradictTheStatedOffset) {
+  for (const double curvature_mm : {-3.0, 5.0}) {
+    SCOPED_TRACE(curvature_mm);
+    model::LensAberrations aberrations;
+    aberrations.field_curvature_mm = curvature_mm;
+    const Calibration found = Calibrated(aberrations, 1);
+    ASSERT_TRUE(found.summary.blur_ratio) << found.summary.reason;
+    EXPECT_THAT(found.summary.warnings, Not(Contains(HasSubstr("bench offset"))));
+    const Result& focus = *found.summary.focus_depth_mm;
+    const double error_mm = std::abs(focus.value - 300);
+    EXPECT_GT(error_mm, 4 * focus.sigma) << "the mean over the field is not the axis";
+    EXPECT_LE(SigmasBeyond(focus, 300), 2);
+    EXPECT_LT(HalfWidth(focus), 3 * error_mm);
+    EXPECT_LE(SigmasBeyond(*found.summary.blur_ratio, 0.45), 2);
+  }
+}
+
+TEST(AberratedLens, ACurvedFieldLeavesTheZeroOfTheScale) {
+  for (const double curvature_mm : {-4.0, 3.0}) {
+    SCOPED_TRACE(curvature_mm);
+    model::LensAberrations aberrations;
+    aberrations.field_curvature_mm = curvature_mm;
+    const Calibration found = Calibrated(aberrations, 2, false);
+    ASSERT_TRUE(found.summary.blur_ratio) << found.summary.reason;
+    EXPECT_LE(SigmasBeyond(*found.summary.bench_offset_mm, 0), 2);
+    EXPECT_LT(std::abs(found.summary.bench_offset_mm->value), 4);
+    EXPECT_LE(SigmasBeyond(*found.summary.focus_depth_mm, 300), 2);
+    EXPECT_LE(SigmasBeyond(*found.summary.blur_ratio, 0.45), 2);
+  }
+}
+
+// Without the map, a few zones show that the field is curved.
+TEST(AberratedLens, ACurvedFieldIsNotSilentWithoutTheMap) {
+  model::LensAberrations aberrations;
+  aberrations.field_curvature_mm = -3;
+  const Calibration found = Calibrated(aberrations, 1, true, false);
+  ASSERT_TRUE(found.summary.focus_depth_mm) << found.summary.reason;
+  EXPECT_TRUE(found.diagnostics.field.tiles.empty());
+  const Result& focus = *found.summary.focus_depth_mm;
+  EXPECT_LT(focus.value, 300 - 8 * focus.sigma);
+  EXPECT_LE(SigmasBeyond(focus, 300), 2);
+  EXPECT_LT(HalfWidth(focus), 3 * (300 - focus.value));
 }
 
 }  // namespace

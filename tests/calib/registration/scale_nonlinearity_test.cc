@@ -137,6 +137,29 @@ TEST(FindScaleNonlinearity, ACurveThatTheErrorsOfTheScalesAllowIsNone) {
   }
 }
 
+// A curve of 4.2 standard errors of the scales. A second run through the same positions has the
+// same errors and does not make it certain; other positions do.
+TEST(FindScaleNonlinearity, FramesAtOnePositionShareTheErrorOfTheirScale) {
+  Recipe recipe;
+  recipe.frames = 21;
+  recipe.reading_sigma_mm = recipe.stated_sigma_mm = 0.005;
+  recipe.scale_sigma = 0;
+  recipe.square_mm = 0.25;
+  const auto with_errors = [](Made made) {
+    for (ScaleSample& sample : made.samples) sample.registration.scale_sigma = 2e-4 * sample.scale;
+    return made;
+  };
+  Made there = with_errors(Make(recipe));
+  EXPECT_FALSE(FindScaleNonlinearity(there.samples, there.law, there.sweep));
+  recipe.seed = 2;
+  const Made back = with_errors(Make(recipe));
+  there.samples.insert(there.samples.end(), back.samples.begin(), back.samples.end());
+  EXPECT_FALSE(FindScaleNonlinearity(there.samples, there.law, there.sweep));
+  recipe.frames = 42;
+  const Made denser = with_errors(Make(recipe));
+  EXPECT_TRUE(FindScaleNonlinearity(denser.samples, denser.law, denser.sweep));
+}
+
 TEST(FindScaleNonlinearity, SingleWrongReadingsNeitherFeignNorHideIt) {
   for (const double square_mm : {0.0, 0.45}) {
     int found = 0;
