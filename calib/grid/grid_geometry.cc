@@ -5,6 +5,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <mutex>
 
 #include "calib/grid/grid_detection.h"
@@ -437,7 +438,9 @@ class Geometry {
       const GridAdjustment found = AdjustGrid(half);
       double square = 0;
       for (const GridView& view : rest) {
-        const double rms = found.done ? HeldOutRms(half, found.shared, view) : 0;
+        // An adjustment that fails is no evidence: every comparison with it is false.
+        const double rms = found.done ? HeldOutRms(half, found.shared, view)
+                                      : std::numeric_limits<double>::quiet_NaN();
         square += rms * rms;
       }
       *rms_px[has_distortion ? 1 : 0] =
