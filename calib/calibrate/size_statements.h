@@ -10,7 +10,8 @@
 
 namespace thicklens::calib {
 
-// What something of known size on the target says of the magnification in the plane of focus.
+// The statements that something of known size on the target makes about the magnification in the
+// plane of focus.
 struct SizeStatements {
   std::vector<model::StatedConjugate> found;  // to be used as stated ones
   std::vector<std::string> warnings;          // where a stated magnification contradicts them

@@ -24,12 +24,12 @@ namespace {
 constexpr std::array<double, kCameraSize> kCameraPrior = {1, 0.5, 0.5, 0.3, 0.15, 0.03, 0.03, 0.05};
 constexpr std::array<double, kSheetSize> kSheetPrior = {0.003, 0.003, 0.003, 0.05, 0.05, 0.05};
 constexpr double kDirectionPrior = 0.5;
-constexpr double kFirstSigmaPx = 0.1, kLeastSigmaPx = 0.005;
+constexpr double kFirstSigmaPx = 0.1, kMinSigmaPx = 0.005;
 constexpr int kRounds = 4;
-constexpr double kOutlier = 6;             // standard deviations beyond which a point is left out
-constexpr double kLeastLateralPx = 0.005;  // scatter of a stage
-constexpr int kDiscSides = 16;             // of the polygon that stands for a disc
-constexpr double kWindow = 0.5;            // least part of the points that stays
+constexpr double kOutlier = 6;           // standard deviations beyond which a point is left out
+constexpr double kMinLateralPx = 0.005;  // scatter of a stage
+constexpr int kDiscSides = 16;           // of the polygon that stands for a disc
+constexpr double kWindow = 0.5;          // least part of the points that stays
 
 double CornerRadius(const GridSetup& setup) {
   const Eigen::Vector2d& c = setup.principal_point_px;
@@ -45,7 +45,7 @@ double HalfDiagonal(const GridSetup& setup) {
   return farthest_mm > 0 ? farthest_mm : 1;  // the bend of a lone point is none
 }
 
-// What turns scaled parameters into a camera.
+// The units that turn scaled parameters into a camera.
 struct Units {
   explicit Units(const GridSetup& setup)
       : focal_px(setup.focal_length_px),
@@ -222,7 +222,7 @@ Pose StartingPose(const GridSetup& setup, const GridView& view) {
   return pose;
 }
 
-// The same pose with the target facing the camera: the sweep's frames show which way it leans.
+// Returns the pose with the target facing the camera: the sweep's frames show which way it leans.
 Pose Facing(const Pose& pose) {
   const double angle = pose.rotation.norm();
   Eigen::Matrix3d matrix = Eigen::Matrix3d::Identity();
@@ -384,7 +384,7 @@ class Adjuster {
     for (std::size_t i = 0; i < setup_.views.size(); ++i) {
       GridView& view = setup_.views[i];
       const std::vector<Eigen::Vector2d> residuals = Residuals(i);
-      const double limit_px = kOutlier * std::max(RobustSigma(residuals), kLeastSigmaPx);
+      const double limit_px = kOutlier * std::max(RobustSigma(residuals), kMinSigmaPx);
       GridView kept = view;
       kept.ids.clear();
       kept.image_px.clear();
@@ -408,7 +408,7 @@ class Adjuster {
       for (const Eigen::Vector2d& residual : residuals) square += residual.squaredNorm();
       const double freedom =
           std::max(1.0, 2 * static_cast<double>(residuals.size()) - (IsFrame(i) ? 3 : 6));
-      sigma_px_[i] = std::max(kLeastSigmaPx, std::sqrt(square / freedom));
+      sigma_px_[i] = std::max(kMinSigmaPx, std::sqrt(square / freedom));
     }
     if (!result_.has_motion || !Covariance()) return;
     double lateral = 0, axial = 0;
@@ -421,7 +421,7 @@ class Adjuster {
       ++frames;
     }
     const double per_px_mm = motion_.place_mm.z() / setup_.focal_length_px;
-    lateral_mm_ = std::max(kLeastLateralPx * per_px_mm, std::sqrt(lateral / frames));
+    lateral_mm_ = std::max(kMinLateralPx * per_px_mm, std::sqrt(lateral / frames));
     if (!(setup_.reading_sigma_mm > 0))
       axial_mm_ = std::max(1e-5 * range_mm_ + 1e-9, std::sqrt(axial / frames));
   }

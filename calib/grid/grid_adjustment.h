@@ -18,11 +18,12 @@ struct GridView {
   // Position along the motion of the sweep, mm, rising away from the camera; absent: a view that
   // may stand anywhere.
   std::optional<double> position_mm;
-  // Of the positions; it is estimated from the view's residuals unless it is above 0.
+  // Standard deviation of the positions; it is estimated from the view's residuals unless it is
+  // above 0.
   double sigma_px = 0;
 };
 
-// What is adjusted, and what is known beforehand.
+// The points that are adjusted, and the knowledge beforehand.
 struct GridSetup {
   std::vector<Eigen::Vector2d> target_mm;    // the points, relative to their mean
   double disc_radius_mm = 0;                 // above 0: the points are the centroids of discs

@@ -14,9 +14,9 @@ namespace {
 
 // Patterns are looked for in an image of at most this size, and their corners in the whole one.
 constexpr int kSearchSidePx = 1600;
-constexpr std::size_t kFewestPoints = 8;
+constexpr std::size_t kMinPoints = 8;
 constexpr double kWhitePart = 0.995;  // quantile of the light that is shown as white
-constexpr int kFewestMarkers = 3;
+constexpr int kMinMarkers = 3;
 
 // 8-bit linear light, which detectors expect.
 cv::Mat Bytes(const cv::Mat& light) {
@@ -70,7 +70,7 @@ class OrderedGrid {
   cv::Point2f AlongColumn() const { return Point(0, rows_ - 1) - Point(0, 0); }
 
   void TurnRound() { std::reverse(points_.begin(), points_.end()); }
-  // By a quarter; only where there are as many columns as rows.
+  // Turns by a quarter; only where there are as many columns as rows.
   void TurnQuarter() {
     std::vector<cv::Point2f> turned(points_.size());
     for (int row = 0; row < rows_; ++row) {
@@ -224,7 +224,7 @@ class CharucoCorners {
 
   // Number of markers that lie where this layout has them.
   int Agreeing() const {
-    if (found_.size() < kFewestMarkers) return 0;
+    if (found_.size() < kMinMarkers) return 0;
     std::vector<cv::Point2f> from, to;
     for (const FoundMarker& marker : found_) AddCorners(marker, &from, &to);
     cv::Mat inliers;
@@ -258,7 +258,7 @@ class CharucoCorners {
       ids.push_back(static_cast<int>(i));
       points.push_back(image[0]);
     }
-    if (points.size() < kFewestPoints) return std::nullopt;
+    if (points.size() < kMinPoints) return std::nullopt;
     // The white border of a marker is the room around a corner without other edges.
     const double border_px =
         0.5 * (grid_.square_mm - grid_.marker_mm) / grid_.square_mm * SquarePx();
@@ -271,7 +271,7 @@ class CharucoCorners {
       view.ids.push_back(ids[i]);
       view.image_px.emplace_back(points[i].x, points[i].y);
     }
-    if (view.ids.size() < kFewestPoints) return std::nullopt;
+    if (view.ids.size() < kMinPoints) return std::nullopt;
     return view;
   }
 
@@ -305,7 +305,7 @@ std::optional<GridView> DetectCharuco(const cv::Mat& light, const model::TargetG
   const std::vector<FoundMarker> found = FindMarkers(light, grid.dictionary);
   const CharucoCorners black(grid, found, false), white(grid, found, true);
   const int black_fits = black.Agreeing(), white_fits = white.Agreeing();
-  if (std::max(black_fits, white_fits) < kFewestMarkers) return std::nullopt;
+  if (std::max(black_fits, white_fits) < kMinMarkers) return std::nullopt;
   return (black_fits >= white_fits ? black : white).Find(light);
 }
 

@@ -5,6 +5,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <mutex>
 
 #include "calib/grid/grid_detection.h"
@@ -17,9 +18,9 @@
 namespace thicklens::calib {
 namespace {
 
-constexpr std::size_t kMostFrames = 60;   // of a sweep, evenly chosen
-constexpr std::size_t kFewestFrames = 4;  // that show a motion
-constexpr double kPrintError = 0.003;     // relative, of the size of a print
+constexpr std::size_t kMaxFrames = 60;       // of a sweep, evenly chosen
+constexpr std::size_t kMinFramesOfGrid = 4;  // that show a motion
+constexpr double kPrintError = 0.003;        // relative, of the size of a print
 // Part of the unit of a parameter above which a direction of the parameters is called open. The
 // weak prior then has an effect below 0.3 % of its distance.
 constexpr double kOpen = 0.05;
@@ -27,14 +28,14 @@ constexpr double kKnownFocalLength = 0.05;  // relative sigma up to which it is 
 constexpr double kKnownPoint = 0.025;       // likewise, of the image's width
 constexpr double kKnownTiltDeg = 5;
 constexpr double kNamedPart = 0.25;  // of the largest part of an open direction
-constexpr int kMostDirections = 4;
+constexpr int kMaxDirections = 4;
 // A distortion: chi^2 of five coefficients (1.5e-5 by chance), its size, its error over the field,
 // and the residuals of views that were left out.
 constexpr double kSurely = 30, kSmallestShiftPx = 0.1, kSigmasOfShift = 3;
 constexpr double kErrorOfShift = 0.25, kSmallErrorPx = 0.1, kHeldOutGain = 0.98;
 // The change of the grid's size over the sweep, relative to what the readings and the focal length
 // of the camera file let expect; and the scatter about the line.
-constexpr double kLeastChange = 0.4, kMostChange = 2.5, kMostScatter = 0.1;
+constexpr double kMinChange = 0.4, kMaxChange = 2.5, kMaxScatter = 0.1;
 constexpr double kSeenChange = 5;  // standard deviations of the change that must be expected
 
 // px of the image per mm of the target at the target's middle, by the homography of a view.
@@ -214,7 +215,7 @@ std::vector<std::string> OpenDirections(const GridSetup& setup, const GridAdjust
   const Eigen::MatrixXd scaled = gradient * found.covariance * gradient.transpose();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(scaled);
   std::vector<std::string> directions;
-  for (Eigen::Index k = n - 1; k >= 0 && static_cast<int>(directions.size()) < kMostDirections;
+  for (Eigen::Index k = n - 1; k >= 0 && static_cast<int>(directions.size()) < kMaxDirections;
        --k) {
     const double sigma = std::sqrt(std::max(0.0, solver.eigenvalues()[k]));
     if (!(sigma > kOpen)) break;
@@ -298,10 +299,10 @@ class Geometry {
   // aligned by a program all have one scale, and a lens that moves has another law.
   bool CompareWithReadings() {
     const auto n = static_cast<Eigen::Index>(found_.frames.size());
-    if (n < static_cast<Eigen::Index>(kFewestFrames)) {
+    if (n < static_cast<Eigen::Index>(kMinFramesOfGrid)) {
       result_.message =
           fmt::format("target_grid: {} frames of the sweep show the {}, fewer than {}", n,
-                      result_.grid, kFewestFrames);
+                      result_.grid, kMinFramesOfGrid);
       return false;
     }
     Eigen::MatrixXd design(n, 2);
@@ -321,8 +322,8 @@ class Geometry {
       // A short sweep shows no change of scale: neither for nor against the readings.
       result_.follows_readings = std::abs(line[1] * range_mm) < kSeenChange * noise_mm;
     } else {
-      result_.follows_readings = line[1] > kLeastChange && line[1] < kMostChange &&
-                                 scatter_mm < kMostScatter * line[1] * range_mm;
+      result_.follows_readings = line[1] > kMinChange && line[1] < kMaxChange &&
+                                 scatter_mm < kMaxScatter * line[1] * range_mm;
     }
     if (!result_.follows_readings) {
       result_.message = fmt::format(
@@ -437,7 +438,9 @@ class Geometry {
       const GridAdjustment found = AdjustGrid(half);
       double square = 0;
       for (const GridView& view : rest) {
-        const double rms = found.done ? HeldOutRms(half, found.shared, view) : 0;
+        // An adjustment that fails is no evidence: every comparison with it is false.
+        const double rms = found.done ? HeldOutRms(half, found.shared, view)
+                                      : std::numeric_limits<double>::quiet_NaN();
         square += rms * rms;
       }
       *rms_px[has_distortion ? 1 : 0] =
@@ -527,7 +530,7 @@ GridGeometry MeasureGrid(const FocusSweep& sweep, int threads, const std::functi
   FocusSweep whole = sweep;
   whole.roi = {};
   whole.camera.distortion.reset();
-  const std::size_t frames = std::min(kMostFrames, sweep.frames.size());
+  const std::size_t frames = std::min(kMaxFrames, sweep.frames.size());
   const std::size_t count = frames + sweep.grid_views.size();
   const std::vector<std::size_t> chosen = [&] {
     std::vector<std::size_t> indices;
@@ -581,7 +584,8 @@ std::optional<model::StatedConjugate> MagnificationOfGrid(const std::vector<Grid
                                                           double front_focal_length_mm, double sign,
                                                           double sharpest_reading_mm,
                                                           const std::string& name) {
-  // Of each frame, with the change from its plane to the plane of focus [D127]: m zf/z at z.
+  // The magnification of each frame, with the change from its plane to the plane of focus [D127]: m
+  // zf/z at z.
   std::vector<double> at_focus, beyond;
   for (const GridScale& scale : scales) {
     const double beyond_mm = sign * (scale.reading_mm - sharpest_reading_mm);
@@ -596,7 +600,7 @@ std::optional<model::StatedConjugate> MagnificationOfGrid(const std::vector<Grid
     beyond.push_back(std::abs(beyond_mm));
   }
   if (at_focus.empty()) return std::nullopt;
-  // Those near focus depend least on the focal length.
+  // The frames near focus depend least on the focal length.
   std::vector<std::size_t> order(at_focus.size());
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
   std::stable_sort(order.begin(), order.end(),

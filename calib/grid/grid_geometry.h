@@ -28,7 +28,7 @@ struct GridViews {
 // result says in `message` why it is not done. Throws Error as LinearGrey does.
 GridGeometry MeasureGrid(const FocusSweep& sweep, int threads, const std::function<void()>& tick);
 
-// The same from points that were found. The counts of what was searched are the caller's.
+// Returns the result from points that were found. The counts of what was searched are the caller's.
 GridGeometry GeometryOf(const FocusSweep& sweep, const GridViews& found);
 
 // The magnification in the plane of focus by the sizes of something of known size in frames, with

@@ -11,9 +11,9 @@ TargetGrid ReadTargetGrid(const YamlNode& node) {
   TargetGrid grid;
   grid.pattern = *GridPatternOf(node.At("pattern").OneOf(
       {"chequerboard", "checkerboard", "chessboard", "charuco", "circles"}));
-  constexpr int kMost = 100000;  // IsValid has the limit
-  grid.columns = node.At("columns").Integer(0, kMost);
-  grid.rows = node.At("rows").Integer(0, kMost);
+  constexpr int kMaxCount = 100000;  // IsValid has the limit
+  grid.columns = node.At("columns").Integer(0, kMaxCount);
+  grid.rows = node.At("rows").Integer(0, kMaxCount);
   grid.square_mm = node.At("square_mm").PositiveNumber();
   const auto marker = node.Find("marker_mm"), dictionary = node.Find("dictionary");
   if (grid.pattern == GridPattern::kCharuco) {
@@ -54,9 +54,9 @@ void ReadGrid(const YamlNode& root, SweepFile* sweep) {
     if (sweep->grid_views.empty()) throw views->ErrorHere("one image or more is expected");
   }
   if (const auto alignment = root.Find("stage_alignment_deg")) {
-    constexpr double kMost = 45;
+    constexpr double kMaxCount = 45;
     sweep->stage_alignment_deg = alignment->PositiveNumber();
-    if (*sweep->stage_alignment_deg > kMost)
+    if (*sweep->stage_alignment_deg > kMaxCount)
       throw alignment->ErrorHere("a standard deviation of at most 45 degrees is expected");
   }
 }

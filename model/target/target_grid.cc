@@ -17,7 +17,7 @@
 namespace thicklens::model {
 namespace {
 
-constexpr int kFewest = 3, kMost = 200;  // squares or circles along a side
+constexpr int kMinCount = 3, kMaxCount = 200;  // squares or circles along a side
 constexpr double kSmallestMm = 1e-4, kLargestMm = 1e4;
 
 // The dictionaries that OpenCV 4.6 has, in the order of its enumeration.
@@ -87,9 +87,9 @@ std::optional<GridPattern> GridPatternOf(const std::string& name) {
 
 bool TargetGrid::IsValid(std::string* why) const {
   for (const auto& [name, count] : {std::pair("columns", columns), {"rows", rows}}) {
-    if (count < kFewest || count > kMost)
-      return Fail(why,
-                  fmt::format("{} must be from {} to {}, found {}", name, kFewest, kMost, count));
+    if (count < kMinCount || count > kMaxCount)
+      return Fail(why, fmt::format("{} must be from {} to {}, found {}", name, kMinCount, kMaxCount,
+                                   count));
   }
   if (!(square_mm >= kSmallestMm && square_mm <= kLargestMm)) {
     return Fail(why, fmt::format("square_mm must be from {} to {} mm, found {}", kSmallestMm,
@@ -144,8 +144,8 @@ TargetGrid ParseTargetGrid(const std::string& text) {
   grid.rows = *rows;
   grid.square_mm = *square_mm;
   const bool is_charuco = grid.pattern == GridPattern::kCharuco;
-  constexpr std::size_t kMostParts = 5;
-  if (parts.size() > (is_charuco ? kMostParts : 3)) throw wrong("");
+  constexpr std::size_t kMaxParts = 5;
+  if (parts.size() > (is_charuco ? kMaxParts : 3)) throw wrong("");
   if (is_charuco) grid.marker_mm = kMarkerPart * grid.square_mm;
   if (parts.size() > 3) {
     const std::optional<double> marker_mm = NumberOf<double>(parts[3]);

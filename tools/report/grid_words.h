@@ -9,12 +9,13 @@
 
 namespace thicklens::tools {
 
-// What the grid on the target shows, one line each; empty: there is none.
+// Returns the findings by the grid on the target, one line each; empty: there is none.
 std::vector<std::string> GridLines(const calib::GridGeometry& grid);
-// What the marks of the target's sheet show, one line; empty: there are none in view.
+// Returns the findings by the marks of the target's sheet in one line; empty: there are none in
+// view.
 std::string MarksLine(const calib::Calibration& calibration);
 
-// The same for --json; null: no grid was stated, or no marks are in view.
+// Returns both for --json; null: no grid was stated, or no marks are in view.
 nlohmann::json GridJson(const calib::GridGeometry& grid);
 nlohmann::json MarksJson(const calib::SheetMarks& marks);
 

@@ -107,7 +107,7 @@ TEST(GridAdjustment, ADiscIsSeenAtItsCentroid) {
 }
 
 // 40 noisy runs: the errors in their standard deviations have a mean square of 1, within what 40
-// runs can tell (sqrt(2/40) = 0.22, three times), and the mean is not far from 0.
+// runs show (sqrt(2/40) = 0.22, three times), and the mean is not far from 0.
 TEST(GridAdjustment, SigmasAreTheScatter) {
   constexpr int kRuns = 40;
   std::vector<double> squares(4, 0.0), sums(4, 0.0);

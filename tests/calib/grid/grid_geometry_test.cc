@@ -1,4 +1,4 @@
-// What a grid shows of the camera, from points that OpenCV projected.
+// The camera by a grid, from points that OpenCV projected.
 #include "calib/grid/grid_geometry.h"
 
 #include <gmock/gmock.h>
@@ -124,7 +124,7 @@ TEST(GridGeometry, AShortSweepLeavesImageDistanceAndDepthOpen) {
   EXPECT_FALSE(found.image_distance_mm);
   EXPECT_THAT(found.open, Contains(::testing::AllOf(HasSubstr("image distance"),
                                                     HasSubstr("distance of the target"))));
-  // What is fixed: f/z.
+  // The ratio f/z is fixed.
   EXPECT_LT(std::abs(Sigmas(found.combinations[0].value, 1500 / 260.0)), 3);
   EXPECT_LT(found.combinations[0].value.sigma, 0.006 * 1500 / 260.0);
 }

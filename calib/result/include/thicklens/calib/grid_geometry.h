@@ -40,7 +40,7 @@ struct SheetMarks {
   std::optional<model::Estimate> tilt_right_deg, tilt_down_deg;
 };
 
-// What a grid on the target shows of the camera: focal length (image distance), principal point and
+// The camera as a grid on the target shows it: focal length (image distance), principal point and
 // distortion. A quantity that the frames leave open is absent.
 struct GridGeometry {
   bool done = false;                         // true: the adjustment gave a result

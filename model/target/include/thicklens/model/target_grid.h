@@ -75,11 +75,11 @@ THICKLENS_EXPORT int DictionaryNumber(const std::string& name);
 THICKLENS_EXPORT std::vector<std::vector<bool>> MarkerModules(const std::string& dictionary,
                                                               int number);
 
-// The marks at the corners of the sheet of a texture. They are markers of `kSheetDictionary` whose
-// number states the corner and their side. The distances between marks along x and y are whole
-// multiples of `kMarkStep` sides, so that two marks in view give the scale of the sheet without any
-// statement.
+// The dictionary of the marks at the corners of the sheet of a texture. A marker's number states
+// the corner and the side.
 inline constexpr char kSheetDictionary[] = "apriltag_36h11";
+// The distances between marks along x and y are whole multiples of so many sides, so that two marks
+// in view give the scale of the sheet without any statement.
 inline constexpr int kMarkStep = 4;
 // A mark of a sheet.
 struct SheetMark {
