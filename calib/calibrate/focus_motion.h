@@ -17,10 +17,10 @@ namespace thicklens::calib {
 // model::DefocusPerAperture at this D, and the image scale is proportional to D/z. A target at the
 // equivalent depth
 //   z' = u/(1 - c/A),  A = -dc/d ln(scale),  u = dD/d ln(scale), both at focus,
-// in front of a thin lens with the magnification |A| at its in-focus object distance u shows the same blur
-// in every frame. If the sensor moves, A = 1, u = xf and z' = xf^2/D, so that the scale is the
-// same, too. If the lens moves, A = (1 - (f2/f1) m^2)/(1 + xf/zf), u = 1/(1/xf + 1/zf), and the
-// scale is the same to second order. |dz'/d reading| is 1 at focus.
+// in front of a thin lens with the magnification |A| at its in-focus object distance u shows the
+// same blur in every frame. If the sensor moves, A = 1, u = xf and z' = xf^2/D, so that the scale
+// is the same, too. If the lens moves, A = (1 - (f2/f1) m^2)/(1 + xf/zf), u = 1/(1/xf + 1/zf), and
+// the scale is the same to second order. |dz'/d reading| is 1 at focus.
 class FocusMotion {
  public:
   // The motion by xf, mm from the rear principal plane, at the reading at focus. `moves` is kLens

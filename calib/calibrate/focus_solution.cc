@@ -317,10 +317,10 @@ class Solution {
       ForgetFocus();
       Refuse(
           motion_ == nullptr
-              ? fmt::format(
-                    "the blur does not determine the in-focus object distance: {:.1f} +- {:.1f} mm in a "
-                    "sweep from {:.1f} to {:.1f} mm, with the bench offset held fixed",
-                    zf, own_zf_sigma, nearest, farthest)
+              ? fmt::format("the blur does not determine the in-focus object distance: {:.1f} +- "
+                            "{:.1f} mm in a "
+                            "sweep from {:.1f} to {:.1f} mm, with the bench offset held fixed",
+                            zf, own_zf_sigma, nearest, farthest)
               : fmt::format(
                     "the blur does not determine the reading at focus: {} +- {} in a sweep of {}",
                     Shown(zf), ShownError(zf, own_zf_sigma), ShownRange(nearest, farthest)));
@@ -450,7 +450,8 @@ class Solution {
                   farthest_mm - nearest_mm, fit_.values[kFocusDepth], zero_mm.value, zero_mm.sigma)
             : fmt::format("by {} it is {:.4g} +- {:.2g} mm", origin, zero_mm.value, zero_mm.sigma);
     return fmt::format(
-        "the bench offset is not known well enough: {}, so that the in-focus object distance is {:.1f} +- "
+        "the bench offset is not known well enough: {}, so that the in-focus object distance is "
+        "{:.1f} +- "
         "{:.1f} mm with a focal length of {:.4g} mm. {}. {}",
         from, fit_.values[kFocusDepth], result_.summary.focus_depth_mm->sigma,
         evidence_.setup.lens.front_focal_length_mm, KnownReading(),

@@ -8,8 +8,8 @@
 
 namespace thicklens::calib {
 
-// Standard deviations by which the in-focus object distance must exceed the focal length, and kappa 0, so
-// that d1 and kappa are determined.
+// Standard deviations by which the in-focus object distance must exceed the focal length, and kappa
+// 0, so that d1 and kappa are determined.
 inline constexpr double kKnownSigmas = 3;
 
 // Derives the results from the blur of the frames. It rejects frames that do not follow the others

@@ -92,7 +92,8 @@ std::vector<Contradiction> FindContradictions(const FocusSweep& sweep,
     if (!(std::abs(apart_mm) > kContradicts * both_mm + kSmallestContradiction * found_mm.value))
       return;
     const std::string text = fmt::format(
-        "{} puts the in-focus object distance at {:.5g} +- {:.2g} mm, {:+.3g} mm from that by {} ({:.5g} "
+        "{} puts the in-focus object distance at {:.5g} +- {:.2g} mm, {:+.3g} mm from that by {} "
+        "({:.5g} "
         "+- {:.2g} mm): one of them, the focal length, the pixel pitch or the unit of the readings "
         "is wrong{}",
         name, focus_mm, sigma_mm, apart_mm, origin, found_mm.value, found_sigma_mm,

@@ -66,7 +66,8 @@ class Field {
       return;
     }
     setup_.read_grey = [this](std::size_t frame) { return store_.Grey(frame); };
-    // Astigmatism comes first, because it may cause different in-focus object distances over the field.
+    // Astigmatism comes first, because it may cause different in-focus object distances over the
+    // field.
     if (!evidence_.axial) MeasureAstigmatism(sweep_, evidence_, fit_, &result_);
     MapTiles(setup_.size_px.minCoeff() < kSmallField ? 3 : 5);
     MeasureChannels();

@@ -52,8 +52,8 @@ model::EffectSelection SelectEffects(const EffectSelection& selection,
   model::EffectConditions conditions;
   conditions.camera = *light_field.camera;
   if (light_field.grid) conditions.planes = light_field.grid->planes;
-  // Views do not state their depths: every depth from half of the in-focus object distance on is possible.
-  // The impact of defocus and aperture shape is therefore not reported.
+  // Views do not state their depths: every depth from half of the in-focus object distance on is
+  // possible. The impact of defocus and aperture shape is therefore not reported.
   constexpr double kFarMm = 1e6;
   const double near_mm = std::min(light_field.camera->focus_depth_mm(), kFarMm) / 2;
   model::EffectSelection decision =

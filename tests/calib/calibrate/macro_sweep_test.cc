@@ -191,7 +191,8 @@ TEST(MacroSweep, AStatementThatTheImageScaleContradictsGivesAWarning) {
       {model::ConjugateKind::kFocusDepth, {200, 0.1}, "focus_depth_mm"});
   c = CalibrateWithoutMap(sweep);
   ASSERT_EQ(c.summary.outcome, Outcome::kRefused);
-  EXPECT_THAT(c.summary.reason, StartsWith("focus_depth_mm puts the in-focus object distance at 200 "));
+  EXPECT_THAT(c.summary.reason,
+              StartsWith("focus_depth_mm puts the in-focus object distance at 200 "));
 }
 
 // A rough bench offset beside a more precise statement only has to agree with it.
@@ -207,7 +208,8 @@ TEST(MacroSweep, ARoughOffsetOnlyHasToAgree) {
   sweep.sweep.offset_mm = model::Estimate{180, 15};
   c = CalibrateWithoutMap(sweep);
   EXPECT_EQ(c.diagnostics.bench_offset_from, "magnification");
-  EXPECT_THAT(c.summary.warnings, Contains(StartsWith("offset_mm puts the in-focus object distance")));
+  EXPECT_THAT(c.summary.warnings,
+              Contains(StartsWith("offset_mm puts the in-focus object distance")));
   // The image scale takes its place only if it is much more precise.
   sweep.sweep.stated_focus.clear();
   sweep.sweep.offset_mm = model::Estimate{112, 15};

@@ -22,7 +22,8 @@ class THICKLENS_EXPORT BlurModel {
  public:
   // Returns nothing if the fit gave no image distance or no blur ratio that a lens can have.
   static std::optional<BlurModel> Of(const FocusSweep& sweep, const Calibration& calibration);
-  // Makes the model from one side's in-focus object distance and blur ratio, with the floor of the fit.
+  // Makes the model from one side's in-focus object distance and blur ratio, with the floor of the
+  // fit.
   static std::optional<BlurModel> OfSide(const FocusSweep& sweep, const Calibration& calibration,
                                          const SideFit& side);
   // Returns the model that a simulated sweep was made with.

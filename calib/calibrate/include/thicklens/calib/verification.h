@@ -69,8 +69,8 @@ struct Verification {
 // sweep was calibrated with. Both covariance matrices count. The file states no systematic interval
 // of the stored values. Therefore the systematic parts of the new sweep are counted once, with an
 // even distribution over their intervals, except those that the numbers of the camera file cause:
-// they move both calibrations alike. The in-focus object distance follows from d1: it is listed and not
-// counted. Throws Error if `stored` has no calibration or if the options are not valid.
+// they move both calibrations alike. The in-focus object distance follows from d1: it is listed and
+// not counted. Throws Error if `stored` has no calibration or if the options are not valid.
 THICKLENS_EXPORT Verification VerifyCalibration(const model::Camera& stored,
                                                 const FocusSweep& sweep, const Calibration& found,
                                                 const VerificationOptions& options);
