@@ -19,8 +19,8 @@ namespace thicklens::calib {
 namespace {
 
 constexpr double kSmallestSidePx = 64;  // of a rectangle that is measured alone
-constexpr double kMostLost = 0.5;       // of its sides, to the parts that move into it
-constexpr double kLeastShare = 0.02;    // of the region of interest
+constexpr double kMaxLost = 0.5;        // of its sides, to the parts that move into it
+constexpr double kMinShare = 0.02;      // of the region of interest
 constexpr double kBlurReach = 2;        // blurs, by which the light of another part reaches
 
 // Frames with their image scale. A frame that was not registered has the scale of the nearest
@@ -126,8 +126,8 @@ Calibration WithoutRelief(const FocusSweep& sweep, const CalibrationOptions& opt
   const cv::Rect2d seen = WithoutSeams(SeenByAll(whole, frames, RegionCentre(sweep)),
                                        kBlurReach * TypicalBlurPx(found), size);
   const double share = seen.area() / (static_cast<double>(size.width) * size.height);
-  if (!(std::min(seen.width, seen.height) >= kSmallestSidePx) || !(share >= kLeastShare) ||
-      !(seen.area() >= kMostLost * kMostLost * whole.area())) {
+  if (!(std::min(seen.width, seen.height) >= kSmallestSidePx) || !(share >= kMinShare) ||
+      !(seen.area() >= kMaxLost * kMaxLost * whole.area())) {
     return Refused(std::move(found),
                    fmt::format("no rectangle of at least {:.0f} x {:.0f} px is at one depth in all "
                                "frames",

@@ -14,9 +14,9 @@ constexpr double kSmoothingPx = 1.5;
 constexpr double kThreshold = 0.25;  // of the steepest gradient
 constexpr double kTopQuantile = 0.999;
 constexpr int kMarginPx = 3;
-constexpr double kFromLinePx = 2;     // rms distance of the pixels from the line
-constexpr double kLeastLength = 0.5;  // of the shorter side
-constexpr double kLeastFilled = 0.5;  // pixels per px of the length
+constexpr double kFromLinePx = 2;   // rms distance of the pixels from the line
+constexpr double kMinLength = 0.5;  // of the shorter side
+constexpr double kMinFilled = 0.5;  // pixels per px of the length
 
 }  // namespace
 
@@ -39,8 +39,8 @@ bool ShowsLoneEdge(const cv::Mat& grey) {
   if (!(std::sqrt(std::max(0.0, axes.eigenvalues()[0])) < kFromLinePx)) return false;
   // A line of evenly spread pixels has the variance length^2/12 along itself.
   const double length_px = std::sqrt(12 * axes.eigenvalues()[1]);
-  return length_px > kLeastLength * std::min(grey.cols, grey.rows) &&
-         static_cast<double>(pixels.size()) > kLeastFilled * length_px;
+  return length_px > kMinLength * std::min(grey.cols, grey.rows) &&
+         static_cast<double>(pixels.size()) > kMinFilled * length_px;
 }
 
 }  // namespace thicklens::calib

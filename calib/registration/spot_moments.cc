@@ -24,12 +24,12 @@ constexpr double kSameStrength = 3;      // ratio to the median of the points
 constexpr double kRoundness = 1.7;       // ratio of the sides of a point's box
 constexpr double kEven = 0.08;           // of the strongest point: more is no ground
 constexpr double kOutstanding = 12;      // of the ground's robust standard deviation
-constexpr double kMostUneven = 0.12;     // share of the pixels that may differ from the ground
+constexpr double kMaxUneven = 0.12;      // share of the pixels that may differ from the ground
 constexpr double kApart = 4;             // spacing over the diameter of a point
 constexpr double kRing = 1.5;            // outer radius of the ring over the inner
-constexpr double kFewestOfRing = 0.3;    // of its pixels without neighbours
+constexpr double kMinOfRing = 0.3;       // of its pixels without neighbours
 constexpr double kReachOfNeighbour = 4;  // sigmas of a neighbour that stay outside the window
-constexpr double kLeastFlux = 8;         // of its standard deviation
+constexpr double kMinFlux = 8;           // of its standard deviation
 constexpr int kIterations = 8;
 constexpr double kSettledPx = 1e-3;
 
@@ -107,7 +107,7 @@ std::optional<Plane> FitGround(const cv::Mat& grey, const cv::Point2d& centre, d
       ++count;
     }
   }
-  if (count < 8 || count < kFewestOfRing * all) return std::nullopt;
+  if (count < 8 || count < kMinOfRing * all) return std::nullopt;
   const Eigen::Vector3d plane = normal.ldlt().solve(right);
   const double rest = squares - plane.dot(right);
   return Plane{plane[0], plane[1], plane[2], std::sqrt(std::max(0.0, rest) / (count - 3)), count};
@@ -182,7 +182,7 @@ SpotPattern FindSpots(const cv::Mat& grey) {
   const double uneven = static_cast<double>(cv::countNonZero(
                             cv::abs(smooth) > std::max(kEven * strongest, 4 * noise))) /
                         static_cast<double>(smooth.total());
-  pattern.is_nothing_else = strongest > kOutstanding * NoiseOf(smooth) && uneven < kMostUneven &&
+  pattern.is_nothing_else = strongest > kOutstanding * NoiseOf(smooth) && uneven < kMaxUneven &&
                             others < 0.2 * static_cast<double>(pattern.centres_px.size()) &&
                             pattern.spacing_px > kApart * diameter_px;
   return pattern;
@@ -257,7 +257,7 @@ SpotMoments MeasureSpot(const cv::Mat& grey, const cv::Point2d& start,
       }
     }
     const double noise2 = ground->noise * ground->noise;
-    if (!(flux > kLeastFlux * std::sqrt(noise2 * pixels))) {
+    if (!(flux > kMinFlux * std::sqrt(noise2 * pixels))) {
       result.fault = SpotFault::kFaint;
       return result;
     }

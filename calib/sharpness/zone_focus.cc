@@ -14,14 +14,14 @@ namespace thicklens::calib {
 namespace {
 
 constexpr double kZonePx = 20;
-constexpr int kMostZones = 16;
+constexpr int kMaxZones = 16;
 constexpr double kSmoothingPx = 1;
 constexpr std::size_t kMinOfTop = 4;
 constexpr double kTop = 0.5;
 // A zone whose sharpest frame exceeds the least sharp ones by less than this shows noise alone.
-constexpr double kLeastRise = 1.3;
-constexpr double kLeastSigma = 0.05;  // of a step: two zones never agree better
-constexpr double kMostSigma = 1.5;    // of a step
+constexpr double kMinRise = 1.3;
+constexpr double kMinSigma = 0.05;  // of a step: two zones never agree better
+constexpr double kMaxSigma = 1.5;   // of a step
 
 struct Sample {
   double reading_mm = 0, sharpness = 0;
@@ -75,8 +75,8 @@ std::optional<model::Estimate> PeakOf(const std::vector<Sample>& samples) {
   const auto least =
       std::min_element(samples.begin(), samples.end(),
                        [](const Sample& a, const Sample& b) { return a.sharpness < b.sharpness; });
-  if (!(top->sharpness > kLeastRise * least->sharpness)) return std::nullopt;
-  // What the noise adds to every frame is below the smallest value.
+  if (!(top->sharpness > kMinRise * least->sharpness)) return std::nullopt;
+  // The noise adds less than the smallest value to every frame.
   const double half = least->sharpness + kTop * (top->sharpness - least->sharpness);
   auto first = top, last = top + 1;
   while (first != samples.begin() && (first - 1)->sharpness >= half) --first;
@@ -110,8 +110,8 @@ std::optional<model::Estimate> PeakOf(const std::vector<Sample>& samples) {
       std::max(0.0, variance * slope.dot((design.transpose() * design).inverse() * slope)));
   const double step_mm = (samples.back().reading_mm - samples.front().reading_mm) /
                          static_cast<double>(samples.size() - 1);
-  const double sigma_mm = std::hypot(half_mm * x_sigma, kLeastSigma * step_mm);
-  if (!(sigma_mm < kMostSigma * step_mm)) return std::nullopt;
+  const double sigma_mm = std::hypot(half_mm * x_sigma, kMinSigma * step_mm);
+  if (!(sigma_mm < kMaxSigma * step_mm)) return std::nullopt;
   return model::Estimate{middle_mm + half_mm * x_peak, sigma_mm};
 }
 
@@ -132,7 +132,7 @@ ZoneFocus FindZoneFocus(const ZoneSetup& setup) {
   });
   const cv::Size size = setup.read_grey(frames.front().frame).size();
   const auto count = [](int length_px) {
-    return std::clamp(static_cast<int>(length_px / kZonePx), 1, kMostZones);
+    return std::clamp(static_cast<int>(length_px / kZonePx), 1, kMaxZones);
   };
   grid.columns = count(size.width);
   grid.rows = count(size.height);

@@ -14,9 +14,9 @@ namespace {
 
 constexpr std::size_t kMinZones = 9;
 constexpr int kMinOfPart = 3;
-constexpr std::size_t kMostParts = 8;
+constexpr std::size_t kMaxParts = 8;
 constexpr double kCeiling = 16;        // of the square of a deviation
-constexpr double kLeastError = 0.1;    // of a step
+constexpr double kMinError = 0.1;      // of a step
 constexpr double kWithin = 4;          // errors from the depth of a zone's part
 constexpr double kApartInSteps = 0.7;  // distance of two depths
 constexpr double kApartInErrors = 6;
@@ -43,7 +43,7 @@ std::vector<Zone> ZonesOf(const ReliefFinding& finding, double step_mm) {
     zone.x = finding.columns > 1 ? 2.0 * column / (finding.columns - 1) - 1 : 0;
     zone.y = finding.rows > 1 ? 2.0 * row / (finding.rows - 1) - 1 : 0;
     zone.value_mm = sharpest->value;
-    zone.error_mm = std::max(sharpest->sigma, kLeastError * step_mm);
+    zone.error_mm = std::max(sharpest->sigma, kMinError * step_mm);
     zones.push_back(zone);
   }
   return zones;
@@ -156,7 +156,7 @@ std::vector<Depth> TakeParts(const ReliefFinding& finding, double step_mm,
                              std::vector<Zone>* zones) {
   std::vector<Depth> depths;
   std::vector<bool> was_tried(zones->size(), false);
-  while (depths.size() < kMostParts) {
+  while (depths.size() < kMaxParts) {
     int most = 0;
     std::size_t middle = 0;
     for (std::size_t i = 0; i < zones->size(); ++i) {

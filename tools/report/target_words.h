@@ -11,7 +11,7 @@ namespace thicklens::tools {
 // "measured as points: 48 of 50 bright points, 1320 measurements; left out: 80 at the border ...":
 // what was measured on the target; empty if nothing was.
 std::string TargetLine(const calib::TargetFinding& target);
-// The same as JSON, with the zones of a relief.
+// JSON of the same findings, with the zones of a relief.
 nlohmann::json TargetJson(const calib::TargetFinding& target);
 
 }  // namespace thicklens::tools

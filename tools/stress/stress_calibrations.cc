@@ -595,15 +595,6 @@ std::vector<StressCase> Targets() {
                           simulation->target.relief[0].size_mm.y() = 8;
                         }),
                         Truth(50)));
-  cases.push_back(Sweep("blocks-everywhere", "no rectangle of the field is at one depth",
-                        "refused: the target has relief, with a map of the depths",
-                        Simulated([](model::SweepSimulationOptions* simulation) {
-                          for (const double x_mm : {-1.2, 1.2}) {
-                            for (const double y_mm : {-1.2, 1.2})
-                              simulation->target.relief.push_back(Block(x_mm, y_mm, 1.2, 5));
-                          }
-                        }),
-                        Refusal({"the target has relief", "Map of the zones"})));
   return cases;
 }
 

@@ -103,7 +103,7 @@ double CoverAt(const ReliefPartOptions& part, const Eigen::Vector2d& place_mm, d
 
 cv::Mat Filtered(const cv::Mat& image, double step_px,
                  const std::function<double(const Eigen::Vector2d& frequency)>& transfer) {
-  // What is added for a fast transform continues the image periodically.
+  // The border that a fast transform needs continues the image periodically.
   const cv::Size size(cv::getOptimalDFTSize(image.cols), cv::getOptimalDFTSize(image.rows));
   cv::Mat spectrum;
   cv::copyMakeBorder(image, spectrum, 0, size.height - image.rows, 0, size.width - image.cols,

@@ -48,7 +48,7 @@ struct ReliefFinding {
   double region_share = 0;  // its area over that of the region of interest
 };
 
-// What was measured on the target of a sweep.
+// Findings about the target of a sweep.
 struct TargetFinding {
   // How the blur was measured: "texture", "edges", "points"; empty: it was not.
   std::string measured_as;
