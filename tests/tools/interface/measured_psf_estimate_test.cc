@@ -75,7 +75,7 @@ double Texture(double x, double y) {
 class Photographed {
  public:
   Photographed(const Shape& shape, double depth_mm, int views)
-      : psf_(PsfOf(shape)), points_(PointsOf(shape, 0.05)), depth_mm_(depth_mm), views_(views) {
+      : psf_(PsfOf(shape)), points_(PointsOf(shape, 0.1)), depth_mm_(depth_mm), views_(views) {
     camera_ = thicklens::testing::TestCameraFocusedAt(
         kFocusMm, "shaped", thicklens::testing::ThinLens(50, 2),
         thicklens::testing::CentredSensor(kSidePx, kSidePx, 0.003, TransferCurve::Linear()),
