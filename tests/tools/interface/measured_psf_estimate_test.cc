@@ -25,11 +25,6 @@ using Shape = std::function<double(double x, double y)>;
 
 double Disc(double x, double y) { return x * x + y * y <= 1 ? 1 : 0; }
 
-double Hexagon(double x, double y) {
-  const double u = std::abs(x), v = std::abs(y), edge = std::sqrt(0.75);
-  return v <= edge && edge * u + v / 2 <= edge ? 1 : 0;
-}
-
 // A disc of which the right side is cut off; its centroid is in the middle.
 double CatEye(double x, double y) {
   const double u = x - 0.3975;
@@ -80,7 +75,7 @@ double Texture(double x, double y) {
 class Photographed {
  public:
   Photographed(const Shape& shape, double depth_mm, int views)
-      : psf_(PsfOf(shape)), points_(PointsOf(shape, 0.05)), depth_mm_(depth_mm), views_(views) {
+      : psf_(PsfOf(shape)), points_(PointsOf(shape, 0.1)), depth_mm_(depth_mm), views_(views) {
     camera_ = thicklens::testing::TestCameraFocusedAt(
         kFocusMm, "shaped", thicklens::testing::ThinLens(50, 2),
         thicklens::testing::CentredSensor(kSidePx, kSidePx, 0.003, TransferCurve::Linear()),
