@@ -128,7 +128,7 @@ class Field {
     return {std::move(fitted.region), MeanOfAxes(fitted.blur)};
   }
 
-  // The in-focus distance and the blur ratio of one region.
+  // The in-focus object distance and the blur ratio of one region.
   struct RegionFocus {
     model::Estimate focus_depth_mm, blur_ratio;
   };

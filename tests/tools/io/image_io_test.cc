@@ -10,11 +10,11 @@
 #include <string>
 #include <vector>
 
+#include "support/temporary_folder.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/io/data_hash.h"
 #include "thicklens/io/frame_files.h"
-#include "support/temporary_folder.h"
 #include "tools/support/image_file_bytes.h"
 
 namespace thicklens::io {
