@@ -12,7 +12,7 @@
 namespace thicklens::calib {
 
 // Decides from the frame with the steepest gradients what the target is, where it is not stated:
-// points, or one straight edge and nothing else, which is taken as a printed one. A stated texture
+// only points, or only one straight edge, which is taken as a printed one. A stated texture
 // that is such an edge has no spectra either, and is taken as one. A warning says what was decided.
 void RecogniseTarget(const std::function<cv::Mat(std::size_t)>& read_grey, FocusSweep* sweep,
                      Calibration* calibration);
@@ -22,7 +22,7 @@ void RecogniseTarget(const std::function<cv::Mat(std::size_t)>& read_grey, Focus
 QualityCheckOptions ChecksFor(model::SweepTarget target, QualityCheckOptions checks);
 
 // Whether the target covers so little of the frame that neither bands of the light nor what is
-// fixed to the frame can be told from it: an edge, or points.
+// fixed to the frame can be found beside it: an edge, or points.
 bool IsSparse(model::SweepTarget target);
 
 }  // namespace thicklens::calib

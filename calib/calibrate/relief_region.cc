@@ -56,7 +56,7 @@ bool IsPattern(const FocusSweep& sweep) {
   return sweep.target == model::SweepTarget::kAuto || sweep.target == model::SweepTarget::kTexture;
 }
 
-// The pixels that show the rectangle, and nothing else, in every frame.
+// The pixels that show only the rectangle in every frame.
 cv::Rect2d SeenByAll(const cv::Rect2d& rectangle, const std::vector<ZoneFrame>& frames,
                      const cv::Point2d& centre_px) {
   cv::Rect2d seen = rectangle;

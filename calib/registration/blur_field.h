@@ -43,7 +43,7 @@ struct TexturePower {
   std::optional<Exponent> exponent;
 };
 
-// What a registration shows of the blur over the field.
+// The blur over the field, as far as a registration shows it.
 struct BlurOverField {
   std::optional<BlurField> field;
   TexturePower texture;

@@ -51,7 +51,7 @@ Points AtOnePosition(const Points& points, double reading_sigma_mm) {
     const auto count = static_cast<double>(end - i);
     sum.u /= count;
     sum.scale_sigma_mm /= count;
-    // Of three and more, one may be wrong.
+    // One of three and more may be wrong.
     sum.reading_mm = Median(readings);
     sum.sigma_mm =
         std::max(std::hypot(reading_sigma_mm / std::sqrt(count), sum.scale_sigma_mm), 1e-6);

@@ -25,10 +25,10 @@ constexpr double kAgreementError = 1e-3;
 // that the smoother image got.
 constexpr double kLargestExponent = 1.5;
 constexpr int kMinRings = 4;
-// With fewer frequencies in a tile, all of them contain what the window cut off.
+// All of the frequencies contain what the window cut off, where a tile has fewer.
 constexpr int kMinBlurFrequencies = 24;
 constexpr int kBlurRounds = 4;
-constexpr double kMostLogRatio = 5;          // of the amplitudes in a tile
+constexpr double kMaxLogRatio = 5;           // of the amplitudes in a tile
 constexpr double kMinTileCondition = 1e-10;  // of the normal equations of a tile's blur
 constexpr float kLargestSine = 0.9F;         // sine of the remaining phase
 constexpr int kMinFrequencies = 12;
@@ -303,7 +303,7 @@ std::vector<TileBlur> TilePhases::Blurs(double blur_px2) const {
       squares = 0;
       for (const Entry& e : entries) {
         const double ratio =
-            std::exp(std::clamp(e.terms.dot(solution), -kMostLogRatio, kMostLogRatio));
+            std::exp(std::clamp(e.terms.dot(solution), -kMaxLogRatio, kMaxLogRatio));
         normal += e.weight * e.smooth * ratio * ratio * e.terms * e.terms.transpose();
         right += e.weight * ratio * (e.cross - ratio * e.smooth) * e.terms;
         squares += e.weight * (e.other - 2 * ratio * e.cross + ratio * ratio * e.smooth);

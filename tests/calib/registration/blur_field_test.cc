@@ -1,4 +1,4 @@
-// What a blur that changes over the field does to the image scale.
+// The effect on the image scale of a blur that changes over the field.
 #include "calib/registration/blur_field.h"
 
 #include <gtest/gtest.h>

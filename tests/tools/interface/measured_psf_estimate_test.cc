@@ -110,7 +110,7 @@ class Photographed {
                             TransferCurve::Linear());
   }
 
-  // With a PSF as the measured one; null: with the disc.
+  // The estimate with a PSF as the measured one; null: with the disc.
   LightField Estimate(const model::MeasuredPsf* psf) const {
     Camera camera = camera_;
     const bool is_measured = psf != nullptr;
