@@ -51,8 +51,8 @@ std::optional<FrameSpectrum> MeasureSpectrum(const cv::Mat& grey, const Eigen::V
                                              const FramePlace& place, const TargetWindow& window,
                                              const std::vector<Mode>& modes, std::size_t count);
 
-// Measures the same of an image whose pixel p shows the target at X = (p - origin)/scale, with a scale along
-// each axis, and without the division by the box of a pixel.
+// Measures the same of an image whose pixel p shows the target at X = (p - origin)/scale, with a
+// scale along each axis, and without the division by the box of a pixel.
 std::optional<FrameSpectrum> MeasureSums(const cv::Mat& image, const Eigen::Vector2d& origin_px,
                                          const Eigen::Vector2d& scale, const TargetWindow& window,
                                          const std::vector<Mode>& modes, std::size_t count);

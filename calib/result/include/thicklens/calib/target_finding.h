@@ -52,8 +52,8 @@ struct ReliefFinding {
 struct TargetFinding {
   // How the blur was measured: "texture", "edges", "points"; empty: it was not.
   std::string measured_as;
-  SpotFinding spots;
-  ReliefFinding relief;
+  SpotFinding spots;     // of points
+  ReliefFinding relief;  // depths of the zones of the field
 
   // The zones as a map of letters, one line for each row of zones: "a" for the first part, "b" for
   // the second, "." where a zone belongs to none of them.

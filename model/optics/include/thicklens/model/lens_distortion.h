@@ -49,7 +49,7 @@ struct LensDistortion {
   // of the way to the nearer border. Otherwise `why`, if not null, gets the field and the value.
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
   // The names of rows and columns of the covariance: "focal_length_px", "principal_point_x_px",
-  // "principal_point_y_px" and those of the coefficients, "k1", ..
+  // "principal_point_y_px" and those of the coefficients, such as "k1".
   THICKLENS_EXPORT std::vector<std::string> CovarianceOrder() const;
 
   // Returns the same lens for photographs of another size of the whole field, as they come from

@@ -40,7 +40,8 @@ THICKLENS_EXPORT std::string TargetKindName(TargetKind kind);  // "dead-leaves",
 // A part that stands out of the plane of the target and shows the pattern, too. It hides what is
 // behind it.
 struct ReliefPartOptions {
-  // kGear is a disc with 12 teeth, whose depth is a fifth of its radius.
+  // kRectangle and kDisc fill the size. kGear is a disc with 12 teeth, whose depth is a fifth of
+  // its radius.
   enum class Shape { kRectangle, kDisc, kGear };
   Shape shape = Shape::kRectangle;  // outline
   Eigen::Vector2d centre_mm{0, 0};  // from the target's centre, X right, Y down
