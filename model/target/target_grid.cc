@@ -18,6 +18,8 @@ namespace thicklens::model {
 namespace {
 
 constexpr int kMinCount = 3, kMaxCount = 200;  // squares or circles along a side
+// OpenCV's detectors need as many: three inner corners along a side, and eight of a ChArUco board.
+constexpr int kMinChequerCount = 4, kMinCharucoCorners = 8;
 constexpr double kSmallestMm = 1e-4, kLargestMm = 1e4;
 
 // The dictionaries that OpenCV 4.6 has, in the order of its enumeration.
@@ -86,10 +88,20 @@ std::optional<GridPattern> GridPatternOf(const std::string& name) {
 }
 
 bool TargetGrid::IsValid(std::string* why) const {
+  const bool is_chequerboard = pattern == GridPattern::kChequerboard;
+  const int least = is_chequerboard ? kMinChequerCount : kMinCount;
   for (const auto& [name, count] : {std::pair("columns", columns), {"rows", rows}}) {
-    if (count < kMinCount || count > kMaxCount)
-      return Fail(why, fmt::format("{} must be from {} to {}, found {}", name, kMinCount, kMaxCount,
-                                   count));
+    if (count < least || count > kMaxCount) {
+      return Fail(
+          why, fmt::format("{}{} must be from {} to {}, found {}", name,
+                           is_chequerboard ? " of a chequerboard" : "", least, kMaxCount, count));
+    }
+  }
+  const int corners = (columns - 1) * (rows - 1);
+  if (pattern == GridPattern::kCharuco && corners < kMinCharucoCorners) {
+    return Fail(why, fmt::format("columns and rows of a ChArUco board must give at least {} inner "
+                                 "corners, such as 5 x 3 squares, found {} by {} x {}",
+                                 kMinCharucoCorners, corners, columns, rows));
   }
   if (!(square_mm >= kSmallestMm && square_mm <= kLargestMm)) {
     return Fail(why, fmt::format("square_mm must be from {} to {} mm, found {}", kSmallestMm,

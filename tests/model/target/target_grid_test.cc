@@ -41,6 +41,12 @@ TEST(TargetGrid, AWrongLineIsRefusedWithTheForm) {
   EXPECT_THAT(ErrorOfGrid("11x8"), HasSubstr("PATTERN:COLUMNSxROWS:SQUARE_MM"));
   EXPECT_THAT(ErrorOfGrid("dots:11x8:10"), HasSubstr("the pattern 'dots' is not known"));
   EXPECT_THAT(ErrorOfGrid("circles:2x8:10"), HasSubstr("columns must be from 3 to 200, found 2"));
+  EXPECT_THAT(ErrorOfGrid("chequerboard:3x8:10"),
+              HasSubstr("columns of a chequerboard must be from 4 to 200, found 3"));
+  EXPECT_THAT(ErrorOfGrid("chequerboard:8x3:10"), HasSubstr("rows of a chequerboard must be"));
+  EXPECT_THAT(ErrorOfGrid("charuco:4x3:10"), HasSubstr("at least 8 inner corners"));
+  EXPECT_EQ(ParseTargetGrid("charuco:5x3:10").rows, 3);
+  EXPECT_EQ(ParseTargetGrid("chequerboard:4x4:10").rows, 4);
   EXPECT_THAT(ErrorOfGrid("circles:9x8:0"), HasSubstr("square_mm must be from"));
   EXPECT_THAT(ErrorOfGrid("circles:9x8:5:3"), HasSubstr("is expected"));
   EXPECT_THAT(ErrorOfGrid("charuco:9x8:5:6"), HasSubstr("marker_mm must be above 0 and below"));

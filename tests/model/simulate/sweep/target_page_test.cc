@@ -270,7 +270,8 @@ TEST(LayOutTarget, AGridFillsTheSheetOrTheField) {
   EXPECT_LE(field.pattern.width, 0.9 * 128);
   EXPECT_LE(field.pattern.height, 0.9 * 96);
   request.grid->square_mm = 40;
-  EXPECT_THAT(RefusalOf(request), HasSubstr("columns must be from 3 to 200, found 1"));
+  EXPECT_THAT(RefusalOf(request),
+              HasSubstr("columns of a chequerboard must be from 4 to 200, found 1"));
   request.view.reset();
   request.grid->columns = request.grid->rows = 9;
   EXPECT_THAT(RefusalOf(request), HasSubstr("does not fit the sheet"));
