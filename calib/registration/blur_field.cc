@@ -17,6 +17,7 @@ constexpr double kMinFieldCondition = 1e-12;
 // Relative error of the stretch that the exponent of the texture leaves. Simulated dead leaves,
 // noise and a checkerboard show about that much.
 constexpr double kStretchError = 0.15;
+constexpr double kSeenFactor = 2;  // standard deviations from which on a factor corrects the scales
 
 // Textures between white noise and isolated edges. The line of the exponents is used this far
 // beyond the frequencies that show them.
@@ -72,6 +73,12 @@ std::optional<ExponentLine> FitExponents(const std::vector<BlurOverField>& blurs
   return line;
 }
 
+// The factor by which scales are corrected: one that is not significant is an error alone.
+model::Estimate Correcting(const model::Estimate& factor) {
+  if (std::abs(factor.value) > kSeenFactor * factor.sigma) return factor;
+  return {0, std::hypot(factor.value, factor.sigma)};
+}
+
 }  // namespace
 
 std::optional<BlurField> FitBlurField(const std::vector<TileBlur>& tiles) {
@@ -114,24 +121,32 @@ double StretchByBlur(double curvature, double astigmatism, double texture_expone
 void TakeOutStretchByBlur(const std::vector<BlurOverField>& blurs,
                           std::vector<ScaleSample>* samples) {
   std::vector<ProportionalTerm> curvatures, astigmatisms;
+  std::vector<model::Estimate> changes;
   for (std::size_t i = 0; i < samples->size(); ++i) {
     const double change = (*samples)[i].scale - 1;
     if (!blurs[i].field || change == 0) continue;
     const auto& [curvature, astigmatism] = *blurs[i].field;
     if (!(curvature.sigma > 0) || !(astigmatism.sigma > 0)) continue;
+    changes.push_back({change, (*samples)[i].registration.scale_sigma});
     curvatures.push_back({change, curvature.value, curvature.sigma});
     astigmatisms.push_back({change, astigmatism.value, astigmatism.sigma});
   }
-  const auto curvature = FitProportion(curvatures), astigmatism = FitProportion(astigmatisms);
+  // Scales that differ by their errors alone would turn a curvature that all frames have into a
+  // factor without a meaning.
+  if (!ExceedErrors(changes)) return;
+  const auto by_curvature = FitProportion(curvatures);
+  const auto by_astigmatism = FitProportion(astigmatisms);
   const auto exponent = FitExponents(blurs);
-  if (!curvature || !astigmatism || !exponent) return;
+  if (!by_curvature || !by_astigmatism || !exponent) return;
+  const model::Estimate curvature = Correcting(*by_curvature);
+  const model::Estimate astigmatism = Correcting(*by_astigmatism);
   for (std::size_t i = 0; i < samples->size(); ++i) {
     ScaleSample& sample = (*samples)[i];
     const double n = exponent->At(blurs[i].texture.log_frequency);
-    const double of_curvature = StretchByBlur(curvature->value, 0, n);
-    const double of_astigmatism = StretchByBlur(0, astigmatism->value, n);
+    const double of_curvature = StretchByBlur(curvature.value, 0, n);
+    const double of_astigmatism = StretchByBlur(0, astigmatism.value, n);
     sample.shared_stretch_sigma = std::hypot(
-        std::hypot(StretchByBlur(curvature->sigma, 0, n), StretchByBlur(0, astigmatism->sigma, n)),
+        std::hypot(StretchByBlur(curvature.sigma, 0, n), StretchByBlur(0, astigmatism.sigma, n)),
         kStretchError * std::hypot(of_curvature, of_astigmatism));
     const double stretch = (of_curvature + of_astigmatism) * (sample.scale - 1);
     Registration& registration = sample.registration;

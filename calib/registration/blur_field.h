@@ -63,8 +63,10 @@ double StretchByBlur(double curvature, double astigmatism, double texture_expone
 // d proportional to s - 1 for the scale s [D156], and a factor is fitted to all frames. The
 // exponent of the texture is fitted as a linear function of the frequency, because the frames with
 // a strong blur show low frequencies only, and not their exponent. The error that remains and that
-// all samples share is stored in each. Changes nothing for fewer than five frames that show it.
-// `blurs` are those of the samples.
+// all samples share is stored in each. A factor within twice its error corrects no scale and is
+// part of that error. Changes nothing for fewer than five frames that show it, and where the scales
+// differ from 1 by no more than their errors, as those of aligned frames do. `blurs` are those of
+// the samples.
 void TakeOutStretchByBlur(const std::vector<BlurOverField>& blurs,
                           std::vector<ScaleSample>* samples);
 

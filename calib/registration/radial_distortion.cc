@@ -92,6 +92,15 @@ std::optional<model::Estimate> FitProportion(const std::vector<ProportionalTerm>
   return result;
 }
 
+bool ExceedErrors(const std::vector<model::Estimate>& responses) {
+  double squares = 0, errors = 0;
+  for (const model::Estimate& response : responses) {
+    squares += response.value * response.value;
+    errors += response.sigma * response.sigma;
+  }
+  return squares > kDefined * errors;
+}
+
 std::optional<model::Estimate> FitRadialDistortion(const std::vector<ScaleSample>& samples) {
   std::vector<Term> terms;
   for (const ScaleSample& s : samples) {
@@ -101,12 +110,12 @@ std::optional<model::Estimate> FitRadialDistortion(const std::vector<ScaleSample
   }
   // Where the scales differ by no more than their own errors, the response consists of these
   // errors.
-  double squares = 0, errors = 0;
+  std::vector<model::Estimate> responses;
   for (const ScaleSample& s : samples) {
-    squares += std::pow(CubicPerDistortion(s.scale), 2);
-    errors += std::pow(2 * s.registration.scale_sigma / std::pow(s.scale, 3), 2);
+    responses.push_back(
+        {CubicPerDistortion(s.scale), 2 * s.registration.scale_sigma / std::pow(s.scale, 3)});
   }
-  if (!(squares > kDefined * errors)) return std::nullopt;
+  if (!ExceedErrors(responses)) return std::nullopt;
   return FitProportion(terms);
 }
 

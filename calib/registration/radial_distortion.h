@@ -25,8 +25,13 @@ struct ProportionalTerm {
 // equal scale share the errors of the reference. Returns std::nullopt for fewer than five terms.
 std::optional<model::Estimate> FitProportion(const std::vector<ProportionalTerm>& terms);
 
+// Returns whether responses, with their standard deviations, exceed these errors by so much that a
+// factor can be fitted to them: the sum of their squares is more than 16 times that of the errors.
+bool ExceedErrors(const std::vector<model::Estimate>& responses);
+
 // Fits k to the cubic terms of a sweep's registrations, robust against single outliers. Returns
-// std::nullopt for fewer than five samples.
+// std::nullopt for fewer than five samples, and where their scales differ by no more than their
+// errors.
 std::optional<model::Estimate> FitRadialDistortion(const std::vector<ScaleSample>& samples);
 
 }  // namespace thicklens::calib

@@ -92,6 +92,49 @@ TEST(BlurField, TheStretchIsTakenOutOfTheScales) {
   EXPECT_EQ(samples[3].scale, before[3].scale) << "nothing is known of these";
 }
 
+// Frames that a program aligned, or of a telecentric lens: all blurs curve, and the scales are
+// noise.
+std::vector<ScaleSample> AlignedSamples(double scale_sigma, double curvature,
+                                        std::vector<BlurOverField>* blurs) {
+  std::mt19937 random(9);
+  std::normal_distribution<double> normal(0, 1);
+  std::vector<ScaleSample> samples;
+  for (int i = 0; i < 21; ++i) {
+    ScaleSample sample;
+    sample.scale = 1 + 1e-4 * normal(random);
+    sample.registration.scale = sample.scale;
+    sample.registration.scale_sigma = scale_sigma;
+    samples.push_back(sample);
+    BlurOverField blur;
+    blur.field = BlurField{{curvature + 1e-3 * normal(random), 1e-3}, {0, 1e-3}};
+    blur.texture = {-2.5, TexturePower::Exponent{-2, -2.5}};
+    blurs->push_back(blur);
+  }
+  return samples;
+}
+
+TEST(BlurField, ScalesThatAreNoiseAreLeftAsTheyAre) {
+  std::vector<BlurOverField> blurs;
+  std::vector<ScaleSample> samples = AlignedSamples(1e-4, 0.02, &blurs);
+  const std::vector<ScaleSample> before = samples;
+  TakeOutStretchByBlur(blurs, &samples);
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    EXPECT_EQ(samples[i].scale, before[i].scale);
+    EXPECT_FALSE(samples[i].registration.stretch_by_blur);
+  }
+}
+
+TEST(BlurField, AFactorWithinItsErrorChangesTheErrorAlone) {
+  std::vector<BlurOverField> blurs;
+  std::vector<ScaleSample> samples = AlignedSamples(1e-6, 0, &blurs);
+  const std::vector<ScaleSample> before = samples;
+  TakeOutStretchByBlur(blurs, &samples);
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    EXPECT_EQ(samples[i].scale, before[i].scale);
+    EXPECT_GT(samples[i].shared_stretch_sigma, 0);
+  }
+}
+
 // Slope of ln(measured scale/true scale) against the change of the scale, from frames of a lens
 // with a curved field, and the largest slope that the samples admit as their own error.
 struct Slope {
