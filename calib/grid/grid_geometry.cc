@@ -21,6 +21,8 @@ namespace {
 constexpr std::size_t kMaxFrames = 60;       // of a sweep, evenly chosen
 constexpr std::size_t kMinFramesOfGrid = 4;  // that show a motion
 constexpr double kPrintError = 0.003;        // relative, of the size of a print
+constexpr double kPointPx = 0.02;            // least standard deviation of a point in a frame
+constexpr double kFileError = 0.05;          // of the file's focal length, which scales the tilt
 // Part of the unit of a parameter above which a direction of the parameters is called open. The
 // weak prior then has an effect below 0.3 % of its distance.
 constexpr double kOpen = 0.05;
@@ -51,6 +53,45 @@ double ScaleOf(const GridView& view, const std::vector<Eigen::Vector2d>& target_
   }
   const Eigen::MatrixXd map = design.colPivHouseholderQr().solve(image);
   return std::sqrt(std::abs(map.topRows(2).determinant()));
+}
+
+// px of the image per mm of the target where the axis meets it, by the pose of a view before a
+// camera without distortion. A tilted target is not smaller there, though its affine map is.
+model::Estimate ScaleByPose(const GridSetup& setup, const GridView& view) {
+  const GridPose pose = FitPose(setup, Eigen::VectorXd::Zero(kRailAt), view);
+  const auto depth_mm = [](const Eigen::VectorXd& six) {
+    return PlaneOfTarget(six.head<3>(), six.tail<3>()).depth_mm;
+  };
+  Eigen::VectorXd six(6);
+  six << pose.rotation, pose.place_mm;
+  const double at_mm = depth_mm(six);
+  const double scale = setup.focal_length_px / at_mm;
+  if (!(at_mm > 0) || !std::isfinite(scale)) {
+    const double affine = ScaleOf(view, setup.target_mm);
+    return {affine, kPrintError * affine};
+  }
+  Eigen::VectorXd gradient(6);
+  for (int i = 0; i < 6; ++i) {
+    const double step = 1e-6 * (i < 3 ? 1 : at_mm);
+    Eigen::VectorXd more = six, less = six;
+    more[i] += step;
+    less[i] -= step;
+    gradient[i] = (depth_mm(more) - depth_mm(less)) / (2 * step);
+  }
+  const auto count = static_cast<double>(view.ids.size());
+  const double noise_px =
+      std::max(kPointPx, pose.rms_px * std::sqrt(count / std::max(1.0, count - 3)));
+  const double variance = gradient.dot(pose.covariance * gradient);
+  return {scale, scale * noise_px * std::sqrt(std::max(0.0, variance)) / at_mm};
+}
+
+// The same with the error that the tilt has from that of the focal length.
+model::Estimate ScaleAtAxis(const GridSetup& setup, const GridView& view) {
+  model::Estimate scale = ScaleByPose(setup, view);
+  GridSetup longer = setup;
+  longer.focal_length_px *= 1 + kFileError;
+  scale.sigma = std::hypot(scale.sigma, ScaleByPose(longer, view).value - scale.value);
+  return scale;
 }
 
 // The position that a camera without the stated distortion would show.
@@ -279,19 +320,22 @@ class Geometry {
     const GridView& some =
         found_.frames.empty() ? found_.views.front() : found_.frames[found_.frames.size() / 2];
     // [S13] D = f2 (1 + m) for a target in focus; f1 D/(f2 p) is the distance that chief rays show.
-    const double magnification =
-        ScaleOf(some, setup_.target_mm) * sweep_.camera.sensor.pixel_pitch_mm;
-    setup_.focal_length_px =
-        sweep_.camera.lens.front_focal_length_mm * (1 + magnification) / sensor.pixel_pitch_mm;
+    const auto start_from = [&](double px_per_mm) {
+      setup_.focal_length_px = sweep_.camera.lens.front_focal_length_mm *
+                               (1 + px_per_mm * sensor.pixel_pitch_mm) / sensor.pixel_pitch_mm;
+    };
+    start_from(ScaleOf(some, setup_.target_mm));
+    start_from(ScaleAtAxis(setup_, some).value);
     setup_.reading_sigma_mm = sweep_.reading_sigma_mm;
     if (sweep_.stage_alignment_deg) setup_.alignment_rad = *sweep_.stage_alignment_deg * kPi / 180;
   }
 
   void MeasureScales() {
     for (std::size_t i = 0; i < found_.frames.size(); ++i) {
-      const double magnification =
-          ScaleOf(found_.frames[i], setup_.target_mm) * sweep_.camera.sensor.pixel_pitch_mm;
-      result_.scales.push_back({found_.readings_mm[i], magnification, 1e-4 * magnification});
+      const double pitch_mm = sweep_.camera.sensor.pixel_pitch_mm;
+      const model::Estimate scale = ScaleAtAxis(setup_, found_.frames[i]);
+      result_.scales.push_back(
+          {found_.readings_mm[i], scale.value * pitch_mm, scale.sigma * pitch_mm});
     }
   }
 
@@ -586,7 +630,7 @@ std::optional<model::StatedConjugate> MagnificationOfGrid(const std::vector<Grid
                                                           const std::string& name) {
   // The magnification of each frame, with the change from its plane to the plane of focus [D127]: m
   // zf/z at z.
-  std::vector<double> at_focus, beyond;
+  std::vector<double> at_focus, sigmas, beyond;
   for (const GridScale& scale : scales) {
     const double beyond_mm = sign * (scale.reading_mm - sharpest_reading_mm);
     double magnification = scale.magnification;
@@ -597,6 +641,7 @@ std::optional<model::StatedConjugate> MagnificationOfGrid(const std::vector<Grid
     }
     if (!(magnification > 0) || !std::isfinite(magnification)) continue;
     at_focus.push_back(magnification);
+    sigmas.push_back(scale.sigma);
     beyond.push_back(std::abs(beyond_mm));
   }
   if (at_focus.empty()) return std::nullopt;
@@ -606,14 +651,18 @@ std::optional<model::StatedConjugate> MagnificationOfGrid(const std::vector<Grid
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return beyond[a] < beyond[b]; });
   order.resize(std::min<std::size_t>(order.size(), 5));
-  std::vector<double> nearest;
-  for (const std::size_t i : order) nearest.push_back(at_focus[i]);
+  std::vector<double> nearest, nearest_sigmas;
+  for (const std::size_t i : order) {
+    nearest.push_back(at_focus[i]);
+    nearest_sigmas.push_back(sigmas[i]);
+  }
   const double value = Median(nearest);
   double scatter = 0;
   for (const double one : nearest) scatter = std::max(scatter, std::abs(one - value));
   model::StatedConjugate stated;
   stated.kind = model::ConjugateKind::kMagnification;
-  stated.value = {value, std::hypot(kPrintError * value, scatter)};
+  // Frames of one sweep see one target with the same points: their mean has the error of one.
+  stated.value = {value, std::hypot(kPrintError * value, scatter, Median(nearest_sigmas))};
   stated.name = name;
   return stated;
 }

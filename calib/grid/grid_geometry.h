@@ -32,7 +32,8 @@ GridGeometry MeasureGrid(const FocusSweep& sweep, int threads, const std::functi
 GridGeometry GeometryOf(const FocusSweep& sweep, const GridViews& found);
 
 // The magnification in the plane of focus by the sizes of something of known size in frames, with
-// the error of the print; absent without a size. `sign` is that of the reading in the depth.
+// the errors of the print and of the sizes; absent without a size. `sign` is that of the reading in
+// the depth.
 std::optional<model::StatedConjugate> MagnificationOfGrid(const std::vector<GridScale>& scales,
                                                           double front_focal_length_mm, double sign,
                                                           double sharpest_reading_mm,

@@ -156,6 +156,46 @@ TEST(GridGeometry, TheTiltOfTheTargetHasItsSense) {
   EXPECT_NEAR(found.tilt_down_deg->value, 0, 3 * found.tilt_down_deg->sigma + 0.1);
 }
 
+// The size on the axis is that of the depth there, however the target is tilted and wherever the
+// grid lies on it.
+TEST(GridGeometry, ATiltedGridHasTheSizeOfItsDepthOnTheAxis) {
+  for (const double degrees : {0.0, 15.0}) {
+    GridBench bench(60);
+    bench.cx = 319.5;
+    bench.cy = 239.5;
+    const double angle = degrees * 3.14159265 / 180;
+    constexpr double kRightMm = 6, kDepthMm = 260;
+    GridViews views;
+    bench.Sweep(11, 40, {0, angle, 0}, {kRightMm, -2, kDepthMm}, {0, 0}, &views);
+    const GridGeometry found = Measured(bench, views);
+    ASSERT_EQ(found.scales.size(), 11U) << found.message;
+    const double middle_mm = kDepthMm + kRightMm * std::tan(angle);
+    double squares = 0;
+    for (const GridScale& scale : found.scales) {
+      const double truth = 1500 * 0.006 / (middle_mm + scale.reading_mm);
+      // The camera file's focal length is 8 % short, which makes the tilt smaller.
+      EXPECT_NEAR(scale.magnification, truth, 0.003 * truth) << degrees;
+      EXPECT_LT(std::abs(scale.magnification - truth), 3.5 * scale.sigma) << degrees;
+      squares += std::pow((scale.magnification - truth) / scale.sigma, 2) / 11;
+    }
+    if (degrees == 0) {
+      EXPECT_LT(squares, 2.5);
+      EXPECT_GT(squares, 0.2);
+    }
+  }
+}
+
+TEST(GridGeometry, TheErrorOfTheSizesIsPartOfTheMagnification) {
+  std::vector<GridScale> scales;
+  for (const double reading_mm : {-1.0, 0.0, 1.0}) scales.push_back({reading_mm, 0.1, 1e-5});
+  const auto sure = MagnificationOfGrid(scales, 50, 1, 0, kFromGrid);
+  for (GridScale& scale : scales) scale.sigma = 0.002;
+  const auto unsure = MagnificationOfGrid(scales, 50, 1, 0, kFromGrid);
+  ASSERT_TRUE(sure && unsure);
+  EXPECT_EQ(unsure->value.value, sure->value.value);
+  EXPECT_NEAR(std::pow(unsure->value.sigma, 2), std::pow(sure->value.sigma, 2) + 4e-6, 1e-8);
+}
+
 // None of them may pass for a distortion.
 TEST(GridGeometry, NoFalseDistortion) {
   const double half = 55;  // mm, of the sheet's diagonal
