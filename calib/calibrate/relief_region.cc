@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "calib/calibrate/recognised_target.h"
 #include "calib/registration/scale_tracking.h"
 #include "calib/sharpness/zone_focus.h"
 #include "calib/sweep/frame_selection.h"
@@ -52,8 +53,15 @@ double StepMm(const std::vector<ZoneFrame>& frames) {
   return (high->reading_mm - low->reading_mm) / static_cast<double>(frames.size() - 1);
 }
 
-bool IsPattern(const FocusSweep& sweep) {
-  return sweep.target == model::SweepTarget::kAuto || sweep.target == model::SweepTarget::kTexture;
+// Whether the target has detail in all zones, as it is stated or as its frames are recognised.
+// Points and a lone edge come into focus in some zones alone.
+bool IsPattern(const FocusSweep& sweep, const Calibration& found, FrameStore* store) {
+  FocusSweep recognised = sweep;
+  Calibration told;
+  told.frames = found.frames;
+  RecogniseTarget([store](std::size_t frame) { return store->Grey(frame); }, &recognised, &told);
+  return recognised.target == model::SweepTarget::kAuto ||
+         recognised.target == model::SweepTarget::kTexture;
 }
 
 // The pixels that show only the rectangle in every frame.
@@ -86,7 +94,41 @@ double TypicalBlurPx(const Calibration& found) {
   return 0.5 * most_px;
 }
 
-Calibration Refused(Calibration found, const std::string& why) {
+// Takes back what the calibration says of focus and of the bench offset: its frames are no target
+// at one depth.
+void Forget(const FocusSweep& sweep, Calibration* found) {
+  constexpr char kHasRelief[] = "the target has relief";
+  CalibrationSummary& summary = found->summary;
+  summary.image_distance_mm.reset();
+  summary.focus_depth_mm.reset();
+  summary.blur_ratio.reset();
+  summary.blur_floor_px.reset();
+  summary.chi2_per_dof = 0;
+  CalibrationDiagnostics& diagnostics = found->diagnostics;
+  diagnostics.magnification_at_focus.reset();
+  diagnostics.focus_reading_mm.reset();
+  diagnostics.blur_slope_px_per_mm.reset();
+  diagnostics.covariance_order.clear();
+  diagnostics.covariance.resize(0, 0);
+  diagnostics.systematic_parts.clear();
+  diagnostics.advice.clear();
+  diagnostics.blur = {};
+  diagnostics.nearer = diagnostics.farther = {};
+  diagnostics.field = {};
+  for (std::string* message : {&diagnostics.blur.message, &diagnostics.nearer.message,
+                               &diagnostics.farther.message, &diagnostics.field.message})
+    *message = kHasRelief;
+  diagnostics.channels.clear();
+  if (sweep.offset_mm) return;
+  summary.bench_offset_mm.reset();
+  diagnostics.bench_offset_from.clear();
+  diagnostics.paper_recipe = {};
+  diagnostics.sharpness = {};
+  diagnostics.paper_recipe.message = diagnostics.sharpness.message = kHasRelief;
+  for (FrameMeasurement& frame : found->frames) frame.depth_mm = 0;
+}
+
+Calibration Refused(const FocusSweep& sweep, Calibration found, const std::string& why) {
   CalibrationSummary& summary = found.summary;
   summary.outcome = Outcome::kRefused;
   summary.reason = fmt::format(
@@ -94,10 +136,7 @@ Calibration Refused(Calibration found, const std::string& why) {
       "a flat target, or state roi_px with one depth. Map of the zones:\n{}",
       PartsInWords(found.diagnostics.target.relief), why, found.diagnostics.target.ReliefMap());
   while (!summary.reason.empty() && summary.reason.back() == '\n') summary.reason.pop_back();
-  summary.image_distance_mm.reset();
-  summary.focus_depth_mm.reset();
-  summary.blur_ratio.reset();
-  summary.blur_floor_px.reset();
+  Forget(sweep, &found);
   return found;
 }
 
@@ -109,8 +148,9 @@ Calibration WithoutRelief(const FocusSweep& sweep, const CalibrationOptions& opt
   const bool was_refused = found.summary.outcome == Outcome::kRefused;
   const std::vector<ZoneFrame> frames = FramesOf(found, was_refused);
   ReliefFinding& relief = found.diagnostics.target.relief;
-  if (!IsPattern(sweep) || !options.fit_blur || frames.size() < kMinFrames) return found;
+  if (!options.fit_blur || frames.size() < kMinFrames) return found;
   FrameStore store(sweep);
+  if (!IsPattern(sweep, found, &store)) return found;
   const ZoneFocus zones = FindZoneFocus({[&store](std::size_t frame) { return store.Grey(frame); },
                                          frames, RegionCentre(sweep), options.threads});
   relief.columns = zones.columns;
@@ -128,7 +168,7 @@ Calibration WithoutRelief(const FocusSweep& sweep, const CalibrationOptions& opt
   const double share = seen.area() / (static_cast<double>(size.width) * size.height);
   if (!(std::min(seen.width, seen.height) >= kSmallestSidePx) || !(share >= kMinShare) ||
       !(seen.area() >= kMaxLost * kMaxLost * whole.area())) {
-    return Refused(std::move(found),
+    return Refused(sweep, std::move(found),
                    fmt::format("no rectangle of at least {:.0f} x {:.0f} px is at one depth in all "
                                "frames",
                                kSmallestSidePx, kSmallestSidePx));
@@ -138,10 +178,12 @@ Calibration WithoutRelief(const FocusSweep& sweep, const CalibrationOptions& opt
                     sweep.roi.y + static_cast<int>(std::ceil(seen.y)),
                     static_cast<int>(std::floor(seen.width)) - 1,
                     static_cast<int>(std::floor(seen.height)) - 1};
+  // The size of the grid is that at the depth of its own place, which may be another part.
+  part_of_it.grid_scales.clear();
   Calibration again = run(part_of_it);
   const std::string words = PartsInWords(relief);
   if (again.summary.outcome == Outcome::kRefused) {
-    return Refused(std::move(found),
+    return Refused(sweep, std::move(found),
                    fmt::format("the largest part at one depth, roi_px [{}, {}, {}, {}], does not "
                                "suffice: {}",
                                part_of_it.roi.x, part_of_it.roi.y, part_of_it.roi.width,

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <string>
 
+#include "calib/calibrate/relief_region.h"
+#include "calib/calibrate/target_calibration.h"
 #include "calib/simulated_sweep.h"
 #include "support/sample_statistics.h"
 #include "thicklens/calib/calibrate.h"
@@ -217,6 +219,39 @@ TEST(TargetsOfSweeps, AReliefWithoutALargePartIsRefusedWithAMap) {
   EXPECT_THAT(found.summary.reason, HasSubstr("the target has relief"));
   EXPECT_THAT(found.summary.reason, HasSubstr("Map of the zones:\n"));
   EXPECT_FALSE(found.summary.blur_ratio.has_value());
+  // Nothing of the fit to several depths is left.
+  EXPECT_FALSE(found.diagnostics.blur.done);
+  EXPECT_FALSE(found.diagnostics.focus_reading_mm.has_value());
+  EXPECT_FALSE(found.diagnostics.magnification_at_focus.has_value());
+  EXPECT_TRUE(found.diagnostics.systematic_parts.empty());
+  EXPECT_EQ(found.diagnostics.covariance.size(), 0);
+  EXPECT_EQ(found.diagnostics.advice, "");
+  EXPECT_EQ(found.summary.bench_offset_mm.has_value(), s.sweep.offset_mm.has_value());
+}
+
+// A calibration of a step, as if with the size of a grid, of which `run` reports the sweep.
+TEST(TargetsOfSweeps, ThePartOfAReliefHasNoSizeOfTheWholeGrid) {
+  model::SweepSimulationOptions options = Bench(TargetKind::kDeadLeaves);
+  options.target.relief = {Part(model::ReliefPartOptions::Shape::kRectangle, 2.2, 0, 2.4, 6, 4)};
+  SimulatedSweep s = Simulate(options);
+  const Calibration whole = CalibrateTarget(s.sweep, {});
+  s.sweep.grid_scales = {{0, 0.25, 0.001}};
+  int runs = 0;
+  WithoutRelief(s.sweep, {}, whole, [&](const FocusSweep& part) {
+    ++runs;
+    EXPECT_TRUE(part.grid_scales.empty());
+    EXPECT_LT(part.roi.width, 240);
+    return whole;
+  });
+  EXPECT_EQ(runs, 1);
+}
+
+// Points at two depths are left as points, whether they are stated or recognised.
+TEST(TargetsOfSweeps, RecognisedPointsAreNotDividedIntoDepths) {
+  SimulatedSweep s = Simulate(Points(TargetKind::kBeads));
+  const Calibration found = Calibrate(s.sweep, {});
+  ASSERT_EQ(found.diagnostics.target.measured_as, "points") << found.summary.reason;
+  EXPECT_EQ(found.diagnostics.target.relief.columns, 0);
 }
 
 }  // namespace
