@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "calib/calibrate/plan_texture.h"
+#include "calib/calibrate/recognised_target.h"
 #include "calib/calibrate/sweep_conditions.h"
 #include "calib/calibrate/zero_choice.h"
 #include "calib/edges/edge_blur.h"
@@ -114,9 +115,7 @@ std::vector<FrameMeasurement> SweepProgress::Impl::Compared(std::vector<std::siz
   std::vector<FrameMeasurement> compared;
   for (const MeasuredFrame& frame : frames) compared.push_back(frame.measurement);
   FrameSelection selection(&compared);
-  QualityCheckOptions checks = options.checks;
-  checks.edge_target |= sweep.target == model::SweepTarget::kKnifeEdge;
-  selection.KeepMeasurable(checks);
+  selection.KeepMeasurable(ChecksFor(sweep.target, options.checks));
   double steepest = 0;
   for (const std::size_t i : selection.used())
     steepest = std::max(steepest, RelativeGradient(compared[i]));
@@ -127,7 +126,7 @@ std::vector<FrameMeasurement> SweepProgress::Impl::Compared(std::vector<std::siz
     compared[i].normalised_edge_slope = frames[i].sharpness[static_cast<std::size_t>(at)];
     compared[i].edge_count = frames[i].edges[static_cast<std::size_t>(at)];
   }
-  selection.KeepThoseWithEdges();
+  if (sweep.target != model::SweepTarget::kPoints) selection.KeepThoseWithEdges();
   *used = selection.used();
   return compared;
 }

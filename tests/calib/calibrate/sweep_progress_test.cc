@@ -138,6 +138,33 @@ TEST(SweepProgress, RejectsAsCalibrateDoes) {
   EXPECT_THAT(report.frames[20].rejection, HasSubstr("saturated"));
 }
 
+// Points on a black ground are dark frames of a texture, and lose their contrast sooner.
+TEST(SweepProgress, ChecksPointsAsCalibrateDoes) {
+  model::SweepSimulationOptions options = SweepCase("ii", 160, 4);
+  options.target.kind = model::TargetKind::kPinholes;
+  options.target.contrast = 0.95;
+  options.target.feature_size_mm = 0.12;
+  options.target.spacing_mm = 0.9;
+  options.light_level = 0.04;
+  options.bits = 16;
+  options.frame_count = 21;
+  options.step_mm = 1;
+  options.first_depth_mm = 290.4;
+  SimulatedSweep s = Simulate(options);
+  s.sweep.target = model::SweepTarget::kPoints;
+  CalibrationOptions calibrate;
+  calibrate.fit_blur = false;
+  const Calibration c = Calibrate(s.sweep, calibrate);
+  const SweepProgressReport report = WithFrames(s, Range(0, 21)).Report();
+  ASSERT_EQ(c.frames.size(), report.frames.size());
+  for (std::size_t i = 0; i < report.frames.size(); ++i)
+    EXPECT_EQ(report.frames[i].rejection, c.frames[i].rejection) << i;
+  EXPECT_EQ(report.rejected, 0);
+  // The same frames would not pass as those of a texture.
+  s.sweep.target = model::SweepTarget::kTexture;
+  EXPECT_GT(WithFrames(s, Range(0, 21)).Report().rejected, 0);
+}
+
 // A frame that does not fit is not added.
 TEST(SweepProgress, RefusesAFrameOfAnotherSize) {
   const SimulatedSweep s = Usual();
