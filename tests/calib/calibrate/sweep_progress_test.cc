@@ -22,6 +22,7 @@ namespace {
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using thicklens::testing::ErrorOf;
 using thicklens::testing::Simulate;
 using thicklens::testing::SimulatedSweep;
@@ -126,6 +127,47 @@ TEST(SweepProgress, AsksForNoMoreFramesThanAreNeeded) {
   // Noise and contrast are measured again with the new frames.
   EXPECT_LT(*after.blur_ratio_error, 1.1 * options.wanted_blur_ratio_error);
   EXPECT_GT(*after.blur_ratio_error, 0.8 * options.wanted_blur_ratio_error);
+}
+
+// A prediction is of a part of a large region, and says so.
+TEST(SweepProgress, SaysAtMostWhereTheRegionIsLarger) {
+  model::SweepSimulationOptions wide = SweepCase("ii", 160, 4);
+  wide.camera.sensor.width_px = 500;
+  wide.camera.sensor.height_px = 80;
+  wide.camera.sensor.principal_point_px = {249.5, 39.5};
+  wide.frame_count = 20;
+  wide.step_mm = 1.5;
+  wide.first_depth_mm = 285.4;
+  wide.bench_offset_mm = 200;
+  SimulatedSweep s = Simulate(wide);
+  SweepProgressOptions options;
+  options.wanted_blur_ratio_error = 1e-6;
+  const auto report_of = [&] {
+    SweepProgress progress(s.sweep, options);
+    for (std::size_t i = 0; i < s.sweep.frames.size(); ++i)
+      progress.Add(s.sweep.frames[i], (*s.stored)[i]);
+    return progress.Report();
+  };
+  const SweepProgressReport large = report_of();
+  ASSERT_TRUE(large.blur_ratio_error);
+  EXPECT_TRUE(large.is_error_at_most);
+  EXPECT_THAT(large.missing, Contains(HasSubstr("kappa is expected to at most ")));
+  // A region that is no larger has an error of its own, which is not that of the sensor.
+  s.sweep.roi = {200, 0, 100, 80};
+  const SweepProgressReport small = report_of();
+  ASSERT_TRUE(small.blur_ratio_error);
+  EXPECT_FALSE(small.is_error_at_most);
+  EXPECT_GT(*small.blur_ratio_error, 1.05 * *large.blur_ratio_error);
+  EXPECT_THAT(small.missing, Not(Contains(HasSubstr("at most"))));
+}
+
+TEST(SweepProgress, HasTheUnitOfTheReadings) {
+  SimulatedSweep s = Usual();
+  EXPECT_THAT(WithFrames(s, Range(0, 9)).Report().missing, Contains(HasSubstr(" mm; take")));
+  s.sweep.readings_are_counts = true;
+  const SweepProgressReport report = WithFrames(s, Range(0, 9)).Report();
+  EXPECT_TRUE(report.readings_are_counts);
+  EXPECT_THAT(report.missing, Contains(HasSubstr(" steps; take")));
 }
 
 TEST(SweepProgress, RejectsAsCalibrateDoes) {
