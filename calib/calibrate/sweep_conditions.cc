@@ -5,6 +5,7 @@
 #include <cstddef>
 
 #include "calib/calibrate/plan_texture.h"
+#include "calib/sweep/frame_selection.h"
 
 namespace thicklens::calib {
 namespace {
@@ -21,8 +22,9 @@ PlanConditions ConditionsOfFrames(const FocusSweep& sweep,
   PlanConditions conditions;
   conditions.camera = sweep.camera;
   model::Sensor& sensor = conditions.camera.sensor;
-  sensor.width_px = std::min(sensor.width_px, kConditionsPx);
-  sensor.height_px = std::min(sensor.height_px, kConditionsPx);
+  const cv::Size region = RegionSize(sweep);
+  sensor.width_px = std::min(region.width, kConditionsPx);
+  sensor.height_px = std::min(region.height, kConditionsPx);
   sensor.principal_point_px = {0.5 * (sensor.width_px - 1), 0.5 * (sensor.height_px - 1)};
   conditions.focus_depth_mm = focus_depth_mm;
   conditions.blur_ratio = std::min(blur_ratio, 1.0);

@@ -10,9 +10,9 @@
 namespace thicklens::calib {
 
 // The conditions of a plan that the frames of a sweep show: light, contrast and noise. The sensor
-// is at most its middle of kConditionsPx, so that a prediction takes milliseconds; the errors of a
-// larger one are smaller. `frames` are at least one. The blur floor is taken as known, and
-// the errors of readings and bench offset are left to the caller.
+// is the region, and at most kConditionsPx of it, so that a prediction takes milliseconds: it is
+// the most that the errors of a larger region are. `frames` are at least one. The blur floor is
+// taken as known, and the errors of readings and bench offset are left to the caller.
 inline constexpr int kConditionsPx = 480;
 PlanConditions ConditionsOfFrames(const FocusSweep& sweep,
                                   const std::vector<const FrameMeasurement*>& frames,

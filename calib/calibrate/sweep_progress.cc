@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "calib/calibrate/plan_texture.h"
+#include "calib/calibrate/recognised_target.h"
 #include "calib/calibrate/sweep_conditions.h"
 #include "calib/calibrate/zero_choice.h"
 #include "calib/edges/edge_blur.h"
@@ -114,9 +115,7 @@ std::vector<FrameMeasurement> SweepProgress::Impl::Compared(std::vector<std::siz
   std::vector<FrameMeasurement> compared;
   for (const MeasuredFrame& frame : frames) compared.push_back(frame.measurement);
   FrameSelection selection(&compared);
-  QualityCheckOptions checks = options.checks;
-  checks.edge_target |= sweep.target == model::SweepTarget::kKnifeEdge;
-  selection.KeepMeasurable(checks);
+  selection.KeepMeasurable(ChecksFor(sweep.target, options.checks));
   double steepest = 0;
   for (const std::size_t i : selection.used())
     steepest = std::max(steepest, RelativeGradient(compared[i]));
@@ -127,7 +126,7 @@ std::vector<FrameMeasurement> SweepProgress::Impl::Compared(std::vector<std::siz
     compared[i].normalised_edge_slope = frames[i].sharpness[static_cast<std::size_t>(at)];
     compared[i].edge_count = frames[i].edges[static_cast<std::size_t>(at)];
   }
-  selection.KeepThoseWithEdges();
+  if (sweep.target != model::SweepTarget::kPoints) selection.KeepThoseWithEdges();
   *used = selection.used();
   return compared;
 }
@@ -177,6 +176,12 @@ class MissingFrames {
 
  private:
   void Say(const std::string& text) { report_.missing.push_back(text); }
+  // A prediction is of kConditionsPx at most, and a larger region has the smaller error.
+  const char* AtMost() const { return report_.is_error_at_most ? "at most " : ""; }
+  std::string Reading(double reading_mm) const {
+    return sweep_.readings_are_counts ? fmt::format("{:.6g} steps", reading_mm)
+                                      : ReadingInWords(sweep_, reading_mm);
+  }
   double Wanted() const { return options_.wanted_blur_ratio_error; }
   double Sign() const { return model::DirectionSign(sweep_.direction); }
 
@@ -200,13 +205,13 @@ class MissingFrames {
     });
     const bool at_first = sharpest == frames_.begin();
     if (at_first || sharpest + 1 == frames_.end()) {
-      Say(
-          fmt::format("no frame is beyond the focus yet: the sharpness rises up to reading {:.6g} "
-                      "mm; take frames beyond it",
-                      (*sharpest)->reading_mm));
+      Say(fmt::format(
+          "no frame is beyond the focus yet: the sharpness rises up to reading {}; take "
+          "frames beyond it",
+          Reading((*sharpest)->reading_mm)));
     } else {
-      Say(fmt::format("the focus is near reading {:.6g} mm; more frames around it determine it",
-                      (*sharpest)->reading_mm));
+      Say(fmt::format("the focus is near reading {}; more frames around it determine it",
+                      Reading((*sharpest)->reading_mm)));
     }
   }
 
@@ -269,6 +274,8 @@ class MissingFrames {
     design_.feature_size_mm = UsualTextureMm(conditions_);
     texture_.emplace(TextureOf(conditions_, design_.feature_size_mm));
     report_.blur_ratio_error = ErrorOf(conditions_, design_);
+    const cv::Size region = RegionSize(sweep_);
+    report_.is_error_at_most = region.width > kConditionsPx || region.height > kConditionsPx;
     return true;
   }
 
@@ -321,8 +328,8 @@ class MissingFrames {
       above = !shorter_above;
     }
     if (more) {
-      Say(fmt::format("{}; {} more beyond reading {:.6g} mm fix kappa to {:.2g} %",
-                      HasFrames(above), *more, EndMm(above), 100 * Wanted()));
+      Say(fmt::format("{}; {}{} more beyond reading {} fix kappa to {:.2g} %", HasFrames(above),
+                      AtMost(), *more, Reading(EndMm(above)), 100 * Wanted()));
       return;
     }
     SayShortSides();
@@ -336,15 +343,16 @@ class MissingFrames {
     const std::optional<double> with_exact = ErrorOf(exact, design_);
     if (with_exact && *with_exact <= Wanted()) {
       Say(
-          fmt::format("kappa is expected to {:.2g} %, mostly by the error of the bench offset: "
+          fmt::format("kappa is expected to {}{:.2g} %, mostly by the error of the bench offset: "
                       "state offset_mm or the magnification more exactly",
-                      100 * *report_.blur_ratio_error));
+                      AtMost(), 100 * *report_.blur_ratio_error));
       return;
     }
     Say(
-        fmt::format("kappa is expected to {:.2g} %, not {:.2g} %: about {:.0f} frames in place of "
+        fmt::format("kappa is expected to {}{:.2g} %, not {:.2g} %: {}{:.0f} frames in place of "
                     "{} over the same range would be needed",
-                    100 * *report_.blur_ratio_error, 100 * Wanted(),
+                    AtMost(), 100 * *report_.blur_ratio_error, 100 * Wanted(),
+                    report_.is_error_at_most ? "at most " : "about ",
                     std::ceil(design_.frames * std::pow(*report_.blur_ratio_error / Wanted(), 2)),
                     design_.frames));
   }
@@ -364,6 +372,7 @@ class MissingFrames {
 
 SweepProgressReport SweepProgress::Impl::Report() const {
   SweepProgressReport report;
+  report.readings_are_counts = sweep.readings_are_counts;
   std::vector<std::size_t> used;
   const std::vector<FrameMeasurement> compared = Compared(&used);
   for (const FrameMeasurement& frame : compared) {

@@ -24,11 +24,6 @@ constexpr double kClearTexture = 3;
 constexpr int kSmallestTextureRegionPx = 64;
 constexpr int kAmpleRegionPx = 128;
 
-cv::Size RegionSize(const FocusSweep& sweep) {
-  if (sweep.roi.width > 0) return {sweep.roi.width, sweep.roi.height};
-  return {sweep.camera.sensor.width_px, sweep.camera.sensor.height_px};
-}
-
 }  // namespace
 
 std::string ReadingInWords(const FocusSweep& sweep, double reading_mm, int digits) {
@@ -186,6 +181,11 @@ std::string ExposureAdvice(const std::vector<FrameMeasurement>& frames,
   if (2 * under > frames.size())
     return advice(under, "under-exposed", "raise the exposure (longer time, more light)");
   return "";
+}
+
+cv::Size RegionSize(const FocusSweep& sweep) {
+  if (sweep.roi.width > 0) return {sweep.roi.width, sweep.roi.height};
+  return {sweep.camera.sensor.width_px, sweep.camera.sensor.height_px};
 }
 
 int RegionSidePx(const FocusSweep& sweep) {

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <opencv2/core/types.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -71,6 +72,9 @@ std::string ExposureAdvice(const std::vector<FrameMeasurement>& frames,
 
 // Nothing can be measured in a region whose shorter side is less than this.
 inline constexpr int kSmallestRegionPx = 24;
+// The size of the part of the frames that is measured, px.
+cv::Size RegionSize(const FocusSweep& sweep);
+// The shorter side of it, px.
 int RegionSidePx(const FocusSweep& sweep);
 // The region's size and the required size, if the region is too small for some of the targets;
 // otherwise empty.

@@ -7,7 +7,9 @@
 #include <cstddef>
 #include <cstdio>
 #include <filesystem>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "thicklens/base/cancel.h"
@@ -32,6 +34,14 @@ void PrintNow(const CommonOptions& common, const std::string& text) {
   std::fflush(stdout);
 }
 
+// What ends the sweep after a look; empty: nothing does. Waits until the next look.
+std::string EndOf(const WatchUpdate& update, const FinishOnInterrupt& interrupt, LineWaiter* line) {
+  if (update.is_ended) return update.ended_by;
+  if (interrupt.IsAsked()) return "an interrupt";
+  if (line->WaitFor(update.added.empty() ? kLookSeconds : 0)) return "a line on standard input";
+  return "";
+}
+
 }  // namespace
 
 WatchedSweep WatchSweep(const SweepArguments& arguments, std::optional<double> pause_s,
@@ -44,7 +54,7 @@ WatchedSweep WatchSweep(const SweepArguments& arguments, std::optional<double> p
     options.pause_s = pause_s;
     FolderWatch watch(arguments.input, arguments.readings_csv, SweepOverridesOf(arguments), options,
                       run.control());
-    const FinishOnInterrupt interrupt;
+    std::optional<FinishOnInterrupt> interrupt(std::in_place);
     PrintNow(common, fmt::format("watching {}: Enter, Ctrl-C, a file named done in it{} ends the "
                                  "sweep\n",
                                  PrintableUtf8(arguments.input),
@@ -54,18 +64,18 @@ WatchedSweep WatchSweep(const SweepArguments& arguments, std::optional<double> p
     std::vector<LeftOutFile> left_out;
     std::string ended_by;
     calib::SweepProgressReport progress;
-    for (const Clock::time_point start = Clock::now(); ended_by.empty();) {
+    const Clock::time_point start = Clock::now();
+    for (bool is_all = false; ended_by.empty() || !is_all;) {
       WatchUpdate update = watch.Look(SecondsSince(start));
       PrintNow(common, text.Lines(update));
       left_out.insert(left_out.end(), update.left_out.begin(), update.left_out.end());
+      // After the end, what is ready is still measured.
+      is_all = !ended_by.empty() &&
+               update.added.size() < static_cast<std::size_t>(options.most_per_look);
+      if (ended_by.empty()) ended_by = EndOf(update, *interrupt, &line);
       progress = std::move(update.progress);
-      if (update.is_ended) {
-        ended_by = update.ended_by;
-      } else if (interrupt.IsAsked()) {
-        ended_by = "an interrupt";
-      } else if (line.WaitFor(update.added.empty() ? kLookSeconds : 0)) {
-        ended_by = "a line on standard input";
-      }
+      // From here on, an interrupt ends the program as usual.
+      if (!ended_by.empty()) interrupt.reset();
       ThrowIfCancelled();
     }
     PrintNow(common, fmt::format("ended by {}: {} frames, {} of them usable\n\n", ended_by,

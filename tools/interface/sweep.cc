@@ -370,7 +370,8 @@ void TakeFullScale(const io::FullScaleFinding& finding, const RunScope& run, Swe
   const std::string remedy = fmt::format("state it: {} {}, or 65535 for 16 bits",
                                          run.Option("full_scale"), finding.full_scale);
   if (finding.full_scale <= kTooDark || !IsScaleFree(sweep->camera.sensor.transfer)) {
-    throw Error(fmt::format("{}: {}; {}", sweep->description.source, finding.reason, remedy));
+    throw UndecidedFullScale(
+        fmt::format("{}: {}; {}", sweep->description.source, finding.reason, remedy));
   }
   sweep->notices.push_back(
       fmt::format("{}; 65535 is taken as full scale, and with the transfer curve {} the result "

@@ -4,9 +4,17 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/base/error.h"
 #include "thicklens/sweep.h"
 
 namespace thicklens {
+
+// The error of ExamineFrames for frames whose values do not show what stands for white. More frames
+// may show it.
+class UndecidedFullScale : public Error {
+ public:
+  using Error::Error;
+};
 
 // A sweep of some of a folder's images, and those of them that have no reading.
 struct SweepOfFrames {

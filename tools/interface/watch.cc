@@ -41,6 +41,7 @@ struct Candidate {
   SizeOfFile size;
   std::optional<double> failed_since_s;  // since when it cannot be decoded or has no own reading
   std::string failure;                   // the last reason
+  std::string state;                     // what it waited for in the last look
   bool has_own_reading = false;          // without a table: its reading was found
   bool is_left_out = false;
   std::optional<std::size_t> frame;  // index of the measured frame
@@ -87,7 +88,14 @@ struct FolderWatch::Impl {
                                           WatchUpdate* update);
   void TakeChangedReadings();
   void Measure(double now_s, WatchUpdate* update);
-  bool Examine();
+  // The file of a frame; null if it is none of the folder.
+  Candidate* CandidateOf(const std::string& image);
+  // Reads a frame. Returns whether this is possible.
+  bool Decode(const model::SweepFrame& frame, Candidate* candidate, double now_s, cv::Mat* stored,
+              WatchUpdate* update);
+  bool Examine(double now_s, WatchUpdate* update);
+  void SetStates(const std::vector<std::string>& images, const std::string& state);
+  Sweep SweepOfMeasured() const;
   void Fail(Candidate* candidate, const std::string& path, const std::string& reason, double now_s,
             WatchUpdate* update) const;
   void LeaveOut(Candidate* candidate, const std::string& path, const std::string& reason,
@@ -108,6 +116,9 @@ struct FolderWatch::Impl {
   std::set<std::string> images_read;  // that the sweep below was read with
   std::optional<Sweep> sweep;         // of all whole images that have a reading
   std::optional<Sweep> examined;
+  std::set<std::string> failed_now;  // images that this look could not decode
+  std::string blocked;               // why no frame can be measured; empty: nothing is wrong
+  std::string table_failure;         // why the last settled table could not be read; empty: it was
   std::optional<calib::SweepProgress> progress;
   calib::SweepProgressReport report;
   std::map<std::string, std::string> rejection_of;  // by the image
@@ -140,16 +151,23 @@ std::vector<std::string> FolderWatch::Impl::Whole(double now_s, WatchUpdate* upd
     const bool is_settled = IsSettled(path, now_s, &candidate.size);
     if (candidate.size.bytes != bytes && !candidate.frame) {  // a file that grows is tried again
       candidate.failed_since_s.reset();
+      candidate.failure.clear();
       candidate.is_left_out = false;
     }
     if (candidate.is_left_out) continue;
     if (is_settled || candidate.frame) {
       whole.push_back(path);
     } else {
+      candidate.state = "it was still being written";
       Wait(NameOf(path) + " is still being written", update);
     }
   }
   return whole;
+}
+
+void FolderWatch::Impl::SetStates(const std::vector<std::string>& images,
+                                  const std::string& state) {
+  for (const std::string& path : images) candidates.at(path).state = state;
 }
 
 void FolderWatch::Impl::LeaveOut(Candidate* candidate, const std::string& path,
@@ -180,6 +198,7 @@ std::vector<std::string> FolderWatch::Impl::WithOwnReading(const std::vector<std
         io::ReadReadings("", {path}, overrides.readings);
         candidate.has_own_reading = true;
         candidate.failed_since_s.reset();
+        candidate.failure.clear();
       } catch (const Interrupted&) {
         throw;
       } catch (const Error& error) {
@@ -198,12 +217,14 @@ bool FolderWatch::Impl::ReadReadings(const std::vector<std::string>& whole, doub
   if (!table.empty()) {
     std::error_code failure;
     if (!fs::exists(table, failure)) {
+      SetStates(whole, "the table of readings did not exist");
       if (!whole.empty()) Wait("the table of readings does not exist yet", update);
       return false;
     }
     // A row that is only half written must not be read: "31" of "31.5".
     if (!IsSettled(table, now_s, &table_size)) {
       if (!sweep) {
+        SetStates(whole, "the table of readings was still being written");
         if (!whole.empty()) Wait("the table of readings is still being written", update);
         return false;
       }
@@ -221,12 +242,15 @@ bool FolderWatch::Impl::ReadReadings(const std::vector<std::string>& whole, doub
       sweep = ReadSweepOfFrames(folder, images, table, overrides, control).sweep;
       images_read = std::move(now);
       table_bytes_read = table_size.bytes;
+      table_failure.clear();
     } catch (const Interrupted&) {
       throw;
     } catch (const OptionError&) {
       throw;
     } catch (const Error& error) {
-      Wait(error.what(), update);
+      table_failure = error.what();
+      SetStates(images, table_failure);
+      Wait(table_failure, update);
       return sweep.has_value();
     }
     TakeChangedReadings();
@@ -238,8 +262,10 @@ bool FolderWatch::Impl::ReadReadings(const std::vector<std::string>& whole, doub
   }
   for (const std::string& path : images) {
     const std::string normal = fs::path(path).lexically_normal().string();
-    if (with_reading.count(normal) == 0 && with_reading.count(path) == 0)
+    if (with_reading.count(normal) == 0 && with_reading.count(path) == 0) {
+      candidates.at(path).state = "it had no reading";
       Wait(NameOf(path) + " has no reading yet", update);
+    }
   }
   return sweep.has_value();
 }
@@ -255,15 +281,63 @@ void FolderWatch::Impl::TakeChangedReadings() {
   }
 }
 
-// Finds once which value stands for white, and by what the frames are corrected.
-bool FolderWatch::Impl::Examine() {
-  if (examined) return true;
+Candidate* FolderWatch::Impl::CandidateOf(const std::string& image) {
+  auto at = candidates.find(image);
+  if (at == candidates.end()) {
+    at = std::find_if(candidates.begin(), candidates.end(), [&](const auto& entry) {
+      return fs::path(entry.first).lexically_normal() == fs::path(image);
+    });
+  }
+  return at == candidates.end() ? nullptr : &at->second;
+}
+
+bool FolderWatch::Impl::Decode(const model::SweepFrame& frame, Candidate* candidate, double now_s,
+                               cv::Mat* stored, WatchUpdate* update) {
+  if (failed_now.count(frame.image) > 0) return false;
   try {
-    examined = ExamineFrames(*sweep, control);
+    *stored = io::FrameFiles({frame}, sweep->description.full_scale).Read(0);
   } catch (const Interrupted&) {
     throw;
-  } catch (const Error&) {
-    if (sweep->description.frames.size() >= kFramesToExamine) throw;
+  } catch (const Error& error) {
+    failed_now.insert(frame.image);
+    Fail(candidate, frame.image, error.what(), now_s, update);
+    return false;
+  }
+  candidate->failed_since_s.reset();
+  candidate->failure.clear();
+  return true;
+}
+
+// Finds once which value stands for white, and by what the frames are corrected, from the frames
+// that can be decoded. Returns whether it is known.
+bool FolderWatch::Impl::Examine(double now_s, WatchUpdate* update) {
+  if (examined) return true;
+  Sweep decoded = *sweep;
+  decoded.description.frames.clear();
+  for (const model::SweepFrame& frame : sweep->description.frames) {
+    ThrowIfCancelled();
+    Candidate* candidate = CandidateOf(frame.image);
+    if (candidate == nullptr || candidate->is_left_out) continue;
+    cv::Mat stored;
+    if (!Decode(frame, candidate, now_s, &stored, update)) continue;
+    decoded.description.frames.push_back(frame);
+    // Further frames are read only to find which of 16 bits are used.
+    if (sweep->description.full_scale || stored.depth() != CV_16U) break;
+  }
+  const std::vector<model::SweepFrame>& frames = decoded.description.frames;
+  if (frames.empty()) return false;
+  blocked.clear();
+  try {
+    examined = ExamineFrames(decoded, control);
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const UndecidedFullScale& error) {
+    if (frames.size() >= kFramesToExamine) throw;
+    blocked = error.what();
+    Wait("more frames are needed to find which value stands for white", update);
+  }
+  if (!examined) {
+    for (const model::SweepFrame& frame : frames) CandidateOf(frame.image)->state = blocked;
     return false;
   }
   calib::SweepProgressOptions settings;
@@ -275,51 +349,35 @@ bool FolderWatch::Impl::Examine() {
 void FolderWatch::Impl::Measure(double now_s, WatchUpdate* update) {
   int left = options.most_per_look;
   const std::size_t before = measured.size();
+  failed_now.clear();
+  if (!Examine(now_s, update)) return;
   for (const model::SweepFrame& frame : sweep->description.frames) {
     ThrowIfCancelled();
-    auto at = candidates.find(frame.image);
-    if (at == candidates.end()) {
-      at = std::find_if(candidates.begin(), candidates.end(), [&](const auto& entry) {
-        return fs::path(entry.first).lexically_normal() == fs::path(frame.image);
-      });
-    }
-    if (at == candidates.end()) continue;
-    Candidate& candidate = at->second;
-    if (candidate.frame || candidate.is_left_out) continue;
+    Candidate* candidate = CandidateOf(frame.image);
+    if (candidate == nullptr || candidate->frame || candidate->is_left_out) continue;
     if (left == 0) {
+      candidate->state = "it was not measured yet";
       Wait(NameOf(frame.image) + " is measured next", update);
       continue;
     }
     cv::Mat stored;
+    if (!Decode(frame, candidate, now_s, &stored, update)) continue;
     try {
-      stored = io::FrameFiles({frame}, sweep->description.full_scale).Read(0);
-    } catch (const Interrupted&) {
-      throw;
-    } catch (const Error& error) {
-      Fail(&candidate, frame.image, error.what(), now_s, update);
-      continue;
-    }
-    if (!Examine()) {
-      Wait("more frames are needed to find which value stands for white", update);
-      return;
-    }
-    if (examined->description.full_scale != sweep->description.full_scale)
-      stored = io::FrameFiles({frame}, examined->description.full_scale).Read(0);
-    try {
+      if (examined->description.full_scale != sweep->description.full_scale)
+        stored = io::FrameFiles({frame}, examined->description.full_scale).Read(0);
       progress->Add(frame, stored);
     } catch (const Interrupted&) {
       throw;
-    } catch (const Error& error) {  // it does not fit the camera
-      LeaveOut(&candidate, frame.image, error.what(), update);
+    } catch (const Error& error) {  // it does not fit the camera or the full scale
+      LeaveOut(candidate, frame.image, error.what(), update);
       continue;
     }
-    candidate.failed_since_s.reset();
-    candidate.frame = measured.size();
+    candidate->frame = measured.size();
     measured.push_back(frame.image);
-    update->added.push_back(*candidate.frame);
+    update->added.push_back(*candidate->frame);
     --left;
   }
-  if (progress) report = progress->Report();
+  report = progress->Report();
   for (std::size_t i = 0; i < report.frames.size(); ++i) {
     std::string& known = rejection_of[report.frames[i].image];
     if (i < before && known.empty() && !report.frames[i].rejection.empty())
@@ -355,26 +413,59 @@ WatchUpdate FolderWatch::Impl::Look(double now_s) {
   return update;
 }
 
-Sweep FolderWatch::Impl::Finish() const {
-  if (measured.empty()) {
-    throw Error(fmt::format(
-        "{}: no frame arrived that could be measured{}", folder,
-        candidates.empty() ? "" : ": " + [this] {
-          for (const auto& [path, candidate] : candidates)
-            if (!candidate.failure.empty()) return candidate.failure;
-          return std::string("none has a reading");
-        }()));
+// The measured frames with the readings of the last table that was whole.
+Sweep FolderWatch::Impl::SweepOfMeasured() const {
+  std::error_code failure;
+  const bool is_as_read =
+      table.empty() || (fs::file_size(table, failure) == table_bytes_read && !failure);
+  Sweep found;
+  if (is_as_read) {
+    found = ReadSweepOfFrames(folder, measured, table, overrides, control).sweep;
+  } else {
+    found = *sweep;
+    std::vector<model::SweepFrame>& frames = found.description.frames;
+    const std::set<std::string> kept(measured.begin(), measured.end());
+    frames.erase(std::remove_if(frames.begin(), frames.end(),
+                                [&](const auto& frame) { return kept.count(frame.image) == 0; }),
+                 frames.end());
+    found.notices.push_back(fmt::format(
+        "{}: the readings are those before its last change: {}", table,
+        table_failure.empty() ? "it was still being written when the sweep ended" : table_failure));
   }
-  SweepOfFrames found = ReadSweepOfFrames(folder, measured, table, overrides, control);
+  std::set<std::string> with_reading;
+  for (const model::SweepFrame& frame : found.description.frames) with_reading.insert(frame.image);
+  for (const std::string& image : measured) {
+    if (with_reading.count(image) == 0) {
+      found.notices.push_back(
+          fmt::format("{} is left out: its reading is not in the table any more", image));
+    }
+  }
+  if (with_reading.empty())
+    throw Error(fmt::format("{}: none of the measured frames has a reading any more", table));
+  return found;
+}
+
+Sweep FolderWatch::Impl::Finish() const {
+  const auto reason_of = [](const Candidate& candidate) {
+    return candidate.failure.empty() ? candidate.state : candidate.failure;
+  };
+  if (measured.empty()) {
+    std::string reason = blocked.empty() ? table_failure : blocked;
+    for (const auto& [path, candidate] : candidates) {
+      if (!reason.empty()) break;
+      if (!reason_of(candidate).empty()) reason = path + ": " + reason_of(candidate);
+    }
+    throw Error(fmt::format("{}: no frame arrived that could be measured{}{}", folder,
+                            reason.empty() ? "" : ": ", reason));
+  }
+  Sweep found = SweepOfMeasured();
   for (const auto& [path, candidate] : candidates) {
     if (candidate.frame) continue;
-    found.sweep.notices.push_back(
-        fmt::format("{} is left out: {}", path,
-                    candidate.failure.empty() ? "it was not whole or had no reading when the sweep "
-                                                "ended"
-                                              : candidate.failure));
+    const std::string reason = reason_of(candidate);
+    found.notices.push_back(
+        fmt::format("{} is left out: {}", path, reason.empty() ? "it was not examined" : reason));
   }
-  return std::move(found.sweep);
+  return found;
 }
 
 FolderWatch::FolderWatch(const std::string& folder, const std::string& readings_csv,

@@ -14,15 +14,20 @@ namespace {
 // Every file waits for a moment; what keeps waiting is reported.
 constexpr int kLooksOfWait = 6;
 
-std::string FocusSoFar(const calib::SharpestReading& sharpest) {
-  if (!sharpest.done) return "focus not determined yet";
-  return "focus at reading " +
-         WithError(sharpest.reading_mm.value, sharpest.reading_mm.sigma, "mm");
+const char* UnitOf(const calib::SweepProgressReport& progress) {
+  return progress.readings_are_counts ? "steps" : "mm";
 }
 
-std::string FrameLine(const calib::ProgressFrame& frame) {
+std::string FocusSoFar(const calib::SweepProgressReport& progress) {
+  const calib::SharpestReading& sharpest = progress.sharpest;
+  if (!sharpest.done) return "focus not determined yet";
+  return "focus at reading " +
+         WithError(sharpest.reading_mm.value, sharpest.reading_mm.sigma, UnitOf(progress));
+}
+
+std::string FrameLine(const calib::ProgressFrame& frame, const char* unit) {
   const std::string head =
-      fmt::format("{}: reading {:.6g} mm, ", FrameName(frame.image), frame.reading_mm);
+      fmt::format("{}: reading {:.6g} {}, ", FrameName(frame.image), frame.reading_mm, unit);
   if (!frame.rejection.empty()) return head + "rejected: " + PrintableUtf8(frame.rejection);
   return head + (frame.sharpness > 0 ? fmt::format("sharpness {:.4f} per px", frame.sharpness)
                                      : std::string("no edges as steep as those of the sharpest "
@@ -32,8 +37,8 @@ std::string FrameLine(const calib::ProgressFrame& frame) {
 // A prediction is about noise, readings and bench offset alone.
 std::string NothingInWords(const calib::SweepProgressReport& progress) {
   if (!progress.blur_ratio_error) return "nothing";
-  return fmt::format("nothing: kappa is expected to {:.2g} %, without systematic errors",
-                     100 * *progress.blur_ratio_error);
+  return fmt::format("nothing: kappa is expected to {}{:.2g} %, without systematic errors",
+                     progress.is_error_at_most ? "at most " : "", 100 * *progress.blur_ratio_error);
 }
 
 }  // namespace
@@ -42,11 +47,11 @@ std::string WatchText::Lines(const WatchUpdate& update) {
   const calib::SweepProgressReport& progress = update.progress;
   std::string text;
   for (const std::size_t i : update.added) {
-    text += FrameLine(progress.frames[i]);
+    text += FrameLine(progress.frames[i], UnitOf(progress));
     // The last of several frames has the state of all of them.
     if (i == update.added.back()) {
-      text += fmt::format("; {}; {} usable, {} rejected", FocusSoFar(progress.sharpest),
-                          progress.usable, progress.rejected);
+      text += fmt::format("; {}; {} usable, {} rejected", FocusSoFar(progress), progress.usable,
+                          progress.rejected);
     }
     text += '\n';
   }

@@ -7,7 +7,8 @@ namespace thicklens::tools {
 class LineWaiter {
  public:
   // Waits for at most so many seconds, or until a signal arrives. Returns true once a line (also an
-  // empty one) has been read. An input that is closed or at its end never gives one.
+  // empty one) has been read. An input that is closed, at its end or cannot be read never gives
+  // one, and a terminal gives none while this program runs in its background.
   bool WaitFor(double seconds);
 
  private:

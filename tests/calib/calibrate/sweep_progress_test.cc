@@ -22,6 +22,7 @@ namespace {
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using thicklens::testing::ErrorOf;
 using thicklens::testing::Simulate;
 using thicklens::testing::SimulatedSweep;
@@ -128,6 +129,47 @@ TEST(SweepProgress, AsksForNoMoreFramesThanAreNeeded) {
   EXPECT_GT(*after.blur_ratio_error, 0.8 * options.wanted_blur_ratio_error);
 }
 
+// A prediction is of a part of a large region, and says so.
+TEST(SweepProgress, SaysAtMostWhereTheRegionIsLarger) {
+  model::SweepSimulationOptions wide = SweepCase("ii", 160, 4);
+  wide.camera.sensor.width_px = 500;
+  wide.camera.sensor.height_px = 80;
+  wide.camera.sensor.principal_point_px = {249.5, 39.5};
+  wide.frame_count = 20;
+  wide.step_mm = 1.5;
+  wide.first_depth_mm = 285.4;
+  wide.bench_offset_mm = 200;
+  SimulatedSweep s = Simulate(wide);
+  SweepProgressOptions options;
+  options.wanted_blur_ratio_error = 1e-6;
+  const auto report_of = [&] {
+    SweepProgress progress(s.sweep, options);
+    for (std::size_t i = 0; i < s.sweep.frames.size(); ++i)
+      progress.Add(s.sweep.frames[i], (*s.stored)[i]);
+    return progress.Report();
+  };
+  const SweepProgressReport large = report_of();
+  ASSERT_TRUE(large.blur_ratio_error);
+  EXPECT_TRUE(large.is_error_at_most);
+  EXPECT_THAT(large.missing, Contains(HasSubstr("kappa is expected to at most ")));
+  // A region that is no larger has an error of its own, which is not that of the sensor.
+  s.sweep.roi = {200, 0, 100, 80};
+  const SweepProgressReport small = report_of();
+  ASSERT_TRUE(small.blur_ratio_error);
+  EXPECT_FALSE(small.is_error_at_most);
+  EXPECT_GT(*small.blur_ratio_error, 1.05 * *large.blur_ratio_error);
+  EXPECT_THAT(small.missing, Not(Contains(HasSubstr("at most"))));
+}
+
+TEST(SweepProgress, HasTheUnitOfTheReadings) {
+  SimulatedSweep s = Usual();
+  EXPECT_THAT(WithFrames(s, Range(0, 9)).Report().missing, Contains(HasSubstr(" mm; take")));
+  s.sweep.readings_are_counts = true;
+  const SweepProgressReport report = WithFrames(s, Range(0, 9)).Report();
+  EXPECT_TRUE(report.readings_are_counts);
+  EXPECT_THAT(report.missing, Contains(HasSubstr(" steps; take")));
+}
+
 TEST(SweepProgress, RejectsAsCalibrateDoes) {
   SimulatedSweep s = Usual();
   s.frame(7).setTo(0);
@@ -136,6 +178,33 @@ TEST(SweepProgress, RejectsAsCalibrateDoes) {
   EXPECT_EQ(report.rejected, 2);
   EXPECT_THAT(report.frames[7].rejection, HasSubstr("dark"));
   EXPECT_THAT(report.frames[20].rejection, HasSubstr("saturated"));
+}
+
+// Points on a black ground are dark frames of a texture, and lose their contrast sooner.
+TEST(SweepProgress, ChecksPointsAsCalibrateDoes) {
+  model::SweepSimulationOptions options = SweepCase("ii", 160, 4);
+  options.target.kind = model::TargetKind::kPinholes;
+  options.target.contrast = 0.95;
+  options.target.feature_size_mm = 0.12;
+  options.target.spacing_mm = 0.9;
+  options.light_level = 0.04;
+  options.bits = 16;
+  options.frame_count = 21;
+  options.step_mm = 1;
+  options.first_depth_mm = 290.4;
+  SimulatedSweep s = Simulate(options);
+  s.sweep.target = model::SweepTarget::kPoints;
+  CalibrationOptions calibrate;
+  calibrate.fit_blur = false;
+  const Calibration c = Calibrate(s.sweep, calibrate);
+  const SweepProgressReport report = WithFrames(s, Range(0, 21)).Report();
+  ASSERT_EQ(c.frames.size(), report.frames.size());
+  for (std::size_t i = 0; i < report.frames.size(); ++i)
+    EXPECT_EQ(report.frames[i].rejection, c.frames[i].rejection) << i;
+  EXPECT_EQ(report.rejected, 0);
+  // The same frames would not pass as those of a texture.
+  s.sweep.target = model::SweepTarget::kTexture;
+  EXPECT_GT(WithFrames(s, Range(0, 21)).Report().rejected, 0);
 }
 
 // A frame that does not fit is not added.

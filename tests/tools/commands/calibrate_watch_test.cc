@@ -3,12 +3,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "support/temporary_folder.h"
@@ -89,7 +91,10 @@ TEST_F(CalibrateWatch, AnInterruptEndsTheSweep) {
   ChildProgram program(Arguments({"--watch", "-o", folder_ / "camera.yaml"}), folder_.path(), 0);
   // It has begun to watch once it has printed its first line.
   const std::string out = folder_ / "stdout";
+  const auto start = std::chrono::steady_clock::now();
   while (program.Running() && ContentOf(out).find("10 usable") == std::string::npos) {
+    ASSERT_LT(std::chrono::steady_clock::now() - start, std::chrono::minutes(5)) << ContentOf(out);
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
   program.Interrupt();
   const ProgramResult result = program.Wait();

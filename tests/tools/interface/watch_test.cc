@@ -5,15 +5,19 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <opencv2/core.hpp>
 #include <string>
 #include <vector>
 
 #include "support/error_message.h"
 #include "support/temporary_folder.h"
+#include "thicklens/base/output_file.h"
 #include "thicklens/calibrate.h"
+#include "thicklens/io/image_file.h"
 #include "tools/support/bench_simulation.h"
 #include "tools/support/option_error.h"
 
@@ -234,6 +238,125 @@ TEST_F(FolderWatchTest, FilesThatAreLeftOutAreNamedInTheNotices) {
   EXPECT_THAT(sweep.description.frames, SizeIs(4));
   EXPECT_THAT(sweep.notices, Contains(HasSubstr(Name(3) + " is left out: ")));
   EXPECT_THAT(sweep.notices, Contains(HasSubstr(Name(5) + " is left out: ")));
+}
+
+// The first frame of the table is still being copied, and more than five others are whole.
+TEST_F(FolderWatchTest, ExaminesTheFramesThatCanBeDecoded) {
+  const auto watch = Watch();
+  for (std::size_t i = 0; i < 7; ++i) {
+    Write(i, i == 0 || i == 3 ? 0.5 : 1);
+    AddRow(i);
+  }
+  watch->Look(0);
+  const WatchUpdate update = watch->Look(2);
+  EXPECT_THAT(update.added, SizeIs(5));
+  EXPECT_EQ(update.waiting, 2U);
+  Write(0);
+  watch->Look(3);
+  EXPECT_THAT(NamesOf(watch->Look(5)), ::testing::ElementsAre(Name(0)));
+}
+
+// Values of 16 bits up to 759: they are of 10 bits, or dark.
+TEST_F(FolderWatchTest, SaysAtTheEndThatTheFullScaleIsNotKnown) {
+  cv::Mat frame(144, 144, CV_16U);
+  for (int i = 0; i < 144 * 144; ++i)
+    frame.at<std::uint16_t>(i / 144, i % 144) = static_cast<std::uint16_t>(i % 760);
+  io::ImageWriting linear;
+  linear.is_linear = true;
+  for (const char* name : {"a.tif", "b.tif"})
+    WriteFileAtomically(frames_ + "/" + name,
+                        io::EncodeImageFile(frame, io::ImageFormat::kTiff, linear));
+  folder_.Put("table.csv", "file,reading_mm\na.tif,1\nb.tif,2\n");
+  const auto watch = Watch();
+  watch->Look(0);
+  const WatchUpdate update = watch->Look(2);
+  EXPECT_THAT(update.added, IsEmpty());
+  EXPECT_THAT(update.waiting_reason, HasSubstr("more frames are needed to find which value"));
+  folder_.Put("frames/done");
+  EXPECT_TRUE(watch->Look(4).is_ended);
+  EXPECT_THAT(ErrorOf([&] { watch->Finish(); }), HasSubstr("nothing is clipped"));
+}
+
+// More frames do not help.
+TEST_F(FolderWatchTest, SaysWhatIsWrongWithTheCorrection) {
+  SweepOverrides overrides = Overrides();
+  overrides.correction.dark = {folder_ / "no-dark.png"};
+  FolderWatch watch(frames_, table_, overrides, {});
+  Write(0);
+  AddRow(0);
+  watch.Look(0);
+  EXPECT_THAT(ErrorOf([&] { watch.Look(2); }), HasSubstr("no-dark.png"));
+}
+
+TEST_F(FolderWatchTest, NoticesSayWhatTheFilesWaitedFor) {
+  WatchOptions options;
+  options.most_per_look = 4;
+  const auto watch = Watch(options);
+  for (std::size_t i = 0; i < 6; ++i) {
+    Write(i);
+    if (i != 5) AddRow(i);
+  }
+  watch->Look(0);
+  EXPECT_THAT(watch->Look(2).added, SizeIs(4));
+  Write(6);
+  EXPECT_THAT(watch->Look(2.5).added, SizeIs(1));
+  Write(7);
+  AddRow(7);
+  watch->Look(3);
+  const Sweep sweep = watch->Finish();
+  EXPECT_THAT(sweep.description.frames, SizeIs(5));
+  EXPECT_THAT(sweep.notices, Contains(HasSubstr(Name(5) + " is left out: it had no reading")));
+  EXPECT_THAT(sweep.notices, Contains(HasSubstr(Name(7) + " is left out: it was still being "
+                                                          "written")));
+}
+
+TEST_F(FolderWatchTest, AFrameThatIsNotMeasuredYetIsNotSaidToBeIncomplete) {
+  WatchOptions options;
+  options.most_per_look = 4;
+  const auto watch = Watch(options);
+  for (std::size_t i = 0; i < 6; ++i) {
+    Write(i);
+    AddRow(i);
+  }
+  watch->Look(0);
+  watch->Look(2);
+  EXPECT_THAT(watch->Finish().notices,
+              Contains(HasSubstr(Name(5) + " is left out: it was not measured yet")));
+}
+
+// "31" of "31.5" when the sweep ends.
+TEST_F(FolderWatchTest, TakesTheReadingsOfTheLastTableThatWasWhole) {
+  const auto watch = Watch();
+  for (const std::size_t i : {0U, 1U}) Write(i);
+  folder_.Put("table.csv", "file,reading_mm\n" + Name(0) + ",31.5\n" + Name(1) + ",34.5\n");
+  watch->Look(0);
+  EXPECT_THAT(watch->Look(2).added, SizeIs(2));
+  folder_.Put("table.csv", "file,reading_mm\n" + Name(0) + ",31.5\n" + Name(1) + ",3");
+  watch->Look(3);
+  const Sweep early = watch->Finish();
+  ASSERT_THAT(early.description.frames, SizeIs(2));
+  EXPECT_EQ(early.description.frames[1].reading_mm, 34.5);
+  EXPECT_THAT(early.notices, Contains(HasSubstr("it was still being written when the sweep")));
+  // A row that is gone from a table that is whole.
+  folder_.Put("table.csv", "file,reading_mm\n" + Name(0) + ",31.25\n");
+  watch->Look(4);
+  watch->Look(6);
+  const Sweep late = watch->Finish();
+  ASSERT_THAT(late.description.frames, SizeIs(1));
+  EXPECT_EQ(late.description.frames[0].reading_mm, 31.25);
+  EXPECT_THAT(late.notices, Contains(HasSubstr("its reading is not in the table any more")));
+}
+
+TEST_F(FolderWatchTest, SaysAtTheEndThatTheTableCannotBeRead) {
+  const auto watch = Watch();
+  Write(0);
+  folder_.Put("table.csv", "file,reading_mm\n" + Name(0) + ",high\n");
+  folder_.Put("frames/done");
+  watch->Look(0);
+  const WatchUpdate update = watch->Look(2);
+  EXPECT_TRUE(update.is_ended);
+  EXPECT_THAT(update.waiting_reason, HasSubstr("high"));
+  EXPECT_THAT(ErrorOf([&] { watch->Finish(); }), HasSubstr("high"));
 }
 
 TEST_F(FolderWatchTest, ReadsReadingsFromTheNames) {

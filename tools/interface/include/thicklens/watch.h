@@ -66,8 +66,9 @@ class FolderWatch {
   // Throws Error for a folder, table or camera that cannot be used at all, and Interrupted.
   THICKLENS_EXPORT WatchUpdate Look(double now_s);
 
-  // Returns the sweep of the frames that were measured, as ReadSweepFolder reads it. Its notices
-  // name the files that were left out. Throws Error if there is no frame.
+  // Returns the sweep of the frames that were measured, as ReadSweepFolder reads it, with the
+  // readings of the last table that was whole. Its notices name the files that were left out, and
+  // why. Throws Error if there is no frame, with the reason.
   THICKLENS_EXPORT Sweep Finish() const;
 
  private:

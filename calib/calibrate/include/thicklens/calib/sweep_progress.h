@@ -45,6 +45,10 @@ struct SweepProgressReport {
   // Expected standard deviation of kappa as a part of kappa, by the Fisher information of equal
   // steps over the usable readings (ExpectSweep); absent: it cannot be predicted yet.
   std::optional<double> blur_ratio_error;
+  // True: the region is larger than the 480 x 480 px that the prediction uses at most, and the
+  // error is at most `blur_ratio_error`.
+  bool is_error_at_most = false;
+  bool readings_are_counts = false;  // the readings are in steps, not in mm (FocusSweep)
   bool is_enough = false;            // nothing is missing
   std::vector<std::string> missing;  // one sentence each, without its stop
 };
