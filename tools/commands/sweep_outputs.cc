@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <opencv2/core.hpp>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -86,11 +87,21 @@ void MakeImages(const SweepOutputPaths& paths, const calib::FocusSweep& sweep,
   merged.height_mm.release();
 }
 
-// The name by which a camera file in its folder refers to the PSF's file.
+// The folder of a file, without links and without "..".
+fs::path FolderOf(const std::string& path) {
+  const fs::path folder = fs::absolute(fs::path(path)).parent_path();
+  std::error_code failed;
+  fs::path found = fs::weakly_canonical(folder, failed);
+  return failed ? folder.lexically_normal() : found;
+}
+
+// The name by which a camera file in its folder refers to the PSF's file: relative or, where there
+// is no such way, absolute.
 std::string NameFromCamera(const std::string& psf, const std::string& camera) {
   if (camera.empty()) return psf;
-  const fs::path folder = fs::absolute(fs::path(camera)).parent_path();
-  return fs::absolute(fs::path(psf)).lexically_relative(folder).generic_string();
+  const fs::path file = FolderOf(psf) / fs::path(psf).filename();
+  const fs::path name = file.lexically_relative(FolderOf(camera));
+  return (name.empty() ? file : name).generic_string();
 }
 
 void MakePsf(const SweepOutputPaths& paths, const std::string& camera_output,

@@ -122,8 +122,8 @@ TEST_F(CalibrateOutputs, MergesTheFramesAndMeasuresTheShapeOfTheBlur) {
   const std::string camera = folder_ / "camera.yaml";
   const ProgramResult result =
       Calibrate({"--no-field", "-o", camera, "--all-in-focus", folder_ / "merged.png",
-                 "--focus-map", folder_ / "height.pfm", "--write-psf", folder_ / "psf/shape.yaml",
-                 "--json", folder_ / "result.json"});
+                 "--focus-map", folder_ / "height.pfm", "--write-psf",
+                 folder_ / "out/../psf/shape.yaml", "--json", folder_ / "result.json"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const auto found = nlohmann::json::parse(ContentOf(folder_ / "result.json"));
   EXPECT_TRUE(found.at("all_in_focus").at("done").get<bool>());
