@@ -141,6 +141,9 @@ CalibrationReport Report(const CalibrateOptions& options, const Sweep& sweep,
                          const calib::FocusSweep& focus_sweep, const Calibration& calibration,
                          const SweepImaging& imaging) {
   const auto& calibrated = calibration.camera.calibration;
+  imaging.has_psf = !options.more.psf.empty();
+  imaging.has_image = !options.more.image.empty();
+  imaging.has_focus_map = !options.more.focus_map.empty();
   std::vector<std::string> notices = sweep.notices;
   if (sweep.description.raw == model::SweepRaw::kGreen)
     notices.emplace_back("measured on the green sites of raw files; px are those of the sensor");

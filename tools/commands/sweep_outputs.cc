@@ -65,11 +65,17 @@ std::string ImageBytes(const cv::Mat& light, const model::Camera& camera, const 
 
 void MakeImages(const SweepOutputPaths& paths, const calib::FocusSweep& sweep,
                 const RunControl& control, const Calibration& calibration, SweepImaging* imaging,
-                SweepOutputBytes* bytes) {
+                std::vector<std::string>* warnings, SweepOutputBytes* bytes) {
   calib::MergeOptions options;
   options.progress = ProgressOf(control, "merging");
   imaging->merged = calib::MergeFrames(sweep, calibration, options);
   calib::MergedFrames& merged = *imaging->merged;
+  if (!merged.done) {
+    for (const std::string& path : {paths.image, paths.focus_map}) {
+      if (!path.empty())
+        warnings->push_back(fmt::format("{} is not written: {}", path, merged.message));
+    }
+  }
   if (merged.done && !paths.image.empty())
     bytes->image = ImageBytes(merged.light, calibration.camera, paths.image);
   if (merged.done && !paths.focus_map.empty()) {
@@ -183,7 +189,7 @@ void MakeSweepOutputs(const SweepOutputPaths& paths, const std::string& camera_o
                       Calibration* calibration, SweepImaging* imaging, SweepOutputBytes* bytes) {
   KeepPsf(camera_output, calibration);
   if (!paths.image.empty() || !paths.focus_map.empty())
-    MakeImages(paths, sweep, control, *calibration, imaging, bytes);
+    MakeImages(paths, sweep, control, *calibration, imaging, &calibration->summary.warnings, bytes);
   if (!paths.psf.empty())
     MakePsf(paths, camera_output, sweep, control, calibration, imaging, bytes);
 }

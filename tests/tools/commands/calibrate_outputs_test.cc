@@ -127,6 +127,7 @@ TEST_F(CalibrateOutputs, MergesTheFramesAndMeasuresTheShapeOfTheBlur) {
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const auto found = nlohmann::json::parse(ContentOf(folder_ / "result.json"));
   EXPECT_TRUE(found.at("all_in_focus").at("done").get<bool>());
+  EXPECT_THAT(result.out, HasSubstr("all-in-focus image and focus map: "));
   EXPECT_TRUE(fs::exists(folder_ / "merged.png"));
   EXPECT_TRUE(fs::exists(folder_ / "height.pfm"));
   ASSERT_TRUE(found.at("measured_psf").at("done").get<bool>()) << found["measured_psf"];
