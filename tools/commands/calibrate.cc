@@ -126,14 +126,18 @@ SweepImaging Imaging(const CalibrateOptions& options, const calib::FocusSweep& f
   const Camera& camera = calibration->camera;
   imaging.units = calib::TransferUnitsOf(camera);
   const CommandRun run(options.common, SweepOptionNames());
-  imaging.transfer = calib::MeasureSweepTransfer(focus_sweep, *calibration, run.control().threads);
+  // The calibration is that of one part of a target with relief; images show all of it.
+  calib::FocusSweep part = focus_sweep;
+  const auto& region = calibration->diagnostics.target.relief.region;
+  if (region) part.roi = *region;
+  imaging.transfer = calib::MeasureSweepTransfer(part, *calibration, run.control().threads);
   if (camera.calibration && camera.calibration->image_distance_mm &&
       camera.calibration->blur_ratio) {
     imaging.limits =
         model::FocusLimitsOf(camera, CircleOfConfusionMm(options.circle, camera.sensor));
   }
-  MakeSweepOutputs(options.more, options.camera_output, focus_sweep, run.control(), calibration,
-                   &imaging, bytes);
+  MakeSweepOutputs(options.more, options.camera_output, focus_sweep, part, run.control(),
+                   calibration, &imaging, bytes);
   return imaging;
 }
 

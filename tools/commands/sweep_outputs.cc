@@ -185,13 +185,13 @@ SweepOutputFiles ClaimSweepOutputs(const SweepOutputPaths& paths) {
 }
 
 void MakeSweepOutputs(const SweepOutputPaths& paths, const std::string& camera_output,
-                      const calib::FocusSweep& sweep, const RunControl& control,
-                      Calibration* calibration, SweepImaging* imaging, SweepOutputBytes* bytes) {
+                      const calib::FocusSweep& sweep, const calib::FocusSweep& part,
+                      const RunControl& control, Calibration* calibration, SweepImaging* imaging,
+                      SweepOutputBytes* bytes) {
   KeepPsf(camera_output, calibration);
   if (!paths.image.empty() || !paths.focus_map.empty())
     MakeImages(paths, sweep, control, *calibration, imaging, &calibration->summary.warnings, bytes);
-  if (!paths.psf.empty())
-    MakePsf(paths, camera_output, sweep, control, calibration, imaging, bytes);
+  if (!paths.psf.empty()) MakePsf(paths, camera_output, part, control, calibration, imaging, bytes);
 }
 
 void CommitSweepOutputs(const SweepOutputBytes& bytes, SweepOutputFiles* files) {

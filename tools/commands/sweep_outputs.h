@@ -33,11 +33,14 @@ SweepOutputFiles ClaimSweepOutputs(const SweepOutputPaths& paths);
 struct SweepOutputBytes {
   std::string image, focus_map, psf;
 };
-// Makes the contents that were asked for and describes them in `imaging`. The camera of the
-// calibration gets the measured PSF with the name of its file as seen from `camera_output`.
+// Makes the contents that were asked for, the images of `sweep` and the PSF of `part`, which has
+// the region that was calibrated, and describes them in `imaging`. The camera of the calibration
+// gets the measured PSF with the name of its file as seen from `camera_output`. What cannot be made
+// is a warning of the calibration.
 void MakeSweepOutputs(const SweepOutputPaths& paths, const std::string& camera_output,
-                      const calib::FocusSweep& sweep, const RunControl& control,
-                      Calibration* calibration, SweepImaging* imaging, SweepOutputBytes* bytes);
+                      const calib::FocusSweep& sweep, const calib::FocusSweep& part,
+                      const RunControl& control, Calibration* calibration, SweepImaging* imaging,
+                      SweepOutputBytes* bytes);
 void CommitSweepOutputs(const SweepOutputBytes& bytes, SweepOutputFiles* files);
 
 }  // namespace thicklens::tools
