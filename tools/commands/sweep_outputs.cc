@@ -176,6 +176,19 @@ void CheckSweepOutputs(const SweepOutputPaths& paths) {
   }
 }
 
+void RequireFramesOfOutputs(const SweepOutputPaths& paths, model::SweepRaw raw) {
+  if (raw != model::SweepRaw::kGreen) return;
+  for (const auto& [option, path] :
+       {std::pair("--all-in-focus", &paths.image), std::pair("--focus-map", &paths.focus_map),
+        std::pair("--write-psf", &paths.psf)}) {
+    if (path->empty()) continue;
+    throw UsageError(
+        fmt::format("{} is not made of the green sites of raw files: state raw: demosaiced, or "
+                    "leave {} out",
+                    option, option));
+  }
+}
+
 SweepOutputFiles ClaimSweepOutputs(const SweepOutputPaths& paths) {
   SweepOutputFiles files;
   if (!paths.image.empty()) files.image.emplace(paths.image);

@@ -8,6 +8,7 @@
 #include "thicklens/base/output_file.h"
 #include "thicklens/calib/focus_sweep.h"
 #include "thicklens/calibrate.h"
+#include "thicklens/model/sweep_file.h"
 #include "thicklens/run.h"
 #include "tools/report/sweep_imaging.h"
 
@@ -22,6 +23,9 @@ struct SweepOutputPaths {
 void AddSweepOutputOptions(CLI::App* command, SweepOutputPaths* paths);
 // Throws UsageError for a name whose ending stands for no kind of file that can have the content.
 void CheckSweepOutputs(const SweepOutputPaths& paths);
+
+// Throws UsageError for an output that is not made of the green sites of raw files.
+void RequireFramesOfOutputs(const SweepOutputPaths& paths, model::SweepRaw raw);
 
 // The files, claimed before anything is measured.
 struct SweepOutputFiles {

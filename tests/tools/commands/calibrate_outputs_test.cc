@@ -148,6 +148,20 @@ TEST_F(CalibrateOutputs, RefusesNamesThatHoldNoImage) {
   EXPECT_THAT(result.err, HasSubstr(".pfm or .tif is expected"));
 }
 
+TEST_F(CalibrateOutputs, RefusesACircleAsLargeAsTheApertureBeforeItMeasures) {
+  fs::create_directories(folder_ / "out");
+  const ProgramResult result = Calibrate({"--coc-um", "100000"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("--coc-um: a circle below the diameter of the aperture"));
+}
+
+TEST_F(CalibrateOutputs, RefusesOutputsThatGreenSitesDoNotGive) {
+  fs::create_directories(folder_ / "out");
+  const ProgramResult result = Calibrate({"--raw", "green", "--focus-map", folder_ / "map.pfm"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("--focus-map is not made of the green sites of raw files"));
+}
+
 // The field of so small an image may have no map. The output shows whether one was tried.
 TEST_F(CalibrateOutputs, NoFieldLeavesTheMapOut) {
   fs::create_directories(folder_ / "out");
