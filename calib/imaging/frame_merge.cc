@@ -18,7 +18,7 @@ namespace thicklens::calib {
 namespace {
 
 constexpr double kMinLogWeight = -27.6;  // of each frame where none shows detail
-constexpr double kLeastLogRatio = -80;   // of two weights: below it, one has no effect
+constexpr double kMinLogRatio = -80;     // of two weights: below it, one has no effect
 constexpr double kNoiseQuantile = 0.01;  // of the energies; such places show noise alone
 constexpr double kShowsDetail = 6;       // energy over that of the noise
 constexpr double kSmoothedPx = 0.7;      // before the Laplacian, against noise
@@ -221,9 +221,9 @@ class Merge {
     weight.setTo(kMinLogWeight, shown == 0);
     const cv::Mat largest = cv::max(log_largest_, weight);
     cv::Mat former = log_largest_ - largest;
-    cv::exp(cv::max(former, kLeastLogRatio), former);
+    cv::exp(cv::max(former, kMinLogRatio), former);
     weight -= largest;
-    cv::exp(cv::max(weight, kLeastLogRatio), weight);
+    cv::exp(cv::max(weight, kMinLogRatio), weight);
     weight = weight.mul(shown);
     log_largest_ = largest;
     weights_ = weights_.mul(former) + weight;

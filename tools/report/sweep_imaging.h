@@ -20,7 +20,7 @@ struct SweepImaging {
   calib::SweepTransfer transfer;
   calib::TransferUnits units;
   std::optional<model::FocusLimits> limits;  // absent: d1 or kappa is not known
-  // What was asked for.
+  // Results that were asked for.
   bool has_psf = false, has_image = false, has_focus_map = false;
   std::optional<calib::PsfMeasurement> psf;   // absent: not asked for, or the sweep was refused
   std::optional<calib::MergedFrames> merged;  // likewise, without the images
