@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <string>
 #include <utility>
 #include <vector>
@@ -94,6 +95,19 @@ double TypicalBlurPx(const Calibration& found) {
   return 0.5 * most_px;
 }
 
+// A reason is one line: " / " stands between the rows of a map.
+std::string InOneLine(const std::string& map) {
+  std::string line;
+  for (std::size_t i = 0; i < map.size(); ++i) {
+    if (map[i] != '\n') {
+      line += map[i];
+    } else if (i + 1 < map.size()) {
+      line += " / ";
+    }
+  }
+  return line;
+}
+
 // Takes back what the calibration says of focus and of the bench offset: its frames are no target
 // at one depth.
 void Forget(const FocusSweep& sweep, Calibration* found) {
@@ -133,9 +147,9 @@ Calibration Refused(const FocusSweep& sweep, Calibration found, const std::strin
   summary.outcome = Outcome::kRefused;
   summary.reason = fmt::format(
       "the target has relief: zones of the field are sharpest at different readings ({}); {}; take "
-      "a flat target, or state roi_px with one depth. Map of the zones:\n{}",
-      PartsInWords(found.diagnostics.target.relief), why, found.diagnostics.target.ReliefMap());
-  while (!summary.reason.empty() && summary.reason.back() == '\n') summary.reason.pop_back();
+      "a flat target, or state roi_px with one depth. Rows of the map of the zones: {}",
+      PartsInWords(found.diagnostics.target.relief), why,
+      InOneLine(found.diagnostics.target.ReliefMap()));
   Forget(sweep, &found);
   return found;
 }
@@ -171,7 +185,8 @@ Calibration WithoutRelief(const FocusSweep& sweep, const CalibrationOptions& opt
     return Refused(sweep, std::move(found),
                    fmt::format("no rectangle of at least {:.0f} x {:.0f} px is at one depth in all "
                                "frames",
-                               kSmallestSidePx, kSmallestSidePx));
+                               sweep.sensor_px_per_px * kSmallestSidePx,
+                               sweep.sensor_px_per_px * kSmallestSidePx));
   }
   FocusSweep part_of_it = sweep;
   part_of_it.roi = {sweep.roi.x + static_cast<int>(std::ceil(seen.x)),
@@ -182,12 +197,14 @@ Calibration WithoutRelief(const FocusSweep& sweep, const CalibrationOptions& opt
   part_of_it.grid_scales.clear();
   Calibration again = run(part_of_it);
   const std::string words = PartsInWords(relief);
+  const int px = sweep.sensor_px_per_px;
+  const std::string region =
+      fmt::format("roi_px [{}, {}, {}, {}]", px * part_of_it.roi.x, px * part_of_it.roi.y,
+                  px * part_of_it.roi.width, px * part_of_it.roi.height);
   if (again.summary.outcome == Outcome::kRefused) {
     return Refused(sweep, std::move(found),
-                   fmt::format("the largest part at one depth, roi_px [{}, {}, {}, {}], does not "
-                               "suffice: {}",
-                               part_of_it.roi.x, part_of_it.roi.y, part_of_it.roi.width,
-                               part_of_it.roi.height, again.summary.reason));
+                   fmt::format("the largest part at one depth, {}, does not suffice: {}", region,
+                               again.summary.reason));
   }
   again.diagnostics.target.relief = relief;
   again.diagnostics.target.relief.region = part_of_it.roi;
@@ -196,9 +213,8 @@ Calibration WithoutRelief(const FocusSweep& sweep, const CalibrationOptions& opt
   again.summary.warnings.insert(
       again.summary.warnings.begin(),
       fmt::format("the target has relief; everything is measured on its largest part at one depth, "
-                  "roi_px [{}, {}, {}, {}], {:.0f} % of the region ({})",
-                  part_of_it.roi.x, part_of_it.roi.y, part_of_it.roi.width, part_of_it.roi.height,
-                  100 * share, words));
+                  "{}, {:.0f} % of the region ({})",
+                  region, 100 * share, words));
   return again;
 }
 

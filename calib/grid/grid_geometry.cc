@@ -561,7 +561,9 @@ GridGeometry MeasureGrid(const FocusSweep& sweep, int threads, const std::functi
     return none;
   }
   if (sweep.sensor_px_per_px != 1) {
-    none.message = "target_grid: the grid is not looked for in the green sites of raw files alone";
+    none.message =
+        "target_grid: with raw: green, the grid is looked for neither in the frames nor in "
+        "grid_views";
     return none;
   }
   if (sweep.moves && model::MovesFocus(*sweep.moves)) {

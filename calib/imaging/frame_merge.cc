@@ -17,7 +17,8 @@
 namespace thicklens::calib {
 namespace {
 
-constexpr double kMinWeight = 1e-12;     // of each frame where none shows detail
+constexpr double kMinLogWeight = -27.6;  // of each frame where none shows detail
+constexpr double kMinLogRatio = -80;     // of two weights: below it, one has no effect
 constexpr double kNoiseQuantile = 0.01;  // of the energies; such places show noise alone
 constexpr double kShowsDetail = 6;       // energy over that of the noise
 constexpr double kSmoothedPx = 0.7;      // before the Laplacian, against noise
@@ -102,6 +103,11 @@ class Merge {
     if (!reference_scale) return Ended("the image scale of the frames is not known");
     axis_ = RegionCentre(sweep_);
     reference_grey_ = LinearGrey(sweep_.read_frame(*reference), sweep_, *reference);
+    // The unit of the reference is that of all frames. A common factor changes only where detail
+    // begins to count.
+    unit_ = std::max(Quantile(SharpnessOf(reference_grey_, options_.sharpness_sigma_px),
+                              cv::Mat::ones(reference_grey_.size(), CV_32F), 0.99),
+                     1e-20F);
     const std::vector<std::size_t> order = FramesByReading();
     int done = 0;
     for (const std::size_t frame : order) {
@@ -202,17 +208,30 @@ class Merge {
     if (sum_.empty()) {
       sum_ = cv::Mat(light.size(), light.type(), cv::Scalar::all(0));
       weights_ = cv::Mat(light.size(), CV_32F, cv::Scalar(0));
+      log_largest_ = cv::Mat(light.size(), CV_32F, cv::Scalar(kMinLogWeight));
       peaks_.emplace(light.size());
-      // The unit is that of the first frame, for all: a common factor changes only their range.
-      unit_ = std::max(Quantile(energy, shown, 0.99), 1e-20F);
     }
     noises_.push_back(Quantile(energy, shown, kNoiseQuantile));
+    // Relative to the largest weight of the pixel until now: the weight itself, a power of the
+    // energy, may exceed what a number can hold.
     cv::Mat weight = energy / unit_;
-    cv::pow(weight, options_.selectivity, weight);
-    weight = (weight + kMinWeight).mul(shown);
-    weights_ += weight;
-    if (light.channels() == 3) cv::merge(std::vector<cv::Mat>(3, weight), weight);
-    sum_ += light.mul(weight);
+    cv::log(cv::max(weight, 1e-30F), weight);
+    weight *= options_.selectivity;
+    weight = cv::max(weight, kMinLogWeight);
+    weight.setTo(kMinLogWeight, shown == 0);
+    const cv::Mat largest = cv::max(log_largest_, weight);
+    cv::Mat former = log_largest_ - largest;
+    cv::exp(cv::max(former, kMinLogRatio), former);
+    weight -= largest;
+    cv::exp(cv::max(weight, kMinLogRatio), weight);
+    weight = weight.mul(shown);
+    log_largest_ = largest;
+    weights_ = weights_.mul(former) + weight;
+    if (light.channels() == 3) {
+      cv::merge(std::vector<cv::Mat>(3, weight), weight);
+      cv::merge(std::vector<cv::Mat>(3, former), former);
+    }
+    sum_ = sum_.mul(former) + light.mul(weight);
     peaks_->Add(energy, shown, merged_.frames);
     readings_mm_.push_back(reading_mm);
     ++merged_.frames;
@@ -271,7 +290,8 @@ class Merge {
   const MergeOptions& options_;
   cv::Point2d axis_;
   cv::Mat reference_grey_;
-  cv::Mat sum_, weights_;
+  // Sums with weights relative to the largest of each pixel, and the logarithm of that.
+  cv::Mat sum_, weights_, log_largest_;
   std::optional<Peaks> peaks_;
   float unit_ = 1;
   std::vector<float> noises_;

@@ -114,11 +114,36 @@ Calibration Measure(const CalibrateOptions& options, const Sweep& sweep) {
   return thicklens::Calibrate(sweep, asked, run.control());
 }
 
+// Refuses before the measurement what would fail after it.
+void RequirePossible(const CalibrateOptions& options, const Sweep& sweep) {
+  RequireFramesOfOutputs(options.more, sweep.description.raw);
+  RequirePossibleCircle(options.circle, sweep.camera);
+}
+
+// The MTF of the frames. The frames of a sweep that was measured on the green sites of raw files
+// are others, with interpolated edges: their MTF is computed from the fit.
+calib::SweepTransfer Transfer(const calib::FocusSweep& focus_sweep, model::SweepRaw raw,
+                              const calib::Calibration& calibration, int threads) {
+  if (raw != model::SweepRaw::kGreen)
+    return calib::MeasureSweepTransfer(focus_sweep, calibration, threads);
+  calib::FocusSweep without_edges = focus_sweep;
+  without_edges.target = model::SweepTarget::kTexture;
+  calib::Calibration fitted = calibration;
+  fitted.diagnostics.blur.estimator.clear();
+  calib::SweepTransfer transfer = calib::MeasureSweepTransfer(without_edges, fitted, threads);
+  transfer.message = transfer.done ? "modelled: with raw: green, no edge is measured"
+                                   : "with raw: green, no edge is measured, and no blur was fitted";
+  return transfer;
+}
+
 // Measures the MTF and makes the images and the PSF that were asked for. The camera of the
 // calibration gets the measured PSF.
 SweepImaging Imaging(const CalibrateOptions& options, const calib::FocusSweep& focus_sweep,
-                     Calibration* calibration, SweepOutputBytes* bytes) {
+                     model::SweepRaw raw, Calibration* calibration, SweepOutputBytes* bytes) {
   SweepImaging imaging;
+  imaging.has_psf = !options.more.psf.empty();
+  imaging.has_image = !options.more.image.empty();
+  imaging.has_focus_map = !options.more.focus_map.empty();
   if (!calibration->refusal.empty()) {
     imaging.transfer.message = calibration->refusal;
     return imaging;
@@ -126,14 +151,17 @@ SweepImaging Imaging(const CalibrateOptions& options, const calib::FocusSweep& f
   const Camera& camera = calibration->camera;
   imaging.units = calib::TransferUnitsOf(camera);
   const CommandRun run(options.common, SweepOptionNames());
-  imaging.transfer = calib::MeasureSweepTransfer(focus_sweep, *calibration, run.control().threads);
+  // The calibration is that of one part of a target with relief; images show all of it.
+  calib::FocusSweep part = focus_sweep;
+  const auto& region = calibration->diagnostics.target.relief.region;
+  if (region) part.roi = *region;
+  imaging.transfer = Transfer(part, raw, *calibration, run.control().threads);
+  const double circle_mm = CircleOfConfusionMm(options.circle, camera.sensor);
   if (camera.calibration && camera.calibration->image_distance_mm &&
-      camera.calibration->blur_ratio) {
-    imaging.limits =
-        model::FocusLimitsOf(camera, CircleOfConfusionMm(options.circle, camera.sensor));
-  }
-  MakeSweepOutputs(options.more, options.camera_output, focus_sweep, run.control(), calibration,
-                   &imaging, bytes);
+      camera.calibration->blur_ratio && circle_mm < 2 * camera.lens.aperture_radius_mm)
+    imaging.limits = model::FocusLimitsOf(camera, circle_mm);
+  MakeSweepOutputs(options.more, options.camera_output, focus_sweep, part, run.control(),
+                   calibration, &imaging, bytes);
   return imaging;
 }
 
@@ -219,7 +247,8 @@ CommandResult RunCalibration(const CalibrateOptions& options, const Sweep& sweep
   if (grid.distortion_is_used)
     focus_sweep = calib::WithDistortion(std::move(focus_sweep), *grid.lens, focus_sweep.roi);
   SweepOutputBytes more;
-  const SweepImaging imaging = Imaging(options, focus_sweep, &calibration, &more);
+  const SweepImaging imaging =
+      Imaging(options, focus_sweep, sweep.description.raw, &calibration, &more);
   WriteOutputs(options, sweep, focus_sweep, calibration, imaging, more, &outputs);
   if (options.common.quiet) {  // otherwise they are part of the text
     for (const std::string& warning : calibration.summary.warnings)
@@ -282,8 +311,10 @@ CommandResult RunDry(const CalibrateOptions& options, const Sweep& sweep) {
   return {UnderstandingJson(sweep, found, options.by_paper() ? "source" : options.method), ""};
 }
 
-// Adds what the values of the frames show, unless there are too few frames.
+// Adds what the values of the frames show, unless there are too few frames. What cannot be done is
+// refused first.
 Sweep Examined(const CalibrateOptions& options, Sweep sweep) {
+  RequirePossible(options, sweep);
   const CommandRun run(options.common, SweepOptionNames());
   std::string why;
   if (!calib::HasEnoughFrames(FocusSweepOf(sweep), &why)) return sweep;

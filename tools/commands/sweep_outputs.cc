@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <opencv2/core.hpp>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -64,11 +65,17 @@ std::string ImageBytes(const cv::Mat& light, const model::Camera& camera, const 
 
 void MakeImages(const SweepOutputPaths& paths, const calib::FocusSweep& sweep,
                 const RunControl& control, const Calibration& calibration, SweepImaging* imaging,
-                SweepOutputBytes* bytes) {
+                std::vector<std::string>* warnings, SweepOutputBytes* bytes) {
   calib::MergeOptions options;
   options.progress = ProgressOf(control, "merging");
   imaging->merged = calib::MergeFrames(sweep, calibration, options);
   calib::MergedFrames& merged = *imaging->merged;
+  if (!merged.done) {
+    for (const std::string& path : {paths.image, paths.focus_map}) {
+      if (!path.empty())
+        warnings->push_back(fmt::format("{} is not written: {}", path, merged.message));
+    }
+  }
   if (merged.done && !paths.image.empty())
     bytes->image = ImageBytes(merged.light, calibration.camera, paths.image);
   if (merged.done && !paths.focus_map.empty()) {
@@ -86,11 +93,21 @@ void MakeImages(const SweepOutputPaths& paths, const calib::FocusSweep& sweep,
   merged.height_mm.release();
 }
 
-// The name by which a camera file in its folder refers to the PSF's file.
+// The folder of a file, without links and without "..".
+fs::path FolderOf(const std::string& path) {
+  const fs::path folder = fs::absolute(fs::path(path)).parent_path();
+  std::error_code failed;
+  fs::path found = fs::weakly_canonical(folder, failed);
+  return failed ? folder.lexically_normal() : found;
+}
+
+// The name by which a camera file in its folder refers to the PSF's file: relative or, where there
+// is no such way, absolute.
 std::string NameFromCamera(const std::string& psf, const std::string& camera) {
   if (camera.empty()) return psf;
-  const fs::path folder = fs::absolute(fs::path(camera)).parent_path();
-  return fs::absolute(fs::path(psf)).lexically_relative(folder).generic_string();
+  const fs::path file = FolderOf(psf) / fs::path(psf).filename();
+  const fs::path name = file.lexically_relative(FolderOf(camera));
+  return (name.empty() ? file : name).generic_string();
 }
 
 void MakePsf(const SweepOutputPaths& paths, const std::string& camera_output,
@@ -159,6 +176,19 @@ void CheckSweepOutputs(const SweepOutputPaths& paths) {
   }
 }
 
+void RequireFramesOfOutputs(const SweepOutputPaths& paths, model::SweepRaw raw) {
+  if (raw != model::SweepRaw::kGreen) return;
+  for (const auto& [option, path] :
+       {std::pair("--all-in-focus", &paths.image), std::pair("--focus-map", &paths.focus_map),
+        std::pair("--write-psf", &paths.psf)}) {
+    if (path->empty()) continue;
+    throw UsageError(
+        fmt::format("{} is not made of the green sites of raw files: state raw: demosaiced, or "
+                    "leave {} out",
+                    option, option));
+  }
+}
+
 SweepOutputFiles ClaimSweepOutputs(const SweepOutputPaths& paths) {
   SweepOutputFiles files;
   if (!paths.image.empty()) files.image.emplace(paths.image);
@@ -168,13 +198,13 @@ SweepOutputFiles ClaimSweepOutputs(const SweepOutputPaths& paths) {
 }
 
 void MakeSweepOutputs(const SweepOutputPaths& paths, const std::string& camera_output,
-                      const calib::FocusSweep& sweep, const RunControl& control,
-                      Calibration* calibration, SweepImaging* imaging, SweepOutputBytes* bytes) {
+                      const calib::FocusSweep& sweep, const calib::FocusSweep& part,
+                      const RunControl& control, Calibration* calibration, SweepImaging* imaging,
+                      SweepOutputBytes* bytes) {
   KeepPsf(camera_output, calibration);
   if (!paths.image.empty() || !paths.focus_map.empty())
-    MakeImages(paths, sweep, control, *calibration, imaging, bytes);
-  if (!paths.psf.empty())
-    MakePsf(paths, camera_output, sweep, control, calibration, imaging, bytes);
+    MakeImages(paths, sweep, control, *calibration, imaging, &calibration->summary.warnings, bytes);
+  if (!paths.psf.empty()) MakePsf(paths, camera_output, part, control, calibration, imaging, bytes);
 }
 
 void CommitSweepOutputs(const SweepOutputBytes& bytes, SweepOutputFiles* files) {

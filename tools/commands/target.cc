@@ -29,6 +29,7 @@ namespace {
 constexpr double kShortestSideMm = 50;
 constexpr double kLongestSideMm = 2000;
 constexpr double kMaxFeatureMm = 50;
+constexpr double kDefaultSquareMm = 10;
 constexpr double kMaxDistanceMm = 1e6;
 constexpr double kMinDpi = 72, kMaxDpi = 4800;
 // In this range the pixels along both axes of the edge have many phases, and the plateaus stay
@@ -55,7 +56,7 @@ struct TargetOptions {
   std::int64_t seed = 1;
   std::string pattern = "texture";
   std::string squares;  // COLUMNSxROWS; empty: as many as fit
-  double square_mm = 10;
+  std::optional<double> square_mm;
   std::optional<double> marker_mm;
   std::string dictionary;
   bool no_marks = false;
@@ -102,6 +103,8 @@ std::optional<model::TargetGrid> GridOf(const TargetOptions& options) {
       throw UsageError(fmt::format("{} is for --pattern {}", option, pattern));
   };
   only(!options.squares.empty(), !is_texture, "--squares", "chequerboard, charuco or circles");
+  only(options.square_mm.has_value(), !is_texture, "--square-mm",
+       "chequerboard, charuco or circles");
   only(options.marker_mm.has_value(), is_charuco, "--marker-mm", "charuco");
   only(!options.dictionary.empty(), is_charuco, "--dictionary", "charuco");
   only(options.feature_mm.has_value(), is_texture, "--feature-mm", "texture");
@@ -109,7 +112,7 @@ std::optional<model::TargetGrid> GridOf(const TargetOptions& options) {
   if (is_texture) return std::nullopt;
   model::TargetGrid grid;
   grid.pattern = *model::GridPatternOf(options.pattern);
-  grid.square_mm = options.square_mm;
+  grid.square_mm = options.square_mm.value_or(kDefaultSquareMm);
   if (!options.squares.empty()) {
     const auto counts = SplitPixels("--squares", options.squares, 'x', "COLUMNSxROWS");
     if (counts.size() != 2 || counts[0] < 1 || counts[1] < 1) {
@@ -260,9 +263,10 @@ void AddTargetOptions(CLI::App* command, TargetOptions* options) {
       ->type_name("COLUMNSxROWS");
   command
       ->add_option("--square-mm", options->square_mm,
-                   "Side of a square of a grid, or distance of the circles' centres")
+                   fmt::format("Side of a square of a grid, or distance of the circles' centres; "
+                               "default {:g}",
+                               kDefaultSquareMm))
       ->check(Between(0, kMaxFeatureMm * 10, "mm on the sheet"))
-      ->capture_default_str()
       ->type_name("MM");
   command
       ->add_option("--marker-mm", options->marker_mm,

@@ -107,6 +107,12 @@ void ConvertToSensorPixels(calib::Calibration* calibration) {
   if (found.sharpness.done) found.sharpness.log_parabola[0] -= std::log(kPx);
   for (calib::FieldTile& tile : found.field.tiles)
     tile.centre_px = kPx * tile.centre_px + Eigen::Vector2d::Constant((kPx - 1) / 2);
+  if (auto& region = found.target.relief.region) {
+    region->x *= kSensorPxPerPx;
+    region->y *= kSensorPxPerPx;
+    region->width *= kSensorPxPerPx;
+    region->height *= kSensorPxPerPx;
+  }
   if (found.magnification) found.magnification->period_px *= kPx;
   if (found.blur_slope_px_per_mm) {
     found.blur_slope_px_per_mm->value *= kPx;

@@ -1,5 +1,7 @@
 #include "tools/options/circle_option.h"
 
+#include <fmt/format.h>
+
 #include "tools/options/option_values.h"
 
 namespace thicklens::tools {
@@ -27,6 +29,15 @@ void AddCircleOptions(CLI::App* command, CircleOption* option) {
 double CircleOfConfusionMm(const CircleOption& option, const model::Sensor& sensor) {
   if (option.um) return *option.um / kUmPerMm;
   return option.px.value_or(kDefaultPx) * sensor.pixel_pitch_mm;
+}
+
+void RequirePossibleCircle(const CircleOption& option, const model::Camera& camera) {
+  const double aperture_mm = 2 * camera.lens.aperture_radius_mm;
+  const double circle_mm = CircleOfConfusionMm(option, camera.sensor);
+  if (!option.is_given() || circle_mm < aperture_mm) return;
+  throw UsageError(fmt::format(
+      "{}: a circle below the diameter of the aperture, {:.6g} mm, is expected, found {:.6g} mm",
+      option.um ? "--coc-um" : "--coc-px", aperture_mm, circle_mm));
 }
 
 }  // namespace thicklens::tools

@@ -18,6 +18,9 @@ void AddCircleOptions(CLI::App* command, CircleOption* option);
 
 // The diameter on the sensor, mm; 2 px if none is given.
 double CircleOfConfusionMm(const CircleOption& option, const model::Sensor& sensor);
+// Throws UsageError that names the option if the circle is not smaller than the aperture: it would
+// have no limits. Without an option there is no error.
+void RequirePossibleCircle(const CircleOption& option, const model::Camera& camera);
 
 }  // namespace thicklens::tools
 

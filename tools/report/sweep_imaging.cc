@@ -63,9 +63,13 @@ std::string PsfLine(const calib::PsfMeasurement& psf) {
       psf.frames, psf.nearer, psf.farther, psf.sigma_x_ratio, psf.sigma_y_ratio);
 }
 
-std::string MergeLine(const calib::MergedFrames& merged) {
-  if (!merged.done) return "none: " + merged.message;
-  return fmt::format("{} frames merged{}", merged.frames,
+std::string MergeLine(const SweepImaging& imaging) {
+  const calib::MergedFrames& merged = *imaging.merged;
+  const std::string name = !imaging.has_focus_map ? "all-in-focus image"
+                           : !imaging.has_image   ? "focus map"
+                                                  : "all-in-focus image and focus map";
+  if (!merged.done) return name + ": none: " + merged.message;
+  return fmt::format("{}: {} frames merged{}", name, merged.frames,
                      merged.left_out > 0 ? fmt::format(", {} could not be aligned and are left out",
                                                        merged.left_out)
                                          : "");
@@ -145,8 +149,7 @@ std::string SweepImagingText(const SweepImaging& imaging, const Calibration& cal
     for (const std::string& line : FocusLimitsLines(*imaging.limits)) text += line + '\n';
   }
   if (imaging.psf) text += "measured PSF: " + PrintableUtf8(PsfLine(*imaging.psf)) + '\n';
-  if (imaging.merged)
-    text += "all-in-focus image: " + PrintableUtf8(MergeLine(*imaging.merged)) + '\n';
+  if (imaging.merged) text += PrintableUtf8(MergeLine(imaging)) + '\n';
   return text;
 }
 
@@ -167,6 +170,7 @@ void AddSweepImaging(const SweepImaging& imaging, const Calibration& calibration
                        : json(nullptr)},
       {"frames", std::move(frames)}};
   (*summary)["focus_limits"] = imaging.limits ? FocusLimitsJson(*imaging.limits) : json(nullptr);
+  if (imaging.has_psf) (*summary)["measured_psf"] = nullptr;
   if (imaging.psf) {
     const calib::PsfMeasurement& psf = *imaging.psf;
     (*summary)["measured_psf"] = {{"done", psf.done},
@@ -177,6 +181,7 @@ void AddSweepImaging(const SweepImaging& imaging, const Calibration& calibration
                                   {"sigma_x_ratio", psf.sigma_x_ratio},
                                   {"sigma_y_ratio", psf.sigma_y_ratio}};
   }
+  if (imaging.has_image || imaging.has_focus_map) (*summary)["all_in_focus"] = nullptr;
   if (imaging.merged) {
     (*summary)["all_in_focus"] = {{"done", imaging.merged->done},
                                   {"message", PrintableUtf8(imaging.merged->message)},
@@ -305,7 +310,7 @@ std::string SweepImagingWords(const SweepImaging& imaging, const Calibration& ca
     for (const std::string& line : FocusLimitsLines(*imaging.limits)) item(line);
   }
   if (imaging.psf) item("measured PSF: " + PsfLine(*imaging.psf));
-  if (imaging.merged) item("all-in-focus image: " + MergeLine(*imaging.merged));
+  if (imaging.merged) item(MergeLine(imaging));
   return items.empty() ? "" : "<ul>\n" + items + "</ul>\n";
 }
 

@@ -19,8 +19,10 @@ namespace thicklens::tools {
 struct SweepImaging {
   calib::SweepTransfer transfer;
   calib::TransferUnits units;
-  std::optional<model::FocusLimits> limits;   // absent: d1 or kappa is not known
-  std::optional<calib::PsfMeasurement> psf;   // present if it was asked for
+  std::optional<model::FocusLimits> limits;  // absent: d1 or kappa is not known
+  // Results that were asked for.
+  bool has_psf = false, has_image = false, has_focus_map = false;
+  std::optional<calib::PsfMeasurement> psf;   // absent: not asked for, or the sweep was refused
   std::optional<calib::MergedFrames> merged;  // likewise, without the images
 };
 
@@ -39,7 +41,8 @@ nlohmann::json CurveJson(const calib::ModulationTransfer& curve);
 
 // The findings for the terminal, one line each.
 std::string SweepImagingText(const SweepImaging& imaging, const calib::Calibration& calibration);
-// Adds the keys "mtf", "focus_limits", "measured_psf" and "all_in_focus" to a summary.
+// Adds the keys "mtf" and "focus_limits" to a summary and, if they were asked for, "measured_psf"
+// and "all_in_focus", which are null after a refusal.
 void AddSweepImaging(const SweepImaging& imaging, const calib::Calibration& calibration,
                      nlohmann::json* summary);
 

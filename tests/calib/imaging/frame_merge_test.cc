@@ -79,6 +79,18 @@ TEST(FrameMerge, IsSharperThanEveryFrameOfATiltedTarget) {
   EXPECT_GT(merged_db, 34);
 }
 
+// The energies to the power of 20 exceed what a float can hold.
+TEST(FrameMerge, HasNoHolesWithTheLargestSelectivity) {
+  const PaintedSweep& painted = TiltedSweep();
+  MergeOptions options;
+  options.selectivity = 20;
+  const MergedFrames merged = MergeFrames(painted.sweep, painted.calibration, options);
+  ASSERT_TRUE(merged.done) << merged.message;
+  EXPECT_TRUE(cv::checkRange(merged.light));
+  const MergedFrames usual = MergeFrames(painted.sweep, painted.calibration, {});
+  EXPECT_GT(PsnrDb(merged.light, usual.light, 20), 25);
+}
+
 TEST(FrameMerge, MapsTheHeightOfTheTarget) {
   const PaintedOptions options = Tilted();
   const PaintedSweep& painted = TiltedSweep();

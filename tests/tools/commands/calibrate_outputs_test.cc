@@ -122,11 +122,12 @@ TEST_F(CalibrateOutputs, MergesTheFramesAndMeasuresTheShapeOfTheBlur) {
   const std::string camera = folder_ / "camera.yaml";
   const ProgramResult result =
       Calibrate({"--no-field", "-o", camera, "--all-in-focus", folder_ / "merged.png",
-                 "--focus-map", folder_ / "height.pfm", "--write-psf", folder_ / "psf/shape.yaml",
-                 "--json", folder_ / "result.json"});
+                 "--focus-map", folder_ / "height.pfm", "--write-psf",
+                 folder_ / "out/../psf/shape.yaml", "--json", folder_ / "result.json"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const auto found = nlohmann::json::parse(ContentOf(folder_ / "result.json"));
   EXPECT_TRUE(found.at("all_in_focus").at("done").get<bool>());
+  EXPECT_THAT(result.out, HasSubstr("all-in-focus image and focus map: "));
   EXPECT_TRUE(fs::exists(folder_ / "merged.png"));
   EXPECT_TRUE(fs::exists(folder_ / "height.pfm"));
   ASSERT_TRUE(found.at("measured_psf").at("done").get<bool>()) << found["measured_psf"];
@@ -145,6 +146,20 @@ TEST_F(CalibrateOutputs, RefusesNamesThatHoldNoImage) {
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.err, HasSubstr("--focus-map"));
   EXPECT_THAT(result.err, HasSubstr(".pfm or .tif is expected"));
+}
+
+TEST_F(CalibrateOutputs, RefusesACircleAsLargeAsTheApertureBeforeItMeasures) {
+  fs::create_directories(folder_ / "out");
+  const ProgramResult result = Calibrate({"--coc-um", "100000"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("--coc-um: a circle below the diameter of the aperture"));
+}
+
+TEST_F(CalibrateOutputs, RefusesOutputsThatGreenSitesDoNotGive) {
+  fs::create_directories(folder_ / "out");
+  const ProgramResult result = Calibrate({"--raw", "green", "--focus-map", folder_ / "map.pfm"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("--focus-map is not made of the green sites of raw files"));
 }
 
 // The field of so small an image may have no map. The output shows whether one was tried.

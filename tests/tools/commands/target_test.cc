@@ -468,6 +468,8 @@ TEST_F(TargetProgram, RefusesNonsense) {
   }
   ExpectFailure({"-o", pdf, "--feature-mm", "nan"}, 2, "--feature-mm");
   ExpectFailure({"-o", pdf, "--feature-mm", "0"}, 2, "--feature-mm");
+  ExpectFailure({"-o", pdf, "--square-mm", "12"}, 2,
+                "--square-mm is for --pattern chequerboard, charuco or circles");
   ExpectFailure({"-o", pdf, "--feature-mm", "0.01"}, 1, "below the 0.1 mm");
   ExpectFailure({"-o", pdf, "--edge-angle-deg", "0"}, 2, "from 2 to 20");
   ExpectFailure({"-o", pdf, "--edge-angle-deg", "45"}, 2, "from 2 to 20");

@@ -81,6 +81,7 @@ TEST(ConvertToSensorPixels, ConvertsAllThatIsInPixels) {
   green.diagnostics.blur_slope_px_per_mm = model::Estimate{3, 0.1};
   green.diagnostics.field.tiles.resize(1);
   green.diagnostics.field.tiles[0].centre_px = {10, 0};
+  green.diagnostics.target.relief.region = model::RegionOfInterest{3, 5, 40, 31};
   green.examples.resize(2);
   green.examples[0].is_edge = true;
   green.examples[0].x = {1};
@@ -108,6 +109,9 @@ TEST(ConvertToSensorPixels, ConvertsAllThatIsInPixels) {
   EXPECT_DOUBLE_EQ(std::exp(found.diagnostics.sharpness.log_parabola[0]),
                    std::exp(green.diagnostics.sharpness.log_parabola[0]) / 2);
   EXPECT_EQ(found.diagnostics.field.tiles[0].centre_px, Eigen::Vector2d(20.5, 0.5));
+  const model::RegionOfInterest& region = *found.diagnostics.target.relief.region;
+  EXPECT_THAT((std::vector<int>{region.x, region.y, region.width, region.height}),
+              ::testing::ElementsAre(6, 10, 80, 62));
   EXPECT_EQ(found.diagnostics.magnification->period_px, 24);
   EXPECT_DOUBLE_EQ(found.diagnostics.blur_slope_px_per_mm->value, 6);
   EXPECT_DOUBLE_EQ(found.diagnostics.blur_slope_px_per_mm->sigma, 0.2);
