@@ -85,7 +85,7 @@ model::Estimate ScaleByPose(const GridSetup& setup, const GridView& view) {
   return {scale, scale * noise_px * std::sqrt(std::max(0.0, variance)) / at_mm};
 }
 
-// The same with the error that the tilt has from that of the focal length.
+// The scale with the error that the tilt has from that of the focal length.
 model::Estimate ScaleAtAxis(const GridSetup& setup, const GridView& view) {
   model::Estimate scale = ScaleByPose(setup, view);
   GridSetup longer = setup;

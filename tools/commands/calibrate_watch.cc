@@ -34,7 +34,7 @@ void PrintNow(const CommonOptions& common, const std::string& text) {
   std::fflush(stdout);
 }
 
-// What ends the sweep after a look; empty: nothing does. Waits until the next look.
+// Returns what ends the sweep after a look; empty: nothing does. Waits until the next look.
 std::string EndOf(const WatchUpdate& update, const FinishOnInterrupt& interrupt, LineWaiter* line) {
   if (update.is_ended) return update.ended_by;
   if (interrupt.IsAsked()) return "an interrupt";
@@ -74,7 +74,7 @@ WatchedSweep WatchSweep(const SweepArguments& arguments, std::optional<double> p
                update.added.size() < static_cast<std::size_t>(options.most_per_look);
       if (ended_by.empty()) ended_by = EndOf(update, *interrupt, &line);
       progress = std::move(update.progress);
-      // From here on, an interrupt ends the program as usual.
+      // An interrupt ends the program as usual from here on.
       if (!ended_by.empty()) interrupt.reset();
       ThrowIfCancelled();
     }

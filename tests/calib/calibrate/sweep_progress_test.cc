@@ -202,7 +202,7 @@ TEST(SweepProgress, ChecksPointsAsCalibrateDoes) {
   for (std::size_t i = 0; i < report.frames.size(); ++i)
     EXPECT_EQ(report.frames[i].rejection, c.frames[i].rejection) << i;
   EXPECT_EQ(report.rejected, 0);
-  // The same frames would not pass as those of a texture.
+  // These frames would not pass as those of a texture.
   s.sweep.target = model::SweepTarget::kTexture;
   EXPECT_GT(WithFrames(s, Range(0, 21)).Report().rejected, 0);
 }

@@ -59,7 +59,7 @@ TEST_F(LineWaiterTest, RestsAtTheEndOfTheInput) {
   ExpectRest();
 }
 
-// As nohup opens it: it is ready at all times and cannot be read.
+// nohup opens it so: it is ready at all times and cannot be read.
 TEST_F(LineWaiterTest, RestsWhereTheInputCannotBeRead) {
   TakeAsInput(::open("/dev/null", O_WRONLY));
   ExpectRest();
