@@ -13,7 +13,7 @@ namespace thicklens::calib {
 
 // Decides from the frame with the steepest gradients what the target is, where it is not stated:
 // only points, or only one straight edge, which is taken as a printed one. A stated texture
-// that is such an edge has no spectra either, and is taken as one. A warning says what was decided.
+// that is such an edge has no spectra, and is taken as one. A warning says what was decided.
 void RecogniseTarget(const std::function<cv::Mat(std::size_t)>& read_grey, FocusSweep* sweep,
                      Calibration* calibration);
 

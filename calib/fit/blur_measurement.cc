@@ -136,8 +136,7 @@ class Measurement {
   // better. Such edges only limit the floor: where there are spectra, the frames around focus
   // suffice for that.
   void MeasureEdges() {
-    // A stated texture that is a lone edge has no spectra.
-    if (task_.sweep.target == model::SweepTarget::kTexture && evidence_.spectrum >= 0) return;
+    if (task_.sweep.target == model::SweepTarget::kTexture) return;
     const bool is_sharp = task_.sweep.target == model::SweepTarget::kKnifeEdge;
     const bool for_bound_alone = evidence_.spectrum >= 0 && !is_sharp;
     const model::Psf psf = task_.sweep.camera.psf;

@@ -71,7 +71,8 @@ TEST(LoneEdge, OfAnUnstatedTargetItsSoftnessIsOpen) {
   const double reach_mm = 2 * c.summary.focus_depth_mm->sigma;
   EXPECT_LT(c.summary.focus_depth_mm->systematic->x() - reach_mm, s.truth.focus_depth_mm);
   EXPECT_GT(c.summary.focus_depth_mm->systematic->y() + reach_mm, s.truth.focus_depth_mm);
-  EXPECT_THAT(c.summary.warnings, Contains(HasSubstr("the given offset_mm could not be checked")));
+  EXPECT_THAT(c.diagnostics.scale.message, HasSubstr("the given offset_mm is used unchecked"));
+  EXPECT_THAT(c.summary.warnings, Contains(HasSubstr("one straight edge and nothing else")));
   EXPECT_THAT(c.summary.warnings, Contains(HasSubstr("photograph a knife edge")));
 }
 

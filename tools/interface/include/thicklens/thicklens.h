@@ -8,6 +8,8 @@
 //
 // Errors: a wrong file, option or device throws thicklens::Error (options: OptionError). The
 // outcome of an operation is in its summary. A cancelled call throws thicklens::Interrupted.
+//
+// The headers that need OpenCV are included apart: thicklens/opencv.h, frames.h and watch.h.
 #include "thicklens/calibrate.h"    // IWYU pragma: export
 #include "thicklens/camera.h"       // IWYU pragma: export
 #include "thicklens/compare.h"      // IWYU pragma: export
@@ -26,6 +28,5 @@
 #include "thicklens/sweep.h"        // IWYU pragma: export
 #include "thicklens/verify.h"       // IWYU pragma: export
 #include "thicklens/version.h"      // IWYU pragma: export
-#include "thicklens/watch.h"        // IWYU pragma: export
 
 #endif  // THICKLENS_THICKLENS_H_
