@@ -51,25 +51,29 @@ json TargetJson(const calib::TargetFinding& target) {
   json region = nullptr;
   if (relief.region)
     region = {relief.region->x, relief.region->y, relief.region->width, relief.region->height};
+  // A number that was not measured is null.
+  const auto count = [](int value, bool is_measured) {
+    return is_measured ? json(value) : json(nullptr);
+  };
   return {{"measured_as", target.measured_as},
           {"points",
            {{"done", spots.done},
             {"message", PrintableUtf8(spots.message)},
             {"are_bright", spots.are_bright},
-            {"found", spots.found},
-            {"used", spots.used},
-            {"measured", spots.measured},
+            {"found", count(spots.found, spots.done)},
+            {"used", count(spots.used, spots.done)},
+            {"measured", count(spots.measured, spots.done)},
             {"left_out", std::move(left_out)}}},
           {"relief",
            {{"measured", relief.measured},
             {"message", PrintableUtf8(relief.message)},
             {"is_relief", relief.is_relief},
-            {"columns", relief.columns},
-            {"rows", relief.rows},
+            {"columns", count(relief.columns, relief.measured)},
+            {"rows", count(relief.rows, relief.measured)},
             {"zones", std::move(zones)},
             {"parts", std::move(parts)},
             {"region_px", std::move(region)},
-            {"region_share", relief.region_share}}}};
+            {"region_share", relief.region ? json(relief.region_share) : json(nullptr)}}}};
 }
 
 }  // namespace thicklens::tools

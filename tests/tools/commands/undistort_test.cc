@@ -233,7 +233,7 @@ TEST_F(UndistortProgram, CalibrateWritesTheDistortionIntoTheCameraFile) {
   const std::string yaml = ContentOf(camera);
   EXPECT_THAT(yaml, AllOf(HasSubstr("distortion:"), HasSubstr("undistorted: true")));
   const ProgramResult explained = Start({"explain", camera, "--depth-range", "290:310"});
-  EXPECT_THAT(explained.out, HasSubstr("lens distortion       OpenCV model with 5 coefficients"));
+  EXPECT_THAT(explained.out, HasSubstr("OpenCV model with 5 coefficients for 144 x 144 px"));
   const std::string wide = PutCalibration(1920, 1080, 2000, 0.001);
   const ProgramResult refused = Start({"calibrate", sweep, "--distortion", wide, "--dry-run"});
   EXPECT_EQ(refused.exit_code, 1);

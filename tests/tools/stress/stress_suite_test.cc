@@ -235,7 +235,8 @@ TEST(StressCaseSweeps, TheTruthMustLieWithinTheStatedErrors) {
     const nlohmann::json summary = {
         {"image_distance_mm", {{"value", distance_mm}, {"sigma", 0.001}, {"systematic", nullptr}}},
         {"focus_depth_mm", {{"value", focus_mm}, {"sigma", focus_sigma_mm}}},
-        {"blur_ratio", {{"value", 0.46}, {"sigma", 0.01}, {"systematic", {0.45, 0.47}}}}};
+        {"blur_ratio", {{"value", 0.46}, {"sigma", 0.01}, {"systematic", {0.45, 0.47}}}},
+        {"error_terms", nlohmann::json::array()}};
     return FindsTruth(truth, 10).error("", summary);
   };
   EXPECT_NEAR(error(60.002, 300, 0.01), 2, 1e-6);
