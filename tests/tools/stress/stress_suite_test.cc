@@ -243,7 +243,8 @@ TEST(StressCaseSweeps, TheTruthMustLieWithinTheStatedErrors) {
   EXPECT_NEAR(error(60, 300.06, 0.01), 6, 1e-6);
   EXPECT_THROW(error(60.02, 300, 0.01), Error);
   EXPECT_THROW(error(60, 300, 0), Error);
-  const nlohmann::json reported = {{"warnings", {"a focal length looks wrong"}}};
+  const nlohmann::json reported = {{"warnings", {"a focal length looks wrong"}},
+                                   {"error_terms", nlohmann::json::array()}};
   EXPECT_EQ(Warned({"focal length", "wrong"}).error("", reported), 0);
   EXPECT_THROW(Warned({"aperture"}).error("", reported), Error);
 }
