@@ -2,11 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <optional>
 #include <utility>
+
+#include "calib/sharpness/log_parabola.h"
 
 namespace thicklens::calib {
 namespace {
@@ -39,33 +41,21 @@ std::pair<std::size_t, std::size_t> Around(const std::vector<Sharpness>& samples
   return {first, last};
 }
 
-// [D70] ln index = c0 + c1 x + c2 x^2 over samples first to last - 1, x = (reading - middle)/half.
-// The vertex is -c1/(2 c2).
+// Fits the parabola [D70] to samples first to last - 1.
 std::optional<Peak> FitPeak(const std::vector<Sharpness>& samples, std::size_t first,
                             std::size_t last) {
   const auto n = static_cast<Eigen::Index>(last - first);
   const double middle_mm = 0.5 * (samples[first].reading_mm + samples[last - 1].reading_mm);
   const double half_mm = 0.5 * (samples[last - 1].reading_mm - samples[first].reading_mm);
-  if (!(half_mm > 0)) return std::nullopt;
-  Eigen::MatrixXd design(n, 3);
-  Eigen::VectorXd logs(n);
+  Eigen::VectorXd readings_mm(n), logs(n);
   for (Eigen::Index i = 0; i < n; ++i) {
     const Sharpness& s = samples[first + static_cast<std::size_t>(i)];
-    const double x = (s.reading_mm - middle_mm) / half_mm;
-    design.row(i) << 1, x, x * x;
+    readings_mm[i] = s.reading_mm;
     logs[i] = std::log(s.index);
   }
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(design);
-  const Eigen::Vector3d c = qr.solve(logs);
-  if (qr.rank() < 3 || !(c[2] < 0)) return std::nullopt;
-  const double x_peak = -c[1] / (2 * c[2]);
-  if (!(std::abs(x_peak) <= 1)) return std::nullopt;
-  const double variance =
-      (design * c - logs).squaredNorm() / static_cast<double>(std::max<Eigen::Index>(1, n - 3));
-  const Eigen::Vector3d slope(0, -1 / (2 * c[2]), c[1] / (2 * c[2] * c[2]));
-  const Eigen::Matrix3d inverse = (design.transpose() * design).inverse();
-  const double x_sigma = std::sqrt(std::max(0.0, variance * slope.dot(inverse * slope)));
-  return Peak{{middle_mm + half_mm * x_peak, half_mm * x_sigma}, static_cast<int>(n)};
+  const auto vertex_mm = VertexOfLogs(readings_mm, logs, middle_mm, half_mm);
+  if (!vertex_mm) return std::nullopt;
+  return Peak{*vertex_mm, static_cast<int>(n)};
 }
 
 // Returns the frames with an index above 0, in the order of the readings.

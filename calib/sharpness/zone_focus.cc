@@ -1,6 +1,6 @@
 #include "calib/sharpness/zone_focus.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "calib/sharpness/edge_pixels.h"
+#include "calib/sharpness/log_parabola.h"
 #include "thicklens/base/parallel.h"
 
 namespace thicklens::calib {
@@ -90,29 +91,18 @@ std::optional<model::Estimate> PeakOf(const std::vector<Sample>& samples) {
   const double middle_mm = top->reading_mm;
   const double half_mm =
       std::max(middle_mm - first->reading_mm, (last - 1)->reading_mm - middle_mm);
-  if (!(half_mm > 0)) return std::nullopt;
-  Eigen::MatrixXd design(n, 3);
-  Eigen::VectorXd logs(n);
+  Eigen::VectorXd readings_mm(n), logs(n);
   for (Eigen::Index i = 0; i < n; ++i) {
-    const double x = ((first + i)->reading_mm - middle_mm) / half_mm;
-    design.row(i) << 1, x, x * x;
+    readings_mm[i] = (first + i)->reading_mm;
     logs[i] = std::log(std::max((first + i)->sharpness, 1e-12));
   }
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(design);
-  const Eigen::Vector3d c = qr.solve(logs);
-  if (qr.rank() < 3 || !(c[2] < 0)) return std::nullopt;
-  const double x_peak = -c[1] / (2 * c[2]);
-  if (!(std::abs(x_peak) <= 1)) return std::nullopt;
-  const double variance =
-      (design * c - logs).squaredNorm() / static_cast<double>(std::max<Eigen::Index>(1, n - 3));
-  const Eigen::Vector3d slope(0, -1 / (2 * c[2]), c[1] / (2 * c[2] * c[2]));
-  const double x_sigma = std::sqrt(
-      std::max(0.0, variance * slope.dot((design.transpose() * design).inverse() * slope)));
+  const auto vertex_mm = VertexOfLogs(readings_mm, logs, middle_mm, half_mm);
+  if (!vertex_mm) return std::nullopt;
   const double step_mm = (samples.back().reading_mm - samples.front().reading_mm) /
                          static_cast<double>(samples.size() - 1);
-  const double sigma_mm = std::hypot(half_mm * x_sigma, kMinSigma * step_mm);
+  const double sigma_mm = std::hypot(vertex_mm->sigma, kMinSigma * step_mm);
   if (!(sigma_mm < kMaxSigma * step_mm)) return std::nullopt;
-  return model::Estimate{middle_mm + half_mm * x_peak, sigma_mm};
+  return model::Estimate{vertex_mm->value, sigma_mm};
 }
 
 }  // namespace
