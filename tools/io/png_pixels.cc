@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <memory>
+#include <new>
 
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
@@ -20,13 +21,38 @@ namespace {
 constexpr std::uint32_t kMaxSidePx = 1 << 20;
 constexpr double kMaxPngPixels = 1 << 30;
 
+// zlib says only that the data are bad where it was refused memory, so that libspng takes its
+// memory here.
+thread_local bool was_refused_memory = false;
+
+void* Noted(void* memory) {
+  if (memory == nullptr) was_refused_memory = true;
+  return memory;
+}
+
+void* Allocate(std::size_t bytes) { return Noted(std::malloc(bytes)); }
+void* Reallocate(void* memory, std::size_t bytes) { return Noted(std::realloc(memory, bytes)); }
+void* AllocateZeros(std::size_t count, std::size_t bytes) {
+  return Noted(std::calloc(count, bytes));
+}
+
+spng_ctx* NewContext(int flags) {
+  was_refused_memory = false;
+  spng_alloc memory{Allocate, Reallocate, AllocateZeros, std::free};
+  return spng_ctx_new2(&memory, flags);
+}
+
+void ThrowIfMemoryWasRefused(int error) {
+  if (error == SPNG_EMEM || (error != SPNG_OK && was_refused_memory)) throw std::bad_alloc();
+}
+
 struct FreeContext {
   void operator()(spng_ctx* context) const { spng_ctx_free(context); }
 };
 using Context = std::unique_ptr<spng_ctx, FreeContext>;
 
 struct Free {
-  void operator()(void* memory) const { std::free(memory); }  // libspng takes it by malloc
+  void operator()(void* memory) const { std::free(memory); }
 };
 
 // The pixel format that a file is decoded to.
@@ -104,7 +130,7 @@ int EncodeRows(const cv::Mat& image, spng_ctx* context) {
 
 cv::Mat DecodePngPixels(const std::string& bytes, std::string* why) {
   const std::string pixels = WithoutPngTexts(bytes);
-  const Context context(spng_ctx_new(0));
+  const Context context(NewContext(0));
   int error = context == nullptr ? SPNG_EMEM : SPNG_OK;
   const auto works = [&](int code) {
     error = code;
@@ -130,6 +156,7 @@ cv::Mat DecodePngPixels(const std::string& bytes, std::string* why) {
       works(DecodeRows(decoding, context.get(), &image));
     }
   }
+  ThrowIfMemoryWasRefused(error);
   if (error == SPNG_OK) return image;
   *why = spng_strerror(error);
   return {};
@@ -137,7 +164,7 @@ cv::Mat DecodePngPixels(const std::string& bytes, std::string* why) {
 
 std::string EncodePngPixels(const cv::Mat& image, PngPacking packing) {
   const cv::Mat whole = image.isContinuous() ? image : image.clone();
-  const Context context(spng_ctx_new(SPNG_CTX_ENCODER));
+  const Context context(NewContext(SPNG_CTX_ENCODER));
   spng_ihdr header{};
   header.width = static_cast<std::uint32_t>(whole.cols);
   header.height = static_cast<std::uint32_t>(whole.rows);
@@ -158,6 +185,7 @@ std::string EncodePngPixels(const cv::Mat& image, PngPacking packing) {
   std::size_t size = 0;
   std::unique_ptr<void, Free> file;
   if (error == SPNG_OK) file.reset(spng_get_png_buffer(context.get(), &size, &error));
+  ThrowIfMemoryWasRefused(error);
   if (error != SPNG_OK || file == nullptr) {
     throw Error(fmt::format("an image of {}x{} px could not be encoded as PNG: {}", whole.cols,
                             whole.rows, spng_strerror(error)));

@@ -8,7 +8,8 @@ namespace thicklens::io {
 
 // Decodes the pixels of a PNG file as they are stored, with libspng: 8 or 16 bits (fewer are spread
 // over 8); 1, 2 (grey with alpha), 3 (RGB) or 4 channels (RGBA: also for images other than grey
-// with a transparent colour). Empty if they cannot be decoded; `why` then gets the reason.
+// with a transparent colour). Empty if they cannot be decoded; `why` then gets the reason. Throws
+// std::bad_alloc if memory is short.
 cv::Mat DecodePngPixels(const std::string& bytes, std::string* why);
 
 enum class PngPacking {
@@ -17,7 +18,8 @@ enum class PngPacking {
   kSmall,        // the strongest compression
 };
 
-// Encodes 8 or 16 bits; 1, 3 (RGB) or 4 (RGBA) channels. Throws Error if memory is short.
+// Encodes 8 or 16 bits; 1, 3 (RGB) or 4 (RGBA) channels. Throws std::bad_alloc if memory is short,
+// and Error if libspng fails otherwise.
 std::string EncodePngPixels(const cv::Mat& image, PngPacking packing);
 
 }  // namespace thicklens::io

@@ -2,12 +2,16 @@
 
 #include <gtest/gtest.h>
 #include <spng.h>
+#ifdef __linux__
+#include <sys/resource.h>
+#endif
 #include <zlib.h>
 
 #include <algorithm>
 #include <cstdint>
 #include <cstdlib>
 #include <memory>
+#include <new>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -15,6 +19,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/sanitizers.h"
 #include "thicklens/base/error.h"
 
 namespace thicklens::io {
@@ -231,6 +236,45 @@ TEST(PngPixels, AreReadWhateverStandsBesideThem) {
     EXPECT_TRUE(AreEqual(DecodePngPixels(with, &why), image)) << beside.substr(4, 4) << why;
   }
 }
+
+#ifdef __linux__
+
+// Takes all memory that the system still gives under a limit, then decodes with `left` bytes. Exits
+// with 0 if the image was decoded or memory was said to be short, and with 1 if the file was
+// blamed.
+[[noreturn]] void DecodeWithLittleMemory(const std::string& bytes, std::size_t left) {
+  void* volatile const reserve = std::malloc(left);
+  rlimit limit{};
+  limit.rlim_cur = limit.rlim_max = 1 << 20;  // less than the program has already
+  setrlimit(RLIMIT_AS, &limit);
+  for (std::size_t block = 1 << 20; block >= 16;) {
+    void* volatile const kept = std::malloc(block);
+    if (kept == nullptr) block /= 2;
+  }
+  std::free(reserve);
+  int code = 1;
+  try {
+    std::string why;
+    code = DecodePngPixels(bytes, &why).empty() ? 1 : 0;
+  } catch (const std::bad_alloc&) {
+    code = 0;
+  } catch (const cv::Exception& error) {
+    code = error.code == cv::Error::StsNoMem ? 0 : 1;
+  }
+  std::_Exit(code);
+}
+
+// zlib calls a file damaged if it gets no memory for it.
+TEST(PngPixels, BlamesNoFileForTooLittleMemory) {
+  if (testing::kIsSanitized) GTEST_SKIP() << "a sanitizer has memory of its own";
+  const std::string bytes =
+      EncodePngPixels(RandomImage({64, 64}, CV_8UC3, 9), PngPacking::kRepetitions);
+  for (std::size_t left = 8 << 10; left <= 120 << 10; left += 8 << 10) {
+    EXPECT_EXIT(DecodeWithLittleMemory(bytes, left), ::testing::ExitedWithCode(0), "") << left;
+  }
+}
+
+#endif
 
 }  // namespace
 }  // namespace thicklens::io
