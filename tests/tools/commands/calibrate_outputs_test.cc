@@ -176,8 +176,8 @@ TEST_F(CalibrateOutputs, NoFieldLeavesTheMapOut) {
                                    .at("message")
                                    .get<std::string>();
   }
-  EXPECT_NE(message[0], "not run");
-  EXPECT_EQ(message[1], "not run");
+  EXPECT_NE(message[0], "the map was not requested");
+  EXPECT_EQ(message[1], "the map was not requested");
 }
 
 TEST_F(CalibrateOutputs, FilesOfOthersAmongTheFiguresStopTheRunAtOnce) {
