@@ -91,7 +91,9 @@ struct AxialBlur {
 // Fits the spectra with two variances per frame: V |nu|^2 in H becomes V_x nu_x^2 + V_y nu_y^2
 // [D129]. Along a direction of frequency, V is then V_x cos^2 + V_y sin^2; a disc becomes an
 // ellipse. V_x and V_y are each known up to a constant of its own. The band is a limit for each
-// direction, because different frames may be sharpest along x and along y.
+// direction, because different frames may be sharpest along x and along y. It also ends where a
+// frame is so much sharper than the reference that the window's leakage, which is measured on the
+// reference, is not known.
 AxialBlur FitAxialBlur(const std::vector<SpectrumSample>& samples, std::size_t reference,
                        const TargetWindow& window, const std::vector<Mode>& modes,
                        const AxisLeakage& leakage, const RelativeBlurOptions& options);
