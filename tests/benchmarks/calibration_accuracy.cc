@@ -45,6 +45,7 @@ struct Arguments {
   bool pupil_laws = false;
   bool processing = false;
   bool benches = false;
+  bool check = false;
   KindsOptions kinds;
 };
 
@@ -82,8 +83,8 @@ void AddOptions(CLI::App* app, Arguments* arguments) {
          "--floor", arguments->floors,
          "blur floor of textures: exact, drawn about the truth (both); an edge measures it")
       ->check(CLI::IsMember({"exact", "drawn"}));
-  app->add_option("--sweeps", arguments->sweeps, "sweeps of each case and target (20)")
-      ->check(CLI::Range(1, 20000));
+  app->add_option("--sweeps", arguments->sweeps, "sweeps of each case, target or kind (20)")
+      ->check(CLI::Range(0, 20000));
   app->add_option("--size", arguments->settings.size_px, "side of the field in px (192)")
       ->check(CLI::Range(64, 4096));
   app->add_option("--psf", arguments->psf, "gaussian (default) or disc")
@@ -108,6 +109,8 @@ void AddOptions(CLI::App* app, Arguments* arguments) {
                 "compressed or sharpened: the change of kappa, and what is reported");
   app->add_flag("--benches", arguments->benches,
                 "instead: sweeps of each kind of configs/accuracy/benches.yaml, with the goals");
+  app->add_flag("--check", arguments->check,
+                "with --benches: exit with 1 if a kind misses its goals");
   app->add_option("--kind", arguments->kinds.names, "with --benches: these kinds alone (all)");
   app->add_option("--mixtures", arguments->kinds.mixtures,
                   "with --benches: sweeps with random mixtures of the disturbances (0)")
@@ -164,7 +167,11 @@ void RunAll(const Arguments& arguments, Run* run) {
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
 }
 
-void RunStudy(Arguments arguments) {
+// Returns false if the goals were to be checked and are missed.
+bool RunStudy(Arguments arguments) {
+  if (arguments.sweeps == 0 && arguments.kinds.mixtures == 0)
+    throw Error("--sweeps: 0 sweeps are only of use with --mixtures");
+  bool passes = true;
   if (arguments.psf == "disc") arguments.settings.psf = model::Psf::kDisc;
   if (!arguments.image_path.empty()) arguments.settings.image = ReadImage(arguments.image_path);
   nlohmann::ordered_json json;
@@ -180,6 +187,7 @@ void RunStudy(Arguments arguments) {
     kinds.first_seed = arguments.settings.first_seed;
     kinds.threads = arguments.threads;
     json["benches"] = RunKindsStudy(kinds);
+    for (const auto& row : json["benches"]) passes = passes && row.at("faults").empty();
   } else if (arguments.processing) {
     json["processing"] =
         RunProcessingStudy(arguments.settings, arguments.sweeps, arguments.threads);
@@ -193,10 +201,12 @@ void RunStudy(Arguments arguments) {
     RunAll(arguments, &run);
     json = PrintTables(run);
   }
-  if (arguments.json_path.empty()) return;
-  std::ofstream file(arguments.json_path);
-  file << json.dump(2) << "\n";
-  if (!file.flush()) throw Error(arguments.json_path + ": cannot be written");
+  if (!arguments.json_path.empty()) {
+    std::ofstream file(arguments.json_path);
+    file << json.dump(2) << "\n";
+    if (!file.flush()) throw Error(arguments.json_path + ": cannot be written");
+  }
+  return passes || !arguments.check;
 }
 
 }  // namespace
@@ -209,10 +219,9 @@ int main(int argc, char** argv) {
   CLI11_PARSE(app, argc, argv);
   cv::setNumThreads(1);  // the sweeps run in parallel
   try {
-    thicklens::accuracy::RunStudy(arguments);
+    return thicklens::accuracy::RunStudy(arguments) ? 0 : 1;
   } catch (const std::exception& e) {
     std::cerr << "thicklens_calibration_accuracy: error: " << e.what() << "\n";
     return 1;
   }
-  return 0;
 }
