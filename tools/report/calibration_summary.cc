@@ -20,6 +20,7 @@ namespace thicklens::tools {
 namespace {
 
 constexpr char kNotRun[] = "not run";
+constexpr char kHeld[] = "(held)";  // beside a value that was not fitted
 constexpr std::size_t kReportedTerms = 4;  // of the error in the text; the rest is in the JSON
 
 std::optional<std::string> ImageOf(const calib::Calibration& calibration, int index) {
@@ -60,10 +61,11 @@ std::string ResultTable(const std::vector<ResultRow>& results, bool has_truth) {
         rounded(result.source), "-", "-"};
     if (result.fit) {
       // A value without a sigma was not fitted: it was given, or assumed within the interval.
-      row[2] = !std::isfinite(result.fit->value) ? std::string("not determined")
-               : UsableSigma(sigma) ? fmt::format("{} +- {}", RoundedTo(result.fit->value, sigma),
-                                                  RoundedSigma(sigma))
-                                    : fmt::format("{} (held)", RoundedTo(result.fit->value, sigma));
+      row[2] =
+          !std::isfinite(result.fit->value) ? std::string("not determined")
+          : UsableSigma(sigma)
+              ? fmt::format("{} +- {}", RoundedTo(result.fit->value, sigma), RoundedSigma(sigma))
+              : fmt::format("{} {}", RoundedTo(result.fit->value, sigma), kHeld);
       if (result.fit->systematic)
         row[3] = fmt::format("{} .. {}", RoundedTo(result.fit->systematic->x(), sigma),
                              RoundedTo(result.fit->systematic->y(), sigma));
@@ -91,7 +93,10 @@ std::string ResultTable(const std::vector<ResultRow>& results, bool has_truth) {
     }
     rows.push_back(std::move(row));
   }
-  return AlignedTable(rows);
+  std::string text = AlignedTable(rows);
+  if (text.find(kHeld) != std::string::npos)
+    text += fmt::format("{}: stated or assumed, and not fitted\n", kHeld);
+  return text;
 }
 
 void AddLine(const char* about, const std::string& line, std::string* text) {

@@ -224,7 +224,8 @@ std::string ResultsSection(const std::vector<ResultRow>& rows, bool has_truth) {
   html +=
       "<p class=\"soft\">Statistical: one standard deviation from noise, readings and the bench "
       "offset. Systematic: the interval that the causes in the table below allow together. The "
-      "paper's recipe has no error estimate.</p>\n";
+      "paper's recipe has no error estimate. A value that is held was stated or assumed, and "
+      "not fitted.</p>\n";
   return html + (has_truth ? ErrorsTable(rows) : "");
 }
 
