@@ -39,6 +39,7 @@ class Conversion {
   void Run() {
     RestoreReadings();
     result_.diagnostics.bench_offset_from = origin_.from;
+    result_.diagnostics.compared_focus = origin_.compared;
     ConvertScale();
     const bool has_focus = result_.summary.focus_depth_mm.has_value();
     equivalent_focus_ = result_.summary.focus_depth_mm;

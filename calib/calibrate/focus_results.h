@@ -23,6 +23,7 @@ struct FocusOrigin {
   // Interval by which the light distribution over the pupil may move xf, mm.
   Eigen::Vector2d pupil_interval_mm{0, 0};
   std::vector<double> contradicting_mm;  // xf by the sources that contradict it
+  std::vector<ComparedFocus> compared;   // all other sources, by their zf
 };
 
 // Converts the calibration of the equivalent sweep of a motion to that of the camera: readings, d1,

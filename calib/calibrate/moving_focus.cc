@@ -270,13 +270,25 @@ class MovingFocus {
     return focus;
   }
 
-  // A statement that contradicts the one that is used, beyond the errors of both.
+  // zf by a source, [D5] with the slope f1 f2/(xf - f2)^2. Nothing is in focus where the sensor is
+  // nearer than the focal length.
+  model::Estimate FocusDepthOf(const Focus& focus) const {
+    const double beyond_mm = focus.distance_mm.value - lens_.rear_focal_length_mm;
+    if (!(beyond_mm > 0)) return {std::numeric_limits<double>::infinity(), 0};
+    const double f1_mm = lens_.front_focal_length_mm;
+    return {f1_mm * focus.distance_mm.value / beyond_mm,
+            f1_mm * lens_.rear_focal_length_mm / (beyond_mm * beyond_mm) * ErrorMm(focus)};
+  }
+
+  // Another source beside the one that is used. It contradicts it beyond the errors of both.
   void Compare(const Focus& other) {
     const double apart_mm = other.distance_mm.value - focus_.distance_mm.value;
     const double both_mm = std::hypot(ErrorMm(other), ErrorMm(focus_));
     constexpr double kSmallest = 1e-3;  // of xf
-    if (!(std::abs(apart_mm) > kGainDiffers * both_mm + kSmallest * focus_.distance_mm.value))
-      return;
+    const bool agrees =
+        !(std::abs(apart_mm) > kGainDiffers * both_mm + kSmallest * focus_.distance_mm.value);
+    compared_.push_back({other.from, FocusDepthOf(other), agrees});
+    if (agrees) return;
     contradictions_.push_back(other.distance_mm.value +
                               std::copysign(kReach * other.distance_mm.sigma, apart_mm));
     warnings_.push_back(fmt::format(
@@ -350,6 +362,7 @@ class MovingFocus {
     if (focus_.from == kFromScale) origin.pupil_interval_mm = pupil_interval_mm_;
     origin.sensor_distance_mm = focus_.distance_mm;
     origin.contradicting_mm = contradictions_;
+    origin.compared = compared_;
     ConvertResults(sweep_, moves_, motion, origin, &found);
     found.summary.warnings.insert(found.summary.warnings.begin(), warnings_.begin(),
                                   warnings_.end());
@@ -370,6 +383,7 @@ class MovingFocus {
   MovingScale scale_;
   std::vector<std::string> warnings_;
   std::vector<double> contradictions_;
+  std::vector<ComparedFocus> compared_;
   Eigen::Vector2d pupil_interval_mm_{0, 0};
 };
 

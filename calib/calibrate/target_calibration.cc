@@ -853,8 +853,8 @@ class Calibrator {
     const model::Estimate found_mm{fit.values[kFocusDepth],
                                    std::sqrt(fit.covariance(kFocusDepth, kFocusDepth))};
     std::string& reason = result_.summary.reason;
-    for (const Contradiction& other : FindContradictions(sweep_, statements_, found_mm, result_))
-      reason = other.text + "; the immediate reason is: " + reason;
+    for (const FocusComparison& other : CompareFocus(sweep_, statements_, found_mm, result_))
+      if (!other.source.agrees) reason = other.text + "; the immediate reason is: " + reason;
   }
 
   // Adds the remaining error of the stage: that of the corrections or, where the cause is open,

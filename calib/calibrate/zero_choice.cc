@@ -77,21 +77,28 @@ double UsualFocusDepth(const model::Camera& camera, const std::vector<ScaleSampl
   return 0.5 * (f1_mm + std::sqrt(f1_mm * f1_mm + 4 * product_mm2));
 }
 
-std::vector<Contradiction> FindContradictions(const FocusSweep& sweep,
-                                              const std::vector<model::StatedConjugate>& statements,
-                                              const model::Estimate& found_mm,
-                                              const Calibration& calibration) {
-  std::vector<Contradiction> contradictions;
-  if (!calibration.summary.bench_offset_mm) return contradictions;
+std::vector<FocusComparison> CompareFocus(const FocusSweep& sweep,
+                                          const std::vector<model::StatedConjugate>& statements,
+                                          const model::Estimate& found_mm,
+                                          const Calibration& calibration) {
+  std::vector<FocusComparison> comparisons;
+  if (!calibration.summary.bench_offset_mm) return comparisons;
   const double offset_mm = calibration.summary.bench_offset_mm->value;
   const std::string& origin = calibration.diagnostics.bench_offset_from;
   double found_sigma_mm = found_mm.sigma;
   const auto compare = [&](const std::string& name, double focus_mm, double sigma_mm) {
     const double apart_mm = focus_mm - found_mm.value;
     const double both_mm = std::hypot(sigma_mm, found_sigma_mm);
-    if (!(std::abs(apart_mm) > kContradicts * both_mm + kSmallestContradiction * found_mm.value))
+    FocusComparison comparison;
+    comparison.source.name = name;
+    comparison.source.focus_depth_mm = {focus_mm, sigma_mm};
+    comparison.source.agrees =
+        !(std::abs(apart_mm) > kContradicts * both_mm + kSmallestContradiction * found_mm.value);
+    if (comparison.source.agrees) {
+      comparisons.push_back(comparison);
       return;
-    const std::string text = fmt::format(
+    }
+    comparison.text = fmt::format(
         "{} puts the in-focus object distance at {:.5g} +- {:.2g} mm, {:+.3g} mm from that by {} "
         "({:.5g} "
         "+- {:.2g} mm): one of them, the focal length, the pixel pitch or the unit of the readings "
@@ -101,7 +108,7 @@ std::vector<Contradiction> FindContradictions(const FocusSweep& sweep,
             ? ", or the entrance pupil of the lens is not at its front principal plane, "
               "from which the image scale measures"
             : "");
-    contradictions.push_back({name, {focus_mm, sigma_mm}, text});
+    comparisons.push_back(comparison);
   };
   for (const model::StatedConjugate& stated : statements) {
     if (stated.name == origin) found_sigma_mm = FocusDepthWithTolerance(sweep.camera, stated).sigma;
@@ -122,7 +129,7 @@ std::vector<Contradiction> FindContradictions(const FocusSweep& sweep,
     const model::Estimate focus_mm = FocusDepthWithTolerance(sweep.camera, stated);
     compare(stated.name, focus_mm.value, focus_mm.sigma);
   }
-  return contradictions;
+  return comparisons;
 }
 
 void CompareWithStatements(const FocusSweep& sweep,
@@ -131,9 +138,11 @@ void CompareWithStatements(const FocusSweep& sweep,
                            Calibration* calibration) {
   if (!calibration->summary.focus_depth_mm) return;
   const Result found = *calibration->summary.focus_depth_mm;
-  for (const Contradiction& other :
-       FindContradictions(sweep, statements, {found.value, found.sigma}, *calibration)) {
-    calibration->summary.warnings.push_back(other.text);
+  for (const auto& [other, text] :
+       CompareFocus(sweep, statements, {found.value, found.sigma}, *calibration)) {
+    calibration->diagnostics.compared_focus.push_back(other);
+    if (other.agrees) continue;
+    calibration->summary.warnings.push_back(text);
     // The fit at the other depth and its error. Nothing comes into focus nearer than the focal
     // point.
     if (!(other.focus_depth_mm.value > setup.lens.front_focal_length_mm)) continue;

@@ -31,23 +31,23 @@ std::optional<model::StatedConjugate> MostPrecise(
 double UsualFocusDepth(const model::Camera& camera, const std::vector<ScaleSample>& samples,
                        double sharpest_reading_mm);
 
-// A statement, or the image scale, that puts the plane of focus elsewhere than the fit.
-struct Contradiction {
-  std::string name;                // "magnification", "the image scale", "offset_mm"
-  model::Estimate focus_depth_mm;  // zf from Ap by it, mm
-  std::string text;                // one sentence with both depths
+// A statement, or the image scale, beside the fit.
+struct FocusComparison {
+  ComparedFocus source;
+  std::string text;  // one sentence with both depths if they contradict each other, else empty
 };
 
 // Compares a fitted zf with the statements that were not used for it, with a stated bench offset
 // that was not used, and with the image scale if a statement was used.
-std::vector<Contradiction> FindContradictions(const FocusSweep& sweep,
-                                              const std::vector<model::StatedConjugate>& statements,
-                                              const model::Estimate& found_mm,
-                                              const Calibration& calibration);
+std::vector<FocusComparison> CompareFocus(const FocusSweep& sweep,
+                                          const std::vector<model::StatedConjugate>& statements,
+                                          const model::Estimate& found_mm,
+                                          const Calibration& calibration);
 
 // Compares the fitted zf with the statements that were not used for it, and with the image scale if
 // a statement was used. A contradiction of more than three standard deviations is a warning, and
-// the intervals of zf, d1, kappa and the bench offset then include the fit at the other depth. The
+// the intervals of zf, d1, kappa and the bench offset then include the fit at the other depth. All
+// comparisons are reported in CalibrationDiagnostics::compared_focus. The
 // image scale of an objective is not compared: it shows where the entrance pupil is, which the
 // equivalent lens does not describe.
 void CompareWithStatements(const FocusSweep& sweep,

@@ -76,6 +76,15 @@ json TextJson(const std::string& text) {
   return text.empty() ? json(nullptr) : json(PrintableUtf8(text));
 }
 
+json ComparedFocusJson(const std::vector<calib::ComparedFocus>& sources) {
+  json list = json::array();
+  for (const calib::ComparedFocus& source : sources)
+    list.push_back(json{{"name", TextJson(source.name)},
+                        {"focus_depth_mm", EstimateJson(source.focus_depth_mm)},
+                        {"agrees", source.agrees}});
+  return list;
+}
+
 // The count of a step that was done; null otherwise.
 json Count(bool done, int count) { return done ? json(count) : json(nullptr); }
 
@@ -343,6 +352,7 @@ json FitJson(const calib::Calibration& calibration) {
                                  : json(nullptr)},
           {"moves_is_recognised", calibration.diagnostics.moves_is_recognised},
           {"bench_offset_from", TextJson(calibration.diagnostics.bench_offset_from)},
+          {"compared_focus", ComparedFocusJson(calibration.diagnostics.compared_focus)},
           {"magnification_at_focus", EstimateJson(calibration.diagnostics.magnification_at_focus)},
           {"examples", ExamplesJson(calibration)},
           {"frames_used", calibration.summary.frames_used},

@@ -60,6 +60,16 @@ std::string OffsetOriginLine(const calib::Calibration& calibration) {
     line += fmt::format("; 1 step = {}", WithError(step->value, step->sigma, "mm"));
   if (const auto& m = diagnostics.magnification_at_focus; m && calibration.summary.focus_depth_mm)
     line += fmt::format("; magnification at focus {}", WithError(m->value, m->sigma, ""));
+  std::vector<std::string> agreeing;
+  for (const calib::ComparedFocus& other : diagnostics.compared_focus) {
+    if (!other.agrees) continue;
+    agreeing.push_back(
+        fmt::format("{} (zf {})", other.name,
+                    WithError(other.focus_depth_mm.value, other.focus_depth_mm.sigma, "mm")));
+  }
+  if (!agreeing.empty())
+    line += fmt::format("; {} {} with it", fmt::join(agreeing, ", "),
+                        agreeing.size() == 1 ? "agrees" : "agree");
   return line;
 }
 

@@ -205,11 +205,20 @@ TEST(MacroSweep, ARoughOffsetOnlyHasToAgree) {
   EXPECT_EQ(c.diagnostics.bench_offset_from, "magnification");
   EXPECT_NEAR(c.summary.focus_depth_mm->value, 200, 1e-3);
   EXPECT_THAT(c.summary.warnings, Each(Not(HasSubstr("offset_mm puts"))));
+  // Whatever was compared is listed: the image scale, too.
+  ASSERT_EQ(c.diagnostics.compared_focus.size(), 2U);
+  for (const ComparedFocus& other : c.diagnostics.compared_focus) EXPECT_TRUE(other.agrees);
+  EXPECT_EQ(c.diagnostics.compared_focus[1].name, "offset_mm");
+  EXPECT_NEAR(c.diagnostics.compared_focus[1].focus_depth_mm.value, 212, 0.1);
+  EXPECT_EQ(c.diagnostics.compared_focus[1].focus_depth_mm.sigma, 15);
   sweep.sweep.offset_mm = model::Estimate{180, 15};
   c = CalibrateWithoutMap(sweep);
   EXPECT_EQ(c.diagnostics.bench_offset_from, "magnification");
   EXPECT_THAT(c.summary.warnings,
               Contains(StartsWith("offset_mm puts the in-focus object distance")));
+  ASSERT_EQ(c.diagnostics.compared_focus.size(), 2U);
+  EXPECT_TRUE(c.diagnostics.compared_focus[0].agrees);
+  EXPECT_FALSE(c.diagnostics.compared_focus[1].agrees);
   // The image scale takes its place only if it is much more precise.
   sweep.sweep.stated_focus.clear();
   sweep.sweep.offset_mm = model::Estimate{112, 15};

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
 #include <string>
 
 #include "support/test_cameras.h"
@@ -112,6 +113,27 @@ TEST(MovingFocus, TakesWhatIsKnownOfThePlaneOfFocus) {
       EXPECT_LT(c.summary.blur_ratio->sigma, 0.006);
     }
   }
+}
+
+// The sources beside the one that is used are listed by their zf, wrong ones with a warning.
+TEST(MovingFocus, ListsWhatElseIsKnownOfThePlaneOfFocus) {
+  SimulatedSweep sweep = MovingSweep(SweepMotion::kSensor, 300, 0.05);
+  sweep.sweep.stated_focus = {
+      {model::ConjugateKind::kFocusDepth, {300, 0.5}, "focus_depth_mm"},
+      {model::ConjugateKind::kImageDistance, {64, 0.1}, "image_distance_mm"},
+      {model::ConjugateKind::kMagnification, {0.25, 0.002}, "magnification"}};
+  const Calibration c = CalibrateWithoutMap(sweep);
+  EXPECT_EQ(c.diagnostics.bench_offset_from, "focus_depth_mm");
+  std::map<std::string, ComparedFocus> compared;
+  for (const ComparedFocus& other : c.diagnostics.compared_focus) compared[other.name] = other;
+  // f1 = f2 = 50 mm, rho = 4 mm: zf = 300 mm at d1 = 64 mm, with dzf/dd1 = -25; zf = 250 mm at 1/4.
+  EXPECT_TRUE(compared.at("image_distance_mm").agrees);
+  EXPECT_NEAR(compared.at("image_distance_mm").focus_depth_mm.value, 300, 1e-6);
+  EXPECT_NEAR(compared.at("image_distance_mm").focus_depth_mm.sigma, 2.5, 0.3);
+  EXPECT_FALSE(compared.at("magnification").agrees);
+  EXPECT_NEAR(compared.at("magnification").focus_depth_mm.value, 250, 1e-6);
+  EXPECT_TRUE(compared.at("the image scale").agrees);
+  EXPECT_EQ(compared.size(), 3U);
 }
 
 // The offset of a focus ring is d1 at reading 0, for example rho + f2 at its stop at infinity.

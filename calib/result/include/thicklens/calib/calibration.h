@@ -283,6 +283,13 @@ struct CalibrationSummary {
   THICKLENS_EXPORT std::string BriefReport() const;
 };
 
+// A plane of focus by a source that the result does not use.
+struct ComparedFocus {
+  std::string name;                // "magnification", "the image scale", "offset_mm"
+  model::Estimate focus_depth_mm;  // zf from Ap by it, mm
+  bool agrees = false;             // within three standard deviations of both
+};
+
 // Evidence behind the result: intermediate results, alternatives, causes.
 struct CalibrationDiagnostics {
   // Covariance of the named parameters, in their units; sigma^2 is on the diagonal.
@@ -309,6 +316,9 @@ struct CalibrationDiagnostics {
   // The source of the bench offset: "offset_mm", "the image scale", or the name of the statement
   // of the sweep's file or the camera file. Empty: nothing does.
   std::string bench_offset_from;
+  // The other sources of the bench offset that were compared with it: statements that were not
+  // used, and the image scale.
+  std::vector<ComparedFocus> compared_focus;
   // The symptoms whose causes were compared, with the causes that are named.
   std::vector<Diagnosis> diagnoses;
   FrameStructureFinding structure;  // vignetting, bands and dust of the frames
