@@ -100,9 +100,9 @@ TEST(AberratedLens, FramesBetweenBothFociAreMeasuredInNoise) {
     const FrameMeasurement& frame = found.frames[i];
     if (!frame.in_blur_fit || std::abs(frame.depth_mm - 300) > 4) continue;
     ++between;
-    // The variances have a common error, that of the floor and of the reference.
+    // The variances have a common error, that of the floor and of the reference, whose own is 0.
     EXPECT_NEAR(frame.blur_sigma_px, simulated.truth.frames[i].blur_sigma_px,
-                4 * frame.blur_sigma_error_px + 0.005)
+                4 * frame.blur_sigma_error_px + 0.02)
         << frame.depth_mm;
   }
   EXPECT_GE(between, 7);

@@ -123,17 +123,20 @@ TEST(MovingFocus, ListsWhatElseIsKnownOfThePlaneOfFocus) {
       {model::ConjugateKind::kImageDistance, {64, 0.1}, "image_distance_mm"},
       {model::ConjugateKind::kMagnification, {0.25, 0.002}, "magnification"}};
   const Calibration c = CalibrateWithoutMap(sweep);
-  EXPECT_EQ(c.diagnostics.bench_offset_from, "focus_depth_mm");
+  // The object distance is less exact at the sensor, because the focal length has an error.
+  EXPECT_EQ(c.diagnostics.bench_offset_from, "image_distance_mm");
   std::map<std::string, ComparedFocus> compared;
   for (const ComparedFocus& other : c.diagnostics.compared_focus) compared[other.name] = other;
-  // f1 = f2 = 50 mm, rho = 4 mm: zf = 300 mm at d1 = 64 mm, with dzf/dd1 = -25; zf = 250 mm at 1/4.
-  EXPECT_TRUE(compared.at("image_distance_mm").agrees);
-  EXPECT_NEAR(compared.at("image_distance_mm").focus_depth_mm.value, 300, 1e-6);
-  EXPECT_NEAR(compared.at("image_distance_mm").focus_depth_mm.sigma, 2.5, 0.3);
-  EXPECT_FALSE(compared.at("magnification").agrees);
-  EXPECT_NEAR(compared.at("magnification").focus_depth_mm.value, 250, 1e-6);
-  EXPECT_TRUE(compared.at("the image scale").agrees);
   EXPECT_EQ(compared.size(), 3U);
+  EXPECT_TRUE(compared["focus_depth_mm"].agrees);
+  EXPECT_NEAR(compared["focus_depth_mm"].focus_depth_mm.value, 300, 1e-6);
+  EXPECT_GE(compared["focus_depth_mm"].focus_depth_mm.sigma, 0.5);
+  // f1 = f2 = 50 mm: zf = 250 mm at 1/4.
+  EXPECT_FALSE(compared["magnification"].agrees);
+  EXPECT_NEAR(compared["magnification"].focus_depth_mm.value, 250, 1e-6);
+  EXPECT_TRUE(compared["the image scale"].agrees);
+  EXPECT_NEAR(compared["the image scale"].focus_depth_mm.value, 300,
+              3 * compared["the image scale"].focus_depth_mm.sigma);
 }
 
 // The offset of a focus ring is d1 at reading 0, for example rho + f2 at its stop at infinity.
