@@ -17,6 +17,7 @@
 #include "calib/grid/grid_geometry.h"
 #include "calib/registration/scale_causes.h"
 #include "calib/sweep/frame_selection.h"
+#include "calib/sweep/kept_frames.h"
 #include "calib/uncertainty/systematic_advice.h"
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
@@ -171,10 +172,12 @@ bool CalibrationOptions::IsValid(std::string* why) const {
   return checks.IsValid(&inner) || Fail(why, "checks." + inner);
 }
 
-Calibration Calibrate(const FocusSweep& sweep, const CalibrationOptions& options) {
+Calibration Calibrate(const FocusSweep& given, const CalibrationOptions& options) {
   std::string why;
   if (!options.IsValid(&why)) throw Error("calibration options: " + why);
-  if (!sweep.IsValid(&why)) throw Error("sweep: " + why);
+  if (!given.IsValid(&why)) throw Error("sweep: " + why);
+  FocusSweep sweep = given;
+  sweep.read_frame = KeptFrames::Of(given.read_frame);
   Calibration found =
       sweep.target_grid ? CalibrateOnGrid(sweep, options) : CalibrateFrames(sweep, options);
   // The results may have been converted to a lens or a sensor that moves.

@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <mutex>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "calib/calibrate/recognised_target.h"
+#include "calib/calibrate/target_calibration.h"
 #include "calib/registration/scale_tracking.h"
 #include "calib/sharpness/zone_focus.h"
 #include "calib/sweep/frame_selection.h"
@@ -165,8 +167,17 @@ Calibration WithoutRelief(const FocusSweep& sweep, const CalibrationOptions& opt
   if (!options.fit_blur || frames.size() < kMinFrames) return found;
   FrameStore store(sweep);
   if (!IsPattern(sweep, found, &store)) return found;
-  const ZoneFocus zones = FindZoneFocus({[&store](std::size_t frame) { return store.Grey(frame); },
-                                         frames, RegionCentre(sweep), options.threads});
+  const auto steps = static_cast<int>(sweep.frames.size());
+  std::mutex mutex;
+  int done = (kStagesOfProgress - 1) * steps;  // this is the last stage
+  const auto read_grey = [&](std::size_t frame) {
+    if (options.progress) {
+      const std::lock_guard<std::mutex> lock(mutex);
+      options.progress(std::min(++done, kStagesOfProgress * steps), kStagesOfProgress * steps);
+    }
+    return store.Grey(frame);
+  };
+  const ZoneFocus zones = FindZoneFocus({read_grey, frames, RegionCentre(sweep), options.threads});
   relief.columns = zones.columns;
   relief.rows = zones.rows;
   relief.sharpest_mm = zones.sharpest_mm;

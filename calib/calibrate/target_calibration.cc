@@ -68,7 +68,7 @@ class Calibrator {
              const FocusMotion* motion = nullptr)
       : sweep_(sweep), options_(options), motion_(motion), store_(sweep_), result_(Begun(sweep)) {
     profiles_.resize(sweep_.frames.size());
-    total_steps_ = 4 * static_cast<int>(sweep.frames.size());
+    total_steps_ = kStagesOfProgress * static_cast<int>(sweep.frames.size());
   }
 
   Calibration Run() {

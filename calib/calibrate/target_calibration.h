@@ -8,6 +8,10 @@
 
 namespace thicklens::calib {
 
+// Stages of a calibration in its progress, with one step per frame each: statistics, sharpness,
+// scale, blur, the map of the field, and the relief of the target (WithoutRelief).
+inline constexpr int kStagesOfProgress = 6;
+
 // Calibrates from a sweep whose target (or whole camera) moves. With `motion`, the sweep is the
 // equivalent one of a lens or a sensor that moves.
 Calibration CalibrateTarget(const FocusSweep& sweep, const CalibrationOptions& options,

@@ -14,11 +14,12 @@ constexpr int kMinEdges = 12;
 }  // namespace
 
 std::optional<SourceEdgeBlur> MeasureSourceEdgeBlur(const cv::Mat& grey) {
-  const Gradient sharp = CentralGradient(grey);
-  const Gradient reblurred = CentralGradient(Smoothed(grey, 1));
+  const cv::Mat sharp = GradientMagnitude(grey);
+  const cv::Mat reblurred = Smoothed(grey, 1);
   std::vector<double> sigmas;
-  for (const cv::Point& edge : EdgePixels(sharp, 0.5 * Quantile(sharp.magnitude, 0.995), 8)) {
-    const double ratio = sharp.magnitude.at<float>(edge) / reblurred.magnitude.at<float>(edge);
+  for (const cv::Point& edge : EdgePixels(grey, sharp, 0.5 * Quantile(sharp, 0.995), 8)) {
+    const cv::Point2f left = GradientAt(reblurred, edge);
+    const double ratio = sharp.at<float>(edge) / std::sqrt(left.x * left.x + left.y * left.y);
     if (ratio > 1 && std::isfinite(ratio)) sigmas.push_back(1 / std::sqrt(ratio * ratio - 1));
   }
   if (sigmas.size() < kMinEdges) return std::nullopt;

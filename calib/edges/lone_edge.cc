@@ -22,9 +22,11 @@ constexpr double kMinFilled = 0.5;  // pixels per px of the length
 
 bool ShowsLoneEdge(const cv::Mat& grey) {
   if (std::min(grey.cols, grey.rows) < 4 * kMarginPx) return false;
-  const Gradient gradient = CentralGradient(Smoothed(grey, kSmoothingPx));
-  const double steepest = Quantile(gradient.magnitude, kTopQuantile);
-  const std::vector<cv::Point> pixels = EdgePixels(gradient, kThreshold * steepest, kMarginPx);
+  const cv::Mat smoothed = Smoothed(grey, kSmoothingPx);
+  const cv::Mat magnitude = GradientMagnitude(smoothed);
+  const double steepest = Quantile(magnitude, kTopQuantile);
+  const std::vector<cv::Point> pixels =
+      EdgePixels(smoothed, magnitude, kThreshold * steepest, kMarginPx);
   if (pixels.size() < 8) return false;
   Eigen::Vector2d mean(0, 0);
   for (const cv::Point& p : pixels) mean += Eigen::Vector2d(p.x, p.y);

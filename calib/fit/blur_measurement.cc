@@ -338,9 +338,8 @@ class Measurement {
     evidence_.spectrum = static_cast<int>(evidence_.setup.estimators.size());
     evidence_.setup.estimators.push_back(FitSamples(evidence_, blur, region_));
     evidence_.frame_noise_ratios.assign(evidence_.setup.frames.size(), 0);
-    for (std::size_t i = 0; i < region_.frames.size(); ++i)
-      evidence_.frame_noise_ratios[evidence_.fit_index[region_.frames[i]]] =
-          blur.noise_ratio[static_cast<Eigen::Index>(i)];
+    evidence_.frame_misfits.assign(evidence_.setup.frames.size(), 0);
+    NoteScatter(region_, blur.noise_ratio, blur.misfit, &evidence_);
     evidence_.blur = blur;
   }
 
@@ -364,6 +363,15 @@ ReadingEvidence EvidenceOfBlur(const BlurEvidence& evidence) {
   of_readings.values = most->variances_px2;
   of_readings.sigmas = most->covariance.diagonal().cwiseMax(0).cwiseSqrt();
   return of_readings;
+}
+
+void NoteScatter(const EstimatorRegion& region, const Eigen::VectorXd& noise_ratio,
+                 const Eigen::VectorXd& misfit, BlurEvidence* evidence) {
+  for (std::size_t i = 0; i < region.frames.size(); ++i) {
+    const std::size_t frame = evidence->fit_index[region.frames[i]];
+    evidence->frame_noise_ratios[frame] = noise_ratio[static_cast<Eigen::Index>(i)];
+    evidence->frame_misfits[frame] = misfit[static_cast<Eigen::Index>(i)];
+  }
 }
 
 int ModesPerRing(std::size_t frames) {

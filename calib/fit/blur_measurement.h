@@ -91,8 +91,10 @@ struct BlurEvidence {
   std::optional<double> gaussian_misfit, disc_misfit;
   double shape_dof = 0;  // degrees of freedom of each misfit; 0: they are means over few edges
   std::vector<BlurExample> examples;
-  std::vector<double> frame_noise_ratios;  // spectral scatter over the pixel noise, of setup.frames
-  std::string message;                     // reason why there is no estimator
+  // Scatter of the spectrum of each of setup.frames about the fit: over the pixel noise, and over
+  // the frame's own spectrum (RelativeBlur::misfit). 0: the frame has no spectrum.
+  std::vector<double> frame_noise_ratios, frame_misfits;
+  std::string message;  // reason why there is no estimator
   // The spectral estimator's own set-up with its results, for parts of the field and channels. It
   // reads the frames from the task's store.
   SpectralEstimatorSetup spectral;
@@ -112,6 +114,10 @@ BlurEvidence MeasureBlur(const BlurTask& task);
 
 // Evidence of the blur about the readings' errors, by the estimator with the most frames.
 ReadingEvidence EvidenceOfBlur(const BlurEvidence& evidence);
+
+// Notes the scatter of the frames of a region about its fit, for RejectOutliers.
+void NoteScatter(const EstimatorRegion& region, const Eigen::VectorXd& noise_ratio,
+                 const Eigen::VectorXd& misfit, BlurEvidence* evidence);
 
 // Takes a region and its blur in place of those of the whole field, with the samples of the
 // spectral estimator. The effect of the tails on V, if the new blur has none, stays that of the

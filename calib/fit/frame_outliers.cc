@@ -12,9 +12,10 @@ namespace thicklens::calib {
 namespace {
 
 constexpr std::size_t kMinFrames = 5;
-// A frame whose spectrum scatters more than the others' by this factor, in power, does not show
-// what the others show.
-constexpr double kScatterOfDamage = 30;
+constexpr double kScatterOfDamage = 30;  // over that of the other frames, in power
+// Part of its own spectrum, in power. The errors of the blur law leave less than 0.0001 in a clean
+// frame without noise, and a smear of 15 px leaves 0.008.
+constexpr double kMisfitOfDamage = 0.001;
 
 // Part of the median step by which the reading that a blur shows may miss that of another frame.
 constexpr double kSwappedWithin = 0.5;
@@ -69,7 +70,7 @@ class Outliers {
     const double typical = Median(ratios);
     for (std::size_t f = 0; f < evidence_.frame_noise_ratios.size(); ++f) {
       const double ratio = evidence_.frame_noise_ratios[f] / typical;
-      if (!(ratio > kScatterOfDamage)) continue;
+      if (!IsDamage(ratio, evidence_.frame_misfits[f])) continue;
       Frame(f).rejection = fmt::format(
           "does not show what the others show: its spectrum deviates {:.0f} times more than theirs "
           "(the frame is smeared, the target moved during the exposure or was covered, or it is so "
@@ -180,6 +181,10 @@ class Outliers {
 };
 
 }  // namespace
+
+bool IsDamage(double scatter, double misfit) {
+  return scatter > kScatterOfDamage && misfit > kMisfitOfDamage;
+}
 
 std::optional<std::string> RejectOutliers(const FocusSweep& sweep, BlurEvidence* evidence,
                                           Calibration* calibration) {

@@ -2,11 +2,26 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 #include <opencv2/imgproc.hpp>
 
 #include "thicklens/base/cancel.h"
 
 namespace thicklens::calib {
+namespace {
+
+constexpr int kLeadingBits = 14;
+
+// The leading bits of a number, in the order of the numbers: those of a negative one are inverted.
+std::size_t LeadingBits(float value) {
+  std::uint32_t bits = 0;
+  std::memcpy(&bits, &value, sizeof bits);
+  const std::uint32_t flip = (bits >> 31) != 0 ? 0xFFFFFFFFU : 0x80000000U;
+  return (bits ^ flip) >> (32 - kLeadingBits);
+}
+
+}  // namespace
 
 Gradient CentralGradient(const cv::Mat& grey) {
   Gradient gradient;
@@ -27,26 +42,55 @@ Gradient CentralGradient(const cv::Mat& grey) {
   return gradient;
 }
 
-std::vector<cv::Point> EdgePixels(const Gradient& gradient, double threshold, int margin_px) {
+cv::Mat GradientMagnitude(const cv::Mat& grey) {
+  cv::Mat magnitude(grey.size(), CV_32F);
+  std::vector<float> gx(static_cast<std::size_t>(grey.cols)), gy(gx.size());
+  for (int y = 0; y < grey.rows; ++y) {
+    cv::Mat row = magnitude.row(y);
+    if (y == 0 || y + 1 == grey.rows || grey.cols < 3) {
+      row.setTo(0);
+      continue;
+    }
+    const auto* above = grey.ptr<float>(y - 1);
+    const auto* here = grey.ptr<float>(y);
+    const auto* below = grey.ptr<float>(y + 1);
+    for (std::size_t x = 1; x + 1 < gx.size(); ++x) {
+      gx[x] = 0.5F * (here[x + 1] - here[x - 1]);
+      gy[x] = 0.5F * (below[x] - above[x]);
+    }
+    cv::magnitude(cv::Mat(1, grey.cols, CV_32F, gx.data()),
+                  cv::Mat(1, grey.cols, CV_32F, gy.data()), row);
+  }
+  return magnitude;
+}
+
+cv::Point2f GradientAt(const cv::Mat& grey, cv::Point pixel) {
+  const auto* here = grey.ptr<float>(pixel.y) + pixel.x;
+  return {0.5F * (here[1] - here[-1]),
+          0.5F * (grey.ptr<float>(pixel.y + 1)[pixel.x] - grey.ptr<float>(pixel.y - 1)[pixel.x])};
+}
+
+std::vector<cv::Point> EdgePixels(const cv::Mat& grey, const cv::Mat& magnitude, double threshold,
+                                  int margin_px) {
   std::vector<cv::Point> edges;
-  const cv::Mat& m = gradient.magnitude;
+  const cv::Mat& m = magnitude;
   const int margin = std::max(margin_px, 2);
+  const auto least = static_cast<float>(threshold);
   // On a texture no branch is predictable, so the neighbours are chosen without branches.
   for (int y = margin; y < m.rows - margin; ++y) {
     ThrowIfCancelled();
     const auto* above = m.ptr<float>(y - 1);
     const auto* here = m.ptr<float>(y);
     const auto* below = m.ptr<float>(y + 1);
-    const auto* gx = gradient.x.ptr<float>(y);
-    const auto* gy = gradient.y.ptr<float>(y);
     for (int x = margin; x < m.cols - margin; ++x) {
-      if (!(here[x] > threshold)) continue;
+      if (!(here[x] > least)) continue;
+      const cv::Point2f gradient = GradientAt(grey, {x, y});
       // The two neighbours along the gradient, interpolated between the grid points around them.
-      const float ax = std::abs(gx[x]);
-      const float ay = std::abs(gy[x]);
-      const int sx = gx[x] >= 0 ? 1 : -1;
-      const auto* row_ahead = gy[x] >= 0 ? below : above;
-      const auto* row_behind = gy[x] >= 0 ? above : below;
+      const float ax = std::abs(gradient.x);
+      const float ay = std::abs(gradient.y);
+      const int sx = gradient.x >= 0 ? 1 : -1;
+      const auto* row_ahead = gradient.y >= 0 ? below : above;
+      const auto* row_behind = gradient.y >= 0 ? above : below;
       const bool along_x = ax >= ay;
       const float t = (along_x ? ay : ax) / (along_x ? ax : ay);
       const float straight_ahead = along_x ? here[x + sx] : row_ahead[x];
@@ -92,10 +136,25 @@ double Quantile(const cv::Mat& values, double fraction) {
     if (rank >= left_out) return nth(&sorted, rank - left_out);
     sorted.clear();
   }
-  sorted.reserve(values.total());
-  for (int y = 0; y < values.rows; ++y)
-    sorted.insert(sorted.end(), values.ptr<float>(y), values.ptr<float>(y) + values.cols);
-  return nth(&sorted, rank);
+  // Only the values that share their leading bits with the one that is sought are sorted.
+  std::vector<std::ptrdiff_t> counts(std::size_t{1} << kLeadingBits, 0);
+  for (int y = 0; y < values.rows; ++y) {
+    ThrowIfCancelled();
+    const auto* row = values.ptr<float>(y);
+    for (int x = 0; x < values.cols; ++x) ++counts[LeadingBits(row[x])];
+  }
+  std::size_t group = 0;
+  std::ptrdiff_t below = 0;
+  while (below + counts[group] <= rank) below += counts[group++];
+  sorted.reserve(static_cast<std::size_t>(counts[group]));
+  for (int y = 0; y < values.rows; ++y) {
+    ThrowIfCancelled();
+    const auto* row = values.ptr<float>(y);
+    for (int x = 0; x < values.cols; ++x) {
+      if (LeadingBits(row[x]) == group) sorted.push_back(row[x]);
+    }
+  }
+  return nth(&sorted, rank - below);
 }
 
 cv::Mat Smoothed(const cv::Mat& grey, double sigma_px) {

@@ -12,9 +12,16 @@ struct Gradient {
 };
 Gradient CentralGradient(const cv::Mat& grey);
 
+// The magnitude alone, for which no matrix of both parts is needed.
+cv::Mat GradientMagnitude(const cv::Mat& grey);
+// The gradient at a pixel that is not on the border.
+cv::Point2f GradientAt(const cv::Mat& grey, cv::Point pixel);
+
 // Returns the pixels whose gradient magnitude exceeds the threshold and is the largest along the
 // gradient's direction (non-maximum suppression). They are at least `margin_px` from the border.
-std::vector<cv::Point> EdgePixels(const Gradient& gradient, double threshold, int margin_px);
+// `magnitude` is that of `grey`.
+std::vector<cv::Point> EdgePixels(const cv::Mat& grey, const cv::Mat& magnitude, double threshold,
+                                  int margin_px);
 
 // Returns the value below which a fraction of a CV_32F matrix lies.
 double Quantile(const cv::Mat& values, double fraction);

@@ -107,14 +107,14 @@ Extremum Walk(const Ray& ray, float start, float sign, int max_px) {
 std::vector<SharpnessIndex> MeanEdgeSlopes(const cv::Mat& grey, const SharpnessOptions& options,
                                            const std::vector<double>& thresholds) {
   const cv::Mat smoothed = Smoothed(grey, options.smoothing_sigma_px);
-  const Gradient gradient = CentralGradient(smoothed);
+  const cv::Mat magnitudes = GradientMagnitude(smoothed);
   std::vector<SharpnessIndex> indices(thresholds.size());
   if (thresholds.empty()) return indices;
   const double lowest = *std::min_element(thresholds.begin(), thresholds.end());
-  for (const cv::Point& edge : EdgePixels(gradient, lowest, 2)) {
-    const double magnitude = gradient.magnitude.at<float>(edge);
-    const double dx = gradient.x.at<float>(edge) / magnitude;
-    const double dy = gradient.y.at<float>(edge) / magnitude;
+  for (const cv::Point& edge : EdgePixels(smoothed, magnitudes, lowest, 2)) {
+    const double magnitude = magnitudes.at<float>(edge);
+    const cv::Point2f gradient = GradientAt(smoothed, edge);
+    const double dx = gradient.x / magnitude, dy = gradient.y / magnitude;
     const float here = smoothed.at<float>(edge);
     const Extremum up = Walk(Ray(smoothed, edge, dx, dy), here, 1, options.max_search_px);
     const Extremum down = Walk(Ray(smoothed, edge, -dx, -dy), here, -1, options.max_search_px);

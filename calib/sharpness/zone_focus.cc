@@ -9,6 +9,7 @@
 
 #include "calib/sharpness/edge_pixels.h"
 #include "calib/sharpness/log_parabola.h"
+#include "thicklens/base/cancel.h"
 #include "thicklens/base/parallel.h"
 
 namespace thicklens::calib {
@@ -28,38 +29,60 @@ struct Sample {
   double reading_mm = 0, sharpness = 0;
 };
 
+// First and last + 1 pixel of each zone along one axis, at the scale of the frame. Empty where the
+// frame does not show them.
+std::vector<cv::Range> PixelsOfZones(int zones, int length_px, double centre_px, double scale) {
+  std::vector<cv::Range> ranges;
+  const double size_px = static_cast<double>(length_px) / zones;
+  for (int zone = 0; zone < zones; ++zone) {
+    const double first = centre_px + scale * (zone * size_px - centre_px);
+    const int begin = std::max(0, static_cast<int>(std::lround(first)));
+    const int end = std::min(length_px, static_cast<int>(std::lround(first + scale * size_px)));
+    ranges.emplace_back(begin, std::max(begin, end));
+  }
+  return ranges;
+}
+
+// Squares of the gradient of some rows of a smoothed frame; 0 on the frame's border. Only these
+// rows are smoothed, so that they stay in the cache.
+cv::Mat SquaredGradient(const cv::Mat& grey, const cv::Range& rows) {
+  cv::Mat squares = cv::Mat::zeros(rows.size(), grey.cols, CV_32F);
+  const cv::Range around(std::max(0, rows.start - 1), std::min(grey.rows, rows.end + 1));
+  const cv::Mat smoothed = Smoothed(grey.rowRange(around), kSmoothingPx);
+  for (int y = std::max(1, rows.start); y < std::min(grey.rows - 1, rows.end); ++y) {
+    const auto* above = smoothed.ptr<float>(y - 1 - around.start);
+    const auto* here = smoothed.ptr<float>(y - around.start);
+    const auto* below = smoothed.ptr<float>(y + 1 - around.start);
+    auto* square = squares.ptr<float>(y - rows.start);
+    for (int x = 1; x + 1 < grey.cols; ++x) {
+      const float gx = 0.5F * (here[x + 1] - here[x - 1]);
+      const float gy = 0.5F * (below[x] - above[x]);
+      square[x] = gx * gx + gy * gy;
+    }
+  }
+  return squares;
+}
+
 // Sharpness of all zones of a frame; 0 where the frame does not show the whole zone.
 std::vector<double> SharpnessOfZones(const cv::Mat& grey, const ZoneFocus& grid,
                                      const ZoneFrame& frame, const cv::Point2d& centre_px) {
-  const Gradient gradient = CentralGradient(Smoothed(grey, kSmoothingPx));
-  cv::Mat squares, sums, lights;
-  cv::multiply(gradient.magnitude, gradient.magnitude, squares);
-  cv::integral(squares, sums, CV_64F);
-  cv::integral(grey, lights, CV_64F);
+  const std::vector<cv::Range> columns =
+      PixelsOfZones(grid.columns, grey.cols, centre_px.x, frame.scale);
+  const cv::Rect2d one = grid.Pixels({0, 0, 1, 1}, grey.size());
+  const double least_area = 0.5 * frame.scale * frame.scale * one.area();
   std::vector<double> sharpness;
-  for (int row = 0; row < grid.rows; ++row) {
-    for (int column = 0; column < grid.columns; ++column) {
-      const cv::Rect2d at_one = grid.Pixels({column, row, 1, 1}, grey.size());
-      const cv::Point2d first =
-          centre_px + frame.scale * (cv::Point2d(at_one.x, at_one.y) - centre_px);
-      const int left = std::max(0, static_cast<int>(std::lround(first.x)));
-      const int top = std::max(0, static_cast<int>(std::lround(first.y)));
-      const int right =
-          std::min(grey.cols, static_cast<int>(std::lround(first.x + frame.scale * at_one.width)));
-      const int bottom =
-          std::min(grey.rows, static_cast<int>(std::lround(first.y + frame.scale * at_one.height)));
-      const double area = static_cast<double>(right - left) * (bottom - top);
-      if (right <= left || bottom <= top ||
-          area < 0.5 * frame.scale * frame.scale * at_one.area()) {
+  for (const cv::Range& rows : PixelsOfZones(grid.rows, grey.rows, centre_px.y, frame.scale)) {
+    ThrowIfCancelled();
+    const cv::Mat squares = rows.empty() ? cv::Mat() : SquaredGradient(grey, rows);
+    for (const cv::Range& part : columns) {
+      const double area = static_cast<double>(part.size()) * rows.size();
+      if (part.empty() || rows.empty() || area < least_area) {
         sharpness.push_back(0);
         continue;
       }
-      const auto sum = [&](const cv::Mat& of) {
-        return of.at<double>(bottom, right) - of.at<double>(top, right) -
-               of.at<double>(bottom, left) + of.at<double>(top, left);
-      };
-      const double light = sum(lights) / area;
-      sharpness.push_back(light > 0 ? frame.scale * frame.scale * sum(sums) / area / (light * light)
+      const double light = cv::mean(grey(rows, part))[0];
+      sharpness.push_back(light > 0 ? frame.scale * frame.scale *
+                                          cv::mean(squares.colRange(part))[0] / (light * light)
                                     : 0);
     }
   }

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
+#include <cstdlib>
+#include <numeric>
 #include <utility>
 
 #include "calib/spectrum/gridded_sum.h"
@@ -43,26 +46,34 @@ std::optional<Axis> MakeAxis(int pixels, double origin_px, double scale, double 
   return axis;
 }
 
-// The orders that modes have along one axis, each once, and their frequencies and phases.
-struct Orders {
-  Orders(const Axis& axis, const GriddedAxis& gridded, std::vector<int> of_modes) {
-    std::sort(of_modes.begin(), of_modes.end());
-    of_modes.erase(std::unique(of_modes.begin(), of_modes.end()), of_modes.end());
-    orders = std::move(of_modes);
-    const double middle_px = axis.first + gridded.middle() - axis.origin_px;
-    for (const int order : orders) {
-      frequencies.push_back(order * axis.cycles);
-      phases.push_back(std::polar(1.0, -2 * kPi * order * axis.cycles * middle_px));
-    }
+// Phases of the orders from -highest to highest, from the middle pixel to the origin of the target.
+class Phases {
+ public:
+  Phases(const Axis& axis, int samples, int highest) : highest_(highest) {
+    const double middle_px = axis.first + samples / 2 - axis.origin_px;
+    for (int order = -highest; order <= highest; ++order)
+      phases_.push_back(std::polar(1.0, -2 * kPi * order * axis.cycles * middle_px));
   }
-  int IndexOf(int order) const {
-    return static_cast<int>(std::lower_bound(orders.begin(), orders.end(), order) - orders.begin());
+  std::complex<double> Of(int order) const {
+    return phases_[static_cast<std::size_t>(order + highest_)];
   }
-  std::complex<double> PhaseAt(int index) const { return phases[static_cast<std::size_t>(index)]; }
 
-  std::vector<int> orders;
-  std::vector<double> frequencies;           // cycles per frame px
-  std::vector<std::complex<double>> phases;  // from the middle pixel to the origin of the target
+ private:
+  int highest_;
+  std::vector<std::complex<double>> phases_;
+};
+
+// The orders of modes along one axis as multiples of their largest common divisor.
+struct CommonSteps {
+  int step = 0, highest = 0;  // in orders; the highest in steps
+  void Add(int order) {
+    step = std::gcd(step, order);
+    highest = std::max(highest, std::abs(order));
+  }
+  void Finish() {
+    step = std::max(step, 1);
+    highest /= step;
+  }
 };
 
 }  // namespace
@@ -104,9 +115,10 @@ std::optional<FrameSpectrum> MeasureSums(const cv::Mat& image, const Eigen::Vect
   const cv::Mat pixels = image(cv::Rect(x->first, y->first, x->count, y->count));
   const double total = x->weight_sum * y->weight_sum;
   double light = 0;
+  const Eigen::VectorXf weights_x = x->weights.cast<float>();
   for (int row = 0; row < y->count; ++row) {
     const Eigen::Map<const Eigen::VectorXf> values(pixels.ptr<float>(row), x->count);
-    light += y->weights[row] * x->weights.dot(values.cast<double>());
+    light += y->weights[row] * static_cast<double>(weights_x.dot(values));
   }
   FrameSpectrum spectrum;
   spectrum.mean = light / total;
@@ -114,24 +126,27 @@ std::optional<FrameSpectrum> MeasureSums(const cv::Mat& image, const Eigen::Vect
   spectrum.noise_gain =
       x->weight_square_sum * y->weight_square_sum / (total * total * spectrum.mean * spectrum.mean);
 
-  std::vector<int> of_x, of_y;
+  CommonSteps steps_x, steps_y;
   for (std::size_t k = 0; k < count; ++k) {
-    of_x.push_back(modes[k].jx);
-    of_y.push_back(modes[k].jy);
+    steps_x.Add(modes[k].jx);
+    steps_y.Add(modes[k].jy);
   }
-  const GriddedAxis along_x(x->weights), along_y(y->weights);
-  const Orders orders_x(*x, along_x, std::move(of_x)), orders_y(*y, along_y, std::move(of_y));
-  std::vector<std::pair<int, int>> pairs;
-  pairs.reserve(count);
+  steps_x.Finish();
+  steps_y.Finish();
+  std::vector<std::pair<int, int>> orders;
+  orders.reserve(count);
   for (std::size_t k = 0; k < count; ++k)
-    pairs.emplace_back(orders_x.IndexOf(modes[k].jx), orders_y.IndexOf(modes[k].jy));
+    orders.emplace_back(modes[k].jx / steps_x.step, modes[k].jy / steps_y.step);
   // The mean is subtracted before the sums, because a later subtraction would leave float rounding.
-  spectrum.values = GriddedSums(pixels, static_cast<float>(spectrum.mean), along_x, along_y,
-                                orders_x.frequencies, orders_y.frequencies, pairs);
+  spectrum.values =
+      GriddedSums(pixels, static_cast<float>(spectrum.mean),
+                  GriddedAxis(x->weights, steps_x.step * x->cycles, steps_x.highest),
+                  GriddedAxis(y->weights, steps_y.step * y->cycles, steps_y.highest), orders);
+  const Phases phases_x(*x, x->count, steps_x.highest * steps_x.step);
+  const Phases phases_y(*y, y->count, steps_y.highest * steps_y.step);
   for (std::size_t k = 0; k < count; ++k) {
-    spectrum.values[static_cast<Eigen::Index>(k)] *= orders_x.PhaseAt(pairs[k].first) *
-                                                     orders_y.PhaseAt(pairs[k].second) /
-                                                     (total * spectrum.mean);
+    spectrum.values[static_cast<Eigen::Index>(k)] *=
+        phases_x.Of(modes[k].jx) * phases_y.Of(modes[k].jy) / (total * spectrum.mean);
   }
   return spectrum;
 }

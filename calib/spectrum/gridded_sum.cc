@@ -12,8 +12,9 @@
 namespace thicklens::calib {
 namespace {
 
-constexpr double kOversampling = 1.5;  // least length of the FFT over the number of samples
-constexpr int kRowsAtOnce = 32;        // a block of rows stays in the cache
+constexpr double kOversampling = 1.5;  // least number of cells over that of the orders
+constexpr int kColumnsAtOnce = 512;    // a block of columns of some rows stays in the cache
+constexpr int kHalfTaps = GriddedAxis::kTaps / 2;
 
 // Beatty's choice for this width and oversampling (IEEE Trans. Med. Imaging 24, 2005, page 799).
 double ShapeOfKernel() {
@@ -32,127 +33,94 @@ double BesselI0(double x) {
   return sum;
 }
 
-// The Kaiser-Bessel kernel at a distance in bins, and its transform at a distance from the middle
-// over the length of the FFT.
-double Kernel(double distance) {
-  const double u = 2 * distance / GriddedAxis::kTaps;
-  return u * u < 1 ? BesselI0(ShapeOfKernel() * std::sqrt(1 - u * u)) : 0;
-}
-double TransformOfKernel(double place) {
-  const double shape = ShapeOfKernel(), wave = kPi * GriddedAxis::kTaps * place;
-  const double root = std::sqrt(shape * shape - wave * wave);  // place is at most 1/3: positive
+// The Kaiser-Bessel kernel against the distance in cells, as a table. The straight lines between
+// its entries err by less than 1e-8 of the largest value.
+class KernelTable {
+ public:
+  KernelTable() {
+    values_.reserve(kHalfTaps * kPerCell + 2);
+    for (int i = 0; i <= kHalfTaps * kPerCell + 1; ++i) {
+      const double u = static_cast<double>(i) / (kHalfTaps * kPerCell);
+      values_.push_back(u < 1 ? BesselI0(ShapeOfKernel() * std::sqrt(1 - u * u)) : 0);
+    }
+  }
+  double At(double distance) const {
+    const double place = std::min(std::abs(distance), static_cast<double>(kHalfTaps)) * kPerCell;
+    const auto i = static_cast<std::size_t>(place);
+    return values_[i] + (place - static_cast<double>(i)) * (values_[i + 1] - values_[i]);
+  }
+
+ private:
+  static constexpr int kPerCell = 4096;
+  std::vector<double> values_;
+};
+
+// The transform of the kernel at a frequency in cycles per cell.
+double TransformOfKernel(double frequency) {
+  const double shape = ShapeOfKernel(), wave = kPi * GriddedAxis::kTaps * frequency;
+  const double root = std::sqrt(shape * shape - wave * wave);  // at most 1/3 cycle: positive
   return GriddedAxis::kTaps * std::sinh(root) / root;
 }
 
-using Complex = std::complex<float>;
-
-// The bin of the transform of real samples in OpenCV's packed order, of an even length.
-Complex PackedBin(const float* packed, int length, int bin) {
-  const int at = ((bin % length) + length) % length;
-  const int k = std::min(at, length - at);
-  if (k == 0) return packed[0];
-  if (2 * k == length) return packed[length - 1];
-  return {packed[2 * k - 1], at == k ? packed[2 * k] : -packed[2 * k]};
-}
-
-Complex Interpolated(const GriddedAxis::Taps& taps, const Complex* bins) {
-  Complex sum = 0;
-  for (int t = 0; t < GriddedAxis::kTaps; ++t)
-    sum += taps.weights[static_cast<std::size_t>(t)] * bins[t];
-  return sum;
-}
-
-std::vector<GriddedAxis::Taps> TapsOf(const GriddedAxis& axis,
-                                      const std::vector<double>& frequencies) {
-  std::vector<GriddedAxis::Taps> taps;
-  taps.reserve(frequencies.size());
-  for (const double f : frequencies) taps.push_back(axis.At(f));
-  return taps;
-}
-
-// Sums along x. Each row of the result has one frequency, and its pixels of y at their places with
-// their factors.
-cv::Mat SumsAlongRows(const cv::Mat& pixels, float less, const GriddedAxis& x, const GriddedAxis& y,
-                      const std::vector<GriddedAxis::Taps>& taps) {
-  cv::Mat sums = cv::Mat::zeros(static_cast<int>(taps.size()), y.length(), CV_32FC2);
-  const auto [least, most] = std::minmax_element(
-      taps.begin(), taps.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-  const int first = least->first, end = most->first + GriddedAxis::kTaps;
-  std::vector<Complex> bins(static_cast<std::size_t>(end - first));
-  cv::Mat block(kRowsAtOnce, x.length(), CV_32F), transform;
-  for (int begin = 0; begin < pixels.rows; begin += kRowsAtOnce) {
+// Spreads the rows of an image over the cells of an axis along y: one row per cell.
+cv::Mat SpreadRows(const cv::Mat& pixels, float less, const GriddedAxis& axis) {
+  cv::Mat cells = cv::Mat::zeros(axis.length(), pixels.cols, CV_32F);
+  for (int begin = 0; begin < pixels.cols; begin += kColumnsAtOnce) {
     ThrowIfCancelled();
-    const int rows = std::min(kRowsAtOnce, pixels.rows - begin);
-    block.setTo(0);
-    for (int r = 0; r < rows; ++r) {
-      const auto* from = pixels.ptr<float>(begin + r);
-      auto* to = block.ptr<float>(r);
-      // The samples before the middle lie at the end.
-      auto* to_end = to + x.length() - x.middle();
-      for (int i = 0; i < x.middle(); ++i) to_end[i] = x.FactorOf(i) * (from[i] - less);
-      to -= x.middle();
-      for (int i = x.middle(); i < x.samples(); ++i) to[i] = x.FactorOf(i) * (from[i] - less);
-    }
-    cv::dft(block.rowRange(0, rows), transform, cv::DFT_ROWS);
-    for (int r = 0; r < rows; ++r) {
-      const auto* packed = transform.ptr<float>(r);
-      for (int bin = first; bin < end; ++bin)
-        bins[static_cast<std::size_t>(bin - first)] = PackedBin(packed, x.length(), bin);
-      const int place = y.PlaceOf(begin + r);
-      const float factor = y.FactorOf(begin + r);
-      for (std::size_t j = 0; j < taps.size(); ++j)
-        sums.ptr<Complex>(static_cast<int>(j))[place] =
-            factor * Interpolated(taps[j], &bins[static_cast<std::size_t>(taps[j].first - first)]);
+    const int count = std::min(kColumnsAtOnce, pixels.cols - begin);
+    for (int row = 0; row < pixels.rows; ++row) {
+      const auto* from = pixels.ptr<float>(row) + begin;
+      const GriddedAxis::Taps& taps = axis.Of(row);
+      int cell = taps.first;
+      for (const float weight : taps.weights) {
+        auto* to = cells.ptr<float>(cell) + begin;
+        for (int i = 0; i < count; ++i) to[i] += weight * (from[i] - less);
+        if (++cell == axis.length()) cell = 0;
+      }
     }
   }
-  return sums;
+  return cells;
 }
 
 }  // namespace
 
-GriddedAxis::GriddedAxis(const Eigen::VectorXd& weights) {
+GriddedAxis::GriddedAxis(const Eigen::VectorXd& weights, double step, int highest)
+    : highest_(highest) {
+  static const KernelTable kernel;
+  length_ = 2 * cv::getOptimalDFTSize(std::max(
+                    kTaps, static_cast<int>(std::ceil(0.5 * kOversampling * (2 * highest + 1)))));
   const auto samples = static_cast<int>(weights.size());
-  length_ = 2 * cv::getOptimalDFTSize(
-                    std::max(kTaps, static_cast<int>(std::ceil(0.5 * kOversampling * samples))));
-  factors_.reserve(static_cast<std::size_t>(samples));
+  taps_.reserve(static_cast<std::size_t>(samples));
   for (int i = 0; i < samples; ++i) {
-    const double place = static_cast<double>(i - samples / 2) / length_;
-    factors_.push_back(static_cast<float>(weights[i] / TransformOfKernel(place)));
+    const double periods = step * (i - samples / 2);
+    const double place = (periods - std::floor(periods)) * length_;
+    const auto before = static_cast<int>(place);
+    Taps taps;
+    for (int t = 0; t < kTaps; ++t) {
+      taps.weights[static_cast<std::size_t>(t)] =
+          static_cast<float>(weights[i] * kernel.At(before - kHalfTaps + 1 + t - place));
+    }
+    taps.first = (before - kHalfTaps + 1 + length_) % length_;
+    taps_.push_back(taps);
   }
-}
-
-GriddedAxis::Taps GriddedAxis::At(double frequency) const {
-  const double bin = frequency * length_;
-  Taps taps;
-  taps.first = static_cast<int>(std::floor(bin)) - kTaps / 2 + 1;
-  for (int t = 0; t < kTaps; ++t)
-    taps.weights[static_cast<std::size_t>(t)] = static_cast<float>(Kernel(taps.first + t - bin));
-  return taps;
+  for (int j = 0; j <= highest; ++j)
+    factors_.push_back(1 / TransformOfKernel(static_cast<double>(j) / length_));
 }
 
 Eigen::ArrayXcd GriddedSums(const cv::Mat& pixels, float less, const GriddedAxis& x,
-                            const GriddedAxis& y, const std::vector<double>& frequencies_x,
-                            const std::vector<double>& frequencies_y,
-                            const std::vector<std::pair<int, int>>& pairs) {
-  Eigen::ArrayXcd result(static_cast<Eigen::Index>(pairs.size()));
-  if (pairs.empty()) return result;
-  cv::Mat sums = SumsAlongRows(pixels, less, x, y, TapsOf(x, frequencies_x));
-  for (int begin = 0; begin < sums.rows; begin += kRowsAtOnce) {
-    ThrowIfCancelled();
-    cv::Mat block = sums.rowRange(begin, std::min(begin + kRowsAtOnce, sums.rows));
-    cv::dft(block, block, cv::DFT_ROWS);
-  }
-  const std::vector<GriddedAxis::Taps> taps = TapsOf(y, frequencies_y);
-  for (std::size_t k = 0; k < pairs.size(); ++k) {
-    const auto* bins = sums.ptr<Complex>(pairs[k].first);
-    const GriddedAxis::Taps& tap = taps[static_cast<std::size_t>(pairs[k].second)];
-    std::complex<double> sum = 0;
-    for (int t = 0; t < GriddedAxis::kTaps; ++t) {
-      const int bin = (tap.first + t) % y.length();
-      sum += static_cast<std::complex<double>>(bins[bin < 0 ? bin + y.length() : bin]) *
-             static_cast<double>(tap.weights[static_cast<std::size_t>(t)]);
-    }
-    result[static_cast<Eigen::Index>(k)] = sum;
+                            const GriddedAxis& y, const std::vector<std::pair<int, int>>& orders) {
+  Eigen::ArrayXcd result(static_cast<Eigen::Index>(orders.size()));
+  if (orders.empty()) return result;
+  cv::Mat cells, transform;
+  cv::transpose(SpreadRows(pixels, less, y), cells);
+  cells = SpreadRows(cells, 0, x);  // one row per cell of x, one column per cell of y
+  ThrowIfCancelled();
+  cv::dft(cells, transform, cv::DFT_COMPLEX_OUTPUT);
+  for (std::size_t k = 0; k < orders.size(); ++k) {
+    const auto [jx, jy] = orders[k];
+    const auto bin = transform.at<std::complex<float>>(x.BinOf(jx), y.BinOf(jy));
+    result[static_cast<Eigen::Index>(k)] =
+        x.FactorOf(jx) * y.FactorOf(jy) * static_cast<std::complex<double>>(bin);
   }
   return result;
 }

@@ -16,6 +16,7 @@ namespace thicklens::calib {
 namespace {
 
 constexpr double kTwoPiSquared = 2 * kPi * kPi;
+constexpr Eigen::Index kMisfitRings = 8;
 constexpr int kMaxSteps = 30;
 // Limit of 2 pi^2 (V of the reference - V) nu^2 along an axis where a frame is sharper than the
 // reference. Up to it, the leakage is e^2 times the measured one at most. Without a limit, the
@@ -551,6 +552,30 @@ class Fit {
       freedom += static_cast<double>(Used(i));
     }
     result_.chi2_per_dof = freedom > 0 ? chi2 / freedom : 0;
+    result_.misfit.resize(n());
+    for (Eigen::Index i = 0; i < n(); ++i) result_.misfit[i] = MisfitOf(i);
+  }
+
+  // The strongest modes, which are the lowest ones, must not hide a misfit of the others: every
+  // ring has its own share.
+  double MisfitOf(Eigen::Index i) const {
+    const auto s = static_cast<std::size_t>(i);
+    const Eigen::Index count = Count(i);
+    const Eigen::ArrayXd weight = weight_[s].head(count);
+    const Eigen::ArrayXd rest =
+        weight * (data_[s] - last_.models[s] * last_.texture.head(count)).abs2();
+    const Eigen::ArrayXd all = weight * data_[s].abs2();
+    double shares = 0;
+    int rings = 0;
+    for (Eigen::Index ring = 0; ring < kMisfitRings; ++ring) {
+      const Eigen::Index first = ring * count / kMisfitRings;
+      const Eigen::Index modes = (ring + 1) * count / kMisfitRings - first;
+      const double power = all.segment(first, modes).sum();
+      if (!(power > 0)) continue;
+      shares += rest.segment(first, modes).sum() / power;
+      ++rings;
+    }
+    return rings > 0 ? shares / rings : 0;
   }
 
   const std::vector<SpectrumSample>& samples_;
@@ -591,6 +616,7 @@ AxialBlur FitAxialBlur(const std::vector<SpectrumSample>& samples, std::size_t r
   blur.gains = fit.gains;
   blur.shifts_px = fit.shifts_px;
   blur.noise_ratio = fit.noise_ratio;
+  blur.misfit = fit.misfit;
   blur.modes_used = fit.modes_used;
   blur.chi2_per_dof = fit.chi2_per_dof;
   blur.texture = std::move(fit.texture);
@@ -611,6 +637,7 @@ RelativeBlur MeanOfAxes(const AxialBlur& axial) {
   mean.gains = axial.gains;
   mean.shifts_px = axial.shifts_px;
   mean.noise_ratio = axial.noise_ratio;
+  mean.misfit = axial.misfit;
   mean.modes_used = axial.modes_used;
   mean.chi2_per_dof = axial.chi2_per_dof;
   mean.texture = axial.texture;

@@ -50,8 +50,11 @@ struct RelativeBlur {
   Eigen::VectorXd gains;          // g
   Eigen::Matrix2Xd shifts_px;     // t
   Eigen::VectorXd noise_ratio;    // scatter about the fit over what the pixel noise explains
-  std::vector<int> modes_used;    // number of modes of each sample
-  double chi2_per_dof = 0;        // all samples, relative to the pixel noise
+  // Power of the scatter about the fit over that of the sample's own spectrum: the mean of rings of
+  // |nu| with equally many modes. 0: the fit describes the sample; near 1: it shows something else.
+  Eigen::VectorXd misfit;
+  std::vector<int> modes_used;  // number of modes of each sample
+  double chi2_per_dof = 0;      // all samples, relative to the pixel noise
   // Departure of the shape from the family [D79]: H exp(4 tails u^2), u = 2 pi^2 v nu^2, where v is
   // the defocus alone. It is the same in all frames and does not change the second moment. 0 is the
   // family itself; to first order a disc is a Gaussian with -1/24. The value is one step of the fit
@@ -83,6 +86,7 @@ struct AxialBlur {
   Eigen::VectorXd gains;        // g
   Eigen::Matrix2Xd shifts_px;   // t
   Eigen::VectorXd noise_ratio;  // scatter about the fit over what the pixel noise explains
+  Eigen::VectorXd misfit;       // as that of RelativeBlur
   std::vector<int> modes_used;  // number of modes of each sample
   double chi2_per_dof = 0;      // all samples, relative to the pixel noise
   Eigen::ArrayXcd texture;      // T

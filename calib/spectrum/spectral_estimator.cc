@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 
 #include "thicklens/base/parallel.h"
 #include "thicklens/base/pi.h"
@@ -67,28 +68,59 @@ cv::Mat Derotated(const cv::Mat& grey, const SpectralEstimatorSetup& setup,
   return turned;
 }
 
-// Modes with power in the sharpest frames: the reference and its two sharpest companions.
-std::vector<Mode> ChooseModes(const SpectralEstimatorSetup& setup, const EstimatorRegion& region) {
-  std::vector<Mode> all = CandidateModes(region.window);
-  all.erase(
-      std::remove_if(all.begin(), all.end(),
+// The modes that may be measured in a region.
+std::vector<Mode> PossibleModes(const SpectralEstimatorSetup& setup, const TargetWindow& window) {
+  std::vector<Mode> modes = CandidateModes(window);
+  modes.erase(
+      std::remove_if(modes.begin(), modes.end(),
                      [&](const Mode& mode) {
                        return (setup.without_row_modes && std::abs(mode.jx) < kWidthOfWindow) ||
                               (setup.without_column_modes && std::abs(mode.jy) < kWidthOfWindow);
                      }),
-      all.end());
-  Eigen::ArrayXd power = Eigen::ArrayXd::Zero(static_cast<Eigen::Index>(all.size()));
-  double noise = 0;
-  for (const std::size_t f : FramesThatShowModes(setup, region)) {
-    const EstimatorFrame& frame = setup.frames[f];
-    const cv::Mat grey = Derotated(setup.read_grey(frame.frame), setup, frame);
-    const auto spectrum =
-        MeasureSpectrum(grey, setup.origin_px, frame.place, region.window, all, all.size());
-    if (!spectrum) continue;
-    power += spectrum->values.abs2();
-    noise += spectrum->noise_gain * frame.pixel_noise * frame.pixel_noise;
+      modes.end());
+  return modes;
+}
+
+// Chooses modes with power in the sharpest frames of each region: the reference and its two
+// sharpest companions.
+void ChooseModes(const SpectralEstimatorSetup& setup, std::vector<EstimatorRegion>* regions) {
+  std::vector<std::vector<std::size_t>> shown_by;  // a frame that stands twice counts twice
+  std::vector<std::size_t> frames;
+  for (const EstimatorRegion& region : *regions) {
+    shown_by.push_back(FramesThatShowModes(setup, region));
+    frames.insert(frames.end(), shown_by.back().begin(), shown_by.back().end());
   }
-  return StrongestModes(all, power, region.window, kSignalToNoise * noise, setup.modes_per_ring);
+  std::sort(frames.begin(), frames.end());
+  frames.erase(std::unique(frames.begin(), frames.end()), frames.end());
+  std::vector<std::vector<Mode>> modes;
+  std::vector<Eigen::ArrayXd> power;
+  for (const EstimatorRegion& region : *regions) {
+    modes.push_back(PossibleModes(setup, region.window));
+    power.emplace_back(Eigen::ArrayXd::Zero(static_cast<Eigen::Index>(modes.back().size())));
+  }
+  std::vector<double> noise(regions->size(), 0);
+  const auto measure = [&](std::size_t f, const cv::Mat& grey, std::size_t r) {
+    const auto times = static_cast<double>(std::count(shown_by[r].begin(), shown_by[r].end(), f));
+    if (times == 0) return;
+    const EstimatorFrame& frame = setup.frames[f];
+    const auto spectrum = MeasureSpectrum(grey, setup.origin_px, frame.place, (*regions)[r].window,
+                                          modes[r], modes[r].size());
+    if (!spectrum) return;
+    power[r] += times * spectrum->values.abs2();
+    noise[r] += times * spectrum->noise_gain * frame.pixel_noise * frame.pixel_noise;
+  };
+  // One frame after the other, so that few are in memory.
+  for (const std::size_t f : frames) {
+    const cv::Mat grey = Derotated(setup.read_grey(setup.frames[f].frame), setup, setup.frames[f]);
+    ParallelFor(static_cast<int>(regions->size()), setup.threads,
+                [&](int r) { measure(f, grey, static_cast<std::size_t>(r)); });
+  }
+  ParallelFor(static_cast<int>(regions->size()), setup.threads, [&](int index) {
+    const auto r = static_cast<std::size_t>(index);
+    EstimatorRegion& region = (*regions)[r];
+    region.modes = StrongestModes(modes[r], power[r], region.window, kSignalToNoise * noise[r],
+                                  setup.modes_per_ring);
+  });
 }
 
 // Removes the frames without which the others would share much more of the target. They were
@@ -187,10 +219,8 @@ std::optional<EstimatorRegion> PlanRegion(const SpectralEstimatorSetup& setup, d
 
 void MeasureRegions(const SpectralEstimatorSetup& setup, std::vector<EstimatorRegion>* regions) {
   const double least = LeastVariance(setup);
-  for (EstimatorRegion& region : *regions) {
-    region.modes = ChooseModes(setup, region);
-    region.samples.assign(region.frames.size(), {});
-  }
+  ChooseModes(setup, regions);
+  for (EstimatorRegion& region : *regions) region.samples.assign(region.frames.size(), {});
   const auto count = static_cast<int>(setup.frames.size());
   ParallelFor(count, setup.threads, [&](int index) {
     const auto f = static_cast<std::size_t>(index);
@@ -234,28 +264,30 @@ void MeasureRegions(const SpectralEstimatorSetup& setup, std::vector<EstimatorRe
   }
   const cv::Mat reference = Derotated(setup.read_grey(setup.frames[setup.reference].frame), setup,
                                       setup.frames[setup.reference]);
-  for (EstimatorRegion& region : *regions) {
-    if (region.frames.size() < kMinFrames || region.modes.empty()) continue;
+  // Regions are independent, so that each is the work of one thread where there are several.
+  const int threads_of_one = regions->size() > 1 ? 1 : setup.threads;
+  ParallelFor(static_cast<int>(regions->size()), setup.threads, [&](int index) {
+    EstimatorRegion& region = (*regions)[static_cast<std::size_t>(index)];
+    if (region.frames.size() < kMinFrames || region.modes.empty()) return;
     double largest = 0;
     for (const std::size_t f : region.frames)
       largest = std::max(largest, setup.frames[f].expected_variance_px2 - least);
     region.leakage = WindowLeakage(reference, setup.origin_px, region.window, region.modes,
                                    region.samples[region.reference].spectrum, setup.psf,
-                                   kLeakageMargin * std::sqrt(largest) + 0.5, setup.threads);
-  }
+                                   kLeakageMargin * std::sqrt(largest) + 0.5, threads_of_one);
+  });
 }
 
 AxisLeakage MeasureAxisLeakage(const SpectralEstimatorSetup& setup, const EstimatorRegion& region,
                                double largest_variance_px2) {
   const EstimatorFrame& frame = setup.frames[region.frames[region.reference]];
   const cv::Mat reference = Derotated(setup.read_grey(frame.frame), setup, frame);
-  const auto along = [&](const Eigen::Vector2d& axis) {
-    return WindowLeakage(reference, setup.origin_px, region.window, region.modes,
-                         region.samples[region.reference].spectrum, setup.psf,
-                         kLeakageMargin * std::sqrt(largest_variance_px2) + 0.5, setup.threads,
-                         axis);
-  };
-  return {along(Eigen::Vector2d::UnitX()), along(Eigen::Vector2d::UnitY())};
+  std::vector<WindowLeakage> leakages =
+      WindowLeakage::AlongAxes(reference, setup.origin_px, region.window, region.modes,
+                               region.samples[region.reference].spectrum, setup.psf,
+                               kLeakageMargin * std::sqrt(largest_variance_px2) + 0.5,
+                               setup.threads, {Eigen::Vector2d::UnitX(), Eigen::Vector2d::UnitY()});
+  return {std::move(leakages[0]), std::move(leakages[1])};
 }
 
 EstimatorRegion PartOf(const EstimatorRegion& region,

@@ -1,8 +1,13 @@
 #include "calib/spectrum/window_leakage.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <complex>
+#include <cstddef>
 #include <opencv2/core.hpp>
+#include <utility>
+#include <vector>
 
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/parallel.h"
@@ -12,87 +17,240 @@
 namespace thicklens::calib {
 namespace {
 
+using Complex = std::complex<float>;
+
 constexpr double kTwoPiSquared = 2 * kPi * kPi;
 constexpr int kLeakageNodes = 12;
 constexpr double kLeakageBand = 4;  // H below exp(-4): no frame uses such a mode
-// Frequencies beyond the modes of a node that still reach them through the window: a share of the
-// highest mode, and orders of the window, whose transform falls with their third power.
-constexpr double kReachOfBand = 1.5;
-constexpr double kReachOfWindow = 32;
+// Largest product of the distances along both axes, in orders of the window, at which a frequency
+// leaks into a mode. The transform of the window falls with the third power of each distance.
+constexpr double kReach = 64;
 // Step of tabulated transfer functions in t = 2 pi f R. The error of the straight lines between the
 // entries is at most 1/32 of its square, because the second derivative is at most 1/4.
-constexpr double kStepOfTable = 0.002;
+constexpr double kStepOfTable = 0.01;
+constexpr int kModesAtOnce = 64;
 
-// The transfer function of the defocus against |f|, which is smooth, as a table.
+// The transfer functions of the defocus of all nodes but the first against |f|, as a table.
 class TransferTable {
  public:
-  TransferTable(model::Psf psf, double sigma_px, double most)
-      : per_step_(2 * kPi * 2 * sigma_px / kStepOfTable) {
-    const auto entries = static_cast<std::size_t>(most * per_step_) + 3;
-    values_.reserve(entries);
-    for (std::size_t i = 0; i < entries; ++i)
-      values_.push_back(static_cast<float>(
-          model::DefocusTransfer(psf, sigma_px, static_cast<double>(i) / per_step_, 0)));
+  using Entry = std::array<float, kLeakageNodes>;  // the last value is 0: whole vectors
+
+  TransferTable(model::Psf psf, double step_px, double most, int threads)
+      : per_step_(static_cast<float>(2 * kPi * 2 * step_px * (kLeakageNodes - 1) / kStepOfTable)),
+        entries_(static_cast<std::size_t>(most * static_cast<double>(per_step_)) + 3) {
+    ParallelFor(kLeakageNodes - 1, threads, [&](int node) {
+      for (std::size_t i = 0; i < entries_.size(); ++i) {
+        entries_[i][static_cast<std::size_t>(node)] = static_cast<float>(model::DefocusTransfer(
+            psf, step_px * (node + 1), static_cast<double>(i) / static_cast<double>(per_step_), 0));
+      }
+    });
   }
-  float At(double f) const {
-    const double place = f * per_step_;
-    const auto i = static_cast<std::size_t>(place);
-    const auto part = static_cast<float>(place - static_cast<double>(i));
-    return values_[i] + part * (values_[i + 1] - values_[i]);
+  Entry At(float f) const {
+    const float place = f * per_step_;
+    const auto i = std::min(static_cast<std::size_t>(place), entries_.size() - 2);
+    const float part = place - static_cast<float>(i);
+    Entry value;
+    for (std::size_t n = 0; n < value.size(); ++n)
+      value[n] = entries_[i][n] + part * (entries_[i + 1][n] - entries_[i][n]);
+    return value;
   }
 
  private:
-  double per_step_;
-  std::vector<float> values_;
+  float per_step_;
+  std::vector<Entry> entries_;
 };
 
-// Length of the FFT that holds the frequencies up to `reach`, in cycles per sample, of one that has
-// `length` samples.
-int ReducedLength(int length, double reach) {
-  if (!(reach < 0.5)) return length;
-  return std::min(length, 2 * cv::getOptimalDFTSize(static_cast<int>(reach * length) + 2));
+// The transform of the Hann window over its middle value at a distance in orders:
+// sin(pi t)/(pi t (1 - t^2)). `sine` is sin(pi t).
+double WindowAt(double t, double sine) {
+  if (std::abs(t) < 1e-6) return 1;
+  if (std::abs(std::abs(t) - 1) < 1e-6) return 0.5;
+  return sine / (kPi * t * (1 - t * t));
 }
 
-// Index in the transform of `length` samples of the frequency that one of `reduced` samples has at
-// `index`, and that frequency in cycles per sample of the former.
-int IndexOfSameFrequency(int index, int reduced, int length) {
-  return index <= reduced / 2 ? index : index - reduced + length;
-}
-double FrequencyAt(int index, int length) {
-  return static_cast<double>(index <= length / 2 ? index : index - length) / length;
-}
-
-// An image with the frequencies up to `reach` along each axis of `transform`, times the transfer
-// function; sampled as coarsely as these allow.
-cv::Mat BlurredImage(const cv::Mat& transform, const TransferTable& transfer,
-                     const Eigen::Vector2d& axes, const Eigen::Vector2d& reach) {
-  const int cols = ReducedLength(transform.cols, reach.x());
-  const int rows = ReducedLength(transform.rows, reach.y());
-  const double share = static_cast<double>(cols) * rows / static_cast<double>(transform.total());
-  std::vector<double> square_x;
-  for (int u = 0; u < cols; ++u) {
-    const double f =
-        axes.x() * FrequencyAt(IndexOfSameFrequency(u, cols, transform.cols), transform.cols);
-    square_x.push_back(f * f);
-  }
-  cv::Mat blurred(rows, cols, CV_32FC2), image;
-  for (int v = 0; v < rows; ++v) {
-    ThrowIfCancelled();
-    const int from_v = IndexOfSameFrequency(v, rows, transform.rows);
-    const double fy = axes.y() * FrequencyAt(from_v, transform.rows);
-    const auto* from = transform.ptr<cv::Vec2f>(from_v);
-    auto* row = blurred.ptr<cv::Vec2f>(v);
-    for (int u = 0; u < cols; ++u) {
-      const auto factor = static_cast<float>(share) *
-                          transfer.At(std::sqrt(square_x[static_cast<std::size_t>(u)] + fy * fy));
-      row[u] = factor * from[IndexOfSameFrequency(u, cols, transform.cols)];
+// One axis of the transform of an image.
+class TransformAxis {
+ public:
+  // `size_px` and `middle_px` are those of the window, in an image of `length` px.
+  TransformAxis(int length, double size_px, double middle_px)
+      : length_(length), orders_per_bin_(size_px / length) {
+    for (int u = 0; u < length; ++u) {
+      const double f = FrequencyOf(u);
+      sines_.push_back(std::sin(kPi * f * size_px));
+      phases_.emplace_back(std::polar(1.0F, static_cast<float>(2 * kPi * Fraction(f * middle_px))));
     }
-    // The highest frequency of a smaller transform is that of both signs.
-    if (cols < transform.cols) row[cols / 2] = 0;
-    if (rows < transform.rows && v == rows / 2) blurred.row(v).setTo(0);
   }
-  cv::dft(blurred, image, cv::DFT_INVERSE | cv::DFT_SCALE | cv::DFT_REAL_OUTPUT);
-  return image;
+
+  // The frequencies that leak into an order of the window, from the lowest one on.
+  struct Neighbours {
+    int first_bin = 0;
+    std::vector<int> indices;        // in the transform
+    std::vector<float> frequencies;  // cycles per px
+    std::vector<float> weights;      // of the window
+    std::vector<double> distances;   // in orders, at least 1
+  };
+  Neighbours Of(int order) const {
+    Neighbours found;
+    const auto [first, last] = BinsWithin(order, kReach);
+    found.first_bin = first;
+    for (int bin = first; bin <= last; ++bin) {
+      const int index = bin >= 0 ? bin : bin + length_;
+      const double t = order - bin * orders_per_bin_;
+      // sin(pi (j - a)) = -(-1)^j sin(pi a).
+      const double sine = (order % 2 == 0 ? -1 : 1) * sines_[static_cast<std::size_t>(index)];
+      found.indices.push_back(index);
+      found.frequencies.push_back(static_cast<float>(static_cast<double>(bin) / length_));
+      found.weights.push_back(static_cast<float>(WindowAt(t, sine)));
+      found.distances.push_back(std::max(1.0, std::abs(t)));
+    }
+    return found;
+  }
+
+  // The first and the last bin within a distance of an order.
+  std::pair<int, int> BinsWithin(int order, double distance) const {
+    return {std::max(1 - length_ / 2,
+                     static_cast<int>(std::ceil((order - distance) / orders_per_bin_))),
+            std::min(length_ / 2 - 1,
+                     static_cast<int>(std::floor((order + distance) / orders_per_bin_)))};
+  }
+  Complex PhaseOf(int index) const { return phases_[static_cast<std::size_t>(index)]; }
+
+ private:
+  static double Fraction(double value) { return value - std::floor(value); }
+  double FrequencyOf(int index) const {
+    return static_cast<double>(index <= length_ / 2 ? index : index - length_) / length_;
+  }
+
+  int length_;
+  double orders_per_bin_;
+  std::vector<double> sines_;    // sin(pi f size)
+  std::vector<Complex> phases_;  // from the first pixel to the middle of the window
+};
+
+// The image around the window, less its mean.
+struct Surroundings {
+  Surroundings(const cv::Mat& reference, const Eigen::Vector2d& origin_px,
+               const TargetWindow& window, double mean, int pad) {
+    // Only the part that the window sees is used, and the surroundings that the blur moves into it.
+    const Eigen::Vector2d first_px = origin_px + window.centre_px - 0.5 * window.size_px;
+    const cv::Rect part = cv::Rect(cv::Point(static_cast<int>(first_px.x()) - pad - 1,
+                                             static_cast<int>(first_px.y()) - pad - 1),
+                                   cv::Size(static_cast<int>(window.size_px.x()) + 2 * pad + 3,
+                                            static_cast<int>(window.size_px.y()) + 2 * pad + 3)) &
+                          cv::Rect(cv::Point(0, 0), reference.size());
+    const cv::Size size(EvenLength(part.width + 2 * pad), EvenLength(part.height + 2 * pad));
+    // Pixels beyond the part are not read: the borders are mirrored instead.
+    cv::copyMakeBorder(reference(part), pixels, pad, size.height - part.height - pad, pad,
+                       size.width - part.width - pad, cv::BORDER_REFLECT_101 | cv::BORDER_ISOLATED);
+    pixels -= mean;
+    middle_px = origin_px + window.centre_px - Eigen::Vector2d(part.x, part.y) +
+                Eigen::Vector2d::Constant(pad);
+  }
+  static int EvenLength(int length) { return 2 * cv::getOptimalDFTSize((length + 1) / 2); }
+
+  cv::Mat pixels;             // CV_32F
+  Eigen::Vector2d middle_px;  // of the window, in `pixels`
+};
+
+// [D175] The window sees at nu the transform G of the whole image, weighted by the transform w of
+// the window around nu. What it sees of a blurred image is therefore H(nu) times what it sees of
+// the image itself, plus the sum over f of (H(f) - H(nu)) w(nu - f) G(f), in which only the
+// neighbours of nu count.
+class LeakageSums {
+ public:
+  LeakageSums(const Surroundings& image, const TargetWindow& window)
+      : window_(window),
+        x_(image.pixels.cols, window.size_px.x(), image.middle_px.x()),
+        y_(image.pixels.rows, window.size_px.y(), image.middle_px.y()) {
+    ThrowIfCancelled();
+    cv::dft(image.pixels, transform_, cv::DFT_COMPLEX_OUTPUT);
+  }
+
+  using Values = std::array<std::complex<double>, kLeakageNodes>;
+
+  // The sums at a mode for all nodes but the first, over the sum of the window.
+  Values At(const Mode& mode, const TransferTable& transfer, const Eigen::Vector2d& axes) const {
+    const TransformAxis::Neighbours of_x = x_.Of(mode.jx), of_y = y_.Of(mode.jy);
+    const Eigen::Vector2d nu = ModeFrequency(mode, window_);
+    const TransferTable::Entry here = transfer.At(static_cast<float>(axes.cwiseProduct(nu).norm()));
+    const auto axis_x = static_cast<float>(axes.x()), axis_y = static_cast<float>(axes.y());
+    Values sums{};
+    for (std::size_t v = 0; v < of_y.indices.size(); ++v) {
+      const auto* row = transform_.ptr<Complex>(of_y.indices[v]);
+      const float fy = axis_y * of_y.frequencies[v];
+      const auto [first, last] = x_.BinsWithin(mode.jx, kReach / of_y.distances[v]);
+      std::array<float, kLeakageNodes> real{}, imaginary{};
+      for (int bin = first; bin <= last; ++bin) {
+        const auto u = static_cast<std::size_t>(bin - of_x.first_bin);
+        const float fx = axis_x * of_x.frequencies[u];
+        const Complex value =
+            of_x.weights[u] * (row[of_x.indices[u]] * x_.PhaseOf(of_x.indices[u]));
+        const TransferTable::Entry there = transfer.At(std::sqrt(fx * fx + fy * fy));
+        for (std::size_t n = 0; n < here.size(); ++n) {
+          real[n] += (there[n] - here[n]) * value.real();
+          imaginary[n] += (there[n] - here[n]) * value.imag();
+        }
+      }
+      const auto weight =
+          static_cast<std::complex<double>>(of_y.weights[v] * y_.PhaseOf(of_y.indices[v]));
+      for (std::size_t n = 0; n < here.size(); ++n)
+        sums[n] += weight * std::complex<double>(real[n], imaginary[n]);
+    }
+    // The phases so far refer to the middle of the window.
+    const auto phase = std::polar(1 / static_cast<double>(transform_.total()),
+                                  -2 * kPi * nu.dot(window_.centre_px));
+    for (std::complex<double>& sum : sums) sum *= phase;
+    return sums;
+  }
+
+ private:
+  TargetWindow window_;
+  TransformAxis x_, y_;
+  cv::Mat transform_;
+};
+
+// The leakage at all nodes.
+std::vector<Eigen::ArrayXcd> Nodes(const LeakageSums& sums, const TransferTable& transfer,
+                                   const TargetWindow& window, const std::vector<Mode>& modes,
+                                   const FrameSpectrum& spectrum, model::Psf psf, double step_px,
+                                   int threads, const Eigen::Vector2d& axes) {
+  std::vector<Eigen::ArrayXcd> nodes(kLeakageNodes);
+  nodes[0] = Eigen::ArrayXcd::Zero(static_cast<Eigen::Index>(modes.size()));
+  const auto highest_of = [&](std::size_t node) {
+    return std::sqrt(kLeakageBand / kTwoPiSquared) / (step_px * static_cast<double>(node));
+  };
+  const auto along = [&](const Mode& mode) -> Eigen::Vector2d {
+    return axes.cwiseProduct(ModeFrequency(mode, window));
+  };
+  for (std::size_t node = 1; node < nodes.size(); ++node) {
+    // A blur along one axis leaves modes of every |nu|.
+    std::size_t count = axes.minCoeff() > 0 ? 0 : modes.size();
+    while (count < modes.size() && along(modes[count]).norm() < highest_of(node)) ++count;
+    nodes[node] = Eigen::ArrayXcd::Zero(static_cast<Eigen::Index>(count));
+  }
+  // The mean that the window sees changes, too.
+  const LeakageSums::Values of_mean = sums.At({0, 0}, transfer, axes);
+  const auto pieces = static_cast<int>((modes.size() + kModesAtOnce - 1) / kModesAtOnce);
+  ParallelFor(pieces, threads, [&](int piece) {
+    const auto begin = static_cast<std::size_t>(piece) * kModesAtOnce;
+    const std::size_t end = std::min(modes.size(), begin + kModesAtOnce);
+    for (std::size_t k = begin; k < end; ++k) {
+      const auto i = static_cast<Eigen::Index>(k);
+      const Eigen::Vector2d nu = along(modes[k]);
+      if (i >= nodes[1].size() || !(nu.norm() < highest_of(1))) continue;
+      const LeakageSums::Values leaks = sums.At(modes[k], transfer, axes);
+      const double box = BoxTransfer(modes[k], window, 1);
+      for (std::size_t node = 1; node < nodes.size(); ++node) {
+        if (i >= nodes[node].size() || !(nu.norm() < highest_of(node))) break;
+        const double mean = spectrum.mean + of_mean[node - 1].real();
+        const double left =
+            model::DefocusTransfer(psf, step_px * static_cast<double>(node), nu.x(), nu.y());
+        nodes[node][i] =
+            leaks[node - 1] / (mean * box) + left * spectrum.values[i] * (spectrum.mean / mean - 1);
+      }
+    }
+  });
+  return nodes;
 }
 
 }  // namespace
@@ -101,65 +259,33 @@ WindowLeakage::WindowLeakage(const cv::Mat& reference, const Eigen::Vector2d& or
                              const TargetWindow& window, const std::vector<Mode>& modes,
                              const FrameSpectrum& spectrum, model::Psf psf, double largest_sigma_px,
                              int threads, const Eigen::Vector2d& axes) {
-  if (!(largest_sigma_px > 0)) return;
-  step_px_ = largest_sigma_px / (kLeakageNodes - 1);
-  const int pad = static_cast<int>(std::ceil(4 * largest_sigma_px));
-  // Only the part that the window sees is used, and the surroundings that the blur moves into it.
-  const cv::Rect part =
-      cv::Rect(
-          cv::Point(
-              static_cast<int>(origin_px.x() + window.centre_px.x() - 0.5 * window.size_px.x()) -
-                  pad - 1,
-              static_cast<int>(origin_px.y() + window.centre_px.y() - 0.5 * window.size_px.y()) -
-                  pad - 1),
-          cv::Size(static_cast<int>(window.size_px.x()) + 2 * pad + 3,
-                   static_cast<int>(window.size_px.y()) + 2 * pad + 3)) &
-      cv::Rect(cv::Point(0, 0), reference.size());
-  const cv::Size size(cv::getOptimalDFTSize(part.width + 2 * pad),
-                      cv::getOptimalDFTSize(part.height + 2 * pad));
-  const Eigen::Vector2d padded_origin_px =
-      origin_px - Eigen::Vector2d(part.x, part.y) + Eigen::Vector2d::Constant(pad);
-  cv::Mat transform;
-  {
-    cv::Mat padded;
-    // Pixels beyond the part are not read: the borders are mirrored instead.
-    cv::copyMakeBorder(reference(part), padded, pad, size.height - part.height - pad, pad,
-                       size.width - part.width - pad, cv::BORDER_REFLECT_101 | cv::BORDER_ISOLATED);
-    cv::dft(padded, transform, cv::DFT_COMPLEX_OUTPUT);
+  *this = AlongAxes(reference, origin_px, window, modes, spectrum, psf, largest_sigma_px, threads,
+                    {axes})
+              .front();
+}
+
+std::vector<WindowLeakage> WindowLeakage::AlongAxes(
+    const cv::Mat& reference, const Eigen::Vector2d& origin_px, const TargetWindow& window,
+    const std::vector<Mode>& modes, const FrameSpectrum& spectrum, model::Psf psf,
+    double largest_sigma_px, int threads, const std::vector<Eigen::Vector2d>& axes) {
+  std::vector<WindowLeakage> found(axes.size());
+  if (!(largest_sigma_px > 0)) return found;
+  const double step_px = largest_sigma_px / (kLeakageNodes - 1);
+  const LeakageSums sums(Surroundings(reference, origin_px, window, spectrum.mean,
+                                      static_cast<int>(std::ceil(4 * largest_sigma_px))),
+                         window);
+  double highest = 0;
+  for (const Mode& mode : modes) highest = std::max(highest, ModeFrequency(mode, window).norm());
+  const TransferTable transfer(
+      psf, step_px,
+      std::min(std::sqrt(0.5), highest + std::sqrt(2.0) * kReach / window.size_px.minCoeff()),
+      threads);
+  for (std::size_t a = 0; a < axes.size(); ++a) {
+    found[a].step_px_ = step_px;
+    found[a].nodes_ =
+        Nodes(sums, transfer, window, modes, spectrum, psf, step_px, threads, axes[a]);
   }
-  nodes_.resize(kLeakageNodes);
-  nodes_[0] = Eigen::ArrayXcd::Zero(static_cast<Eigen::Index>(modes.size()));
-  ParallelFor(kLeakageNodes - 1, threads, [&](int index) {
-    const double sigma = step_px_ * (index + 1);
-    const double highest = std::sqrt(kLeakageBand / kTwoPiSquared) / sigma;
-    const auto is_left = [&](const Mode& mode) {
-      return axes.cwiseProduct(ModeFrequency(mode, window)).norm() < highest;
-    };
-    // A blur along one axis leaves modes of every |nu|.
-    std::size_t count = axes.minCoeff() > 0 ? 0 : modes.size();
-    while (count < modes.size() && is_left(modes[count])) ++count;
-    const Eigen::Vector2d reach =
-        (axes.array() > 0)
-            .select((highest + kReachOfWindow / window.size_px.array()).max(kReachOfBand * highest),
-                    0.5);
-    const cv::Mat image =
-        BlurredImage(transform, TransferTable(psf, sigma, std::sqrt(0.5)), axes, reach);
-    const Eigen::Vector2d scale(static_cast<double>(image.cols) / size.width,
-                                static_cast<double>(image.rows) / size.height);
-    const auto seen =
-        MeasureSums(image, padded_origin_px.cwiseProduct(scale), scale, window, modes, count);
-    Eigen::ArrayXcd& node = nodes_[static_cast<std::size_t>(index + 1)];
-    node = Eigen::ArrayXcd::Zero(static_cast<Eigen::Index>(count));
-    if (!seen) return;
-    for (std::size_t k = 0; k < count; ++k) {
-      if (!is_left(modes[k])) continue;
-      const Eigen::Vector2d nu = ModeFrequency(modes[k], window);
-      const auto i = static_cast<Eigen::Index>(k);
-      node[i] = seen->values[i] / BoxTransfer(modes[k], window, 1) -
-                spectrum.values[i] *
-                    model::DefocusTransfer(psf, sigma, axes.x() * nu.x(), axes.y() * nu.y());
-    }
-  });
+  return found;
 }
 
 // Cubic interpolation between the nodes. The function is even in sigma, so that the nodes are

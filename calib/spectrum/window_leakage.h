@@ -23,6 +23,11 @@ class WindowLeakage {
                 const TargetWindow& window, const std::vector<Mode>& modes,
                 const FrameSpectrum& spectrum, model::Psf psf, double largest_sigma_px, int threads,
                 const Eigen::Vector2d& axes = {1, 1});
+  // One leakage for each of `axes`, from one transform of the reference.
+  static std::vector<WindowLeakage> AlongAxes(
+      const cv::Mat& reference, const Eigen::Vector2d& origin_px, const TargetWindow& window,
+      const std::vector<Mode>& modes, const FrameSpectrum& spectrum, model::Psf psf,
+      double largest_sigma_px, int threads, const std::vector<Eigen::Vector2d>& axes);
 
   // The leakage at the first `count` modes for a blur of `variance_px2` beyond that of the
   // reference; 0 for no added blur.

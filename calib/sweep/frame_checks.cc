@@ -146,13 +146,14 @@ cv::Mat WidelySmoothed(const cv::Mat& grey, double sigma_px) {
   cv::Mat padded, small, wide;
   cv::copyMakeBorder(grey, padded, top, top + rest(grey.rows), left, left + rest(grey.cols),
                      cv::BORDER_REFLECT_101);
-  cv::resize(padded, small, padded.size() / shrink, 0, 0, cv::INTER_AREA);
+  const cv::Size size = padded.size();
+  cv::resize(padded, small, size / shrink, 0, 0, cv::INTER_AREA);
+  padded.release();
   // [D86] The mean over a block of n px is a blur of variance (n^2 - 1)/12. Linear interpolation
   // between points n px apart, at n places between them, is on average a blur of variance n^2/6 +
   // 1/12.
   const double variance_px2 = sigma_px * sigma_px - 0.25 * shrink * shrink;
-  cv::resize(Smoothed(small, std::sqrt(variance_px2) / shrink), wide, padded.size(), 0, 0,
-             cv::INTER_LINEAR);
+  cv::resize(Smoothed(small, std::sqrt(variance_px2) / shrink), wide, size, 0, 0, cv::INTER_LINEAR);
   return wide(cv::Rect(left, top, grey.cols, grey.rows));
 }
 
@@ -161,9 +162,11 @@ cv::Mat WidelySmoothed(const cv::Mat& grey, double sigma_px) {
 double CoarseTexture(const cv::Mat& grey, const cv::Mat& slow, double noise_sigma) {
   constexpr int kShrink = 4;
   if (grey.cols < 8 * kShrink || grey.rows < 8 * kShrink) return 0;
-  cv::Mat coarse;
-  cv::resize(grey - slow, coarse, cv::Size(grey.cols / kShrink, grey.rows / kShrink), 0, 0,
-             cv::INTER_AREA);
+  cv::Mat coarse, coarse_slow;
+  const cv::Size size(grey.cols / kShrink, grey.rows / kShrink);
+  cv::resize(grey, coarse, size, 0, 0, cv::INTER_AREA);
+  cv::resize(slow, coarse_slow, size, 0, 0, cv::INTER_AREA);
+  coarse -= coarse_slow;
   cv::Scalar mean, deviation;
   cv::meanStdDev(Smoothed(coarse, 1), mean, deviation);
   const double noise = std::max(noise_sigma, 1e-6) / kShrink / (2 * std::sqrt(CV_PI));
@@ -223,14 +226,16 @@ FrameStatistics MeasureFrame(const cv::Mat& stored, const cv::Mat& linear_grey) 
   result.is_mosaic = IsMosaic(stored);
   result.content_hash = ContentHash(stored);
 
-  const cv::Mat smoothed = Smoothed(linear_grey, 1);
-  result.top_gradient = Quantile(CentralGradient(smoothed).magnitude, 0.995);
+  cv::Mat smoothed = Smoothed(linear_grey, 1);
+  result.top_gradient = Quantile(GradientMagnitude(smoothed), 0.995);
   if (result.mean_linear > 0) {
     // Variation by a lamp, a vignette or a shadow over a sizeable part of the field is no texture.
     const cv::Mat slow = WidelySmoothed(
         linear_grey, std::max(4.0, std::min(linear_grey.cols, linear_grey.rows) / 25.0));
     cv::Scalar mean, deviation;
-    cv::meanStdDev(smoothed - slow, mean, deviation);
+    cv::subtract(smoothed, slow, smoothed);
+    cv::meanStdDev(smoothed, mean, deviation);
+    smoothed.release();
     result.contrast = deviation[0] / result.mean_linear;
     result.coarse_texture = CoarseTexture(linear_grey, slow, result.noise_sigma);
   }

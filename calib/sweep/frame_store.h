@@ -3,25 +3,22 @@
 
 #include <cstddef>
 #include <memory>
-#include <mutex>
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
 #include "calib/sweep/fixed_pattern_removal.h"
+#include "calib/sweep/kept_frames.h"
 #include "thicklens/calib/focus_sweep.h"
 
 namespace thicklens::calib {
 
-// The frames of a sweep for steps that use them repeatedly. The first frames that are read are kept
-// as they were read, up to a limit of memory in all. Beyond the limit a frame is read again each
-// time, so that memory does not grow with the sweep. The store is thread safe, and results do not
-// depend on which frames are kept.
+// The frames of a sweep for steps that use them repeatedly. They are kept as they were read
+// (KeptFrames), together with those of other stores if the sweep's own reader keeps them. The store
+// is thread safe, and results do not depend on which frames are kept.
 class FrameStore {
  public:
-  static constexpr std::size_t kDefaultLimit = std::size_t{128} << 20;  // bytes
-
-  // `sweep` must outlive the store.
-  explicit FrameStore(const FocusSweep& sweep, std::size_t byte_limit = kDefaultLimit);
+  // `sweep` must outlive the store. The limit is that of a reader that keeps no frames itself.
+  explicit FrameStore(const FocusSweep& sweep, std::size_t byte_limit = KeptFrames::kDefaultLimit);
 
   // Returns the whole frame as its file stores it. The caller must not write to it. Throws what the
   // reader throws.
@@ -44,14 +41,11 @@ class FrameStore {
   // alone. Throws Error if the frame has no such channel.
   cv::Mat Channel(std::size_t index, int channel);
 
-  std::size_t kept_bytes() const;
+  std::size_t kept_bytes() const { return kept_.kept_bytes(); }
 
  private:
   const FocusSweep& sweep_;
-  const std::size_t byte_limit_;
-  mutable std::mutex mutex_;
-  std::vector<cv::Mat> kept_;  // empty where a frame is not kept
-  std::size_t kept_bytes_ = 0;
+  KeptFrames kept_;
   std::unique_ptr<const FixedPatternRemoval> correction_;
   std::vector<cv::Mat> line_factors_;  // one row or column for each frame; empty: none
 

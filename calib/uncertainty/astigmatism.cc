@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "calib/fit/axial_focus.h"
+#include "calib/fit/frame_outliers.h"
 #include "calib/fit/misfit_causes.h"
 #include "calib/uncertainty/evenly_spread.h"
 #include "calib/uncertainty/systematic_advice.h"
@@ -19,7 +20,6 @@ namespace {
 constexpr std::size_t kMinAxialFrames = 5;
 constexpr std::size_t kMaxAxialFrames = 128;  // the time grows with their square
 constexpr int kMinAxialModes = 16;            // of a frame
-constexpr double kAxialScatterOfDamage = 30;  // times the typical scatter, in power
 // Chi^2 per degree of freedom of the spectra with one variance for all directions. Below it, what
 // an astigmatism changes in the results is smaller than their errors from noise. Simulated sweeps
 // of isotropic lenses have 0.7 to 1.5.
@@ -194,7 +194,8 @@ FittedAxes FitRegionAlongAxes(EstimatorRegion region, const AxisLeakage& leakage
     const double typical = Median(std::vector<double>(noise.begin(), noise.end()));
     std::vector<std::size_t> kept;
     for (std::size_t i = 0; i < now.frames.size(); ++i) {
-      const bool fits = noise[static_cast<Eigen::Index>(i)] <= kAxialScatterOfDamage * typical;
+      const auto index = static_cast<Eigen::Index>(i);
+      const bool fits = !IsDamage(noise[index] / typical, fitted.blur.misfit[index]);
       if (i == now.reference || (fits && fitted.blur.modes_used[i] >= kMinAxialModes))
         kept.push_back(now.frames[i]);
     }
@@ -222,9 +223,7 @@ bool TakeMeanOfAxes(const FocusSweep& sweep, BlurEvidence* evidence) {
                                   axial.thinned_out(), free_gains.has_value(), std::nullopt};
   if (free_gains) evidence->axial->free_gains = FitSamples(*evidence, *free_gains, axial.region());
   const AxialBlur& blur = evidence->axial->blur;
-  for (std::size_t i = 0; i < axial.region().frames.size(); ++i)
-    evidence->frame_noise_ratios[evidence->fit_index[axial.region().frames[i]]] =
-        blur.noise_ratio[static_cast<Eigen::Index>(i)];
+  NoteScatter(axial.region(), blur.noise_ratio, blur.misfit, evidence);
   ReplaceSpectralBlur(std::move(axial.region()), MeanOfAxes(blur), evidence);
   return true;
 }

@@ -121,13 +121,16 @@ TEST(SolveFocus, AFrameWhoseSpectrumScattersIsRejected) {
   FocusCase c = Texture();
   std::vector<double>& ratios = c.evidence.frame_noise_ratios;
   ratios.assign(static_cast<std::size_t>(c.bench.count), 0);  // most frames have no spectrum
+  c.evidence.frame_misfits.assign(ratios.size(), 0.0003);
   for (std::size_t i = 0; i < 9; ++i) ratios[i] = 1.2;
+  for (const std::size_t i : {4U, 5U, 7U}) c.evidence.frame_misfits[i] = 0.04;
   ratios[4] = 1.2 * 36;
   ratios[5] = 1.2 * 29;
+  ratios[6] = 1.2 * 500;  // so little noise that a small error of the blur law stands out
   c.Solve();
   EXPECT_THAT(c.frame(4).rejection, AllOf(HasSubstr("does not show what the others show"),
                                           HasSubstr("deviates 6 times")));
-  EXPECT_EQ(c.frame(5).rejection, "");
+  for (const std::size_t i : {5U, 6U, 7U}) EXPECT_EQ(c.frame(i).rejection, "") << i;
   EXPECT_THAT(c.evidence.setup.estimators[0].frames, Not(Contains(4U)));
   EXPECT_EQ(c.calibration.diagnostics.blur.frames_used, c.bench.count - 1);
 }
@@ -136,6 +139,7 @@ TEST(SolveFocus, TheFirstReasonStands) {
   FocusCase c = Texture();
   c.evidence.frame_noise_ratios.assign(static_cast<std::size_t>(c.bench.count), 1);
   c.evidence.frame_noise_ratios[6] = 100;
+  c.evidence.frame_misfits.assign(static_cast<std::size_t>(c.bench.count), 0.9);
   c.evidence.setup.estimators[0].variances_px2[6] += 8;
   c.Solve();
   EXPECT_THAT(c.frame(6).rejection, HasSubstr("does not show"));

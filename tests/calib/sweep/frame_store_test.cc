@@ -170,6 +170,22 @@ TEST(FrameStore, LinesAreDividedByTheirGain) {
   }
 }
 
+TEST(FrameStore, StoresOfSweepsWithOneReaderThatKeepsFramesShareThem) {
+  CountedSweep counted(3);
+  constexpr std::size_t kTwo = 2U * kWidth * kHeight;
+  counted.sweep.read_frame = KeptFrames::Of(counted.sweep.read_frame, kTwo);
+  FocusSweep other = counted.sweep;
+  other.camera.sensor.transfer = model::TransferCurve::Srgb();
+  FrameStore first(counted.sweep), second(other);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(first.Stored(i).data == second.Stored(i).data, i < 2) << i;
+    EXPECT_EQ(counted.ReadsOf(i), i < 2 ? 1 : 2);
+    EXPECT_LT(second.Grey(i).at<float>(0, 0), first.Grey(i).at<float>(0, 0)) << "its own light";
+  }
+  EXPECT_EQ(first.kept_bytes(), kTwo);
+  EXPECT_EQ(second.kept_bytes(), kTwo);
+}
+
 TEST(FrameStore, AFrameThatCannotBeReadIsTriedAgain) {
   CountedSweep counted(1);
   auto read = counted.sweep.read_frame;
