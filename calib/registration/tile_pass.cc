@@ -39,7 +39,7 @@ void MatchBlur(double variance_px2, cv::Mat* reference, cv::Mat* frame) {
   cv::GaussianBlur(*sharper, *sharper, cv::Size(), sigma_px, sigma_px, cv::BORDER_REPLICATE);
 }
 
-// The same with a blur that depends on the place.
+// Gives every point of the reference the blur that it lacks at its place.
 void MatchBlur(PlaceBlur blur, cv::Mat* reference, cv::Mat* frame) {
   const double too_much_px2 = std::max(0.0, -blur.Least(reference->size()));
   blur.at_centre_px2 += too_much_px2;
