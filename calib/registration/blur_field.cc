@@ -14,9 +14,10 @@ namespace {
 constexpr std::size_t kMinBlurTiles = 9;
 constexpr Eigen::Index kFieldTerms = 7;
 constexpr double kMinFieldCondition = 1e-12;
-// Relative error of the stretch that the exponent of the texture leaves. Simulated dead leaves,
-// noise and a checkerboard show about that much.
+// Relative error of the stretch that the model of the blur leaves: 11 % in the mean of six
+// simulated sweeps of dead leaves with -3 mm of curvature.
 constexpr double kStretchError = 0.15;
+constexpr double kUsualExponent = -2;  // of a texture that does not show it
 constexpr double kSeenFactor = 2;  // standard deviations from which on a factor corrects the scales
 
 // Textures between white noise and isolated edges. The line of the exponents is used this far
@@ -118,44 +119,45 @@ double StretchByBlur(double curvature, double astigmatism, double texture_expone
   return -0.5 * ((2 - texture_exponent) * curvature + (4 - texture_exponent) * astigmatism);
 }
 
-void TakeOutStretchByBlur(const std::vector<BlurOverField>& blurs,
-                          std::vector<ScaleSample>* samples) {
+std::optional<BlurField> BlurPerScale(const std::vector<BlurOverField>& blurs,
+                                      const std::vector<ScaleSample>& samples) {
   std::vector<ProportionalTerm> curvatures, astigmatisms;
   std::vector<model::Estimate> changes;
-  for (std::size_t i = 0; i < samples->size(); ++i) {
-    const double change = (*samples)[i].scale - 1;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const double change = samples[i].scale - 1;
     if (!blurs[i].field || change == 0) continue;
     const auto& [curvature, astigmatism] = *blurs[i].field;
     if (!(curvature.sigma > 0) || !(astigmatism.sigma > 0)) continue;
-    changes.push_back({change, (*samples)[i].registration.scale_sigma});
+    changes.push_back({change, samples[i].registration.scale_sigma});
     curvatures.push_back({change, curvature.value, curvature.sigma});
     astigmatisms.push_back({change, astigmatism.value, astigmatism.sigma});
   }
-  // Scales that differ by their errors alone would turn a curvature that all frames have into a
-  // factor without a meaning.
-  if (!ExceedErrors(changes)) return;
-  const auto by_curvature = FitProportion(curvatures);
-  const auto by_astigmatism = FitProportion(astigmatisms);
-  const auto exponent = FitExponents(blurs);
-  if (!by_curvature || !by_astigmatism || !exponent) return;
-  const model::Estimate curvature = Correcting(*by_curvature);
-  const model::Estimate astigmatism = Correcting(*by_astigmatism);
+  if (!ExceedErrors(changes)) return std::nullopt;
+  const auto curvature = FitProportion(curvatures);
+  const auto astigmatism = FitProportion(astigmatisms);
+  if (!curvature || !astigmatism) return std::nullopt;
+  return BlurField{*curvature, *astigmatism};
+}
+
+BlurField SeenFactors(const BlurField& factors) {
+  return {Correcting(factors.curvature), Correcting(factors.astigmatism)};
+}
+
+void StateStretchByBlur(const BlurField& factors, const std::vector<BlurOverField>& blurs,
+                        const std::vector<double>& before, std::vector<ScaleSample>* samples) {
+  const auto exponents = FitExponents(blurs);
   for (std::size_t i = 0; i < samples->size(); ++i) {
     ScaleSample& sample = (*samples)[i];
-    const double n = exponent->At(blurs[i].texture.log_frequency);
-    const double of_curvature = StretchByBlur(curvature.value, 0, n);
-    const double of_astigmatism = StretchByBlur(0, astigmatism.value, n);
-    sample.shared_stretch_sigma = std::hypot(
-        std::hypot(StretchByBlur(curvature.sigma, 0, n), StretchByBlur(0, astigmatism.sigma, n)),
-        kStretchError * std::hypot(of_curvature, of_astigmatism));
-    const double stretch = (of_curvature + of_astigmatism) * (sample.scale - 1);
-    Registration& registration = sample.registration;
-    registration.scale /= 1 + stretch;
-    registration.scale_x /= 1 + stretch;
-    registration.scale_y /= 1 + stretch;
-    registration.stretch_by_blur =
-        model::Estimate{stretch, sample.shared_stretch_sigma * std::abs(sample.scale - 1)};
-    sample.scale = registration.scale;
+    const double n = exponents ? exponents->At(blurs[i].texture.log_frequency) : kUsualExponent;
+    const double taken_out = std::hypot(StretchByBlur(factors.curvature.value, 0, n),
+                                        StretchByBlur(0, factors.astigmatism.value, n));
+    sample.shared_stretch_sigma =
+        std::hypot(std::hypot(StretchByBlur(factors.curvature.sigma, 0, n),
+                              StretchByBlur(0, factors.astigmatism.sigma, n)),
+                   kStretchError * taken_out);
+    if (before.empty()) continue;
+    sample.registration.stretch_by_blur = model::Estimate{
+        before[i] / sample.scale - 1, sample.shared_stretch_sigma * std::abs(sample.scale - 1)};
   }
 }
 

@@ -59,16 +59,27 @@ struct BlurOverField {
 // Limit: a blur that is the same everywhere does not displace.
 double StretchByBlur(double curvature, double astigmatism, double texture_exponent);
 
-// Takes the stretch by blur out of the scales. A lens with a curved or astigmatic field makes b and
-// d proportional to s - 1 for the scale s [D156], and a factor is fitted to all frames. The
-// exponent of the texture is fitted as a linear function of the frequency, because the frames with
-// a strong blur show low frequencies only, and not their exponent. The error that remains and that
-// all samples share is stored in each. A factor within twice its error corrects no scale and is
-// part of that error. Changes nothing for fewer than five frames that show it, and where the scales
-// differ from 1 by no more than their errors, as those of aligned frames do. `blurs` are those of
-// the samples.
-void TakeOutStretchByBlur(const std::vector<BlurOverField>& blurs,
-                          std::vector<ScaleSample>* samples);
+// The curvature and the astigmatism of the blur per change of the scale, (s - 1). A lens with a
+// curved or astigmatic field makes both proportional to it [D156], and a factor is fitted to all
+// frames. Returns std::nullopt for fewer than five frames that show the field, and where the scales
+// differ from 1 by no more than their errors, as those of aligned frames do: such errors would turn
+// a curvature that all frames have into a factor without a meaning. `blurs` are those of the
+// samples.
+std::optional<BlurField> BlurPerScale(const std::vector<BlurOverField>& blurs,
+                                      const std::vector<ScaleSample>& samples);
+
+// The factors that are to be taken into account: one within twice its error is 0, and its value is
+// a part of its error.
+BlurField SeenFactors(const BlurField& factors);
+
+// Stores in each sample the error of the scale that all samples share: from the errors of the
+// factors and, where these are not 0, from the part of the stretch that the model of the blur
+// leaves open. The exponent of the texture is fitted as a linear function of the frequency, because
+// the frames with a strong blur show low frequencies only, and not their exponent. `before` has the
+// scales without the blur over the field if those of the samples were measured with it
+// (RegisterWithBlur); otherwise it is empty. Changes no scale.
+void StateStretchByBlur(const BlurField& factors, const std::vector<BlurOverField>& blurs,
+                        const std::vector<double>& before, std::vector<ScaleSample>* samples);
 
 }  // namespace thicklens::calib
 

@@ -103,6 +103,33 @@ int FactorOfPass(const cv::Rect2d& shared, double added_variance_px2) {
   return std::clamp(TileFactor(field_px, std::sqrt(std::abs(added_variance_px2))), finest, coarser);
 }
 
+namespace {
+
+// The pass that determines the result. `scale` is what the map must agree with.
+std::optional<FreeRegistration> LastPass(const cv::Mat& reference, const cv::Mat& frame,
+                                         const FrameMap& map, double scale, double variance_px2,
+                                         const std::optional<KnownBlurField>& known) {
+  ThrowIfCancelled();
+  const cv::Rect2d shared = SharedField(map, reference.size(), frame.size());
+  const auto pass =
+      MeasureTiles(reference, frame, map, FactorOfPass(shared, variance_px2), variance_px2, known);
+  if (!pass || !(pass->agreement > kMinAgreement)) return std::nullopt;
+  const auto fitted = FitDisplacement(pass->shifts, pass->weight_variance_px2);
+  if (!fitted) return std::nullopt;
+  const FrameMap corrected = Corrected(map, *fitted);
+  if (!(std::abs(Scale(corrected) / scale - 1) < kMaxDisagreement)) return std::nullopt;
+  FreeRegistration result = DescribeFreely(map, *fitted);
+  Registration& free = result.free;
+  if (!(std::abs(free.scale_x / free.scale_y - 1) < kMaxAnisotropy)) return std::nullopt;
+  free.added_variance_px2 = pass->added_variance_px2;
+  result.blur = {FitBlurField(pass->blurs), pass->texture};
+  result.map = corrected;
+  if (!(result.WithCubic(0, 0).scale_sigma < kMaxScaleSigma * free.scale)) return std::nullopt;
+  return result;
+}
+
+}  // namespace
+
 std::optional<FreeRegistration> RegisterFreely(const cv::Mat& reference, const cv::Mat& frame,
                                                double expected_scale, cv::Point2d centre) {
   const std::optional<FrameMap> coarse = RegisterCoarsely(reference, frame, expected_scale, centre);
@@ -131,20 +158,16 @@ std::optional<FreeRegistration> RegisterFreely(const cv::Mat& reference, const c
     if (is_close && std::abs(variance_px2 - before_px2) < kCloseBlur * (1 + std::abs(variance_px2)))
       break;
   }
-  const auto pass =
-      MeasureTiles(reference, frame, map, FactorOfPass(shared, variance_px2), variance_px2);
-  if (!pass || !(pass->agreement > kMinAgreement)) return std::nullopt;
-  const auto fitted = FitDisplacement(pass->shifts, pass->weight_variance_px2);
-  if (!fitted) return std::nullopt;
-  const DisplacementField& field = *fitted;
-  const double alone = Scale(Corrected(map, field));
-  if (!(std::abs(alone / Scale(*coarse) - 1) < kMaxDisagreement)) return std::nullopt;
-  FreeRegistration result = DescribeFreely(map, field);
-  Registration& free = result.free;
-  if (!(std::abs(free.scale_x / free.scale_y - 1) < kMaxAnisotropy)) return std::nullopt;
-  free.added_variance_px2 = pass->added_variance_px2;
-  result.blur = {FitBlurField(pass->blurs), pass->texture};
-  if (!(result.WithCubic(0, 0).scale_sigma < kMaxScaleSigma * free.scale)) return std::nullopt;
+  return LastPass(reference, frame, map, Scale(*coarse), variance_px2, std::nullopt);
+}
+
+std::optional<FreeRegistration> RegisterWithBlur(const cv::Mat& reference, const cv::Mat& frame,
+                                                 const FreeRegistration& first,
+                                                 const KnownBlurField& known) {
+  auto result = LastPass(reference, frame, first.map, Scale(first.map),
+                         first.free.added_variance_px2.value_or(0), known);
+  // The power of the texture assumes one blur of the reference.
+  if (result) result->blur.texture = first.blur.texture;
   return result;
 }
 

@@ -8,6 +8,7 @@
 #include "calib/registration/coarse_registration.h"
 #include "calib/registration/image_scale.h"
 #include "calib/registration/tile_map.h"
+#include "calib/registration/tile_pass.h"
 
 namespace thicklens::calib {
 
@@ -19,6 +20,7 @@ struct FreeRegistration {
   // free.scale + scale_per_cubic (free.cubic - c).
   double scale_per_cubic = 0;
   BlurOverField blur;  // how the added blur changes over the field
+  FrameMap map;        // of the affine part, or with the cubic term where it is significant
 
   // The registration for a cubic term that is known to be `cubic` with `cubic_sigma`. The measured
   // cubic term remains in the result.
@@ -36,6 +38,14 @@ int FactorOfPass(const cv::Rect2d& shared, double added_variance_px2);
 // shows it. Throws Interrupted after a request to stop.
 std::optional<FreeRegistration> RegisterFreely(const cv::Mat& reference, const cv::Mat& frame,
                                                double expected_scale, cv::Point2d centre);
+
+// Registers once more from the map of `first`, with the blur over the field, which other frames
+// determine better than one pair shows it: the reference is blurred as the frame is at every place.
+// `blur.field` of the result is what is left beyond that field, and `blur.texture` is that of
+// `first`.
+std::optional<FreeRegistration> RegisterWithBlur(const cv::Mat& reference, const cv::Mat& frame,
+                                                 const FreeRegistration& first,
+                                                 const KnownBlurField& known);
 
 }  // namespace thicklens::calib
 

@@ -21,6 +21,7 @@ constexpr std::size_t kEnoughToLearn = 5;
 constexpr double kRung = 1.1;
 constexpr int kRungs = 12;  // rungs up, and as many down: 1.1^12 = 3.1
 constexpr std::ptrdiff_t kTriedRungs = 4;
+constexpr int kRoundsWithBlur = 2;
 // Maximum relative change of the image height at the corner that is expected of a lens.
 constexpr double kLikelyDistortion = 0.02;
 
@@ -116,6 +117,88 @@ std::vector<ScaleSample> TrackShifts(const FocusSweep& sweep,
   return samples;
 }
 
+std::vector<BlurOverField> BlursOf(const std::vector<FreeRegistration>& registrations) {
+  std::vector<BlurOverField> blurs;
+  for (const FreeRegistration& registration : registrations) blurs.push_back(registration.blur);
+  return blurs;
+}
+
+// Factors of a field that was not taken out.
+BlurField AsErrors(const BlurField& factors) {
+  const auto error = [](const model::Estimate& factor) {
+    return model::Estimate{0, std::hypot(factor.value, factor.sigma)};
+  };
+  return {error(factors.curvature), error(factors.astigmatism)};
+}
+
+// A factor with what registrations with it show beyond it, whose error is that of the sum.
+model::Estimate Plus(const model::Estimate& factor, const model::Estimate& left) {
+  return {factor.value + left.value, left.sigma};
+}
+
+struct FrameReader {
+  const cv::Mat& reference;
+  const std::function<cv::Mat(std::size_t)>& read_grey;
+  int threads;
+};
+
+// A blur that changes over the field displaces the detail of each texture in its own way, by an
+// amount that is in proportion to the change of scale. All frames share these displacements, so
+// that they look like another law of the scale, or like a distortion. Where the frames show such a
+// field, they are registered again with a reference that is blurred in the same way: the law of the
+// blur over the field comes from all frames, and what it leaves is added to it once. Frames that
+// do not fit are left out.
+void TakeOutStretchByBlur(double corner_px, const FrameReader& reader,
+                          std::vector<FreeRegistration> registrations,
+                          std::vector<ScaleSample>* samples) {
+  const auto shown = BlurPerScale(BlursOf(registrations), *samples);
+  if (!shown) return;
+  BlurField factors = SeenFactors(*shown);
+  std::vector<double> before;
+  const auto is_seen = [&] {
+    return factors.curvature.value != 0 || factors.astigmatism.value != 0;
+  };
+  for (int round = 0; round < kRoundsWithBlur && is_seen(); ++round) {
+    std::vector<std::optional<FreeRegistration>> found(samples->size());
+    ParallelFor(static_cast<int>(samples->size()), reader.threads, [&](int i) {
+      const auto index = static_cast<std::size_t>(i);
+      const double change = (*samples)[index].scale - 1;
+      if (change == 0) return;
+      found[index] = RegisterWithBlur(
+          reader.reference, reader.read_grey((*samples)[index].frame), registrations[index],
+          {factors.curvature.value * change, factors.astigmatism.value * change});
+    });
+    std::vector<FreeRegistration> again;
+    std::vector<ScaleSample> kept;
+    std::vector<double> kept_before;
+    for (std::size_t i = 0; i < samples->size(); ++i) {
+      ScaleSample sample = (*samples)[i];
+      const double first = before.empty() ? sample.scale : before[i];
+      if (sample.scale != 1) {
+        if (!found[i]) continue;
+        sample.registration = found[i]->WithCubic(0, 0);
+        sample.scale = sample.registration.scale;
+      }
+      again.push_back(found[i].value_or(registrations[i]));
+      kept.push_back(sample);
+      kept_before.push_back(first);
+    }
+    if (kept.size() < std::min(kEnoughToLearn, samples->size())) {
+      if (before.empty()) factors = AsErrors(factors);  // nothing was taken out
+      break;
+    }
+    registrations = std::move(again);
+    *samples = std::move(kept);
+    before = std::move(kept_before);
+    TakeOutDistortion(corner_px, registrations, samples);
+    const auto left = BlurPerScale(BlursOf(registrations), *samples);
+    if (!left) break;
+    factors = SeenFactors(
+        {Plus(factors.curvature, left->curvature), Plus(factors.astigmatism, left->astigmatism)});
+  }
+  StateStretchByBlur(factors, BlursOf(registrations), before, samples);
+}
+
 }  // namespace
 
 cv::Point2d RegionCentre(const FocusSweep& sweep) {
@@ -200,10 +283,9 @@ std::vector<ScaleSample> TrackScale(const FocusSweep& sweep,
     prediction.Learn(samples);
     done += count;
   }
-  TakeOutDistortion(RegionCornerRadiusPx(sweep), registrations, &samples);
-  std::vector<BlurOverField> blurs;
-  for (const FreeRegistration& registration : registrations) blurs.push_back(registration.blur);
-  TakeOutStretchByBlur(blurs, &samples);
+  const double corner_px = RegionCornerRadiusPx(sweep);
+  TakeOutDistortion(corner_px, registrations, &samples);
+  TakeOutStretchByBlur(corner_px, {reference_grey, read_grey, threads}, registrations, &samples);
   return samples;
 }
 

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "calib/registration/place_blur.h"
+
 namespace thicklens::calib {
 namespace {
 
@@ -37,6 +39,26 @@ void MatchBlur(double variance_px2, cv::Mat* reference, cv::Mat* frame) {
   cv::GaussianBlur(*sharper, *sharper, cv::Size(), sigma_px, sigma_px, cv::BORDER_REPLICATE);
 }
 
+// Gives every point of the reference the blur that it lacks at its place.
+void MatchBlur(PlaceBlur blur, cv::Mat* reference, cv::Mat* frame) {
+  const double too_much_px2 = std::max(0.0, -blur.Least(reference->size()));
+  blur.at_centre_px2 += too_much_px2;
+  MatchBlur(-too_much_px2, reference, frame);
+  *reference = SpreadByPlace(*reference, blur);
+}
+
+// Mean square of the distance from `centre`, over all tiles with the weight of their windows, px^2.
+double MeanSquareRadius(const TileLayout& layout, const Eigen::Vector2d& centre,
+                        double weight_variance_px2) {
+  double sum = 0;
+  for (const cv::Point& corner : layout.corners) {
+    const Eigen::Vector2d middle =
+        Eigen::Vector2d(corner.x, corner.y).array() + 0.5 * (layout.size_px - 1);
+    sum += (middle - centre).squaredNorm() + 2 * weight_variance_px2;
+  }
+  return sum / static_cast<double>(layout.corners.size());
+}
+
 }  // namespace
 
 std::optional<TileLayout> LayOutTiles(const FrameMap& map, cv::Size reference, cv::Size frame,
@@ -64,7 +86,8 @@ std::optional<TileLayout> LayOutTiles(const FrameMap& map, cv::Size reference, c
 }
 
 std::optional<TilePass> MeasureTiles(const cv::Mat& reference, const cv::Mat& frame,
-                                     const FrameMap& map, int factor, double variance_px2) {
+                                     const FrameMap& map, int factor, double variance_px2,
+                                     const std::optional<KnownBlurField>& known) {
   const auto layout = LayOutTiles(map, reference.size(), frame.size(), factor);
   if (!layout) return std::nullopt;
   const cv::Rect& field = layout->field;
@@ -77,9 +100,21 @@ std::optional<TilePass> MeasureTiles(const cv::Mat& reference, const cv::Mat& fr
                           whole;
   cv::Mat expected = InFrameGeometry(reference, map, factor, region);
   cv::Mat seen = Shrunk(frame, factor)(region);
-  MatchBlur(variance_px2 / (factor * factor), &expected, &seen);
-
   TilePhases phases(layout->size_px);
+  const double mean_px2 = variance_px2 / (factor * factor);
+  if (known) {
+    const Eigen::Vector2d centre = (map.centre.array() + 0.5) / factor - 0.5;
+    PlaceBlur blur;
+    blur.centre_px = centre - Eigen::Vector2d(region.x, region.y);
+    blur.curvature = known->curvature;
+    blur.astigmatism = known->astigmatism;
+    blur.at_centre_px2 =
+        mean_px2 -
+        known->curvature * MeanSquareRadius(*layout, centre, phases.weight_variance_px2());
+    MatchBlur(blur, &expected, &seen);
+  } else {
+    MatchBlur(mean_px2, &expected, &seen);
+  }
   for (const cv::Point& corner : layout->corners) phases.Add(expected, seen, corner - region.tl());
   TilePass pass;
   pass.shifts = phases.Solve();

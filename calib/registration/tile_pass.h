@@ -34,11 +34,20 @@ struct TileLayout {
 std::optional<TileLayout> LayOutTiles(const FrameMap& map, cv::Size reference, cv::Size frame,
                                       int factor);
 
+// How a blur is known to change with the distance from the centre of the map, as in BlurField.
+struct KnownBlurField {
+  double curvature = 0, astigmatism = 0;
+};
+
 // Measures the tiles with the frame shrunk by `factor`. The blur added by `variance_px2`, the
-// present estimate, is applied to the sharper image. Returns std::nullopt where the shared field is
-// too small for tiles.
+// present estimate of its mean over the field, is applied to the sharper image. With a known field,
+// every point of the reference gets the blur that it lacks at its own place, so that a blur that
+// changes over the field displaces the detail of both images alike; where the reference has too
+// much blur, the frame is blurred evenly. Returns std::nullopt where the shared field is too small
+// for tiles.
 std::optional<TilePass> MeasureTiles(const cv::Mat& reference, const cv::Mat& frame,
-                                     const FrameMap& map, int factor, double variance_px2);
+                                     const FrameMap& map, int factor, double variance_px2,
+                                     const std::optional<KnownBlurField>& known = std::nullopt);
 
 // Factor by which to shrink a field. More pixels would cost time without more information.
 int TileFactor(double field_px, double blur_px);
