@@ -274,7 +274,9 @@ std::optional<SolvedScene> SceneBandRun<Real>::SolveIn(int count,
   const std::vector<SceneBand> bands =
       BandsOf(photograph.height_px, count, BandMarginPx(reach_px_));
   SceneOptions options = options_;
-  if (count > 1) {
+  const bool is_centre_view =
+      options.photo_aperture == 0 && options.strength_rule == StrengthRule::kAuto;
+  if (count > 1 && !is_centre_view) {  // the centre view has no prior
     options.strength = StrengthFor(photograph, bands);
     (options_.strength_rule == StrengthRule::kGcv ? summary_->solve_seconds
                                                   : summary_->setup_seconds) += take_lap();

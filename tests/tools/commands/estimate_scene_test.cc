@@ -485,7 +485,7 @@ TEST_F(EstimateSceneTest, ASharpPhotographIsTakenAsTheCentreView) {
   EXPECT_THAT(result.out, HasSubstr("blur shown   sharp: "));
   EXPECT_THAT(result.err, AllOf(HasSubstr("is sharp at all depths"), HasSubstr("--photo")));
   EXPECT_THAT(ContentOf(Report() + "/index.html"), HasSubstr("is sharp at all depths"));
-  EXPECT_LT(found.at("residual_rms").get<double>(), 2.0 / 255);
+  EXPECT_LT(found.at("residual_rms").get<double>(), 0.1 / 255);
 
   const json stated = Summary(With(arguments, {"--photo", "sharp"}), &result).at("photo");
   EXPECT_EQ(stated.at("verdict"), "not measured");
