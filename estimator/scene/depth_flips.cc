@@ -21,7 +21,7 @@ constexpr double kMaxOfExcess = 0.35;
 constexpr double kAboutAsWell = 1.1;
 
 double ResidualOf(const BlurImage& image, model::DepthFlip flip, const EstimateInput& input,
-                  const SolverRun& run) {
+                  double photo_aperture, const SolverRun& run) {
   EstimateInput tried;
   tried.image = image.image;
   tried.disparity = image.disparity;
@@ -30,6 +30,7 @@ double ResidualOf(const BlurImage& image, model::DepthFlip flip, const EstimateI
   tried.transfer = input.transfer;
   SceneOptions options;
   options.falloff = false;
+  options.photo_aperture = photo_aperture;
   SceneSummary summary;
   EstimateScene(tried, options, run, &summary);
   return summary.residual_rms;
@@ -74,7 +75,7 @@ DepthFlipCheck CheckDepthFlips(const EstimateInput& input, const DepthFlipOption
   run.sink = &sink;
   for (const model::DepthFlip flip : {model::DepthFlip::kNone, model::DepthFlip::kRows,
                                       model::DepthFlip::kColumns, model::DepthFlip::kBoth}) {
-    check.trials.push_back({flip, ResidualOf(image, flip, input, run)});
+    check.trials.push_back({flip, ResidualOf(image, flip, input, options.photo_aperture, run)});
   }
   check.better = BetterFlip(check.trials, check.noise_sigma);
   return check;

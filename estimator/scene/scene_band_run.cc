@@ -162,7 +162,13 @@ double SceneBandRun<Real>::Prepare(const model::LinearImage& photograph, const S
     band_disparity_ = PhotographDisparity(whole ? input_.disparity : band_disparity_,
                                           LandingStepPx(*input_.camera, *input_.grid));
   }
-  const DisparityMap& disparity = whole && !input_.grid ? input_.disparity : band_disparity_;
+  if (options_.photo_aperture != 1) {
+    if (whole && !input_.grid) band_disparity_ = input_.disparity;
+    for (float& value : band_disparity_.disparity)
+      value *= static_cast<float>(options_.photo_aperture);
+  }
+  const bool is_own = whole && !input_.grid && options_.photo_aperture == 1;
+  const DisparityMap& disparity = is_own ? input_.disparity : band_disparity_;
   const std::optional<model::LinearImage> cut =
       whole ? std::nullopt : std::optional(CutRows(photograph, band.from, band.to));
   const model::LinearImage& rows = cut ? *cut : photograph;
@@ -253,7 +259,8 @@ bool SceneBandRun<Real>::Fits(const SceneBand& band, const Radiance& radiance) {
 
 template <typename Real>
 bool SceneBandRun<Real>::MayKeepBundle(int bands) const {
-  if (bands > 1) return false;
+  // The rays of a photograph through another aperture are not those of the views.
+  if (bands > 1 || options_.photo_aperture != 1) return false;
   if (!input_.grid) return true;
   return LandingStepPx(*input_.camera, *input_.grid).isZero(0);
 }
@@ -267,7 +274,9 @@ std::optional<SolvedScene> SceneBandRun<Real>::SolveIn(int count,
   const std::vector<SceneBand> bands =
       BandsOf(photograph.height_px, count, BandMarginPx(reach_px_));
   SceneOptions options = options_;
-  if (count > 1) {
+  const bool is_centre_view =
+      options.photo_aperture == 0 && options.strength_rule == StrengthRule::kAuto;
+  if (count > 1 && !is_centre_view) {  // the centre view has no prior
     options.strength = StrengthFor(photograph, bands);
     (options_.strength_rule == StrengthRule::kGcv ? summary_->solve_seconds
                                                   : summary_->setup_seconds) += take_lap();

@@ -42,6 +42,13 @@ double CoarseStrength(Prior prior, double strength) {
 // Patches begin with total variation.
 Prior SolvedFirst(Prior prior) { return prior == Prior::kPatches ? Prior::kTotalVariation : prior; }
 
+// A photograph through a pinhole shows the radiance itself. Where its texture is fine it hides the
+// noise, and a prior for a noise that is too large would remove details: without a stated strength
+// none is used, so that the views are never worse than the warped photograph.
+bool IsTheCentreView(const SceneOptions& options) {
+  return options.photo_aperture == 0 && options.strength_rule == StrengthRule::kAuto;
+}
+
 // Standard deviation of the Gaussian that smooths the intensity for the slope of the transfer
 // curve.
 constexpr double kSlopeSmoothingPx = 2;
@@ -68,6 +75,7 @@ template <typename Real>
 double SceneRadiance<Real>::FindStart(const model::LinearImage& photograph,
                                       const DisparityMap& disparity) {
   if (std::min(photograph.width_px, photograph.height_px) < 2 * kMinCoarsePx) return 0;
+  if (IsTheCentreView(run_.options)) return 0;
   EstimateInput half;
   half.image = HalfSize(photograph);
   half.disparity = HalfSize(disparity);
@@ -142,9 +150,10 @@ model::LinearImage SceneRadiance<Real>::Solve(SceneSummary* summary) {
   limits.tolerance = options.tolerance_or_usual();
   limits.max_iterations = options.max_iterations;
   limits.on_iteration = [this] { run_.progress->CountUpTo(run_.last_iteration); };
-  summary->strength = options.strength;
+  summary->strength = IsTheCentreView(options) ? 0 : options.strength;
   const double sigma = std::max(run_.noise_sigma, kMinNoise);
-  if (options.strength_rule != StrengthRule::kGiven) {
+  const bool is_view = IsTheCentreView(options);
+  if (options.strength_rule != StrengthRule::kGiven && !is_view) {
     summary->strength = StrengthForNoise(options.prior, sigma, data_, slope_squared_);
   }
   if (options.strength_rule == StrengthRule::kGcv) {
@@ -154,8 +163,11 @@ model::LinearImage SceneRadiance<Real>::Solve(SceneSummary* summary) {
     summary->strength = search.strength;
     summary->iterations = search.iterations;
   }
+  RadianceOutcome taken;
+  taken.converged = true;
   const RadianceOutcome outcome =
-      options.prior == Prior::kPatches
+      is_view ? taken
+      : options.prior == Prior::kPatches
           ? SolveWithPatches(
                 {summary->strength, sigma, run_.input.transfer, disparity_, run_.guide_slope},
                 data_, slope_squared_, limits, std::move(system), run_.backend, &radiance)

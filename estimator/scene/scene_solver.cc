@@ -148,6 +148,16 @@ double UsualTolerance(Prior prior) {
   return prior == Prior::kTotalVariation || prior == Prior::kPatches ? 1e-4 : 1e-3;
 }
 
+namespace {
+
+bool IsShare(const char* name, double value, std::string* why) {
+  if (value >= 0 && value <= 1) return true;
+  if (why != nullptr) *why = fmt::format("{} is {:g}: it must be from 0 to 1", name, value);
+  return false;
+}
+
+}  // namespace
+
 bool SceneOptions::IsValid(std::string* why) const {
   return IsEnumerator(Prior::kPatches, "prior", prior, why) &&
          IsEnumerator(StrengthRule::kGiven, "strength_rule", strength_rule, why) &&
@@ -155,7 +165,8 @@ bool SceneOptions::IsValid(std::string* why) const {
                                                 : IsNonNegative("strength", strength, why)) &&
          IsTolerance("tolerance", tolerance, why) &&
          IsAtLeast(1, "max_iterations", max_iterations, why) &&
-         IsAtLeast(1, "least_bands", least_bands, why);
+         IsAtLeast(1, "least_bands", least_bands, why) &&
+         IsShare("photo_aperture", photo_aperture, why);
 }
 
 model::LightField EstimateScene(const EstimateInput& input, const SceneOptions& options,

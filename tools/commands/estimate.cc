@@ -204,7 +204,8 @@ std::vector<std::pair<std::string, std::string>> SourcesOf(const EstimateOptions
       {"part of both", options.crop.text},
       {"encoded values", fmt::format("{} ({})", summary["transfer"].get<std::string>(),
                                      said.empty() ? "assumed" : "from " + said)},
-      {"aperture", ApertureInWords(options, outcome.estimate.diagnostics)}};
+      {"aperture", ApertureInWords(options, outcome.estimate.diagnostics)},
+      {"blur of the photograph", BlurShownInWords(outcome.estimate.diagnostics)}};
 }
 
 std::string Page(const EstimateOptions& options, const EstimateOutcome& outcome,

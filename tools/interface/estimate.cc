@@ -151,6 +151,7 @@ void CheckFlips(const PreparedProblem& prepared, const EstimateOptions& options,
   estimator::DepthFlipOptions check;
   check.falloff = prepared.effects.on.Has(Effect::kFalloff);
   check.compression_sigma = found.compression_sigma.value_or(0);
+  check.photo_aperture = found.used_photo_aperture;
   check.threads = run->threads();
   check.memory_limit_mib =
       options.memory_limit_mib ? options.memory_limit_mib : UsualMemoryLimitMib();
@@ -179,6 +180,29 @@ std::string WordsOf(model::DepthFlip flip) {
       return "with left and right exchanged";
     default:
       return "turned by 180 degrees";
+  }
+}
+
+// What a user should know of the photograph's aperture; empty: nothing beyond the summary.
+std::string PhotoWarning(const EstimateDiagnostics& found, const RunScope& run) {
+  using Verdict = estimator::PhotoAperture::Verdict;
+  if (!found.photo_aperture) return "";
+  const estimator::PhotoAperture& photo = *found.photo_aperture;
+  const std::string stated = run.Option("solver.photo");
+  switch (photo.verdict) {
+    case Verdict::kSharp:
+      return fmt::format("{}; it is taken as the centre view ({})", photo.message, stated);
+    case Verdict::kPartial:
+      return fmt::format("{}; that share of the aperture explains it ({})", photo.message, stated);
+    case Verdict::kContradicted:
+      return fmt::format("{}; it is taken as captured through the whole aperture ({})",
+                         photo.message, stated);
+    case Verdict::kUndecided:
+      if (!photo.is_narrower()) return "";
+      return fmt::format("{}; it is taken as captured through the whole aperture ({})",
+                         photo.message, stated);
+    default:
+      return "";
   }
 }
 
@@ -276,6 +300,8 @@ std::vector<std::string> WarningsOf(const DepthFile& depth, bool has_camera, con
         "this effect",
         kEightBitLevels * *found.residual_rms, *found.residual_rms / *found.DoubtSigma(), noise));
   }
+  const std::string photo = PhotoWarning(found, run);
+  if (!photo.empty()) warnings.push_back(photo + jpeg_cause);
   if (found.blur_check) {
     const std::string blur =
         BlurWarning(*found.blur_check, found.blur_proposal, estimate.problem->input(), run);
@@ -394,6 +420,8 @@ LightFieldEstimate Estimate(ViewSink* given_sink, Image photo, DepthMap depth,
     seconds.sink = sink->seconds() / ResolveThreads(control.threads);
     seconds.views = std::max(0.0, seconds.views - seconds.sink);
   }
+  if (estimate.diagnostics.photo_aperture)
+    seconds.photo_aperture = estimate.diagnostics.photo_aperture->seconds;
   if (solved.blur) {
     seconds.blur_check = solved.blur->seconds;
     estimate.diagnostics.blur_proposal =

@@ -286,6 +286,7 @@ bool EffectSelection::LeavesOut(Effect effect) const {
 bool SceneSolver::IsValid(std::string* why) const {
   if (!OneOf(why, "prior", Prior::kPatches, prior)) return false;
   if (!OneOf(why, "strength_rule", StrengthRule::kGiven, strength_rule)) return false;
+  if (!OneOf(why, "photo", PhotoKind::kSharp, photo)) return false;
   if (strength_rule == StrengthRule::kGiven) {
     if (!Positive(why, "strength", strength)) return false;
   } else if (!(strength == 0)) {  // NaN too

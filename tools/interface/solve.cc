@@ -93,7 +93,8 @@ estimator::SceneViewSink SinkOf(ViewSink* sink, double values) {
   return views;
 }
 
-estimator::SolverOptions OptionsOf(const SceneSolver& solver, const PreparedProblem& prepared) {
+estimator::SolverOptions OptionsOf(const SceneSolver& solver, const PreparedProblem& prepared,
+                                   const EstimateDiagnostics& found) {
   const auto pixels = static_cast<double>(prepared.input->disparity.disparity.size());
   estimator::SceneOptions settings;
   settings.prior = PriorOf(solver.prior);
@@ -104,10 +105,12 @@ estimator::SolverOptions OptionsOf(const SceneSolver& solver, const PreparedProb
   settings.double_precision = solver.double_precision;
   settings.falloff = prepared.effects.on.Has(Effect::kFalloff);
   settings.least_bands = std::max(1, static_cast<int>(std::ceil(pixels / kMaxBandPixels)));
+  settings.photo_aperture = found.used_photo_aperture;
   return settings;
 }
 
-estimator::SolverOptions OptionsOf(const BlockSolver& solver, const PreparedProblem& prepared) {
+estimator::SolverOptions OptionsOf(const BlockSolver& solver, const PreparedProblem& prepared,
+                                   const EstimateDiagnostics& /*found*/) {
   estimator::BlockOptions settings;
   settings.solver = LinearOf(solver.linear);
   settings.stencil = solver.stencil == BlockSolver::Stencil::kWarp ? estimator::Stencil::kWarp
@@ -135,12 +138,13 @@ estimator::WholeImageOptions WholeImageOf(const FunctionalSolver& solver,
   return settings;
 }
 
-estimator::SolverOptions OptionsOf(const FunctionalSolver& solver,
-                                   const PreparedProblem& prepared) {
+estimator::SolverOptions OptionsOf(const FunctionalSolver& solver, const PreparedProblem& prepared,
+                                   const EstimateDiagnostics& /*found*/) {
   return estimator::FunctionalOptions{WholeImageOf(solver, prepared)};
 }
 
-estimator::SolverOptions OptionsOf(const GridSolver& solver, const PreparedProblem& prepared) {
+estimator::SolverOptions OptionsOf(const GridSolver& solver, const PreparedProblem& prepared,
+                                   const EstimateDiagnostics& /*found*/) {
   return estimator::GridOptions{WholeImageOf(solver, prepared)};
 }
 
@@ -233,6 +237,22 @@ void CompleteRun(const FunctionalSolver& /*solver*/, const PreparedProblem& /*pr
   run->Detail("device: cpu");
 }
 
+// Finds the aperture of the photograph; only SceneSolver knows of one.
+void FindPhotoAperture(const SceneSolver& solver, const PreparedProblem& prepared, RunScope* run,
+                       EstimateDiagnostics* found) {
+  if (solver.photo == PhotoKind::kSharp) found->used_photo_aperture = 0;
+  if (solver.photo != PhotoKind::kAuto) return;
+  estimator::PhotoApertureOptions options;
+  options.threads = run->threads();
+  options.compression_sigma = prepared.compression_sigma;
+  found->photo_aperture = estimator::MeasurePhotoAperture(*prepared.input, options);
+  found->used_photo_aperture = found->photo_aperture->used_share();
+}
+
+template <typename Other>
+void FindPhotoAperture(const Other& /*solver*/, const PreparedProblem& /*prepared*/,
+                       RunScope* /*run*/, EstimateDiagnostics* /*found*/) {}
+
 template <typename Given>
 Solved SolveByLibrary(const Given& solver, const PreparedProblem& prepared,
                       const EstimateOptions& options, ViewSink* sink,
@@ -243,10 +263,12 @@ Solved SolveByLibrary(const Given& solver, const PreparedProblem& prepared,
   library.how.progress = run->ProgressOf("estimating");
   Solved solved;
   CompleteRun(solver, prepared, options, sink, run, &library, &solved);
+  FindPhotoAperture(solver, prepared, run, diagnostics);
   library.how.backend = library.backend.get();
   estimator::SolverSummary summary;
-  solved.light_field = estimator::Solve(*prepared.input, OptionsOf(solver, prepared), library.how,
-                                        &summary, solved.maps ? &*solved.maps : nullptr);
+  solved.light_field =
+      estimator::Solve(*prepared.input, OptionsOf(solver, prepared, *diagnostics), library.how,
+                       &summary, solved.maps ? &*solved.maps : nullptr);
   if (solved.maps) solved.maps->radiance = {};  // the middle of the light field contains it
   TakeSummary(summary, &solved);
   std::visit([&](const auto& found) { TakeDiagnostics(found, diagnostics); }, summary.diagnostics);

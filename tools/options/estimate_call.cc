@@ -40,6 +40,8 @@ SceneSolver SceneSolverOf(const EstimateOptions& options) {
   if (options.max_iterations) solver.max_iterations = *options.max_iterations;
   solver.double_precision = options.double_precision;
   solver.check_blur = options.check_blur;
+  if (options.photo == "captured") solver.photo = PhotoKind::kCaptured;
+  if (options.photo == "sharp") solver.photo = PhotoKind::kSharp;
   return solver;
 }
 
@@ -132,6 +134,7 @@ OptionNames EstimateOptionNames() {
           {"solver", "--solver"},
           {"solver.prior", "--prior"},
           {"solver.strength", "--strength"},
+          {"solver.photo", "--photo"},
           {"solver.tolerance", "--tolerance"},
           {"solver.max_iterations", "--max-iterations"},
           {"solver.gamma", "--gamma"},

@@ -155,6 +155,14 @@ void AddQualityOptions(CLI::App* command, EstimateOptions* options) {
                     "Check whether a narrower blur or another plane of focus fits the photograph "
                     "better than camera and depth, and propose it (solver scene); costs one more "
                     "solve at half the size, and seven to seventeen if something may be wrong");
+  command
+      ->add_option(
+          "--photo", options->photo,
+          "How wide the aperture of the photograph was (solver scene): captured (as camera "
+          "and views state), sharp (a pinhole: sharp at all depths) or auto (measured from "
+          "the photograph, default)")
+      ->check(CLI::IsMember({"captured", "sharp", "auto"}))
+      ->type_name("KIND");
   command->add_flag("--keep-depth-noise", options->keep_depth_noise,
                     "Disable depth denoising, which smooths the depth along surfaces");
   command
@@ -309,6 +317,7 @@ std::vector<OptionOfSolvers> OptionsOfSolvers(const EstimateOptions& options) {
   return {{"--prior", options.prior.has_value(), scene},
           {"--strength", options.strength.has_value(), scene},
           {"--check-blur", options.check_blur, scene},
+          {"--photo", options.photo.has_value(), scene},
           {"--tolerance", options.tolerance.has_value(), iterative},
           {"--max-iterations", options.max_iterations.has_value(), iterative},
           {"--double", options.double_precision, whole_image},

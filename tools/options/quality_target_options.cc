@@ -22,7 +22,7 @@ void AddQualityTargetOptions(CLI::App* command, estimator::QualityTarget* target
               "Choose the solver by quality. draft: the fastest plan with half of the "
               "gain of the best plan over warping; standard: nine tenths; best. This option, "
               "--within and --psnr-loss replace the options of the solver, --prior, "
-              "--strength, --check-blur and --device")
+              "--strength, --check-blur, --photo and --device")
           ->check(CLI::IsMember({"draft", "standard", "best"}))
           ->type_name("NAME");
   CLI::Option* within = AddNumberWithUnit(command, "--within", "s", "2s",
@@ -38,9 +38,10 @@ void AddQualityTargetOptions(CLI::App* command, estimator::QualityTarget* target
 }
 
 void ExcludeSolverOptions(CLI::App* command) {
-  for (const char* chosen : {"--solver", "--prior", "--strength", "--check-blur", "--tolerance",
-                             "--max-iterations", "--double", "--gamma", "--ridge", "--block-solver",
-                             "--block-px", "--stencil", "--splat", "--checkpoint", "--device"}) {
+  for (const char* chosen :
+       {"--solver", "--prior", "--strength", "--check-blur", "--photo", "--tolerance",
+        "--max-iterations", "--double", "--gamma", "--ridge", "--block-solver", "--block-px",
+        "--stencil", "--splat", "--checkpoint", "--device"}) {
     for (const char* target : {"--quality", "--within", "--psnr-loss"}) {
       command->get_option(target)->excludes(command->get_option(chosen));
     }

@@ -113,6 +113,35 @@ json BlurCheckJson(const EstimateDiagnostics& found) {
   return out;
 }
 
+// Returns {verdict, message, share, sigma, used_share, ..}; only used_share if it was stated.
+json PhotoJson(const EstimateDiagnostics& found) {
+  json out = {{"verdict", "not measured"}, {"used_share", found.used_photo_aperture}};
+  if (!found.photo_aperture) return out;
+  const estimator::PhotoAperture& photo = *found.photo_aperture;
+  json regions = json::array();
+  for (const estimator::PhotoAperture::Region& region : photo.regions) {
+    regions.push_back({{"x_px", region.x},
+                       {"y_px", region.y},
+                       {"width_px", region.width_px},
+                       {"height_px", region.height_px},
+                       {"tiles", region.tiles},
+                       {"predicted_sigma_px", region.predicted_sigma_px},
+                       {"share", OrNull(region.share)},
+                       {"sigma", OrNull(region.sigma)}});
+  }
+  out.update({{"verdict", estimator::PhotoVerdictName(photo.verdict)},
+              {"message", photo.message},
+              {"share", OrNull(photo.share)},
+              {"sigma", OrNull(photo.sigma)},
+              {"evidence_against_captured", photo.evidence_against_captured},
+              {"evidence_against_sharp", photo.evidence_against_sharp},
+              {"tiles", photo.tiles},
+              {"largest_sigma_px", photo.largest_sigma_px},
+              {"regions", regions},
+              {"seconds", photo.seconds}});
+  return out;
+}
+
 // Returns {noise_sigma, trials: [{flip, residual_rms}, ..], better}, or null without a check.
 json DepthFlipsJson(const EstimateDiagnostics& found) {
   if (!found.depth_flips) return nullptr;
@@ -137,6 +166,7 @@ void AddScene(const LightFieldEstimate& estimate, json* out) {
                {"reweightings", found.reweightings},
                {"residual_patches", PatchesJson(found.patches)},
                {"unexplained_share", OrNull(found.unexplained_share)},
+               {"photo", PhotoJson(found)},
                {"blur_check", BlurCheckJson(found)},
                {"depth_flips", DepthFlipsJson(found)}});
 }
@@ -262,6 +292,16 @@ std::string ApertureInWords(const EstimateOptions& options, const EstimateDiagno
                                      : fmt::format("{}, views of {}", text, options.aperture_of);
 }
 
+std::string BlurShownInWords(const EstimateDiagnostics& found) {
+  if (found.photo_aperture) {
+    return fmt::format("{}: {}", estimator::PhotoVerdictName(found.photo_aperture->verdict),
+                       found.photo_aperture->message);
+  }
+  return found.used_photo_aperture == 0
+             ? "sharp, as stated: the photograph is taken as the centre view"
+             : "";
+}
+
 json EstimateJson(const EstimateOptions& options, const EstimateOutcome& outcome) {
   const LightFieldEstimate& estimate = outcome.estimate;
   const EstimateSummary& summary = estimate.summary;
@@ -290,6 +330,7 @@ json EstimateJson(const EstimateOptions& options, const EstimateOutcome& outcome
               {"seconds",
                {{"read", read_seconds},
                 {"setup", read_seconds + seconds.setup},
+                {"photo_aperture", seconds.photo_aperture},
                 {"blur_check", seconds.blur_check},
                 {"depth_flips", seconds.depth_flips},
                 {"solve", seconds.solve},
@@ -378,6 +419,8 @@ std::string EstimateText(const EstimateOptions& options, const EstimateOutcome& 
   text += fmt::format("device       {}, {} thread(s)\n", summary.device, summary.threads);
   if (!found.effects.findings.empty()) text += EffectsText(found.effects);
   text += AccuracyText(summary);
+  const std::string blur_shown = BlurShownInWords(found);
+  if (!blur_shown.empty()) text += fmt::format("blur shown   {}\n", blur_shown);
   if (found.blur_check) {
     text += fmt::format("blur check   {} ({} solve(s), {:.1f} s)\n", found.blur_check->message,
                         found.blur_check->trials.size(), found.blur_check->seconds);
@@ -385,8 +428,9 @@ std::string EstimateText(const EstimateOptions& options, const EstimateOutcome& 
   text += ConfidenceText(found);
   if (found.inpainting) text += fmt::format("inpainting   {}\n", found.inpainting->message);
   text += fmt::format(
-      "time         {:.2f} s: set-up {:.2f}, {}solve {:.2f}, {}views {:.2f}, files {:.2f}\n",
+      "time         {:.2f} s: set-up {:.2f}, {}{}solve {:.2f}, {}views {:.2f}, files {:.2f}\n",
       outcome.total_seconds, json_summary["seconds"]["setup"].get<double>(),
+      found.photo_aperture ? fmt::format("blur shown {:.2f}, ", seconds.photo_aperture) : "",
       found.blur_check ? fmt::format("blur check {:.2f}, ", seconds.blur_check) : "", seconds.solve,
       found.depth_flips ? fmt::format("reversed depth {:.2f}, ", seconds.depth_flips) : "",
       seconds.views, outcome.files_seconds);

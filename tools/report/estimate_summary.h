@@ -23,6 +23,8 @@ struct EstimateOutcome {
 
 // "gaussian (from the camera), views of LF": the aperture in words.
 std::string ApertureInWords(const EstimateOptions& options, const EstimateDiagnostics& found);
+// How much of the predicted blur the photograph shows, in words; empty: it was stated.
+std::string BlurShownInWords(const EstimateDiagnostics& found);
 
 // Returns what --json writes.
 nlohmann::json EstimateJson(const EstimateOptions& options, const EstimateOutcome& outcome);

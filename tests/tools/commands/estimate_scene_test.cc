@@ -401,7 +401,9 @@ TEST_F(EstimateSceneTest, NamesAPatchWhoseDepthIsWrong) {
                                "--depth-kind",
                                "disparity",
                                "--views",
-                               "5x5"};
+                               "5x5",
+                               "--photo",
+                               "captured"};
   const json summary = Summary(arguments);
   ASSERT_FALSE(summary["residual_patches"].empty());
   for (const json& patch : summary["residual_patches"]) {
@@ -425,7 +427,9 @@ TEST_F(EstimateSceneTest, APhotographSharperThanItsDepthAllowsIsReported) {
                          "--depth-kind",
                          "disparity",
                          "--views",
-                         "5x5"};
+                         "5x5",
+                         "--photo",
+                         "captured"};
   // The error is the same everywhere, so that no patch stands out.
   const json summary = Summary(arguments);
   EXPECT_GT(summary["unexplained_share"], 0.9);
@@ -435,6 +439,66 @@ TEST_F(EstimateSceneTest, APhotographSharperThanItsDepthAllowsIsReported) {
   const json right = Summary(arguments);
   EXPECT_LT(right["unexplained_share"], 0.05);
   EXPECT_THAT(right["warnings"], IsEmpty());
+}
+
+// Values of blocks of several sizes added up: sharp at every pixel.
+model::EncodedImage SharpBlocks(int width_px, int height_px) {
+  std::mt19937 engine(11);
+  std::normal_distribution<double> value(0, 1);
+  std::vector<double> sum(static_cast<std::size_t>(width_px) * height_px, 110);
+  for (const int block_px : {2, 5, 11, 23}) {
+    const int across = width_px / block_px + 1;
+    std::vector<double> levels(static_cast<std::size_t>(across) * (height_px / block_px + 1));
+    for (double& level : levels) level = 6 * std::sqrt(block_px) * value(engine);
+    for (int i = 0; i < width_px * height_px; ++i) {
+      sum[static_cast<std::size_t>(i)] += levels[static_cast<std::size_t>(
+          i / width_px / block_px * across + i % width_px / block_px)];
+    }
+  }
+  model::EncodedImage image{width_px, height_px, 1, 8, {}};
+  for (const double level : sum) {
+    image.values.push_back(
+        static_cast<std::uint16_t>(std::lround(std::clamp(level + value(engine), 0.0, 255.0))));
+  }
+  return image;
+}
+
+TEST_F(EstimateSceneTest, ASharpPhotographIsTakenAsTheCentreView) {
+  constexpr int kWide = 192, kHigh = 128;
+  model::RawDepthMap map{kWide, kHigh, {}, false};
+  for (int i = 0; i < kWide * kHigh; ++i)
+    map.values.push_back(static_cast<float>(1.4 * (i % kWide) / kWide));
+  const Arguments arguments = {folder_.Put("sharp.png", io::EncodePng(SharpBlocks(kWide, kHigh))),
+                               folder_.Put("sharp.pfm", io::EncodePfm(map)),
+                               "--depth-kind",
+                               "disparity",
+                               "--views",
+                               "5x5"};
+  ProgramResult result;
+  const json found = Summary(With(arguments, {"--report", Report()}), &result);
+  const json& photo = found.at("photo");
+  EXPECT_EQ(photo.at("verdict"), "sharp") << photo.dump(1);
+  EXPECT_EQ(photo.at("used_share"), 0);
+  EXPECT_LT(photo.at("share").get<double>(), 0.3);
+  EXPECT_GT(photo.at("sigma").get<double>(), 0);
+  EXPECT_FALSE(photo.at("regions").empty());
+  EXPECT_THAT(result.out, HasSubstr("blur shown   sharp: "));
+  EXPECT_THAT(result.err, AllOf(HasSubstr("is sharp at all depths"), HasSubstr("--photo")));
+  EXPECT_THAT(ContentOf(Report() + "/index.html"), HasSubstr("is sharp at all depths"));
+  EXPECT_LT(found.at("residual_rms").get<double>(), 0.1 / 255);
+
+  const json stated = Summary(With(arguments, {"--photo", "sharp"}), &result).at("photo");
+  EXPECT_EQ(stated.at("verdict"), "not measured");
+  EXPECT_EQ(stated.at("used_share"), 0);
+  EXPECT_THAT(result.err, Not(HasSubstr("sharp at all depths")));
+  const json captured = Summary(With(arguments, {"--photo", "captured"}));
+  EXPECT_EQ(captured.at("photo").at("used_share"), 1);
+  EXPECT_GT(captured.at("residual_rms").get<double>(), 4.0 / 255);
+  fs::remove_all(Output());
+  fs::remove_all(Report());
+  EXPECT_THAT(Refusal(With(arguments, {"--photo", "sharp", "--solver", "blocks"}), 2),
+              HasSubstr("--photo requires --solver scene"));
+  EXPECT_THAT(Refusal(With(arguments, {"--photo", "blurred"}), 2), HasSubstr("--photo"));
 }
 
 // Compression removes noise and adds its own error: a photograph with the right depth is not in
@@ -452,7 +516,9 @@ TEST_F(EstimateSceneTest, TheErrorOfJpegCompressionIsPartOfTheNoise) {
                          "--depth-kind",
                          "disparity",
                          "--views",
-                         "5x5"};
+                         "5x5",
+                         "--photo",
+                         "captured"};
   const json summary = Summary(arguments);
   const std::optional<io::JpegError> error = io::MeasureJpegError(jpeg);
   ASSERT_TRUE(error);

@@ -334,6 +334,7 @@ TEST_F(EstimateTarget, ExcludesWhatItChooses) {
       {"--quality", "good"},
       {"--profile", "file"},
       {"--quality", "best", "--check-blur"},
+      {"--quality", "best", "--photo", "sharp"},
       {"--quality", "best", "--max-iterations", "1"},
       {"--within", "2", "--gamma", "1"}};
   for (const std::vector<std::string>& arguments : wrong) {

@@ -17,6 +17,7 @@
 #include "thicklens/estimator/blur_check.h"
 #include "thicklens/estimator/depth_flips.h"
 #include "thicklens/estimator/inpaint.h"
+#include "thicklens/estimator/photo_aperture.h"
 #include "thicklens/estimator/scene_solver.h"
 #include "thicklens/image.h"
 #include "thicklens/light_field.h"
@@ -92,11 +93,14 @@ struct EstimateOptions {
 struct EstimateSeconds {
   double prepare = 0;                           // camera, aperture, depth, effects
   double setup = 0, blur_check = 0, solve = 0;  // of the solver, and of check_blur
+  double photo_aperture = 0;                    // measuring the photograph's aperture
   double depth_flips = 0;                       // the search for reversed rows and columns
   double views = 0;                             // making the views, and inpainting
   double sink = 0;  // giving views and confidence to a ViewSink; shared among the threads
   // The sum of all parts, s.
-  double total() const { return prepare + setup + blur_check + solve + depth_flips + views + sink; }
+  double total() const {
+    return prepare + setup + photo_aperture + blur_check + solve + depth_flips + views + sink;
+  }
 };
 
 // The result in numbers.
@@ -217,6 +221,10 @@ struct EstimateDiagnostics {
   std::optional<estimator::InpaintSummary> inpainting;  // of HiddenRays::kTelea
   std::optional<estimator::BlurCheck> blur_check;       // of SceneSolver::check_blur
   BlurProposal blur_proposal;                           // that follows from it
+  // Of SceneSolver: what PhotoKind::kAuto measured; absent if the aperture was stated.
+  std::optional<estimator::PhotoAperture> photo_aperture;
+  // The aperture of the photograph over that of the views by which it was explained; 1: as stated.
+  double used_photo_aperture = 1;
   // Of SceneSolver, for a photograph that stays unexplained.
   std::optional<estimator::DepthFlipCheck> depth_flips;
   std::vector<Notice> notices;  // remarks on the call, in their order

@@ -38,6 +38,13 @@ enum class StrengthRule {
   kGiven,  // SceneSolver::strength
 };
 
+// The aperture through which the photograph was taken.
+enum class PhotoKind {
+  kAuto,      // measured from the photograph [D180]; the stated one where it does not show it
+  kCaptured,  // that of camera and views: points are blurred by their depth
+  kSharp,     // a pinhole: the photograph is the centre view, sharp at all depths
+};
+
 // The radiance of the scene's points for the whole image at once [D101]; the default.
 struct SceneSolver {
   Prior prior = Prior::kTotalVariation;              // assumption about the radiance
@@ -51,6 +58,7 @@ struct SceneSolver {
   // Also look whether the photograph asks for a narrower blur or another plane of focus [D109]. The
   // light field is the same with and without.
   bool check_blur = false;
+  PhotoKind photo = PhotoKind::kAuto;  // how wide the photograph's aperture was
 
   // Returns whether all members are in their range. Otherwise `why`, if not null, gets the field,
   // the value and the constraint.

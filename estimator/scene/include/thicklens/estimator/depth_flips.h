@@ -32,6 +32,7 @@ struct DepthFlipOptions {
   bool falloff = true;  // use the irradiance of [S12] if there is a camera
   // Error of the photograph's compression, in its encoded values, which its noise does not show.
   double compression_sigma = 0;
+  double photo_aperture = 1;               // of SceneOptions
   int threads = 0;                         // 0: one per core
   std::optional<double> memory_limit_mib;  // for the whole process
 };

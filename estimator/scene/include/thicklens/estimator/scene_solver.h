@@ -59,6 +59,10 @@ struct SceneOptions {
   bool cubic = true;
   bool falloff = true;  // use the irradiance of [S12] if there is a camera
   int least_bands = 1;  // minimum number of bands, >= 1
+  // The aperture of the photograph over that of the views, >= 0, <= 1: H sees every disparity as
+  // that share of it. 0: the photograph is the centre view, equally sharp at all depths, and with
+  // kAuto it is that without a prior.
+  double photo_aperture = 1;
 
   // The tolerance, or UsualTolerance of the prior if it is absent.
   double tolerance_or_usual() const { return tolerance.value_or(UsualTolerance(prior)); }
