@@ -537,6 +537,16 @@ std::vector<StressCase> Aberrations() {
                        "frames in colour: red is in focus 2 mm farther and blue 1 mm nearer than "
                        "green",
                        aberrations));
+  cases.push_back(Sweep("hexagonal-aperture",
+                        "six straight blades, calibrated as a disc of the same second moment",
+                        "d1, zf and kappa within 4 standard errors of the truth, d1 within 50 um",
+                        Simulated([](model::SweepSimulationOptions* simulation) {
+                          simulation->camera.psf = model::Psf::kDisc;
+                          simulation->pupil_law = model::PupilLaw::kUniform;
+                          simulation->aperture.blades = 6;
+                          simulation->aperture.rotation_deg = 10;
+                        }),
+                        Truth(50)));
   aberrations = {};
   aberrations.field_curvature_mm = -2;
   cases.push_back(
