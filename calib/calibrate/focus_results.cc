@@ -9,6 +9,7 @@
 #include "calib/fit/known_focus.h"
 #include "calib/fit/misfit_causes.h"
 #include "calib/registration/moving_scale.h"
+#include "calib/uncertainty/colour_focus.h"
 #include "calib/uncertainty/field_map.h"
 #include "calib/uncertainty/systematic_advice.h"
 #include "thicklens/base/error.h"
@@ -312,7 +313,7 @@ class Conversion {
   }
 
   std::vector<std::string> WordsOfField() const {
-    std::vector<std::string> words = {AstigmatismInWords(result_)};
+    std::vector<std::string> words = {AstigmatismInWords(result_), ColoursInWords(result_)};
     for (const std::string& warning : FieldWarnings(result_)) words.push_back(warning);
     return words;
   }

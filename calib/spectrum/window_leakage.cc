@@ -152,7 +152,7 @@ struct Surroundings {
   Eigen::Vector2d middle_px;  // of the window, in `pixels`
 };
 
-// [D175] The window sees at nu the transform G of the whole image, weighted by the transform w of
+// [D176] The window sees at nu the transform G of the whole image, weighted by the transform w of
 // the window around nu. What it sees of a blurred image is therefore H(nu) times what it sees of
 // the image itself, plus the sum over f of (H(f) - H(nu)) w(nu - f) G(f), in which only the
 // neighbours of nu count.

@@ -11,6 +11,7 @@
 
 #include "calib/fit/misfit_causes.h"
 #include "calib/uncertainty/astigmatism.h"
+#include "calib/uncertainty/colour_focus.h"
 #include "calib/uncertainty/evenly_spread.h"
 #include "calib/uncertainty/systematic_advice.h"
 #include "thicklens/base/parallel.h"
@@ -25,7 +26,9 @@ constexpr std::size_t kMinTiles = 5;
 constexpr double kSpreadOverErrors = 4;  // ratio of squares; below it the tiles agree
 constexpr double kApart = 6;             // standard deviations between depths of a target
 constexpr double kRoughSurface = 4;  // chi^2 per dof of a smooth field above which depths differ
-constexpr double kColourDifference = 0.01;  // part of the mean; below it the channels are copies
+// Part of the mean below which channels are copies. Those of a grey target differ by their noise
+// alone, which may be less than 1 % of the light.
+constexpr double kColourDifference = 0.001;
 // At most this many frames of a longer sweep are mapped, evenly spread: the time to fit one part
 // grows with the square of its frames, and all parts' spectra are in memory at once.
 constexpr std::size_t kMaxFrames = 128;
@@ -48,7 +51,7 @@ class Field {
   }
 
   // A few large tiles of a few frames, which cost a small part of the map. Only the interval of zf,
-  // and the warnings if the tiles differ, remain of them.
+  // and the warnings if the tiles differ, remain of them. Colours are compared in the same frames.
   void RunCoarsely() {
     if (evidence_.spectrum < 0 || setup_.frames.size() < 5) return;
     ThinOut(kMaxCoarseFrames);
@@ -57,6 +60,7 @@ class Field {
     MapTiles(kCoarseSide);
     result_.diagnostics.field = {};
     result_.diagnostics.field.message = "the map was not requested";
+    MeasureChannels();
   }
 
   void Run() {
@@ -385,11 +389,15 @@ class Field {
         if (const auto found = FocusOf(regions[0], &focus.message)) {
           focus.done = true;
           focus.focus_depth_mm = found->focus_depth_mm;
-          focus.blur_ratio = found->blur_ratio;
+          focus.blur_ratio = RatioOfColour(found->blur_ratio, found->focus_depth_mm.value,
+                                           fit_.values[kFocusDepth], sweep_.camera.lens);
         }
       }
       result_.diagnostics.channels.push_back(focus);
     }
+    WidenByColours(sweep_.camera.lens, &result_);
+    const std::string words = ColoursInWords(result_);
+    if (!words.empty()) result_.summary.warnings.push_back(words);
   }
 
   const FocusSweep& sweep_;

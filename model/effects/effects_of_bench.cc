@@ -153,10 +153,13 @@ EffectImpact DustImpact(const EffectOptics& optics, const EffectSite& place,
 EffectImpact AberrationsImpact(const EffectOptics& optics, const EffectSite& place,
                                const EffectSet& others) {
   const auto& bench = optics.conditions().bench;
-  if (!bench || !bench->aberrations.DisplaceFocus() || !std::isfinite(place.depth_mm) ||
-      !(optics.inverse_focus() > 0))
-    return {};
+  if (!bench || !std::isfinite(place.depth_mm) || !(optics.inverse_focus() > 0)) return {};
   const double focus_mm = 1 / optics.inverse_focus();
+  double by_colour = 0;
+  for (int c = 0; c < 3; ++c) {
+    by_colour = std::max(by_colour, std::abs(ColourDisplacement(bench->aberrations, focus_mm, c)));
+  }
+  if (!bench->aberrations.DisplaceFocus() && by_colour == 0) return {};
   const Sensor& sensor = optics.camera().sensor;
   const Eigen::Matrix2d displacement =
       FocusDisplacement(bench->aberrations, focus_mm, place.position_px - sensor.principal_point_px,
@@ -164,7 +167,8 @@ EffectImpact AberrationsImpact(const EffectOptics& optics, const EffectSite& pla
   const double largest = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(displacement)
                              .eigenvalues()
                              .cwiseAbs()
-                             .maxCoeff();
+                             .maxCoeff() +
+                         by_colour;
   const double nearness = std::max(1e-3, 1 - largest * place.depth_mm);
   const double shift_mm = place.depth_mm * (1 / nearness - 1);
   return {std::abs(focus_mm - 1 / (1 / focus_mm + largest)),

@@ -45,7 +45,10 @@ bool LensAberrations::IsValid(const ThickLens& lens, double focus_depth_mm,
     return Fail(why, fmt::format("aberrations.distortion is {}: it must be from {} to {}",
                                  distortion, kMinDistortion, kMaxDistortion));
   }
-  if (!DisplaceFocus()) return true;
+  if (axial_colour_mm && !axial_colour_mm->allFinite())
+    return Fail(why, "aberrations.axial_colour_mm has a number that is not finite");
+  const bool displaces_colours = axial_colour_mm && !axial_colour_mm->isZero(0);
+  if (!DisplaceFocus() && !displaces_colours) return true;
   const double f1_mm = lens.front_focal_length_mm;
   if (!std::isfinite(focus_depth_mm)) {
     return Fail(why,
@@ -53,7 +56,8 @@ bool LensAberrations::IsValid(const ThickLens& lens, double focus_depth_mm,
                 "describe its displacement");
   }
   for (const double medial_mm : {focus_depth_mm, focus_depth_mm + field_curvature_mm}) {
-    const double apart_mm = 0.5 * (std::abs(field_astigmatism_mm) + std::abs(astigmatism_mm));
+    const double apart_mm = 0.5 * (std::abs(field_astigmatism_mm) + std::abs(astigmatism_mm)) +
+                            (displaces_colours ? std::max(0.0, -axial_colour_mm->minCoeff()) : 0);
     if (!(medial_mm - apart_mm > f1_mm)) {
       return Fail(why, fmt::format("aberrations: a part of the field would be in focus at {:g} mm: "
                                    "it must be beyond the front focal length {:g} mm",
@@ -76,6 +80,11 @@ Eigen::Matrix2d FocusDisplacement(const LensAberrations& aberrations, double foc
     displacement += by_field * (Eigen::Matrix2d::Identity() - 2 * radial * radial.transpose());
   }
   return displacement;
+}
+
+double ColourDisplacement(const LensAberrations& aberrations, double focus_depth_mm, int colour) {
+  if (!aberrations.axial_colour_mm || (*aberrations.axial_colour_mm)[colour] == 0) return 0;
+  return 1 / (focus_depth_mm + (*aberrations.axial_colour_mm)[colour]) - 1 / focus_depth_mm;
 }
 
 Eigen::Vector2d WithoutDistortion(double distortion, const Eigen::Vector2d& from_axis_px,

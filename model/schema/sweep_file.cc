@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <set>
 
 #include "model/schema/frame_pairing.h"
@@ -16,6 +17,7 @@ namespace thicklens::model {
 namespace {
 
 constexpr char kSchema[] = "thicklens/sweep/1";
+constexpr char kReadingsFile[] = "readings.csv";
 constexpr SweepMotion kMotions[] = {SweepMotion::kTarget, SweepMotion::kCamera, SweepMotion::kLens,
                                     SweepMotion::kSensor};
 
@@ -294,6 +296,14 @@ SweepFile SweepFromPages(const std::string& path, int pages, const ReadingSet& r
   return sweep;
 }
 
+std::string ReadingsTable(const SweepFile& sweep) {
+  std::string table = sweep.readings_are_counts ? "image,counts\n" : "image,reading_mm\n";
+  for (const SweepFrame& frame : sweep.frames)
+    table += fmt::format("{},{}\n", std::filesystem::path(frame.image).filename().string(),
+                         frame.reading_mm);
+  return table;
+}
+
 std::string SweepToYaml(const SweepFile& sweep) {
   YamlWriter out(kSchema);
   out.Text("camera", sweep.camera_path);
@@ -330,6 +340,16 @@ std::string SweepToYaml(const SweepFile& sweep) {
   for (const CorrectionKey& of : kCorrectionKeys) {
     const std::vector<std::string>& files = sweep.correction.*of.field;
     if (!files.empty()) out.List(of.key, files);
+  }
+  if (sweep.readings_are_counts) {
+    out.Text("frames_csv", kReadingsFile);
+    if (!sweep.frames.empty()) {
+      const std::string folder =
+          std::filesystem::path(sweep.frames.front().image).parent_path().string();
+      if (!folder.empty()) out.Text("frames_dir", folder);
+    }
+    out.Text("readings_unit", "counts");
+    return out.Finish();
   }
   out.BeginList("frames");
   for (const SweepFrame& frame : sweep.frames) {

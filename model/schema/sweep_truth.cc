@@ -14,7 +14,8 @@ namespace {
 constexpr char kTruthSchema[] = "thicklens/sweep-truth/1";
 
 void WriteAberrations(const LensAberrations& aberrations, YamlWriter* out) {
-  if (!aberrations.DisplaceFocus() && aberrations.distortion == 0) return;
+  const auto& colour_mm = aberrations.axial_colour_mm;
+  if (!aberrations.DisplaceFocus() && aberrations.distortion == 0 && !colour_mm) return;
   out->BeginMap("aberrations");
   for (const auto& [name, value] :
        {std::pair("field_curvature_mm", aberrations.field_curvature_mm),
@@ -22,6 +23,11 @@ void WriteAberrations(const LensAberrations& aberrations, YamlWriter* out) {
         std::pair("astigmatism_mm", aberrations.astigmatism_mm),
         std::pair("distortion", aberrations.distortion)}) {
     if (value != 0) out->Number(name, value);
+  }
+  if (colour_mm) {
+    out->BeginListInLine("axial_colour_mm");
+    for (const double zf_mm : *colour_mm) out->Element(zf_mm);
+    out->EndList();
   }
   out->EndMap();
 }
@@ -31,10 +37,26 @@ void WriteAberrations(const LensAberrations& aberrations, YamlWriter* out) {
 SweepTruth ReadSweepTruth(const std::string& path) {
   const YamlNode root = YamlNode::LoadFile(path);
   root.RequireSchema(kTruthSchema);
-  root.RequireKeys({"schema", "image_distance_mm", "focus_depth_mm", "blur_ratio", "blur_floor_px",
-                    "bench_offset_mm", "moves", "tilt_deg", "relief_mm", "corner_stops", "specks",
-                    "aberrations", "band_amplitude", "exposure_drift_stops", "pupil_law", "effects",
-                    "left_out_grey_levels", "frames"});
+  root.RequireKeys({"schema",
+                    "image_distance_mm",
+                    "focus_depth_mm",
+                    "blur_ratio",
+                    "blur_floor_px",
+                    "bench_offset_mm",
+                    "moves",
+                    "tilt_deg",
+                    "relief_mm",
+                    "corner_stops",
+                    "specks",
+                    "aberrations",
+                    "aperture",
+                    "counts_per_mm",
+                    "band_amplitude",
+                    "exposure_drift_stops",
+                    "pupil_law",
+                    "effects",
+                    "left_out_grey_levels",
+                    "frames"});
   SweepTruth truth;
   truth.image_distance_mm = root.At("image_distance_mm").PositiveNumber();
   truth.focus_depth_mm = root.At("focus_depth_mm").PositiveNumber();
@@ -54,6 +76,9 @@ SweepTruth ReadSweepTruth(const std::string& path) {
   if (const auto stops = root.Find("corner_stops")) truth.corner_stops = stops->Number();
   if (const auto specks = root.Find("specks")) truth.specks = specks->Integer(0, 10000);
   if (const auto lens = root.Find("aberrations")) truth.aberrations = ReadAberrations(*lens);
+  if (const auto aperture = root.Find("aperture")) truth.aperture = ReadAperture(*aperture);
+  if (const auto counts = root.Find("counts_per_mm"))
+    truth.counts_per_mm = counts->PositiveNumber();
   if (const auto bands = root.Find("band_amplitude")) truth.band_amplitude = bands->Number();
   if (const auto drift = root.Find("exposure_drift_stops"))
     truth.exposure_drift_stops = drift->Number();
@@ -88,6 +113,14 @@ std::string SweepTruthToYaml(const SweepTruth& truth) {
   if (truth.corner_stops != 0) out.Number("corner_stops", truth.corner_stops);
   if (truth.specks != 0) out.Number("specks", truth.specks);
   WriteAberrations(truth.aberrations, &out);
+  if (!truth.aperture.IsRound()) {
+    out.BeginMap("aperture");
+    out.Number("blades", truth.aperture.blades);
+    out.Number("rotation_deg", truth.aperture.rotation_deg);
+    out.Number("roundness", truth.aperture.roundness);
+    out.EndMap();
+  }
+  if (truth.counts_per_mm > 0) out.Number("counts_per_mm", truth.counts_per_mm);
   if (truth.band_amplitude != 0) out.Number("band_amplitude", truth.band_amplitude);
   if (truth.exposure_drift_stops != 0)
     out.Number("exposure_drift_stops", truth.exposure_drift_stops);

@@ -27,13 +27,28 @@ Estimate ReadEstimate(const YamlNode& node, double (YamlNode::*number)() const) 
 }
 
 LensAberrations ReadAberrations(const YamlNode& node) {
-  node.RequireKeys({"field_curvature_mm", "field_astigmatism_mm", "astigmatism_mm", "distortion"});
+  node.RequireKeys({"field_curvature_mm", "field_astigmatism_mm", "astigmatism_mm", "distortion",
+                    "axial_colour_mm"});
   LensAberrations aberrations;
   ReadNumber(node, "field_curvature_mm", &aberrations.field_curvature_mm);
   ReadNumber(node, "field_astigmatism_mm", &aberrations.field_astigmatism_mm);
   ReadNumber(node, "astigmatism_mm", &aberrations.astigmatism_mm);
   ReadNumber(node, "distortion", &aberrations.distortion);
+  if (const auto colour = node.Find("axial_colour_mm")) {
+    const auto numbers = colour->ElementsExactly(3);
+    aberrations.axial_colour_mm.emplace(numbers[0].Number(), numbers[1].Number(),
+                                        numbers[2].Number());
+  }
   return aberrations;
+}
+
+ApertureOutline ReadAperture(const YamlNode& node) {
+  node.RequireKeys({"blades", "rotation_deg", "roundness"});
+  ApertureOutline aperture;
+  aperture.blades = node.At("blades").Integer(0, 1000);
+  ReadNumber(node, "rotation_deg", &aperture.rotation_deg);
+  ReadNumber(node, "roundness", &aperture.roundness);
+  return aperture;
 }
 
 TransferCurve ReadTransfer(const YamlNode& node) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "thicklens/base/yaml_reader.h"
+#include "thicklens/model/aperture_outline.h"
 #include "thicklens/model/camera.h"
 #include "thicklens/model/lens_aberrations.h"
 
@@ -23,6 +24,7 @@ Eigen::Vector2d ReadPair(const YamlNode& node);  // a list of two numbers
 Estimate ReadEstimate(const YamlNode& node, double (YamlNode::*number)() const);
 
 LensAberrations ReadAberrations(const YamlNode& node);  // the aberrations of a simulated sweep
+ApertureOutline ReadAperture(const YamlNode& node);     // its outline of the aperture
 
 TransferCurve ReadTransfer(const YamlNode& node);  // the name of a transfer curve
 

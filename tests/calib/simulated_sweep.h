@@ -18,16 +18,18 @@ namespace thicklens::testing {
 
 // An image as the camera stores it, as a matrix.
 inline cv::Mat EncodedMat(const model::EncodedImage& image) {
-  cv::Mat stored(image.height_px, image.width_px, image.bits == 8 ? CV_8U : CV_16U);
+  cv::Mat stored(image.height_px, image.width_px,
+                 CV_MAKETYPE(image.bits == 8 ? CV_8U : CV_16U, image.channels));
+  const int values = stored.cols * image.channels;
   for (int y = 0; y < stored.rows; ++y) {
-    for (int x = 0; x < stored.cols; ++x) {
+    for (int i = 0; i < values; ++i) {
       const auto value =
-          image.values[static_cast<std::size_t>(y) * static_cast<std::size_t>(stored.cols) +
-                       static_cast<std::size_t>(x)];
+          image.values[static_cast<std::size_t>(y) * static_cast<std::size_t>(values) +
+                       static_cast<std::size_t>(i)];
       if (image.bits == 8) {
-        stored.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(value);
+        stored.ptr<std::uint8_t>(y)[i] = static_cast<std::uint8_t>(value);
       } else {
-        stored.at<std::uint16_t>(y, x) = value;
+        stored.ptr<std::uint16_t>(y)[i] = value;
       }
     }
   }
@@ -89,6 +91,11 @@ inline SimulatedSweep Simulate(const model::SweepSimulationOptions& options,
   result.sweep.reading_sigma_mm = options.reading_sigma_mm;
   result.sweep.offset_mm = model::Estimate{options.bench_offset_mm, 0};
   result.sweep.direction = options.direction;
+  if (options.counts_per_mm > 0) {
+    result.sweep.readings_are_counts = true;
+    result.sweep.reading_sigma_mm *= options.counts_per_mm;
+    result.sweep.offset_mm.reset();
+  }
   return result;
 }
 

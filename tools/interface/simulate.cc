@@ -37,9 +37,9 @@ SceneSimulation ReadSceneSimulation(const std::string& path) {
 }
 
 OutputFolder ClaimSweepFolder(const std::string& folder) {
-  return OutputFolder(
-      folder, kTruthFile,
-      {"frames", "sweep.yaml", "camera.yaml", kTruthFile, kAblationPage, kAblationTable});
+  return OutputFolder(folder, kTruthFile,
+                      {"frames", "sweep.yaml", "readings.csv", "camera.yaml", kTruthFile,
+                       kAblationPage, kAblationTable});
 }
 
 SimulatedSweep SimulateSweep(const SweepSimulation& simulation, OutputFolder* folder,
@@ -63,8 +63,10 @@ SimulatedSweep SimulateSweep(const SweepSimulation& simulation, OutputFolder* fo
   Camera camera = simulator.camera();
   camera.calibration.reset();  // a calibration of this sweep must find it
   folder->Write("camera.yaml", model::CameraToYaml(model::WithoutMeasuredPsf(camera)));
-  folder->Write("sweep.yaml",
-                model::SweepToYaml(io::DescribeSweep(simulation, simulator, unknown_offset)));
+  const model::SweepFile description = io::DescribeSweep(simulation, simulator, unknown_offset);
+  folder->Write("sweep.yaml", model::SweepToYaml(description));
+  if (description.readings_are_counts)
+    folder->Write("readings.csv", model::ReadingsTable(description));
   folder->Write(kTruthFile, model::SweepTruthToYaml(simulator.truth()));
   return {simulator.truth(), simulator.effects(), bits};
 }

@@ -41,7 +41,13 @@ model::SweepFile DescribeSweep(const model::SweepSimulationOptions& simulation,
     sweep.reading_sigma_mm = simulation.reading_sigma_mm;
   }
   sweep.reading_sigma_stated = true;
-  if (!unknown_offset) sweep.offset_mm = model::Estimate{simulation.bench_offset_mm, 0};
+  if (simulation.counts_per_mm > 0) {
+    sweep.readings_are_counts = true;
+    sweep.reading_sigma_mm *= simulation.counts_per_mm;
+    if (!unknown_offset) sweep.focus_depth_mm = model::Estimate{truth.focus_depth_mm, 0};
+  } else if (!unknown_offset) {
+    sweep.offset_mm = model::Estimate{simulation.bench_offset_mm, 0};
+  }
   sweep.direction = simulation.direction;
   if (simulation.moves != model::SweepMotion::kTarget) sweep.moves = simulation.moves;
   sweep.target = SweepTargetOf(simulation.target.kind);

@@ -424,6 +424,11 @@ std::vector<StressCase> MovingFocus() {
   cases.push_back(Sweep("moving-lens", "the same, with the distance of the target known to 0.5 mm",
                         "d1, zf and kappa within 4 standard errors of the truth, d1 within 1 mm",
                         lens, Truth(1000)));
+  lens.simulation.counts_per_mm = 400;
+  lens.simulation.bench_offset_mm = 50;
+  cases.push_back(Sweep(
+      "counts-of-a-drive", "the same with the counts of a drive, 400 per mm, as readings",
+      "d1, zf and kappa within 4 standard errors of the truth, d1 within 1 mm", lens, Truth(1000)));
   return cases;
 }
 
@@ -526,6 +531,22 @@ std::vector<StressCase> Aberrations() {
   cases.push_back(lens("astigmatic-lens",
                        "the blur along x is smallest 4 mm nearer than the blur along y",
                        aberrations));
+  aberrations = {};
+  aberrations.axial_colour_mm.emplace(2, 0, -1);
+  cases.push_back(lens("axial-colour",
+                       "frames in colour: red is in focus 2 mm farther and blue 1 mm nearer than "
+                       "green",
+                       aberrations));
+  cases.push_back(Sweep("hexagonal-aperture",
+                        "six straight blades, calibrated as a disc of the same second moment",
+                        "d1, zf and kappa within 4 standard errors of the truth, d1 within 50 um",
+                        Simulated([](model::SweepSimulationOptions* simulation) {
+                          simulation->camera.psf = model::Psf::kDisc;
+                          simulation->pupil_law = model::PupilLaw::kUniform;
+                          simulation->aperture.blades = 6;
+                          simulation->aperture.rotation_deg = 10;
+                        }),
+                        Truth(50)));
   aberrations = {};
   aberrations.field_curvature_mm = -2;
   cases.push_back(

@@ -84,6 +84,8 @@ model::SweepTruth WriteSweep(const fs::path& folder, const StressSweep& sweep) {
   }
   WriteFileAtomically((sweep_folder / "camera.yaml").string(), model::CameraToYaml(camera));
   WriteFileAtomically((sweep_folder / "sweep.yaml").string(), model::SweepToYaml(file));
+  if (file.readings_are_counts)
+    WriteFileAtomically((sweep_folder / "readings.csv").string(), model::ReadingsTable(file));
   return truth;
 }
 

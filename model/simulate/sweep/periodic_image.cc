@@ -191,9 +191,13 @@ cv::Mat PeriodicImage::Evaluate(const AxisSampling& x_steps, const AxisSampling&
         const double row_factor = y_plan.factor[static_cast<std::size_t>(b)];
         for (int a = 0; a <= x_plan.limit; ++a) {
           double factor = row_factor * x_plan.factor[static_cast<std::size_t>(a)];
-          if (!separates) factor *= defocus_transfer(a * x.step, b * y.step);
-          nodes[a] = Coefficient(a, b) * factor;
-          if (a > 0) nodes[x_plan.grid_size - a] = Coefficient(-a, b) * factor;
+          if (!separates && !blur.shape) factor *= defocus_transfer(a * x.step, b * y.step);
+          const auto node = [&](int sign) {
+            const std::complex<double> value = Coefficient(sign * a, b) * factor;
+            return blur.shape ? value * blur.shape({sign * a * x.step, b * y.step}) : value;
+          };
+          nodes[a] = node(1);
+          if (a > 0) nodes[x_plan.grid_size - a] = node(-1);
         }
       }
       cv::dft(padded, fine.grid, cv::DFT_INVERSE | cv::DFT_ROWS);

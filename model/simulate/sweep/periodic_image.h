@@ -1,7 +1,9 @@
 #ifndef THICKLENS_MODEL_SIMULATE_SWEEP_PERIODIC_IMAGE_H_
 #define THICKLENS_MODEL_SIMULATE_SWEEP_PERIODIC_IMAGE_H_
 
+#include <Eigen/Core>
 #include <complex>
+#include <functional>
 #include <opencv2/core.hpp>
 #include <vector>
 
@@ -29,6 +31,9 @@ struct FrameBlur {
   // The shape of the defocus blur if it is not that of `psf`; not owned.
   const PupilProfile* profile = nullptr;
   double pixel_steps = 1;
+  // The transfer function of the defocus at a frequency in cycles per px, for a shape that is not
+  // round; it takes the place of `psf`, which is kDisc then. Empty: a round one.
+  std::function<std::complex<double>(const Eigen::Vector2d& f)> shape = {};
 };
 
 // An image that is a finite Fourier series: it repeats in both directions and is band-limited by

@@ -75,6 +75,24 @@ bool IsValidPart(const ReliefPartOptions& part, double nearest_depth_mm, std::st
   return true;
 }
 
+// The blur of another outline is known for flat textures and one plane of focus.
+bool IsValidAperture(const SweepSimulationOptions& options, std::string* why) {
+  if (!options.aperture.IsValid(why)) return false;
+  if (options.aperture.IsRound()) return true;
+  const bool is_edge = options.target.kind == TargetKind::kPrintedEdge ||
+                       options.target.kind == TargetKind::kKnifeEdge;
+  if (options.camera.psf != Psf::kDisc)
+    return Fail(why, "aperture.blades is stated: the camera must have psf: disc");
+  if (options.pupil_law != PupilLaw::kUniform)
+    return Fail(why, "aperture.blades is stated: pupil_law must be stated as uniform");
+  if (is_edge || !options.target.relief.empty() || options.aberrations.DisplaceFocus()) {
+    return Fail(why,
+                "aperture.blades is stated: the target must be no edge and have no relief, and the "
+                "lens neither field curvature nor astigmatism");
+  }
+  return true;
+}
+
 // Parts hide the target, but not one another.
 bool IsValidRelief(const SweepSimulationOptions& options, std::string* why) {
   const std::vector<ReliefPartOptions>& parts = options.target.relief;
@@ -82,7 +100,7 @@ bool IsValidRelief(const SweepSimulationOptions& options, std::string* why) {
   const bool is_edge = options.target.kind == TargetKind::kPrintedEdge ||
                        options.target.kind == TargetKind::kKnifeEdge;
   if (is_edge || options.target.tilt_deg != 0 || options.aberrations.DisplaceFocus() ||
-      options.aberrations.distortion != 0) {
+      options.aberrations.distortion != 0 || options.aberrations.axial_colour_mm) {
     return Fail(why,
                 "target.relief is stated: the target must be no edge and have tilt_deg 0, and "
                 "the lens no aberrations");
@@ -215,6 +233,16 @@ bool SweepSimulationOptions::IsValid(std::string* why) const {
   if (!(frame_count >= 1 && frame_count <= 100000)) {
     return Fail(why, fmt::format("bench.frames is {}: it must be from 1 to 100000", frame_count));
   }
+  if (!(counts_per_mm >= 0) || !std::isfinite(counts_per_mm)) {
+    return Fail(why, fmt::format("bench.counts_per_mm is {}: it must be finite and > 0, or absent "
+                                 "for readings in mm",
+                                 counts_per_mm));
+  }
+  if (counts_per_mm > 0 && !MovesFocus(moves)) {
+    return Fail(why, fmt::format("bench.counts_per_mm is {}, but the {} moves: counts are those of "
+                                 "a drive of the lens or the sensor (bench.moves)",
+                                 counts_per_mm, SweepMotionName(moves)));
+  }
   const auto possible = [](double length_mm) { return length_mm > 0 && std::isfinite(length_mm); };
   const double thickness_mm = camera.lens.lens_thickness_mm;
   const double first_mm = ImageDistanceMm(0), last_mm = ImageDistanceMm(FarthestFrame());
@@ -291,6 +319,7 @@ bool SweepSimulationOptions::IsValid(std::string* why) const {
                 fmt::format("fixed_to_frame.speck_radius_px is {}: it must be from 0.5 to 1000",
                             speck_radius_px));
   }
+  if (!IsValidAperture(*this, why)) return false;
   if (!aberrations.IsValid(camera.lens, camera.focus_depth_mm(), why)) return false;
   if (!(band_amplitude >= 0 && band_amplitude <= 1)) {
     return Fail(why, fmt::format("bands.amplitude is {}: it must be from 0 to 1", band_amplitude));

@@ -114,7 +114,7 @@ void ReadStage(const YamlNode& node, StageOptions* stage) {
 
 void ReadBench(const YamlNode& node, SweepSimulationOptions* options) {
   node.RequireKeys({"moves", "first_depth_mm", "first_image_distance_mm", "step_mm", "frames",
-                    "offset_mm", "direction", "reading_sigma_mm", "stage"});
+                    "offset_mm", "direction", "reading_sigma_mm", "counts_per_mm", "stage"});
   if (const auto moves = node.Find("moves")) {
     options->moves = ReadNamed<SweepMotion>(
         *moves,
@@ -139,6 +139,8 @@ void ReadBench(const YamlNode& node, SweepSimulationOptions* options) {
   options->frame_count = node.At("frames").Integer(1, 100000);
   ReadNumber(node, "offset_mm", &options->bench_offset_mm);
   ReadNumber(node, "reading_sigma_mm", &options->reading_sigma_mm);
+  if (const auto counts = node.Find("counts_per_mm"))
+    options->counts_per_mm = counts->PositiveNumber();
   if (const auto stage = node.Find("stage")) ReadStage(*stage, &options->stage);
   if (const auto direction = node.Find("direction")) {
     options->direction = direction->OneOf({"away", "toward"}) == "away" ? BenchDirection::kAway
@@ -184,8 +186,8 @@ SweepSimulationOptions ReadSweepSimulation(const std::string& path) {
   const YamlNode root = YamlNode::LoadFile(path);
   root.RequireSchema(kSchema);
   root.RequireKeys({"schema", "camera", "truth", "size_px", "target", "bench", "light",
-                    "drift_sigma_px", "noise", "fixed_to_frame", "aberrations", "bands", "bits",
-                    "pupil_law", "effects", "without", "seed"});
+                    "drift_sigma_px", "noise", "fixed_to_frame", "aberrations", "aperture", "bands",
+                    "bits", "pupil_law", "effects", "without", "seed"});
   SweepSimulationOptions options;
   options.camera = ReadCamera(root.ResolvePath(root.At("camera").Text()));
   TakeOutDistortion(&options.camera, &options.notices);
@@ -198,6 +200,7 @@ SweepSimulationOptions ReadSweepSimulation(const std::string& path) {
   if (const auto noise = root.Find("noise")) ReadNoise(*noise, &options);
   if (const auto fixed = root.Find("fixed_to_frame")) ReadFixedToFrame(*fixed, &options);
   if (const auto lens = root.Find("aberrations")) options.aberrations = ReadAberrations(*lens);
+  if (const auto aperture = root.Find("aperture")) options.aperture = ReadAperture(*aperture);
   if (const auto bands = root.Find("bands")) ReadBands(*bands, &options);
   if (const auto bits = root.Find("bits")) options.bits = bits->Integer(8, 16);
   if (const auto law = root.Find("pupil_law")) {

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -92,6 +94,7 @@ struct FrameState {
   double defocus_sigma_px = 0;     // value of kappa r_defocus
   bool in_focus = false;           // true: without defocus
   bool is_bare = false;            // true: without blur floor and pixel box
+  double colour_per_mm = 0;        // ColourDisplacement of the light, 1/mm
 };
 
 }  // namespace
@@ -104,6 +107,7 @@ struct SweepSimulator::Impl {
     frames = FramesWith(decision.on);
     MakePupil();
     MakeTruth();
+    MakeOutline();
     MakeFalloff();
     MakeFixedToFrame();
     if (!IsEdge(options.target.kind)) MakeTile(image);
@@ -173,11 +177,41 @@ struct SweepSimulator::Impl {
            sensor.principal_point_px;
   }
 
+  // The displacement of a ray on the sensor per mm on Ap, with the plane of focus displaced by
+  // `colour_per_mm` (ColourDisplacement).
+  double Landing(double depth_mm, double image_distance_mm, double colour_per_mm) const {
+    const ThickLens& lens = options.camera.lens;
+    return DefocusPerAperture(lens, image_distance_mm, depth_mm) -
+           DefocusScaleMm(lens, image_distance_mm) * colour_per_mm;
+  }
   // Defocus sigma = kappa r_defocus, here in px.
-  double DefocusPx(double depth_mm, double image_distance_mm) const {
+  double DefocusPx(double depth_mm, double image_distance_mm, double colour_per_mm) const {
     const Camera& camera = options.camera;
-    return camera.blur_ratio() * BlurRadiusMm(camera.lens, image_distance_mm, depth_mm) /
-           camera.sensor.pixel_pitch_mm;
+    const double radius_mm =
+        colour_per_mm == 0 ? BlurRadiusMm(camera.lens, image_distance_mm, depth_mm)
+                           : camera.lens.aperture_radius_mm *
+                                 std::abs(Landing(depth_mm, image_distance_mm, colour_per_mm));
+    return camera.blur_ratio() * radius_mm / camera.sensor.pixel_pitch_mm;
+  }
+  bool IsInColour() const { return options.aberrations.axial_colour_mm.has_value(); }
+  bool DisplacesColours() const { return On(Effect::kAberrations) && On(Effect::kDefocus); }
+  // ColourDisplacement of each channel, 1/mm; of grey frames one, 0.
+  std::vector<double> ColoursPerMm(bool displaces) const {
+    if (!IsInColour()) return {0};
+    std::vector<double> colours(3, 0);
+    if (!displaces) return colours;
+    for (int c = 0; c < 3; ++c) {
+      colours[static_cast<std::size_t>(c)] =
+          ColourDisplacement(options.aberrations, options.camera.focus_depth_mm(), c);
+    }
+    return colours;
+  }
+  // The frame in another colour of light.
+  FrameState OfColour(FrameState frame, double colour_per_mm) const {
+    if (colour_per_mm == 0) return frame;
+    frame.colour_per_mm = colour_per_mm;
+    frame.defocus_sigma_px = DefocusPx(frame.depth_mm, frame.image_distance_mm, colour_per_mm);
+    return frame;
   }
   bool DisplacesFocus() const {
     return On(Effect::kAberrations) && On(Effect::kDefocus) && options.aberrations.DisplaceFocus();
@@ -185,26 +219,32 @@ struct SweepSimulator::Impl {
   double Distortion() const { return On(Effect::kDistortion) ? options.aberrations.distortion : 0; }
   // The defocus, px, of a light whose sigma on Ap is kappa r, as a matrix: DefocusPx for each
   // direction.
-  Eigen::Matrix2d DefocusMapPx(double depth_mm, double image_distance_mm,
+  Eigen::Matrix2d DefocusMapPx(double depth_mm, double image_distance_mm, double colour_per_mm,
                                const Eigen::Vector2d& from_axis_px) const {
     const Camera& camera = options.camera;
     const double sigma_px =
         camera.blur_ratio() * camera.lens.aperture_radius_mm / camera.sensor.pixel_pitch_mm;
-    return sigma_px * (DefocusPerAperture(camera.lens, image_distance_mm, depth_mm) *
-                           Eigen::Matrix2d::Identity() -
-                       DefocusScaleMm(camera.lens, image_distance_mm) *
-                           FocusDisplacement(options.aberrations, camera.focus_depth_mm(),
-                                             from_axis_px, FarthestCornerPx(camera.sensor)));
+    return sigma_px *
+           (Landing(depth_mm, image_distance_mm, colour_per_mm) * Eigen::Matrix2d::Identity() -
+            DefocusScaleMm(camera.lens, image_distance_mm) *
+                FocusDisplacement(options.aberrations, camera.focus_depth_mm(), from_axis_px,
+                                  FarthestCornerPx(camera.sensor)));
   }
   // The largest sigma of the defocus of a frame, over the field and all directions.
-  double MostDefocusPx(const FrameState& frame, bool displaces_focus) const {
+  double MostDefocusPx(const FrameState& grey, bool displaces_focus, bool displaces_colours) const {
+    double most_px = 0;
+    for (const double colour_per_mm : ColoursPerMm(displaces_colours))
+      most_px = std::max(most_px, MostDefocusOfPx(OfColour(grey, colour_per_mm), displaces_focus));
+    return most_px;
+  }
+  double MostDefocusOfPx(const FrameState& frame, bool displaces_focus) const {
     double most_px = frame.defocus_sigma_px;
     if (!displaces_focus) return most_px;
     const Eigen::Vector2d to_corner_px(FarthestCornerPx(options.camera.sensor), 0);
     for (const Eigen::Vector2d& place_px :
          {Eigen::Vector2d(0, 0), to_corner_px, Eigen::Vector2d(0, to_corner_px.x())}) {
       const Eigen::Matrix2d map_px =
-          DefocusMapPx(frame.depth_mm, frame.image_distance_mm, place_px);
+          DefocusMapPx(frame.depth_mm, frame.image_distance_mm, frame.colour_per_mm, place_px);
       most_px = std::max(most_px, map_px.cwiseAbs().rowwise().sum().maxCoeff());
     }
     return most_px;
@@ -225,8 +265,7 @@ struct SweepSimulator::Impl {
   // The target of a frame as seen by the columns around `x_px`, px from the axis.
   TiltedTarget SeenTarget(const FrameState& frame, double x_px) const {
     const double depth_mm = TargetOf(frame, frame.pixel_mm, decision.on).DepthMm(x_px);
-    return TargetOf(frame, frame.pixel_mm * SeenScale(depth_mm, frame.image_distance_mm),
-                    decision.on);
+    return TargetOf(frame, frame.pixel_mm * SeenScale(frame, depth_mm), decision.on);
   }
   bool IsTilted() const { return On(Effect::kTilt) && options.target.tilt_deg != 0; }
 
@@ -251,6 +290,8 @@ struct SweepSimulator::Impl {
         frame.reading_mm = options.stage.Written(
             frame.reading_mm + options.reading_sigma_mm * bench.Normal(), options.IsFalling(i), i);
       }
+      if (options.counts_per_mm > 0)
+        frame.reading_mm = std::round(options.counts_per_mm * frame.reading_mm);
       // The lamp is at the camera: the irradiance of the target is (zf/z)^2, 1 in the plane of
       // focus.
       const double falloff = options.lamp_falloff && on.Has(Effect::kLampFalloff)
@@ -270,7 +311,7 @@ struct SweepSimulator::Impl {
       frame.drift_mm.y() = drift_sigma_mm * drift.Normal();
       frame.pixel_mm = PixelMm(frame.depth_mm, frame.image_distance_mm, on);
       if (on.Has(Effect::kDefocus))
-        frame.defocus_sigma_px = DefocusPx(frame.depth_mm, frame.image_distance_mm);
+        frame.defocus_sigma_px = DefocusPx(frame.depth_mm, frame.image_distance_mm, 0);
       states.push_back(frame);
     }
     return states;
@@ -287,7 +328,7 @@ struct SweepSimulator::Impl {
     const double distance_mm = On(Effect::kThickness) ? camera.image_distance_mm() : scale_mm;
     double most_px = 0;
     for (const FrameState& frame : frames)
-      most_px = std::max(most_px, MostDefocusPx(frame, DisplacesFocus()));
+      most_px = std::max(most_px, MostDefocusPx(frame, DisplacesFocus(), DisplacesColours()));
     // Every frequency of a frame is at most one cycle per px on each axis.
     profile.emplace(
         law,
@@ -297,15 +338,14 @@ struct SweepSimulator::Impl {
     mean_per_landing = profile->mean_per_landing();
   }
   // Factor of the positions that a pixel sees at a depth, for the mean of its rays.
-  double SeenScale(double depth_mm, double image_distance_mm) const {
-    return 1 +
-           mean_per_landing * DefocusPerAperture(options.camera.lens, image_distance_mm, depth_mm);
+  double SeenScale(const FrameState& frame, double depth_mm) const {
+    return 1 + mean_per_landing * Landing(depth_mm, frame.image_distance_mm, frame.colour_per_mm);
   }
 
   // Root of the mean variance over both axes, at the principal point.
   double MeanDefocusPx(const FrameState& frame) const {
     if (!DisplacesFocus()) return frame.defocus_sigma_px;
-    return DefocusMapPx(frame.depth_mm, frame.image_distance_mm, {0, 0}).norm() / std::sqrt(2.0);
+    return DefocusMapPx(frame.depth_mm, frame.image_distance_mm, 0, {0, 0}).norm() / std::sqrt(2.0);
   }
 
   void MakeTruth() {
@@ -325,6 +365,7 @@ struct SweepSimulator::Impl {
     if (On(Effect::kShading)) truth.corner_stops = options.corner_stops;
     if (On(Effect::kDust)) truth.specks = options.speck_count;
     if (On(Effect::kAberrations)) truth.aberrations = options.aberrations;
+    truth.counts_per_mm = options.counts_per_mm;
     truth.aberrations.distortion = Distortion();
     if (On(Effect::kBands)) truth.band_amplitude = options.band_amplitude;
     if (On(Effect::kExposureDrift)) truth.exposure_drift_stops = options.exposure_drift_stops;
@@ -451,7 +492,7 @@ struct SweepSimulator::Impl {
     double nearest_pixel_mm = with_all.front().pixel_mm;
     const Eigen::Vector2d& axis_px = sensor.principal_point_px;
     for (const FrameState& frame : with_all) {
-      const double most_px = MostDefocusPx(frame, options.aberrations.DisplaceFocus());
+      const double most_px = MostDefocusPx(frame, options.aberrations.DisplaceFocus(), true);
       const double margin_px = std::min(3 * std::hypot(most_floor_px, most_px),
                                         std::min(sensor.width_px, sensor.height_px) / 4.0) +
                                1;
@@ -489,9 +530,30 @@ struct SweepSimulator::Impl {
                               options.frame_count));
     }
     const FrameState& frame = frames[static_cast<std::size_t>(frame_index)];
-    LinearImage image = RenderFrame(frame);
-    for (std::size_t i = 0; i < light_of_pixel.size(); ++i) image.values[i] *= light_of_pixel[i];
-    if (On(Effect::kBands) && options.band_amplitude > 0) AddBands(frame.band_phase, &image);
+    const std::vector<double> colours = ColoursPerMm(DisplacesColours());
+    std::vector<LinearImage> channels;
+    for (const double colour_per_mm : colours) {
+      if (!channels.empty() && colour_per_mm == colours[channels.size() - 1]) {
+        channels.push_back(channels.back());
+        continue;
+      }
+      LinearImage image = RenderFrame(OfColour(frame, colour_per_mm));
+      for (std::size_t i = 0; i < light_of_pixel.size(); ++i) image.values[i] *= light_of_pixel[i];
+      if (On(Effect::kBands) && options.band_amplitude > 0) AddBands(frame.band_phase, &image);
+      channels.push_back(std::move(image));
+    }
+    return Interleaved(std::move(channels));
+  }
+
+  // One image with the channels of several, which have one channel each.
+  static LinearImage Interleaved(std::vector<LinearImage> channels) {
+    if (channels.size() == 1) return std::move(channels[0]);
+    LinearImage image{
+        channels[0].width_px, channels[0].height_px, static_cast<int>(channels.size()), {}};
+    image.values.reserve(channels.size() * channels[0].values.size());
+    for (std::size_t i = 0; i < channels[0].values.size(); ++i) {
+      for (const LinearImage& channel : channels) image.values.push_back(channel.values[i]);
+    }
     return image;
   }
 
@@ -528,12 +590,36 @@ struct SweepSimulator::Impl {
   // Sigma of the defocus, and below the light, of a column at a depth.
   double SeenDefocusPx(const FrameState& frame, double depth_mm) const {
     if (frame.in_focus) return 0;
-    return IsTilted() && On(Effect::kDefocus) ? DefocusPx(depth_mm, frame.image_distance_mm)
-                                              : frame.defocus_sigma_px;
+    return IsTilted() && On(Effect::kDefocus)
+               ? DefocusPx(depth_mm, frame.image_distance_mm, frame.colour_per_mm)
+               : frame.defocus_sigma_px;
   }
   double LampAt(const FrameState& frame, double depth_mm) const {
     const bool falls = options.lamp_falloff && On(Effect::kLampFalloff);
     return frame.lamp * (falls ? std::pow(frame.depth_mm / depth_mm, 2) : 1);
+  }
+
+  // The transfer function of an aperture that is not round. A ray through A lands at -A c(z)/p in
+  // the picture: points nearer than the plane of focus show the outline turned by half a turn.
+  std::function<std::complex<double>(const Eigen::Vector2d&)> ShapeOf(const FrameState& frame,
+                                                                      double depth_mm) const {
+    if (outline.empty() || frame.in_focus) return {};
+    const double sigma_px =
+        std::copysign(SeenDefocusPx(frame, depth_mm),
+                      Landing(depth_mm, frame.image_distance_mm, frame.colour_per_mm));
+    return [this, sigma_px](const Eigen::Vector2d& f) {
+      return PolygonTransfer(outline, outline_moments, -sigma_px * f);
+    };
+  }
+
+  // The outline of the aperture, scaled to a sigma of 1.
+  void MakeOutline() {
+    if (options.aperture.IsRound() || !On(Effect::kApertureShape) || !On(Effect::kDefocus)) return;
+    outline = options.aperture.Corners();
+    const PolygonMoments moments = MomentsOf(outline);
+    for (Eigen::Vector2d& corner : outline) corner = (corner - moments.centroid) / moments.Sigma();
+    outline_moments = MomentsOf(outline);
+    truth.aperture = options.aperture;
   }
 
   // Columns `first` .. `last` of a grid of pixels with the blur and the scale at the column
@@ -558,11 +644,12 @@ struct SweepSimulator::Impl {
     }
     const AxisSampling y{(grid.YPx(0) * down_mm + beside_mm.y()) / tile_frame.height_mm,
                          grid.step_px * down_mm / tile_frame.height_mm, grid.rows};
+    const double depth_mm = target.DepthMm(node_px);
     return tile_texture->Evaluate(
         x, y,
-        {frame.is_bare ? 0 : floor_px, stored_camera.psf,
-         SeenDefocusPx(frame, target.DepthMm(node_px)), !frame.is_bare && On(Effect::kPixelBox),
-         profile ? &*profile : nullptr, 1 / grid.step_px});
+        {frame.is_bare ? 0 : floor_px, stored_camera.psf, SeenDefocusPx(frame, depth_mm),
+         !frame.is_bare && On(Effect::kPixelBox), profile ? &*profile : nullptr, 1 / grid.step_px,
+         ShapeOf(frame, depth_mm)});
   }
 
   // The light of a grid of pixels of a texture, without the factors of each pixel, CV_64F.
@@ -622,7 +709,7 @@ struct SweepSimulator::Impl {
     part.lamp = LampAt(frame, part.depth_mm);
     part.pixel_mm = PixelMm(part.depth_mm, part.image_distance_mm, decision.on);
     if (On(Effect::kDefocus))
-      part.defocus_sigma_px = DefocusPx(part.depth_mm, part.image_distance_mm);
+      part.defocus_sigma_px = DefocusPx(part.depth_mm, part.image_distance_mm, 0);
     part.is_bare = true;
     return part;
   }
@@ -706,7 +793,7 @@ struct SweepSimulator::Impl {
         const double depth_mm = TargetOf(frame, frame.pixel_mm, decision.on)
                                     .DepthMm(std::clamp(from_axis_px.x(), pixels.first_px.x(),
                                                         pixels.XPx(pixels.columns - 1)));
-        return DefocusMapPx(depth_mm, frame.image_distance_mm, from_axis_px);
+        return DefocusMapPx(depth_mm, frame.image_distance_mm, frame.colour_per_mm, from_axis_px);
       };
       light = Blurred(light, fine.step_px,
                       {stored_camera.psf, profile ? &*profile : nullptr, map_px, floor_px});
@@ -734,7 +821,7 @@ struct SweepSimulator::Impl {
         high_px = high_px.cwiseMax(place_px);
       }
     }
-    const double reach_px = DisplacesFocus() ? kBlurReach * MostDefocusPx(frame, true) : 0;
+    const double reach_px = DisplacesFocus() ? kBlurReach * MostDefocusOfPx(frame, true) : 0;
     const double border = kFineBorder + std::ceil(reach_px / kFinePx);
     // Whole steps from the first pixel, so that pixels of an undistorted image are samples.
     const Eigen::Vector2d before = ((pixels.first_px - low_px) / kFinePx).array().ceil() + border;
@@ -817,6 +904,8 @@ struct SweepSimulator::Impl {
   PupilLaw law = PupilLaw::kUniform;
   std::optional<PupilProfile> profile;  // none for the uniform law, whose blur is that of the PSF
   double mean_per_landing = 0;
+  std::vector<Eigen::Vector2d> outline;  // of sigma 1; empty: a round aperture
+  PolygonMoments outline_moments;
   std::vector<float> light_of_pixel;  // empty without fall-off
   std::vector<FrameState> frames;
   SweepTruth truth;

@@ -146,6 +146,12 @@ KindTrial RunOne(const Kind& kind, const model::SweepSimulationOptions& options)
   if (model::MovesFocus(options.moves)) simulated.sweep.moves = options.moves;
   if (!kind.gives_offset) simulated.sweep.offset_mm.reset();
   if (kind.reading_sigma_mm) simulated.sweep.reading_sigma_mm = *kind.reading_sigma_mm;
+  if (options.counts_per_mm > 0) {
+    constexpr double kStatedSigmaMm = 0.5;
+    simulated.sweep.stated_focus = {{model::ConjugateKind::kFocusDepth,
+                                     {simulated.truth.focus_depth_mm, kStatedSigmaMm},
+                                     "focus_depth_mm"}};
+  }
   if (!kind.measures_floor) testing::GiveDrawnFloor(&simulated, options.seed);
   KindTrial result;
   result.seed = options.seed;

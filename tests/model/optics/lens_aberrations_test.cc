@@ -81,5 +81,26 @@ TEST(LensAberrations, ImpossibleOnesAreNamed) {
   EXPECT_TRUE(aberrations.IsValid(lens, kFocusMm, nullptr));
 }
 
+TEST(LensAberrations, AxialColourDisplacesTheFocusOfAColour) {
+  LensAberrations aberrations;
+  EXPECT_EQ(ColourDisplacement(aberrations, kFocusMm, 0), 0);
+  aberrations.axial_colour_mm.emplace(4, 0, -2);
+  EXPECT_FALSE(aberrations.DisplaceFocus());
+  EXPECT_NEAR(1 / (1 / kFocusMm + ColourDisplacement(aberrations, kFocusMm, 0)), kFocusMm + 4,
+              1e-9);
+  EXPECT_EQ(ColourDisplacement(aberrations, kFocusMm, 1), 0);
+  EXPECT_NEAR(1 / (1 / kFocusMm + ColourDisplacement(aberrations, kFocusMm, 2)), kFocusMm - 2,
+              1e-9);
+  const ThickLens lens{50, 50, 0, 8};
+  EXPECT_TRUE(aberrations.IsValid(lens, kFocusMm, nullptr));
+  std::string why;
+  aberrations.axial_colour_mm.emplace(0, 0, -kFocusMm + 40);
+  EXPECT_FALSE(aberrations.IsValid(lens, kFocusMm, &why));
+  EXPECT_THAT(why, HasSubstr("in focus at 40 mm"));
+  aberrations.axial_colour_mm.emplace(0, std::nan(""), 0);
+  EXPECT_FALSE(aberrations.IsValid(lens, kFocusMm, &why));
+  EXPECT_THAT(why, HasSubstr("axial_colour_mm"));
+}
+
 }  // namespace
 }  // namespace thicklens::model

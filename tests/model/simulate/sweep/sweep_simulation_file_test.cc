@@ -123,7 +123,7 @@ TEST_F(SweepSimulationFileTest, ReadsEveryField) {
       "drift_sigma_px: 1.25\n"
       "fixed_to_frame: {corner_stops: -1.5, specks: 12, speck_depth: 0.6, speck_radius_px: 7}\n"
       "aberrations: {field_curvature_mm: -3, field_astigmatism_mm: 2.5, astigmatism_mm: 1.5,\n"
-      "              distortion: -0.04}\n"
+      "              distortion: -0.04, axial_colour_mm: [2.5, 0, -1]}\n"
       "bands: {amplitude: 0.15, period_px: 24.5, wave: square, along: columns}\n"
       "noise: {full_well_electrons: 9000, read_noise_electrons: 5}\n"
       "bits: 16\n"
@@ -132,6 +132,8 @@ TEST_F(SweepSimulationFileTest, ReadsEveryField) {
   EXPECT_EQ(options.aberrations.field_astigmatism_mm, 2.5);
   EXPECT_EQ(options.aberrations.astigmatism_mm, 1.5);
   EXPECT_EQ(options.aberrations.distortion, -0.04);
+  ASSERT_TRUE(options.aberrations.axial_colour_mm);
+  EXPECT_EQ(*options.aberrations.axial_colour_mm, Eigen::Vector3d(2.5, 0, -1));
   EXPECT_EQ(options.corner_stops, -1.5);
   EXPECT_EQ(options.speck_count, 12);
   EXPECT_TRUE(options.stage.there_and_back);
@@ -260,6 +262,11 @@ TEST_F(SweepSimulationFileTest, ErrorsHaveTheirPlaceInTheFile) {
       {head + kTruth + rest + "noise: {read_noise_electrons: 3}\n", "needs noise.full_well"},
       {head + kTruth + rest + "fixed_to_frame: {corner_stops: -7}\n", "must be from -6 to 2"},
       {head + kTruth + rest + "aberrations: {distortion: -0.2}\n", "must be from -0.14 to 0.3"},
+      {head + kTruth + rest + "aberrations: {axial_colour_mm: [1, 2]}\n", "a list of 3"},
+      {head + kTruth + rest + "aberrations: {axial_colour_mm: [0, 0, -280]}\n", "in focus at 20"},
+      {head + kTruth + kTarget +
+           "bench: {first_depth_mm: 290, step_mm: 1, frames: 21, counts_per_mm: 100}\n",
+       "bench.counts_per_mm is 100, but the target moves"},
       {head + kTruth + rest + "fixed_to_frame: {speck_depth: 2}\n", "must be from 0 to 1"},
       {head + kTruth + rest + "fixed_to_frame: {specks: -1}\n", "specks"},
       {head + kTruth + kTarget +

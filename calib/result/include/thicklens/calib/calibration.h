@@ -210,7 +210,8 @@ struct FieldMap {
   std::vector<DepthCluster> clusters;  // a single cluster: the target is at one depth
 };
 
-// Result of a fit to one colour channel.
+// Result of a fit to one colour channel. The errors are those of the differences between colours:
+// they do not contain what all colours share, the errors of readings and bench offset.
 struct ChannelFocus {
   std::string name;                 // "red", "green", "blue"
   bool done = false;                // true if the channel was fitted

@@ -2,6 +2,7 @@
 #define THICKLENS_MODEL_LENS_ABERRATIONS_H_
 
 #include <Eigen/Core>
+#include <optional>
 #include <string>
 
 #include "thicklens/base/export.h"
@@ -25,8 +26,13 @@ struct LensAberrations {
   // Relative displacement of the image point of that corner away from the axis, dimensionless;
   // negative: barrel. A point at the distance r is displaced by distortion r rho^2.
   double distortion = 0;
+  // zf of red, green and blue light minus zf, mm, everywhere in the field. The sensor is where it
+  // is, so that K and the size of the image are the same for all colours. Present: frames in
+  // colour; absent: in grey.
+  std::optional<Eigen::Vector3d> axial_colour_mm;
 
-  // Whether any of them but the distortion differs from 0.
+  // Whether any of those that depend on direction or place in the field differs from 0. The
+  // distortion displaces no focus, and the axial colour is the same everywhere.
   bool DisplaceFocus() const {
     return field_curvature_mm != 0 || field_astigmatism_mm != 0 || astigmatism_mm != 0;
   }
@@ -47,6 +53,12 @@ THICKLENS_EXPORT Eigen::Matrix2d FocusDisplacement(const LensAberrations& aberra
                                                    double focus_depth_mm,
                                                    const Eigen::Vector2d& from_axis_px,
                                                    double farthest_corner_px);
+
+// The displacement of the plane of focus by axial colour, 1/mm, of red (0), green (1) or blue (2)
+// light: 1/(zf + axial_colour_mm) - 1/zf, as a multiple of the identity in FocusDisplacement.
+// 0 without axial colour.
+THICKLENS_EXPORT double ColourDisplacement(const LensAberrations& aberrations,
+                                           double focus_depth_mm, int colour);
 
 // The position that a lens without distortion would give to a position of the image. Both are in px
 // from the axis.

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "thicklens/base/export.h"
+#include "thicklens/model/aperture_outline.h"
 #include "thicklens/model/camera.h"
 #include "thicklens/model/effect_selection.h"
 #include "thicklens/model/lens_aberrations.h"
@@ -198,7 +199,11 @@ THICKLENS_EXPORT std::vector<std::string> ImagesOfFolder(const std::string& fold
 
 // The YAML text of a sweep. Paths in `sweep` are written unchanged; they should therefore be
 // relative to the folder of the written file.
+// Readings in counts are in a table beside that file, "readings.csv" (ReadingsTable).
 THICKLENS_EXPORT std::string SweepToYaml(const SweepFile& sweep);
+// The table of the readings of a sweep whose images are in one folder: name of the image and
+// reading, in mm or in counts.
+THICKLENS_EXPORT std::string ReadingsTable(const SweepFile& sweep);
 
 // Parameters with which a sweep was simulated, schema thicklens/sweep-truth/1.
 struct SweepTruth {
@@ -213,6 +218,8 @@ struct SweepTruth {
   double corner_stops = 0;          // shading: light at the farthest corner over the axis, stops
   int specks = 0;                   // number of specks on the sensor
   LensAberrations aberrations;      // of the lens, all 0 if there are none
+  ApertureOutline aperture;         // outline of the aperture
+  double counts_per_mm = 0;         // counts of the readings per mm; 0: the readings are in mm
   double band_amplitude = 0;        // relative amplitude of the bands of the light
   double exposure_drift_stops = 0;  // change of the exposure over the sweep, stops
   std::string pupil_law;            // PupilLawName; empty: not stated
@@ -220,9 +227,9 @@ struct SweepTruth {
   struct Frame {
     std::string image;      // file name of the frame
     double depth_mm = 0;    // true z from Ap
-    double reading_mm = 0;  // the reading of the bench with its error
+    double reading_mm = 0;  // the reading with its error; a count where counts_per_mm > 0
     // Second-moment sigma of the blur, sqrt(floor^2 + (kappa r_defocus/p)^2), without the pixel
-    // box.
+    // box. With axial colour it is that of light whose zf is focus_depth_mm.
     double blur_sigma_px = 0;
     double image_distance_mm = 0;  // d1, from Ap to the sensor; 0: that of the sweep
   };

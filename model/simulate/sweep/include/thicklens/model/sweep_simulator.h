@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "thicklens/base/export.h"
+#include "thicklens/model/aperture_outline.h"
 #include "thicklens/model/camera.h"
 #include "thicklens/model/effect_selection.h"
 #include "thicklens/model/lens_aberrations.h"
@@ -119,7 +120,10 @@ struct SweepSimulationOptions {
   double bench_offset_mm = 0;          // z (or d1) = offset + reading, or offset - reading
   BenchDirection direction = BenchDirection::kAway;  // sign of the reading in z (or d1)
   double reading_sigma_mm = 0;                       // sd of the error of each written reading
-  StageOptions stage;                                // order of the positions; systematic errors
+  // > 0: the readings are whole counts of a drive of the lens or the sensor, so many per mm, and
+  // count 0 is at the offset. 0: they are in mm.
+  double counts_per_mm = 0;
+  StageOptions stage;  // order of the positions; systematic errors
 
   double light_level = 0.5;         // mean linear grey at the plane of focus, of full scale
   bool lamp_falloff = true;         // the irradiance of the target is proportional to (zf/z)^2
@@ -135,9 +139,14 @@ struct SweepSimulationOptions {
   int speck_count = 0;         // number of specks on the sensor
   double speck_depth = 0.4;    // part of the light that a speck takes, 0 to 1
   double speck_radius_px = 9;  // radius of the largest speck, px
-  // Field curvature, astigmatism and distortion of the lens. The plane of focus of the camera is
-  // the medial focus on the axis. Distortion displaces the blurred image of a lens without it.
+  // Field curvature, astigmatism, distortion and axial colour of the lens. The plane of focus of
+  // the camera is the medial focus on the axis. Distortion displaces the blurred image of a lens
+  // without it. With axial colour the frames have three channels, of equal light.
   LensAberrations aberrations;
+  // The outline of the aperture; other than round ones need a camera whose PSF is a disc, the
+  // uniform pupil law and a flat texture, and a lens without field curvature and astigmatism. Its
+  // size is such that the second moment of the light is (kappa r)^2.
+  ApertureOutline aperture;
   // Bands of the light in rows or columns: a lamp that flickers while the shutter rolls. The phase
   // is another one in each frame.
   double band_amplitude = 0;        // relative, 0 to 1; 0: none
@@ -180,13 +189,13 @@ THICKLENS_EXPORT EffectSet SweepEffects();
 // is not valid.
 THICKLENS_EXPORT SweepSimulationOptions ReadSweepSimulation(const std::string& path);
 
-// A bench sweep of a flat target, frame by frame, in grey. Each frame shows the target at its depth
-// through the exact transfer functions of defocus, blur floor and pixel box, at the image scale of
-// its chief rays. Each effect can be left out. Textures are periodic and band-limited by
-// definition: beyond the tile a frame sees its repetition. Edges have a closed form. Each column of
-// a tilted target is at its own depth, within about 0.01 px of its blur and position. Parts of a
-// relief have the scale and the blur of their own depths, and hide what is behind them from a part
-// of the aperture.
+// A bench sweep of a flat target, frame by frame, in grey or, with axial colour, in RGB. Each frame
+// shows the target at its depth through the exact transfer functions of defocus, blur floor and
+// pixel box, at the image scale of its chief rays. Each effect can be left out. Textures are
+// periodic and band-limited by definition: beyond the tile a frame sees its repetition. Edges have
+// a closed form. Each column of a tilted target is at its own depth, within about 0.01 px of its
+// blur and position. Parts of a relief have the scale and the blur of their own depths, and hide
+// what is behind them from a part of the aperture.
 class THICKLENS_EXPORT SweepSimulator {
  public:
   // `target_image` is linear light; only kImage uses it. Throws Error if the options are not

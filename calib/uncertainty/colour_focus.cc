@@ -1,0 +1,95 @@
+#include "calib/uncertainty/colour_focus.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "calib/uncertainty/systematic_advice.h"
+#include "thicklens/model/camera.h"
+
+namespace thicklens::calib {
+namespace {
+
+constexpr std::size_t kColours = 3;
+constexpr double kLargestChi2 = 16;  // of two degrees of freedom
+
+bool AreMeasured(const std::vector<ChannelFocus>& channels) {
+  return channels.size() == kColours &&
+         std::all_of(channels.begin(), channels.end(),
+                     [](const ChannelFocus& channel) { return channel.done; });
+}
+
+double Chi2(const std::vector<ChannelFocus>& channels, model::Estimate ChannelFocus::*value) {
+  double weights = 0, mean = 0, chi2 = 0;
+  for (const ChannelFocus& channel : channels) {
+    const model::Estimate& of = channel.*value;
+    const double weight = 1 / std::pow(std::max(of.sigma, 1e-12), 2);
+    weights += weight;
+    mean += weight * of.value;
+  }
+  mean /= weights;
+  for (const ChannelFocus& channel : channels) {
+    const model::Estimate& of = channel.*value;
+    chi2 += std::pow((of.value - mean) / std::max(of.sigma, 1e-12), 2);
+  }
+  return chi2;
+}
+
+}  // namespace
+
+model::Estimate RatioOfColour(const model::Estimate& fitted, double colour_focus_mm,
+                              double grey_focus_mm, const model::ThickLens& lens) {
+  const auto scale_mm = [&lens](double focus_mm) {
+    return model::DefocusScaleMm(lens, model::ImageDistanceMm(lens, focus_mm));
+  };
+  const double factor = scale_mm(colour_focus_mm) / scale_mm(grey_focus_mm);
+  return {factor * fitted.value, factor * fitted.sigma};
+}
+
+bool ColoursDiffer(const std::vector<ChannelFocus>& channels) {
+  return AreMeasured(channels) && (Chi2(channels, &ChannelFocus::focus_depth_mm) > kLargestChi2 ||
+                                   Chi2(channels, &ChannelFocus::blur_ratio) > kLargestChi2);
+}
+
+std::string ColoursInWords(const Calibration& calibration) {
+  const std::vector<ChannelFocus>& channels = calibration.diagnostics.channels;
+  if (!ColoursDiffer(channels)) return "";
+  std::string colours;
+  for (const ChannelFocus& channel : channels) {
+    colours += fmt::format("{}{} at {:.2f} +- {:.2f} mm with the blur ratio {:.4f} +- {:.4f}",
+                           colours.empty() ? "" : ", ", channel.name, channel.focus_depth_mm.value,
+                           channel.focus_depth_mm.sigma, channel.blur_ratio.value,
+                           channel.blur_ratio.sigma);
+  }
+  return fmt::format(
+      "the colours come into focus differently: {}. The results are those of grey (0.2126 R + "
+      "0.7152 G + 0.0722 B), and their intervals contain the spread of the colours. The lens has "
+      "axial colour, or parts of the target with different colours are at different depths",
+      colours);
+}
+
+void WidenByColours(const model::ThickLens& lens, Calibration* calibration) {
+  const std::vector<ChannelFocus>& channels = calibration->diagnostics.channels;
+  const auto& zf = calibration->summary.focus_depth_mm;
+  const auto& ratio = calibration->summary.blur_ratio;
+  if (!zf || !ratio || !ColoursDiffer(channels)) return;
+  double squares_mm2 = 0, ratio_move = 0, ratio_variance = 0;
+  for (std::size_t c = 0; c < kColours; ++c) {
+    const model::Estimate& focus = channels[c].focus_depth_mm;
+    squares_mm2 +=
+        kGreyWeights[c] * (std::pow(focus.value - zf->value, 2) - std::pow(focus.sigma, 2));
+    ratio_move += kGreyWeights[c] * (channels[c].blur_ratio.value - ratio->value);
+    ratio_variance += std::pow(kGreyWeights[c] * channels[c].blur_ratio.sigma, 2);
+  }
+  const double spread_mm = std::sqrt(std::max(0.0, squares_mm2));
+  const double reach = 2 * std::sqrt(ratio_variance);
+  WidenFocusAndRatio("axial colour", {-spread_mm, spread_mm},
+                     {std::min(0.0, ratio_move - reach), std::max(0.0, ratio_move + reach)},
+                     "calibrate frames of one colour: photograph the sweep in the light of that "
+                     "colour, or give one channel as grey frames",
+                     lens, calibration);
+}
+
+}  // namespace thicklens::calib

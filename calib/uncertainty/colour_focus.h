@@ -1,0 +1,36 @@
+#ifndef THICKLENS_CALIB_UNCERTAINTY_COLOUR_FOCUS_H_
+#define THICKLENS_CALIB_UNCERTAINTY_COLOUR_FOCUS_H_
+
+#include <string>
+#include <vector>
+
+#include "thicklens/calib/calibration.h"
+#include "thicklens/model/thick_lens.h"
+
+namespace thicklens::calib {
+
+// Part of red, green and blue in the grey that is calibrated.
+inline constexpr double kGreyWeights[] = {0.2126, 0.7152, 0.0722};
+
+// [D178] kappa of a colour for the sensor where it is. The fit of a colour takes D, and with it
+// K = f1 D/f2, from the zf of that colour and the focal length of the camera. The sensor has one D
+// for all colours, and it is the focal length that differs: kappa K is what the frames show, so
+// that kappa is the fitted one times K(zf of the colour)/K(zf of grey).
+model::Estimate RatioOfColour(const model::Estimate& fitted, double colour_focus_mm,
+                              double grey_focus_mm, const model::ThickLens& lens);
+
+// Whether the colours come into focus at different depths, or have different blur ratios, beyond
+// their errors: chi^2 of three values about their mean above 16, whose probability for equal
+// colours is 3e-4.
+bool ColoursDiffer(const std::vector<ChannelFocus>& channels);
+
+// The in-focus object distances of colours that differ, in words; empty if they do not.
+std::string ColoursInWords(const Calibration& calibration);
+
+// Adds what colours that differ leave open: zf is that of grey, with a part for the spread of the
+// colours, weighed as in grey; kappa has one for the difference of the mean of the colours.
+void WidenByColours(const model::ThickLens& lens, Calibration* calibration);
+
+}  // namespace thicklens::calib
+
+#endif  // THICKLENS_CALIB_UNCERTAINTY_COLOUR_FOCUS_H_

@@ -1,0 +1,73 @@
+// What colours that come into focus at different depths change in the results.
+#include "calib/uncertainty/colour_focus.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace thicklens::calib {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+Calibration Found(const Eigen::Vector3d& focus_mm, double sigma_mm) {
+  Calibration found;
+  found.summary.focus_depth_mm = Result{300.4, 0.05, Eigen::Vector2d(300.4, 300.4)};
+  found.summary.image_distance_mm = Result{60, 0.002, Eigen::Vector2d(60, 60)};
+  found.summary.blur_ratio = Result{0.45, 0.001, Eigen::Vector2d(0.45, 0.45)};
+  const char* const names[] = {"red", "green", "blue"};
+  for (int c = 0; c < 3; ++c) {
+    ChannelFocus channel;
+    channel.name = names[c];
+    channel.done = true;
+    channel.focus_depth_mm = {focus_mm[c], sigma_mm};
+    channel.blur_ratio = {0.45, 0.001};
+    found.diagnostics.channels.push_back(channel);
+  }
+  return found;
+}
+
+// The sensor stays: K = f D/f of all colours is that of grey, while a fit with the camera's f takes
+// f zf/(zf - f) of the colour.
+TEST(ColourFocus, TheRatioIsThatOfTheSensorWhereItIs) {
+  const model::ThickLens lens{50, 50, 0, 9};
+  const model::Estimate ratio = RatioOfColour({0.45, 0.01}, 310, 300, lens);
+  EXPECT_NEAR(ratio.value, 0.45 * (50 * 310.0 / 260) / (50 * 300.0 / 250), 1e-12);
+  EXPECT_NEAR(ratio.sigma, 0.01 * ratio.value / 0.45, 1e-12);
+  EXPECT_DOUBLE_EQ(RatioOfColour({0.45, 0.01}, 300, 300, lens).value, 0.45);
+}
+
+TEST(ColourFocus, EqualColoursChangeNothing) {
+  Calibration found = Found({300.5, 300.4, 300.3}, 0.1);
+  EXPECT_FALSE(ColoursDiffer(found.diagnostics.channels));
+  EXPECT_THAT(ColoursInWords(found), IsEmpty());
+  WidenByColours({50, 50, 0, 9}, &found);
+  EXPECT_THAT(found.diagnostics.systematic_parts, IsEmpty());
+  EXPECT_EQ(found.summary.focus_depth_mm->systematic, Eigen::Vector2d(300.4, 300.4));
+}
+
+// The root mean square of 2, 0 and -1 mm about 300.4 mm, weighed as in grey.
+TEST(ColourFocus, TheIntervalOfFocusHasTheSpreadOfTheColours) {
+  Calibration found = Found({302, 300, 299}, 0.01);
+  EXPECT_TRUE(ColoursDiffer(found.diagnostics.channels));
+  EXPECT_THAT(ColoursInWords(found), HasSubstr("red at 302.00 +- 0.01 mm"));
+  WidenByColours({50, 50, 0, 9}, &found);
+  ASSERT_EQ(found.diagnostics.systematic_parts.size(), 1U);
+  EXPECT_EQ(found.diagnostics.systematic_parts[0].name, "axial colour");
+  const double spread_mm =
+      std::sqrt(0.2126 * 1.6 * 1.6 + 0.7152 * 0.4 * 0.4 + 0.0722 * 1.4 * 1.4 - 1e-4);
+  EXPECT_NEAR(found.summary.focus_depth_mm->systematic->x(), 300.4 - spread_mm, 1e-9);
+  EXPECT_NEAR(found.summary.focus_depth_mm->systematic->y(), 300.4 + spread_mm, 1e-9);
+  EXPECT_LT(found.summary.blur_ratio->systematic->x(), 0.45);
+}
+
+// A colour that could not be measured is no reason for a statement.
+TEST(ColourFocus, ColoursThatWereNotMeasuredSayNothing) {
+  Calibration found = Found({302, 300, 299}, 0.01);
+  found.diagnostics.channels[2].done = false;
+  EXPECT_FALSE(ColoursDiffer(found.diagnostics.channels));
+  EXPECT_THAT(ColoursInWords(found), IsEmpty());
+}
+
+}  // namespace
+}  // namespace thicklens::calib
