@@ -51,7 +51,8 @@ struct RelativeBlur {
   Eigen::Matrix2Xd shifts_px;     // t
   Eigen::VectorXd noise_ratio;    // scatter about the fit over what the pixel noise explains
   // Power of the scatter about the fit over that of the sample's own spectrum: the mean of rings of
-  // |nu| with equally many modes. 0: the fit describes the sample; near 1: it shows something else.
+  // |nu| with equally many modes. Near 0, the fit describes the sample; near 1, the sample shows
+  // another image.
   Eigen::VectorXd misfit;
   std::vector<int> modes_used;  // number of modes of each sample
   double chi2_per_dof = 0;      // all samples, relative to the pixel noise

@@ -28,7 +28,7 @@ bool ColoursDiffer(const std::vector<ChannelFocus>& channels);
 std::string ColoursInWords(const Calibration& calibration);
 
 // Adds what colours that differ leave open: zf is that of grey, with a part for the spread of the
-// colours, weighed as in grey; kappa has one for the difference of the mean of the colours.
+// colours, weighted as in grey; kappa has one for the difference of the mean of the colours.
 void WidenByColours(const model::ThickLens& lens, Calibration* calibration);
 
 }  // namespace thicklens::calib

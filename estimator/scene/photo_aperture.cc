@@ -32,10 +32,10 @@ constexpr double kShareStep = 0.1;
 constexpr std::size_t kWhole = 10;  // index of the share 1
 double ShareAt(std::size_t i) { return static_cast<double>(i) * kShareStep; }
 // The most that one tile says for one share against another.
-constexpr double kMostOfTile = 4;
+constexpr double kMaxOfTile = 4;
 // Overlapping tiles repeat half of each other.
 constexpr double kOverlapWeight = 0.5;
-constexpr std::size_t kFewTiles = 150, kMostTiles = 128;
+constexpr std::size_t kFewTiles = 150, kMaxTiles = 128;
 constexpr int kPartsAlong = 4;
 // Fewer tiles do not show what is usual in the photograph.
 constexpr int kMinTiles = 6;
@@ -53,9 +53,9 @@ constexpr double kLikelier = 3;
 // Less than the whole aperture by so little is not worth it.
 constexpr double kNearlyWhole = 0.85;
 // The largest share that may be none, however uncertain it is.
-constexpr double kMostOfSharp = 0.45;
+constexpr double kMaxOfSharp = 0.45;
 // The largest uncertainty of a share that is used.
-constexpr double kMostSigma = 0.15;
+constexpr double kMaxSigma = 0.15;
 
 // The image on which the share is measured: grey, of at most a million pixels.
 struct Looked {
@@ -132,7 +132,7 @@ ShareFit FitShare(const TileCosts& tiles, const std::function<bool(std::size_t)>
     for (std::size_t i = 0; i < tiles.costs.size(); ++i) {
       if (!is_used(i)) continue;
       for (std::size_t s = 0; s < kShares; ++s) {
-        sums[s] += tiles.weight * std::min(kMostOfTile, tiles.costs[i][blur][s] - tiles.lowest[i]);
+        sums[s] += tiles.weight * std::min(kMaxOfTile, tiles.costs[i][blur][s] - tiles.lowest[i]);
       }
     }
     for (std::size_t s = 0; s < kShares; ++s) line[s] = std::min(line[s], sums[s]);
@@ -190,10 +190,9 @@ class Measurement {
     std::stable_sort(tiles_.begin(), tiles_.end(), [](const PhotoTile& a, const PhotoTile& b) {
       return RmsOf(a.disparity) > RmsOf(b.disparity);
     });
-    if (tiles_.size() > kMostTiles) {
-      for (std::size_t i = 0; i < kMostTiles; ++i)
-        tiles_[i] = tiles_[i * tiles_.size() / kMostTiles];
-      tiles_.resize(kMostTiles);
+    if (tiles_.size() > kMaxTiles) {
+      for (std::size_t i = 0; i < kMaxTiles; ++i) tiles_[i] = tiles_[i * tiles_.size() / kMaxTiles];
+      tiles_.resize(kMaxTiles);
     }
   }
 
@@ -222,7 +221,7 @@ class Measurement {
       largest = std::max(largest, std::abs(static_cast<double>(value)));
     Tried& tried = tried_.emplace_back();
     tried.spectra.emplace(aperture, input_.weights, looked_.disparity.step,
-                          1.5 * largest + kMostOffsetPx / spread_, threads_);
+                          1.5 * largest + kMaxOffsetPx / spread_, threads_);
     tried.raw.resize(tiles_.size());
     overdispersion_.resize(tiles_.size(), std::numeric_limits<double>::infinity());
     ParallelFor(static_cast<int>(tiles_.size()), threads_, [&](int i) {
@@ -282,7 +281,7 @@ class Measurement {
         if (!of_other[i]) continue;
         const double cost = (*of_other[i])[blur] / overdispersion_[i];
         // A tile that the other map explains better than any share counts for it, within limits.
-        sum += weight_ * std::clamp(cost - costs.lowest[i], -kMostOfTile, kMostOfTile);
+        sum += weight_ * std::clamp(cost - costs.lowest[i], -kMaxOfTile, kMaxOfTile);
       }
       least = std::min(least, sum);
     }
@@ -306,7 +305,7 @@ class Measurement {
     double most = -std::numeric_limits<double>::infinity();
     for (int i = 1; i <= kOffsets; ++i) {
       for (const int sign : {-1, 1}) {
-        const double offset = sign * i * kMostOffsetPx / kOffsets / spread_;
+        const double offset = sign * i * kMaxOffsetPx / kOffsets / spread_;
         most = std::max(most, LikelierBy(costs, form, [offset](const PhotoTile& tile) {
                           TileDisparity disparity = tile.disparity;
                           for (double& part : disparity) part += offset;
@@ -325,7 +324,7 @@ class Measurement {
 
  private:
   // Offsets that are tried, as the standard deviation of the blur that they cause.
-  static constexpr double kMostOffsetPx = 2;
+  static constexpr double kMaxOffsetPx = 2;
   static constexpr int kOffsets = 4;
 
   struct Tried {
@@ -393,11 +392,11 @@ double Jackknife(const Measurement& measurement, const TileCosts& costs, PhotoAp
 void Decide(PhotoAperture* found) {
   using Verdict = PhotoAperture::Verdict;
   // Shares above are not tried.
-  constexpr double kMostShare = (kShares - 1.5) * kShareStep;
+  constexpr double kMaxShare = (kShares - 1.5) * kShareStep;
   const std::string measured =
-      *found->share < kMostShare
+      *found->share < kMaxShare
           ? fmt::format("{:.2f} +- {:.2f} of the predicted blur", *found->share, *found->sigma)
-          : fmt::format("at least {:.2g} of the predicted blur", kMostShare);
+          : fmt::format("at least {:.2g} of the predicted blur", kMaxShare);
   if (found->evidence_against_captured <= kExcluded && found->evidence_against_sharp <= kExcluded) {
     found->verdict = Verdict::kUndecided;
     found->message = fmt::format(
@@ -411,11 +410,11 @@ void Decide(PhotoAperture* found) {
     found->message =
         is_clear ? "the photograph shows " + measured
                  : fmt::format("the photograph shows {}, too uncertain to be used", measured);
-  } else if (*found->share < kMostOfSharp &&
+  } else if (*found->share < kMaxOfSharp &&
              *found->share * *found->share <= kConsistent * found->sigma_of_square) {
     found->verdict = Verdict::kSharp;
     found->message = fmt::format("the photograph is sharp at all depths: it shows {}", measured);
-  } else if (*found->sigma <= kMostSigma) {
+  } else if (*found->sigma <= kMaxSigma) {
     found->verdict = Verdict::kPartial;
     found->message = fmt::format(
         "the photograph shows {}: a smaller aperture, or a scale of the depth that is too large",

@@ -17,24 +17,24 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 // Frequencies below are dominated by the tile's mean and the window.
-constexpr double kLeastRadius = 1.5;
+constexpr double kMinRadius = 1.5;
 // A tile shows one depth if its blur differs by no more than this, px and share.
 constexpr double kBlurRangePx = 0.35, kBlurRangeShare = 0.25;
 // Encoded value above which a pixel is taken as clipped, and the share of such pixels.
 constexpr double kClipped = 0.99, kMaxClippedShare = 0.01;
 // Power of a tile over that of the noise, averaged over its lower rings, above which it has
 // texture.
-constexpr double kLeastTexture = 6;
+constexpr double kMinTexture = 6;
 constexpr int kTextureRings = 6;
 // Samples of an aperture `d` px apart represent frequencies up to about 1/(2 d); beyond, a sampled
 // and a continuous aperture differ.
-constexpr double kMostOfSampling = 0.55;
+constexpr double kMaxOfSampling = 0.55;
 
 // Returns the bin of a frequency of the half plane, or -1.
 int BinOf(int kx, int ky) {
   const double radius = std::hypot(kx, ky);
-  const int ring = static_cast<int>(std::floor(radius - kLeastRadius));
-  if (radius < kLeastRadius || ring >= kTileRings) return -1;
+  const int ring = static_cast<int>(std::floor(radius - kMinRadius));
+  if (radius < kMinRadius || ring >= kTileRings) return -1;
   const double angle = std::atan2(std::abs(ky), std::abs(kx));
   const int sector = angle < kPi / 10 ? 0 : angle > kPi / 2 - kPi / 10 ? 1 : 2;
   return sector * kTileRings + ring;
@@ -161,7 +161,7 @@ std::vector<PhotoTile> TilesOf(const model::LinearImage& grey, const DisparityMa
       });
       const auto& bins = TileBinsOf();
       const double most_radius =
-          kMostOfSampling * kTilePx / std::max(1e-9, RmsOf(tile.disparity) * largest_step);
+          kMaxOfSampling * kTilePx / std::max(1e-9, RmsOf(tile.disparity) * largest_step);
       double texture = 0, count = 0;
       for (std::size_t bin = 0; bin < kTileBins; ++bin) {
         tile.is_used[bin] = bins[bin].count > 0 && bins[bin].radius <= most_radius;
@@ -171,7 +171,7 @@ std::vector<PhotoTile> TilesOf(const model::LinearImage& grey, const DisparityMa
         }
         if (bins[bin].count > 0) tile.power[bin] /= bins[bin].count;
       }
-      if (texture / count > kLeastTexture * noise_sigma * noise_sigma)
+      if (texture / count > kMinTexture * noise_sigma * noise_sigma)
         rows[Index(row)].push_back(tile);
     }
   });

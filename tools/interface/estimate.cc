@@ -183,7 +183,7 @@ std::string WordsOf(model::DepthFlip flip) {
   }
 }
 
-// What a user should know of the photograph's aperture; empty: nothing beyond the summary.
+// Returns what a user should know of the photograph's aperture; empty: nothing beyond the summary.
 std::string PhotoWarning(const EstimateDiagnostics& found, const RunScope& run) {
   using Verdict = estimator::PhotoAperture::Verdict;
   if (!found.photo_aperture) return "";

@@ -20,7 +20,7 @@ namespace thicklens::tools {
 namespace {
 
 constexpr char kNotRun[] = "not run";
-constexpr char kHeld[] = "(held)";  // beside a value that was not fitted
+constexpr char kHeld[] = "(held)";         // beside a value that was not fitted
 constexpr std::size_t kReportedTerms = 4;  // of the error in the text; the rest is in the JSON
 
 std::optional<std::string> ImageOf(const calib::Calibration& calibration, int index) {

@@ -7,9 +7,9 @@
 
 namespace thicklens::tools {
 
-// What a line of progress says after `elapsed_s` seconds, for example "measuring 40 %, 9 s left".
-// The remaining time assumes that the other steps take as long as those that are done; it is left
-// out during the first second, in which there is nothing to conclude it from.
+// Returns what a line of progress says after `elapsed_s` seconds, for example "measuring 40 %, 9 s
+// left". The remaining time assumes that the other steps take as long as those that are done; it is
+// left out during the first second, in which there is nothing to conclude it from.
 std::string ProgressText(const std::string& what, int percent, double elapsed_s);
 
 // One line on stderr that is overwritten and erased at the end. It is silent unless stderr is a

@@ -600,7 +600,7 @@ struct SweepSimulator::Impl {
   }
 
   // The transfer function of an aperture that is not round. A ray through A lands at -A c(z)/p in
-  // the picture: points nearer than the plane of focus show the outline turned by half a turn.
+  // the image: points nearer than the plane of focus show the outline turned by half a turn.
   std::function<std::complex<double>(const Eigen::Vector2d&)> ShapeOf(const FrameState& frame,
                                                                       double depth_mm) const {
     if (outline.empty() || frame.in_focus) return {};

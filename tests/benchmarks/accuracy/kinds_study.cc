@@ -39,7 +39,7 @@ constexpr double kWidestInterval = 3;  // half of it over the 90 % quantile of t
 // Fewer sweeps do not show a quantile: the check of a goal is then a test of how many errors exceed
 // it.
 constexpr int kShowQuantiles = 60;
-constexpr double kMostWrongReasons = 0.02;  // of the refusals
+constexpr double kMaxWrongReasons = 0.02;  // of the refusals
 
 struct Kind {
   std::string name;
@@ -329,7 +329,7 @@ Json Report(const Kind& kind, const std::vector<KindTrial>& trials,
       covered("kappa", ratio), focus.half_width_ratio, ratio.half_width_ratio,
       focus.silent + ratio.silent + distance.silent, wrong, seconds));
   const auto refused = static_cast<double>(trials.size()) - done;
-  if (wrong > kMostWrongReasons * refused)
+  if (wrong > kMaxWrongReasons * refused)
     faults.push_back(fmt::format("{} of {} refusals for another reason", wrong, refused));
   for (const std::string& fault : faults) std::cerr << "  fault: " << fault << "\n";
   for (const auto& [reason, count] : reasons)

@@ -39,13 +39,13 @@ double SigmasBeyond(const Result& result, double truth) {
 }
 
 // The distances between the colours and kappa of each are the truth within their errors over the
-// seeds, and so is zf with the error that all colours share. The grey 1/zf is the mean weighed as
+// seeds, and so is zf with the error that all colours share. The grey 1/zf is the mean weighted as
 // in grey, and kappa is not changed by the colour.
 TEST(AxialColourOfSweeps, EachColourHasItsFocusAndTheSameRatio) {
   const Eigen::Vector3d colours_mm(2.5, 0, -1.5);
   constexpr double kFocusMm = 300, kRatio = 0.45;
   constexpr int kSeeds = 3;
-  constexpr double kMostChi2 = 16.3;  // 99.9 % of chi^2 with three degrees of freedom
+  constexpr double kMaxChi2 = 16.3;  // 99.9 % of chi^2 with three degrees of freedom
   Eigen::Array3d apart_chi2 = Eigen::Array3d::Zero(), focus_chi2 = apart_chi2;
   Eigen::Array3d ratio_chi2 = apart_chi2;
   double inverse_mm = 0;
@@ -76,9 +76,9 @@ TEST(AxialColourOfSweeps, EachColourHasItsFocusAndTheSameRatio) {
     EXPECT_THAT(found.diagnostics.systematic_parts,
                 Contains(::testing::Field(&SystematicPart::name, "axial colour")));
   }
-  EXPECT_LT(apart_chi2.maxCoeff(), kMostChi2) << apart_chi2;
-  EXPECT_LT(focus_chi2.maxCoeff(), kMostChi2) << focus_chi2;
-  EXPECT_LT(ratio_chi2.maxCoeff(), kMostChi2) << ratio_chi2;
+  EXPECT_LT(apart_chi2.maxCoeff(), kMaxChi2) << apart_chi2;
+  EXPECT_LT(focus_chi2.maxCoeff(), kMaxChi2) << focus_chi2;
+  EXPECT_LT(ratio_chi2.maxCoeff(), kMaxChi2) << ratio_chi2;
 }
 
 // Without the map, a few frames show it.

@@ -1,4 +1,4 @@
-// What colours that come into focus at different depths change in the results.
+// Colours that come into focus at different depths change the results.
 #include "calib/uncertainty/colour_focus.h"
 
 #include <gmock/gmock.h>
@@ -46,7 +46,7 @@ TEST(ColourFocus, EqualColoursChangeNothing) {
   EXPECT_EQ(found.summary.focus_depth_mm->systematic, Eigen::Vector2d(300.4, 300.4));
 }
 
-// The root mean square of 2, 0 and -1 mm about 300.4 mm, weighed as in grey.
+// The root mean square of 2, 0 and -1 mm about 300.4 mm, weighted as in grey.
 TEST(ColourFocus, TheIntervalOfFocusHasTheSpreadOfTheColours) {
   Calibration found = Found({302, 300, 299}, 0.01);
   EXPECT_TRUE(ColoursDiffer(found.diagnostics.channels));

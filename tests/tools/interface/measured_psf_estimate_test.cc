@@ -103,7 +103,7 @@ class Texture {
     }
   }
 
-  // What remains of each wave behind a blur whose transform at a frequency in cycles per px is
+  // Returns each wave behind a blur whose transform at a frequency in cycles per px is
   // `transfer`.
   template <class Transfer>
   std::vector<std::complex<double>> Behind(const Transfer& transfer) const {
@@ -148,7 +148,7 @@ class Photographed {
   // Disparity of a plane for a step of 1 mm on the aperture, px.
   double PxPerMm(double depth_mm) const { return model::DisparityPx(camera_, 1, depth_mm); }
 
-  // What remains of the texture's waves in the image of the plane, for a focus at which a step of
+  // Returns the texture's waves in the image of the plane, for a focus at which a step of
   // 1 mm on the aperture is `px_per_mm`.
   std::vector<std::complex<double>> Blur(double px_per_mm) const {
     const double radius_px = camera_.lens.aperture_radius_mm * px_per_mm;

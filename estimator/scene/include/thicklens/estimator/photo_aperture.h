@@ -27,15 +27,15 @@ namespace thicklens::estimator {
 // standard deviation is tried as well, and the likelier of the two is taken. The standard deviation
 // of the share is the larger one of the likelihood and of a delete-one jackknife over 4 x 4 parts
 // of the photograph, with a systematic 0.05; and the variance of the blur is uncertain by 0.25
-// px^2, as sharp textures differ by that. Derived here [D180].
+// px^2, as sharp textures differ by that. Derived here [D179].
 //
 // A share below 1 is also what a wrong map may look like. So the map with its rows, its columns or
 // both reversed, and with eight offsets of its disparity, is tried with the whole aperture: unless
 // the measured share is clearly likelier than all of these, the verdict is kContradicted. A scale
-// of the disparities that is wrong everywhere is the same as another aperture and cannot be told
-// from it.
+// of the disparities that is wrong everywhere is the same as another aperture and cannot be
+// distinguished from it.
 struct PhotoAperture {
-  // What the share says of the photograph.
+  // Meaning of the share for the photograph.
   enum class Verdict {
     kNotMeasured,   // it was stated
     kCaptured,      // the share is consistent with 1
@@ -57,8 +57,8 @@ struct PhotoAperture {
   // The measured share and its standard deviation, which contains the scatter between regions;
   // absent if too few tiles have texture.
   std::optional<double> share, sigma;
-  // Standard deviation of the share's square. A blur of some tenths of a px cannot be told from
-  // none, so that this and not `sigma` decides what is consistent with 0 and 1.
+  // Standard deviation of the share's square. A blur of some tenths of a px cannot be distinguished
+  // from none, so that this and not `sigma` decides what is consistent with 0 and 1.
   double sigma_of_square = 0;
   // Logarithms of the likelihoods of the measured share over 1, and over 0.
   double evidence_against_captured = 0, evidence_against_sharp = 0;
