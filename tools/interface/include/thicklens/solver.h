@@ -40,7 +40,7 @@ enum class StrengthRule {
 
 // The aperture through which the photograph was taken.
 enum class PhotoKind {
-  kAuto,      // measured from the photograph [D180]; the stated one where it does not show it
+  kAuto,      // measured from the photograph [D179]; the stated one where it does not show it
   kCaptured,  // that of camera and views: points are blurred by their depth
   kSharp,     // a pinhole: the photograph is the centre view, sharp at all depths
 };
