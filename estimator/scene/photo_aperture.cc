@@ -57,27 +57,30 @@ constexpr double kMaxOfSharp = 0.45;
 // The largest uncertainty of a share that is used.
 constexpr double kMaxSigma = 0.15;
 
-// The image on which the share is measured: grey, of at most a million pixels.
+// The image on which the share is measured: grey, of at most a million pixels. A pixel with a
+// clipped channel is clipped in it.
 struct Looked {
   model::LinearImage grey;
   DisparityMap disparity;
   double scale = 1;  // px of the photograph per px of it
 };
 
-model::LinearImage GreyOf(const model::LinearImage& image) {
+model::LinearImage GreyOf(const model::LinearImage& image, double clipped) {
   if (image.channels < 3) return image;
   model::LinearImage grey{image.width_px, image.height_px, 1, {}};
   grey.values.reserve(Index(image.width_px) * Index(image.height_px));
   const auto channels = Index(image.channels);
   for (std::size_t i = 0; i < image.values.size(); i += channels) {
-    grey.values.push_back(0.2126F * image.values[i] + 0.7152F * image.values[i + 1] +
-                          0.0722F * image.values[i + 2]);
+    const float red = image.values[i], green = image.values[i + 1], blue = image.values[i + 2];
+    const float mean = 0.2126F * red + 0.7152F * green + 0.0722F * blue;
+    const float largest = std::max({red, green, blue});
+    grey.values.push_back(static_cast<double>(largest) >= clipped ? std::max(largest, mean) : mean);
   }
   return grey;
 }
 
 Looked LookedAt(const EstimateInput& input) {
-  Looked looked{GreyOf(input.image), input.disparity, 1};
+  Looked looked{GreyOf(input.image, input.transfer.Decode(kClippedValue)), input.disparity, 1};
   if (input.grid) {
     looked.disparity =
         PhotographDisparity(input.disparity, LandingStepPx(*input.camera, *input.grid));
@@ -210,6 +213,12 @@ class Measurement {
       sum += std::pow(spread_ * RmsOf(tiles_[i].disparity), 2);
     return count == 0 ? 0 : sum / static_cast<double>(count);
   }
+  // Whether any blur is predicted: views of one point of the aperture have none.
+  bool IsBlurred() const {
+    return spread_ > 0 &&
+           std::any_of(looked_.disparity.disparity.begin(), looked_.disparity.disparity.end(),
+                       [](float value) { return value != 0; });
+  }
   double scale() const { return looked_.scale; }
   int width_px() const { return looked_.grey.width_px; }
   int height_px() const { return looked_.grey.height_px; }
@@ -217,8 +226,7 @@ class Measurement {
   // Finds the costs for one form of the aperture, and keeps them.
   void Try(ExpectedSpectra::Aperture aperture) {
     double largest = 0;
-    for (const float value : looked_.disparity.disparity)
-      largest = std::max(largest, std::abs(static_cast<double>(value)));
+    for (const PhotoTile& tile : tiles_) largest = std::max(largest, RmsOf(tile.disparity));
     Tried& tried = tried_.emplace_back();
     tried.spectra.emplace(aperture, input_.weights, looked_.disparity.step,
                           1.5 * largest + kMaxOffsetPx / spread_, threads_);
@@ -274,6 +282,10 @@ class Measurement {
       const std::optional<TileDisparity> disparity = other(tiles_[Index(i)]);
       if (disparity) of_other[Index(i)] = FitOf(tried_[form], Index(i), *disparity, 1).cost;
     });
+    // Without tiles that show one depth in both maps, nothing was compared.
+    if (std::count_if(of_other.begin(), of_other.end(),
+                      [](const auto& cost) { return cost.has_value(); }) < kMinTiles)
+      return -std::numeric_limits<double>::infinity();
     double least = std::numeric_limits<double>::infinity();
     for (std::size_t blur = 0; blur < kCommonBlursPx.size(); ++blur) {
       double sum = 0;
@@ -396,7 +408,7 @@ void Decide(PhotoAperture* found) {
   const std::string measured =
       *found->share < kMaxShare
           ? fmt::format("{:.2f} +- {:.2f} of the predicted blur", *found->share, *found->sigma)
-          : fmt::format("at least {:.2g} of the predicted blur", kMaxShare);
+          : fmt::format("at least {:.3g} of the predicted blur", kMaxShare);
   if (found->evidence_against_captured <= kExcluded && found->evidence_against_sharp <= kExcluded) {
     found->verdict = Verdict::kUndecided;
     found->message = fmt::format(
@@ -404,8 +416,11 @@ void Decide(PhotoAperture* found) {
         "tile(s) are blurred by at most {:.2g} px, or too smooth",
         found->tiles, found->largest_sigma_px);
   } else if (!found->is_narrower()) {
-    // A blur that is much too wide, with sharp details besides, is nobody's aperture.
-    const bool is_clear = found->evidence_against_sharp > kExcluded;
+    // A blur that is much too wide, with sharp details besides, is nobody's aperture; a share that
+    // is both unlike 1 and too uncertain to differ from it shows nothing.
+    const bool is_clear =
+        found->evidence_against_sharp > kExcluded &&
+        (found->evidence_against_captured <= kExcluded || *found->share >= kNearlyWhole);
     found->verdict = is_clear ? Verdict::kCaptured : Verdict::kUndecided;
     found->message =
         is_clear ? "the photograph shows " + measured
@@ -470,6 +485,12 @@ PhotoAperture MeasurePhotoAperture(const EstimateInput& input,
   found.tiles = static_cast<int>(measurement.tiles().size());
   for (const PhotoTile& tile : measurement.tiles())
     found.largest_sigma_px = std::max(found.largest_sigma_px, measurement.PredictedPx(tile));
+  if (!measurement.IsBlurred()) {
+    found.verdict = PhotoAperture::Verdict::kUndecided;
+    found.message = "the stated aperture and depth predict no blur anywhere";
+    found.seconds = SecondsSince(start);
+    return found;
+  }
   if (found.tiles < kMinTiles) {
     found.verdict = PhotoAperture::Verdict::kUndecided;
     found.message = fmt::format(

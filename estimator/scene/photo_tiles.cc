@@ -20,8 +20,9 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr double kMinRadius = 1.5;
 // A tile shows one depth if its blur differs by no more than this, px and share.
 constexpr double kBlurRangePx = 0.35, kBlurRangeShare = 0.25;
-// Encoded value above which a pixel is taken as clipped, and the share of such pixels.
-constexpr double kClipped = 0.99, kMaxClippedShare = 0.01;
+constexpr double kMaxClippedShare = 0.01;  // of the pixels of a tile
+// A tile whose views are so far apart that fewer bins represent the aperture shows nothing of it.
+constexpr int kMinBins = 9;
 // Power of a tile over that of the noise, averaged over its lower rings, above which it has
 // texture.
 constexpr double kMinTexture = 6;
@@ -118,7 +119,7 @@ std::vector<PhotoTile> TilesOf(const model::LinearImage& grey, const DisparityMa
   if (grey.width_px < kTilePx || grey.height_px < kTilePx) return {};
   std::vector<std::vector<PhotoTile>> rows(Index(down));
   const double largest_step = map.step.cwiseAbs().maxCoeff();
-  const double clipped_light = transfer.Decode(kClipped);
+  const double clipped_light = transfer.Decode(kClippedValue);
   const std::vector<double>& window = Window();
   ParallelFor(down, threads, [&](int row) {
     ThrowIfCancelled();
@@ -171,6 +172,7 @@ std::vector<PhotoTile> TilesOf(const model::LinearImage& grey, const DisparityMa
         }
         if (bins[bin].count > 0) tile.power[bin] /= bins[bin].count;
       }
+      if (std::count(tile.is_used.begin(), tile.is_used.end(), true) < kMinBins) continue;
       if (texture / count > kMinTexture * noise_sigma * noise_sigma)
         rows[Index(row)].push_back(tile);
     }

@@ -12,6 +12,8 @@
 
 namespace thicklens::estimator {
 
+// Encoded value from which a pixel is taken as clipped.
+constexpr double kClippedValue = 0.99;
 // Edge of a tile, px.
 constexpr int kTilePx = 32;
 // Frequencies are averaged in rings, one cycle per tile wide, and in three sectors: across, down,

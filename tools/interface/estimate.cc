@@ -193,7 +193,8 @@ std::string PhotoWarning(const EstimateDiagnostics& found, const RunScope& run) 
     case Verdict::kSharp:
       return fmt::format("{}; it is taken as the centre view ({})", photo.message, stated);
     case Verdict::kPartial:
-      return fmt::format("{}; that share of the aperture explains it ({})", photo.message, stated);
+      return fmt::format("{}; it is estimated with that share of the aperture ({})", photo.message,
+                         stated);
     case Verdict::kContradicted:
       return fmt::format("{}; it is taken as captured through the whole aperture ({})",
                          photo.message, stated);
@@ -301,7 +302,7 @@ std::vector<std::string> WarningsOf(const DepthFile& depth, bool has_camera, con
         kEightBitLevels * *found.residual_rms, *found.residual_rms / *found.DoubtSigma(), noise));
   }
   const std::string photo = PhotoWarning(found, run);
-  if (!photo.empty()) warnings.push_back(photo + jpeg_cause);
+  if (!photo.empty()) warnings.push_back(photo);
   if (found.blur_check) {
     const std::string blur =
         BlurWarning(*found.blur_check, found.blur_proposal, estimate.problem->input(), run);
@@ -428,7 +429,8 @@ LightFieldEstimate Estimate(ViewSink* given_sink, Image photo, DepthMap depth,
         ProposalOf(*solved.blur, *prepared.input, depth_file.meaning);
     estimate.diagnostics.blur_check = std::move(solved.blur);
   }
-  origin.seconds = seconds.prepare + seconds.setup + seconds.solve + seconds.views;
+  origin.seconds =
+      seconds.prepare + seconds.photo_aperture + seconds.setup + seconds.solve + seconds.views;
   origin.effects = prepared.effects.on.Names();
   origin.version = LibraryVersion();
   origin.date = NowIso8601();

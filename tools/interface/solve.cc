@@ -196,6 +196,7 @@ struct LibraryRun {
   std::shared_ptr<kernels::Backend> backend;
   std::optional<estimator::SceneViewSink> views;
   estimator::SolverRun how;
+  double photo_aperture = 1;  // the used share
 };
 
 // Complete the run by what only this solver uses, and do what comes before it.
@@ -207,7 +208,10 @@ void CompleteRun(const SceneSolver& solver, const PreparedProblem& prepared,
   library->backend = Open(options.device == "auto" ? "cpu" : options.device, run);
   std::optional<double>& memory_limit_mib = library->how.memory_limit_mib;
   if (!memory_limit_mib) memory_limit_mib = UsualMemoryLimitMib();
-  if (solver.check_blur) {
+  // The check compares the photograph with the whole aperture.
+  if (solver.check_blur && library->photo_aperture != 1) {
+    run->Detail("the blur is not checked, because the photograph has a smaller aperture");
+  } else if (solver.check_blur) {
     estimator::BlurCheckOptions check;
     check.falloff = prepared.effects.on.Has(Effect::kFalloff);
     check.compression_sigma = prepared.compression_sigma;
@@ -262,8 +266,9 @@ Solved SolveByLibrary(const Given& solver, const PreparedProblem& prepared,
   library.how.memory_limit_mib = options.memory_limit_mib;
   library.how.progress = run->ProgressOf("estimating");
   Solved solved;
-  CompleteRun(solver, prepared, options, sink, run, &library, &solved);
   FindPhotoAperture(solver, prepared, run, diagnostics);
+  library.photo_aperture = diagnostics->used_photo_aperture;
+  CompleteRun(solver, prepared, options, sink, run, &library, &solved);
   library.how.backend = library.backend.get();
   estimator::SolverSummary summary;
   solved.light_field =

@@ -133,6 +133,7 @@ json PhotoJson(const EstimateDiagnostics& found) {
               {"message", photo.message},
               {"share", OrNull(photo.share)},
               {"sigma", OrNull(photo.sigma)},
+              {"sigma_of_square", photo.sigma_of_square},
               {"evidence_against_captured", photo.evidence_against_captured},
               {"evidence_against_sharp", photo.evidence_against_sharp},
               {"tiles", photo.tiles},

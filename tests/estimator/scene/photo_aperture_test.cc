@@ -134,6 +134,19 @@ INSTANTIATE_TEST_SUITE_P(PhotoApertureOf, SharesAndNoises,
                          ::testing::Combine(::testing::Values(0.0, 0.3, 0.6, 1.0),
                                             ::testing::Values(0.3, 3.0)));
 
+// Views through one point of the aperture, and a scene in focus, predict no blur.
+TEST(PhotoAperture, OfNoPredictedBlurIsUndecided) {
+  EstimateInput input = PlaneInput(1, 1, 1);
+  input.disparity.step = {0, 0};
+  const PhotoAperture of_one_point = MeasurePhotoAperture(input, {});
+  EXPECT_EQ(of_one_point.verdict, Verdict::kUndecided);
+  EXPECT_THAT(of_one_point.message, HasSubstr("no blur anywhere"));
+  EXPECT_EQ(of_one_point.used_share(), 1);
+  input.disparity.step = {1, 1};
+  std::fill(input.disparity.disparity.begin(), input.disparity.disparity.end(), 0.0F);
+  EXPECT_EQ(MeasurePhotoAperture(input, {}).verdict, Verdict::kUndecided);
+}
+
 TEST(PhotoAperture, ErrorsAreThoseOfManyTextures) {
   double squares = 0;
   constexpr int kRuns = 9;
