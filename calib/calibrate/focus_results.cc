@@ -303,11 +303,12 @@ class Conversion {
     const std::vector<std::string> after = WordsOfField();
     auto& warnings = result_.summary.warnings;
     for (std::size_t i = 0; i < before.size(); ++i) {
+      if (before[i].empty()) continue;
       const auto at = std::find(warnings.begin(), warnings.end(), before[i]);
       if (at == warnings.end()) continue;
-      if (i >= after.size())
+      if (i >= after.size() || after[i].empty())
         warnings.erase(at);
-      else if (!after[i].empty())
+      else
         *at = after[i];
     }
   }

@@ -9,10 +9,9 @@
 namespace thicklens::calib {
 
 // Whether a frame does not show what the others show: its spectrum scatters about the fit far more
-// than theirs (`scatter`: ratio in power), and the scatter is a relevant part of the spectrum
-// itself
-// (`misfit`, RelativeBlur::misfit). Without the second condition a large frame, whose noise is
-// nearly nothing, would be rejected for a small error of the blur law.
+// than theirs (`scatter`: ratio in power), and the scatter is a relevant part of its own spectrum
+// (`misfit`, RelativeBlur::misfit). Without the second condition a frame with little noise, for
+// example a large one, would be rejected for a small error of the blur law.
 bool IsDamage(double scatter, double misfit);
 
 // Removes from the estimators' samples the frames that do not follow the others: their spectrum

@@ -17,6 +17,7 @@ namespace {
 constexpr double kSmallestScale = 0.1, kLargestScale = 10;
 constexpr std::size_t kFirstWave = 4;
 constexpr std::size_t kEnoughToLearn = 5;
+constexpr double kNearlyAll = 0.8;  // share of the frames that must be registered again
 // The steps of the ladder are half of the range within which a registration converges.
 constexpr double kRung = 1.1;
 constexpr int kRungs = 12;  // rungs up, and as many down: 1.1^12 = 3.1
@@ -146,8 +147,8 @@ struct FrameReader {
 // amount that is in proportion to the change of scale. All frames share these displacements, so
 // that they look like another law of the scale, or like a distortion. Where the frames show such a
 // field, they are registered again with a reference that is blurred in the same way: the law of the
-// blur over the field comes from all frames, and what it leaves is added to it once. Frames that
-// do not fit are left out.
+// blur over the field comes from all frames, and what it leaves is added to it after each round.
+// Frames that do not fit are left out, unless they are many.
 void TakeOutStretchByBlur(double corner_px, const FrameReader& reader,
                           std::vector<FreeRegistration> registrations,
                           std::vector<ScaleSample>* samples) {
@@ -183,7 +184,11 @@ void TakeOutStretchByBlur(double corner_px, const FrameReader& reader,
       kept.push_back(sample);
       kept_before.push_back(first);
     }
-    if (kept.size() < std::min(kEnoughToLearn, samples->size())) {
+    // A law of the scale by a few frames is worse than one with an error for the stretch.
+    const bool are_enough =
+        kept.size() >= kEnoughToLearn &&
+        static_cast<double>(kept.size()) >= kNearlyAll * static_cast<double>(samples->size());
+    if (!are_enough) {
       if (before.empty()) factors = AsErrors(factors);  // nothing was taken out
       break;
     }

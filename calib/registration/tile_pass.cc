@@ -30,18 +30,21 @@ int TileSize(int field_px) {
   return size;
 }
 
+constexpr double kMinMatchedPx = 0.3;  // standard deviation of a blur that is matched
+
 // Applies the added blur of the more blurred image to the sharper one. Otherwise the parts that a
 // window cuts off would differ between the two, and look like a shift.
 void MatchBlur(double variance_px2, cv::Mat* reference, cv::Mat* frame) {
   const double sigma_px = std::sqrt(std::abs(variance_px2));
-  if (!(sigma_px > 0.3)) return;
+  if (!(sigma_px > kMinMatchedPx)) return;
   cv::Mat* sharper = variance_px2 > 0 ? reference : frame;
   cv::GaussianBlur(*sharper, *sharper, cv::Size(), sigma_px, sigma_px, cv::BORDER_REPLICATE);
 }
 
 // Gives every point of the reference the blur that it lacks at its place.
 void MatchBlur(PlaceBlur blur, cv::Mat* reference, cv::Mat* frame) {
-  const double too_much_px2 = std::max(0.0, -blur.Least(reference->size()));
+  double too_much_px2 = std::max(0.0, -blur.Least(reference->size()));
+  if (too_much_px2 < kMinMatchedPx * kMinMatchedPx) too_much_px2 = 0;  // it counts as 0
   blur.at_centre_px2 += too_much_px2;
   MatchBlur(-too_much_px2, reference, frame);
   *reference = SpreadByPlace(*reference, blur);
@@ -92,7 +95,21 @@ std::optional<TilePass> MeasureTiles(const cv::Mat& reference, const cv::Mat& fr
   if (!layout) return std::nullopt;
   const cv::Rect& field = layout->field;
   const cv::Rect whole(0, 0, frame.cols / factor, frame.rows / factor);
-  const double blur_px = std::sqrt(std::abs(variance_px2)) / factor;
+  double largest_px2 = std::abs(variance_px2) / (factor * factor);
+  if (known) {
+    // The corners of the field may be blurred by more than its mean.
+    const Eigen::Vector2d centre = (map.centre.array() + 0.5) / factor - 0.5;
+    for (const cv::Point& corner : {field.tl(), field.br(), cv::Point(field.x, field.br().y),
+                                    cv::Point(field.br().x, field.y)}) {
+      largest_px2 = std::max(largest_px2,
+                             std::abs(variance_px2) / (factor * factor) +
+                                 (std::abs(known->curvature) + std::abs(known->astigmatism)) *
+                                     (Eigen::Vector2d(corner.x, corner.y) - centre).squaredNorm());
+    }
+    // A blur wider than the tiles is no law that the frames have shown.
+    if (!(largest_px2 < 0.25 * layout->size_px * layout->size_px)) return std::nullopt;
+  }
+  const double blur_px = std::sqrt(largest_px2);
   // The margin contains the surroundings, because the blur moves their light into the field.
   const int margin = static_cast<int>(std::ceil(3 * blur_px));
   const cv::Rect region = cv::Rect(field.x - margin, field.y - margin, field.width + 2 * margin,

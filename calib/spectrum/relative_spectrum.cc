@@ -19,9 +19,9 @@ constexpr double kTwoPiSquared = 2 * kPi * kPi;
 constexpr Eigen::Index kMisfitRings = 8;
 constexpr int kMaxSteps = 30;
 // Limit of 2 pi^2 (V of the reference - V) nu^2 along an axis where a frame is sharper than the
-// reference. Up to it, the leakage is e^2 times the measured one at most. Without a limit, the
-// noise of the reference moved frames between the foci of an astigmatic lens by 19 standard
-// deviations.
+// reference. Up to it, the leakage along that axis is e^2 times the measured one at most. Without a
+// limit, the noise of the reference moved frames between the foci of an astigmatic lens by 19
+// standard deviations.
 constexpr double kSharperBand = 2;
 
 // The leakage for one variance in all directions, or for one along each axis.

@@ -65,7 +65,8 @@ std::string ColoursInWords(const Calibration& calibration) {
   }
   return fmt::format(
       "the colours come into focus differently: {}. The results are those of grey (0.2126 R + "
-      "0.7152 G + 0.0722 B), and their intervals contain the spread of the colours. The lens has "
+      "0.7152 G + 0.0722 B), and their intervals contain the root mean square of the differences "
+      "to the colours. The lens has "
       "axial colour, or parts of the target with different colours are at different depths",
       colours);
 }

@@ -21,7 +21,7 @@ model::Estimate RatioOfColour(const model::Estimate& fitted, double colour_focus
 
 // Whether the colours come into focus at different depths, or have different blur ratios, beyond
 // their errors: chi^2 of three values about their mean above 16, whose probability for equal
-// colours is 3e-4.
+// colours is 3e-4 for each of the two.
 bool ColoursDiffer(const std::vector<ChannelFocus>& channels);
 
 // The in-focus object distances of colours that differ, in words; empty if they do not.

@@ -14,6 +14,7 @@
 #include "calib/uncertainty/colour_focus.h"
 #include "calib/uncertainty/evenly_spread.h"
 #include "calib/uncertainty/systematic_advice.h"
+#include "thicklens/base/cancel.h"
 #include "thicklens/base/parallel.h"
 #include "thicklens/base/pi.h"
 
@@ -376,6 +377,7 @@ class Field {
           kColourDifference * mean))
       return;
     const char* const names[] = {"red", "green", "blue"};
+    setup_.tick = [] { ThrowIfCancelled(); };  // the progress does not count the colours
     for (int channel = 0; channel < 3; ++channel) {
       ChannelFocus focus;
       focus.name = names[channel];

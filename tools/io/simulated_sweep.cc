@@ -1,5 +1,6 @@
 #include "thicklens/io/simulated_sweep.h"
 
+#include <cmath>
 #include <cstdint>
 
 #include "thicklens/io/image_io.h"
@@ -43,7 +44,10 @@ model::SweepFile DescribeSweep(const model::SweepSimulationOptions& simulation,
   sweep.reading_sigma_stated = true;
   if (simulation.counts_per_mm > 0) {
     sweep.readings_are_counts = true;
-    sweep.reading_sigma_mm *= simulation.counts_per_mm;
+    // A whole count differs from the position by up to half of one.
+    constexpr double kVarianceOfRounding = 1.0 / 12;
+    sweep.reading_sigma_mm = std::hypot(sweep.reading_sigma_mm * simulation.counts_per_mm,
+                                        std::sqrt(kVarianceOfRounding));
     if (!unknown_offset) sweep.focus_depth_mm = model::Estimate{truth.focus_depth_mm, 0};
   } else if (!unknown_offset) {
     sweep.offset_mm = model::Estimate{simulation.bench_offset_mm, 0};
