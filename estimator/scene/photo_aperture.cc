@@ -428,7 +428,9 @@ void Decide(PhotoAperture* found) {
   } else if (*found->share < kMaxOfSharp &&
              *found->share * *found->share <= kConsistent * found->sigma_of_square) {
     found->verdict = Verdict::kSharp;
-    found->message = fmt::format("the photograph is sharp at all depths: it shows {}", measured);
+    found->message = fmt::format(
+        "the photograph is sharp at all depths: it shows {}, which is consistent with none",
+        measured);
   } else if (*found->sigma <= kMaxSigma) {
     found->verdict = Verdict::kPartial;
     found->message = fmt::format(
