@@ -245,13 +245,14 @@ TEST(MeasureBlur, ABlurredReferenceIsNoReference) {
 }
 
 TEST(MeasureBlur, ABlankTargetShowsTooLittleTexture) {
-  MeasuredSweep m = Measured(Leaves());
-  m.simulated.sweep.read_frame = [](std::size_t i) {
+  SimulatedSweep blank = Leaves();
+  blank.sweep.read_frame = [](std::size_t i) {
     cv::Mat image(kFieldPx, kFieldPx, CV_8U);
     cv::RNG random(40 + i);
     random.fill(image, cv::RNG::NORMAL, 100, 2);
     return image;
   };
+  MeasuredSweep m = Measured(blank);
   const BlurEvidence evidence = m.Measure();
   EXPECT_THAT(evidence.setup.estimators, IsEmpty());
   EXPECT_THAT(evidence.message, HasSubstr("too little texture above the noise"));
