@@ -663,8 +663,11 @@ TEST_F(ProtocolTest, ASparseLightFieldSeenThroughAGaussianAperture) {
   };
   const double gaussian_db = above_warping({"--aperture-shape", "gaussian"});
   EXPECT_GT(gaussian_db, 1);
-  // This shape was formerly assumed without a message.
-  EXPECT_GT(gaussian_db, above_warping({"--aperture-shape", "uniform"}) + 0.5);
+  // This shape was formerly assumed without a message. Where it may be corrected by the blur that
+  // the photograph shows, it is as good.
+  EXPECT_GT(gaussian_db,
+            above_warping({"--aperture-shape", "uniform", "--photo", "captured"}) + 0.5);
+  EXPECT_GT(above_warping({"--aperture-shape", "uniform"}), gaussian_db - 0.5);
 }
 
 }  // namespace
