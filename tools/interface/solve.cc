@@ -210,7 +210,10 @@ void CompleteRun(const SceneSolver& solver, const PreparedProblem& prepared,
   if (!memory_limit_mib) memory_limit_mib = UsualMemoryLimitMib();
   // The check compares the photograph with the whole aperture.
   if (solver.check_blur && library->photo_aperture != 1) {
-    run->Detail("the blur is not checked, because the photograph has a smaller aperture");
+    run->Inform(fmt::format(
+        "the blur is not checked, because the photograph has a smaller aperture than the views; {} "
+        "captured compares it with the whole one",
+        run->Option("solver.photo")));
   } else if (solver.check_blur) {
     estimator::BlurCheckOptions check;
     check.falloff = prepared.effects.on.Has(Effect::kFalloff);

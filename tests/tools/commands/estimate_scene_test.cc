@@ -670,7 +670,7 @@ TEST_F(EstimateSceneTest, ChecksTheBlurWhereItIsAskedTo) {
                            "1"};
   EXPECT_TRUE(Summary(sharp).at("blur_check").is_null());
   ProgramResult result;
-  const json summary = Summary(With(sharp, {"--check-blur"}), &result);
+  const json summary = Summary(With(sharp, {"--check-blur", "--photo", "captured"}), &result);
   EXPECT_THAT(result.out, HasSubstr("blur check   "));
   const json& check = summary.at("blur_check");
   EXPECT_EQ(check.at("size"), json({kWide, kHigh}));
@@ -681,6 +681,11 @@ TEST_F(EstimateSceneTest, ChecksTheBlurWhereItIsAskedTo) {
   EXPECT_THAT(summary.at("warnings").dump(), HasSubstr("is sharper than"));
   // Proposed, not applied.
   EXPECT_NEAR(summary.at("disparity").at("max_px").get<double>(), 1.2, 1e-6);
+  // A photograph that has a smaller aperture is not compared with the whole one.
+  EXPECT_TRUE(Summary(With(sharp, {"--check-blur", "--photo", "sharp"}), &result)
+                  .at("blur_check")
+                  .is_null());
+  EXPECT_THAT(result.err, HasSubstr("the blur is not checked"));
 
   const json right = Summary(With(Usual(), {"--check-blur"}), &result);
   EXPECT_TRUE(right.at("blur_check").at("proposal").is_null());
