@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "support/special_numbers.h"
+#include "tools/report/calibration_answers.h"
 #include "tools/support/fake_calibration.h"
 
 namespace thicklens::tools {
@@ -45,6 +46,16 @@ TEST(Rounding, WithoutAnErrorShowsFiveDigits) {
     EXPECT_EQ(RoundedSigma(sigma), "-");
   }
   EXPECT_EQ(RoundedTo(kNan, 0.1), "nan");
+}
+
+// A term that moves d1 and kappa leaves zf as it is up to the rounding of two fits, which is no
+// error of zf.
+TEST(TermErrors, LeavesOutWhatIsRounding) {
+  calib::ErrorTerm term;
+  term.focus_depth_mm = 3e-13;
+  term.image_distance_mm = 0.05;
+  term.blur_ratio = 0.0046;
+  EXPECT_EQ(TermErrors(term), "d1 +-0.050 mm, kappa +-0.0046");
 }
 
 TEST(CalibrationText, PutsBothMethodsBesideTheTruth) {
