@@ -91,6 +91,20 @@ std::string AstigmatismInWords(const Calibration& calibration) {
             "include the middle between both depths and both kappa");
 }
 
+std::string FieldAstigmatismInWords(const Calibration& calibration) {
+  const auto& corner = calibration.diagnostics.field.field_astigmatism_mm;
+  if (!corner || !(std::abs(corner->value) >
+                   std::max(kSignificant * corner->sigma, kMatters * SweepLengthMm(calibration))))
+    return "";
+  return fmt::format(
+      "the lens has field astigmatism: in the corner of the image the blur along the tangent is "
+      "smallest {:.3g} +- {:.2g} mm {} than the blur along the radius. A tilted target is not the "
+      "cause: it displaces both alike. One blur law does not describe both directions; the "
+      "intervals of zf, d1 and kappa include the middle between both foci and both kappa, and a "
+      "smaller roi_px in the middle of the field avoids it",
+      std::abs(corner->value), corner->sigma, corner->value > 0 ? "farther" : "nearer");
+}
+
 bool AstigmatismExplains(double spread_mm, const Calibration& calibration) {
   return IsAstigmatic(calibration) &&
          spread_mm < kReach * std::abs(calibration.diagnostics.field.astigmatism_mm->value);

@@ -24,6 +24,10 @@ bool IsAstigmatic(const Calibration& calibration);
 // none.
 std::string AstigmatismInWords(const Calibration& calibration);
 
+// What FieldMap::field_astigmatism_mm says of the lens, in words; empty where it is not beyond
+// doubt, or too small against the sweep to matter.
+std::string FieldAstigmatismInWords(const Calibration& calibration);
+
 // Whether astigmatism may also explain depths of parts of the field that differ by `spread_mm`: it
 // moves a part's focus by up to half of itself in either direction, depending on the part's
 // texture.

@@ -44,10 +44,11 @@ class Fit {
     for (Eigen::Index k = 0; k < count; ++k)
       nu_.col(k) = ModeFrequency(modes[static_cast<std::size_t>(k)], window);
     norm2_ = nu_.colwise().squaredNorm().transpose().array();
+    along_ = Eigen::Rotation2Dd(-options.axis_angle_rad).toRotationMatrix() * nu_;
     if constexpr (kAxes == 1) {
       shares_.setOnes(1, count);
     } else {
-      shares_ = nu_.array().square().rowwise() / norm2_.transpose();
+      shares_ = along_.array().square().rowwise() / norm2_.transpose();
     }
     box2_.resize(samples.size());
     for (std::size_t i = 0; i < samples.size(); ++i) {
@@ -165,7 +166,7 @@ class Fit {
     } else {
       const Variance sharper =
           state_.variance.col(static_cast<Eigen::Index>(reference_)) - state_.variance.col(i);
-      return kTwoPiSquared * (sharper.array() * nu_.col(k).array().square()).maxCoeff() <
+      return kTwoPiSquared * (sharper.array() * along_.col(k).array().square()).maxCoeff() <
              kSharperBand;
     }
   }
@@ -193,7 +194,7 @@ class Fit {
       for (Eigen::Index k = 0; k < leaked.size(); ++k) {
         for (const int axis : {0, 1}) {
           const double other =
-              SpectralTransfer(options_.psf, 0, added[1 - axis], 1, std::abs(nu_(1 - axis, k)))
+              SpectralTransfer(options_.psf, 0, added[1 - axis], 1, std::abs(along_(1 - axis, k)))
                   .value;
           leaked[k] += other * along[axis][k];
         }
@@ -582,7 +583,7 @@ class Fit {
   std::size_t reference_;
   const LeakageOf<kAxes>& leakage_;
   RelativeBlurOptions options_;
-  Eigen::Matrix2Xd nu_;
+  Eigen::Matrix2Xd nu_, along_;  // frequencies along x and y, and along the axes of the blur
   Eigen::ArrayXd norm2_;
   // Share of each axis in |nu|^2, per mode; 1 where there is one V.
   Eigen::Array<double, kAxes, Eigen::Dynamic> shares_;

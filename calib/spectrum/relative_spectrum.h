@@ -40,6 +40,8 @@ struct RelativeBlurOptions {
   // Holds g at 1: the spectra are relative to the mean of their frame. A halo around the blur takes
   // contrast at all frequencies alike, which a free gain would take for a change of the light.
   bool hold_gains = false;
+  // FitAxialBlur: the angle by which its axes are turned from x and y, from x towards y.
+  double axis_angle_rad = 0;
 };
 
 struct RelativeBlur {

@@ -279,14 +279,14 @@ void MeasureRegions(const SpectralEstimatorSetup& setup, std::vector<EstimatorRe
 }
 
 AxisLeakage MeasureAxisLeakage(const SpectralEstimatorSetup& setup, const EstimatorRegion& region,
-                               double largest_variance_px2) {
+                               double largest_variance_px2, double angle_rad) {
   const EstimatorFrame& frame = setup.frames[region.frames[region.reference]];
   const cv::Mat reference = Derotated(setup.read_grey(frame.frame), setup, frame);
-  std::vector<WindowLeakage> leakages =
-      WindowLeakage::AlongAxes(reference, setup.origin_px, region.window, region.modes,
-                               region.samples[region.reference].spectrum, setup.psf,
-                               kLeakageMargin * std::sqrt(largest_variance_px2) + 0.5,
-                               setup.threads, {Eigen::Vector2d::UnitX(), Eigen::Vector2d::UnitY()});
+  std::vector<WindowLeakage> leakages = WindowLeakage::AlongAxes(
+      reference, setup.origin_px, region.window, region.modes,
+      region.samples[region.reference].spectrum, setup.psf,
+      kLeakageMargin * std::sqrt(largest_variance_px2) + 0.5, setup.threads,
+      {Eigen::Vector2d::UnitX(), Eigen::Vector2d::UnitY()}, angle_rad);
   return {std::move(leakages[0]), std::move(leakages[1])};
 }
 

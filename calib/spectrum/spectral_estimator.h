@@ -73,9 +73,10 @@ std::size_t ModesInBand(const std::vector<Mode>& modes, const TargetWindow& wind
 void MeasureRegions(const SpectralEstimatorSetup& setup, std::vector<EstimatorRegion>* regions);
 
 // The leakage of a measured region's window for blur along x and along y, for a blur of up to
-// `largest_variance_px2` beyond that of the reference, px^2 of the target.
+// `largest_variance_px2` beyond that of the reference, px^2 of the target. Both axes are turned by
+// `angle_rad` from x towards y, as RelativeBlurOptions::axis_angle_rad.
 AxisLeakage MeasureAxisLeakage(const SpectralEstimatorSetup& setup, const EstimatorRegion& region,
-                               double largest_variance_px2);
+                               double largest_variance_px2, double angle_rad = 0);
 
 // Part of a measured region: only those frames and modes for which the predicates are true. The
 // argument of `frame` is an index into SpectralEstimatorSetup::frames. The reference must be kept.

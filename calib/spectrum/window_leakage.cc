@@ -1,5 +1,6 @@
 #include "calib/spectrum/window_leakage.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -168,24 +169,27 @@ class LeakageSums {
 
   using Values = std::array<std::complex<double>, kLeakageNodes>;
 
-  // The sums at a mode for all nodes but the first, over the sum of the window.
-  Values At(const Mode& mode, const TransferTable& transfer, const Eigen::Vector2d& axes) const {
+  // The sums at a mode for all nodes but the first, over the sum of the window. `along` times a
+  // frequency is its part along the axes of the blur.
+  Values At(const Mode& mode, const TransferTable& transfer, const Eigen::Matrix2d& along) const {
     const TransformAxis::Neighbours of_x = x_.Of(mode.jx), of_y = y_.Of(mode.jy);
     const Eigen::Vector2d nu = ModeFrequency(mode, window_);
-    const TransferTable::Entry here = transfer.At(static_cast<float>(axes.cwiseProduct(nu).norm()));
-    const auto axis_x = static_cast<float>(axes.x()), axis_y = static_cast<float>(axes.y());
+    const TransferTable::Entry here = transfer.At(static_cast<float>((along * nu).norm()));
+    const Eigen::Matrix2f axes = along.cast<float>();
     Values sums{};
     for (std::size_t v = 0; v < of_y.indices.size(); ++v) {
       const auto* row = transform_.ptr<Complex>(of_y.indices[v]);
-      const float fy = axis_y * of_y.frequencies[v];
+      const float fy = of_y.frequencies[v];
+      const float row_a = axes(0, 1) * fy, row_b = axes(1, 1) * fy;
       const auto [first, last] = x_.BinsWithin(mode.jx, kReach / of_y.distances[v]);
       std::array<float, kLeakageNodes> real{}, imaginary{};
       for (int bin = first; bin <= last; ++bin) {
         const auto u = static_cast<std::size_t>(bin - of_x.first_bin);
-        const float fx = axis_x * of_x.frequencies[u];
+        const float fx = of_x.frequencies[u];
+        const float a = axes(0, 0) * fx + row_a, b = axes(1, 0) * fx + row_b;
         const Complex value =
             of_x.weights[u] * (row[of_x.indices[u]] * x_.PhaseOf(of_x.indices[u]));
-        const TransferTable::Entry there = transfer.At(std::sqrt(fx * fx + fy * fy));
+        const TransferTable::Entry there = transfer.At(std::sqrt(a * a + b * b));
         for (std::size_t n = 0; n < here.size(); ++n) {
           real[n] += (there[n] - here[n]) * value.real();
           imaginary[n] += (there[n] - here[n]) * value.imag();
@@ -213,18 +217,19 @@ class LeakageSums {
 std::vector<Eigen::ArrayXcd> Nodes(const LeakageSums& sums, const TransferTable& transfer,
                                    const TargetWindow& window, const std::vector<Mode>& modes,
                                    const FrameSpectrum& spectrum, model::Psf psf, double step_px,
-                                   int threads, const Eigen::Vector2d& axes) {
+                                   int threads, const Eigen::Matrix2d& axes) {
   std::vector<Eigen::ArrayXcd> nodes(kLeakageNodes);
   nodes[0] = Eigen::ArrayXcd::Zero(static_cast<Eigen::Index>(modes.size()));
   const auto highest_of = [&](std::size_t node) {
     return std::sqrt(kLeakageBand / kTwoPiSquared) / (step_px * static_cast<double>(node));
   };
   const auto along = [&](const Mode& mode) -> Eigen::Vector2d {
-    return axes.cwiseProduct(ModeFrequency(mode, window));
+    return axes * ModeFrequency(mode, window);
   };
   for (std::size_t node = 1; node < nodes.size(); ++node) {
     // A blur along one axis leaves modes of every |nu|.
-    std::size_t count = axes.minCoeff() > 0 ? 0 : modes.size();
+    const bool is_along_both = axes.row(0).squaredNorm() > 0 && axes.row(1).squaredNorm() > 0;
+    std::size_t count = is_along_both ? 0 : modes.size();
     while (count < modes.size() && along(modes[count]).norm() < highest_of(node)) ++count;
     nodes[node] = Eigen::ArrayXcd::Zero(static_cast<Eigen::Index>(count));
   }
@@ -258,16 +263,17 @@ std::vector<Eigen::ArrayXcd> Nodes(const LeakageSums& sums, const TransferTable&
 WindowLeakage::WindowLeakage(const cv::Mat& reference, const Eigen::Vector2d& origin_px,
                              const TargetWindow& window, const std::vector<Mode>& modes,
                              const FrameSpectrum& spectrum, model::Psf psf, double largest_sigma_px,
-                             int threads, const Eigen::Vector2d& axes) {
+                             int threads, const Eigen::Vector2d& axes, double angle_rad) {
   *this = AlongAxes(reference, origin_px, window, modes, spectrum, psf, largest_sigma_px, threads,
-                    {axes})
+                    {axes}, angle_rad)
               .front();
 }
 
 std::vector<WindowLeakage> WindowLeakage::AlongAxes(
     const cv::Mat& reference, const Eigen::Vector2d& origin_px, const TargetWindow& window,
     const std::vector<Mode>& modes, const FrameSpectrum& spectrum, model::Psf psf,
-    double largest_sigma_px, int threads, const std::vector<Eigen::Vector2d>& axes) {
+    double largest_sigma_px, int threads, const std::vector<Eigen::Vector2d>& axes,
+    double angle_rad) {
   std::vector<WindowLeakage> found(axes.size());
   if (!(largest_sigma_px > 0)) return found;
   const double step_px = largest_sigma_px / (kLeakageNodes - 1);
@@ -280,10 +286,11 @@ std::vector<WindowLeakage> WindowLeakage::AlongAxes(
       psf, step_px,
       std::min(std::sqrt(0.5), highest + std::sqrt(2.0) * kReach / window.size_px.minCoeff()),
       threads);
+  const Eigen::Matrix2d turned = Eigen::Rotation2Dd(-angle_rad).toRotationMatrix();
   for (std::size_t a = 0; a < axes.size(); ++a) {
+    const Eigen::Matrix2d along = axes[a].asDiagonal() * turned;
     found[a].step_px_ = step_px;
-    found[a].nodes_ =
-        Nodes(sums, transfer, window, modes, spectrum, psf, step_px, threads, axes[a]);
+    found[a].nodes_ = Nodes(sums, transfer, window, modes, spectrum, psf, step_px, threads, along);
   }
   return found;
 }

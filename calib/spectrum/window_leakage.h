@@ -18,16 +18,18 @@ class WindowLeakage {
  public:
   WindowLeakage() = default;
   // `largest_sigma_px` is the end of the table. `spectrum` is that of the reference. `axes` are 1
-  // for the axes along which the image is blurred, and 0 for the others.
+  // for the axes along which the image is blurred, and 0 for the others; the first of them is
+  // turned by `angle_rad` from x towards y.
   WindowLeakage(const cv::Mat& reference, const Eigen::Vector2d& origin_px,
                 const TargetWindow& window, const std::vector<Mode>& modes,
                 const FrameSpectrum& spectrum, model::Psf psf, double largest_sigma_px, int threads,
-                const Eigen::Vector2d& axes = {1, 1});
+                const Eigen::Vector2d& axes = {1, 1}, double angle_rad = 0);
   // One leakage for each of `axes`, from one transform of the reference.
   static std::vector<WindowLeakage> AlongAxes(
       const cv::Mat& reference, const Eigen::Vector2d& origin_px, const TargetWindow& window,
       const std::vector<Mode>& modes, const FrameSpectrum& spectrum, model::Psf psf,
-      double largest_sigma_px, int threads, const std::vector<Eigen::Vector2d>& axes);
+      double largest_sigma_px, int threads, const std::vector<Eigen::Vector2d>& axes,
+      double angle_rad = 0);
 
   // The leakage at the first `count` modes for a blur of `variance_px2` beyond that of the
   // reference; 0 for no added blur.
@@ -41,7 +43,8 @@ class WindowLeakage {
   std::vector<Eigen::ArrayXcd> nodes_;  // fewer modes at strong blur; the rest is 0
 };
 
-// The leakage of a blur along x alone, and of one along y alone.
+// The leakage of a blur along the first axis alone (x, unless the axes are turned), and of one
+// along the second axis alone.
 struct AxisLeakage {
   WindowLeakage x, y;
 };

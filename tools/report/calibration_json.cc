@@ -267,7 +267,9 @@ json FieldJson(const calib::FieldMap& field) {
          {"message", PrintableUtf8(tile.message)},
          {"focus_depth_mm", tile.done ? EstimateJson(tile.focus_depth_mm) : json(nullptr)},
          {"blur_ratio", tile.done ? EstimateJson(tile.blur_ratio) : json(nullptr)},
-         {"cluster", Count(tile.done, tile.cluster)}});
+         {"cluster", Count(tile.done, tile.cluster)},
+         {"sagittal", AxisFocusJson(tile.sagittal)},
+         {"tangential", AxisFocusJson(tile.tangential)}});
   for (const calib::DepthCluster& cluster : field.clusters)
     clusters.push_back(
         {{"focus_depth_mm", EstimateJson(cluster.focus_depth_mm)}, {"tiles", cluster.tiles}});
@@ -280,6 +282,7 @@ json FieldJson(const calib::FieldMap& field) {
           {"tilt_down_deg", EstimateJson(field.tilt_down_deg)},
           {"curvature_mm", EstimateJson(field.curvature_mm)},
           {"astigmatism_mm", EstimateJson(field.astigmatism_mm)},
+          {"field_astigmatism_mm", EstimateJson(field.field_astigmatism_mm)},
           {"along_x", AxisFocusJson(field.along_x)},
           {"along_y", AxisFocusJson(field.along_y)},
           {"clusters", std::move(clusters)}};

@@ -119,6 +119,11 @@ std::vector<std::string> FieldLines(const calib::FieldMap& field) {
   if (field.astigmatism_mm)
     lines.push_back(fmt::format("astigmatism {}, horizontal blur against vertical",
                                 Signed(*field.astigmatism_mm, "mm")));
+  if (field.field_astigmatism_mm)
+    lines.push_back(
+        fmt::format("field astigmatism {} in the corner, sagittal focus against "
+                    "tangential (blur along the tangent against the radius)",
+                    Signed(*field.field_astigmatism_mm, "mm")));
   if (field.clusters.size() > 1) lines.push_back(ClusterLine(field.clusters));
   if (std::string line = RatioLine(field); !line.empty()) lines.push_back(std::move(line));
   return lines;

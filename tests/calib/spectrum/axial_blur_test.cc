@@ -5,6 +5,7 @@
 
 #include <Eigen/Dense>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "calib/spectrum/relative_spectrum.h"
@@ -25,6 +26,7 @@ constexpr double kPi = 3.14159265358979323846;
 // The reference is between both, and neither V_x nor V_y is smallest there.
 struct AxialScene {
   TextureScene scene = TextureSweep();
+  double angle_rad = 0;  // of the axes of the blur, from x towards y
   std::vector<Eigen::Vector2d> variances_px2 = {{1.0, 7.5}, {0.3, 4.4}, {0.9, 2.2}, {1.6, 1.5},
                                                 {2.5, 0.8}, {4.6, 0.3}, {7.0, 0.8}};
 
@@ -39,10 +41,12 @@ struct AxialScene {
       images.push_back(texture.RenderPlane(
           TextureScene::kSizePx, TextureScene::kSizePx, scene.origin, view,
           [&](const Eigen::Vector2d& nu) {
+            const Eigen::Vector2d along = Eigen::Rotation2Dd(-angle_rad).toRotationMatrix() * nu;
             if (scene.psf == model::Psf::kGaussian)
-              return std::exp(-2 * kPi * kPi * v.dot(nu.cwiseAbs2()));
+              return std::exp(-2 * kPi * kPi * v.dot(along.cwiseAbs2()));
             // An ellipse of the radii 2 sqrt(V - floor), times the floor's Gaussian.
-            const Eigen::Vector2d stretched = nu.cwiseProduct((v.array() - floor).sqrt().matrix());
+            const Eigen::Vector2d stretched =
+                along.cwiseProduct((v.array() - floor).sqrt().matrix());
             return model::GaussianTransfer(std::sqrt(floor), nu.x(), nu.y()) *
                    model::DiscTransfer(2, stretched.x(), stretched.y());
           }));
@@ -53,9 +57,14 @@ struct AxialScene {
                       const std::vector<Mode>& modes) const {
     const auto along = [&](const Eigen::Vector2d& axis) {
       return WindowLeakage(image, scene.origin, scene.window, modes, sample.spectrum, scene.psf, 4,
-                           1, axis);
+                           1, axis, angle_rad);
     };
     return {along({1, 0}), along({0, 1})};
+  }
+  RelativeBlurOptions Options() const {
+    RelativeBlurOptions options = scene.Options();
+    options.axis_angle_rad = angle_rad;
+    return options;
   }
   // The start is the isotropic mean, which is far from both variances.
   std::vector<SpectrumSample> Samples(const std::vector<cv::Mat>& images,
@@ -68,11 +77,16 @@ struct AxialScene {
   }
 };
 
+// Axes that are turned by 0.6 rad share no direction with those of the pixels.
 TEST(FitAxialBlur, RecoversBothVariances) {
-  for (const model::Psf psf : {model::Psf::kGaussian, model::Psf::kDisc}) {
+  for (const auto& [psf, angle_rad] :
+       {std::pair(model::Psf::kGaussian, 0.0), std::pair(model::Psf::kDisc, 0.0),
+        std::pair(model::Psf::kGaussian, 0.6), std::pair(model::Psf::kDisc, -0.9)}) {
     SCOPED_TRACE(model::PsfName(psf));
+    SCOPED_TRACE(angle_rad);
     AxialScene axial;
     axial.scene.psf = psf;
+    axial.angle_rad = angle_rad;
     if (psf == model::Psf::kDisc) {
       for (Eigen::Vector2d& v : axial.variances_px2) v.array() += 0.1;
     }
@@ -81,7 +95,7 @@ TEST(FitAxialBlur, RecoversBothVariances) {
     const auto samples = axial.Samples(images, modes);
     const AxialBlur fit =
         FitAxialBlur(samples, 3, axial.scene.window, modes,
-                     axial.Leakage(images[3], samples[3], modes), axial.scene.Options());
+                     axial.Leakage(images[3], samples[3], modes), axial.Options());
     ASSERT_TRUE(fit.done) << fit.message;
     EXPECT_EQ(fit.variances_px2.col(3), axial.variances_px2[3]);
     for (std::size_t i = 0; i < images.size(); ++i) {

@@ -173,6 +173,11 @@ struct SideFit {
   int frames_used = 0;              // number of frames on this side
 };
 
+// In-focus object distance and blur ratio of the blur along one direction in the image.
+struct AxisFocus {
+  model::Estimate focus_depth_mm;  // zf from Ap, without the error of the bench offset
+  model::Estimate blur_ratio;      // kappa, dimensionless
+};
 // Focus over the field, from the same fit on each tile of a regular grid.
 struct FieldTile {
   Eigen::Vector2d centre_px{0, 0};  // in the full image
@@ -181,16 +186,14 @@ struct FieldTile {
   model::Estimate focus_depth_mm;   // zf of the tile, from Ap
   model::Estimate blur_ratio;       // kappa of the tile, dimensionless
   int cluster = 0;                  // index into FieldMap::clusters
+  // The blur along the tangent and along the radius of the tile's position; present with
+  // FieldMap::field_astigmatism_mm where the tile's texture determines both.
+  std::optional<AxisFocus> sagittal, tangential;
 };
 // Tiles whose in-focus object distances agree: a part of the target at one depth.
 struct DepthCluster {
   model::Estimate focus_depth_mm;  // weighted mean of the tiles, from Ap
   int tiles = 0;                   // number of tiles
-};
-// In-focus object distance and blur ratio of the blur along one axis of the image.
-struct AxisFocus {
-  model::Estimate focus_depth_mm;  // zf from Ap, without the error of the bench offset
-  model::Estimate blur_ratio;      // kappa, dimensionless
 };
 // In-focus object distance over the field of view.
 struct FieldMap {
@@ -207,6 +210,11 @@ struct FieldMap {
   std::optional<model::Estimate> astigmatism_mm;  // zf of horizontal blur minus zf of vertical blur
   // The blur along x (horizontal) and along y (vertical); present with astigmatism_mm.
   std::optional<AxisFocus> along_x, along_y;
+  // Sagittal minus tangential focus in the farthest corner of the image: zf of the blur along the
+  // tangent minus that along the radius, by the law that it grows with the square of the distance
+  // from the axis. A tilt of the target, which displaces both alike, is no part of it. Measured only
+  // where one variance for all directions does not describe the tiles.
+  std::optional<model::Estimate> field_astigmatism_mm;
   std::vector<DepthCluster> clusters;  // a single cluster: the target is at one depth
 };
 
