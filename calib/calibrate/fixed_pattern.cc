@@ -2,12 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <opencv2/core.hpp>
 
 #include "calib/registration/frame_shading.h"
 #include "calib/registration/sensor_defects.h"
 
 namespace thicklens::calib {
 namespace {
+
+// Specks of simulated sweeps were found to within 0.3 of their amplitude where the registrations
+// were right.
+constexpr double kLeastRemainder = 0.1, kLargestRemainder = 1;
 
 // Adds to what is removed from the light of every frame.
 void AddToCorrection(const FixedPatternRemoval& more, FrameStore* store) {
@@ -25,19 +30,7 @@ bool RemoveShading(const FramePlaces& places, const FrameShading& shading, Frame
   return true;
 }
 
-}  // namespace
-
-bool FindFixedPattern(const FramePlaces& places, std::size_t reference,
-                      const std::vector<double>& sharpness, int threads, FrameStore* store,
-                      FixedPattern* pattern) {
-  const FrameShading shading = MeasureShading(places, threads);
-  pattern->measured = shading.done;
-  pattern->message = shading.message;
-  pattern->corner_stops = shading.corner_stops;
-  const bool shades = RemoveShading(places, shading, store, pattern);
-  const SensorDefects defects = FindSensorDefects(places, reference, sharpness, threads);
-  pattern->measured |= defects.done;
-  if (!defects.Any()) return shades;
+void Describe(const SensorDefects& defects, FixedPattern* pattern) {
   pattern->specks = defects.specks;
   pattern->deepest_speck = defects.deepest_speck;
   pattern->defective_px = defects.defective_px;
@@ -45,16 +38,51 @@ bool FindFixedPattern(const FramePlaces& places, std::size_t reference,
   pattern->filled_share = defects.filled_share;
   pattern->column_deviation = defects.column_deviation;
   pattern->row_deviation = defects.row_deviation;
-  AddToCorrection({defects.log_gain, defects.filled}, store);
+}
+
+}  // namespace
+
+bool FindFixedPattern(const FramePlaces& places, std::size_t reference,
+                      const std::vector<double>& sharpness, int threads, FrameStore* store,
+                      FixedPattern* pattern, RemovedDefects* defects) {
+  const FrameShading shading = MeasureShading(places, threads);
+  pattern->measured = shading.done;
+  pattern->message = shading.message;
+  pattern->corner_stops = shading.corner_stops;
+  const bool shades = RemoveShading(places, shading, store, pattern);
+  SensorDefects& found = defects->all;
+  found = FindSensorDefects(places, reference, sharpness, threads);
+  pattern->measured |= found.done;
+  if (!found.Any()) return shades;
+  Describe(found, pattern);
+  AddToCorrection({found.log_gain, found.filled}, store);
   return true;
 }
 
-bool FindRemainingShading(const FramePlaces& places, int threads, FrameStore* store,
-                          FixedPattern* pattern) {
+bool FindRemainingPattern(const FramePlaces& places, std::size_t reference,
+                          const std::vector<double>& sharpness, int threads, FrameStore* store,
+                          FixedPattern* pattern, RemovedDefects* defects) {
   const FrameShading shading = MeasureShading(places, threads);
-  if (!RemoveShading(places, shading, store, pattern)) return false;
-  pattern->corner_stops->value += shading.corner_stops->value;
-  pattern->corner_stops->sigma = shading.corner_stops->sigma;
+  const bool had_shading = pattern->shading_removed;
+  const bool shades = RemoveShading(places, shading, store, pattern);
+  if (shades && had_shading) {
+    pattern->corner_stops->value += shading.corner_stops->value;
+    pattern->corner_stops->sigma = shading.corner_stops->sigma;
+  } else if (shades) {
+    pattern->corner_stops = shading.corner_stops;
+  }
+  if (!defects->all.Any()) return shades;
+  const SensorDefects more = FindSensorDefects(places, reference, sharpness, threads);
+  defects->remainder = kLeastRemainder;
+  if (!more.done || !more.Any()) return shades;
+  defects->all = WithMore(defects->all, more);
+  const double power = cv::norm(defects->all.log_gain, cv::NORM_L2SQR);
+  if (power > 0) {
+    defects->remainder = std::clamp(cv::norm(more.log_gain, cv::NORM_L2SQR) / power,
+                                    kLeastRemainder, kLargestRemainder);
+  }
+  Describe(defects->all, pattern);
+  AddToCorrection({more.log_gain, more.filled}, store);
   return true;
 }
 
@@ -64,6 +92,12 @@ void AddErrorOfShading(const FixedPattern& pattern, const ScaleModel& before, Sc
       std::min(1.0, pattern.corner_stops->sigma / std::abs(pattern.corner_stops->value));
   law->offset_mm.sigma =
       std::hypot(law->offset_mm.sigma, part * (law->offset_mm.value - before.offset_mm.value));
+}
+
+void AddErrorOfDefects(const RemovedDefects& defects, const ScaleModel& before, ScaleModel* law) {
+  if (!defects.all.Any() || !law->done || !before.done) return;
+  law->offset_mm.sigma = std::hypot(
+      law->offset_mm.sigma, defects.remainder * (law->offset_mm.value - before.offset_mm.value));
 }
 
 }  // namespace thicklens::calib

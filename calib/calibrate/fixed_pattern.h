@@ -5,26 +5,41 @@
 #include <vector>
 
 #include "calib/registration/frame_structure.h"
+#include "calib/registration/sensor_defects.h"
 #include "calib/sweep/frame_store.h"
 #include "thicklens/calib/calibration.h"
 
 namespace thicklens::calib {
 
+// The fine structure that was removed.
+struct RemovedDefects {
+  SensorDefects all;  // the sum of what was found in each round
+  // Part of the power of the structure that may be left: what the last round found, over all.
+  double remainder = 1;
+};
+
 // Finds the shading and the fine structure that are fixed to the frame, and lets `store` remove
 // them from the light of all frames. Says in `pattern` what was found. `sharpness` has an index for
-// each frame of the sweep. Returns whether anything is removed.
+// each frame of the sweep. `defects` gets the fine structure. Returns whether anything is removed.
 bool FindFixedPattern(const FramePlaces& places, std::size_t reference,
                       const std::vector<double>& sharpness, int threads, FrameStore* store,
-                      FixedPattern* pattern);
+                      FixedPattern* pattern, RemovedDefects* defects);
 
-// Finds what is left of a strong shading once its removal has made the scales better. Returns
-// whether more is removed.
-bool FindRemainingShading(const FramePlaces& places, int threads, FrameStore* store,
-                          FixedPattern* pattern);
+// Finds what is left of a strong shading, or of fine structure, once its removal has made the
+// registrations better: fine structure pulls the scale of blurred frames toward 1 and their blur
+// toward 0. Returns whether more is removed.
+bool FindRemainingPattern(const FramePlaces& places, std::size_t reference,
+                          const std::vector<double>& sharpness, int threads, FrameStore* store,
+                          FixedPattern* pattern, RemovedDefects* defects);
 
 // Adds the part of the bench offset's error that the error of a removed shading causes: the shift
 // of the offset is proportional to the shading. `before` is the law of the scales with the shading.
 void AddErrorOfShading(const FixedPattern& pattern, const ScaleModel& before, ScaleModel* law);
+
+// The same for the fine structure. It is common to all frames and pulls their scales toward 1 by
+// its part of the power of the cross-spectra, so that the shift of the offset is proportional to
+// its power.
+void AddErrorOfDefects(const RemovedDefects& defects, const ScaleModel& before, ScaleModel* law);
 
 }  // namespace thicklens::calib
 

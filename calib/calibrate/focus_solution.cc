@@ -29,6 +29,8 @@ namespace {
 constexpr double kOutlierWeight = 0.6;
 // Above this chi^2 per degree of freedom the law itself is in doubt.
 constexpr double kLargeMisfit = 2;
+// Above both of these no blur law and no shape of the blur describes the frames.
+constexpr double kDoubtfulChi2 = 5, kDoubtfulShape = 10;
 constexpr double kSmallestRatio = 0.2, kLargestRatio = 0.8;
 // A lens with a ratio beyond these is unusual: the full aperture gives 0.5 by second moment.
 constexpr double kLowRatio = 0.35, kHighRatio = 0.65;
@@ -73,6 +75,7 @@ class Solution {
     FitSides(evidence_, fit_, &result_);
     AddSystematicParts(sweep_, evidence_, fit_, choice.interval_px2, &result_);
     if (evidence_.by_points) WidenByWindow(sweep_.camera.psf, &result_);
+    if (IsDoubtful()) WidenByDoubt();
     if (evidence_.axial) MeasureAstigmatism(sweep_, evidence_, fit_, &result_);
     FillFloor(choice);
     FillCovariance();
@@ -170,6 +173,37 @@ class Solution {
         fmt::format("the frames deviate from the blur law by more than their errors (chi2/dof "
                     "{:.3g}), which were widened accordingly: {}",
                     fit_.chi2_per_dof, CausesOfMisfit(sweep_, evidence_, result_)));
+  }
+
+  // Whether neither the law nor either shape of the blur describes the frames. The errors were
+  // widened by the scatter of the frames about the law, but what moves all frames of a part of the
+  // sweep alike does not scatter.
+  bool IsDoubtful() const {
+    return fit_.error_factor > 1 && fit_.chi2_per_dof > kDoubtfulChi2 &&
+           evidence_.gaussian_misfit && evidence_.disc_misfit &&
+           std::min(*evidence_.gaussian_misfit, *evidence_.disc_misfit) > kDoubtfulShape;
+  }
+
+  std::string Doubt() const {
+    return fmt::format(
+        "the frames deviate from the blur law (chi2/dof {:.3g}), and their texture deviates from "
+        "that of any shape of the blur (chi2/dof {:.3g})",
+        fit_.chi2_per_dof, std::min(*evidence_.gaussian_misfit, *evidence_.disc_misfit));
+  }
+
+  // Each side of focus alone contradicts the law of both by as much as the law may be wrong, in
+  // either direction.
+  void WidenByDoubt() {
+    double focus_mm = 0, ratio = 0;
+    for (const SideFit* side : {&result_.diagnostics.nearer, &result_.diagnostics.farther}) {
+      if (!side->done) continue;
+      focus_mm =
+          std::max(focus_mm, std::abs(side->focus_depth_mm.value - fit_.values[kFocusDepth]));
+      ratio = std::max(ratio, std::abs(side->blur_ratio.value - fit_.values[kBlurRatio]));
+    }
+    WidenFocusAndRatio("deviation from the blur law", {-focus_mm, focus_mm}, {-ratio, ratio},
+                       "find the cause of the deviation and take the sweep again",
+                       evidence_.setup.lens, &result_);
   }
 
   void FillFrames() {
@@ -349,6 +383,13 @@ class Solution {
     // An uncertain bench offset makes the ratio uncertain, which is then no contradiction.
     const double reach = kKnownSigmas * kappa_sigma;
     if (!(kappa + reach >= kSmallestRatio && kappa - reach <= kLargestRatio)) {
+      // Numbers of the camera change the ratio, and not how well the frames follow the law.
+      if (IsDoubtful()) {
+        Refuse(fmt::format("{}; the blur ratio would be {:.{}f}, which no lens has ({} to {}): {}",
+                           Doubt(), kappa, kappa < 0.1 ? 4 : 2, kSmallestRatio, kLargestRatio,
+                           CausesOfMisfit(sweep_, evidence_, result_)));
+        return false;
+      }
       Refuse(
           fmt::format("the blur ratio would have to be {:.{}f}, which no lens has ({} to {}): "
                       "check {}the unit of the readings, and that the {} moved and not {}",
@@ -531,6 +572,12 @@ class Solution {
     if (!result_.diagnostics.blur.undetermined.empty()) {
       result_.summary.outcome = Outcome::kPartial;
       result_.summary.reason = "the blur floor is not determined";
+    }
+    if (IsDoubtful()) {
+      std::string& reason = result_.summary.reason;
+      if (!reason.empty()) reason += "; ";
+      reason += "the result is doubtful: " + Doubt();
+      result_.summary.outcome = Outcome::kPartial;
     }
   }
 

@@ -8,6 +8,7 @@
 #include <mutex>
 #include <utility>
 
+#include "calib/calibrate/clipped_frames.h"
 #include "calib/calibrate/fixed_pattern.h"
 #include "calib/calibrate/focus_motion.h"
 #include "calib/calibrate/focus_solution.h"
@@ -31,6 +32,7 @@
 #include "calib/registration/scale_tracking.h"
 #include "calib/registration/spot_tracking.h"
 #include "calib/registration/stage_comparison.h"
+#include "calib/sharpness/gradient_energy.h"
 #include "calib/sharpness/sharpest_reading.h"
 #include "calib/sharpness/sharpness.h"
 #include "calib/sharpness/sharpness_peak.h"
@@ -54,9 +56,9 @@ constexpr double kFarBetter = 3;        // ratio of errors
 constexpr double kSigmasOfChange = 2;   // by which StageComparison changes its amplitudes
 constexpr double kPartOfStep = 0.2;     // of the readings, by which known depths may be off
 constexpr double kFewRegistered = 0.8;  // share of the used frames; below it the light is checked
-// Rounds of finding structure fixed to the frame: the second one, with better scales, finds the
-// remainder of a strong shading.
-constexpr int kPatternRounds = 2;
+// Rounds of finding structure fixed to the frame: the later ones, with better scales, find the
+// remainder.
+constexpr int kPatternRounds = 3;
 // Rounds of measuring bands: the second one has better registrations.
 constexpr int kBandPasses = 2;
 constexpr char kNoOffset[] = "nothing determines the bench offset";
@@ -68,6 +70,7 @@ class Calibrator {
              const FocusMotion* motion = nullptr)
       : sweep_(sweep), options_(options), motion_(motion), store_(sweep_), result_(Begun(sweep)) {
     profiles_.resize(sweep_.frames.size());
+    energies_.resize(sweep_.frames.size(), 0);
     total_steps_ = kStagesOfProgress * static_cast<int>(sweep.frames.size());
   }
 
@@ -321,6 +324,7 @@ class Calibrator {
       frame.mean_edge_slope = indices[0].mean_edge_slope;
       frame.normalised_edge_slope = indices[1].mean_edge_slope / mean;
       frame.edge_count = indices[1].edge_count;
+      energies_[i] = GradientEnergy(grey, frame.statistics.noise_sigma);
       if (const auto blur = MeasureSourceEdgeBlur(grey))
         frame.source_blur_sigma_px = blur->sigma_px;
     });
@@ -332,9 +336,10 @@ class Calibrator {
   }
 
   std::size_t SharpestUsed() const {
-    return *std::max_element(used().begin(), used().end(), [&](std::size_t a, std::size_t b) {
-      return result_.frames[a].normalised_edge_slope < result_.frames[b].normalised_edge_slope;
-    });
+    std::vector<double> slopes;
+    for (const FrameMeasurement& frame : result_.frames)
+      slopes.push_back(frame.normalised_edge_slope);
+    return SharpestFrame(used(), slopes, IsSparse(sweep_.target) ? slopes : energies_);
   }
 
   // Determines the bench offset (given, or from the image scale), then every frame's depth.
@@ -520,16 +525,12 @@ class Calibrator {
       pattern.message = "an edge or points do not show what is fixed to the frame";
       return true;
     }
-    std::vector<double> sharpness;
-    for (const FrameMeasurement& frame : result_.frames)
-      sharpness.push_back(frame.normalised_edge_slope);
     const ScaleModel before = result_.diagnostics.scale;
+    RemovedDefects defects;
     for (int round = 0; round < kPatternRounds; ++round) {
       const FramePlaces places = PlacesOf(*samples);
-      const bool found =
-          round == 0
-              ? FindFixedPattern(places, reference_, sharpness, options_.threads, &store_, &pattern)
-              : FindRemainingShading(places, options_.threads, &store_, &pattern);
+      const bool found = (round == 0 ? FindFixedPattern : FindRemainingPattern)(
+          places, reference_, energies_, options_.threads, &store_, &pattern, &defects);
       if (!found) break;
       ForEachUsed([&](std::size_t frame) { MeasureStatistics(frame); });
       if (!MeasureSharpness()) return false;
@@ -539,6 +540,7 @@ class Calibrator {
     ScaleModel& law = result_.diagnostics.scale;
     const double without_mm = law.offset_mm.sigma;
     AddErrorOfShading(pattern, before, &law);
+    AddErrorOfDefects(defects, before, &law);
     shading_sigma_mm_ = std::sqrt(
         std::max(0.0, law.offset_mm.sigma * law.offset_mm.sigma - without_mm * without_mm));
     return true;
@@ -793,8 +795,11 @@ class Calibrator {
     const double start_mm = result_.diagnostics.sharpness.done
                                 ? result_.diagnostics.sharpness.focus_depth_mm
                                 : result_.frames[reference_].depth_mm;
+    const ClippedFrames clipped = IsSparse(sweep_.target)
+                                      ? ClippedFrames()
+                                      : ChooseClippedFrames(result_.frames, used(), start_mm);
     BlurTask task(sweep_, store_);
-    task.frames = used();
+    task.frames = LeaveOutClipped(clipped, used(), &reference_, &scales_, &result_);
     task.reference = reference_;
     task.scales = scales_;
     task.scale_centre_mm = result_.diagnostics.scale.centre_mm;
@@ -838,6 +843,7 @@ class Calibrator {
       CheckMagnification(sweep_, reference_, Grey(reference_), &result_);
     if (result_.summary.outcome == Outcome::kRefused) return NameContradictions(fit);
     WidenByContradictions(evidence, fit);
+    WidenByClipping(clipped, &result_);
     if (motion_ == nullptr)
       CompareWithStatements(sweep_, statements_, evidence.setup, fit, &result_);
     task.scales = scales_;
@@ -1011,6 +1017,7 @@ class Calibrator {
   FrameSelection selection_{&result_.frames};  // frames that passed the quality checks
   std::size_t reference_ = 0;                  // the sharpest of them, normalised
   std::vector<LightProfiles> profiles_;        // by the index in the sweep
+  std::vector<double> energies_;               // GradientEnergy, by the index in the sweep
   std::vector<ScaleSample> scales_;            // registered frames
   ScaleCauses causes_;                         // possible causes of the scales
   std::optional<ReadingStep> slip_;

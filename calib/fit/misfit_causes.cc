@@ -11,6 +11,7 @@ namespace thicklens::calib {
 namespace {
 
 constexpr double kSignificant = 4;
+constexpr double kMuchRemoved = 0.02;   // part of the field
 constexpr double kMatters = 0.02;       // part of the sweep's length
 constexpr double kAsStated = 1.5;       // times the stated error of the readings
 constexpr double kClearlyBetter = 1.1;  // ratio of chi^2 with the two shapes of the blur
@@ -35,6 +36,13 @@ std::string CausesOfMisfit(const FocusSweep& sweep, const BlurEvidence& evidence
   if (calibration.diagnostics.structure.HasBands()) causes.emplace_back("bands of the light");
   if (calibration.diagnostics.structure.HasFixedStructure())
     causes.emplace_back("structure that stays on the sensor");
+  const FixedPattern& pattern = calibration.diagnostics.fixed_pattern;
+  const double removed = pattern.divided_share + pattern.filled_share;
+  if (removed > kMuchRemoved)
+    causes.emplace_back(
+        fmt::format("dust, or what was taken for it and removed on {:.2g} % of the "
+                    "field",
+                    100 * removed));
   const ScaleModel& scale = calibration.diagnostics.scale;
   // The image scale shows the readings' errors without the blur.
   const bool readings_are_as_stated = scale.done && sweep.reading_sigma_mm > 0 &&

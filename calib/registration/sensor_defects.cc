@@ -518,4 +518,35 @@ SensorDefects FindSensorDefects(const FramePlaces& places, std::size_t reference
   return DefectFinder(places, reference, sharpness, threads).Run();
 }
 
+SensorDefects WithMore(const SensorDefects& before, const SensorDefects& more) {
+  if (before.log_gain.empty()) return more;
+  if (more.log_gain.empty() || !more.Any()) return before;
+  SensorDefects both = before;
+  // The matrices of `before` may be in use elsewhere: these are new ones.
+  both.log_gain = cv::Mat();
+  both.filled = cv::Mat();
+  cv::add(before.log_gain, more.log_gain, both.log_gain);
+  cv::bitwise_or(before.filled, more.filled, both.filled);
+  both.column_deviation = std::max(before.column_deviation, more.column_deviation);
+  both.row_deviation = std::max(before.row_deviation, more.row_deviation);
+  both.defective_px = before.defective_px + more.defective_px;
+  // Unequal columns and rows are weaker than the weakest speck.
+  const cv::Mat divided = (cv::abs(both.log_gain) > kMinSpeck) & (both.filled == 0);
+  cv::Mat labels, statistics, centroids;
+  const int count = cv::connectedComponentsWithStats(divided | both.filled, labels, statistics,
+                                                     centroids, 8, CV_32S);
+  both.specks = 0;
+  for (int label = 1; label < count; ++label)
+    both.specks += statistics.at<int>(label, cv::CC_STAT_AREA) > kFewPixels;
+  double low = 0, high = 0;
+  cv::minMaxLoc(both.log_gain, &low, &high, nullptr, nullptr, both.filled == 0);
+  both.deepest_speck = std::max(1 - std::exp(low), std::exp(high) - 1);
+  const auto share = [&](const cv::Mat& mask) {
+    return cv::countNonZero(mask) / static_cast<double>(mask.total());
+  };
+  both.divided_share = share(divided);
+  both.filled_share = share(both.filled);
+  return both;
+}
+
 }  // namespace thicklens::calib

@@ -43,6 +43,11 @@ struct SensorDefects {
 SensorDefects FindSensorDefects(const FramePlaces& places, std::size_t reference,
                                 const std::vector<double>& sharpness, int threads);
 
+// Both findings in one, where `more` was found in frames without what `before` describes: what was
+// missed, and what was taken for too deep or too shallow because it disturbed the registrations and
+// the kernels. Specks are counted again in the sum.
+SensorDefects WithMore(const SensorDefects& before, const SensorDefects& more);
+
 }  // namespace thicklens::calib
 
 #endif  // THICKLENS_CALIB_REGISTRATION_SENSOR_DEFECTS_H_

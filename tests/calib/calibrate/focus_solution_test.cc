@@ -370,5 +370,58 @@ TEST(SolveFocus, AnotherShapeIsWarnedOfWhereItFitsClearlyBetter) {
   }
 }
 
+// ---- frames that follow no law ----
+
+// Every second frame deviates by three of its standard deviations to the other side.
+FocusCase Scattered(double misfit) {
+  FocusCase c = FocusCase().WithTexture(kErrorPx2).WithTrueFloor(0.01);
+  Eigen::VectorXd& variances_px2 = c.evidence.setup.estimators.front().variances_px2;
+  for (Eigen::Index i = 0; i < variances_px2.size(); ++i)
+    variances_px2[i] += (i % 2 == 0 ? 3 : -3) * kErrorPx2;
+  c.evidence.gaussian_misfit = misfit;
+  c.evidence.disc_misfit = 1.1 * misfit;
+  c.Solve();
+  return c;
+}
+
+TEST(SolveFocus, FramesThatFollowNeitherLawNorShapeGiveADoubtfulResult) {
+  FocusCase c = Scattered(120);
+  const CalibrationSummary& found = c.calibration.summary;
+  EXPECT_GT(c.fit.chi2_per_dof, 5);
+  EXPECT_EQ(found.outcome, Outcome::kPartial);
+  EXPECT_THAT(found.reason, HasSubstr("the result is doubtful"));
+  EXPECT_THAT(found.warnings, Contains(HasSubstr("deviate from the blur law")));
+  ASSERT_NE(c.Part("deviation from the blur law"), nullptr);
+  // Each side of focus alone, and its mirror image, lie in the intervals.
+  for (const SideFit* side :
+       {&c.calibration.diagnostics.nearer, &c.calibration.diagnostics.farther}) {
+    ASSERT_TRUE(side->done);
+    const double ratio = side->blur_ratio.value - found.blur_ratio->value;
+    const double focus_mm = side->focus_depth_mm.value - found.focus_depth_mm->value;
+    for (const double sign : {-1, 1}) {
+      EXPECT_LE(found.blur_ratio->systematic->x(), found.blur_ratio->value + sign * ratio);
+      EXPECT_GE(found.blur_ratio->systematic->y(), found.blur_ratio->value + sign * ratio);
+      EXPECT_LE(found.focus_depth_mm->systematic->x(),
+                found.focus_depth_mm->value + sign * focus_mm);
+      EXPECT_GE(found.focus_depth_mm->systematic->y(),
+                found.focus_depth_mm->value + sign * focus_mm);
+    }
+  }
+}
+
+TEST(SolveFocus, OneOfTheTwoAloneIsNoDoubt) {
+  // The errors of frames that scatter about the law are widened by their scatter.
+  FocusCase scattered = Scattered(1.2);
+  EXPECT_EQ(scattered.calibration.summary.outcome, Outcome::kOk);
+  EXPECT_GT(scattered.fit.error_factor, 2);
+  // Frames with little noise show more of a shape than any model has.
+  FocusCase quiet = FocusCase().WithTexture(kErrorPx2).WithTrueFloor(0.01);
+  quiet.evidence.gaussian_misfit = 120;
+  quiet.evidence.disc_misfit = 130;
+  quiet.Solve();
+  EXPECT_EQ(quiet.calibration.summary.outcome, Outcome::kOk);
+  EXPECT_EQ(quiet.Part("deviation from the blur law"), nullptr);
+}
+
 }  // namespace
 }  // namespace thicklens::calib

@@ -98,5 +98,32 @@ TEST(SensorDefects, ColumnsOfUnequalGainAreFound) {
   EXPECT_LT(cv::norm(before - found.log_gain), 0.6 * cv::norm(before));
 }
 
+// A second round finds that one speck is shallower than it seemed, and one more.
+TEST(SensorDefects, FindingsOfTwoRoundsAddUp) {
+  SensorDefects first, second;
+  first.done = second.done = true;
+  first.log_gain = cv::Mat::zeros(60, 80, CV_32F);
+  first.filled = cv::Mat::zeros(60, 80, CV_8U);
+  second.log_gain = first.log_gain.clone();
+  second.filled = first.filled.clone();
+  const cv::Rect a(10, 10, 6, 6), b(40, 30, 5, 8);
+  first.log_gain(a).setTo(-0.9);
+  first.specks = 1;
+  first.deepest_speck = 0.6;
+  second.log_gain(a).setTo(0.4);
+  second.log_gain(b).setTo(-0.3);
+  second.specks = 2;
+  const SensorDefects both = WithMore(first, second);
+  EXPECT_EQ(both.specks, 2);
+  EXPECT_NEAR(both.deepest_speck, 1 - std::exp(-0.5), 1e-6);
+  EXPECT_NEAR(both.divided_share, (36 + 40) / 4800.0, 1e-9);
+  EXPECT_EQ(both.filled_share, 0);
+  EXPECT_EQ(first.log_gain.at<float>(12, 12), -0.9F);  // the first finding stays as it was
+  // A speck that the second round takes back altogether does not count.
+  second.log_gain(a).setTo(0.9);
+  EXPECT_EQ(WithMore(first, second).specks, 1);
+  EXPECT_EQ(WithMore(first, SensorDefects()).specks, 1);
+}
+
 }  // namespace
 }  // namespace thicklens::calib
