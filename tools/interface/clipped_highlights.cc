@@ -17,17 +17,17 @@ namespace {
 
 // Below full scale, at least so many values must be equal to the largest, so many times as many as
 // at any of the next lower levels, and the level must be in the upper half.
-constexpr std::size_t kLeastValues = 20;
+constexpr std::size_t kMinValues = 20;
 constexpr std::size_t kPileFactor = 8;
 constexpr int kLevelsBelow = 10;
 constexpr double kLowestLevel = 0.5;
 // Separate areas at the largest level, of at least so many values each, that show it as a limit:
 // that several objects have one brightness to the last level is no coincidence.
-constexpr int kLeastAreas = 3;
-constexpr std::size_t kLeastOfArea = 5;
+constexpr int kMinAreas = 3;
+constexpr std::size_t kMinOfArea = 5;
 // Expected number of values above the largest, for its noise, that is no coincidence; the noise of
 // highlights may be below that of the photograph by this factor.
-constexpr double kLeastExpected = 15;
+constexpr double kMinExpected = 15;
 constexpr double kNoiseOfHighlights = 0.4;
 
 double NormalBelow(double x) { return std::erfc(-x / std::sqrt(2.0)) / 2; }
@@ -81,7 +81,7 @@ class Channel {
     return most;
   }
   bool is_piled_up() const {
-    return count() >= kLeastValues && count() >= kPileFactor * largest_count_below() &&
+    return count() >= kMinValues && count() >= kPileFactor * largest_count_below() &&
            counts_.size() > 1;
   }
 
@@ -111,7 +111,7 @@ class Channel {
           visit(i, j - 1);
           visit(i, j + 1);
         }
-        if (size >= kLeastOfArea) ++areas;
+        if (size >= kMinOfArea) ++areas;
       }
     }
     return areas;
@@ -171,11 +171,11 @@ PhotoClipping ClippingOfEncoded(const Image& photo) {
       continue;
     }
     if (level < kLowestLevel || !channel.is_piled_up()) continue;
-    bool is_limit = channel.Areas() >= kLeastAreas;
+    bool is_limit = channel.Areas() >= kMinAreas;
     if (!is_limit) {
       if (!noise) noise = NoiseBelow(photo, image.values, largest);
       const double sigma = kNoiseOfHighlights * *noise * full_scale;
-      is_limit = static_cast<double>(channel.count()) * ShareAbove(sigma) >= kLeastExpected;
+      is_limit = static_cast<double>(channel.count()) * ShareAbove(sigma) >= kMinExpected;
     }
     if (!is_limit) continue;
     found.levels[c] = level;
@@ -195,7 +195,7 @@ PhotoClipping ClippingOfLight(const Image& photo) {
     const Channel<float>& channel = channels[c];
     if (!(channel.largest() > 0) || !channel.is_piled_up()) continue;
     const bool is_continuous = channel.largest_count_below() <= 2;
-    if (is_continuous || channel.Areas() >= kLeastAreas)
+    if (is_continuous || channel.Areas() >= kMinAreas)
       found.levels[c] = static_cast<double>(channel.largest());
   }
   return found;
@@ -286,7 +286,10 @@ std::optional<Image> ClippedPartsOf(const Image& photo, const EstimateOptions& o
   std::vector<float> mask = MaskOf(photo, diagnostics->clipping);
   constexpr double kLargestScatter = 4;  // in standard deviations of the compression
   const double scatter = kLargestScatter * diagnostics->compression_sigma.value_or(0);
-  if (scatter > 0) GrowMask(photo, diagnostics->clipping, scatter, &mask);
+  if (scatter > 0) {
+    GrowMask(photo, diagnostics->clipping, scatter, &mask);
+    diagnostics->clipping.share = ShareOf(mask);
+  }
   return Image::FromLight(photo.width_px(), photo.height_px(), photo.order(), std::move(mask),
                           TransferCurve::Linear());
 }

@@ -10,7 +10,7 @@ namespace thicklens {
 namespace {
 
 // A fall-off that brightens no corner by more is not tested: it is within what no one sees.
-constexpr double kLeastFactor = 1.1;
+constexpr double kMinFactor = 1.1;
 // An undecided fall-off that brightens no corner by more is taken as the camera states it.
 constexpr double kHarmlessFactor = 1.25;
 
@@ -26,7 +26,7 @@ void DecideFalloff(const std::string& photo, const EstimateOptions& options,
   }
   estimator::FalloffEvidence evidence = estimator::TestFalloff(input, run->threads());
   const double factor = 1 / evidence.darkest;
-  if (!(factor >= kLeastFactor)) return;
+  if (!(factor >= kMinFactor)) return;
   const std::string without = run->Option("effects.without") + " falloff";
   const std::string with = run->Option("effects.given") + " all";
   const std::string keeps = fmt::format(

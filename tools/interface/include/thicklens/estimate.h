@@ -46,8 +46,8 @@ enum class ExifCheck {
   kIgnore,   // report contradictions as notices
 };
 
-// What the clipped values of a photograph are in an estimate by SceneSolver. The other solvers take
-// them as data.
+// Meaning of the clipped values of a photograph in an estimate by SceneSolver. The other solvers
+// take them as data.
 enum class ClippedHighlights {
   kBounds,  // lower bounds of the light: the residual counts below them only [D185]
   kData,    // the light itself
@@ -96,7 +96,7 @@ struct EstimateOptions {
   EffectSelection effects;                       // effects that the estimate models
   AnySolver solver = SceneSolver{};              // how the light field is computed
   HiddenRays hidden_rays = HiddenRays::kSolver;  // how hidden rays are filled
-  // What clipped values of the photograph are.
+  // Meaning of the clipped values of the photograph.
   ClippedHighlights clipped = ClippedHighlights::kBounds;
   // "auto", "cpu", "opencl", "opencl:PLATFORM" or "opencl:PLATFORM:DEVICE". auto: the processor for
   // SceneSolver, the best device for BlockSolver.
