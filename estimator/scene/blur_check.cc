@@ -175,7 +175,8 @@ BlurCheck CheckBlur(const EstimateInput& input, const BlurCheckOptions& options)
   progress.Report();
   BlurImage looked = BlurImageOf(input, options.falloff, threads);
   check.halvings = looked.halvings;
-  const std::optional<double> noise = EncodedNoiseSigma(looked.image, input.transfer);
+  const std::optional<double> noise =
+      EncodedNoiseSigma(looked.image, input.transfer, looked.clipped);
   // The mean of four pixels has half of an error that is white.
   check.noise_sigma = std::hypot(std::max(noise.value_or(kDefaultNoise), kMinNoise),
                                  std::ldexp(options.compression_sigma, -looked.halvings));
@@ -193,7 +194,7 @@ BlurCheck CheckBlur(const EstimateInput& input, const BlurCheckOptions& options)
   check.width_px = looked.image.width_px;
   check.height_px = looked.image.height_px;
   BlurTrials trials({std::move(looked.image), std::move(looked.disparity), input.weights,
-                     input.transfer, check.noise_sigma},
+                     input.transfer, check.noise_sigma, std::move(looked.clipped)},
                     *given, projection);
   given.reset();
   progress.Count();

@@ -29,6 +29,8 @@ bool IsToBeHalved(const model::LinearImage& image, int halvings) {
 void KeepMiddleRows(int rows, BlurImage* looked) {
   if (rows >= looked->image.height_px) return;
   const int from = (looked->image.height_px - rows) / 2;
+  looked->clipped =
+      CutRows(looked->clipped, looked->image.width_px, looked->image.channels, from, from + rows);
   looked->image = CutRows(looked->image, from, from + rows);
   looked->disparity = CutRows(looked->disparity, from, from + rows);
 }
@@ -47,9 +49,13 @@ BlurImage BlurImageOf(const EstimateInput& input, bool falloff, int threads) {
   }
   const DisparityMap& disparity = of_pixels ? *of_pixels : input.disparity;
   const model::LinearImage& image = without_falloff ? *without_falloff : input.image;
-  if (!IsToBeHalved(image, 0)) return {image, disparity, 0};
-  BlurImage looked{HalfSize(image), HalfSize(disparity), 1};
+  if (!IsToBeHalved(image, 0)) return {image, disparity, 0, input.clipped};
+  const auto half_of = [](const ClippedValues& clipped, const model::LinearImage& of) {
+    return HalfSize(clipped, of.width_px, of.height_px, of.channels);
+  };
+  BlurImage looked{HalfSize(image), HalfSize(disparity), 1, half_of(input.clipped, image)};
   while (IsToBeHalved(looked.image, looked.halvings)) {
+    looked.clipped = half_of(looked.clipped, looked.image);
     looked.image = HalfSize(looked.image);
     looked.disparity = HalfSize(looked.disparity);
     ++looked.halvings;

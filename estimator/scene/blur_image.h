@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "estimator/projection/scene_projection.h"
+#include "estimator/scene/lower_bounds.h"
 #include "thicklens/estimator/estimate_input.h"
 
 namespace thicklens::estimator {
@@ -14,6 +15,7 @@ struct BlurImage {
   model::LinearImage image;
   DisparityMap disparity;
   int halvings = 0;
+  ClippedValues clipped = {};
 };
 BlurImage BlurImageOf(const EstimateInput& input, bool falloff, int threads);
 

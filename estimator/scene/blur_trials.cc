@@ -70,6 +70,8 @@ std::size_t BlurTrials::BlockOf(std::size_t pixel) const {
 std::vector<BlurTrials::Block> BlurTrials::Solve(const SceneProjection<float>& projection,
                                                  const DisparityMap& disparity) {
   DataTerm<float> data = DataTermOf(projection, photograph_.image, options_.threads);
+  data.bounds =
+      BoundsInPlanes(photograph_.clipped, data.width_px, data.channels, 0, data.height_px);
   data.weight = weight_;
   data.row_norm2 = SquaredRows<float>(disparity, photograph_.weights);
   if (strength_ == 0) {
@@ -84,6 +86,7 @@ std::vector<BlurTrials::Block> BlurTrials::Solve(const SceneProjection<float>& p
   const std::vector<float> trace = ProbedTrace(data, limits, &system, &iterations_);
   std::vector<float> shown(radiance_.size());
   projection.Apply(radiance_.data(), data.channels, shown.data());
+  for (const std::size_t i : data.bounds) shown[i] = std::min(shown[i], data.photograph[i]);
 
   std::vector<Block> blocks(static_cast<std::size_t>(BlocksAlong(data.width_px)) *
                             static_cast<std::size_t>(BlocksAlong(data.height_px)));

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "estimator/projection/scene_projection.h"
+#include "estimator/scene/lower_bounds.h"
 #include "thicklens/estimator/blur_check.h"
 #include "thicklens/model/transfer_curve.h"
 
@@ -21,6 +22,7 @@ class BlurTrials {
     Eigen::ArrayXXd weights;
     model::TransferCurve transfer;
     double noise_sigma = 0;  // of encoded values
+    ClippedValues clipped = {};
   };
   // Solves with the given blur, whose H is `given`. `options` apply to the other blurs; their
   // `progress` is called repeatedly, from any thread, and may throw to stop.

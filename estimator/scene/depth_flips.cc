@@ -24,6 +24,7 @@ double ResidualOf(const BlurImage& image, model::DepthFlip flip, const EstimateI
                   double photo_aperture, const SolverRun& run) {
   EstimateInput tried;
   tried.image = image.image;
+  tried.clipped = image.clipped;
   tried.disparity = image.disparity;
   model::FlipDepth(flip, tried.disparity.width_px, &tried.disparity.disparity);
   tried.weights = input.weights;
@@ -59,8 +60,8 @@ DepthFlipCheck CheckDepthFlips(const EstimateInput& input, const DepthFlipOption
   const int threads = ResolveThreads(options.threads);
   const BlurImage image = BlurImageOf(input, options.falloff, threads);
   DepthFlipCheck check;
-  const double noise_sigma =
-      std::max(EncodedNoiseSigma(image.image, input.transfer).value_or(0), kMinNoise);
+  const double noise_sigma = std::max(
+      EncodedNoiseSigma(image.image, input.transfer, image.clipped).value_or(0), kMinNoise);
   // The mean of four pixels has half of an error that is white.
   check.noise_sigma =
       std::hypot(noise_sigma, std::ldexp(options.compression_sigma, -image.halvings));

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "estimator/scene/encoding_slope.h"
+#include "thicklens/base/index.h"
 #include "thicklens/estimator/scene_solver.h"
 
 namespace thicklens::estimator {
@@ -43,15 +44,30 @@ BlockNoise NoiseOf(const model::LinearImage& image, const EncodedValueTable& tab
   return noise;
 }
 
+// Returns whether a channel of a block has a value that is only a lower bound.
+bool IsClipped(const std::vector<std::uint8_t>& clipped, const model::LinearImage& image, int x0,
+               int y0, int channel) {
+  if (clipped.empty()) return false;
+  for (int y = y0; y < y0 + kBlockPx; ++y) {
+    for (int x = x0; x < x0 + kBlockPx; ++x) {
+      const std::size_t pixel = Index(y) * Index(image.width_px) + Index(x);
+      if (clipped[pixel * Index(image.channels) + Index(channel)] != 0) return true;
+    }
+  }
+  return false;
+}
+
 }  // namespace
 
 std::optional<double> EncodedNoiseSigma(const model::LinearImage& image,
-                                        const model::TransferCurve& transfer) {
+                                        const model::TransferCurve& transfer,
+                                        const std::vector<std::uint8_t>& clipped) {
   const EncodedValueTable table(transfer);
   std::vector<double> rms;
   for (int y = 0; y + kBlockPx <= image.height_px; y += kBlockPx) {
     for (int x = 0; x + kBlockPx <= image.width_px; x += kBlockPx) {
       for (int channel = 0; channel < image.channels; ++channel) {
+        if (IsClipped(clipped, image, x, y, channel)) continue;
         const BlockNoise noise = NoiseOf(image, table, x, y, channel);
         if (noise.mean >= kDarkestMean && noise.mean <= kBrightestMean) rms.push_back(noise.rms);
       }

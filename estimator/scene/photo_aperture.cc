@@ -10,6 +10,7 @@
 #include <limits>
 
 #include "estimator/scene/coarse_start.h"
+#include "estimator/scene/lower_bounds.h"
 #include "estimator/scene/photo_tiles.h"
 #include "estimator/scene/scene_data.h"
 #include "estimator/views/input_checks.h"
@@ -79,14 +80,26 @@ model::LinearImage GreyOf(const model::LinearImage& image, double clipped) {
   return grey;
 }
 
+// Sets the pixels that are only lower bounds to full scale: a level of clipping may be lower.
+void MarkClipped(const ClippedValues& clipped, model::LinearImage* grey) {
+  for (std::size_t i = 0; i < clipped.size(); ++i) {
+    if (clipped[i] != 0) grey->values[i] = std::max(grey->values[i], 1.0F);
+  }
+}
+
 Looked LookedAt(const EstimateInput& input) {
   Looked looked{GreyOf(input.image, input.transfer.Decode(kClippedValue)), input.disparity, 1};
+  ClippedValues clipped;
+  if (looked.grey.channels == 1) clipped = InAnyChannel(input.clipped, input.image.channels);
+  MarkClipped(clipped, &looked.grey);
   if (input.grid) {
     looked.disparity =
         PhotographDisparity(input.disparity, LandingStepPx(*input.camera, *input.grid));
   }
   while (1.0 * looked.grey.width_px * looked.grey.height_px > kMaxPixels) {
+    clipped = HalfSize(clipped, looked.grey.width_px, looked.grey.height_px, 1);
     looked.grey = HalfSize(looked.grey);
+    MarkClipped(clipped, &looked.grey);
     looked.disparity = HalfSize(looked.disparity);
     looked.scale *= 2;
   }

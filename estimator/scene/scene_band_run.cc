@@ -174,7 +174,7 @@ double SceneBandRun<Real>::Prepare(const model::LinearImage& photograph, const S
   const model::LinearImage& rows = cut ? *cut : photograph;
   double seconds = 0;
   if (start == Start::kFound) {
-    seconds = radiance->FindStart(rows, disparity);
+    seconds = radiance->FindStart(rows, disparity, band);
     ReturnFreedMemory(run_.memory_limit_mib);
   }
   radiance->Prepare(rows, disparity, band);

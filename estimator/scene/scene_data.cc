@@ -147,6 +147,8 @@ EncodedResidual EncodedResidualOf(const DataTerm<Real>& data, const std::vector<
   const EncodedValueTable table(transfer);
   std::vector<Real> shown(radiance.size());
   data.projection.apply(radiance.data(), data.channels, shown.data());
+  // Light above a lower bound agrees with it.
+  for (const std::size_t i : data.bounds) shown[i] = std::min(shown[i], data.photograph[i]);
   EncodedResidual residual;
   residual.mean.assign(data.pixels(), 0.0F);
   const Sums sums = SumOverBands(data.height_px, data.threads, [&](int y0, int y1) {

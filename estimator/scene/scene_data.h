@@ -42,7 +42,7 @@ std::vector<Real> DataWeights(const std::vector<Real>& slope_squared,
 std::vector<float> BlurSigmaPx(const DisparityMap& disparity, const Eigen::ArrayXXd& weights);
 
 // H r - I in encoded values in some rows: the mean of the channels at each pixel (0 in other rows),
-// and the rms of all.
+// and the rms of all; 0 where H r is above a lower bound.
 struct EncodedResidual {
   std::vector<float> mean;
   double rms = 0;

@@ -74,6 +74,7 @@ std::vector<Real> LocalVariation(const DataTerm<Real>& data, const std::vector<R
                                  const std::vector<Real>& radiance, double noise_sigma) {
   std::vector<Real> shown(radiance.size());
   data.projection.apply(radiance.data(), data.channels, shown.data());
+  for (const std::size_t i : data.bounds) shown[i] = std::min(shown[i], data.photograph[i]);
   std::vector<double> squares(data.pixels());
   for (std::size_t i = 0; i < shown.size(); ++i) {
     const std::size_t pixel = i % data.pixels();
@@ -162,6 +163,7 @@ class PatchRun {
   // which must not end early because of them. Returns false if it does not converge.
   bool Estimate(const std::vector<Real>& radiance, std::vector<Real>* planes) {
     DataTerm<Real> of_planes = data_;
+    of_planes.bounds.clear();
     of_planes.channels = static_cast<int>(planes->size() / data_.pixels());
     of_planes.photograph.resize(planes->size());
     data_.projection.apply(planes->data(), of_planes.channels, of_planes.photograph.data());

@@ -169,6 +169,21 @@ namespace {
 // First iterations of total variation with equal weights everywhere, which bring the blurred parts
 // of the photograph close to their final values.
 constexpr int kStartIterations = 4;
+// The ridge of a pixel with a clipped value, over that of others: the photograph does not say what
+// its radiance is near.
+constexpr double kRidgeOfBounds = 0.01;
+
+// Returns the ridge of a photograph, some of whose values may be lower bounds.
+template <typename Real>
+QuadraticPrior<Real> RidgeOf(const DataTerm<Real>& data, const std::vector<Real>& slope_squared,
+                             double mu) {
+  QuadraticPrior<Real> ridge = RidgePrior(slope_squared, mu);
+  for (const std::size_t bound : data.bounds) {
+    const std::size_t pixel = bound % data.pixels();
+    ridge.tikhonov_weight[pixel] = static_cast<Real>(kRidgeOfBounds * mu) * slope_squared[pixel];
+  }
+  return ridge;
+}
 
 }  // namespace
 
@@ -198,7 +213,7 @@ RadianceOutcome SolveRadiance(Prior prior, double strength, const DataTerm<Real>
     outcome.iterations = system->SolveRenewed(cg, renew, radiance).iterations;
     system->ReweightVariation();
   } else {
-    system->SetPrior(prior == Prior::kRidge ? RidgePrior(slope_squared, strength)
+    system->SetPrior(prior == Prior::kRidge ? RidgeOf(data, slope_squared, strength)
                                             : GradientPrior(slope_squared, strength));
     outcome.iterations = system->Solve(cg, radiance).iterations;
   }

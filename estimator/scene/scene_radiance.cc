@@ -9,6 +9,7 @@
 
 #include "estimator/scene/coarse_start.h"
 #include "estimator/scene/encoding_slope.h"
+#include "estimator/scene/lower_bounds.h"
 #include "estimator/scene/scene_patches.h"
 #include "estimator/scene/scene_strength.h"
 #include "thicklens/base/run_cost.h"
@@ -73,12 +74,15 @@ double MeanSlope(const model::LinearImage& photograph, const model::TransferCurv
 
 template <typename Real>
 double SceneRadiance<Real>::FindStart(const model::LinearImage& photograph,
-                                      const DisparityMap& disparity) {
+                                      const DisparityMap& disparity, const SceneBand& band) {
   if (std::min(photograph.width_px, photograph.height_px) < 2 * kMinCoarsePx) return 0;
   if (IsTheCentreView(run_.options)) return 0;
   EstimateInput half;
   half.image = HalfSize(photograph);
   half.disparity = HalfSize(disparity);
+  half.clipped = HalfSize(
+      CutRows(run_.input.clipped, photograph.width_px, photograph.channels, band.from, band.to),
+      photograph.width_px, photograph.height_px, photograph.channels);
   half.weights = run_.input.weights;
   half.transfer = run_.input.transfer;
   SceneOptions options = run_.options;
@@ -93,7 +97,8 @@ double SceneRadiance<Real>::FindStart(const model::LinearImage& photograph,
   run.backend = run_.backend;
   run.memory_limit_mib = run_.memory_limit_mib;
   run.threads = run_.threads;
-  run.noise_sigma = EncodedNoiseSigma(half.image, half.transfer).value_or(kDefaultNoise / 2);
+  run.noise_sigma =
+      EncodedNoiseSigma(half.image, half.transfer, half.clipped).value_or(kDefaultNoise / 2);
   run.mean_slope = run_.mean_slope;
   run.progress = &progress;
   SceneRadiance coarse(run);
@@ -121,6 +126,8 @@ void SceneRadiance<Real>::Prepare(const model::LinearImage& photograph,
   ReturnFreedMemory(run_.memory_limit_mib);
 
   data_ = DataTermOf(projection_, photograph, run_.threads);
+  data_.bounds =
+      BoundsInPlanes(run_.input.clipped, data_.width_px, data_.channels, band.from, band.to);
   slope_squared_ = SlopeSquared(photograph);
   data_.weight =
       DataWeights(slope_squared_, projection_.occluded_fraction, run_.options.disocclusion_weights);

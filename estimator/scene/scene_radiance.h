@@ -51,7 +51,8 @@ class SceneRadiance {
   // Finds the start of the iteration: the estimate at half the size, unless the image is small. It
   // must be called before Prepare, so that H of both sizes is never held at once; if it is not
   // called, the photograph is the start. Returns the seconds that it took without those for H.
-  double FindStart(const model::LinearImage& photograph, const DisparityMap& disparity);
+  double FindStart(const model::LinearImage& photograph, const DisparityMap& disparity,
+                   const SceneBand& band);
   // Makes H, I and the weights from the rows of the band: the photograph without fall-off, and the
   // disparity of its pixels, which must outlive this object.
   void Prepare(const model::LinearImage& photograph, const DisparityMap& disparity,

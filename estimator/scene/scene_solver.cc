@@ -78,7 +78,7 @@ model::LightField EstimateIn(const EstimateInput& input, const SceneOptions& opt
   const int iterations = std::min(options.max_iterations, UsualIterations(options.prior));
   IterationProgress progress(how.progress, iterations + static_cast<int>(input.weights.size()));
 
-  const std::optional<double> noise = EncodedNoiseSigma(input.image, input.transfer);
+  const std::optional<double> noise = EncodedNoiseSigma(input.image, input.transfer, input.clipped);
   summary->noise_sigma = noise.value_or(kDefaultNoise);
   SceneBandRun<Real> run(input, options, how, memory, reach_px, iterations, &progress, summary);
   std::optional<model::LinearImage> without_falloff;
@@ -91,6 +91,15 @@ model::LightField EstimateIn(const EstimateInput& input, const SceneOptions& opt
   SolvedScene solved = run.Solve(falloff ? *without_falloff : input.image, wants_confidence, maps);
   without_falloff.reset();
   ReturnFreedMemory(how.memory_limit_mib);
+
+  if (!solved.radiance.values.empty()) {
+    summary->brightest = static_cast<double>(
+        *std::max_element(solved.radiance.values.begin(), solved.radiance.values.end()));
+  }
+  summary->clipped_share =
+      static_cast<double>(std::count(input.clipped.begin(), input.clipped.end(), 1)) /
+      static_cast<double>(input.image.values.size());
+  if (summary->clipped_share > 0) summary->device = "cpu";  // that of the iterations
 
   const auto views_start = Clock::now();
   if (sink == nullptr) {

@@ -35,7 +35,8 @@ Sums SumOverBands(int height_px, int threads, const std::function<Sums(int, int)
 template <typename Real>
 SceneSystem<Real>::SceneSystem(const DataTerm<Real>& data, kernels::Backend* backend)
     : data_(data),
-      steps_(backend != nullptr ? backend->NewSteps(data) : kernels::NewCpuRadianceSteps(data)) {}
+      steps_(backend != nullptr && data.bounds.empty() ? backend->NewSteps(data)
+                                                       : kernels::NewCpuRadianceSteps(data)) {}
 
 template <typename Real>
 void SceneSystem<Real>::SetPrior(const QuadraticPrior<Real>& prior) {
@@ -71,7 +72,7 @@ CgOutcome SceneSystem<Real>::Iterate(const CgLimits& limits, const Renew& renew)
       if (may_converge) break;
       continue;
     }
-    steps_->UpdateSolution(steepness / curvature);
+    steps_->UpdateSolution(steps_->StepLength(steepness, curvature));
     ++outcome.iterations;
     if (limits.on_iteration) limits.on_iteration();
   }
@@ -124,6 +125,13 @@ double SceneSystem<Real>::DataMisfit(const std::vector<Real>& x) {
     const double difference =
         static_cast<double>(projected[i]) - static_cast<double>(data_.photograph[i]);
     sum += static_cast<double>(data_.weight[i % data_.pixels()]) * difference * difference;
+  }
+  for (const std::size_t i : data_.bounds) {  // above a bound there is no misfit
+    const double difference =
+        static_cast<double>(projected[i]) - static_cast<double>(data_.photograph[i]);
+    if (difference > 0) {
+      sum -= static_cast<double>(data_.weight[i % data_.pixels()]) * difference * difference;
+    }
   }
   return sum;
 }

@@ -33,7 +33,8 @@ struct CgOutcome {
 template <typename Real>
 class SceneSystem {
  public:
-  // `data` is kept by reference. Without a backend the steps run in C++ on the processor.
+  // `data` is kept by reference. Without a backend, or with bounds [D185], the steps run in C++ on
+  // the processor.
   explicit SceneSystem(const DataTerm<Real>& data, kernels::Backend* backend = nullptr);
 
   void SetPrior(const QuadraticPrior<Real>& prior);
@@ -56,7 +57,7 @@ class SceneSystem {
   // Returns |A x - b|/|b| of Solve's system, recomputed.
   double RelativeResidual(const std::vector<Real>& x);
 
-  // Returns sum W |H x - I|^2.
+  // Returns sum W |H x - I|^2; where I is a lower bound, only what is below it.
   double DataMisfit(const std::vector<Real>& x);
 
  private:

@@ -87,6 +87,11 @@ void CheckWeights(const Eigen::ArrayXXd& weights) {
 void CheckInput(const EstimateInput& input) {
   const model::LinearImage& image = input.image;
   CheckImage(image);
+  if (!input.clipped.empty() && input.clipped.size() != image.values.size()) {
+    Fail(fmt::format(
+        "the marks of clipped values are {}, but the image has {} values: the counts must be equal",
+        input.clipped.size(), image.values.size()));
+  }
   CheckDisparity(input.disparity, image);
   CheckWeights(input.weights);
   if (input.grid.has_value() != input.camera.has_value()) {

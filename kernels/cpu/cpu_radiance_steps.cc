@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <functional>
 #include <memory>
@@ -32,6 +33,7 @@ class CpuRadianceSteps : public RadianceSteps<Real> {
   ResidualSums UpdateResidual() override;
   double UpdateDirection(double beta) override;
   double ApplyNormalOperator() override;
+  double StepLength(double steepness, double curvature) override;
   void UpdateSolution(double step) override;
   std::vector<Real> Radiance() override { return x_; }
   std::vector<Real> Project(const std::vector<Real>& x) override;
@@ -54,6 +56,11 @@ class CpuRadianceSteps : public RadianceSteps<Real> {
   void UpdatePreconditioner();
   void StartAt(const std::vector<Real>& x);
   void MultiplyData(const std::vector<Real>& x, std::vector<Real>* y);  // y = H^T W H x
+  // Whether the system that was started has values that are lower bounds. A photograph given to
+  // StartFor has none.
+  bool HasBounds() const { return !data_.bounds.empty() && photograph_ == &data_.photograph; }
+  // Computes H x anew, and from it which bounds count and the residual of the data.
+  void MeetBounds();
   // Computes the sum over the channels of the squared forward differences of x at each pixel of a
   // row.
   void SquaredDifferences(int y, std::vector<Real>* squares) const;
@@ -78,6 +85,9 @@ class CpuRadianceSteps : public RadianceSteps<Real> {
   const std::vector<Real>* right_ = nullptr;  // H^T W I
   std::vector<Real> x_, data_residual_, residual_, direction_, product_;
   std::vector<Real> projected_;  // H x
+  // At the values that are bounds: H x, H p, and whether the residual counts.
+  std::vector<Real> shown_, along_;
+  std::vector<char> counts_;
 };
 
 template <typename Real>
@@ -220,7 +230,40 @@ void CpuRadianceSteps<Real>::MultiplyData(const std::vector<Real>& x, std::vecto
     }
     return Sums{};
   });
+  if (HasBounds()) {
+    for (std::size_t j = 0; j < data_.bounds.size(); ++j) {
+      Real& value = projected_[data_.bounds[j]];
+      along_[j] = value / data_.weight[data_.bounds[j] % pixels];
+      if (counts_[j] == 0) value = 0;
+    }
+  }
   data_.projection.apply_transposed(projected_.data(), channels_, y->data());
+}
+
+template <typename Real>
+void CpuRadianceSteps<Real>::MeetBounds() {
+  const std::size_t pixels = data_.pixels();
+  data_.projection.apply(x_.data(), channels_, projected_.data());
+  for (std::size_t j = 0; j < data_.bounds.size(); ++j) {
+    const std::size_t i = data_.bounds[j];
+    shown_[j] = projected_[i];
+    counts_[j] = shown_[j] < data_.photograph[i] ? 1 : 0;
+  }
+  SumOverBands([&](int y0, int y1, Room*) {
+    const std::size_t end = Index(y1) * Index(data_.width_px);
+    for (int channel = 0; channel < channels_; ++channel) {
+      const std::size_t plane = Index(channel) * pixels;
+      for (std::size_t i = Index(y0) * Index(data_.width_px); i < end; ++i) {
+        projected_[plane + i] =
+            data_.weight[i] * (data_.photograph[plane + i] - projected_[plane + i]);
+      }
+    }
+    return Sums{};
+  });
+  for (std::size_t j = 0; j < data_.bounds.size(); ++j) {
+    if (counts_[j] == 0) projected_[data_.bounds[j]] = 0;
+  }
+  data_.projection.apply_transposed(projected_.data(), channels_, data_residual_.data());
 }
 
 template <typename Real>
@@ -249,6 +292,13 @@ void CpuRadianceSteps<Real>::StartAt(const std::vector<Real>& x) {
   residual_.assign(x.size(), Real(0));
   direction_.assign(x.size(), Real(0));
   product_.resize(x.size());
+  if (HasBounds()) {
+    shown_.resize(data_.bounds.size());
+    along_.resize(data_.bounds.size());
+    counts_.resize(data_.bounds.size());
+    MeetBounds();
+    return;
+  }
   MultiplyData(x_, &product_);
   for (std::size_t i = 0; i < x.size(); ++i) data_residual_[i] -= product_[i];
 }
@@ -316,6 +366,49 @@ void CpuRadianceSteps<Real>::UpdateSolution(double step_along_direction) {
                       x_.data() + first, data_residual_.data() + first);
     return Sums{};
   });
+  if (!HasBounds()) return;
+  bool is_changed = false;
+  for (std::size_t j = 0; j < data_.bounds.size(); ++j) {
+    shown_[j] += step * along_[j];
+    is_changed |= (counts_[j] != 0) != (shown_[j] < data_.photograph[data_.bounds[j]]);
+  }
+  if (is_changed) MeetBounds();
+}
+
+// Half of the derivative along p at the distance a is -p.r + a p.A p, of the values that counted at
+// a = 0, plus the change of the terms -W Hp max(0, I - H x - a Hp) of the bounds. It increases with
+// a. Its zero is found by Newton's method on the pieces, within a bracket.
+template <typename Real>
+double CpuRadianceSteps<Real>::StepLength(double steepness, double curvature) {
+  double at = steepness / curvature;
+  if (!HasBounds()) return at;
+  constexpr int kMaxTries = 40;
+  constexpr double kTolerance = 1e-6;  // of the steepness
+  double low = 0, high = 0;            // high: 0 while it is not known
+  for (int i = 0; i < kMaxTries; ++i) {
+    double slope = at * curvature - steepness, bend = curvature;
+    for (std::size_t j = 0; j < data_.bounds.size(); ++j) {
+      const std::size_t index = data_.bounds[j];
+      const auto along = static_cast<double>(along_[j]);
+      const double below = static_cast<double>(data_.photograph[index]) -
+                           static_cast<double>(shown_[j]) - at * along;
+      const bool counted = counts_[j] != 0, counts = below > 0;
+      if (counted == counts) continue;
+      const double weight = static_cast<double>(data_.weight[index % data_.pixels()]);
+      const double sign = counts ? 1 : -1;
+      slope -= sign * weight * along * below;
+      bend += sign * weight * along * along;
+    }
+    if (std::abs(slope) <= kTolerance * steepness) break;
+    (slope < 0 ? low : high) = at;
+    const double next = bend > 0 ? at - slope / bend : 0;
+    if (next > low && (high == 0 || next < high)) {
+      at = next;
+    } else {
+      at = high == 0 ? 2 * at : (low + high) / 2;
+    }
+  }
+  return at;
 }
 
 template <typename Real>

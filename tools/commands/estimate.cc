@@ -259,6 +259,13 @@ void EstimateInto(io::LightFieldWriter* writer, EstimateCall call, bool has_page
       static_cast<double>(light_field.ViewStart(light_field.channels, 0, 0));
 }
 
+// Highlights that are estimated are brighter than full scale, where png ends.
+io::ViewFormat FormatFor(const EstimateOptions& options, const Image& photo) {
+  const bool is_auto_tiff = options.format == "auto" && options.solver == "scene" &&
+                            options.clipped == "bounds" && FindClipping(photo).share > 0;
+  return is_auto_tiff || options.format == "tiff" ? io::ViewFormat::kTiff : io::ViewFormat::kPng;
+}
+
 }  // namespace
 
 CommandResult RunEstimate(const EstimateOptions& options) {
@@ -279,9 +286,8 @@ CommandResult RunEstimate(const EstimateOptions& options) {
       call.settings.solver = ChooserOf(options, start, &choice);
     }
     outcome.read_seconds = SecondsSince(start);
-    io::LightFieldWriter writer(
-        TransferOf(call), options.format == "tiff" ? io::ViewFormat::kTiff : io::ViewFormat::kPng,
-        &outputs.light_field, call.photo.ColourProfile(TransferOf(call)));
+    io::LightFieldWriter writer(TransferOf(call), FormatFor(options, call.photo),
+                                &outputs.light_field, call.photo.ColourProfile(TransferOf(call)));
     EstimateInto(&writer, std::move(call), outputs.report.has_value(), run.control(), &outcome);
   });
   outcome.total_seconds = SecondsSince(start);

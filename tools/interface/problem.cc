@@ -18,10 +18,12 @@
 #include "thicklens/io/readings.h"
 #include "thicklens/model/effect_impact.h"
 #include "thicklens/model/undistort.h"
+#include "tools/interface/clipped_highlights.h"
 #include "tools/interface/depth_causes.h"
 #include "tools/interface/depth_reports.h"
 #include "tools/interface/effects_choice.h"
 #include "tools/interface/exif_comparison.h"
+#include "tools/interface/falloff_choice.h"
 #include "tools/interface/prepare_aperture.h"
 #include "tools/interface/stated_transfer.h"
 #include "tools/interface/validation.h"
@@ -509,14 +511,18 @@ PreparedProblem Prepare(Image photo, DepthMap map, const std::optional<Camera>& 
   if (photo.channels() == 4) run->Warn(file.name + ": its alpha channel is ignored");
   Image part = photo.channels() == 4 ? photo.WithoutAlpha() : std::move(photo);
   FindStorageErrors(part, facts.get(), diagnostics);
+  std::optional<Image> clipped = ClippedPartsOf(part, options, diagnostics);
   const std::optional<TransferCurve> given = part.transfer();
   if (const auto distortion =
           DistortionOf(file.name, part.width_px(), part.height_px(), camera, options, run)) {
     Undistort(*distortion, given.value_or(camera->sensor.transfer), &part, &map, diagnostics, run);
+    if (clipped) clipped = UndistortImage(*clipped, *distortion);
   }
   const int full_width_px = std::max(part.width_px(), map.width_px);
   const int full_height_px = std::max(part.height_px(), map.height_px);
   CutToCrop(options.crop, &part, &map, run);
+  if (clipped && clipped->width_px() * clipped->height_px() != part.width_px() * part.height_px())
+    clipped = clipped->Cropped(*options.crop);
   if (map.width_px != part.width_px() || map.height_px != part.height_px()) {
     throw Error(
         fmt::format("{}: it is {}x{} px, the image {} is {}x{} px: the sizes must be equal{}",
@@ -538,6 +544,8 @@ PreparedProblem Prepare(Image photo, DepthMap map, const std::optional<Camera>& 
   if (facts != nullptr && StatedTransferOf(*facts) == input.transfer)
     prepared.colour_profile = facts->icc_profile;
   input.image = part.ToLight(input.transfer);
+  if (clipped) input.clipped = MarksOf(*clipped);
+  ReportClipping(file.name, options, diagnostics->clipping, run);
   part = Image();  // its memory is needed
   const Camera* const known = input.camera ? &*input.camera : nullptr;
   const PreparedAperture aperture = PrepareAperture(options, known, run);
@@ -569,10 +577,11 @@ PreparedProblem Prepare(Image photo, DepthMap map, const std::optional<Camera>& 
   SmoothNoisyDepth(options, &input.disparity, diagnostics, run->threads());
   diagnostics->disparity_range_px = DisparityRangePx(input.disparity);
   prepared.effects = SelectEffects(options, input.camera, prepared_depth.depth);
-  diagnostics->effects = prepared.effects;
   if (input.camera && !prepared.effects.on.Has(Effect::kThickness)) {
     input.falloff_camera = model::ThinLensEquivalent(*input.camera);
   }
+  DecideFalloff(file.name, options, &prepared, diagnostics, run);
+  diagnostics->effects = prepared.effects;
   if (input.grid) {
     const bool falloff = prepared.effects.on.Has(Effect::kFalloff);
     const estimator::ApertureBlur blur = estimator::MeasureApertureBlur(

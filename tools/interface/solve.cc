@@ -155,6 +155,7 @@ void TakeDiagnostics(const estimator::SceneDiagnostics& found, EstimateDiagnosti
   diagnostics->row_share = found.row_share;
   diagnostics->occluded_fraction = found.occluded_fraction;
   diagnostics->bands = found.bands;
+  diagnostics->brightest = found.brightest;
   diagnostics->reweightings = found.reweightings;
 }
 

@@ -135,6 +135,7 @@ OptionNames EstimateOptionNames() {
           {"solver.prior", "--prior"},
           {"solver.strength", "--strength"},
           {"solver.photo", "--photo"},
+          {"clipped", "--clipped"},
           {"solver.tolerance", "--tolerance"},
           {"solver.max_iterations", "--max-iterations"},
           {"solver.gamma", "--gamma"},
@@ -175,6 +176,7 @@ thicklens::EstimateOptions SettingsOf(const EstimateOptions& options) {
   }
   settings.st_depth_mm = options.st_depth_mm;
   settings.smooth_depth = !options.keep_depth_noise;
+  if (options.clipped == "data") settings.clipped = ClippedHighlights::kData;
   settings.effects = EffectSelectionOf(options.effects);
   settings.solver = AsAnySolver(SolverOf(options));
   if (options.fill == "telea") settings.hidden_rays = HiddenRays::kTelea;

@@ -163,6 +163,13 @@ void AddQualityOptions(CLI::App* command, EstimateOptions* options) {
           "the photograph, default)")
       ->check(CLI::IsMember({"captured", "sharp", "auto"}))
       ->type_name("KIND");
+  command
+      ->add_option("--clipped", options->clipped,
+                   "What clipped values of the photograph are: bounds (the light is at least that, "
+                   "solver scene) or data (the light itself)")
+      ->check(CLI::IsMember({"bounds", "data"}))
+      ->capture_default_str()
+      ->type_name("WHAT");
   command->add_flag("--keep-depth-noise", options->keep_depth_noise,
                     "Disable depth denoising, which smooths the depth along surfaces");
   command
@@ -183,8 +190,10 @@ void AddOutputOptions(CLI::App* command, EstimateOptions* options) {
   command
       ->add_option(
           "--format", options->format,
-          "Format of the views: png (16 bit, encoded values) or tiff (float, linear light)")
-      ->check(CLI::IsMember({"png", "tiff"}))
+          "Format of the views: png (16 bit, encoded values), tiff (float, linear light, which "
+          "keeps what is brighter than full scale) or auto (tiff if highlights of the photograph "
+          "are clipped and estimated, otherwise png)")
+      ->check(CLI::IsMember({"auto", "png", "tiff"}))
       ->capture_default_str()
       ->type_name("NAME");
   command

@@ -39,11 +39,12 @@ struct EstimateOptions {
   std::string fill = "solver";  // or "telea"
   EffectOptions effects;
   std::string device = "auto";
-  std::string format = "png";
+  std::string format = "auto";  // png, or tiff for a photograph with clipped highlights
   // Options of some solvers, as the help says.
   std::optional<std::string> prior, strength;
   bool check_blur = false;
   std::optional<std::string> photo;  // captured, sharp or auto
+  std::string clipped = "bounds";    // or data
   std::optional<double> tolerance;
   std::optional<int> max_iterations;
   bool double_precision = false;

@@ -113,6 +113,16 @@ json BlurCheckJson(const EstimateDiagnostics& found) {
   return out;
 }
 
+// Returns null if it was not tested.
+json FalloffJson(const EstimateDiagnostics& found) {
+  if (!found.falloff) return nullptr;
+  return {{"verdict", estimator::FalloffVerdictName(found.falloff->verdict)},
+          {"message", found.falloff->message},
+          {"share", found.falloff->share},
+          {"sigma", found.falloff->sigma},
+          {"darkest", found.falloff->darkest}};
+}
+
 // Returns {verdict, message, share, sigma, used_share, ..}; only used_share if it was stated.
 json PhotoJson(const EstimateDiagnostics& found) {
   json out = {{"verdict", "not measured"}, {"used_share", found.used_photo_aperture}};
@@ -386,6 +396,9 @@ json EstimateJson(const EstimateOptions& options, const EstimateOutcome& outcome
                     {"median_mm", found.depth->median_mm},
                     {"max_mm", found.depth->max_mm}};
   }
+  out["photo_clipping"] = {{"share", found.clipping.share}, {"levels", found.clipping.levels}};
+  out["brightest"] = OrNull(found.brightest);
+  out["falloff"] = FalloffJson(found);
   if (found.gamma) out["gamma"] = *found.gamma;
   if (found.ridge) out["ridge"] = *found.ridge;
   if (summary.solver == "scene") AddScene(estimate, &out);

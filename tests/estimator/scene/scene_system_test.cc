@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <functional>
@@ -187,6 +188,163 @@ TEST(SceneSystem, SolvesTheGradientPrior) {
   SolveRadiance(Prior::kGradient, kEta, data, Values<double>(made.slope_squared), Accurate(),
                 &system, &found);
   EXPECT_LT(LargestError(found, expected), 1e-8);
+}
+
+// [D185] The oracle has a slack z >= 0 for every bound: |H r - I - z|^2. Without r, which is a
+// linear function of z, this is a least-squares problem in z >= 0, solved one variable at a time.
+// The bounds are the brightest sixth of one channel, and every fifth pixel of the other.
+bool IsBound(const Made& made, int channel, Eigen::Index i) {
+  return channel == 0 ? made.photograph(i, 0) > 0.85 : i % 5 == 0;
+}
+
+struct BoundedCase {
+  Made made = MakeCase();
+  MatrixXd system;  // H^T W H + P, of one channel
+  std::vector<std::size_t> bounds;
+  MatrixXd expected;
+  int met = 0, exceeded = 0;  // bounds with and without a residual
+};
+
+BoundedCase MakeBounded(const MatrixXd& prior, const MatrixXd& prior_right) {
+  BoundedCase bounded;
+  const Made& made = bounded.made;
+  const Eigen::Index pixels = made.blur.rows();
+  bounded.system = DataMatrix(made) + prior;
+  const auto factor = bounded.system.ldlt();
+  const MatrixXd weighted = made.blur.transpose() * made.weight.asDiagonal();
+  bounded.expected = MatrixXd(pixels, made.channels);
+  for (int channel = 0; channel < made.channels; ++channel) {
+    std::vector<Eigen::Index> at;
+    for (Eigen::Index i = 0; i < pixels; ++i) {
+      if (IsBound(made, channel, i)) at.push_back(i);
+    }
+    const auto count = static_cast<Eigen::Index>(at.size());
+    MatrixXd lift(pixels, count);  // W^(1/2) times what a slack changes, r included
+    const VectorXd root = made.weight.cwiseSqrt();
+    for (Eigen::Index j = 0; j < count; ++j) {
+      bounded.bounds.push_back(static_cast<std::size_t>(channel * pixels + at[Index(j)]));
+      lift.col(j) = factor.solve(weighted.col(at[Index(j)]));
+    }
+    const VectorXd start =
+        factor.solve(weighted * made.photograph.col(channel) + prior_right.col(channel));
+    // The derivative by z_j is -2 W_j ((H r(z))_j - I_j - z_j).
+    MatrixXd shown(count, count);
+    VectorXd left(count);
+    for (Eigen::Index i = 0; i < count; ++i) {
+      left[i] = made.blur.row(at[Index(i)]).dot(start) - made.photograph(at[Index(i)], channel);
+      for (Eigen::Index j = 0; j < count; ++j)
+        shown(i, j) = made.blur.row(at[Index(i)]).dot(lift.col(j));
+    }
+    VectorXd slack = VectorXd::Zero(count);
+    for (int sweep = 0; sweep < 5000; ++sweep) {
+      for (Eigen::Index i = 0; i < count; ++i) {
+        const double gradient = left[i] + shown.row(i).dot(slack) - slack[i];
+        slack[i] = std::max(0.0, slack[i] + gradient / (1 - shown(i, i)));
+      }
+    }
+    bounded.expected.col(channel) = start + lift * slack;
+    for (Eigen::Index i = 0; i < count; ++i) ++(slack[i] > 0 ? bounded.exceeded : bounded.met);
+  }
+  return bounded;
+}
+
+TEST(SceneSystem, MeetsBoundsLikeLeastSquaresWithSlacks) {
+  const Made made = MakeCase();
+  constexpr double kMu = 0.02;
+  VectorXd ridge = kMu * made.slope_squared;
+  for (Eigen::Index i = 0; i < ridge.size(); ++i) {
+    if (IsBound(made, 0, i) || IsBound(made, 1, i)) ridge[i] *= 0.01;
+  }
+  const MatrixXd tikhonov_weight = ridge.asDiagonal();
+  const BoundedCase bounded = MakeBounded(tikhonov_weight, tikhonov_weight * made.photograph);
+  ASSERT_GT(bounded.met, 10);
+  ASSERT_GT(bounded.exceeded, 10);
+  DataTerm<double> data = DataOf<double>(made);
+  data.bounds = bounded.bounds;
+  SceneSystem<double> system(data);
+  std::vector<double> found = data.photograph;
+  const RadianceOutcome outcome = SolveRadiance(
+      Prior::kRidge, kMu, data, Values<double>(made.slope_squared), Accurate(), &system, &found);
+  EXPECT_TRUE(outcome.converged);
+  EXPECT_LT(LargestError(found, bounded.expected), 1e-8);
+  DataTerm<double> all = DataOf<double>(made);
+  SceneSystem<double> plain(all);
+  std::vector<double> without = data.photograph;
+  SolveRadiance(Prior::kRidge, kMu, all, Values<double>(made.slope_squared), Accurate(), &plain,
+                &without);
+  EXPECT_GT(LargestError(without, bounded.expected), 0.01);
+  // The misfit has no part above the bounds.
+  MatrixXd residual = made.blur * bounded.expected - made.photograph;
+  for (const std::size_t i : data.bounds) residual.data()[i] = std::min(0.0, residual.data()[i]);
+  double misfit = 0;
+  for (int channel = 0; channel < made.channels; ++channel)
+    misfit += made.weight.dot(residual.col(channel).cwiseAbs2());
+  EXPECT_NEAR(system.DataMisfit(found), misfit, 1e-8);
+}
+
+TEST(SceneSystem, MeetsBoundsOfTheGradientPriorFromAnyStart) {
+  const Made made = MakeCase();
+  constexpr double kEta = 0.03;
+  const MatrixXd prior =
+      GradientMatrix(made, kEta * made.slope_squared) +
+      1e-6 * MatrixXd::Identity(made.slope_squared.size(), made.slope_squared.size());
+  const BoundedCase bounded =
+      MakeBounded(prior, MatrixXd::Zero(made.photograph.rows(), made.channels));
+  DataTerm<double> data = DataOf<double>(made);
+  data.bounds = bounded.bounds;
+  SceneSystem<double> system(data);
+  for (const double start : {0.0, 1.0, 40.0}) {
+    std::vector<double> found(data.photograph.size(), start);
+    SolveRadiance(Prior::kGradient, kEta, data, Values<double>(made.slope_squared), Accurate(),
+                  &system, &found);
+    EXPECT_LT(LargestError(found, bounded.expected), 1e-7) << start;
+  }
+}
+
+// No direction lowers the functional of total variation with bounds at its solution.
+TEST(SceneSystem, MinimisesVariationWithBounds) {
+  const Made made = MakeCase();
+  constexpr double kLambda = 0.05;
+  DataTerm<double> data = DataOf<double>(made);
+  for (std::size_t i = 0; i < data.photograph.size(); i += 4) data.bounds.push_back(i);
+  const std::vector<double> slope_squared = Values<double>(made.slope_squared);
+  SceneSystem<double> system(data);
+  std::vector<double> found = data.photograph;
+  const RadianceOutcome outcome = SolveRadiance(Prior::kTotalVariation, kLambda, data,
+                                                slope_squared, Accurate(), &system, &found);
+  EXPECT_TRUE(outcome.converged);
+  const MatrixXd differences = Differences(made);
+  const Eigen::Index pixels = made.blur.rows();
+  const auto functional = [&](const std::vector<double>& radiance) {
+    const Eigen::Map<const MatrixXd> r(radiance.data(), pixels, made.channels);
+    MatrixXd residual = made.blur * r - made.photograph;
+    for (const std::size_t i : data.bounds) residual.data()[i] = std::min(0.0, residual.data()[i]);
+    double sum = 1e-6 * r.squaredNorm();
+    for (int channel = 0; channel < made.channels; ++channel)
+      sum += made.weight.dot(residual.col(channel).cwiseAbs2());
+    const MatrixXd steps = differences * r;
+    for (Eigen::Index i = 0; i < pixels; ++i) {
+      const double g = made.slope_squared[i] *
+                       (steps.row(i).squaredNorm() + steps.row(pixels + i).squaredNorm());
+      sum += kLambda * std::sqrt(g + kVariationEps * kVariationEps);
+    }
+    return sum;
+  };
+  const double least = functional(found);
+  std::mt19937 engine(7);
+  std::normal_distribution<double> normal(0, 1);
+  for (int direction = 0; direction < 40; ++direction) {
+    std::vector<double> tried = found;
+    for (double& value : tried) value += 1e-3 * normal(engine);
+    EXPECT_GT(functional(tried), least);
+  }
+  for (std::size_t i = 0; i < found.size(); i += 3) {
+    for (const double step : {-1e-3, 1e-3}) {
+      std::vector<double> tried = found;
+      tried[i] += step;
+      EXPECT_GT(functional(tried), least) << i;
+    }
+  }
 }
 
 TEST(SceneSystem, TheResidualIsThatOfAnyAnswer) {

@@ -16,6 +16,7 @@
 #include "thicklens/effects.h"
 #include "thicklens/estimator/blur_check.h"
 #include "thicklens/estimator/depth_flips.h"
+#include "thicklens/estimator/falloff_evidence.h"
 #include "thicklens/estimator/inpaint.h"
 #include "thicklens/estimator/photo_aperture.h"
 #include "thicklens/estimator/scene_solver.h"
@@ -44,6 +45,26 @@ enum class ExifCheck {
   kRequire,  // throw Error if the photograph's EXIF contradicts the camera
   kIgnore,   // report contradictions as notices
 };
+
+// Meaning of the clipped values of a photograph in an estimate by SceneSolver. The other solvers
+// take them as data.
+enum class ClippedHighlights {
+  kBounds,  // lower bounds of the light: the residual counts below them only [D185]
+  kData,    // the light itself
+};
+
+// The clipped values of a photograph.
+struct PhotoClipping {
+  double share = 0;  // of all its values
+  // Per channel the encoded value, 1 at full scale, at which it is clipped; for an image of linear
+  // light the light. 0: the channel is not clipped. Empty: not looked for.
+  std::vector<double> levels;
+  bool at_full_scale = true;  // every level is the largest that the type has
+};
+// Finds the levels at which the channels of an image are clipped [D186]: full scale where the
+// values pile up at it, and a lower level where so many are equal to the largest that neither noise
+// nor the image's content explains it. Alpha is not looked at.
+THICKLENS_EXPORT PhotoClipping FindClipping(const Image& photo);
 
 // How rays are filled that the centre view does not show.
 enum class HiddenRays {
@@ -75,6 +96,8 @@ struct EstimateOptions {
   EffectSelection effects;                       // effects that the estimate models
   AnySolver solver = SceneSolver{};              // how the light field is computed
   HiddenRays hidden_rays = HiddenRays::kSolver;  // how hidden rays are filled
+  // Meaning of the clipped values of the photograph.
+  ClippedHighlights clipped = ClippedHighlights::kBounds;
   // "auto", "cpu", "opencl", "opencl:PLATFORM" or "opencl:PLATFORM:DEVICE". auto: the processor for
   // SceneSolver, the best device for BlockSolver.
   std::string device = "auto";
@@ -225,6 +248,12 @@ struct EstimateDiagnostics {
   std::optional<estimator::PhotoAperture> photo_aperture;
   // The aperture of the photograph over that of the views by which it was explained; 1: as stated.
   double used_photo_aperture = 1;
+  PhotoClipping clipping;  // clipped values of the photograph
+  // Of SceneSolver: the largest light of the scene's points, 1 at full scale.
+  std::optional<double> brightest;
+  // Whether the photograph shows the fall-off; absent: not tested, because the effect was stated or
+  // does not matter.
+  std::optional<estimator::FalloffEvidence> falloff;
   // Of SceneSolver, for a photograph that stays unexplained.
   std::optional<estimator::DepthFlipCheck> depth_flips;
   std::vector<Notice> notices;  // remarks on the call, in their order

@@ -1,6 +1,7 @@
 #ifndef THICKLENS_ESTIMATOR_SCENE_SOLVER_H_
 #define THICKLENS_ESTIMATOR_SCENE_SOLVER_H_
 
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
@@ -85,6 +86,9 @@ struct SceneDiagnostics {
   // Number of parts in which the image was solved, from top to bottom. The iterations and the
   // relative residual are the maximum over the parts.
   int bands = 1;
+  // The share of the photograph's values that are lower bounds, and the largest light of r, 1 at
+  // full scale.
+  double clipped_share = 0, brightest = 0;
 };
 
 // Convergence and residual are those of the last system; the device is that of the iterations.
@@ -108,11 +112,13 @@ struct SceneMaps {
 //
 //   sum_x W(x) |H r - I|^2 + prior,
 //
+// where the residual of a clipped value counts only below it (EstimateInput::clipped, [D185]), so
+// that r may be brighter than full scale. Such a photograph is solved on the processor.
 // W = s^2/(1 + (20 h)^2), where s is the slope of the transfer curve at the smoothed intensity
 // (errors of encoded values count) and h the share of the aperture that sees past an edge. H is
 // that of SceneProjection. Derived here [D101]. Priors:
 //
-//   ridge      mu sum s^2 |r - I|^2
+//   ridge      mu sum s^2 |r - I|^2; a hundredth of it at pixels with a clipped value
 //   gradient   eta sum s^2 |grad r|^2 + 1e-6 |r|^2
 //   tv         lambda sum_p (sum over channels and both differences of s^2 |dr|^2 + eps^2)^(1/2)
 //              + 1e-6 |r|^2, eps = 0.004, by reweighted least squares; the weights are renewed in
@@ -154,9 +160,11 @@ struct SceneViewSink {
 
 // Returns the standard deviation of the noise of encoded values in [0, 1], quantisation included
 // [D97]. For each 16 x 16 block with a mean of 12/255 to 243/255 it takes the rms of (p00 - p10 -
-// p01 + p11)/2, and of these the 25th percentile. Absent if there is no such block.
-THICKLENS_EXPORT std::optional<double> EncodedNoiseSigma(const model::LinearImage& image,
-                                                         const model::TransferCurve& transfer);
+// p01 + p11)/2, and of these the 25th percentile. Absent if there is no such block. Blocks with
+// values that `clipped` marks, as in EstimateInput, are left out: clipping hides their noise.
+THICKLENS_EXPORT std::optional<double> EncodedNoiseSigma(
+    const model::LinearImage& image, const model::TransferCurve& transfer,
+    const std::vector<std::uint8_t>& clipped = {});
 
 }  // namespace thicklens::estimator
 

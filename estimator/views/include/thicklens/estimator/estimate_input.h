@@ -2,7 +2,9 @@
 #define THICKLENS_ESTIMATOR_ESTIMATE_INPUT_H_
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "thicklens/base/export.h"
 #include "thicklens/estimator/disparity_map.h"
@@ -17,8 +19,11 @@ namespace thicklens::estimator {
 // The data that an estimate starts from. Valid inputs satisfy CheckInput (input_checks.h).
 struct EstimateInput {
   model::LinearImage image;  // photograph, linear light
-  DisparityMap disparity;    // without holes, of the image's size
-  Eigen::ArrayXXd weights;   // V x U, sum 1, >= 0
+  // One per value of the image: 1 where it is clipped, so that it is only a lower bound of the
+  // light [D185], and 0 elsewhere. Empty: none is clipped.
+  std::vector<std::uint8_t> clipped = {};
+  DisparityMap disparity;   // without holes, of the image's size
+  Eigen::ArrayXXd weights;  // V x U, sum 1, >= 0
   // The curve of the photograph's encoded values.
   model::TransferCurve transfer = model::TransferCurve::Srgb();
   // Either both are set or neither is. The S x T samples of the grid are the size of the image.

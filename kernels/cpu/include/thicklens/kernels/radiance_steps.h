@@ -34,7 +34,8 @@ struct FilteredMap {
 };
 
 // The data term that all systems of one photograph share: sum_x W(x) |H r - I|^2, with the same
-// weights in all channels.
+// weights in all channels. Where the photograph is only a lower bound of the light, the residual
+// counts below it only: W(x) max(0, I - H r)^2 [D185].
 template <typename Real>
 struct DataTerm {
   int width_px = 0, height_px = 0, channels = 0;  // of the photograph
@@ -44,7 +45,10 @@ struct DataTerm {
   std::vector<Real> weight;                       // weight W, one plane
   std::vector<Real> row_norm2;  // sum_j H_ij^2 of each pixel i: small if the pixel is a mean of
                                 // many
-  int threads = 1;              // number of threads, >= 1
+  // Indices into `photograph` of the values that are lower bounds, ascending; empty: none. They
+  // exist for the steps on the processor only.
+  std::vector<std::size_t> bounds;
+  int threads = 1;  // number of threads, >= 1
 
   // Number of pixels of one plane.
   std::size_t pixels() const {
@@ -108,7 +112,11 @@ class THICKLENS_EXPORT RadianceSteps {
   virtual ResidualSums UpdateResidual() = 0;        // r = b - (H^T W H + P) x
   virtual double UpdateDirection(double beta) = 0;  // p = M^-1 r + beta p; returns p . r
   virtual double ApplyNormalOperator() = 0;         // returns p . (H^T W H + P) p
-  virtual void UpdateSolution(double step) = 0;     // x += step p
+  // Returns the step along p to the minimum on that line, from p . r and p . (H^T W H + P) p. With
+  // bounds, H^T W H has the weights of those values only that counted at x; the function along p is
+  // then a parabola in pieces, whose minimum is found [D185].
+  virtual double StepLength(double steepness, double curvature) { return steepness / curvature; }
+  virtual void UpdateSolution(double step) = 0;  // x += step p
 
   virtual std::vector<Real> Radiance() = 0;  // returns x
 
