@@ -38,7 +38,7 @@ constexpr std::uint64_t kNoiseSeed = 1, kDepthSeed = 5;
 struct Arguments {
   std::vector<std::string> folders = {THICKLENS_SHARED_DATA_DIR "/lf_antinous"};
   std::vector<std::string> maps;
-  std::string prior = "tv", other, json_path;
+  std::string prior = "tv", other, json_path, refine = "auto";
   bool as_gaussian = false;
   int border_px = 20;
   int threads = 0;
@@ -222,6 +222,8 @@ Row Measure(const TrueScene& scene, const std::string& name, const cv::Mat& map,
   SceneSolver solver;
   solver.prior = arguments.prior == "patches" ? Prior::kPatches : Prior::kTotalVariation;
   options.solver = solver;
+  if (arguments.refine == "on") options.refine_depth = DepthRefining::kOn;
+  if (arguments.refine == "off") options.refine_depth = DepthRefining::kOff;
   RunControl run;
   run.threads = arguments.threads;
   Row row;
@@ -239,6 +241,8 @@ Row Measure(const TrueScene& scene, const std::string& name, const cv::Mat& map,
     row.remark = estimate.summary.partial_reason.empty()
                      ? fmt::format("{} warning(s)", estimate.summary.warnings.size())
                      : "partial: " + estimate.summary.partial_reason;
+    if (const auto& refined = estimate.diagnostics.depth_refinement)
+      row.remark += fmt::format("; {} ({:.2f} s)", refined->message, refined->seconds);
   } catch (const Interrupted&) {
     throw;
   } catch (const Error& error) {
@@ -263,6 +267,8 @@ void AddOptions(CLI::App* app, Arguments* arguments) {
   app->add_flag("--gaussian", arguments->as_gaussian, "instead of a uniform aperture");
   app->add_option("--other", arguments->other,
                   "folder of the light field whose map is of-another (lf_backgammon)");
+  app->add_option("--refine-depth", arguments->refine, "auto (default), on or off")
+      ->check(CLI::IsMember({"auto", "on", "off"}));
   app->add_option("--border", arguments->border_px, "px that are left out (20)")
       ->check(CLI::Range(0, 100));
   app->add_option("--threads", arguments->threads, "0: one per core")->check(CLI::Range(0, 1024));
