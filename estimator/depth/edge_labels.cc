@@ -89,12 +89,15 @@ struct Choice {
 // Finds by how much the colours of both sides make the pixel one of the near side.
 class ColourPreference {
  public:
-  ColourPreference(const cv::Mat& guide, const cv::Mat& map, const Edges& edges,
-                   const EdgeLabelOptions& options)
+  // Pixels of `unknown`, which may be empty, are no samples.
+  ColourPreference(const cv::Mat& guide, const cv::Mat& map, const cv::Mat& unknown,
+                   const Edges& edges, const EdgeLabelOptions& options)
       : guide_(guide),
         map_(map),
+        unknown_(unknown),
         edges_(edges),
-        reach_(static_cast<int>(options.reach_px) + 3),
+        reach_(static_cast<int>(options.reach_px) + (unknown.empty() ? 3 : 8)),
+        stride_(unknown.empty() ? 1 : 2),
         unsure_(static_cast<float>(options.unsure_px)),
         inverse_(static_cast<float>(1 / (2 * options.colour_sigma * options.colour_sigma))) {}
 
@@ -102,9 +105,11 @@ class ColourPreference {
     const float middle = (near_px + far_px) / 2, tolerance = (near_px - far_px) / 2;
     double like[2] = {0, 0}, total[2] = {0, 0};
     const float spread = static_cast<float>(reach_) / 2;
-    for (int v = std::max(-reach_, -y); v <= std::min(reach_, map_.rows - 1 - y); ++v) {
-      for (int u = std::max(-reach_, -x); u <= std::min(reach_, map_.cols - 1 - x); ++u) {
-        if (u == 0 && v == 0) continue;
+    for (int v = -reach_; v <= reach_; v += stride_) {
+      if (y + v < 0 || y + v >= map_.rows) continue;
+      for (int u = -reach_; u <= reach_; u += stride_) {
+        if (x + u < 0 || x + u >= map_.cols || (u == 0 && v == 0)) continue;
+        if (!unknown_.empty() && unknown_.at<uchar>(y + v, x + u) != 0) continue;
         const float disparity = map_.at<float>(y + v, x + u);
         if (disparity > near_px + tolerance || disparity < far_px - tolerance) continue;
         // The closer to the edge, the less sure is the side of a sample.
@@ -128,8 +133,9 @@ class ColourPreference {
  private:
   const cv::Mat& guide_;
   const cv::Mat& map_;
+  const cv::Mat unknown_;
   const Edges& edges_;
-  const int reach_;
+  const int reach_, stride_;
   const float unsure_, inverse_;
 };
 
@@ -181,7 +187,7 @@ double Label(const cv::Mat& guide, const cv::Mat& unknown, const EdgeLabelOption
   const auto at = [&](int x, int y) -> Choice& {
     return choices[Index(y) * Index(width) + Index(x)];
   };
-  const ColourPreference colours(guide, *map, edges, options);
+  const ColourPreference colours(guide, *map, unknown, edges, options);
   const auto reach = static_cast<float>(options.reach_px);
   ParallelFor(height, ResolveThreads(options.threads), [&](int y) {
     for (int x = 0; x < width; ++x) {
@@ -319,7 +325,7 @@ EdgeAlignment AlignEdges(const cv::Mat& guide, const cv::Mat& map,
   EdgeAlignment alignment;
   const Edges edges = FindEdges(map, static_cast<float>(options.jump_px));
   if (edges.near_px.empty()) return alignment;
-  const ColourPreference colours(guide, map, edges, options);
+  const ColourPreference colours(guide, map, cv::Mat(), edges, options);
   const auto reach = static_cast<float>(options.reach_px);
   const int part_px = std::max(16, std::min(map.cols, map.rows) / 12);
   // A part of the pixels is sufficient.

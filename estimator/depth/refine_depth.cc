@@ -28,7 +28,9 @@ constexpr double kManyHoles = 1e-3;
 constexpr double kCertain = 2.5, kProbable = 1.5, kNext = 1;
 // The gain also has to be this share of the agreement.
 constexpr double kLeastGain = 0.01;
-constexpr double kHoleReachPx = 8;
+// The way by which an edge in a filled hole may be wrong, and by which one pass moves it.
+constexpr double kHoleSigmaPx = 4, kHoleReachPx = 8;
+constexpr int kHolePasses = 2;
 constexpr int kAlignments = 4;
 constexpr int kLeastDilationPx = 2;
 constexpr double kMostShiftPx = 7;
@@ -134,10 +136,20 @@ DepthRefinement RefineDepth(const model::LinearImage& photo, const model::Transf
   labels.threads = options.threads;
   labels.jump_px = std::max(kLeastJumpPx, kJumpOfNoise * options.noise_px);
 
-  const BlockGrid blocks = FindBlocks(now);
+  // The values of the file: filled holes have others.
+  cv::Mat unknown(now.size(), CV_8U, cv::Scalar(0));
+  for (std::size_t i = 0; i < was_hole.size(); ++i) {
+    if (was_hole[i])
+      unknown.at<uchar>(static_cast<int>(i / Index(now.cols)),
+                        static_cast<int>(i % Index(now.cols))) = 255;
+  }
+  cv::Mat stored = before.clone();
+  stored.setTo(0, unknown);
+  const BlockGrid blocks = FindBlocks(stored);
   found.block_px = blocks.size_px();
   if (found.block_px > 1) now = WithoutBlocks(now, blocks);
-  found.quantum_px = QuantumPx(before);
+  found.quantum_px = QuantumPx(stored);
+  stored.release();
   const bool quanta = found.quantum_px > kLeastQuantumPx;
   if (quanta) now = WithoutQuanta(now, found.quantum_px);
   cv::Mat without_outliers = now.clone();
@@ -159,14 +171,10 @@ DepthRefinement RefineDepth(const model::LinearImage& photo, const model::Transf
   const bool holes = static_cast<double>(std::count(was_hole.begin(), was_hole.end(), true)) >
                      kManyHoles * static_cast<double>(pixels);
   if (holes) {
-    cv::Mat unknown(now.size(), CV_8U);
-    for (std::size_t i = 0; i < pixels; ++i)
-      unknown.at<uchar>(static_cast<int>(i / Index(now.cols)),
-                        static_cast<int>(i % Index(now.cols))) = was_hole[i] ? 255 : 0;
     EdgeLabelOptions of_holes = labels;
-    of_holes.edge_sigma_px = 3;
+    of_holes.edge_sigma_px = kHoleSigmaPx;
     of_holes.reach_px = kHoleReachPx;
-    LabelUnknown(guide, unknown, of_holes, &now);
+    for (int pass = 0; pass < kHolePasses; ++pass) LabelUnknown(guide, unknown, of_holes, &now);
   }
   found.applied = ramps || moved || quanta || outliers || holes || found.block_px > 1;
   if (found.applied) {

@@ -183,6 +183,27 @@ TEST(RefineDepth, QuantisedMapsAreMadeSmoothWithinTheirRounding) {
   EXPECT_LT(after, before / 3);
 }
 
+TEST(RefineDepth, FilledHolesDoNotHideBlocksAndQuanta) {
+  const TwoDiscs scene;
+  cv::Mat small, large;
+  cv::resize(scene.disparity, small, {}, 0.25, 0.25, cv::INTER_NEAREST);
+  for (float& value : cv::Mat_<float>(small)) value = 0.05F * std::round(value / 0.05F);
+  cv::resize(small, large, scene.disparity.size(), 0, 0, cv::INTER_NEAREST);
+  std::vector<bool> holes(large.total(), false);
+  std::mt19937_64 engine(4);
+  std::uniform_real_distribution<float> any(-1, 1);
+  for (int y = 40; y < 60; ++y) {
+    for (int x = 120; x < 140; ++x) {
+      holes[static_cast<std::size_t>(y * kSize + x)] = true;
+      large.at<float>(y, x) += 0.01F * any(engine);
+    }
+  }
+  DisparityMap map = MapOf(large);
+  const DepthRefinement found = Refine(scene, &map, holes);
+  EXPECT_EQ(found.block_px, 4);
+  EXPECT_NEAR(found.quantum_px, 0.05, 1e-3);
+}
+
 TEST(RefineDepth, OutliersAreDropped) {
   const TwoDiscs scene;
   cv::Mat spoilt = scene.disparity.clone();
