@@ -349,6 +349,7 @@ bool EstimateOptions::IsValid(std::string* why) const {
     return false;
   }
   if (!OneOf(why, "exif", ExifCheck::kIgnore, exif)) return false;
+  if (!OneOf(why, "refine_depth", DepthRefining::kOff, refine_depth)) return false;
   if (aperture.shape &&
       !OneOf(why, "aperture.shape", model::ApertureShape::kDisc, *aperture.shape)) {
     return false;

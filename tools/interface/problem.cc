@@ -13,6 +13,7 @@
 #include "thicklens/estimator/aperture_blur.h"
 #include "thicklens/estimator/depth_noise.h"
 #include "thicklens/estimator/estimate_checks.h"
+#include "thicklens/estimator/refine_depth.h"
 #include "thicklens/io/exif.h"
 #include "thicklens/io/image_file.h"
 #include "thicklens/io/readings.h"
@@ -455,6 +456,19 @@ void SmoothNoisyDepth(const EstimateOptions& options, estimator::DisparityMap* d
   diagnostics->depth_noise_left_px = smoothed.noise_left_px;
 }
 
+// The smoothing before it leaves little noise.
+void RefineDepthOf(const EstimateOptions& options, const std::vector<bool>& was_hole, int threads,
+                   estimator::EstimateInput* input, EstimateDiagnostics* diagnostics) {
+  if (options.refine_depth == DepthRefining::kOff) return;
+  estimator::DepthRefinementOptions refining;
+  refining.eager = options.refine_depth == DepthRefining::kOn;
+  refining.noise_px =
+      diagnostics->depth_noise_left_px.value_or(diagnostics->depth_noise_px.value_or(0));
+  refining.threads = threads;
+  diagnostics->depth_refinement =
+      estimator::RefineDepth(input->image, input->transfer, was_hole, refining, &input->disparity);
+}
+
 // ---- 6. The effects.
 
 EffectSet EffectsOfModel(const AnySolver& solver, bool camera) {
@@ -575,6 +589,7 @@ PreparedProblem Prepare(Image photo, DepthMap map, const std::optional<Camera>& 
   CheckDisparities(map, input.disparity, *run);
   CheckScaleIsGiven(map, input.disparity, input.weights, *run);
   SmoothNoisyDepth(options, &input.disparity, diagnostics, run->threads());
+  RefineDepthOf(options, prepared.was_hole, run->threads(), &input, diagnostics);
   diagnostics->disparity_range_px = DisparityRangePx(input.disparity);
   prepared.effects = SelectEffects(options, input.camera, prepared_depth.depth);
   if (input.camera && !prepared.effects.on.Has(Effect::kThickness)) {

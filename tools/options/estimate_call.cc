@@ -112,6 +112,7 @@ OptionNames EstimateOptionNames() {
           {"aperture", "--aperture-shape and --aperture-of"},
           {"st_depth_mm", "--st-depth-mm"},
           {"smooth_depth", "--keep-depth-noise"},
+          {"refine_depth", "--refine-depth"},
           {"effects", "--effects, --without"},
           {"effects.given", "--effects"},
           {"effects.without", "--without"},
@@ -177,6 +178,8 @@ thicklens::EstimateOptions SettingsOf(const EstimateOptions& options) {
   settings.st_depth_mm = options.st_depth_mm;
   settings.smooth_depth = !options.keep_depth_noise;
   if (options.clipped == "data") settings.clipped = ClippedHighlights::kData;
+  if (options.refine_depth == "on") settings.refine_depth = DepthRefining::kOn;
+  if (options.refine_depth == "off") settings.refine_depth = DepthRefining::kOff;
   settings.effects = EffectSelectionOf(options.effects);
   settings.solver = AsAnySolver(SolverOf(options));
   if (options.fill == "telea") settings.hidden_rays = HiddenRays::kTelea;

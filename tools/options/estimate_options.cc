@@ -173,6 +173,13 @@ void AddQualityOptions(CLI::App* command, EstimateOptions* options) {
   command->add_flag("--keep-depth-noise", options->keep_depth_noise,
                     "Disable depth denoising, which smooths the depth along surfaces");
   command
+      ->add_option("--refine-depth", options->refine_depth,
+                   "Repair the depth map by the photograph (edges that are wide or displaced, "
+                   "blocks, steps, outliers, filled holes): auto (the faults that map and "
+                   "photograph show for certain, default), on (also probable ones) or off")
+      ->check(CLI::IsMember({"auto", "on", "off"}))
+      ->type_name("WHETHER");
+  command
       ->add_option("--fill", options->fill,
                    "Fill of areas that the centre view does not show: by the solver, or by the "
                    "paper's inpainting (telea) view by view, for comparison")

@@ -36,6 +36,7 @@ struct EstimateOptions {
   std::string solver = "scene";
   std::optional<double> memory_limit_mib;
   bool keep_depth_noise = false;
+  std::string refine_depth = "auto";
   std::string fill = "solver";  // or "telea"
   EffectOptions effects;
   std::string device = "auto";

@@ -279,6 +279,8 @@ std::string DepthText(const EstimateDiagnostics& found) {
     text += fmt::format("depth noise  {:.3f} px per view step, smoothed along surfaces to {:.3f}\n",
                         *found.depth_noise_px, *found.depth_noise_left_px);
   }
+  if (found.depth_refinement && found.depth_refinement->applied)
+    text += fmt::format("refined      {}\n", found.depth_refinement->message);
   if (found.holes_filled > 0) {
     text += fmt::format("holes        {} px, filled along the surfaces around them ({:.1f} %)\n",
                         found.holes_filled, std::min(99.9, 100 * found.holes_share));
@@ -286,6 +288,21 @@ std::string DepthText(const EstimateDiagnostics& found) {
     if (!reasons.empty()) text += fmt::format("             {}\n", reasons);
   }
   return text;
+}
+
+json RefinementJson(const EstimateDiagnostics& found) {
+  if (!found.depth_refinement) return nullptr;
+  const estimator::DepthRefinement& refinement = *found.depth_refinement;
+  return {{"message", refinement.message},
+          {"applied", refinement.applied},
+          {"edge_width_px", refinement.edge_width_px},
+          {"block_px", refinement.block_px},
+          {"quantum_px", refinement.quantum_px},
+          {"outlier_share", refinement.outlier_share},
+          {"displaced_px", {refinement.right_px, refinement.down_px}},
+          {"dilation_px", refinement.dilation_px},
+          {"changed_share", refinement.changed_share},
+          {"seconds", refinement.seconds}};
 }
 
 json TextOrNull(const std::string& text) {
@@ -373,6 +390,7 @@ json EstimateJson(const EstimateOptions& options, const EstimateOutcome& outcome
                 {"coarse_share", found.coarse_share},
                 {"noise_px", OrNull(found.depth_noise_px)},
                 {"noise_left_px", OrNull(found.depth_noise_left_px)}}},
+              {"depth_refinement", RefinementJson(found)},
               {"warnings", summary.warnings},
               {"aperture_blur", ApertureBlurJson(found)},
               {"inpainting", InpaintingJson(found)},

@@ -19,6 +19,7 @@
 #include "thicklens/estimator/falloff_evidence.h"
 #include "thicklens/estimator/inpaint.h"
 #include "thicklens/estimator/photo_aperture.h"
+#include "thicklens/estimator/refine_depth.h"
 #include "thicklens/estimator/scene_solver.h"
 #include "thicklens/image.h"
 #include "thicklens/light_field.h"
@@ -72,6 +73,13 @@ enum class HiddenRays {
   kTelea,   // by the inpainting of section 6 of the supplement [D99], for comparison
 };
 
+// Whether the faults of a depth map are repaired by the photograph [D200] to [D202].
+enum class DepthRefining {
+  kAuto,  // those that map and photograph show for certain
+  kOn,    // also those that are only probable
+  kOff,   // none
+};
+
 // Everything of `thicklens estimate` that determines its result, with the same defaults. Only the
 // choice of a solver for a limit of time or quality (--within, --quality, --psnr-loss) is left to
 // the caller, who gives a SolverChooser as the solver.
@@ -92,10 +100,11 @@ struct EstimateOptions {
   // Depth of the ST plane from Ap, mm, 0 < st_depth_mm <= 1e9; absent: the plane of focus. Needs a
   // camera.
   std::optional<double> st_depth_mm;
-  bool smooth_depth = true;                      // smooth a noisy depth along its surfaces [D94]
-  EffectSelection effects;                       // effects that the estimate models
-  AnySolver solver = SceneSolver{};              // how the light field is computed
-  HiddenRays hidden_rays = HiddenRays::kSolver;  // how hidden rays are filled
+  bool smooth_depth = true;                           // smooth a noisy depth along surfaces [D94]
+  DepthRefining refine_depth = DepthRefining::kAuto;  // which faults of the depth are repaired
+  EffectSelection effects;                            // effects that the estimate models
+  AnySolver solver = SceneSolver{};                   // how the light field is computed
+  HiddenRays hidden_rays = HiddenRays::kSolver;       // how hidden rays are filled
   // Meaning of the clipped values of the photograph.
   ClippedHighlights clipped = ClippedHighlights::kBounds;
   // "auto", "cpu", "opencl", "opencl:PLATFORM" or "opencl:PLATFORM:DEVICE". auto: the processor for
@@ -212,6 +221,8 @@ struct EstimateDiagnostics {
   model::DepthHoles holes;                       // the map's holes by reason
   std::pair<double, double> disparity_range_px{0, 0};         // px per view step
   std::optional<double> depth_noise_px, depth_noise_left_px;  // px per view step [D93], [D94]
+  // What was repaired in the depth map; absent with DepthRefining::kOff.
+  std::optional<estimator::DepthRefinement> depth_refinement;
   double largest_step_px = 0;  // displacement between neighbouring views
   double coarse_share = 0;     // share of the pixels whose step is above 3 px
   std::optional<double> strength, noise_sigma, residual_rms;  // noise, residual in encoded values

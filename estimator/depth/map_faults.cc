@@ -1,0 +1,203 @@
+#include "estimator/depth/map_faults.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/index.h"
+
+namespace thicklens::estimator {
+namespace {
+
+constexpr int kReachPx = 8;     // of a rise, to each side
+constexpr int kFlankPx = 4;     // beyond it
+constexpr float kFlat = 0.15F;  // of the flanks, relative to the rise
+constexpr std::size_t kFewRises = 20;
+
+void AddWidthsOfRow(const float* row, int width, float jump, std::vector<float>* widths) {
+  for (int x = kReachPx + kFlankPx; x + kReachPx + kFlankPx + 1 < width; ++x) {
+    const float before = row[x - kReachPx], after = row[x + kReachPx + 1];
+    const float rise = after - before, height = std::abs(rise);
+    if (!(height > jump)) continue;
+    if (std::abs(row[x - kReachPx - kFlankPx] - before) +
+            std::abs(row[x + kReachPx + kFlankPx + 1] - after) >
+        kFlat * height) {
+      continue;
+    }
+    float path = 0, steepest = 0, moment = 0;
+    for (int n = -kReachPx; n <= kReachPx; ++n) {
+      const float slope = std::abs(row[x + n + 1] - row[x + n]);
+      path += slope;
+      moment += slope * static_cast<float>(n);
+      steepest = std::max(steepest, slope);
+    }
+    // Each rise counts once, where it is in the middle.
+    if (path > (1 + kFlat) * height || std::abs(moment / path) > 0.5F) continue;
+    widths->push_back(height / steepest);
+  }
+}
+
+// Returns the places where neighbouring lines differ, if these are at equal distances of at least
+// 2 px; otherwise nothing. `map`: the lines are its columns.
+std::vector<int> RegularStarts(const cv::Mat& map) {
+  std::vector<int> starts = {0};
+  for (int x = 1; x < map.cols; ++x) {
+    if (cv::norm(map.col(x), map.col(x - 1), cv::NORM_INF) > 0) starts.push_back(x);
+  }
+  constexpr std::size_t kFewest = 8;
+  if (starts.size() < kFewest) return {};
+  std::vector<int> sizes;
+  for (std::size_t i = 1; i < starts.size(); ++i) sizes.push_back(starts[i] - starts[i - 1]);
+  std::nth_element(sizes.begin(), sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2),
+                   sizes.end());
+  const int usual = sizes[sizes.size() / 2];
+  const auto regular = std::count_if(sizes.begin(), sizes.end(),
+                                     [usual](int n) { return std::abs(n - usual) <= 1; });
+  constexpr double kMost = 0.9;
+  if (usual < 2 || static_cast<double>(regular) < kMost * static_cast<double>(sizes.size()))
+    return {};
+  return starts;
+}
+
+// Position among the middles of blocks of each pixel.
+std::vector<float> PlacesOf(const std::vector<int>& starts, int size) {
+  std::vector<float> middles;
+  for (std::size_t i = 0; i < starts.size(); ++i) {
+    const int end = i + 1 < starts.size() ? starts[i + 1] : size;
+    middles.push_back(static_cast<float>(starts[i] + end - 1) / 2);
+  }
+  std::vector<float> places(Index(size));
+  std::size_t cell = 0;
+  for (int x = 0; x < size; ++x) {
+    const auto at = static_cast<float>(x);
+    while (cell + 2 < middles.size() && middles[cell + 1] <= at) ++cell;
+    const float share = (at - middles[cell]) / (middles[cell + 1] - middles[cell]);
+    places[Index(x)] = static_cast<float>(cell) + std::clamp(share, 0.0F, 1.0F);
+  }
+  return places;
+}
+
+}  // namespace
+
+double EdgeWidthPx(const cv::Mat& map, double jump_px) {
+  std::vector<float> widths;
+  const cv::Mat turned = map.t();
+  for (const cv::Mat& lines : {map, turned}) {
+    for (int y = 0; y < lines.rows; ++y)
+      AddWidthsOfRow(lines.ptr<float>(y), lines.cols, static_cast<float>(jump_px), &widths);
+  }
+  if (widths.size() < kFewRises) return 0;
+  const auto middle = widths.begin() + static_cast<std::ptrdiff_t>(widths.size() / 2);
+  std::nth_element(widths.begin(), middle, widths.end());
+  return static_cast<double>(*middle);
+}
+
+int BlockGrid::size_px() const {
+  if (columns.size() < 2 || rows.size() < 2) return 1;
+  const double across =
+      static_cast<double>(columns.back()) / static_cast<double>(columns.size() - 1);
+  return static_cast<int>(std::lround(across));
+}
+
+BlockGrid FindBlocks(const cv::Mat& map) {
+  BlockGrid grid{RegularStarts(map), RegularStarts(map.t())};
+  if (grid.columns.empty() || grid.rows.empty()) return {};
+  return grid;
+}
+
+cv::Mat WithoutBlocks(const cv::Mat& map, const BlockGrid& grid) {
+  cv::Mat small(static_cast<int>(grid.rows.size()), static_cast<int>(grid.columns.size()), CV_32F);
+  for (int y = 0; y < small.rows; ++y) {
+    for (int x = 0; x < small.cols; ++x)
+      small.at<float>(y, x) = map.at<float>(grid.rows[Index(y)], grid.columns[Index(x)]);
+  }
+  const std::vector<float> across = PlacesOf(grid.columns, map.cols);
+  const std::vector<float> down = PlacesOf(grid.rows, map.rows);
+  cv::Mat at_x(map.size(), CV_32F), at_y(map.size(), CV_32F), smooth;
+  for (int y = 0; y < map.rows; ++y) {
+    for (int x = 0; x < map.cols; ++x) {
+      at_x.at<float>(y, x) = across[Index(x)];
+      at_y.at<float>(y, x) = down[Index(y)];
+    }
+  }
+  cv::remap(small, smooth, at_x, at_y, cv::INTER_LINEAR, cv::BORDER_REPLICATE);
+  return smooth;
+}
+
+double QuantumPx(const cv::Mat& map) {
+  // A part of the rows is sufficient.
+  constexpr int kEnough = 1 << 20;
+  const int stride = std::max(1, static_cast<int>(map.total() / kEnough));
+  std::vector<float> values;
+  for (int y = 0; y < map.rows; y += stride)
+    values.insert(values.end(), map.ptr<float>(y), map.ptr<float>(y) + map.cols);
+  std::sort(values.begin(), values.end());
+  values.erase(std::unique(values.begin(), values.end()), values.end());
+  constexpr std::size_t kMost = 1024, kFewest = 5;
+  if (values.size() > kMost || values.size() < kFewest) return 0;
+  std::vector<float> steps;
+  for (std::size_t i = 1; i < values.size(); ++i) steps.push_back(values[i] - values[i - 1]);
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  return static_cast<double>(*middle);
+}
+
+cv::Mat WithoutQuanta(const cv::Mat& map, double quantum_px) {
+  constexpr int kPasses = 80;
+  const auto half = static_cast<float>(quantum_px / 2), most = 3 * half;
+  cv::Mat smooth = map.clone(), next = map.clone();
+  for (int pass = 0; pass < kPasses; ++pass) {
+    ThrowIfCancelled();
+    for (int y = 0; y < map.rows; ++y) {
+      const float* const own = map.ptr<float>(y);
+      const float* const now = smooth.ptr<float>(y);
+      const float* const above = y > 0 ? smooth.ptr<float>(y - 1) : now;
+      const float* const below = y + 1 < map.rows ? smooth.ptr<float>(y + 1) : now;
+      for (int x = 0; x < map.cols; ++x) {
+        const std::array<float, 4> others = {above[x], below[x], now[std::max(0, x - 1)],
+                                             now[std::min(map.cols - 1, x + 1)]};
+        float sum = now[x], count = 1;
+        for (const float other : others) {
+          if (std::abs(other - own[x]) > most) continue;
+          sum += other;
+          count += 1;
+        }
+        next.at<float>(y, x) = std::clamp(sum / count, own[x] - half, own[x] + half);
+      }
+    }
+    std::swap(smooth, next);
+  }
+  return smooth;
+}
+
+double DropOutliers(double jump_px, cv::Mat* map) {
+  const cv::Mat before = map->clone();
+  const auto jump = static_cast<float>(jump_px);
+  std::size_t count = 0;
+  for (int y = 1; y + 1 < map->rows; ++y) {
+    for (int x = 1; x + 1 < map->cols; ++x) {
+      std::array<float, 8> others{};
+      std::size_t n = 0;
+      int alike = 0;
+      const float own = before.at<float>(y, x);
+      for (int v = -1; v <= 1; ++v) {
+        for (int u = -1; u <= 1; ++u) {
+          if (u == 0 && v == 0) continue;
+          others[n] = before.at<float>(y + v, x + u);
+          if (std::abs(others[n++] - own) <= jump) ++alike;
+        }
+      }
+      if (alike >= 2) continue;
+      std::nth_element(others.begin(), others.begin() + 4, others.end());
+      map->at<float>(y, x) = others[4];
+      ++count;
+    }
+  }
+  return static_cast<double>(count) / static_cast<double>(map->total());
+}
+
+}  // namespace thicklens::estimator
