@@ -25,7 +25,7 @@ constexpr double kLeastQuantumPx = 0.02;
 constexpr double kManyOutliers = 1e-3;
 constexpr double kManyHoles = 1e-3;
 // Standard errors of the gain by which a displacement is certain, and probable.
-constexpr double kCertain = 2.5, kProbable = 1.5, kNext = 1;
+constexpr double kCertain = 3.2, kProbable = 2.5, kNext = 1;
 // The gain also has to be this share of the agreement.
 constexpr double kLeastGain = 0.01;
 // The way by which an edge in a filled hole may be wrong, and by which one pass moves it.
