@@ -141,7 +141,7 @@ class ColourPreference {
 
 }  // namespace
 
-cv::Mat SharpenEdges(double width_px, double jump_px, cv::Mat* map) {
+cv::Mat SharpenEdges(double width_px, double jump, cv::Mat* map) {
   const int reach = std::max(1, static_cast<int>(std::lround(width_px / 2)));
   cv::Mat low, high, gradient_x, gradient_y, smooth;
   const cv::Mat range = Range(*map, reach, &low, &high);
@@ -158,14 +158,14 @@ cv::Mat SharpenEdges(double width_px, double jump_px, cv::Mat* map) {
   for (int y = 0; y < map->rows; ++y) {
     for (int x = 0; x < map->cols; ++x) {
       const float own = range.at<float>(y, x);
-      if (!(own > static_cast<float>(jump_px))) continue;
+      if (!(own > static_cast<float>(jump))) continue;
       const float gx = gradient_x.at<float>(y, x), gy = gradient_y.at<float>(y, x);
       const float length = std::hypot(gx, gy);
       if (!(length > 0)) continue;
       const float dx = flank * gx / length, dy = flank * gy / length;
       const auto fx = static_cast<float>(x), fy = static_cast<float>(y);
       const float flanks = (range_at(fx + dx, fy + dy) + range_at(fx - dx, fy - dy)) / 2;
-      if (own < kRampOfFlank * flanks && own - flanks < static_cast<float>(4 * jump_px)) continue;
+      if (own < kRampOfFlank * flanks && own - flanks < static_cast<float>(4 * jump)) continue;
       const float value = before.at<float>(y, x);
       const float up = high.at<float>(y, x) - value, down = value - low.at<float>(y, x);
       map->at<float>(y, x) = up < down ? high.at<float>(y, x) : low.at<float>(y, x);
@@ -180,7 +180,7 @@ namespace {
 // `unknown` may be empty: all pixels may change.
 double Label(const cv::Mat& guide, const cv::Mat& unknown, const EdgeLabelOptions& options,
              cv::Mat* map) {
-  const Edges edges = FindEdges(*map, static_cast<float>(options.jump_px));
+  const Edges edges = FindEdges(*map, static_cast<float>(options.jump));
   if (edges.near_px.empty()) return 0;
   const int width = map->cols, height = map->rows;
   std::vector<Choice> choices(map->total());
@@ -346,7 +346,7 @@ Gain GainOf(const Agreement& after, const Agreement& before) {
 EdgeAlignment AlignEdges(const cv::Mat& guide, const cv::Mat& map,
                          const EdgeLabelOptions& options) {
   EdgeAlignment alignment;
-  const Edges edges = FindEdges(map, static_cast<float>(options.jump_px));
+  const Edges edges = FindEdges(map, static_cast<float>(options.jump));
   if (edges.near_px.empty()) return alignment;
   const ColourPreference colours(guide, map, cv::Mat(), edges, options);
   const auto reach = static_cast<float>(options.reach_px);
