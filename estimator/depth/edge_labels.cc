@@ -141,7 +141,7 @@ class ColourPreference {
 
 }  // namespace
 
-cv::Mat SharpenEdges(double width_px, double jump_px, cv::Mat* map) {
+cv::Mat SharpenEdges(double width_px, double jump, cv::Mat* map) {
   const int reach = std::max(1, static_cast<int>(std::lround(width_px / 2)));
   cv::Mat low, high, gradient_x, gradient_y, smooth;
   const cv::Mat range = Range(*map, reach, &low, &high);
@@ -158,14 +158,14 @@ cv::Mat SharpenEdges(double width_px, double jump_px, cv::Mat* map) {
   for (int y = 0; y < map->rows; ++y) {
     for (int x = 0; x < map->cols; ++x) {
       const float own = range.at<float>(y, x);
-      if (!(own > static_cast<float>(jump_px))) continue;
+      if (!(own > static_cast<float>(jump))) continue;
       const float gx = gradient_x.at<float>(y, x), gy = gradient_y.at<float>(y, x);
       const float length = std::hypot(gx, gy);
       if (!(length > 0)) continue;
       const float dx = flank * gx / length, dy = flank * gy / length;
       const auto fx = static_cast<float>(x), fy = static_cast<float>(y);
       const float flanks = (range_at(fx + dx, fy + dy) + range_at(fx - dx, fy - dy)) / 2;
-      if (own < kRampOfFlank * flanks && own - flanks < static_cast<float>(4 * jump_px)) continue;
+      if (own < kRampOfFlank * flanks && own - flanks < static_cast<float>(4 * jump)) continue;
       const float value = before.at<float>(y, x);
       const float up = high.at<float>(y, x) - value, down = value - low.at<float>(y, x);
       map->at<float>(y, x) = up < down ? high.at<float>(y, x) : low.at<float>(y, x);
@@ -180,7 +180,7 @@ namespace {
 // `unknown` may be empty: all pixels may change.
 double Label(const cv::Mat& guide, const cv::Mat& unknown, const EdgeLabelOptions& options,
              cv::Mat* map) {
-  const Edges edges = FindEdges(*map, static_cast<float>(options.jump_px));
+  const Edges edges = FindEdges(*map, static_cast<float>(options.jump));
   if (edges.near_px.empty()) return 0;
   const int width = map->cols, height = map->rows;
   std::vector<Choice> choices(map->total());
@@ -279,10 +279,13 @@ namespace {
 constexpr int kMostShiftPx = 5, kMostDilationPx = 4;
 constexpr std::size_t kParts = 16;
 constexpr double kTollOfAgreement = 1e-3;
+// Share of the edges on one side of the near surfaces, relative to those on the other side.
+constexpr double kLeastSide = 0.2;
 
 struct Voter {
   int x = 0, y = 0;
   float middle_px = 0, preference = 0;
+  double near_x = 0, near_y = 0;  // direction of the near side
   std::size_t part = 0;
 };
 
@@ -300,22 +303,42 @@ cv::Mat Narrowed(const cv::Mat& map, int by_px) {
   return narrowed;
 }
 
-std::array<double, kParts> AgreementOf(const std::vector<Voter>& voters, const cv::Mat& map,
-                                       int right_px, int down_px) {
-  std::array<double, kParts> sums{};
+// The agreement of each part of the image, for edges whose near side is in the direction (x, y) and
+// for those whose near side is in the opposite one.
+using Agreement = std::array<std::array<double, 2>, kParts>;
+
+Agreement AgreementOf(const std::vector<Voter>& voters, const cv::Mat& map, int right_px,
+                      int down_px, double x_direction, double y_direction) {
+  Agreement sums{};
   for (const Voter& voter : voters) {
     const int x = std::clamp(voter.x + right_px, 0, map.cols - 1);
     const int y = std::clamp(voter.y + down_px, 0, map.rows - 1);
     const float sign = map.at<float>(y, x) > voter.middle_px ? 1.0F : -1.0F;
-    sums[voter.part] += static_cast<double>(sign * voter.preference);
+    const bool is_along = voter.near_x * x_direction + voter.near_y * y_direction > 0;
+    sums[voter.part][is_along ? 0 : 1] += static_cast<double>(sign * voter.preference);
   }
   return sums;
 }
 
-double SumOf(const std::array<double, kParts>& parts) {
-  double sum = 0;
-  for (const double part : parts) sum += part;
-  return sum;
+// What one place of the map gains over another.
+struct Gain {
+  double gain = 0, sigma = 0;
+};
+Gain GainOf(const Agreement& after, const Agreement& before) {
+  std::array<double, 2> sides{};
+  for (std::size_t part = 0; part < kParts; ++part) {
+    for (std::size_t side = 0; side < 2; ++side)
+      sides[side] += after[part][side] - before[part][side];
+  }
+  Gain gain{sides[0] + sides[1], 0};
+  const double mean = (sides[0] + sides[1]) / kParts;
+  double squares = 0;
+  for (std::size_t part = 0; part < kParts; ++part) {
+    const double own = after[part][0] + after[part][1] - before[part][0] - before[part][1];
+    squares += std::pow(own - mean, 2);
+  }
+  gain.sigma = std::sqrt(squares);
+  return gain;
 }
 
 }  // namespace
@@ -323,7 +346,7 @@ double SumOf(const std::array<double, kParts>& parts) {
 EdgeAlignment AlignEdges(const cv::Mat& guide, const cv::Mat& map,
                          const EdgeLabelOptions& options) {
   EdgeAlignment alignment;
-  const Edges edges = FindEdges(map, static_cast<float>(options.jump_px));
+  const Edges edges = FindEdges(map, static_cast<float>(options.jump));
   if (edges.near_px.empty()) return alignment;
   const ColourPreference colours(guide, map, cv::Mat(), edges, options);
   const auto reach = static_cast<float>(options.reach_px);
@@ -332,6 +355,10 @@ EdgeAlignment AlignEdges(const cv::Mat& guide, const cv::Mat& map,
   constexpr double kEnough = 16000;
   const cv::Mat in_reach = edges.distance_px < options.reach_px;
   const int stride = std::max(2, static_cast<int>(cv::countNonZero(in_reach) / kEnough));
+  cv::Mat smooth, slope_x, slope_y;
+  cv::GaussianBlur(map, smooth, {}, 2);
+  cv::Sobel(smooth, slope_x, CV_32F, 1, 0);
+  cv::Sobel(smooth, slope_y, CV_32F, 0, 1);
   std::vector<std::vector<Voter>> rows(Index(map.rows));
   ParallelFor(map.rows, ResolveThreads(options.threads), [&](int y) {
     for (int x = y % stride; x < map.cols; x += stride) {
@@ -342,6 +369,8 @@ EdgeAlignment AlignEdges(const cv::Mat& guide, const cv::Mat& map,
       voter.y = y;
       voter.middle_px = (edges.near_px[edge] + edges.far_px[edge]) / 2;
       voter.preference = colours.At(x, y, edges.near_px[edge], edges.far_px[edge]);
+      voter.near_x = static_cast<double>(slope_x.at<float>(y, x));
+      voter.near_y = static_cast<double>(slope_y.at<float>(y, x));
       voter.part = (Index(x / part_px) * 5 + Index(y / part_px) * 3) % kParts;
       rows[Index(y)].push_back(voter);
     }
@@ -349,25 +378,41 @@ EdgeAlignment AlignEdges(const cv::Mat& guide, const cv::Mat& map,
   std::vector<Voter> voters;
   for (const auto& row : rows) voters.insert(voters.end(), row.begin(), row.end());
   if (voters.empty()) return alignment;
-  const auto start = AgreementOf(voters, map, 0, 0);
   const auto count = static_cast<double>(voters.size());
-  alignment.agreement = SumOf(start) / count;
-  double best = SumOf(start);
-  std::array<double, kParts> best_parts = start;
+  double total = 0;
+  for (const auto& part : AgreementOf(voters, map, 0, 0, 1, 0)) total += part[0] + part[1];
+  alignment.agreement = total / count;
   // A longer way has to gain more: a map that can be moved along its edges stays.
-  const double toll = kTollOfAgreement * std::abs(SumOf(start));
-  double best_with_toll = best;
+  const double toll = kTollOfAgreement * std::abs(total);
+  double best = 0;
+  // Where only one side of the near surfaces is seen, a shadow beside them looks like a
+  // displacement.
+  const auto is_seen_from_both_sides = [&](double x_direction, double y_direction) {
+    double along = 0, against = 0;
+    for (const Voter& voter : voters) {
+      const double part = voter.near_x * x_direction + voter.near_y * y_direction;
+      const double share = part / std::max(1e-9, std::hypot(voter.near_x, voter.near_y) *
+                                                     std::hypot(x_direction, y_direction));
+      (share > 0 ? along : against) += std::abs(share);
+    }
+    return std::min(along, against) > kLeastSide * std::max(along, against);
+  };
+  const bool is_seen_across = is_seen_from_both_sides(1, 0);
+  const bool is_seen_along = is_seen_from_both_sides(0, 1);
   const auto try_out = [&](const cv::Mat& candidate, int right, int down, int dilation) {
-    const auto parts = AgreementOf(voters, candidate, right, down);
-    const double sum = SumOf(parts);
-    const double with_toll = sum - toll * (std::hypot(right, down) + std::abs(dilation));
-    if (!(with_toll > best_with_toll)) return;
-    best_with_toll = with_toll;
-    best = sum;
-    best_parts = parts;
+    const bool is_shift = right != 0 || down != 0;
+    const double x_direction = is_shift ? right : 1, y_direction = down;
+    const Gain found = GainOf(AgreementOf(voters, candidate, right, down, x_direction, y_direction),
+                              AgreementOf(voters, map, 0, 0, x_direction, y_direction));
+    const double with_toll = found.gain - toll * (std::hypot(right, down) + std::abs(dilation));
+    if (!(with_toll > best) || (right != 0 && !is_seen_across) || (down != 0 && !is_seen_along))
+      return;
+    best = with_toll;
     alignment.right_px = right;
     alignment.down_px = down;
     alignment.dilation_px = dilation;
+    alignment.gain = found.gain / count;
+    alignment.gain_sigma = found.sigma / count;
   };
   for (int down = -kMostShiftPx; down <= kMostShiftPx; ++down) {
     for (int right = -kMostShiftPx; right <= kMostShiftPx; ++right) try_out(map, right, down, 0);
@@ -376,11 +421,6 @@ EdgeAlignment AlignEdges(const cv::Mat& guide, const cv::Mat& map,
     try_out(Narrowed(map, dilation), 0, 0, dilation);
     try_out(Narrowed(map, -dilation), 0, 0, -dilation);
   }
-  alignment.gain = (best - SumOf(start)) / count;
-  double squares = 0;
-  for (std::size_t part = 0; part < kParts; ++part)
-    squares += std::pow(best_parts[part] - start[part] - alignment.gain * count / kParts, 2);
-  alignment.gain_sigma = std::sqrt(squares) / count;
   return alignment;
 }
 

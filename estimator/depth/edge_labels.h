@@ -5,11 +5,10 @@
 
 namespace thicklens::estimator {
 
-// How the pixels beside a depth edge are given to its two surfaces. Lengths are px, disparities px
-// per view step.
+// How the pixels beside a depth edge are given to its two surfaces. Lengths are px.
 struct EdgeLabelOptions {
-  double jump_px = 0.25;       // smallest jump between neighbours that is an edge
-  double reach_px = 4;         // distance from an edge within which a pixel may change its side
+  double jump = 0.25;   // smallest jump between neighbours that is an edge, in the unit of the map
+  double reach_px = 4;  // distance from an edge within which a pixel may change its side
   double edge_sigma_px = 1;    // standard error of the position of the map's edges
   double colour_sigma = 0.02;  // difference of the guide that is none
   double colour_weight = 1;    // of the colours against the position
@@ -23,7 +22,7 @@ struct EdgeLabelOptions {
 // larger or the smaller disparity of its surroundings, whichever is nearer to its own. A ramp is
 // where the range of the surroundings is several times that of the flanks [D200]; slopes are none.
 // `map` is CV_32F without holes. Returns the mask (CV_8U) of the pixels that were in a ramp.
-cv::Mat SharpenEdges(double width_px, double jump_px, cv::Mat* map);
+cv::Mat SharpenEdges(double width_px, double jump, cv::Mat* map);
 
 // Decides anew for each pixel near a depth edge to which of the two surfaces of the edge it
 // belongs. The colours of the surroundings on each side say how likely the pixel is of that side,

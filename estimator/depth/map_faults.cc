@@ -83,12 +83,12 @@ std::vector<float> PlacesOf(const std::vector<int>& starts, int size) {
 
 }  // namespace
 
-double EdgeWidthPx(const cv::Mat& map, double jump_px) {
+double EdgeWidthPx(const cv::Mat& map, double jump) {
   std::vector<float> widths;
   const cv::Mat turned = map.t();
   for (const cv::Mat& lines : {map, turned}) {
     for (int y = 0; y < lines.rows; ++y)
-      AddWidthsOfRow(lines.ptr<float>(y), lines.cols, static_cast<float>(jump_px), &widths);
+      AddWidthsOfRow(lines.ptr<float>(y), lines.cols, static_cast<float>(jump), &widths);
   }
   if (widths.size() < kFewRises) return 0;
   const auto middle = widths.begin() + static_cast<std::ptrdiff_t>(widths.size() / 2);
@@ -128,7 +128,7 @@ cv::Mat WithoutBlocks(const cv::Mat& map, const BlockGrid& grid) {
   return smooth;
 }
 
-double QuantumPx(const cv::Mat& map) {
+double QuantumOf(const cv::Mat& map) {
   // A part of the rows is sufficient.
   constexpr int kEnough = 1 << 20;
   const int stride = std::max(1, static_cast<int>(map.total() / kEnough));
@@ -146,9 +146,9 @@ double QuantumPx(const cv::Mat& map) {
   return static_cast<double>(*middle);
 }
 
-cv::Mat WithoutQuanta(const cv::Mat& map, double quantum_px) {
+cv::Mat WithoutQuanta(const cv::Mat& map, double quantum) {
   constexpr int kPasses = 80;
-  const auto half = static_cast<float>(quantum_px / 2), most = 3 * half;
+  const auto half = static_cast<float>(quantum / 2), most = 3 * half;
   cv::Mat smooth = map.clone(), next = map.clone();
   for (int pass = 0; pass < kPasses; ++pass) {
     ThrowIfCancelled();
@@ -174,9 +174,9 @@ cv::Mat WithoutQuanta(const cv::Mat& map, double quantum_px) {
   return smooth;
 }
 
-double DropOutliers(double jump_px, cv::Mat* map) {
+double DropOutliers(double jump, cv::Mat* map) {
   const cv::Mat before = map->clone();
-  const auto jump = static_cast<float>(jump_px);
+  const auto least_jump = static_cast<float>(jump);
   std::size_t count = 0;
   for (int y = 1; y + 1 < map->rows; ++y) {
     for (int x = 1; x + 1 < map->cols; ++x) {
@@ -188,7 +188,7 @@ double DropOutliers(double jump_px, cv::Mat* map) {
         for (int u = -1; u <= 1; ++u) {
           if (u == 0 && v == 0) continue;
           others[n] = before.at<float>(y + v, x + u);
-          if (std::abs(others[n++] - own) <= jump) ++alike;
+          if (std::abs(others[n++] - own) <= least_jump) ++alike;
         }
       }
       if (alike >= 2) continue;

@@ -6,12 +6,12 @@
 
 namespace thicklens::estimator {
 
-// Maps are CV_32F without holes, in px per view step.
+// Maps are CV_32F without holes. Jumps and quanta are in the unit of the map.
 
 // The width of the edges of a map, px: the height of a step over its largest slope, the median over
-// the rises along rows and columns that are alone, monotone and at least `jump_px` high. 1: steps.
+// the rises along rows and columns that are alone, monotone and at least `jump` high. 1: steps.
 // 0: there are fewer than twenty.
-double EdgeWidthPx(const cv::Mat& map, double jump_px);
+double EdgeWidthPx(const cv::Mat& map, double jump);
 
 // The first pixels of the blocks of a map that was enlarged without interpolation, along both axes,
 // with 0; empty: the map has no blocks.
@@ -25,14 +25,14 @@ cv::Mat WithoutBlocks(const cv::Mat& map, const BlockGrid& grid);
 
 // The step of a quantised map: the usual difference of its values, if it has at most 1024 of them.
 // 0: none.
-double QuantumPx(const cv::Mat& map);
+double QuantumOf(const cv::Mat& map);
 // Makes the values smooth within half a quantum of their own, by repeated means over the neighbours
 // that differ by at most one and a half quanta.
-cv::Mat WithoutQuanta(const cv::Mat& map, double quantum_px);
+cv::Mat WithoutQuanta(const cv::Mat& map, double quantum);
 
-// Replaces pixels that fewer than two of the eight neighbours resemble to `jump_px` by the median
+// Replaces pixels that fewer than two of the eight neighbours resemble to `jump` by the median
 // over these. Returns the share of the pixels.
-double DropOutliers(double jump_px, cv::Mat* map);
+double DropOutliers(double jump, cv::Mat* map);
 
 }  // namespace thicklens::estimator
 

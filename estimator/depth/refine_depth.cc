@@ -25,7 +25,7 @@ constexpr double kLeastQuantumPx = 0.02;
 constexpr double kManyOutliers = 1e-3;
 constexpr double kManyHoles = 1e-3;
 // Standard errors of the gain by which a displacement is certain, and probable.
-constexpr double kCertain = 2.5, kProbable = 1.5, kNext = 1;
+constexpr double kCertain = 3.2, kProbable = 2.5, kNext = 1;
 // The gain also has to be this share of the agreement.
 constexpr double kLeastGain = 0.01;
 // The way by which an edge in a filled hole may be wrong, and by which one pass moves it.
@@ -127,14 +127,15 @@ DepthRefinement RefineDepth(const model::LinearImage& photo, const model::Transf
         photo.width_px, photo.height_px, map->width_px, map->height_px, map->disparity.size(),
         was_hole.size()));
   }
+  // All is done in the unit of the map, so that what does not change keeps its bits.
   const double step = map->step.cwiseAbs().maxCoeff();
   const cv::Mat before =
-      cv::Mat(map->height_px, map->width_px, CV_32F, map->disparity.data()) * step;
+      cv::Mat(map->height_px, map->width_px, CV_32F, map->disparity.data()).clone();
   cv::Mat now = before.clone();
   DepthRefinement found;
   EdgeLabelOptions labels;
   labels.threads = options.threads;
-  labels.jump_px = std::max(kLeastJumpPx, kJumpOfNoise * options.noise_px);
+  labels.jump = std::max(kLeastJumpPx, kJumpOfNoise * options.noise_px) / step;
 
   // The values of the file: filled holes have others.
   cv::Mat unknown(now.size(), CV_8U, cv::Scalar(0));
@@ -148,18 +149,19 @@ DepthRefinement RefineDepth(const model::LinearImage& photo, const model::Transf
   const BlockGrid blocks = FindBlocks(stored);
   found.block_px = blocks.size_px();
   if (found.block_px > 1) now = WithoutBlocks(now, blocks);
-  found.quantum_px = QuantumPx(stored);
+  const double quantum = QuantumOf(stored);
+  found.quantum_px = quantum * step;
   stored.release();
   const bool quanta = found.quantum_px > kLeastQuantumPx;
-  if (quanta) now = WithoutQuanta(now, found.quantum_px);
+  if (quanta) now = WithoutQuanta(now, quantum);
   cv::Mat without_outliers = now.clone();
-  found.outlier_share = DropOutliers(labels.jump_px, &without_outliers);
+  found.outlier_share = DropOutliers(labels.jump, &without_outliers);
   const bool outliers = found.outlier_share > kManyOutliers;
   if (outliers) now = without_outliers;
   without_outliers.release();
-  found.edge_width_px = EdgeWidthPx(now, 2 * labels.jump_px);
+  found.edge_width_px = EdgeWidthPx(now, 2 * labels.jump);
   const bool ramps = found.edge_width_px > kRampPx;
-  if (ramps) SharpenEdges(found.edge_width_px, labels.jump_px, &now);
+  if (ramps) SharpenEdges(found.edge_width_px, labels.jump, &now);
   const cv::Mat guide = GuideOf(photo, transfer);
   Align(guide, labels, options.eager, ramps || found.block_px > 1, &now, &found);
   const bool moved = found.right_px != 0 || found.down_px != 0 || found.dilation_px != 0;
@@ -183,9 +185,8 @@ DepthRefinement RefineDepth(const model::LinearImage& photo, const model::Transf
       const int y = static_cast<int>(i / Index(now.cols)),
                 x = static_cast<int>(i % Index(now.cols));
       const float value = now.at<float>(y, x);
-      if (std::abs(value - before.at<float>(y, x)) > static_cast<float>(labels.jump_px / 2))
-        ++changed;
-      map->disparity[i] = static_cast<float>(static_cast<double>(value) / step);
+      if (std::abs(value - before.at<float>(y, x)) > static_cast<float>(labels.jump / 2)) ++changed;
+      map->disparity[i] = value;
     }
     found.changed_share = static_cast<double>(changed) / static_cast<double>(pixels);
   }

@@ -69,14 +69,14 @@ cv::Mat AtPartOfSize(const cv::Mat& exact, int n, int interpolation) {
   return full(cv::Rect(0, 0, exact.cols, exact.rows)).clone();
 }
 
-// Discs of 3 to 8 px radius without a depth, up to the share.
+// Discs of 3 to 19 px radius without a depth, up to the share.
 cv::Mat WithHoles(const cv::Mat& exact, double share) {
   cv::Mat holes = cv::Mat::zeros(exact.size(), CV_8U);
   std::mt19937_64 engine(kDepthSeed);
   const auto below = [&engine](int limit) {
     return static_cast<int>(engine() % static_cast<std::uint64_t>(limit));
   };
-  constexpr int kLeastPx = 3, kRangePx = 6;
+  constexpr int kLeastPx = 3, kRangePx = 17;
   while (cv::countNonZero(holes) < share * static_cast<double>(exact.total())) {
     const cv::Point centre(below(exact.cols), below(exact.rows));
     cv::circle(holes, centre, kLeastPx + below(kRangePx), 1, cv::FILLED);

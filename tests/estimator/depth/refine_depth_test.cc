@@ -242,6 +242,21 @@ TEST(RefineDepth, TheResultDoesNotDependOnTheThreads) {
   EXPECT_EQ(one.disparity, four.disparity);
 }
 
+TEST(RefineDepth, AnotherUnitOfTheMapChangesNothing) {
+  const TwoDiscs scene;
+  cv::Mat blurred;
+  cv::GaussianBlur(scene.disparity, blurred, {}, 2);
+  // A power of two keeps the digits.
+  constexpr float kUnits = 16;
+  DisparityMap map = MapOf(blurred), other = map;
+  for (float& value : other.disparity) value *= kUnits;
+  other.step = {1 / kUnits, 1 / kUnits};
+  const DepthRefinement found = Refine(scene, &map), found_other = Refine(scene, &other);
+  EXPECT_EQ(found.message, found_other.message);
+  for (float& value : map.disparity) value *= kUnits;
+  EXPECT_EQ(map.disparity, other.disparity);
+}
+
 TEST(RefineDepth, OtherSizesAreRefused) {
   const TwoDiscs scene;
   DisparityMap map = MapOf(scene.disparity(cv::Rect(0, 0, 80, 160)).clone());
@@ -268,12 +283,12 @@ TEST(MapFaults, ExactMapsHaveNoBlocksAndNoQuantum) {
   const TwoDiscs scene;
   EXPECT_EQ(FindBlocks(scene.disparity).size_px(), 1);
   // The truth is a multiple of the slopes per px, which is far below any rounding that matters.
-  EXPECT_LT(QuantumPx(scene.disparity), 0.0025);
+  EXPECT_LT(QuantumOf(scene.disparity), 0.0025);
   // Few flat surfaces are neither.
   cv::Mat flat(100, 100, CV_32F, cv::Scalar(0));
   flat(cv::Rect(20, 30, 40, 20)) = 1;
   EXPECT_EQ(FindBlocks(flat).size_px(), 1);
-  EXPECT_EQ(QuantumPx(flat), 0);
+  EXPECT_EQ(QuantumOf(flat), 0);
 }
 
 }  // namespace
