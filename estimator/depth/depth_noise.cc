@@ -65,9 +65,14 @@ Middle MiddleOf(const PlaneSums& sums) {
 
 }  // namespace
 
-SmoothedDepth SmoothDepth(const DisparityMap& map, double noise_px, int threads) {
+SmoothedDepth SmoothDepth(const DisparityMap& map, double noise_px, int threads,
+                          const std::vector<float>& confidence) {
   if (!(noise_px > 0)) {
     throw Error(fmt::format("noise of the depth is {} px per view step: it must be > 0", noise_px));
+  }
+  if (!confidence.empty() && confidence.size() != map.disparity.size()) {
+    throw Error(fmt::format("{} confidences for {} disparities: their numbers must be equal",
+                            confidence.size(), map.disparity.size()));
   }
   for (const float disparity : map.disparity) {
     if (std::isnan(disparity)) throw Error("the disparity has holes: they must be filled first");
@@ -86,7 +91,10 @@ SmoothedDepth SmoothDepth(const DisparityMap& map, double noise_px, int threads)
         for (int u = std::max(-kReachPx, -x); u <= std::min(kReachPx, map.width_px - 1 - x); ++u) {
           const float there = map.disparity[Index(y + v) * Index(map.width_px) + Index(x + u)];
           if (!(std::abs(there - own) <= tolerance)) continue;
-          sums.Add(window[Index(u + kReachPx)] * window[Index(v + kReachPx)], u, v,
+          const std::size_t neighbour = Index(y + v) * Index(map.width_px) + Index(x + u);
+          const double trust = confidence.empty() ? 1 : static_cast<double>(confidence[neighbour]);
+          if (!(trust > 0)) continue;
+          sums.Add(trust * window[Index(u + kReachPx)] * window[Index(v + kReachPx)], u, v,
                    static_cast<double>(there - own));
         }
       }

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "thicklens/base/error.h"
+#include "thicklens/depth_fit.h"
 #include "thicklens/io/block_checkpoint.h"
 #include "thicklens/io/depth_io.h"
 #include "thicklens/io/exif.h"
@@ -182,6 +183,8 @@ const std::vector<FuzzedReader>& FuzzedReaders() {
        [](const std::string& bytes, const TemporaryFolder&) {
          io::ParseLensDistortion(bytes, "calibration", "", 640, 480);
        }},
+      OfFile("depth-camera", "depth-camera.yaml",
+             [](const std::string& path) { ReadDepthCamera(path); }),
       {"block-checkpoint", ReadCheckpoint},
       OfFile("profile-json", "profile.json",
              [](const std::string& path) { tools::ReadProfile(path); }),

@@ -321,9 +321,14 @@ void AddEstimateCommand(CLI::App* program, CommandAction* action) {
   command->callback([options, action] {
     *action = [options] {
       CheckEstimateUsage(*options);
-      std::vector<std::string> inputs = {
-          options->image_path,  options->depth_path,   options->camera_path,
-          options->aperture_of, options->profile_path, FileOfDistortion(options->distortion)};
+      std::vector<std::string> inputs = {options->image_path,
+                                         options->depth_path,
+                                         options->camera_path,
+                                         options->aperture_of,
+                                         options->profile_path,
+                                         FileOfDistortion(options->distortion),
+                                         options->depth_fit.camera_path,
+                                         options->depth_fit.confidence_path};
       const model::CorrectionFiles& correction = options->correction;
       for (const auto* more : {&correction.dark, &correction.flat, &correction.defects})
         inputs.insert(inputs.end(), more->begin(), more->end());

@@ -32,11 +32,23 @@ std::string LengthUnitName(LengthUnit unit) {
 DepthMap DepthMap::Cropped(const model::PixelRect& rect) const {
   return WithFileContext(source.empty() ? "depth" : source, [&] {
     model::RawDepthMap map = model::CropDepth({width_px, height_px, values, is_integer}, rect);
-    return DepthMap{map.width_px,    map.height_px, std::move(map.values),
-                    map.integer,     meaning,       source,
-                    largest_of_type, holes,         notes,
-                    warnings,        flip,          is_lossy,
-                    near_value};
+    std::vector<float> of_part;
+    if (!confidence.empty())
+      of_part = model::CropDepth({width_px, height_px, confidence, false}, rect).values;
+    return DepthMap{map.width_px,
+                    map.height_px,
+                    std::move(map.values),
+                    map.integer,
+                    meaning,
+                    source,
+                    largest_of_type,
+                    holes,
+                    notes,
+                    warnings,
+                    flip,
+                    is_lossy,
+                    near_value,
+                    std::move(of_part)};
   });
 }
 

@@ -145,6 +145,11 @@ bool DepthMap::IsValid(std::string* why) const {
         why, "values",
         fmt::format("{} x {} numbers are expected, found {}", width_px, height_px, values.size()));
   }
+  if (!confidence.empty() && confidence.size() != expected) {
+    return Fail(why, "confidence",
+                fmt::format("{} x {} numbers or none are expected, found {}", width_px, height_px,
+                            confidence.size()));
+  }
   if (!Member(why, "meaning", meaning)) return false;
   std::string reason;
   return holes.IsValid(meaning.kind, &reason) || Fail(why, "holes", reason);
@@ -341,6 +346,7 @@ bool EstimateOptions::IsValid(std::string* why) const {
     }
   }
   if (crop && !IsRect(why, "crop", *crop)) return false;
+  if (!Member(why, "depth_fit", depth_fit)) return false;
   if (lens_position && !std::isfinite(*lens_position)) {
     return Fail(why, "lens_position", fmt::format("must be finite, is {}", *lens_position));
   }

@@ -9,6 +9,7 @@
 #include <memory>
 #include <utility>
 
+#include "thicklens/depth_fit.h"
 #include "thicklens/distortion.h"
 #include "thicklens/estimator/aperture_blur.h"
 #include "thicklens/estimator/depth_noise.h"
@@ -95,6 +96,15 @@ void CutToCrop(const std::optional<PixelRect>& crop, Image* photo, DepthMap* dep
   }
 }
 
+// Whether one of photograph and depth map is the crop of the other already.
+bool IsCutAlready(const std::optional<PixelRect>& crop, const Image& photo, const DepthMap& depth) {
+  if (!crop) return false;
+  const auto is_crop = [&](int width_px, int height_px) {
+    return width_px == crop->width && height_px == crop->height;
+  };
+  return is_crop(photo.width_px(), photo.height_px()) || is_crop(depth.width_px, depth.height_px);
+}
+
 // ---- 2. The distortion of the lens.
 
 // The distortion of this photograph, of which the camera's sensor may show more; absent: it is
@@ -159,7 +169,15 @@ void Undistort(const LensDistortion& distortion, const TransferCurve& transfer, 
     *photo = Image::FromLight(light.width_px, light.height_px, photo->order(),
                               std::move(light.values), transfer, photo->source());
   }
+  std::vector<float> confidence = std::move(depth->confidence);
+  depth->confidence.clear();
+  if (!confidence.empty()) {
+    DepthMap map = *depth;
+    map.values = std::move(confidence);
+    confidence = UndistortDepth(map, distortion).values;
+  }
   *depth = UndistortDepth(*depth, distortion);
+  depth->confidence = std::move(confidence);
   diagnostics->without_source_share =
       static_cast<double>(missing) / (static_cast<double>(photo->width_px()) * photo->height_px());
   diagnostics->undistorted = distortion.Description();
@@ -443,15 +461,16 @@ void CheckScaleIsGiven(const DepthMap& map, const estimator::DisparityMap& dispa
       run.Option("depth.meaning.disparity_offset_px")));
 }
 
-void SmoothNoisyDepth(const EstimateOptions& options, estimator::DisparityMap* disparity,
-                      EstimateDiagnostics* diagnostics, int threads) {
+void SmoothNoisyDepth(const EstimateOptions& options, const std::vector<float>& confidence,
+                      estimator::DisparityMap* disparity, EstimateDiagnostics* diagnostics,
+                      int threads) {
   diagnostics->depth_noise_px = estimator::DepthNoisePx(*disparity);
   if (!options.smooth_depth || !diagnostics->depth_noise_px ||
       !(*diagnostics->depth_noise_px > estimator::kSmoothedNoisePx)) {
     return;
   }
   estimator::SmoothedDepth smoothed =
-      estimator::SmoothDepth(*disparity, *diagnostics->depth_noise_px, threads);
+      estimator::SmoothDepth(*disparity, *diagnostics->depth_noise_px, threads, confidence);
   *disparity = std::move(smoothed.map);
   diagnostics->depth_noise_left_px = smoothed.noise_left_px;
 }
@@ -527,6 +546,19 @@ PreparedProblem Prepare(Image photo, DepthMap map, const std::optional<Camera>& 
   FindStorageErrors(part, facts.get(), diagnostics);
   std::optional<Image> clipped = ClippedPartsOf(part, options, diagnostics);
   const std::optional<TransferCurve> given = part.transfer();
+  if (!IsCutAlready(options.crop, part, map)) {
+    try {
+      map = FitDepth(std::move(map), part, options.depth_fit, &diagnostics->depth_fit,
+                     run->control());
+    } catch (const OptionError&) {
+      throw;
+    } catch (const Interrupted&) {
+      throw;
+    } catch (const Error& error) {
+      if (turned.empty()) throw;
+      throw Error(fmt::format("{}; of the image, {}", error.what(), turned));
+    }
+  }
   if (const auto distortion =
           DistortionOf(file.name, part.width_px(), part.height_px(), camera, options, run)) {
     Undistort(*distortion, given.value_or(camera->sensor.transfer), &part, &map, diagnostics, run);
@@ -588,7 +620,7 @@ PreparedProblem Prepare(Image photo, DepthMap map, const std::optional<Camera>& 
   }
   CheckDisparities(map, input.disparity, *run);
   CheckScaleIsGiven(map, input.disparity, input.weights, *run);
-  SmoothNoisyDepth(options, &input.disparity, diagnostics, run->threads());
+  SmoothNoisyDepth(options, map.confidence, &input.disparity, diagnostics, run->threads());
   RefineDepthOf(options, prepared.was_hole, run->threads(), &input, diagnostics);
   diagnostics->disparity_range_px = DisparityRangePx(input.disparity);
   prepared.effects = SelectEffects(options, input.camera, prepared_depth.depth);

@@ -116,7 +116,7 @@ RunControl DepthRun(const std::string& other_way) {
 DepthMap DepthInsidePhoto(const EstimateOptions& options, int width_px, int height_px) {
   const std::string& path = options.image_path;
   std::optional<DepthMap> inside =
-      ReadEmbeddedDepth(path, width_px, height_px, DepthFlipOf(options.depth), DepthRun());
+      ReadEmbeddedDepth(path, 0, 0, DepthFlipOf(options.depth), DepthRun());
   if (!inside) throw NoDepth(path);
   RefuseOtherMeaning(options.depth, *inside);
   if (!options.camera_path.empty()) return std::move(*inside);

@@ -26,7 +26,7 @@ std::string KindInWords(model::DepthKind kind);
 // inside: "DEPTH left out"; empty: nothing.
 RunControl DepthRun(const std::string& other_way = "");
 
-// Returns the depth map inside the photograph of `estimate`, in the photograph's size. Throws Error
+// Returns the depth map inside the photograph of `estimate`, in its own size. Throws Error
 // if there is none, with what was looked for and found, and UsageError if the options contradict it
 // or the camera is missing that it needs.
 DepthMap DepthInsidePhoto(const EstimateOptions& options, int width_px, int height_px);

@@ -122,6 +122,9 @@ OptionNames EstimateOptionNames() {
           {"depth.meaning.disparity_scale", "--disparity-scale"},
           {"depth.meaning.disparity_offset_px", "--disparity-offset"},
           {"depth.flip", "--depth-flip"},
+          {"depth_fit.part", "--depth-crop"},
+          {"depth_fit.camera", "--depth-camera"},
+          {"depth_fit.min_confidence", "--min-confidence"},
           {"depth.meaning.inverse_scale_dpt", "--inverse-scale"},
           {"depth.meaning.inverse_offset_dpt", "--inverse-offset"},
           {"depth.near_mm", "--depth-near"},
@@ -176,6 +179,7 @@ thicklens::EstimateOptions SettingsOf(const EstimateOptions& options) {
     settings.aperture.shape = model::ApertureShapeFromName(options.aperture_shape);
   }
   settings.st_depth_mm = options.st_depth_mm;
+  settings.depth_fit = DepthFitOf(options.depth_fit);
   settings.smooth_depth = !options.keep_depth_noise;
   if (options.clipped == "data") settings.clipped = ClippedHighlights::kData;
   if (options.refine_depth == "on") settings.refine_depth = DepthRefining::kOn;
@@ -207,6 +211,11 @@ EstimateCall ReadEstimateCall(const EstimateOptions& options, const RunControl& 
                    : ReadDepth(options.depth_path, DepthMeaningOf(options.depth),
                                DepthReadOptionsOf(options.depth),
                                DepthRun("the same command without a depth map"));
+  ReadConfidenceInto(options.depth_fit, &call.depth);
+  if (!options.depth_fit.camera_path.empty()) {
+    call.settings.depth_fit.camera =
+        std::make_shared<const DepthCamera>(ReadDepthCamera(options.depth_fit.camera_path));
+  }
   if (!options.camera_path.empty()) call.camera = ReadCamera(options.camera_path);
   if (call.settings.undistort && !options.distortion.empty()) {
     const model::Sensor& sensor = call.camera->sensor;

@@ -60,10 +60,11 @@ void AddInputOptions(CLI::App* command, EstimateOptions* options) {
   command
       ->add_option(
           "depth", options->depth_path,
-          "Its depth map, of the same size; default: the one inside the photograph's file, "
-          "as phones store it")
+          "Its depth map, of any size with the same aspect ratio (others: --depth-crop, "
+          "--depth-camera); default: the one inside the photograph's file, as phones store it")
       ->type_name("DEPTH");
   AddDepthOptions(command, "Required with DEPTH", &options->depth);
+  AddDepthFitOptions(command, &options->depth_fit);
   command
       ->add_option("--camera", options->camera_path,
                    "The calibrated camera; optional if the depth map holds disparities")

@@ -19,6 +19,7 @@ struct EstimateOptions {
   CommonOptions common;
   std::string image_path, depth_path, camera_path, output_folder, report_folder;
   DepthOptions depth;
+  DepthFitOptions depth_fit;
   ViewsOption views;
   CropOption crop;
   std::string aperture_shape;

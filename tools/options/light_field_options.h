@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "thicklens/depth.h"
+#include "thicklens/depth_fit.h"
 #include "thicklens/io/light_field_io.h"
 #include "thicklens/light_field.h"
 #include "thicklens/model/scene.h"
@@ -64,6 +65,17 @@ struct DepthOptions {
   std::string pfm_scale;  // "apply" or "ignore"; empty: by rule
   std::string flip;       // "rows", "columns" or "both"; empty: none
 };
+
+// The options of `estimate` for a map of another size, part or camera, and for its confidence.
+struct DepthFitOptions {
+  std::string part, camera_path, samples, confidence_path;  // empty: not given
+  std::optional<double> confidence_full, min_confidence;
+};
+void AddDepthFitOptions(CLI::App* command, DepthFitOptions* options);
+// Throws UsageError. The depth camera is read later.
+DepthFit DepthFitOf(const DepthFitOptions& options);
+// Reads the confidence into the map, if it was given. Throws UsageError and Error.
+void ReadConfidenceInto(const DepthFitOptions& options, DepthMap* depth);
 // `required` begins the description of --depth-kind: when the kind must be given.
 void AddDepthOptions(CLI::App* command, const std::string& required, DepthOptions* options);
 // Throws UsageError if the kind is not given, z or range have no unit, disparity has one, or an

@@ -351,6 +351,7 @@ json EstimateJson(const EstimateOptions& options, const EstimateOutcome& outcome
                                                                : "option"},
               {"read", FileReadJson(options.image_path, outcome.photo_facts.get())},
               {"undistorted", TextOrNull(found.undistorted)},
+              {"depth_fit", TextOrNull(found.depth_fit)},
               {"without_source_share", found.without_source_share},
               {"embedded_depth", TextOrNull(outcome.embedded_depth)},
               {"aperture", ApertureJson(options, found)},

@@ -113,6 +113,23 @@ TEST(SmoothDepth, KeepsWhatHasNoSurface) {
   EXPECT_NEAR(smoothed.noise_left_px, 0.05, 1e-12);
 }
 
+TEST(SmoothDepth, DoubtfulPixelsYieldToTheOthers) {
+  // Every second column has four times the noise, and a confidence that says so.
+  DisparityMap map = MapOf(Slant, 0.02);
+  const DisparityMap noisier = MapOf(Slant, 0.08);
+  std::vector<float> confidence(map.disparity.size(), 1.0F);
+  for (std::size_t i = 0; i < map.disparity.size(); i += 2) {
+    map.disparity[i] = noisier.disparity[i];
+    confidence[i] = 1 / 16.0F;
+  }
+  const double even = RmsError(SmoothDepth(map, 0.08, 1).map, Slant, Everywhere);
+  const double weighted = RmsError(SmoothDepth(map, 0.08, 1, confidence).map, Slant, Everywhere);
+  EXPECT_LT(weighted, 0.6 * even);
+  confidence.pop_back();
+  EXPECT_THAT(ErrorOf([&] { SmoothDepth(map, 0.08, 1, confidence); }),
+              HasSubstr("numbers must be equal"));
+}
+
 TEST(SmoothDepth, RefusesHolesAndNoNoise) {
   DisparityMap map = MapOf(Slant);
   EXPECT_THAT(ErrorOf([&] { SmoothDepth(map, 0, 1); }), HasSubstr("must be > 0"));

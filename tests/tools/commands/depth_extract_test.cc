@@ -72,7 +72,7 @@ TEST_F(DepthInsideTest, EstimateUsesItAndSaysSo) {
   EXPECT_THAT(result.out,
               HasSubstr("depth map    The depth map inside is used: GDepth, RangeInverse from 0.4 "
                         "to 2.5 m along the optical axis; PNG, 32 x 24 px"));
-  EXPECT_THAT(result.err, HasSubstr("32 x 24 px and is enlarged to 64 x 48 px"));
+  EXPECT_THAT(result.err, HasSubstr("32 x 24 px brought to 64 x 48 px"));
   const nlohmann::json json = Json();
   EXPECT_THAT(json["embedded_depth"].get<std::string>(), HasSubstr("GDepth"));
   EXPECT_NEAR(json["depth"]["min_mm"], 1000 / 2.08, 0.1);

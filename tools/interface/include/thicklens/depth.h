@@ -65,6 +65,9 @@ struct DepthMap {
   bool is_lossy = false;  // the file is compressed with losses, as JPEG is
   // The value that lies at DepthReadOptions::near_mm, if that was given.
   std::optional<double> near_value = std::nullopt;
+  // Confidence of each value, 0 (none) to 1 (full); empty: it is not known. It is the weight of
+  // the value where values are interpolated and smoothed, and a confidence of 0 makes a hole.
+  std::vector<float> confidence = {};
 
   // Returns a rectangle of the map, px. Throws Error if it is empty or not inside.
   THICKLENS_EXPORT DepthMap Cropped(const model::PixelRect& rect) const;

@@ -13,6 +13,7 @@
 #include "thicklens/base/export.h"
 #include "thicklens/camera.h"
 #include "thicklens/depth.h"
+#include "thicklens/depth_fit.h"
 #include "thicklens/effects.h"
 #include "thicklens/estimator/blur_check.h"
 #include "thicklens/estimator/depth_flips.h"
@@ -100,6 +101,7 @@ struct EstimateOptions {
   // Depth of the ST plane from Ap, mm, 0 < st_depth_mm <= 1e9; absent: the plane of focus. Needs a
   // camera.
   std::optional<double> st_depth_mm;
+  DepthFit depth_fit;                                 // how a map of another size or camera is used
   bool smooth_depth = true;                           // smooth a noisy depth along surfaces [D94]
   DepthRefining refine_depth = DepthRefining::kAuto;  // which faults of the depth are repaired
   EffectSelection effects;                            // effects that the estimate models
@@ -206,6 +208,8 @@ struct EstimateDiagnostics {
   std::string transfer_from;                       // "image", "camera", "file" or "assumed"
   // The distortion that was taken out of photograph and depth map, in words; empty: none.
   std::string undistorted;
+  // How the depth map came to the photograph's pixels, in words; empty: it had them.
+  std::string depth_fit;
   double without_source_share = 0;   // share of the pixels that the distorted photograph lacks
   bool has_exif = false;             // EXIF was found and compared
   std::vector<ExifComparison> exif;  // one per compared quantity

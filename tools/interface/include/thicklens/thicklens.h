@@ -14,6 +14,7 @@
 #include "thicklens/camera.h"       // IWYU pragma: export
 #include "thicklens/compare.h"      // IWYU pragma: export
 #include "thicklens/depth.h"        // IWYU pragma: export
+#include "thicklens/depth_fit.h"    // IWYU pragma: export
 #include "thicklens/distortion.h"   // IWYU pragma: export
 #include "thicklens/effects.h"      // IWYU pragma: export
 #include "thicklens/estimate.h"     // IWYU pragma: export

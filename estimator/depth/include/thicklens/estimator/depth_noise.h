@@ -1,6 +1,8 @@
 #ifndef THICKLENS_ESTIMATOR_DEPTH_NOISE_H_
 #define THICKLENS_ESTIMATOR_DEPTH_NOISE_H_
 
+#include <vector>
+
 #include "thicklens/base/export.h"
 #include "thicklens/estimator/disparity_map.h"
 
@@ -25,8 +27,11 @@ struct SmoothedDepth {
 // A pixel with fewer than six such neighbours, or with all of them in a line, keeps its disparity.
 // Derived here [D94]. `noise_px`: standard deviation, px per view step (of the larger of the two
 // steps), > 0, as DepthNoisePx finds it. The result does not depend on the number of threads.
-// Throws Error if the map has holes or noise_px is not > 0.
-THICKLENS_EXPORT SmoothedDepth SmoothDepth(const DisparityMap& map, double noise_px, int threads);
+// `confidence`, 0 to 1 per pixel, multiplies the weights of the neighbours, and a pixel that has
+// less than those around it yields to them; empty: all are equal. Throws Error if the map has
+// holes, noise_px is not > 0 or the number of confidences does not fit.
+THICKLENS_EXPORT SmoothedDepth SmoothDepth(const DisparityMap& map, double noise_px, int threads,
+                                           const std::vector<float>& confidence = {});
 
 }  // namespace thicklens::estimator
 
