@@ -38,6 +38,8 @@ constexpr double kUsualExponent = 2.5, kExponentSpread = 0.9;
 constexpr std::array<double, 3> kNuggets = {1e-6, 3e-4, 1e-2};
 // Modes of frequencies up to this, in half waves per image, by which the Gaussian field is judged.
 constexpr int kLowModes = 3;
+// A fall-off that leaves more than this in the corners is within what a scene does anyway.
+constexpr double kMaxDarkest = 1 / 1.1;
 // A block's mean is not known better than this, in the logarithm.
 constexpr double kMinError = 2e-3;
 // Neither the law of the fall-off nor the correction in a camera is exact to more than this.
@@ -257,6 +259,11 @@ FalloffEvidence TestFalloff(const EstimateInput& input, int threads) {
                      input.image.height_px, ResolveThreads(threads));
   FalloffEvidence evidence;
   evidence.darkest = static_cast<double>(*std::min_element(falloff.begin(), falloff.end()));
+  if (evidence.darkest > kMaxDarkest) {
+    evidence.message = "the predicted fall-off is too small to be seen in a photograph";
+    evidence.seconds = SecondsSince(start);
+    return evidence;
+  }
   const Blocks blocks = BlocksOf(input, falloff);
   evidence.blocks = static_cast<int>(blocks.x.size());
   if (evidence.blocks < kMinBlocks) {
@@ -265,7 +272,7 @@ FalloffEvidence TestFalloff(const EstimateInput& input, int threads) {
         "it has the fall-off",
         evidence.blocks);
   } else if (blocks.falloff.maxCoeff() - blocks.falloff.minCoeff() < kMinError) {
-    evidence.message = "the predicted fall-off is the same everywhere in the photograph";
+    evidence.message = "the predicted fall-off is the same in all parts that can be compared";
   } else {
     FitShare(blocks, &evidence);
     Judge(&evidence);

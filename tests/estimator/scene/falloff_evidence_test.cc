@@ -101,7 +101,7 @@ TEST(FalloffEvidence, KnowsItsErrorOverManyScenes) {
   for (const double exponent : {1.8, 3.0}) {
     for (const double power : {0.0, 1.0}) {
       double squares = 0, normalised = 0, sigmas = 0;
-      constexpr int kScenes = 24;
+      constexpr int kScenes = 20;
       int wrong = 0;
       for (int i = 0; i < kScenes; ++i) {
         Take(RandomScene(0.3, exponent, static_cast<unsigned>(i)), power, &input);
@@ -147,6 +147,13 @@ TEST(FalloffEvidence, IsUndecidedWhereTheSceneHidesIt) {
     undecided += TestFalloff(input, 1).verdict == Verdict::kUndecided ? 1 : 0;
   }
   EXPECT_GE(undecided, 11);
+}
+
+TEST(FalloffEvidence, OfLessThanATenthIsNotLookedFor) {
+  EstimateInput input = InputOf(1);
+  Take(RandomScene(0.01, 2, 1), 1, &input);
+  EXPECT_EQ(TestFalloff(input, 1).verdict, Verdict::kUndecided);
+  EXPECT_THAT(TestFalloff(input, 1).message, HasSubstr("too small"));
 }
 
 TEST(FalloffEvidence, LeavesOutClippedAndBlackParts) {

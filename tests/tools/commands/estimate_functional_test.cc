@@ -143,9 +143,11 @@ TEST_P(EstimateFunctionalTest, TheFallOffCanBeLeftOut) {
                                  "--depth-kind", "z",
                                  "--depth-unit", "mm",
                                  "--camera",     folder_.Put("camera.yaml", WideCameraYaml())};
-  const model::LightField with = Estimated(with_camera);
-  const model::LightField without = Estimated(With(with_camera, {"--without", "falloff"}));
   const bool is_grid = GetParam() == std::string("grid");
+  const model::LightField with =
+      Estimated(With(with_camera, {"--effects", is_grid ? "thickness,defocus,falloff,occlusion"
+                                                        : "thickness,defocus,falloff"}));
+  const model::LightField without = Estimated(With(with_camera, {"--without", "falloff"}));
   EXPECT_EQ(fmt::format("{}", fmt::join(without.origin.effects, ", ")),
             is_grid ? "defocus, occlusion" : "defocus");
   EXPECT_EQ(fmt::format("{}", fmt::join(with.origin.effects, ", ")),
@@ -155,6 +157,12 @@ TEST_P(EstimateFunctionalTest, TheFallOffCanBeLeftOut) {
   EXPECT_GT(bright.at(2, 2, 0), 1.2F * dark.at(2, 2, 0));
   EXPECT_NEAR(bright.at(kWidthPx / 2, kHeightPx / 2, 0), dark.at(kWidthPx / 2, kHeightPx / 2, 0),
               0.01);
+  // The stripes do not show it, so that nothing is divided out without a statement.
+  const json tested = Summary(with_camera);
+  EXPECT_NE(tested["falloff"]["verdict"], "shown");
+  EXPECT_GT(tested["falloff"]["sigma"], 0.2);
+  EXPECT_THAT(tested["effects"].dump(), Not(HasSubstr("falloff")));
+  EXPECT_TRUE(Summary(With(with_camera, {"--without", "falloff"}))["falloff"].is_null());
 }
 
 TEST_P(EstimateFunctionalTest, TheReportHasNoMaps) {
