@@ -141,7 +141,7 @@ class ColourPreference {
 
 }  // namespace
 
-cv::Mat SharpenEdges(double width_px, double jump, cv::Mat* map) {
+void SharpenEdges(double width_px, double jump, cv::Mat* map) {
   const int reach = std::max(1, static_cast<int>(std::lround(width_px / 2)));
   cv::Mat low, high, gradient_x, gradient_y, smooth;
   const cv::Mat range = Range(*map, reach, &low, &high);
@@ -149,7 +149,6 @@ cv::Mat SharpenEdges(double width_px, double jump, cv::Mat* map) {
   cv::Sobel(smooth, gradient_x, CV_32F, 1, 0);
   cv::Sobel(smooth, gradient_y, CV_32F, 0, 1);
   const cv::Mat before = map->clone();
-  cv::Mat in_ramp(map->size(), CV_8U, cv::Scalar(0));
   const auto flank = static_cast<float>(2 * reach + 1);
   const auto range_at = [&](float x, float y) {
     return range.at<float>(std::clamp(static_cast<int>(std::lround(y)), 0, map->rows - 1),
@@ -169,19 +168,17 @@ cv::Mat SharpenEdges(double width_px, double jump, cv::Mat* map) {
       const float value = before.at<float>(y, x);
       const float up = high.at<float>(y, x) - value, down = value - low.at<float>(y, x);
       map->at<float>(y, x) = up < down ? high.at<float>(y, x) : low.at<float>(y, x);
-      in_ramp.at<uchar>(y, x) = 255;
     }
   }
-  return in_ramp;
 }
 
 namespace {
 
 // `unknown` may be empty: all pixels may change.
-double Label(const cv::Mat& guide, const cv::Mat& unknown, const EdgeLabelOptions& options,
-             cv::Mat* map) {
+void Label(const cv::Mat& guide, const cv::Mat& unknown, const EdgeLabelOptions& options,
+           cv::Mat* map) {
   const Edges edges = FindEdges(*map, static_cast<float>(options.jump));
-  if (edges.near_px.empty()) return 0;
+  if (edges.near_px.empty()) return;
   const int width = map->cols, height = map->rows;
   std::vector<Choice> choices(map->total());
   const auto at = [&](int x, int y) -> Choice& {
@@ -217,7 +214,7 @@ double Label(const cv::Mat& guide, const cv::Mat& unknown, const EdgeLabelOption
       if (x + 1 < width) contrast += static_cast<double>(SquaredDifference(guide, x, y, x + 1, y));
     }
   }
-  if (nodes == 0) return 0;
+  if (nodes == 0) return;
   const auto inverse_contrast = static_cast<float>(1 / std::max(1e-6, 2 * contrast / nodes));
   cv::detail::GCGraph<float> graph(static_cast<unsigned>(nodes + 1),
                                    static_cast<unsigned>(4 * nodes + 4));
@@ -249,29 +246,25 @@ double Label(const cv::Mat& guide, const cv::Mat& unknown, const EdgeLabelOption
     }
   }
   graph.maxFlow();
-  std::size_t changed = 0;
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       const Choice& choice = at(x, y);
       if (choice.node < 0) continue;
       const float value = graph.inSourceSegment(choice.node) ? choice.near_px : choice.far_px;
-      if (value == map->at<float>(y, x)) continue;
       map->at<float>(y, x) = value;
-      ++changed;
     }
   }
-  return static_cast<double>(changed) / static_cast<double>(map->total());
 }
 
 }  // namespace
 
-double LabelEdges(const cv::Mat& guide, const EdgeLabelOptions& options, cv::Mat* map) {
-  return Label(guide, {}, options, map);
+void LabelEdges(const cv::Mat& guide, const EdgeLabelOptions& options, cv::Mat* map) {
+  Label(guide, {}, options, map);
 }
 
-double LabelUnknown(const cv::Mat& guide, const cv::Mat& unknown, const EdgeLabelOptions& options,
-                    cv::Mat* map) {
-  return Label(guide, unknown, options, map);
+void LabelUnknown(const cv::Mat& guide, const cv::Mat& unknown, const EdgeLabelOptions& options,
+                  cv::Mat* map) {
+  Label(guide, unknown, options, map);
 }
 
 namespace {

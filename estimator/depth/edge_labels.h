@@ -21,8 +21,8 @@ struct EdgeLabelOptions {
 // Replaces the ramps of a map whose edges are `width_px` wide by steps: a pixel of a ramp gets the
 // larger or the smaller disparity of its surroundings, whichever is nearer to its own. A ramp is
 // where the range of the surroundings is several times that of the flanks [D200]; slopes are none.
-// `map` is CV_32F without holes. Returns the mask (CV_8U) of the pixels that were in a ramp.
-cv::Mat SharpenEdges(double width_px, double jump, cv::Mat* map);
+// `map` is CV_32F without holes.
+void SharpenEdges(double width_px, double jump, cv::Mat* map);
 
 // Decides anew for each pixel near a depth edge to which of the two surfaces of the edge it
 // belongs. The colours of the surroundings on each side say how likely the pixel is of that side,
@@ -30,11 +30,11 @@ cv::Mat SharpenEdges(double width_px, double jump, cv::Mat* map);
 // cheap where the guide has one. The sum is least for a minimum cut [D201]. A pixel that changes
 // its side gets the disparity of the other side at the edge. `guide`: CV_32FC1 or CV_32FC3; `map`
 // as above. Returns the share of the pixels that changed.
-double LabelEdges(const cv::Mat& guide, const EdgeLabelOptions& options, cv::Mat* map);
+void LabelEdges(const cv::Mat& guide, const EdgeLabelOptions& options, cv::Mat* map);
 // Likewise for the pixels of `unknown` (CV_8U) alone, which the map does not place on a side: a
 // hole that was filled.
-double LabelUnknown(const cv::Mat& guide, const cv::Mat& unknown, const EdgeLabelOptions& options,
-                    cv::Mat* map);
+void LabelUnknown(const cv::Mat& guide, const cv::Mat& unknown, const EdgeLabelOptions& options,
+                  cv::Mat* map);
 
 // Where the photograph has the edges of a map, px.
 struct EdgeAlignment {
