@@ -112,6 +112,7 @@ OptionNames EstimateOptionNames() {
           {"aperture", "--aperture-shape and --aperture-of"},
           {"st_depth_mm", "--st-depth-mm"},
           {"smooth_depth", "--keep-depth-noise"},
+          {"strict", "--strict"},
           {"effects", "--effects, --without"},
           {"effects.given", "--effects"},
           {"effects.without", "--without"},
@@ -175,6 +176,7 @@ thicklens::EstimateOptions SettingsOf(const EstimateOptions& options) {
   }
   settings.st_depth_mm = options.st_depth_mm;
   settings.smooth_depth = !options.keep_depth_noise;
+  settings.strict = options.strict;
   settings.effects = EffectSelectionOf(options.effects);
   settings.solver = AsAnySolver(SolverOf(options));
   if (options.fill == "telea") settings.hidden_rays = HiddenRays::kTelea;

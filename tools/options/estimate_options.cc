@@ -163,6 +163,9 @@ void AddQualityOptions(CLI::App* command, EstimateOptions* options) {
           "the photograph, default)")
       ->check(CLI::IsMember({"captured", "sharp", "auto"}))
       ->type_name("KIND");
+  command->add_flag("--strict", options->strict,
+                    "Refuse where the result would be partial: the photograph contradicts the "
+                    "depth, or the iterations do not converge");
   command->add_flag("--keep-depth-noise", options->keep_depth_noise,
                     "Disable depth denoising, which smooths the depth along surfaces");
   command
