@@ -170,12 +170,15 @@ class Search {
         orders.begin(), orders.end(),
         [](const DepthCauseTrial& a, const DepthCauseTrial& b) { return *a.edges > *b.edges; });
     const double best = orders.empty() ? 0 : *orders.front().edges;
+    const bool is_far = std::max(std::abs(given.best_x), std::abs(given.best_y)) >= kLeastShiftPx;
     if (best >= kOtherOrder && best >= given.sigmas + kMoreThanGiven &&
-        given.sigmas <= kOfBest * best &&
-        given.best_sigmas < std::max(kOtherPlace, kAboutTheBest * best)) {
+        given.sigmas <= kOfBest * best) {
       for (const DepthCauseTrial& order : orders) {
         if (*order.edges >= kAboutTheBest * best) found_->causes.push_back(order);
       }
+      // One symmetrical thing may be reversed or moved.
+      if (is_far && given.best_sigmas >= std::max(kOtherPlace, kAboutTheBest * best))
+        CompareWithShift(given);
       found_->is_contradicted = true;
       found_->message = fmt::format(
           "in another order, the depth's edges lie on edges of the photograph ({:.1f} standard "
@@ -183,16 +186,12 @@ class Search {
           best, given.sigmas);
       return true;
     }
-    const bool is_far = std::max(std::abs(given.best_x), std::abs(given.best_y)) >= kLeastShiftPx;
     if (!is_far || given.best_sigmas < kOtherPlace ||
         given.best_sigmas < given.sigmas + kMoreThanGiven + 1 ||
         given.sigmas > kOfBest * given.best_sigmas || given.best_sigmas < best / kAboutTheBest) {
       return false;
     }
-    DepthCauseTrial shift = TrialOf(DepthCause::kShift);
-    shift.shift_x_px = static_cast<int>(std::lround(given.best_x * small_.scale));
-    shift.shift_y_px = static_cast<int>(std::lround(given.best_y * small_.scale));
-    shift.edges = given.best_sigmas;
+    DepthCauseTrial shift = ShiftOf(given);
     // The edges of a dilated map lie elsewhere as well, but to both sides.
     const bool is_single = given.best_sigmas >= kSinglePlace &&
                            given.opposite_sigmas <= kOfSinglePlace * given.best_sigmas;
@@ -206,6 +205,29 @@ class Search {
         "photograph ({:.1f} standard deviations; as it is: {:.1f})",
         shift.shift_x_px, shift.shift_y_px, given.best_sigmas, given.sigmas);
     return true;
+  }
+
+  DepthCauseTrial ShiftOf(const EdgeCoincidence::Found& given) const {
+    DepthCauseTrial shift = TrialOf(DepthCause::kShift);
+    shift.shift_x_px = static_cast<int>(std::lround(given.best_x * small_.scale));
+    shift.shift_y_px = static_cast<int>(std::lround(given.best_y * small_.scale));
+    shift.edges = given.best_sigmas;
+    return shift;
+  }
+
+  // Names the shift beside an order unless the order explains the photograph better.
+  void CompareWithShift(const EdgeCoincidence::Found& given) {
+    DepthCauseTrial shift = ShiftOf(given);
+    const ReducedPhoto& photo = Least();
+    const auto explained = [&](const DepthCauseTrial& change) {
+      return ExplainedBy(photo, Reordered(photo.disparity, change, photo.scale), input_,
+                         options_.photo_aperture, threads_);
+    };
+    // Against the map in that order.
+    shift.residual =
+        SigmasBetter(explained(found_->causes.front()), explained(shift), NoiseOfBlock());
+    found_->trials.push_back(shift);
+    if (*shift.residual > -kShiftDecided) found_->causes.push_back(shift);
   }
 
   // Whether the map's edges lie on the photograph's no more often than elsewhere, although no order
@@ -223,11 +245,7 @@ class Search {
         found_->causes.begin(), found_->causes.end(),
         [](const DepthCauseTrial& a, const DepthCauseTrial& b) { return *a.edges > *b.edges; });
     if (given.best_sigmas >= kOtherOrder) {
-      DepthCauseTrial shift = TrialOf(DepthCause::kShift);
-      shift.shift_x_px = static_cast<int>(std::lround(given.best_x * small_.scale));
-      shift.shift_y_px = static_cast<int>(std::lround(given.best_y * small_.scale));
-      shift.edges = given.best_sigmas;
-      found_->causes.push_back(shift);
+      found_->causes.push_back(ShiftOf(given));
     }
     found_->causes.push_back(TrialOf(DepthCause::kOtherImage));
     found_->is_contradicted = true;
@@ -275,7 +293,7 @@ class Search {
       made.spectra_sigma = gain.sigma;
       return made;
     };
-    constexpr int kScalesDown = 30, kScalesUp = 8, kOffsets = 20;
+    constexpr int kScalesDown = 18, kScalesUp = 8, kOffsets = 20;
     constexpr double kScalesPerOctave = 6, kOffsetSigmaPx = 0.15;
     const double offset_px = kOffsetSigmaPx / tiles.spread_px() * step;
     // Blur does not show the side of focus, so that an offset to each side may explain it.
@@ -300,6 +318,7 @@ class Search {
       }
     }
     std::vector<DepthCauseTrial> tried(best_of.begin(), best_of.end() - 1);
+    tried.push_back(trial(DepthCause::kSharp, 0, 0));
     // Two numbers suit a wrong map more easily than one.
     if (*best_of[3].spectra >= kMuchLikelierTwo) tried.push_back(best_of[3]);
     if (!has_edges) {
@@ -326,7 +345,7 @@ class Search {
     const DepthCauseTrial& first = tried.front();
     const double best = *first.spectra;
     const bool is_small =
-        std::abs(std::log2(first.scale)) < kLeastOctaves &&
+        first.cause != DepthCause::kSharp && std::abs(std::log2(first.scale)) < kLeastOctaves &&
         std::abs(first.offset_px) / step * tiles.spread_px() < kLeastOffsetPx &&
         (first.cause == DepthCause::kScale || first.cause == DepthCause::kOffset ||
          first.cause == DepthCause::kScaleOffset);
@@ -335,9 +354,14 @@ class Search {
     found_->is_contradicted = true;
     for (DepthCauseTrial& cause : tried) {
       if (*cause.spectra < best - std::max(kAlike, kAlikeShare * best)) continue;
-      const bool is_sharp = cause.cause == DepthCause::kScale && cause.scale <= kNoBlurScale;
-      if (is_sharp) cause.cause = DepthCause::kSharp;
+      // So little blur is none.
+      if (cause.cause == DepthCause::kScale && cause.scale <= kNoBlurScale) continue;
       found_->causes.push_back(cause);
+    }
+    if (found_->causes.empty()) {
+      found_->causes.push_back(*std::find_if(
+          tried.begin(), tried.end(),
+          [](const DepthCauseTrial& cause) { return cause.cause == DepthCause::kSharp; }));
     }
     // A change of both is named where neither alone does.
     const auto is_single = [](const DepthCauseTrial& cause) {

@@ -19,6 +19,7 @@
 #include "thicklens/io/light_field_io.h"
 #include "thicklens/version.h"
 #include "tools/interface/blur_proposal.h"
+#include "tools/interface/contradiction.h"
 #include "tools/interface/problem.h"
 #include "tools/interface/solve.h"
 #include "tools/interface/validation.h"
@@ -165,12 +166,7 @@ void CheckFlips(const PreparedProblem& prepared, const EstimateOptions& options,
   estimate->summary.seconds.depth_flips = SecondsSince(start);
 }
 
-// The depth map without its values.
-struct DepthFile {
-  std::string name;  // in messages
-  DepthMeaning meaning;
-  model::DepthFlip flip = model::DepthFlip::kNone;  // by which it was read
-};
+using DepthFile = DepthOrigin;
 
 std::string WordsOf(model::DepthFlip flip) {
   switch (flip) {
@@ -181,6 +177,48 @@ std::string WordsOf(model::DepthFlip flip) {
     default:
       return "turned by 180 degrees";
   }
+}
+
+std::string ReversedText(const DepthFile& depth, const LightFieldEstimate& estimate,
+                         const RunScope& run) {
+  const estimator::DepthFlipCheck& flips = *estimate.diagnostics.depth_flips;
+  const EstimateSummary& summary = estimate.summary;
+  const model::DepthFlip flip = model::Combined(depth.flip, flips.better->flip);
+  return fmt::format(
+      "{}: {}, the map explains the photograph down to {:.1f} grey levels, as it is only to "
+      "{:.1f} (noise: {:.1f}{}): it is probably stored the other way; {} reads it so",
+      depth.name, WordsOf(flips.better->flip), kEightBitLevels * flips.better->residual_rms,
+      kEightBitLevels * flips.trials.front().residual_rms, kEightBitLevels * flips.noise_sigma,
+      summary.width_px >= 256 && summary.height_px >= 256 ? ", at a reduced size" : "",
+      flip == model::DepthFlip::kNone
+          ? fmt::format("without {} the program", run.Option("depth.flip"))
+          : fmt::format("{} {}", run.Option("depth.flip"), model::DepthFlipName(flip)));
+}
+
+// A photograph that contradicts its depth, or that nothing explains, makes the result partial. The
+// residual alone shows reversed orders only if the map has no edges.
+void CheckAgreement(const PreparedProblem& prepared, const EstimateOptions& options,
+                    const DepthFile& depth, RunScope* run, LightFieldEstimate* estimate) {
+  if (!std::holds_alternative<SceneSolver>(options.solver)) return;
+  EstimateDiagnostics& found = estimate->diagnostics;
+  FindContradiction(prepared, IsInDoubt(found, kDoubtful), run, estimate);
+  std::string reason =
+      found.contradiction ? ContradictionText(depth, *found.contradiction, *run) : "";
+  const bool has_edges = found.contradiction && found.contradiction->trials.front().edges;
+  if (reason.empty() && !has_edges) CheckFlips(prepared, options, run, estimate);
+  const bool is_reversed = found.depth_flips && found.depth_flips->better;
+  if (is_reversed) reason = ReversedText(depth, *estimate, *run);
+  if (reason.empty() && IsInDoubt(found, kUnexplainedResidual)) {
+    reason = fmt::format(
+        "{}: the photograph is not explained: its residual of {:.1f} grey levels is {:.1f} times "
+        "the noise, and none of the causes that were tested (order, place, sign, scale, offset, "
+        "another image) explains it",
+        depth.name, kEightBitLevels * *found.residual_rms,
+        *found.residual_rms / *found.DoubtSigma());
+  }
+  if (reason.empty()) return;
+  std::string& partial = estimate->summary.partial_reason;
+  partial += (partial.empty() ? "" : "; ") + reason;
 }
 
 // Returns what a user should know of the photograph's aperture; empty: nothing beyond the summary.
@@ -257,7 +295,9 @@ std::vector<std::string> WarningsOf(const DepthFile& depth, bool has_camera, con
         worst.y + worst.height_px - 1, kEightBitLevels * worst.residual_rms, noise,
         noise_of_mean_levels, std::exchange(jpeg_cause, "")));
   }
-  const bool is_reversed = found.depth_flips && found.depth_flips->better;
+  // One reason is enough, and the others would be false.
+  const bool is_reversed = (found.depth_flips && found.depth_flips->better) ||
+                           (found.contradiction && found.contradiction->is_contradicted);
   if (found.unexplained_share && *found.unexplained_share > estimator::kMaxUnexplained &&
       !is_reversed) {
     warnings.push_back(fmt::format(
@@ -269,19 +309,6 @@ std::vector<std::string> WarningsOf(const DepthFile& depth, bool has_camera, con
                           run.Option("depth.meaning.disparity_offset_px"))
             : "are the depth's unit, and the camera's aperture and focus, right?",
         std::exchange(jpeg_cause, "")));
-  }
-  if (is_reversed) {
-    const estimator::DepthFlipCheck& flips = *found.depth_flips;
-    const model::DepthFlip flip = model::Combined(depth.flip, flips.better->flip);
-    warnings.push_back(fmt::format(
-        "{}: {}, the map explains the photograph down to {:.1f} grey levels, as it is only to "
-        "{:.1f} (noise: {:.1f}{}): it is probably stored the other way; {} reads it so",
-        depth.name, WordsOf(flips.better->flip), kEightBitLevels * flips.better->residual_rms,
-        kEightBitLevels * flips.trials.front().residual_rms, kEightBitLevels * flips.noise_sigma,
-        summary.width_px >= 256 && summary.height_px >= 256 ? ", at a reduced size" : "",
-        flip == model::DepthFlip::kNone
-            ? fmt::format("without {} the program", run.Option("depth.flip"))
-            : fmt::format("{} {}", run.Option("depth.flip"), model::DepthFlipName(flip))));
   }
   if (IsInDoubt(found, kDoubtful) && !found.unexplained_share && !is_reversed) {
     warnings.push_back(fmt::format(
@@ -302,7 +329,7 @@ std::vector<std::string> WarningsOf(const DepthFile& depth, bool has_camera, con
         kEightBitLevels * *found.residual_rms, *found.residual_rms / *found.DoubtSigma(), noise));
   }
   const std::string photo = PhotoWarning(found, run);
-  if (!photo.empty()) warnings.push_back(photo);
+  if (!photo.empty() && !is_reversed) warnings.push_back(photo);
   if (found.blur_check) {
     const std::string blur =
         BlurWarning(*found.blur_check, found.blur_proposal, estimate.problem->input(), run);
@@ -436,7 +463,9 @@ LightFieldEstimate Estimate(ViewSink* given_sink, Image photo, DepthMap depth,
   origin.date = NowIso8601();
   estimate.summary.effects = origin.effects;
   CheckResult(prepared, solved, &estimate);
-  CheckFlips(prepared, options, &run, &estimate);
+  CheckAgreement(prepared, options, depth_file, &run, &estimate);
+  if (options.strict && !estimate.summary.partial_reason.empty())
+    throw Error(estimate.summary.partial_reason);
   ThrowIfCancelled();
   const auto rays_start = Clock::now();
   GiveRays(prepared, control.threads, sink ? &*sink : nullptr, &solved, &estimate);

@@ -22,6 +22,7 @@
 #include "thicklens/model/undistort.h"
 #include "tools/interface/clipped_highlights.h"
 #include "tools/interface/depth_causes.h"
+#include "tools/interface/depth_plausibility.h"
 #include "tools/interface/depth_reports.h"
 #include "tools/interface/effects_choice.h"
 #include "tools/interface/exif_comparison.h"
@@ -432,35 +433,6 @@ void CheckDisparities(const DepthMap& map, const estimator::DisparityMap& dispar
                         run.Option("depth.meaning.unit"))));
 }
 
-// A map of 8 or 16 bits without a scale holds grey levels, which mean px only by accident. The test
-// is the blur that they would mean: the views at the two ends of the aperture see half of the
-// points more than an image apart.
-void CheckScaleIsGiven(const DepthMap& map, const estimator::DisparityMap& disparity,
-                       const Eigen::ArrayXXd& weights, const RunScope& run) {
-  const DepthMeaning& meaning = map.meaning;
-  if (!map.is_integer || meaning.kind != DepthKind::kDisparity || meaning.disparity_scale != 1 ||
-      meaning.disparity_offset_px != 0) {
-    return;
-  }
-  const double step = disparity.step.x() != 0 ? disparity.step.x() : disparity.step.y();
-  std::vector<float> sizes;
-  sizes.reserve(disparity.disparity.size());
-  for (const float value : disparity.disparity) sizes.push_back(std::abs(value));
-  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-  std::nth_element(sizes.begin(), middle, sizes.end());
-  const double median_px = static_cast<double>(*middle) * std::abs(step);
-  const auto steps = static_cast<double>(std::max(weights.rows(), weights.cols()) - 1);
-  const int size_px = std::min(disparity.width_px, disparity.height_px);
-  if (median_px * steps <= size_px) return;
-  throw Error(fmt::format(
-      "{}: the whole numbers of the map are taken as px per view step: with a median of {:.4g} px "
-      "the outermost views see a point {:.4g} px apart, and the image has {} px; grey levels need "
-      "a scale, disparity = scale * value + offset: {} and {}",
-      NameOf(map), median_px, median_px * steps, size_px,
-      run.Option("depth.meaning.disparity_scale"),
-      run.Option("depth.meaning.disparity_offset_px")));
-}
-
 void SmoothNoisyDepth(const EstimateOptions& options, const std::vector<float>& confidence,
                       estimator::DisparityMap* disparity, EstimateDiagnostics* diagnostics,
                       int threads) {
@@ -619,7 +591,8 @@ PreparedProblem Prepare(Image photo, DepthMap map, const std::optional<Camera>& 
     WarnOfUnlikelyDepth(map, *input.camera, *prepared_depth.depth, run);
   }
   CheckDisparities(map, input.disparity, *run);
-  CheckScaleIsGiven(map, input.disparity, input.weights, *run);
+  ReportPlausibility(map, input.disparity, input.weights, !options.st_depth_mm, input.camera,
+                     prepared_depth.depth, run);
   SmoothNoisyDepth(options, map.confidence, &input.disparity, diagnostics, run->threads());
   RefineDepthOf(options, prepared.was_hole, run->threads(), &input, diagnostics);
   diagnostics->disparity_range_px = DisparityRangePx(input.disparity);

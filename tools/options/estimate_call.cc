@@ -113,6 +113,7 @@ OptionNames EstimateOptionNames() {
           {"st_depth_mm", "--st-depth-mm"},
           {"smooth_depth", "--keep-depth-noise"},
           {"refine_depth", "--refine-depth"},
+          {"strict", "--strict"},
           {"effects", "--effects, --without"},
           {"effects.given", "--effects"},
           {"effects.without", "--without"},
@@ -184,6 +185,7 @@ thicklens::EstimateOptions SettingsOf(const EstimateOptions& options) {
   if (options.clipped == "data") settings.clipped = ClippedHighlights::kData;
   if (options.refine_depth == "on") settings.refine_depth = DepthRefining::kOn;
   if (options.refine_depth == "off") settings.refine_depth = DepthRefining::kOff;
+  settings.strict = options.strict;
   settings.effects = EffectSelectionOf(options.effects);
   settings.solver = AsAnySolver(SolverOf(options));
   if (options.fill == "telea") settings.hidden_rays = HiddenRays::kTelea;

@@ -171,6 +171,9 @@ void AddQualityOptions(CLI::App* command, EstimateOptions* options) {
       ->check(CLI::IsMember({"bounds", "data"}))
       ->capture_default_str()
       ->type_name("WHAT");
+  command->add_flag("--strict", options->strict,
+                    "Refuse where the result would be partial: the photograph contradicts the "
+                    "depth, or the iterations do not converge");
   command->add_flag("--keep-depth-noise", options->keep_depth_noise,
                     "Disable depth denoising, which smooths the depth along surfaces");
   command

@@ -166,6 +166,31 @@ json DepthFlipsJson(const EstimateDiagnostics& found) {
   return {{"noise_sigma", found.depth_flips->noise_sigma}, {"trials", trials}, {"better", better}};
 }
 
+json ContradictionJson(const EstimateDiagnostics& found) {
+  if (!found.contradiction) return nullptr;
+  const auto list = [](const std::vector<estimator::DepthCauseTrial>& trials) {
+    json all = json::array();
+    for (const estimator::DepthCauseTrial& trial : trials) {
+      all.push_back({{"cause", estimator::DepthCauseName(trial.cause)},
+                     {"scale", trial.scale},
+                     {"offset_px", trial.offset_px},
+                     {"shift_px", {trial.shift_x_px, trial.shift_y_px}},
+                     {"edges_sigmas", OrNull(trial.edges)},
+                     {"spectra_log_likelihood", OrNull(trial.spectra)},
+                     {"spectra_sigma", OrNull(trial.spectra_sigma)},
+                     {"residual_sigmas", OrNull(trial.residual)}});
+    }
+    return all;
+  };
+  const estimator::DepthContradiction& of = *found.contradiction;
+  return {{"is_contradicted", of.is_contradicted},
+          {"message", of.message},
+          {"causes", list(of.causes)},
+          {"is_sign_open", of.is_sign_open},
+          {"trials", list(of.trials)},
+          {"seconds", of.seconds}};
+}
+
 void AddScene(const LightFieldEstimate& estimate, json* out) {
   const EstimateDiagnostics& found = estimate.diagnostics;
   out->update({{"block_solver", nullptr},
@@ -179,7 +204,8 @@ void AddScene(const LightFieldEstimate& estimate, json* out) {
                {"unexplained_share", OrNull(found.unexplained_share)},
                {"photo", PhotoJson(found)},
                {"blur_check", BlurCheckJson(found)},
-               {"depth_flips", DepthFlipsJson(found)}});
+               {"depth_flips", DepthFlipsJson(found)},
+               {"contradiction", ContradictionJson(found)}});
 }
 
 void AddBlocks(const LightFieldEstimate& estimate, json* out) {
@@ -362,6 +388,7 @@ json EstimateJson(const EstimateOptions& options, const EstimateOutcome& outcome
                 {"photo_aperture", seconds.photo_aperture},
                 {"blur_check", seconds.blur_check},
                 {"depth_flips", seconds.depth_flips},
+                {"contradiction", seconds.contradiction},
                 {"solve", seconds.solve},
                 {"views", seconds.views},
                 {"files", outcome.files_seconds},
@@ -461,11 +488,12 @@ std::string EstimateText(const EstimateOptions& options, const EstimateOutcome& 
   text += ConfidenceText(found);
   if (found.inpainting) text += fmt::format("inpainting   {}\n", found.inpainting->message);
   text += fmt::format(
-      "time         {:.2f} s: set-up {:.2f}, {}{}solve {:.2f}, {}views {:.2f}, files {:.2f}\n",
+      "time         {:.2f} s: set-up {:.2f}, {}{}solve {:.2f}, {}{}views {:.2f}, files {:.2f}\n",
       outcome.total_seconds, json_summary["seconds"]["setup"].get<double>(),
       found.photo_aperture ? fmt::format("blur shown {:.2f}, ", seconds.photo_aperture) : "",
       found.blur_check ? fmt::format("blur check {:.2f}, ", seconds.blur_check) : "", seconds.solve,
       found.depth_flips ? fmt::format("reversed depth {:.2f}, ", seconds.depth_flips) : "",
+      found.contradiction ? fmt::format("agreement {:.2f}, ", seconds.contradiction) : "",
       seconds.views, outcome.files_seconds);
   text += fmt::format("memory       {:.0f} MiB at most ({:.0f} predicted)\n",
                       json_summary["peak_rss_mib"].get<double>(), found.predicted_memory_mib);

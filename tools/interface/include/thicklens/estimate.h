@@ -16,6 +16,7 @@
 #include "thicklens/depth_fit.h"
 #include "thicklens/effects.h"
 #include "thicklens/estimator/blur_check.h"
+#include "thicklens/estimator/depth_contradiction.h"
 #include "thicklens/estimator/depth_flips.h"
 #include "thicklens/estimator/falloff_evidence.h"
 #include "thicklens/estimator/inpaint.h"
@@ -116,6 +117,9 @@ struct EstimateOptions {
   // four fifths of the available memory for SceneSolver, none for the others.
   std::optional<double> memory_limit_mib;
 
+  // Throw Error instead of returning a partial result, with EstimateSummary::partial_reason.
+  bool strict = false;
+
   // Returns true if all members are valid and do not contradict each other. Otherwise `why`, if not
   // null, gets the field, the value and the constraint. NaN is never valid.
   THICKLENS_EXPORT bool IsValid(std::string* why) const;
@@ -129,11 +133,13 @@ struct EstimateSeconds {
   double setup = 0, blur_check = 0, solve = 0;  // of the solver, and of check_blur
   double photo_aperture = 0;                    // measuring the photograph's aperture
   double depth_flips = 0;                       // the search for reversed rows and columns
+  double contradiction = 0;                     // whether the photograph contradicts the depth
   double views = 0;                             // making the views, and inpainting
   double sink = 0;  // giving views and confidence to a ViewSink; shared among the threads
   // The sum of all parts, s.
   double total() const {
-    return prepare + setup + photo_aperture + blur_check + solve + depth_flips + views + sink;
+    return prepare + setup + photo_aperture + blur_check + solve + depth_flips + contradiction +
+           views + sink;
   }
 };
 
@@ -152,7 +158,8 @@ struct EstimateSummary {
   std::string device;                // that computed: "cpu", "opencl:0:0"
   int threads = 0;                   // number of threads that computed
   std::vector<std::string> effects;  // names of the effects that were taken into account
-  // Why the result is partial: the iterations did not converge. Empty: it is complete.
+  // Why the result is partial: the iterations did not converge, or the photograph contradicts the
+  // depth. Empty: it is complete.
   std::string partial_reason;
   std::vector<std::string> warnings;  // what may make the result wrong, one line each
   EstimateSeconds seconds;            // where the time went
@@ -271,6 +278,8 @@ struct EstimateDiagnostics {
   std::optional<estimator::FalloffEvidence> falloff;
   // Of SceneSolver, for a photograph that stays unexplained.
   std::optional<estimator::DepthFlipCheck> depth_flips;
+  // Of SceneSolver: whether the photograph contradicts the depth, and the likely causes.
+  std::optional<estimator::DepthContradiction> contradiction;
   std::vector<Notice> notices;  // remarks on the call, in their order
 };
 
