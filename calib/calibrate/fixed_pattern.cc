@@ -12,7 +12,8 @@ namespace {
 
 // Specks of simulated sweeps were found to within 0.3 of their amplitude where the registrations
 // were right.
-constexpr double kLeastRemainder = 0.1, kLargestRemainder = 1;
+constexpr double kMinRemainder = 0.3, kMaxRemainder = 1;
+constexpr double kLogOfOpaque = -1.2;  // ln 0.3, up to which specks are divided out
 
 // Adds to what is removed from the light of every frame.
 void AddToCorrection(const FixedPatternRemoval& more, FrameStore* store) {
@@ -28,6 +29,12 @@ bool RemoveShading(const FramePlaces& places, const FrameShading& shading, Frame
   const cv::Size size = places.read_grey(places.used.front()).size();
   AddToCorrection({LogOfShading(shading, size), cv::Mat()}, store);
   return true;
+}
+
+// Power of ln of the light that passes. Filled pixels are opaque, or nearly so.
+double PowerOf(const SensorDefects& defects) {
+  return cv::norm(defects.log_gain, cv::NORM_L2SQR) +
+         kLogOfOpaque * kLogOfOpaque * cv::countNonZero(defects.filled);
 }
 
 void Describe(const SensorDefects& defects, FixedPattern* pattern) {
@@ -73,13 +80,17 @@ bool FindRemainingPattern(const FramePlaces& places, std::size_t reference,
   }
   if (!defects->all.Any()) return shades;
   const SensorDefects more = FindSensorDefects(places, reference, sharpness, threads);
-  defects->remainder = kLeastRemainder;
+  defects->remainder = kMinRemainder;
   if (!more.done || !more.Any()) return shades;
+  const double before = PowerOf(defects->all);
+  const cv::Mat filled_before = defects->all.filled;
   defects->all = WithMore(defects->all, more);
-  const double power = cv::norm(defects->all.log_gain, cv::NORM_L2SQR);
-  if (power > 0) {
-    defects->remainder = std::clamp(cv::norm(more.log_gain, cv::NORM_L2SQR) / power,
-                                    kLeastRemainder, kLargestRemainder);
+  const double all = PowerOf(defects->all);
+  SensorDefects fresh = more;
+  fresh.filled = more.filled & (filled_before == 0);
+  if (all > 0) {
+    defects->remainder =
+        std::clamp(std::sqrt(PowerOf(fresh) / std::max(all, before)), kMinRemainder, kMaxRemainder);
   }
   Describe(defects->all, pattern);
   AddToCorrection({more.log_gain, more.filled}, store);

@@ -14,7 +14,7 @@ namespace thicklens::calib {
 // The fine structure that was removed.
 struct RemovedDefects {
   SensorDefects all;  // the sum of what was found in each round
-  // Part of the power of the structure that may be left: what the last round found, over all.
+  // Part of the amplitude of the structure that may be left: what the last round found, over all.
   double remainder = 1;
 };
 
@@ -36,9 +36,9 @@ bool FindRemainingPattern(const FramePlaces& places, std::size_t reference,
 // of the offset is proportional to the shading. `before` is the law of the scales with the shading.
 void AddErrorOfShading(const FixedPattern& pattern, const ScaleModel& before, ScaleModel* law);
 
-// The same for the fine structure. It is common to all frames and pulls their scales toward 1 by
-// its part of the power of the cross-spectra, so that the shift of the offset is proportional to
-// its power.
+// Adds the part that the remainder of the fine structure causes. Such structure is common to all
+// frames and pulls their scales toward 1. The shift of the offset is at most proportional to its
+// amplitude.
 void AddErrorOfDefects(const RemovedDefects& defects, const ScaleModel& before, ScaleModel* law);
 
 }  // namespace thicklens::calib

@@ -15,6 +15,7 @@
 #include "calib/response/processing_traces.h"
 #include "calib/response/response_frames.h"
 #include "calib/response/weak_detail.h"
+#include "calib/sweep/fixed_pattern_removal.h"
 #include "calib/uncertainty/astigmatism.h"
 #include "calib/uncertainty/systematic_advice.h"
 
@@ -100,6 +101,8 @@ class ResponseCheck {
       frame.registration = sample.registration;
       frame.registration.scale = sample.scale;
       frame.variance_px2 = FittedDefocusVariance(evidence_.setup, fit_, measured.depth_mm);
+      if (const FixedPatternRemoval* removal = store.correction(); removal != nullptr)
+        frame.filled = removal->filled();
       if (measured.statistics.saturated_fraction > 0)
         frame.brightest =
             curve.Decode(measured.statistics.saturation_level / full_scale - kClippingMargin);

@@ -104,6 +104,11 @@ double ResponseCrop::AddedVariancePx2(std::size_t of, std::size_t than) const {
 
 cv::Mat ClippedPixels(const cv::Mat& image, const ResponseFrame& frame) {
   cv::Mat clipped = (image >= frame.brightest) | (image <= frame.darkest);
+  if (!frame.filled.empty()) {
+    const cv::Rect part((frame.filled.cols - image.cols) / 2, (frame.filled.rows - image.rows) / 2,
+                        image.cols, image.rows);
+    clipped |= frame.filled(part) != 0;
+  }
   clipped.convertTo(clipped, CV_32F, 1.0 / 255);
   return clipped;
 }

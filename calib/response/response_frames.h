@@ -19,6 +19,9 @@ struct ResponseFrame {
   double variance_px2 = 0;    // variance of the defocus blur, px^2 of this frame, without the floor
   // Linear light at and beyond which the values are clipped.
   double darkest = -1, brightest = 2;
+  // CV_8U of the size of the frame, not 0 where a value comes from the pixels around it, so that
+  // detail is missing there; empty: nowhere.
+  cv::Mat filled = cv::Mat();
 };
 
 // The frames whose response is measured. All have one size.
@@ -53,7 +56,8 @@ class ResponseCrop {
   Eigen::Vector2d centre_;
 };
 
-// 1 where the values of the frame are clipped, 0 where they are not, CV_32F.
+// 1 where the values of the frame are clipped or filled, 0 where they are not, CV_32F. `image` is
+// the middle part of the frame, as ResponseCrop reads it.
 cv::Mat ClippedPixels(const cv::Mat& image, const ResponseFrame& frame);
 
 // Gaussian blur of an image of any number of pixels per sigma; none for sigma 0.

@@ -21,6 +21,9 @@ class FixedPatternRemoval {
   // group, with weights 1/distance^3. `light` is CV_32F.
   void Apply(cv::Mat* light) const;
 
+  // CV_8U, not 0 at the pixels that are filled. The caller must not write to it.
+  const cv::Mat& filled() const { return filled_; }
+
  private:
   struct Source {
     cv::Point from;
