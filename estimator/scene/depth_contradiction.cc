@@ -33,7 +33,8 @@ constexpr double kCoincides = 3, kAtPlace = 2, kNearPlace = 1.35;
 constexpr double kOtherOrder = 4, kOtherPlace = 5, kMayBeRight = 3;
 constexpr double kMoreThanGiven = 3;
 constexpr double kOfBest = 0.5, kAboutTheBest = 0.7;
-constexpr double kSinglePlace = 8, kOfSinglePlace = 0.35;
+constexpr double kSinglePlace = 10, kOfSinglePlace = 0.35;
+constexpr int kFarShiftPx = 7;
 constexpr int kReachPx = 24, kLeastShiftPx = 4;
 // Standard deviations of a residual that decide.
 constexpr double kSignDecided = 4, kShiftDecided = 3;
@@ -172,7 +173,7 @@ class Search {
     const double best = orders.empty() ? 0 : *orders.front().edges;
     const bool is_far = std::max(std::abs(given.best_x), std::abs(given.best_y)) >= kLeastShiftPx;
     if (best >= kOtherOrder && best >= given.sigmas + kMoreThanGiven &&
-        given.sigmas <= kOfBest * best) {
+        given.sigmas <= kOfBest * best && best >= given.best_sigmas) {
       for (const DepthCauseTrial& order : orders) {
         if (*order.edges >= kAboutTheBest * best) found_->causes.push_back(order);
       }
@@ -193,8 +194,10 @@ class Search {
     }
     DepthCauseTrial shift = ShiftOf(given);
     // The edges of a dilated map lie elsewhere as well, but to both sides.
-    const bool is_single = given.best_sigmas >= kSinglePlace &&
-                           given.opposite_sigmas <= kOfSinglePlace * given.best_sigmas;
+    const bool is_single =
+        std::max(std::abs(given.best_x), std::abs(given.best_y)) >= kFarShiftPx &&
+        given.best_sigmas >= kSinglePlace &&
+        given.opposite_sigmas <= kOfSinglePlace * given.best_sigmas;
     if (!is_single) shift.residual = ResidualOf(shift);
     found_->trials.push_back(shift);
     if (!is_single && !(*shift.residual >= kShiftDecided)) return false;
