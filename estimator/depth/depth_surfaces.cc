@@ -64,9 +64,9 @@ void DepthSurfaces::FindJump() {
   // quarter of a normal distribution's magnitudes are below 0.3186 of its own. Maps of many edges
   // have larger differences, but not in a quarter of their samples.
   const double noise = bends.empty() ? 0 : rank(&bends, 0.25) / (0.3186 * std::sqrt(6.0));
-  constexpr double kOfNoise = 5, kMostOfRange = 0.1;
+  constexpr double kOfNoise = 5, kMaxOfRange = 0.1;
   jump_ =
-      static_cast<float>(std::clamp(kOfNoise * noise, kJumpOfRange * range, kMostOfRange * range));
+      static_cast<float>(std::clamp(kOfNoise * noise, kJumpOfRange * range, kMaxOfRange * range));
 }
 
 // A sample strictly between its neighbours on both sides, by more than a jump each, whose

@@ -16,11 +16,11 @@ namespace thicklens::estimator {
 namespace {
 
 constexpr double kEdgeSigma = 1;     // of the smoothing of both edge images, samples of the map
-constexpr double kLeastShare = 0.5;  // of the photograph's width or height
+constexpr double kMinShare = 0.5;    // of the photograph's width or height
 constexpr double kScaleStep = 0.01;  // from one size to the next, relative
 constexpr double kApart = 3;         // between different parts, samples of the map
-constexpr int kMostSide = 192;       // likewise, of those that are compared
-constexpr int kLeastSide = 16;       // of the map, samples
+constexpr int kMaxSide = 192;        // likewise, of those that are compared
+constexpr int kMinSide = 16;         // of the map, samples
 
 // Where one surface of the map ends: 1 beside neighbours that are not of one surface, smoothed.
 cv::Mat EdgesOf(const DepthSampling& map) {
@@ -71,9 +71,9 @@ FoundPart FindPart(const DepthSampling& map, const model::LinearImage& photo) {
     throw Error("the part of a photograph that a depth map shows needs both with their values");
   }
   const int longer = std::max(map.width_px, map.height_px);
-  if (longer > kMostSide) {
+  if (longer > kMaxSide) {
     // The middle of each n x n samples: enough to find the part, in a time that large maps allow.
-    const int n = (longer + kMostSide - 1) / kMostSide;
+    const int n = (longer + kMaxSide - 1) / kMaxSide;
     DepthSampling small{map.width_px / n, map.height_px / n, {}, {}};
     if (small.width_px < 1 || small.height_px < 1) return {};
     for (int y = 0; y < small.height_px; ++y) {
@@ -88,7 +88,7 @@ FoundPart FindPart(const DepthSampling& map, const model::LinearImage& photo) {
     return found;
   }
   FoundPart best;
-  if (std::min(map.width_px, map.height_px) < kLeastSide) return best;
+  if (std::min(map.width_px, map.height_px) < kMinSide) return best;
   const cv::Mat of_map = EdgesOf(map);
   if (!(cv::norm(of_map) > 0)) return best;
   cv::Mat grey(photo.height_px, photo.width_px, CV_32F);
@@ -101,8 +101,8 @@ FoundPart FindPart(const DepthSampling& map, const model::LinearImage& photo) {
   }
   const double most = std::min(static_cast<double>(photo.width_px) / map.width_px,
                                static_cast<double>(photo.height_px) / map.height_px);
-  const double least = kLeastShare * std::max(static_cast<double>(photo.width_px) / map.width_px,
-                                              static_cast<double>(photo.height_px) / map.height_px);
+  const double least = kMinShare * std::max(static_cast<double>(photo.width_px) / map.width_px,
+                                            static_cast<double>(photo.height_px) / map.height_px);
   std::vector<Trial> trials;
   for (double step = most; step >= std::min(least, most); step /= 1 + kScaleStep) {
     ThrowIfCancelled();
@@ -149,9 +149,10 @@ FoundPart FindPart(const DepthSampling& map, const model::LinearImage& photo) {
   // The smoothing makes 4 pi sigma^2 samples one; Fisher's transform has the error 1/sqrt(n - 3).
   const double independent =
       map.width_px * static_cast<double>(map.height_px) / (4 * kPi * kEdgeSigma * kEdgeSigma);
-  constexpr double kMost = 0.999999;
-  best.sigma = (std::atanh(std::min(best.correlation, kMost)) - std::atanh(std::min(next, kMost))) *
-               std::sqrt(std::max(independent - 3, 0.0) / 2);
+  constexpr double kMaximum = 0.999999;
+  best.sigma =
+      (std::atanh(std::min(best.correlation, kMaximum)) - std::atanh(std::min(next, kMaximum))) *
+      std::sqrt(std::max(independent - 3, 0.0) / 2);
   return best;
 }
 

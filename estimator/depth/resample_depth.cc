@@ -26,11 +26,11 @@ constexpr int kRounds = 4;              // of the comparison with the photograph
 constexpr double kPriorWeight = 2;      // of the bilinear weights, logarithm of a likelihood
 constexpr double kNeighbourWeight = 2;  // of the pixels around, likewise
 constexpr double kLargestEvidence = 4;  // of the light of one pixel, likewise
-constexpr double kLeastSigma = 0.004;   // of the light around a pixel, 1 at full scale
+constexpr double kMinSigma = 0.004;     // of the light around a pixel, 1 at full scale
 
 // ---- One pixel between the samples.
 
-// What a pixel may be: its surface by the samples alone, and the next one.
+// The two surfaces that a pixel may have: its surface by the samples alone, and the next one.
 struct Candidates {
   float first = kHole, second = kHole;
   float lead = 1;  // bilinear weight of the first less that of the second, 0 to 1
@@ -313,8 +313,8 @@ class LightOfSurfaces {
         }
       }
     }
-    constexpr double kLeastWeight = 1;
-    if (!(weights[0] > kLeastWeight && weights[1] > kLeastWeight)) return 0;
+    constexpr double kMinWeight = 1;
+    if (!(weights[0] > kMinWeight && weights[1] > kMinWeight)) return 0;
     double distance[2] = {0, 0};
     for (int side = 0; side < 2; ++side) {
       for (int c = 0; c < channels; ++c) {
@@ -327,7 +327,7 @@ class LightOfSurfaces {
     double evidence = 0;
     for (int side = 0; side < 2; ++side) {
       const double variance =
-          std::max(squares[side], 0.0) / weights[side] / channels + kLeastSigma * kLeastSigma;
+          std::max(squares[side], 0.0) / weights[side] / channels + kMinSigma * kMinSigma;
       const double here = -distance[side] / (2 * variance) - channels / 2.0 * std::log(variance);
       evidence += side == 0 ? here : -here;
     }
@@ -507,8 +507,8 @@ double SigmaBetter(const EdgeAgreement& first, const EdgeAgreement& second) {
     differences.push_back(second.sums[n] / static_cast<double>(second.counts[n]) -
                           first.sums[n] / static_cast<double>(first.counts[n]));
   }
-  constexpr std::size_t kLeastTiles = 8;
-  if (differences.size() < kLeastTiles) return 0;
+  constexpr std::size_t kMinTiles = 8;
+  if (differences.size() < kMinTiles) return 0;
   const auto count = static_cast<double>(differences.size());
   double mean = 0, scatter = 0;
   for (const double difference : differences) mean += difference / count;

@@ -1,4 +1,4 @@
-// What describes how a depth map belongs to a photograph: its camera and its confidence.
+// The camera and the confidence of a depth map.
 #include "thicklens/depth_fit.h"
 
 #include <fmt/format.h>

@@ -25,10 +25,11 @@ model::PixelRect RectangleOf(const std::string& text) {
     at = next;
     if (at < end && *at == ',') ++at;
   }
-  constexpr int kMost = 1000000;
+  constexpr int kMaximum = 1000000;
   if (at != end || numbers.size() != 4 || std::count(text.begin(), text.end(), ',') != 3 ||
-      numbers[2] < 1 || numbers[3] < 1 ||
-      std::any_of(numbers.begin(), numbers.end(), [](int n) { return n > kMost || n < -kMost; })) {
+      numbers[2] < 1 || numbers[3] < 1 || std::any_of(numbers.begin(), numbers.end(), [](int n) {
+        return n > kMaximum || n < -kMaximum;
+      })) {
     throw UsageError(fmt::format(
         "--depth-crop: X,Y,W,H in px of the photograph, with W and H above 0, is expected, found "
         "'{}'",

@@ -152,7 +152,7 @@ TEST(ResampleDepth, HolesStayHolesAndAreNotAveraged) {
   }
 }
 
-TEST(ResampleDepth, ConfidenceWeighsAndZeroIsAHole) {
+TEST(ResampleDepth, ConfidenceIsAWeightAndZeroIsAHole) {
   DepthSampling map = SamplesOf(Plane, 30, 24);
   map.confidence.assign(map.values.size(), 1.0F);
   const auto at = static_cast<std::size_t>(12 * 30 + 15);

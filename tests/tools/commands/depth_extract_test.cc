@@ -157,8 +157,7 @@ TEST_F(DepthInsideTest, EstimateTakesTheWrittenFileByThePrintedOptions) {
     const nlohmann::json inside = Json()["depth"];
     for (const char* name : {"map.pfm", "map.png"}) {
       const std::string map = folder_ / name;
-      ASSERT_EQ(Start({"depth", "extract", path, "--enlarge", "-o", map, "--json", json}).exit_code,
-                0);
+      ASSERT_EQ(Start({"depth", "extract", path, "-o", map, "--json", json}).exit_code, 0);
       Arguments more = {map, "--camera", camera_};
       const nlohmann::json extracted = Json();
       for (const auto& option : extracted["options"]) more.push_back(option);

@@ -168,11 +168,16 @@ TEST_F(UndistortedEstimate, ACalibrationOfOtherFramesIsReported) {
   EXPECT_THAT(found.undistorted, IsEmpty());
 }
 
-TEST_F(UndistortedEstimate, MapsOfAnotherSizeAreRefused) {
-  depth_ = depth_.Cropped({0, 0, 60, 45});
+TEST_F(UndistortedEstimate, MapsOfAnotherSizeAreBroughtToThePhotographBefore) {
+  const DepthMap whole = depth_;
+  depth_ = whole.Cropped({0, 0, 60, 45});
   EstimateDiagnostics found;
+  Prepared(&found);
+  EXPECT_THAT(found.depth_fit, HasSubstr("60 x 45 px brought to"));
+  EXPECT_THAT(found.undistorted, HasSubstr("OpenCV model"));
+  depth_ = whole.Cropped({0, 0, 60, 30});
   EXPECT_THAT(ErrorOf([&] { Prepared(&found); }),
-              AllOf(HasSubstr("depth"), HasSubstr("60x45"), HasSubstr("thicklens undistort")));
+              AllOf(HasSubstr("depth"), HasSubstr("60x30"), HasSubstr("depth_fit.part")));
 }
 
 TEST(DoubtOfDistortion, ComparesTheFocalLengths) {

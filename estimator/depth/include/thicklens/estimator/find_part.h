@@ -13,8 +13,8 @@ namespace thicklens::estimator {
 struct FoundPart {
   Eigen::Vector2d corner_px{0, 0}, size_px{0, 0};  // of the rectangle, px of the photograph
   double correlation = 0;                          // of the edges, up to 1
-  // By how many standard errors it fits better than every other part: one whose middle or whose
-  // size differs by more than three samples of the map.
+  // Number of standard errors by which it fits better than every other part: one whose middle
+  // or whose size differs by more than three samples of the map.
   double sigma = 0;
 };
 

@@ -68,8 +68,8 @@ struct EdgeAgreement {
 THICKLENS_EXPORT EdgeAgreement AgreementOf(const DepthSampling& map,
                                            const model::LinearImage& photo,
                                            const MapPlacement& placement, int threads);
-// By how many standard errors `second` agrees better than `first`, from the scatter of the tiles; 0
-// if fewer than eight tiles show an edge in both.
+// Returns the number of standard errors by which `second` agrees better than `first`, from the
+// scatter of the tiles; 0 if fewer than eight tiles show an edge in both.
 THICKLENS_EXPORT double SigmaBetter(const EdgeAgreement& first, const EdgeAgreement& second);
 
 }  // namespace thicklens::estimator
