@@ -45,7 +45,7 @@ struct EstimateOptions {
   // Options of some solvers, as the help says.
   std::optional<std::string> prior, strength;
   bool check_blur = false;
-  bool strict = false;  // refuse instead of a partial result
+  bool strict = false;               // refuse instead of a partial result
   std::optional<std::string> photo;  // captured, sharp or auto
   std::string clipped = "bounds";    // or data
   std::optional<double> tolerance;

@@ -150,7 +150,8 @@ std::string TermErrors(const calib::ErrorTerm& term) {
   constexpr double kRounding = 1e-9;
   std::vector<std::string> parts;
   const auto add = [&parts](const char* name, double value, const char* unit) {
-    if (value > kRounding) parts.push_back(fmt::format("{} +-{}{}", name, RoundedSigma(value), unit));
+    if (value > kRounding)
+      parts.push_back(fmt::format("{} +-{}{}", name, RoundedSigma(value), unit));
   };
   add("zf", term.focus_depth_mm, " mm");
   add("d1", term.image_distance_mm, " mm");

@@ -212,8 +212,8 @@ struct FieldMap {
   std::optional<AxisFocus> along_x, along_y;
   // Sagittal minus tangential focus in the farthest corner of the image: zf of the blur along the
   // tangent minus that along the radius, by the law that it grows with the square of the distance
-  // from the axis. A tilt of the target, which displaces both alike, is no part of it. Measured only
-  // where one variance for all directions does not describe the tiles.
+  // from the axis. A tilt of the target, which displaces both alike, is no part of it. Measured
+  // only where one variance for all directions does not describe the tiles.
   std::optional<model::Estimate> field_astigmatism_mm;
   std::vector<DepthCluster> clusters;  // a single cluster: the target is at one depth
 };
