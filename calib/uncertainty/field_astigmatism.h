@@ -38,7 +38,7 @@ struct FieldAstigmatism {
   double chi2_per_dof = 0;       // of the tiles about this law
 };
 
-// [D205] Fits the differences d of the tiles' foci at the azimuth phi from x towards y and at the
+// [D194] Fits the differences d of the tiles' foci at the azimuth phi from x towards y and at the
 // relative distance rho from the axis: d = C rho^2 - a cos 2 phi - b sin 2 phi, where a and b are
 // those of an astigmatism that is the same everywhere. A target's tilt displaces both foci alike
 // and is no part of d. rho^2 is the mean over the tile: its middle's plus `moment_px2`, the sum of

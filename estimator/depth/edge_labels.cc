@@ -269,11 +269,11 @@ void LabelUnknown(const cv::Mat& guide, const cv::Mat& unknown, const EdgeLabelO
 
 namespace {
 
-constexpr int kMostShiftPx = 5, kMostDilationPx = 4;
+constexpr int kMaxShiftPx = 5, kMaxDilationPx = 4;
 constexpr std::size_t kParts = 16;
 constexpr double kTollOfAgreement = 1e-3;
 // Share of the edges on one side of the near surfaces, relative to those on the other side.
-constexpr double kLeastSide = 0.2;
+constexpr double kMinSide = 0.2;
 
 struct Voter {
   int x = 0, y = 0;
@@ -388,7 +388,7 @@ EdgeAlignment AlignEdges(const cv::Mat& guide, const cv::Mat& map,
                                                      std::hypot(x_direction, y_direction));
       (share > 0 ? along : against) += std::abs(share);
     }
-    return std::min(along, against) > kLeastSide * std::max(along, against);
+    return std::min(along, against) > kMinSide * std::max(along, against);
   };
   const bool is_seen_across = is_seen_from_both_sides(1, 0);
   const bool is_seen_along = is_seen_from_both_sides(0, 1);
@@ -407,10 +407,10 @@ EdgeAlignment AlignEdges(const cv::Mat& guide, const cv::Mat& map,
     alignment.gain = found.gain / count;
     alignment.gain_sigma = found.sigma / count;
   };
-  for (int down = -kMostShiftPx; down <= kMostShiftPx; ++down) {
-    for (int right = -kMostShiftPx; right <= kMostShiftPx; ++right) try_out(map, right, down, 0);
+  for (int down = -kMaxShiftPx; down <= kMaxShiftPx; ++down) {
+    for (int right = -kMaxShiftPx; right <= kMaxShiftPx; ++right) try_out(map, right, down, 0);
   }
-  for (int dilation = options.least_dilation_px; dilation <= kMostDilationPx; ++dilation) {
+  for (int dilation = options.least_dilation_px; dilation <= kMaxDilationPx; ++dilation) {
     try_out(Narrowed(map, dilation), 0, 0, dilation);
     try_out(Narrowed(map, -dilation), 0, 0, -dilation);
   }

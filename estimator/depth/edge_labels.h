@@ -20,14 +20,14 @@ struct EdgeLabelOptions {
 
 // Replaces the ramps of a map whose edges are `width_px` wide by steps: a pixel of a ramp gets the
 // larger or the smaller disparity of its surroundings, whichever is nearer to its own. A ramp is
-// where the range of the surroundings is several times that of the flanks [D200]; slopes are none.
+// where the range of the surroundings is several times that of the flanks [D191]; slopes are none.
 // `map` is CV_32F without holes.
 void SharpenEdges(double width_px, double jump, cv::Mat* map);
 
 // Decides anew for each pixel near a depth edge to which of the two surfaces of the edge it
 // belongs. The colours of the surroundings on each side say how likely the pixel is of that side,
 // the distance to the map's own edge how likely it is to have changed, and an edge of the map is
-// cheap where the guide has one. The sum is least for a minimum cut [D201]. A pixel that changes
+// cheap where the guide has one. The sum is least for a minimum cut [D192]. A pixel that changes
 // its side gets the disparity of the other side at the edge. `guide`: CV_32FC1 or CV_32FC3; `map`
 // as above. Returns the share of the pixels that changed.
 void LabelEdges(const cv::Mat& guide, const EdgeLabelOptions& options, cv::Mat* map);
@@ -48,7 +48,7 @@ struct EdgeAlignment {
 
 // Compares the map with the colours on both sides of its edges. The sum over the pixels near the
 // edges of the preference for the side that the map states is largest where the map is right
-// [D202]: the map is moved by whole px, and its near surfaces are made narrower or wider. The error
+// [D193]: the map is moved by whole px, and its near surfaces are made narrower or wider. The error
 // is from the scatter among parts of the image. `map` and `guide` as above.
 EdgeAlignment AlignEdges(const cv::Mat& guide, const cv::Mat& map, const EdgeLabelOptions& options);
 

@@ -17,23 +17,23 @@
 namespace thicklens::estimator {
 namespace {
 
-constexpr double kLeastJumpPx = 0.25;
+constexpr double kMinJumpPx = 0.25;
 constexpr double kJumpOfNoise = 6;
 // Edges of a map that is rendered or measured at full size are narrower.
 constexpr double kRampPx = 2.2;
-constexpr double kLeastQuantumPx = 0.02;
+constexpr double kMinQuantumPx = 0.02;
 constexpr double kManyOutliers = 1e-3;
 constexpr double kManyHoles = 1e-3;
 // Standard errors of the gain by which a displacement is certain, and probable.
 constexpr double kCertain = 3.2, kProbable = 2.5, kNext = 1;
 // The gain also has to be this share of the agreement.
-constexpr double kLeastGain = 0.01;
+constexpr double kMinGain = 0.01;
 // The way by which an edge in a filled hole may be wrong, and by which one pass moves it.
 constexpr double kHoleSigmaPx = 4, kHoleReachPx = 8;
 constexpr int kHolePasses = 2;
 constexpr int kAlignments = 4;
-constexpr int kLeastDilationPx = 2;
-constexpr double kMostShiftPx = 7;
+constexpr int kMinDilationPx = 2;
+constexpr double kMaxShiftPx = 7;
 
 cv::Mat GuideOf(const model::LinearImage& photo, const model::TransferCurve& transfer) {
   const int channels = photo.channels >= 3 ? 3 : 1;
@@ -66,20 +66,20 @@ void Align(const cv::Mat& guide, const EdgeLabelOptions& labels, bool eager, boo
   EdgeAlignment total;
   for (int i = 0; i < kAlignments; ++i) {
     // A width of 1 px may be that of the blur.
-    options.least_dilation_px = total.dilation_px == 0 ? kLeastDilationPx : 1;
+    options.least_dilation_px = total.dilation_px == 0 ? kMinDilationPx : 1;
     const EdgeAlignment step = AlignEdges(guide, moved, options);
     if (step.right_px == 0 && step.down_px == 0 && step.dilation_px == 0) break;
     // What is known to be displaced may be so by more, and a map that was enlarged is often
     // displaced by a part of its samples.
     const double certain = i > 0 || is_coarse ? kNext : eager ? kProbable : kCertain;
-    if (!(step.gain > std::max(certain * step.gain_sigma, kLeastGain * step.agreement))) break;
+    if (!(step.gain > std::max(certain * step.gain_sigma, kMinGain * step.agreement))) break;
     total.right_px += step.right_px;
     total.down_px += step.down_px;
     total.dilation_px += step.dilation_px;
     moved = Aligned(before, total);
   }
   // So far no map is displaced: the colours repeat.
-  if (std::hypot(total.right_px, total.down_px) > kMostShiftPx) total = {};
+  if (std::hypot(total.right_px, total.down_px) > kMaxShiftPx) total = {};
   found->right_px = total.right_px;
   found->down_px = total.down_px;
   found->dilation_px = total.dilation_px;
@@ -135,7 +135,7 @@ DepthRefinement RefineDepth(const model::LinearImage& photo, const model::Transf
   DepthRefinement found;
   EdgeLabelOptions labels;
   labels.threads = options.threads;
-  labels.jump = std::max(kLeastJumpPx, kJumpOfNoise * options.noise_px) / step;
+  labels.jump = std::max(kMinJumpPx, kJumpOfNoise * options.noise_px) / step;
 
   // The values of the file: filled holes have others.
   cv::Mat unknown(now.size(), CV_8U, cv::Scalar(0));
@@ -152,7 +152,7 @@ DepthRefinement RefineDepth(const model::LinearImage& photo, const model::Transf
   const double quantum = QuantumOf(stored);
   found.quantum_px = quantum * step;
   stored.release();
-  const bool quanta = found.quantum_px > kLeastQuantumPx;
+  const bool quanta = found.quantum_px > kMinQuantumPx;
   if (quanta) now = WithoutQuanta(now, quantum);
   cv::Mat without_outliers = now.clone();
   found.outlier_share = DropOutliers(labels.jump, &without_outliers);

@@ -35,7 +35,7 @@ constexpr double kMoreThanGiven = 3;
 constexpr double kOfBest = 0.5, kAboutTheBest = 0.7;
 constexpr double kSinglePlace = 10, kOfSinglePlace = 0.35;
 constexpr int kFarShiftPx = 7;
-constexpr int kReachPx = 24, kLeastShiftPx = 4;
+constexpr int kReachPx = 24, kMinShiftPx = 4;
 // Standard deviations of a residual that decide.
 constexpr double kSignDecided = 4, kShiftDecided = 3;
 // Logarithm of the likelihood ratio, and that over its standard deviation, from which the values
@@ -44,7 +44,7 @@ constexpr double kMuchLikelier = 14, kMuchLikelierTwo = 40, kLikelierSigmas = 1.
                  kAlikeShare = 0.08;
 // Changes up to these are within what textures show: octaves of the scale, and the standard
 // deviation of the blur of an offset, px.
-constexpr double kLeastOctaves = 0.3, kLeastOffsetPx = 0.4;
+constexpr double kMinOctaves = 0.3, kMinOffsetPx = 0.4;
 constexpr double kNoBlurScale = 0.2;
 
 DepthCauseTrial TrialOf(DepthCause cause, double scale = 1, double offset_px = 0) {
@@ -171,7 +171,7 @@ class Search {
         orders.begin(), orders.end(),
         [](const DepthCauseTrial& a, const DepthCauseTrial& b) { return *a.edges > *b.edges; });
     const double best = orders.empty() ? 0 : *orders.front().edges;
-    const bool is_far = std::max(std::abs(given.best_x), std::abs(given.best_y)) >= kLeastShiftPx;
+    const bool is_far = std::max(std::abs(given.best_x), std::abs(given.best_y)) >= kMinShiftPx;
     if (best >= kOtherOrder && best >= given.sigmas + kMoreThanGiven &&
         given.sigmas <= kOfBest * best && best >= given.best_sigmas) {
       for (const DepthCauseTrial& order : orders) {
@@ -348,8 +348,8 @@ class Search {
     const DepthCauseTrial& first = tried.front();
     const double best = *first.spectra;
     const bool is_small =
-        first.cause != DepthCause::kSharp && std::abs(std::log2(first.scale)) < kLeastOctaves &&
-        std::abs(first.offset_px) / step * tiles.spread_px() < kLeastOffsetPx &&
+        first.cause != DepthCause::kSharp && std::abs(std::log2(first.scale)) < kMinOctaves &&
+        std::abs(first.offset_px) / step * tiles.spread_px() < kMinOffsetPx &&
         (first.cause == DepthCause::kScale || first.cause == DepthCause::kOffset ||
          first.cause == DepthCause::kScaleOffset);
     if (is_small || !(best >= kMuchLikelier && best >= kLikelierSigmas * *first.spectra_sigma))
@@ -485,11 +485,11 @@ DepthContradiction CheckContradiction(const EstimateInput& input,
   CheckInput(input);
   const auto start = Clock::now();
   DepthContradiction found;
-  constexpr int kLeastPx = 48;
-  if (std::min(input.image.width_px, input.image.height_px) < kLeastPx) {
+  constexpr int kMinPx = 48;
+  if (std::min(input.image.width_px, input.image.height_px) < kMinPx) {
     found.trials.push_back({});
     found.message = fmt::format(
-        "a photograph of less than {} px does not show whether its depth agrees", kLeastPx);
+        "a photograph of less than {} px does not show whether its depth agrees", kMinPx);
   } else {
     Search(input, options, ResolveThreads(options.threads), &found).Run();
   }

@@ -25,7 +25,7 @@ constexpr double kEdgeSmoothingPx = 1;
 // A jump of so large a share of the depth's range is an edge.
 constexpr double kFullEdge = 0.15;
 // Slanted surfaces and noise: gradients up to so many times the median are no edges.
-constexpr double kNoEdge = 3, kLeastEdge = 0.2;
+constexpr double kNoEdge = 3, kMinEdge = 0.2;
 // Places that are compared lie so far off, as shares of the smaller side.
 constexpr double kNearest = 0.06, kFarthest = 0.3;
 constexpr int kBorderPx = 3;
@@ -91,7 +91,7 @@ std::optional<EdgeParts> DepthEdges(const DisparityMap& map) {
       // The Sobel filter gives four times the difference over a px and a neighbour.
       const double above = static_cast<double>(strength(y, x)) - kNoEdge * median;
       const double edge = is_border ? 0 : std::clamp(above / (4 * kFullEdge * range), 0.0, 1.0);
-      strength(y, x) = edge < kLeastEdge ? 0 : static_cast<float>(edge);
+      strength(y, x) = edge < kMinEdge ? 0 : static_cast<float>(edge);
       sum += static_cast<double>(strength(y, x));
     }
   }
@@ -264,7 +264,7 @@ namespace {
 // Blurs for which the likelihood of a tile is known, standard deviations in px.
 constexpr std::array<double, 14> kLevelsPx = {0,   0.25, 0.5, 0.75, 1,   1.3, 1.6,
                                               2.0, 2.5,  3,   3.7,  4.5, 5.5, 7};
-constexpr double kMostOfTile = 4;  // the most that one tile says
+constexpr double kMaxOfTile = 4;  // the most that one tile says
 constexpr std::size_t kEnoughTiles = 64, kFewTiles = 48;
 constexpr int kPartsAlong = 4;
 
@@ -372,7 +372,7 @@ std::optional<TileLikelihood::Gain> TileLikelihood::Against(const Other& other) 
     return least;
   };
   const auto limited = [&](std::size_t i, double cost) {
-    return std::min(kMostOfTile, cost - lowest(i));
+    return std::min(kMaxOfTile, cost - lowest(i));
   };
   const auto given_cost = [&](std::size_t i, std::size_t blur) {
     return limited(i, given_[i][blur]);

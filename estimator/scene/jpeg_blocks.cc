@@ -39,8 +39,8 @@ Block CosineTransform() {
 }  // namespace
 
 bool ShowsJpegBlocks(const model::LinearImage& image, const model::TransferCurve& transfer) {
-  constexpr int kLeastPx = 4 * kBlock;
-  if (std::min(image.width_px, image.height_px) < kLeastPx) return false;
+  constexpr int kMinPx = 4 * kBlock;
+  if (std::min(image.width_px, image.height_px) < kMinPx) return false;
   const auto luminance = [&](int x, int y) {
     const auto level = [&](int channel) {
       return 255 * transfer.Encode(std::max(0.0, static_cast<double>(image.at(x, y, channel))));

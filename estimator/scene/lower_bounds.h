@@ -7,7 +7,7 @@
 
 namespace thicklens::estimator {
 
-// Which values of an image are lower bounds of the light: those of clipped highlights [D185]. One
+// Which values of an image are lower bounds of the light: those of clipped highlights [D181]. One
 // per value, interleaved like the image: 1, or 0 for a value that is data. Empty: all are data.
 using ClippedValues = std::vector<std::uint8_t>;
 

@@ -33,7 +33,7 @@ struct CgOutcome {
 template <typename Real>
 class SceneSystem {
  public:
-  // `data` is kept by reference. Without a backend, or with bounds [D185], the steps run in C++ on
+  // `data` is kept by reference. Without a backend, or with bounds [D181], the steps run in C++ on
   // the processor.
   explicit SceneSystem(const DataTerm<Real>& data, kernels::Backend* backend = nullptr);
 

@@ -76,10 +76,10 @@ cv::Mat WithHoles(const cv::Mat& exact, double share) {
   const auto below = [&engine](int limit) {
     return static_cast<int>(engine() % static_cast<std::uint64_t>(limit));
   };
-  constexpr int kLeastPx = 3, kRangePx = 17;
+  constexpr int kMinPx = 3, kRangePx = 17;
   while (cv::countNonZero(holes) < share * static_cast<double>(exact.total())) {
     const cv::Point centre(below(exact.cols), below(exact.rows));
-    cv::circle(holes, centre, kLeastPx + below(kRangePx), 1, cv::FILLED);
+    cv::circle(holes, centre, kMinPx + below(kRangePx), 1, cv::FILLED);
   }
   cv::Mat map = exact.clone();
   map.setTo(std::numeric_limits<float>::quiet_NaN(), holes);

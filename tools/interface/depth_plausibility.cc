@@ -14,10 +14,10 @@ namespace thicklens {
 namespace {
 
 // Displacement between neighbouring views above which whole numbers without a scale are no px.
-constexpr double kMostOfWholePx = 3;
+constexpr double kMaxOfWholePx = 3;
 // Share of the image by which the outermost views may see half of the points apart: light fields
 // have less than a twentieth, a wide portrait lens blurs a far background by an eighth.
-constexpr double kMostOfDisparity = 1.0 / 8, kMostOfDepth = 1.0 / 2;
+constexpr double kMaxOfDisparity = 1.0 / 8, kMaxOfDepth = 1.0 / 2;
 // Displacement over the whole aperture that is no visible parallax, and one that is, px.
 // Diameter over focal length of the widest lenses.
 constexpr double kWidestLens = 1.4;
@@ -103,7 +103,7 @@ void ReportPlausibility(const DepthMap& map, const estimator::DisparityMap& disp
   const DepthMeaning& meaning = map.meaning;
   const bool has_no_scale = map.is_integer && meaning.kind == DepthKind::kDisparity &&
                             meaning.disparity_scale == 1 && meaning.disparity_offset_px == 0;
-  if (has_no_scale && size.median > kMostOfWholePx) {
+  if (has_no_scale && size.median > kMaxOfWholePx) {
     throw Error(fmt::format(
         "{}: the whole numbers of the map are taken as px per view step: the median of {:.4g} px "
         "moves a point by {:.4g} px between the outermost views, and the image has {} px; {}",
@@ -112,8 +112,8 @@ void ReportPlausibility(const DepthMap& map, const estimator::DisparityMap& disp
   }
   const int size_px = std::min(disparity.width_px, disparity.height_px);
   const double most =
-      (meaning.kind == DepthKind::kDisparity ? kMostOfDisparity : kMostOfDepth) * size_px;
-  if (size.median * views > most && size.median > kMostOfWholePx) {
+      (meaning.kind == DepthKind::kDisparity ? kMaxOfDisparity : kMaxOfDepth) * size_px;
+  if (size.median * views > most && size.median > kMaxOfWholePx) {
     throw Error(fmt::format(
         "{}: disparities from {:.4g} to {:.4g} px per view step: the median moves a point by "
         "{:.4g} px between the outermost views, a large part of the {} px of the image; {}",

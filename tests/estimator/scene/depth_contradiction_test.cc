@@ -31,7 +31,7 @@ std::vector<std::string> CausesOf(const DepthContradiction& found) {
   return names;
 }
 
-// What each trial found, for messages of failed tests.
+// Describes each trial, for messages of failed tests.
 std::string TrialsOf(const DepthContradiction& found) {
   std::string text = found.message;
   for (const DepthCauseTrial& trial : found.trials) {

@@ -190,7 +190,7 @@ TEST(SceneSystem, SolvesTheGradientPrior) {
   EXPECT_LT(LargestError(found, expected), 1e-8);
 }
 
-// [D185] The oracle has a slack z >= 0 for every bound: |H r - I - z|^2. Without r, which is a
+// [D181] The oracle has a slack z >= 0 for every bound: |H r - I - z|^2. Without r, which is a
 // linear function of z, this is a least-squares problem in z >= 0, solved one variable at a time.
 // The bounds are the brightest sixth of one channel, and every fifth pixel of the other.
 bool IsBound(const Made& made, int channel, Eigen::Index i) {

@@ -1,5 +1,5 @@
-// What the public interface says of a depth that contradicts its photograph, and of depths that
-// mean nothing.
+// The answers of the public interface to a depth that contradicts its photograph, and to depths
+// that mean nothing.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -113,7 +113,7 @@ TEST(DepthPlausibility, GreyLevelsAreNoPixelsAndAScaleIsProposed) {
   EXPECT_THAT(refused, AllOf(HasSubstr("px per view step = scale * value + offset"),
                              HasSubstr("<depth.meaning.disparity_scale> 0."),
                              HasSubstr("<depth.meaning.disparity_offset_px> -")));
-  // What is proposed is accepted.
+  // The proposal is accepted.
   files.map.meaning.disparity_scale = 0.05;
   files.map.meaning.disparity_offset_px = -2;
   EXPECT_NO_THROW(PrepareProblem(files.photo, files.map, {}, FiveViews(), nullptr, OneThread()));

@@ -52,7 +52,7 @@ enum class ExifCheck {
 // Meaning of the clipped values of a photograph in an estimate by SceneSolver. The other solvers
 // take them as data.
 enum class ClippedHighlights {
-  kBounds,  // lower bounds of the light: the residual counts below them only [D185]
+  kBounds,  // lower bounds of the light: the residual counts below them only [D181]
   kData,    // the light itself
 };
 
@@ -64,7 +64,7 @@ struct PhotoClipping {
   std::vector<double> levels;
   bool at_full_scale = true;  // every level is the largest that the type has
 };
-// Finds the levels at which the channels of an image are clipped [D186]: full scale where the
+// Finds the levels at which the channels of an image are clipped [D182]: full scale where the
 // values pile up at it, and a lower level where so many are equal to the largest that neither noise
 // nor the image's content explains it. Alpha is not looked at.
 THICKLENS_EXPORT PhotoClipping FindClipping(const Image& photo);
@@ -75,7 +75,7 @@ enum class HiddenRays {
   kTelea,   // by the inpainting of section 6 of the supplement [D99], for comparison
 };
 
-// Whether the faults of a depth map are repaired by the photograph [D200] to [D202].
+// Whether the faults of a depth map are repaired by the photograph [D191] to [D193].
 enum class DepthRefining {
   kAuto,  // those that map and photograph show for certain
   kOn,    // also those that are only probable
@@ -232,7 +232,7 @@ struct EstimateDiagnostics {
   model::DepthHoles holes;                       // the map's holes by reason
   std::pair<double, double> disparity_range_px{0, 0};         // px per view step
   std::optional<double> depth_noise_px, depth_noise_left_px;  // px per view step [D93], [D94]
-  // What was repaired in the depth map; absent with DepthRefining::kOff.
+  // Repairs of the depth map; absent with DepthRefining::kOff.
   std::optional<estimator::DepthRefinement> depth_refinement;
   double largest_step_px = 0;  // displacement between neighbouring views
   double coarse_share = 0;     // share of the pixels whose step is above 3 px

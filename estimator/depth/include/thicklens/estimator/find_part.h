@@ -18,7 +18,7 @@ struct FoundPart {
   double sigma = 0;
 };
 
-// Looks for the part of the photograph that the map shows [D199]: a rectangle of the map's aspect
+// Looks for the part of the photograph that the map shows [D190]: a rectangle of the map's aspect
 // ratio inside the photograph, at least half as wide or as high as it, not turned. The measure is
 // the correlation of the magnitudes of both gradients; its error is that of as many independent
 // samples as the smoothing leaves. `sigma` is 0 if the map or the photograph has no edges. Throws

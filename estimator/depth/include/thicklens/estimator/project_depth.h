@@ -16,7 +16,7 @@ struct SeenSamples {
 };
 
 // Renders the samples of a map on the grid of another camera, of width_px x height_px samples
-// [D198]. Each square of four samples becomes two triangles, as far as their corners are of one
+// [D189]. Each square of four samples becomes two triangles, as far as their corners are of one
 // surface; in a triangle the inverse depth is linear in the position, which is exact for a plane. A
 // sample without a triangle covers the nearest sample of the grid. Of several surfaces the nearest
 // counts, so that it hides what lies behind it. Samples of the grid that nothing covers are NaN:

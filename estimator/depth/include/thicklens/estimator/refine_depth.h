@@ -40,9 +40,9 @@ struct DepthRefinementOptions {
 // Repairs the usual faults of depth maps with the help of the photograph. The map itself shows
 // which faults it has, and no other step is taken: blocks are interpolated; the steps of a
 // quantised map are made smooth within their rounding; values between two surfaces, where edges are
-// ramps, get that of the nearer surface [D200]; the whole map is moved where the colours on both
-// sides of its edges ask for it, and its near surfaces made narrower or wider [D202]; where one of
-// these was done, the pixels near edges are given to the surface whose colours they have [D201]. A
+// ramps, get that of the nearer surface [D191]; the whole map is moved where the colours on both
+// sides of its edges ask for it, and its near surfaces made narrower or wider [D193]; where one of
+// these was done, the pixels near edges are given to the surface whose colours they have [D192]. A
 // hole that was filled gets the surface of its colour. A map without a fault stays as it is, bit
 // for bit. `was_hole`: per pixel, or empty. The size of the photograph is that of the map, which
 // has no holes. The result does not depend on the number of threads. Throws Error for sizes that do

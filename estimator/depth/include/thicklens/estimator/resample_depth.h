@@ -38,14 +38,14 @@ struct ResampledDepth {
   std::size_t mixed_samples = 0;  // values between two surfaces, which were given to the nearer one
 };
 
-// Brings the map to the pixels of the photograph [D195].
+// Brings the map to the pixels of the photograph [D186].
 //
 // Neighbouring samples belong to one surface if they differ by little, or as much as the samples
 // beside them. Within a surface a pixel's value is interpolated linearly. Between two surfaces it
 // is extrapolated along one of them, so that no value appears between them. The surface is the one
 // whose samples have the larger bilinear weight, unless the photograph contradicts: the light of
 // the pixel is compared with the means of the pixels of both surfaces around it, which puts the
-// edge where the light is halfway between them, as the blur of an edge leaves it [D196]. A sample
+// edge where the light is halfway between them, as the blur of an edge leaves it [D187]. A sample
 // between two surfaces, as averaging leaves it, is given to the nearer one before. A pixel most of
 // whose weight is holes is a hole.
 //
@@ -59,7 +59,7 @@ THICKLENS_EXPORT ResampledDepth ResampleDepth(const DepthSampling& map,
 
 // How well the edges of the map agree with those of the photograph: the mean, over the pixels
 // between two surfaces, of the logarithm of how much likelier the light of a pixel is on its own
-// surface than on the other one [D197], by square tiles of the photograph. Tiles without such
+// surface than on the other one [D188], by square tiles of the photograph. Tiles without such
 // pixels have a count of 0.
 struct EdgeAgreement {
   std::vector<double> sums;         // of the logarithms, by tile, row by row

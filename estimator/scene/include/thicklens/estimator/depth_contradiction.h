@@ -10,7 +10,7 @@
 
 namespace thicklens::estimator {
 
-// What may be wrong with a depth map that contradicts its photograph.
+// A fault of a depth map that contradicts its photograph.
 enum class DepthCause {
   kNone,          // nothing: the map as it is
   kRows,          // its rows are stored from the bottom
@@ -30,7 +30,7 @@ enum class DepthCause {
 // "scale", "offset", "scale-and-offset", "sharp" or "other-image".
 THICKLENS_EXPORT std::string DepthCauseName(DepthCause cause);
 
-// What the photograph says of the map after one change.
+// The evidence of the photograph about the map after one change.
 struct DepthCauseTrial {
   DepthCause cause = DepthCause::kNone;  // the reason that the change removes
   double scale = 1;                      // factor of the disparities
@@ -89,7 +89,7 @@ struct DepthContradictionOptions {
 // off. It does not depend on blur, scale or sign. Only a map whose edges lie there no more often
 // than elsewhere may be turned, shifted or another image's; only one whose edges lie there may have
 // wrong values. These are tested by the spectra of tiles, as in PhotoAperture, which contain |d|
-// alone, so that the sign follows from the residual at edges only. Derived here [D190], [D191].
+// alone, so that the sign follows from the residual at edges only. Derived here [D184], [D185].
 //
 // Throws Error for inputs that do not fit. The result does not depend on the number of threads.
 THICKLENS_EXPORT DepthContradiction CheckContradiction(const EstimateInput& input,

@@ -12,7 +12,7 @@ namespace thicklens::estimator {
 // corrected for it, as phones and raw converters do.
 //
 // The logarithm of the light, averaged over blocks, is fitted by a constant plus `share` times the
-// logarithm of the predicted fall-off [D187]. The scene is itself brighter here and darker there:
+// logarithm of the predicted fall-off [D183]. The scene is itself brighter here and darker there:
 // its logarithm is taken as a random field whose power falls with frequency as a power law, whose
 // exponent and size follow from the finer structure of the photograph. The error of the share is
 // that of this field at the low frequencies of the fall-off.

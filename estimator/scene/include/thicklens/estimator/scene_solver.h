@@ -112,7 +112,7 @@ struct SceneMaps {
 //
 //   sum_x W(x) |H r - I|^2 + prior,
 //
-// where the residual of a clipped value counts only below it (EstimateInput::clipped, [D185]), so
+// where the residual of a clipped value counts only below it (EstimateInput::clipped, [D181]), so
 // that r may be brighter than full scale. Such a photograph is solved on the processor.
 // W = s^2/(1 + (20 h)^2), where s is the slope of the transfer curve at the smoothed intensity
 // (errors of encoded values count) and h the share of the aperture that sees past an edge. H is

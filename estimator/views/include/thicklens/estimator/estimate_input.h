@@ -20,7 +20,7 @@ namespace thicklens::estimator {
 struct EstimateInput {
   model::LinearImage image;  // photograph, linear light
   // One per value of the image: 1 where it is clipped, so that it is only a lower bound of the
-  // light [D185], and 0 elsewhere. Empty: none is clipped.
+  // light [D181], and 0 elsewhere. Empty: none is clipped.
   std::vector<std::uint8_t> clipped = {};
   DisparityMap disparity;   // without holes, of the image's size
   Eigen::ArrayXXd weights;  // V x U, sum 1, >= 0

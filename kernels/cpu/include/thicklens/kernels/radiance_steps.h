@@ -35,7 +35,7 @@ struct FilteredMap {
 
 // The data term that all systems of one photograph share: sum_x W(x) |H r - I|^2, with the same
 // weights in all channels. Where the photograph is only a lower bound of the light, the residual
-// counts below it only: W(x) max(0, I - H r)^2 [D185].
+// counts below it only: W(x) max(0, I - H r)^2 [D181].
 template <typename Real>
 struct DataTerm {
   int width_px = 0, height_px = 0, channels = 0;  // of the photograph
@@ -114,7 +114,7 @@ class THICKLENS_EXPORT RadianceSteps {
   virtual double ApplyNormalOperator() = 0;         // returns p . (H^T W H + P) p
   // Returns the step along p to the minimum on that line, from p . r and p . (H^T W H + P) p. With
   // bounds, H^T W H has the weights of those values only that counted at x; the function along p is
-  // then a parabola in pieces, whose minimum is found [D185].
+  // then a parabola in pieces, whose minimum is found [D181].
   virtual double StepLength(double steepness, double curvature) { return steepness / curvature; }
   virtual void UpdateSolution(double step) = 0;  // x += step p
 
