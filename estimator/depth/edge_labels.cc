@@ -313,7 +313,7 @@ Agreement AgreementOf(const std::vector<Voter>& voters, const cv::Mat& map, int 
   return sums;
 }
 
-// What one place of the map gains over another.
+// The gain of one place of the map over another, and its standard error.
 struct Gain {
   double gain = 0, sigma = 0;
 };

@@ -13,7 +13,7 @@ struct EdgeLabelOptions {
   double colour_sigma = 0.02;  // difference of the guide that is none
   double colour_weight = 1;    // of the colours against the position
   double smoothness = 1.5;     // cost of an edge of the map, per px, where the guide has none
-  double unsure_px = 0;  // distance from an edge within which the side of a sample is not believed
+  double unsure_px = 0;       // distance from an edge within which the side of a sample is not used
   int least_dilation_px = 2;  // AlignEdges tries no smaller change of the width
   int threads = 0;            // 0: one per core
 };
@@ -38,8 +38,8 @@ void LabelUnknown(const cv::Mat& guide, const cv::Mat& unknown, const EdgeLabelO
 
 // Where the photograph has the edges of a map, px.
 struct EdgeAlignment {
-  // By how much the map lies to the right of and below the photograph, and its near surfaces are
-  // too wide on each side.
+  // Distances by which the map lies to the right of and below the photograph, and by which its near
+  // surfaces are too wide on each side.
   double right_px = 0, down_px = 0, dilation_px = 0;
   // The gain in the mean agreement of a pixel over the map as it is, and its standard error.
   double gain = 0, gain_sigma = 0;

@@ -69,7 +69,7 @@ void Align(const cv::Mat& guide, const EdgeLabelOptions& labels, bool eager, boo
     options.least_dilation_px = total.dilation_px == 0 ? kMinDilationPx : 1;
     const EdgeAlignment step = AlignEdges(guide, moved, options);
     if (step.right_px == 0 && step.down_px == 0 && step.dilation_px == 0) break;
-    // What is known to be displaced may be so by more, and a map that was enlarged is often
+    // A map that is known to be displaced may be so by more, and one that was enlarged is often
     // displaced by a part of its samples.
     const double certain = i > 0 || is_coarse ? kNext : eager ? kProbable : kCertain;
     if (!(step.gain > std::max(certain * step.gain_sigma, kMinGain * step.agreement))) break;

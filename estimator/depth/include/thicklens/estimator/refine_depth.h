@@ -11,7 +11,7 @@
 
 namespace thicklens::estimator {
 
-// What was found in a depth map, and what was changed. Lengths are px of the map.
+// The faults of a depth map, and what was changed. Lengths are px of the map.
 struct DepthRefinement {
   std::string message = "not run";  // one line: what was changed, and why
   bool applied = false;             // the map was changed
@@ -21,8 +21,8 @@ struct DepthRefinement {
   int block_px = 1;          // edge of the blocks of a map that was enlarged without interpolation
   double quantum_px = 0;     // step of a quantised map, px per view step; 0: none
   double outlier_share = 0;  // share of pixels that differ from all neighbours
-  // By how much the map lay to the right of and below the photograph, and its near surfaces were
-  // too wide on each side.
+  // Distances by which the map lay to the right of and below the photograph, and by which its near
+  // surfaces were too wide on each side.
   double right_px = 0, down_px = 0, dilation_px = 0;
   // Share of the pixels that changed by more than half of the smallest jump.
   double changed_share = 0;
