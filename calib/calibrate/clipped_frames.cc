@@ -49,29 +49,34 @@ ClippedFrames ChooseClippedFrames(const std::vector<FrameMeasurement>& frames,
   return clipped;
 }
 
-std::vector<std::size_t> LeaveOutClipped(const ClippedFrames& clipped,
+std::vector<std::size_t> LeaveOutClipped(ClippedFrames* clipped,
                                          const std::vector<std::size_t>& used,
-                                         std::size_t* reference, std::vector<ScaleSample>* scales,
+                                         const SharpestOf& sharpest_of, std::size_t* reference,
+                                         std::vector<ScaleSample>* scales,
                                          Calibration* calibration) {
-  if (clipped.left_out.empty()) return used;
+  if (clipped->left_out.empty()) return used;
   std::vector<std::size_t> others;
   for (const std::size_t i : used) {
-    if (!Contains(clipped.left_out, i)) others.push_back(i);
+    if (!Contains(clipped->left_out, i)) others.push_back(i);
   }
-  const ScaleSample* next = nullptr;
+  std::vector<std::size_t> registered;
   for (const ScaleSample& sample : *scales) {
-    if (!Contains(others, sample.frame)) continue;
-    if (next == nullptr || calibration->frames[sample.frame].normalised_edge_slope >
-                               calibration->frames[next->frame].normalised_edge_slope)
-      next = &sample;
+    if (Contains(others, sample.frame)) registered.push_back(sample.frame);
   }
-  if (next == nullptr) return used;
-  if (Contains(clipped.left_out, *reference)) {
-    *reference = next->frame;
+  if (registered.empty()) {
+    clipped->kept.insert(clipped->kept.begin(), clipped->left_out.begin(), clipped->left_out.end());
+    clipped->left_out.clear();
+    return used;
+  }
+  if (Contains(clipped->left_out, *reference)) {
+    *reference = sharpest_of(registered);
+    const auto next =
+        std::find_if(scales->begin(), scales->end(),
+                     [reference](const ScaleSample& sample) { return sample.frame == *reference; });
     ReferTo(next->registration, scales);
   }
   double most = 0;
-  for (const std::size_t i : clipped.left_out) {
+  for (const std::size_t i : clipped->left_out) {
     FrameMeasurement& frame = calibration->frames[i];
     most = std::max(most, ShareOf(frame));
     frame.not_in_fit = fmt::format(
@@ -82,9 +87,8 @@ std::vector<std::size_t> LeaveOutClipped(const ClippedFrames& clipped,
   }
   const std::string warning = fmt::format(
       "bright places are clipped in {} frames (up to {:.2g} % of the pixels), which are left out "
-      "of "
-      "the fit of the blur because clipping changes it: {}",
-      clipped.left_out.size(), 100 * most, kRemedy);
+      "of the fit of the blur because clipping changes it: {}",
+      clipped->left_out.size(), 100 * most, kRemedy);
   auto& warnings = calibration->summary.warnings;
   if (std::find(warnings.begin(), warnings.end(), warning) == warnings.end())
     warnings.push_back(warning);

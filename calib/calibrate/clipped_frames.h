@@ -2,6 +2,7 @@
 #define THICKLENS_CALIB_CALIBRATE_CLIPPED_FRAMES_H_
 
 #include <cstddef>
+#include <functional>
 #include <vector>
 
 #include "calib/registration/image_scale.h"
@@ -18,17 +19,22 @@ struct ClippedFrames {
   std::vector<std::size_t> kept;      // without these too few frames would be left
 };
 
+// Returns the sharpest of some frames, which are indices into the sweep.
+using SharpestOf = std::function<std::size_t(const std::vector<std::size_t>& frames)>;
+
 // Leaves clipped frames out of the fit of the blur, the most clipped ones first, as long as at
 // least a half of `used` and nine frames are left, with frames nearer and farther than `focus_mm`.
-// `depths` are those of `frames`.
 ClippedFrames ChooseClippedFrames(const std::vector<FrameMeasurement>& frames,
                                   const std::vector<std::size_t>& used, double focus_mm);
 
 // Leaves these frames out, says so, and returns the other ones of `used`. A reference that is left
-// out is replaced by the sharpest other registered frame, to which `scales` are converted.
-std::vector<std::size_t> LeaveOutClipped(const ClippedFrames& clipped,
+// out is replaced by the sharpest other registered frame, to which `scales` are converted;
+// `sharpest_of` returns the sharpest one of some frames. Where no other frame is registered, the
+// clipped ones stay, as `kept`.
+std::vector<std::size_t> LeaveOutClipped(ClippedFrames* clipped,
                                          const std::vector<std::size_t>& used,
-                                         std::size_t* reference, std::vector<ScaleSample>* scales,
+                                         const SharpestOf& sharpest_of, std::size_t* reference,
+                                         std::vector<ScaleSample>* scales,
                                          Calibration* calibration);
 
 // Widens the interval of kappa for clipped frames that stayed in the fit.

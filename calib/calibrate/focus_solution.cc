@@ -195,6 +195,12 @@ class Solution {
   // either direction.
   void WidenByDoubt() {
     double focus_mm = 0, ratio = 0;
+    if (!result_.diagnostics.nearer.done && !result_.diagnostics.farther.done) {
+      // Neither side can be fitted alone: two of the errors, which the misfit widened, stand for
+      // it.
+      focus_mm = 2 * std::sqrt(fit_.covariance(kFocusDepth, kFocusDepth));
+      ratio = 2 * std::sqrt(fit_.covariance(kBlurRatio, kBlurRatio));
+    }
     for (const SideFit* side : {&result_.diagnostics.nearer, &result_.diagnostics.farther}) {
       if (!side->done) continue;
       focus_mm =

@@ -335,11 +335,13 @@ class Calibrator {
     return true;
   }
 
-  std::size_t SharpestUsed() const {
+  std::size_t SharpestUsed() const { return SharpestAmong(used()); }
+
+  std::size_t SharpestAmong(const std::vector<std::size_t>& frames) const {
     std::vector<double> slopes;
     for (const FrameMeasurement& frame : result_.frames)
       slopes.push_back(frame.normalised_edge_slope);
-    return SharpestFrame(used(), slopes, IsSparse(sweep_.target) ? slopes : energies_);
+    return SharpestFrame(frames, slopes, IsSparse(sweep_.target) ? slopes : energies_);
   }
 
   // Determines the bench offset (given, or from the image scale), then every frame's depth.
@@ -764,14 +766,13 @@ class Calibrator {
   // place, and the registrations to the old reference are converted to the new one.
   void ReplaceReference() {
     if (result_.frames[reference_].rejection.empty()) return;
-    const ScaleSample* next = nullptr;
-    for (const ScaleSample& sample : scales_) {
-      if (next == nullptr || result_.frames[sample.frame].normalised_edge_slope >
-                                 result_.frames[next->frame].normalised_edge_slope)
-        next = &sample;
-    }
-    reference_ = next == nullptr ? SharpestUsed() : next->frame;
-    if (next != nullptr) ReferTo(next->registration, &scales_);
+    std::vector<std::size_t> registered;
+    for (const ScaleSample& sample : scales_) registered.push_back(sample.frame);
+    reference_ = registered.empty() ? SharpestUsed() : SharpestAmong(registered);
+    const auto next =
+        std::find_if(scales_.begin(), scales_.end(),
+                     [this](const ScaleSample& sample) { return sample.frame == reference_; });
+    if (next != scales_.end()) ReferTo(next->registration, &scales_);
   }
 
   void FitPeak() {
@@ -795,11 +796,14 @@ class Calibrator {
     const double start_mm = result_.diagnostics.sharpness.done
                                 ? result_.diagnostics.sharpness.focus_depth_mm
                                 : result_.frames[reference_].depth_mm;
-    const ClippedFrames clipped = IsSparse(sweep_.target)
-                                      ? ClippedFrames()
-                                      : ChooseClippedFrames(result_.frames, used(), start_mm);
+    ClippedFrames clipped = IsSparse(sweep_.target)
+                                ? ClippedFrames()
+                                : ChooseClippedFrames(result_.frames, used(), start_mm);
     BlurTask task(sweep_, store_);
-    task.frames = LeaveOutClipped(clipped, used(), &reference_, &scales_, &result_);
+    task.frames = LeaveOutClipped(
+        &clipped, used(),
+        [this](const std::vector<std::size_t>& some) { return SharpestAmong(some); }, &reference_,
+        &scales_, &result_);
     task.reference = reference_;
     task.scales = scales_;
     task.scale_centre_mm = result_.diagnostics.scale.centre_mm;

@@ -50,7 +50,8 @@ std::optional<TileFoci> FociOfTile(const SpectralEstimatorSetup& setup,
 }
 
 std::optional<FieldAstigmatism> FitFieldAstigmatism(const std::vector<TileFoci>& tiles,
-                                                    double corner_px, double moment_px2) {
+                                                    double corner_px,
+                                                    const Eigen::Vector2d& moments_px2) {
   if (tiles.size() < kMinTilesOfLaw) return std::nullopt;
   const auto n = static_cast<Eigen::Index>(tiles.size());
   constexpr Eigen::Index kTerms = 3;
@@ -59,10 +60,9 @@ std::optional<FieldAstigmatism> FitFieldAstigmatism(const std::vector<TileFoci>&
   for (Eigen::Index i = 0; i < n; ++i) {
     const TileFoci& tile = tiles[static_cast<std::size_t>(i)];
     const double azimuth = AzimuthOf(tile.from_axis_px);
-    const bool has_radius = tile.from_axis_px.norm() >= kOnAxisPx;
-    // Around the axis the radius has all directions, and only x and y are compared there.
-    design(i, 0) =
-        has_radius ? (tile.from_axis_px.squaredNorm() + moment_px2) / (corner_px * corner_px) : 0;
+    design(i, 0) = (tile.from_axis_px.squaredNorm() +
+                    (moments_px2.x() - moments_px2.y()) * std::cos(2 * azimuth)) /
+                   (corner_px * corner_px);
     design(i, 1) = -std::cos(2 * azimuth);
     design(i, 2) = -std::sin(2 * azimuth);
     value[i] = tile.difference_mm.value;

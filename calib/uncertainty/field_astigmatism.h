@@ -41,11 +41,13 @@ struct FieldAstigmatism {
 // [D194] Fits the differences d of the tiles' foci at the azimuth phi from x towards y and at the
 // relative distance rho from the axis: d = C rho^2 - a cos 2 phi - b sin 2 phi, where a and b are
 // those of an astigmatism that is the same everywhere. A target's tilt displaces both foci alike
-// and is no part of d. rho^2 is the mean over the tile: its middle's plus `moment_px2`, the sum of
-// the second moments of a tile's window along x and y. Errors are widened where chi^2 per degree of
-// freedom is above 1. Absent for fewer than five tiles.
+// and is no part of d. rho^2 is the mean of rho^2 cos 2(phi - phi_0) over the window of the tile,
+// whose middle has the azimuth phi_0: that of the middle plus (m_x - m_y) cos 2 phi_0, where
+// `moments_px2` are the second moments of the window along x and y about its middle. Errors are
+// widened where chi^2 per degree of freedom is above 1. Absent for fewer than five tiles.
 std::optional<FieldAstigmatism> FitFieldAstigmatism(const std::vector<TileFoci>& tiles,
-                                                    double corner_px, double moment_px2);
+                                                    double corner_px,
+                                                    const Eigen::Vector2d& moments_px2);
 
 // Where the field astigmatism of a calibration is beyond doubt: a warning, and intervals of zf, d1
 // and kappa that contain the mean of both foci and of both ratios over the tiles, beside those of

@@ -236,9 +236,9 @@ class Field {
     DescribeSurface(fitted, part);
   }
 
-  // The sum of the second moments of a tile's window along x and y, px^2.
-  double WindowMomentPx2(double part) const {
-    return kWindowMoment * std::pow(kWholeField * part, 2) * setup_.size_px.squaredNorm();
+  // The second moments of a tile's window along x and y about its middle, px^2.
+  Eigen::Vector2d WindowMomentsPx2(double part) const {
+    return kWindowMoment * std::pow(kWholeField * part, 2) * setup_.size_px.cwiseAbs2();
   }
 
   void MeasureFieldAstigmatism(const std::vector<EstimatorRegion>& regions,
@@ -259,7 +259,7 @@ class Field {
       if (tile) tiles.push_back(*tile);
     }
     const auto law = FitFieldAstigmatism(tiles, model::FarthestCornerPx(sweep_.camera.sensor),
-                                         WindowMomentPx2(part));
+                                         WindowMomentsPx2(part));
     if (!law) return;
     map.field_astigmatism_mm = law->at_corner_mm;
     for (std::size_t i = 0; i < found.size(); ++i) {
@@ -320,7 +320,7 @@ class Field {
     std::optional<CurvedField> curved;
     if (with_curvature && std::abs(surface[3]) > kCurved * std::sqrt(covariance(3, 3))) {
       // A tile shows the mean of its window, on which R^2 is larger than at the centre [D157].
-      const double moment_mm2 = mm_per_px * mm_per_px * WindowMomentPx2(part);
+      const double moment_mm2 = mm_per_px * mm_per_px * WindowMomentsPx2(part).sum();
       curved = CurvedField{surface[0] - surface[3] * moment_mm2, std::sqrt(covariance(0, 0)), {}};
       for (Eigen::Index i = 0; i < n; ++i)
         curved->without_mm.push_back(value[i] - surface[3] * design(i, 3));

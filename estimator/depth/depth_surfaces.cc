@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "thicklens/base/cancel.h"
+
 namespace thicklens::estimator {
 namespace {
 
@@ -22,6 +24,7 @@ DepthSurfaces::DepthSurfaces(const DepthSampling& map)
     : width_(map.width_px), height_(map.height_px), values_(map.values), weights_(map.confidence) {
   if (weights_.empty()) weights_.assign(values_.size(), 1.0F);
   for (std::size_t i = 0; i < values_.size(); ++i) {
+    if (i % Index(width_) == 0) ThrowIfCancelled();
     if (!std::isfinite(values_[i]) || !(weights_[i] > 0)) {
       values_[i] = kNoSample;
       weights_[i] = 0;
@@ -32,6 +35,7 @@ DepthSurfaces::DepthSurfaces(const DepthSampling& map)
   for (std::size_t n = 0; n < kSteps.size(); ++n) {
     linked_[n].assign(values_.size(), 0);
     for (int y = 0; y < height_; ++y) {
+      ThrowIfCancelled();
       for (int x = 0; x < width_; ++x)
         linked_[n][At(x, y)] = AreLinked(x, y, kSteps[n][0], kSteps[n][1]) ? 1 : 0;
     }
@@ -45,6 +49,7 @@ float DepthSurfaces::ValueOrHole(int x, int y) const {
 void DepthSurfaces::FindJump() {
   std::vector<float> known, bends;
   for (int y = 0; y < height_; ++y) {
+    ThrowIfCancelled();
     for (int x = 0; x < width_; ++x) {
       const float v = value(x, y);
       if (std::isnan(v)) continue;
@@ -77,6 +82,7 @@ void DepthSurfaces::GiveMixedSamplesAway() {
     return x < 0 || y < 0 || x >= width_ || y >= height_ ? kNoSample : found[At(x, y)];
   };
   for (int y = 0; y < height_; ++y) {
+    ThrowIfCancelled();
     for (int x = 0; x < width_; ++x) {
       const float own = at(x, y);
       if (std::isnan(own)) continue;

@@ -10,6 +10,7 @@
 #include <opencv2/imgproc/detail/gcgraph.hpp>
 #include <vector>
 
+#include "thicklens/base/cancel.h"
 #include "thicklens/base/index.h"
 #include "thicklens/base/parallel.h"
 
@@ -47,6 +48,7 @@ Edges FindEdges(const cv::Mat& map, float jump) {
     }
   };
   for (int y = 0; y < map.rows; ++y) {
+    ThrowIfCancelled();
     for (int x = 0; x < map.cols; ++x) {
       if (x + 1 < map.cols) join(y, x, y, x + 1);
       if (y + 1 < map.rows) join(y, x, y + 1, x);
@@ -61,6 +63,7 @@ Edges FindEdges(const cv::Mat& map, float jump) {
   edges.near_px.resize(static_cast<std::size_t>(labels) + 1);
   edges.far_px.resize(edges.near_px.size());
   for (int y = 0; y < map.rows; ++y) {
+    ThrowIfCancelled();
     for (int x = 0; x < map.cols; ++x) {
       if (is_off.at<uchar>(y, x) != 0) continue;
       const auto label = Index(edges.closest.at<int>(y, x));
@@ -155,6 +158,7 @@ void SharpenEdges(double width_px, double jump, cv::Mat* map) {
                            std::clamp(static_cast<int>(std::lround(x)), 0, map->cols - 1));
   };
   for (int y = 0; y < map->rows; ++y) {
+    ThrowIfCancelled();
     for (int x = 0; x < map->cols; ++x) {
       const float own = range.at<float>(y, x);
       if (!(own > static_cast<float>(jump))) continue;
@@ -208,6 +212,7 @@ void Label(const cv::Mat& guide, const cv::Mat& unknown, const EdgeLabelOptions&
   int nodes = 0;
   double contrast = 0;
   for (int y = 0; y < height; ++y) {
+    ThrowIfCancelled();
     for (int x = 0; x < width; ++x) {
       if (at(x, y).node < 0) continue;
       at(x, y).node = nodes++;
@@ -218,10 +223,12 @@ void Label(const cv::Mat& guide, const cv::Mat& unknown, const EdgeLabelOptions&
   const auto inverse_contrast = static_cast<float>(1 / std::max(1e-6, 2 * contrast / nodes));
   cv::detail::GCGraph<float> graph(static_cast<unsigned>(nodes + 1),
                                    static_cast<unsigned>(4 * nodes + 4));
+  ThrowIfCancelled();
   for (int n = 0; n < nodes; ++n) graph.addVtx();
   constexpr int kAround[8][2] = {{1, 0},  {0, 1},  {1, 1},   {-1, 1},
                                  {-1, 0}, {0, -1}, {-1, -1}, {1, -1}};
   for (int y = 0; y < height; ++y) {
+    ThrowIfCancelled();
     for (int x = 0; x < width; ++x) {
       const Choice& own = at(x, y);
       if (own.node < 0) continue;
@@ -247,6 +254,7 @@ void Label(const cv::Mat& guide, const cv::Mat& unknown, const EdgeLabelOptions&
   }
   graph.maxFlow();
   for (int y = 0; y < height; ++y) {
+    ThrowIfCancelled();
     for (int x = 0; x < width; ++x) {
       const Choice& choice = at(x, y);
       if (choice.node < 0) continue;
@@ -423,6 +431,7 @@ cv::Mat Aligned(const cv::Mat& map, const EdgeAlignment& alignment) {
             down = static_cast<int>(alignment.down_px);
   cv::Mat aligned(map.size(), CV_32F);
   for (int y = 0; y < map.rows; ++y) {
+    ThrowIfCancelled();
     for (int x = 0; x < map.cols; ++x) {
       aligned.at<float>(y, x) = narrowed.at<float>(std::clamp(y + down, 0, map.rows - 1),
                                                    std::clamp(x + right, 0, map.cols - 1));

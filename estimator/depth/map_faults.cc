@@ -9,6 +9,7 @@
 
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/index.h"
+#include "thicklens/base/parallel.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -46,6 +47,7 @@ void AddWidthsOfRow(const float* row, int width, float jump, std::vector<float>*
 std::vector<int> RegularStarts(const cv::Mat& map) {
   std::vector<int> starts = {0};
   for (int x = 1; x < map.cols; ++x) {
+    ThrowIfCancelled();
     if (cv::norm(map.col(x), map.col(x - 1), cv::NORM_INF) > 0) starts.push_back(x);
   }
   constexpr std::size_t kFewest = 8;
@@ -81,14 +83,64 @@ std::vector<float> PlacesOf(const std::vector<int>& starts, int size) {
   return places;
 }
 
+// A pass of WithoutQuanta over the pixels from `begin` to before `end` of a row.
+struct QuantaPass {
+  const float* own;
+  const float* now;
+  const float* above;
+  const float* below;
+  float half, min_change;
+  float* next;
+
+  // Returns whether a value changed by more than `min_change`. `left` and `right`: distances of
+  // these neighbours.
+  bool Run(int begin, int end, int left, int right) const {
+    const float most = 3 * half;
+    int changes = 0;
+    // Adds no neighbour by a branch, which a map would make unpredictable.
+    for (int x = begin; x < end; ++x) {
+      const float a = above[x], b = below[x], c = now[x - left], d = now[x + right];
+      const float of_a = std::abs(a - own[x]) <= most ? 1.0F : 0.0F;
+      const float of_b = std::abs(b - own[x]) <= most ? 1.0F : 0.0F;
+      const float of_c = std::abs(c - own[x]) <= most ? 1.0F : 0.0F;
+      const float of_d = std::abs(d - own[x]) <= most ? 1.0F : 0.0F;
+      const float mean =
+          (now[x] + of_a * a + of_b * b + of_c * c + of_d * d) / (1 + of_a + of_b + of_c + of_d);
+      const float value = std::min(std::max(mean, own[x] - half), own[x] + half);
+      changes |= std::abs(value - now[x]) > min_change ? 1 : 0;
+      next[x] = value;
+    }
+    return changes != 0;
+  }
+};
+
+bool SmoothRow(const cv::Mat& map, const cv::Mat& smooth, int y, float half, float min_change,
+               cv::Mat* next) {
+  const QuantaPass pass{map.ptr<float>(y),
+                        smooth.ptr<float>(y),
+                        smooth.ptr<float>(std::max(0, y - 1)),
+                        smooth.ptr<float>(std::min(map.rows - 1, y + 1)),
+                        half,
+                        min_change,
+                        next->ptr<float>(y)};
+  const int last = map.cols - 1;
+  // At the borders the pixel itself stands for its neighbour.
+  bool has_changed = pass.Run(0, 1, 0, last > 0 ? 1 : 0);
+  has_changed |= pass.Run(1, last, 1, 1);
+  if (last > 0) has_changed |= pass.Run(last, last + 1, 1, 0);
+  return has_changed;
+}
+
 }  // namespace
 
 double EdgeWidthPx(const cv::Mat& map, double jump) {
   std::vector<float> widths;
   const cv::Mat turned = map.t();
   for (const cv::Mat& lines : {map, turned}) {
-    for (int y = 0; y < lines.rows; ++y)
+    for (int y = 0; y < lines.rows; ++y) {
+      ThrowIfCancelled();
       AddWidthsOfRow(lines.ptr<float>(y), lines.cols, static_cast<float>(jump), &widths);
+    }
   }
   if (widths.size() < kFewRises) return 0;
   const auto middle = widths.begin() + static_cast<std::ptrdiff_t>(widths.size() / 2);
@@ -112,6 +164,7 @@ BlockGrid FindBlocks(const cv::Mat& map) {
 cv::Mat WithoutBlocks(const cv::Mat& map, const BlockGrid& grid) {
   cv::Mat small(static_cast<int>(grid.rows.size()), static_cast<int>(grid.columns.size()), CV_32F);
   for (int y = 0; y < small.rows; ++y) {
+    ThrowIfCancelled();
     for (int x = 0; x < small.cols; ++x)
       small.at<float>(y, x) = map.at<float>(grid.rows[Index(y)], grid.columns[Index(x)]);
   }
@@ -119,6 +172,7 @@ cv::Mat WithoutBlocks(const cv::Mat& map, const BlockGrid& grid) {
   const std::vector<float> down = PlacesOf(grid.rows, map.rows);
   cv::Mat at_x(map.size(), CV_32F), at_y(map.size(), CV_32F), smooth;
   for (int y = 0; y < map.rows; ++y) {
+    ThrowIfCancelled();
     for (int x = 0; x < map.cols; ++x) {
       at_x.at<float>(y, x) = across[Index(x)];
       at_y.at<float>(y, x) = down[Index(y)];
@@ -128,7 +182,7 @@ cv::Mat WithoutBlocks(const cv::Mat& map, const BlockGrid& grid) {
   return smooth;
 }
 
-double QuantumOf(const cv::Mat& map) {
+double QuantumOf(const cv::Mat& map, double jump) {
   // A part of the rows is sufficient.
   constexpr int kEnough = 1 << 20;
   const int stride = std::max(1, static_cast<int>(map.total() / kEnough));
@@ -143,33 +197,39 @@ double QuantumOf(const cv::Mat& map) {
   for (std::size_t i = 1; i < values.size(); ++i) steps.push_back(values[i] - values[i - 1]);
   const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
   std::nth_element(steps.begin(), middle, steps.end());
-  return static_cast<double>(*middle);
+  const float quantum = *middle;
+  if (!(static_cast<double>(quantum) < jump / 2)) return 0;
+  // The layers of a scene are at any distances.
+  constexpr float kTolerance = 0.1F;
+  constexpr double kRegular = 0.8;
+  const auto regular = std::count_if(steps.begin(), steps.end(), [quantum](float step) {
+    const float multiple = step / quantum;
+    return std::abs(multiple - std::max(1.0F, std::round(multiple))) <= kTolerance;
+  });
+  const bool is_regular =
+      static_cast<double>(regular) >= kRegular * static_cast<double>(steps.size());
+  return is_regular ? static_cast<double>(quantum) : 0;
 }
 
-cv::Mat WithoutQuanta(const cv::Mat& map, double quantum) {
-  constexpr int kPasses = 80;
-  const auto half = static_cast<float>(quantum / 2), most = 3 * half;
-  cv::Mat smooth = map.clone(), next = map.clone();
+cv::Mat WithoutQuanta(const cv::Mat& map, double quantum, int threads) {
+  constexpr int kPasses = 80, kBandRows = 16;
+  // A step spreads over n pixels by n^2 passes, and changes by less than 1 % of it in most of them.
+  constexpr double kMinChange = 1e-3;
+  const auto min_change = static_cast<float>(kMinChange * quantum);
+  const auto half = static_cast<float>(quantum / 2);
+  const int bands = (map.rows + kBandRows - 1) / kBandRows;
+  cv::Mat smooth = map.clone(), next(map.size(), CV_32F);
+  std::vector<char> has_changed(Index(bands), 1);
   for (int pass = 0; pass < kPasses; ++pass) {
-    ThrowIfCancelled();
-    for (int y = 0; y < map.rows; ++y) {
-      const float* const own = map.ptr<float>(y);
-      const float* const now = smooth.ptr<float>(y);
-      const float* const above = y > 0 ? smooth.ptr<float>(y - 1) : now;
-      const float* const below = y + 1 < map.rows ? smooth.ptr<float>(y + 1) : now;
-      for (int x = 0; x < map.cols; ++x) {
-        const std::array<float, 4> others = {above[x], below[x], now[std::max(0, x - 1)],
-                                             now[std::min(map.cols - 1, x + 1)]};
-        float sum = now[x], count = 1;
-        for (const float other : others) {
-          if (std::abs(other - own[x]) > most) continue;
-          sum += other;
-          count += 1;
-        }
-        next.at<float>(y, x) = std::clamp(sum / count, own[x] - half, own[x] + half);
-      }
-    }
+    ParallelFor(bands, threads, [&](int band) {
+      bool is_any = false;
+      const int end = std::min(map.rows, (band + 1) * kBandRows);
+      for (int y = band * kBandRows; y < end; ++y)
+        is_any |= SmoothRow(map, smooth, y, half, min_change, &next);
+      has_changed[Index(band)] = is_any ? 1 : 0;
+    });
     std::swap(smooth, next);
+    if (std::count(has_changed.begin(), has_changed.end(), 1) == 0) break;
   }
   return smooth;
 }
@@ -179,6 +239,7 @@ double DropOutliers(double jump, cv::Mat* map) {
   const auto least_jump = static_cast<float>(jump);
   std::size_t count = 0;
   for (int y = 1; y + 1 < map->rows; ++y) {
+    ThrowIfCancelled();
     for (int x = 1; x + 1 < map->cols; ++x) {
       std::array<float, 8> others{};
       std::size_t n = 0;

@@ -23,12 +23,14 @@ BlockGrid FindBlocks(const cv::Mat& map);
 // Interpolates linearly between the middles of the blocks.
 cv::Mat WithoutBlocks(const cv::Mat& map, const BlockGrid& grid);
 
-// The step of a quantised map: the usual difference of its values, if it has at most 1024 of them.
-// 0: none.
-double QuantumOf(const cv::Mat& map);
+// The step of a quantised map: the usual difference of its values, if it has at most 1024 of them,
+// most of which differ by multiples of it, and it is below half of `jump`: surfaces at larger
+// distances are layers. 0: none.
+double QuantumOf(const cv::Mat& map, double jump);
 // Makes the values smooth within half a quantum of their own, by repeated means over the neighbours
-// that differ by at most one and a half quanta.
-cv::Mat WithoutQuanta(const cv::Mat& map, double quantum);
+// that differ by at most one and a half quanta. The result does not depend on the number of threads
+// (0: one per core).
+cv::Mat WithoutQuanta(const cv::Mat& map, double quantum, int threads);
 
 // Replaces pixels that fewer than two of the eight neighbours resemble to `jump` by the median
 // over these. Returns the share of the pixels.

@@ -10,6 +10,7 @@
 
 #include "estimator/depth/edge_labels.h"
 #include "estimator/depth/map_faults.h"
+#include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/index.h"
 #include "thicklens/base/run_cost.h"
@@ -44,6 +45,7 @@ cv::Mat GuideOf(const model::LinearImage& photo, const model::TransferCurve& tra
   for (int i = 0; i <= kCells; ++i)
     table.push_back(static_cast<float>(transfer.Encode(std::pow(i / (1.0 * kCells), 2))));
   for (int y = 0; y < photo.height_px; ++y) {
+    ThrowIfCancelled();
     float* row = guide.ptr<float>(y);
     for (int x = 0; x < photo.width_px; ++x) {
       for (int c = 0; c < channels; ++c) {
@@ -149,11 +151,11 @@ DepthRefinement RefineDepth(const model::LinearImage& photo, const model::Transf
   const BlockGrid blocks = FindBlocks(stored);
   found.block_px = blocks.size_px();
   if (found.block_px > 1) now = WithoutBlocks(now, blocks);
-  const double quantum = QuantumOf(stored);
+  const double quantum = QuantumOf(stored, labels.jump);
   found.quantum_px = quantum * step;
   stored.release();
   const bool quanta = found.quantum_px > kMinQuantumPx;
-  if (quanta) now = WithoutQuanta(now, quantum);
+  if (quanta) now = WithoutQuanta(now, quantum, options.threads);
   cv::Mat without_outliers = now.clone();
   found.outlier_share = DropOutliers(labels.jump, &without_outliers);
   const bool outliers = found.outlier_share > kManyOutliers;
@@ -184,6 +186,7 @@ DepthRefinement RefineDepth(const model::LinearImage& photo, const model::Transf
     for (std::size_t i = 0; i < pixels; ++i) {
       const int y = static_cast<int>(i / Index(now.cols)),
                 x = static_cast<int>(i % Index(now.cols));
+      if (x == 0) ThrowIfCancelled();
       const float value = now.at<float>(y, x);
       if (std::abs(value - before.at<float>(y, x)) > static_cast<float>(labels.jump / 2)) ++changed;
       map->disparity[i] = value;

@@ -11,6 +11,7 @@
 #include "estimator/scene/coarse_start.h"
 #include "estimator/scene/depth_evidence.h"
 #include "estimator/scene/jpeg_blocks.h"
+#include "estimator/scene/lower_bounds.h"
 #include "estimator/views/input_checks.h"
 #include "estimator/views/option_checks.h"
 #include "estimator/views/ray_landing.h"
@@ -35,6 +36,8 @@ constexpr double kMoreThanGiven = 3;
 constexpr double kOfBest = 0.5, kAboutTheBest = 0.7;
 constexpr double kSinglePlace = 10, kOfSinglePlace = 0.35;
 constexpr int kFarShiftPx = 7;
+// The smaller side, also at the size at which edges are compared.
+constexpr int kMinSidePx = 48;
 constexpr int kReachPx = 24, kMinShiftPx = 4;
 // Standard deviations of a residual that decide.
 constexpr double kSignDecided = 4, kShiftDecided = 3;
@@ -57,6 +60,7 @@ DepthCauseTrial TrialOf(DepthCause cause, double scale = 1, double offset_px = 0
 
 ReducedPhoto ReducedTo(double pixels, ReducedPhoto photo) {
   while (1.0 * photo.grey.width_px * photo.grey.height_px > pixels) {
+    photo.clipped = HalfSize(photo.clipped, photo.grey.width_px, photo.grey.height_px, 1);
     photo.grey = HalfSize(photo.grey);
     photo.disparity = HalfSize(photo.disparity);
     photo.scale *= 2;
@@ -64,7 +68,8 @@ ReducedPhoto ReducedTo(double pixels, ReducedPhoto photo) {
   return photo;
 }
 
-// The photograph in grey, without its fall-off, with the disparity of its pixels.
+// The photograph in grey, without its fall-off, with the disparity of its pixels. The sum of
+// channels is a lower bound if one of them is.
 ReducedPhoto LookedAtFor(const EstimateInput& input, bool falloff, int threads) {
   ReducedPhoto photo;
   std::optional<model::LinearImage> without;
@@ -87,18 +92,22 @@ ReducedPhoto LookedAtFor(const EstimateInput& input, bool falloff, int threads) 
                                     : 0.2126F * image.values[i] + 0.7152F * image.values[i + 1] +
                                           0.0722F * image.values[i + 2]);
   }
+  photo.clipped = InAnyChannel(input.clipped, image.channels);
   return photo;
 }
 
 double NoiseOf(const ReducedPhoto& photo, const EstimateInput& input, double compression_sigma) {
   return std::hypot(
-      std::max(EncodedNoiseSigma(photo.grey, input.transfer).value_or(1.0 / 255), kRoundingNoise),
+      std::max(EncodedNoiseSigma(photo.grey, input.transfer, photo.clipped).value_or(1.0 / 255),
+               kRoundingNoise),
       compression_sigma / photo.scale);
 }
 
 // Standard deviations by which `other` explains the photograph better than `given`: the mean of
 // the logarithm of the ratio of their squares in blocks, in which no single block decides.
 double SigmasBetter(const ResidualBlocks& given, const ResidualBlocks& other, double noise_square) {
+  // Rounding alone makes the same small difference in many blocks.
+  constexpr double kMinRatio = 0.01;
   double sum = 0, squares = 0, count = 0;
   for (std::size_t i = 0; i < given.squares.size(); ++i) {
     const double ratio =
@@ -107,6 +116,7 @@ double SigmasBetter(const ResidualBlocks& given, const ResidualBlocks& other, do
     squares += ratio * ratio;
     count += 1;
   }
+  if (!(std::abs(sum) > kMinRatio * count)) return 0;
   const double scatter = (squares - sum * sum / count) * count / std::max(1.0, count - 1);
   return sum / std::sqrt(std::max(1e-12, scatter));
 }
@@ -124,34 +134,59 @@ class Search {
 
   void Run() {
     found_->trials.push_back({});
-    const EdgeCoincidence edges(small_.grey, input_.transfer);
-    const auto given = edges.Of(small_.disparity, kReachPx);
-    if (given) found_->trials.front().edges = given->sigmas;
-    if (given && given->sigmas >= kCoincides && !options_.check_values) {
-      found_->message = fmt::format(
-          "the depth's edges lie on edges of the photograph ({:.1f} standard deviations)",
-          given->sigmas);
+    // A strip is too narrow at the size at which edges are compared.
+    if (std::min(small_.grey.width_px, small_.grey.height_px) < kMinSidePx) {
+      found_->values_untested = fmt::format(
+          "the photograph has less than {} px at 1/{:g} of its size", kMinSidePx, small_.scale);
+      found_->message =
+          "the depth cannot be compared with the photograph: " + found_->values_untested;
       return;
     }
+    const EdgeCoincidence edges(small_.grey, input_.transfer);
+    const auto given = edges.Of(small_.disparity, kReachPx);
+    if (given && given->is_unclear) {
+      found_->values_untested = "most edges of the depth are steps between few levels, or noise";
+      found_->message =
+          "the depth cannot be compared with the photograph: " + found_->values_untested;
+      return;
+    }
+    if (given) found_->trials.front().edges = given->sigmas;
     if (given && IsElsewhere(edges, *given)) return;
     if (given && IsNowhere(*given)) return;
     const bool is_at_place = !given || given->sigmas >= kCoincides;
     // Between the two, as with a map of an eighth of the size, nothing is certain.
     const bool is_open = given && !is_at_place && given->sigmas >= kAtPlace;
-    if (!is_open) TryValues(given.has_value(), is_at_place);
-    if (!found_->is_contradicted && is_at_place) TrySign();
-    if (!found_->is_contradicted) {
-      found_->message =
-          given
-              ? fmt::format(
-                    "the depth's edges lie on edges of the photograph ({:.1f} standard "
-                    "deviations), and no other values explain its blur better",
-                    given->sigmas)
-              : "the depth has no edges, and no other values explain the photograph's blur better";
+    if (is_open) {
+      found_->values_untested = "it is not certain that the depth's edges lie on the photograph's";
+    } else if (given && is_at_place && !options_.check_values) {
+      found_->values_untested = "the photograph shows the blur that they predict";
+    } else {
+      TryValues(given.has_value(), is_at_place);
     }
+    // Without edges, the residual of the reversed sign is the same.
+    if (!found_->is_contradicted && given && is_at_place) TrySign();
+    if (!found_->is_contradicted) found_->message = AgreementText(given);
   }
 
  private:
+  // The message of a map that nothing contradicts.
+  std::string AgreementText(const std::optional<EdgeCoincidence::Found>& given) const {
+    const std::string edges =
+        !given ? "the depth has no edges"
+        : given->sigmas >= kCoincides
+            ? fmt::format(
+                  "the depth's edges lie on edges of the photograph ({:.1f} standard deviations)",
+                  given->sigmas)
+            : fmt::format(
+                  "whether the depth's edges lie on edges of the photograph is not certain ({:.1f} "
+                  "standard deviations, {:.1f} on average within some px)",
+                  given->sigmas, given->coarse_sigmas);
+    return edges +
+           (found_->values_untested.empty()
+                ? ", and no other values explain the photograph's blur better"
+                : fmt::format("; other values were not tested: {}", found_->values_untested));
+  }
+
   // Whether the map in another order, or at another place, lies on the photograph's edges.
   bool IsElsewhere(const EdgeCoincidence& edges, const EdgeCoincidence::Found& given) {
     std::vector<DepthCauseTrial> orders;
@@ -162,7 +197,7 @@ class Search {
       if (is_quarter && small_.disparity.width_px != small_.disparity.height_px) continue;
       DepthCauseTrial trial = TrialOf(cause);
       const auto place = edges.Of(Reordered(small_.disparity, trial, small_.scale), 1);
-      if (!place) continue;
+      if (!place || place->is_unclear) continue;
       trial.edges = place->sigmas;
       found_->trials.push_back(trial);
       orders.push_back(trial);
@@ -283,12 +318,24 @@ class Search {
   }
 
   void TryValues(bool has_edges, bool is_at_place) {
-    if (!(options_.photo_aperture > 0)) return;  // the photograph is taken as sharp
-    if (options_.compression_sigma > 0 || ShowsJpegBlocks(input_.image, input_.transfer)) return;
+    if (!(options_.photo_aperture > 0)) {
+      found_->values_untested = "the photograph is taken as sharp";
+      return;
+    }
+    if (options_.compression_sigma > 0 || ShowsJpegBlocks(input_.image, input_.transfer)) {
+      found_->values_untested = "the photograph's compression hides its blur";
+      return;
+    }
     const TileLikelihood tiles(photo_, input_, options_.photo_aperture,
                                NoiseOf(photo_, input_, options_.compression_sigma), threads_);
-    const double step = photo_.disparity.step.cwiseAbs().maxCoeff();
-    if (tiles.tiles() < TileLikelihood::kMinTiles) return;
+    // Offsets are stated in px of the photograph, whose step the reduced one has not.
+    const double step = photo_.disparity.step.cwiseAbs().maxCoeff() * photo_.scale;
+    if (tiles.tiles() < TileLikelihood::kMinTiles) {
+      found_->values_untested =
+          fmt::format("of the {} parts that are needed, {} show one depth and more than noise",
+                      TileLikelihood::kMinTiles, tiles.tiles());
+      return;
+    }
     const auto trial = [&](DepthCause cause, double scale, double offset) {
       const TileLikelihood::Gain gain = tiles.OfValues(scale, offset / step);
       DepthCauseTrial made = TrialOf(cause, scale, offset);
@@ -388,18 +435,17 @@ class Search {
   // Which of the two signs the changed disparities have.
   void DecideSide(DepthCauseTrial* cause) {
     const ReducedPhoto& photo = Least();
-    const double step = photo.disparity.step.cwiseAbs().maxCoeff();
+    const double step = photo.disparity.step.cwiseAbs().maxCoeff() * photo.scale;
     DisparityMap changed = photo.disparity, mirrored = photo.disparity;
     for (std::size_t i = 0; i < changed.disparity.size(); ++i) {
-      // The offset is in px of the photograph.
-      const double value = cause->scale * static_cast<double>(changed.disparity[i]) +
-                           cause->offset_px / photo.scale / step;
+      const double value =
+          cause->scale * static_cast<double>(changed.disparity[i]) + cause->offset_px / step;
       changed.disparity[i] = static_cast<float>(value);
       mirrored.disparity[i] = static_cast<float>(-value);
     }
-    const double sigmas =
-        SigmasBetter(ExplainedBy(photo, mirrored, input_, 1, threads_),
-                     ExplainedBy(photo, changed, input_, 1, threads_), NoiseOfBlock());
+    const double sigmas = SigmasBetter(
+        ExplainedBy(photo, mirrored, input_, options_.photo_aperture, threads_),
+        ExplainedBy(photo, changed, input_, options_.photo_aperture, threads_), NoiseOfBlock());
     cause->residual = sigmas;
     found_->is_sign_open = std::abs(sigmas) < kSignDecided;
     if (sigmas <= -kSignDecided) {
@@ -485,11 +531,11 @@ DepthContradiction CheckContradiction(const EstimateInput& input,
   CheckInput(input);
   const auto start = Clock::now();
   DepthContradiction found;
-  constexpr int kMinPx = 48;
-  if (std::min(input.image.width_px, input.image.height_px) < kMinPx) {
+  if (std::min(input.image.width_px, input.image.height_px) < kMinSidePx) {
     found.trials.push_back({});
     found.message = fmt::format(
-        "a photograph of less than {} px does not show whether its depth agrees", kMinPx);
+        "a photograph of less than {} px does not show whether its depth agrees", kMinSidePx);
+    found.values_untested = fmt::format("the photograph has less than {} px", kMinSidePx);
   } else {
     Search(input, options, ResolveThreads(options.threads), &found).Run();
   }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <numeric>
 #include <opencv2/core.hpp>
@@ -26,6 +28,18 @@ constexpr double kEdgeSmoothingPx = 1;
 constexpr double kFullEdge = 0.15;
 // Slanted surfaces and noise: gradients up to so many times the median are no edges.
 constexpr double kNoEdge = 3, kMinEdge = 0.2;
+// Contours of a slanted surface in a map of few levels are one level high. Edges are higher.
+constexpr double kMinLevels = 1.5;
+// A level of the map has this share of its pixels, and all levels together have the other one:
+// interpolation leaves few values between them.
+constexpr double kShareOfLevel = 1e-3, kShareOfLevels = 0.8;
+// The slope of an edge is compared with those so many px off on both sides.
+constexpr int kFlankPx = 7;
+// Without single pixels, an edge keeps this share of its gradient.
+constexpr double kKeptGradient = 0.5;
+// Where levels and single pixels have more than this share of the gradients, the others are not
+// certain either.
+constexpr double kMaxOfNoEdges = 0.5;
 // Places that are compared lie so far off, as shares of the smaller side.
 constexpr double kNearest = 0.06, kFarthest = 0.3;
 constexpr int kBorderPx = 3;
@@ -74,30 +88,95 @@ EdgeParts WithDirections(const cv::Mat_<float>& strength, const Gradient& gradie
   return parts;
 }
 
-// Edges of a depth map, 0 to 1 per pixel; absent if there are none.
-std::optional<EdgeParts> DepthEdges(const DisparityMap& map) {
+// The smallest difference between levels of a map; 0 if it does not consist of levels.
+float LevelStep(std::vector<float> values) {
+  std::sort(values.begin(), values.end());
+  const double size = static_cast<double>(values.size());
+  double covered = 0;
+  std::optional<float> last;
+  float step = 0;
+  for (auto first = values.begin(); first != values.end();) {
+    const auto end = std::upper_bound(first, values.end(), *first);
+    const auto count = static_cast<double>(end - first);
+    if (count >= kShareOfLevel * size) {
+      covered += count;
+      if (last && (step == 0 || *first - *last < step)) step = *first - *last;
+      last = *first;
+    }
+    first = end;
+  }
+  return covered >= kShareOfLevels * size ? step : 0;
+}
+
+struct MapEdges {
+  std::optional<EdgeParts> parts;  // absent if there are none
+  bool is_unclear = false;         // there are none but levels of slanted surfaces, and noise
+};
+
+// Edges of a depth map, 0 to 1 per pixel.
+MapEdges DepthEdges(const DisparityMap& map) {
   const double range =
       static_cast<double>(Quantile(map.disparity, 0.98) - Quantile(map.disparity, 0.02));
-  if (!(range > 0)) return std::nullopt;
-  const Gradient gradient = GradientOf(ImageOf(map.disparity, map.width_px, map.height_px));
+  if (!(range > 0)) return {};
+  const cv::Mat_<float> values = ImageOf(map.disparity, map.width_px, map.height_px);
+  const Gradient gradient = GradientOf(values);
+  cv::Mat_<float> without, highest, lowest;  // without single pixels
+  cv::medianBlur(values, without, 3);
+  cv::dilate(without, highest, {});
+  cv::erode(without, lowest, {});
+  const Gradient smooth = GradientOf(without);
+  const double level_step = static_cast<double>(LevelStep(map.disparity));
   cv::Mat_<float> strength = gradient.size.clone();
   const double median =
       static_cast<double>(Quantile(std::vector<float>(strength.begin(), strength.end()), 0.5));
-  double sum = 0;
+  const auto is_high = [&](int x, int y) {
+    return static_cast<double>(highest(y, x) - lowest(y, x)) >= kMinLevels * level_step;
+  };
+  const auto is_kept = [&](int x, int y) {
+    const double across = static_cast<double>(gradient.across(y, x)),
+                 down = static_cast<double>(gradient.down(y, x));
+    return across * static_cast<double>(smooth.across(y, x)) +
+               down * static_cast<double>(smooth.down(y, x)) >=
+           kKeptGradient * (across * across + down * down);
+  };
+  // Both flanks are less steep.
+  const auto is_steep = [&](int x, int y) {
+    const double size = static_cast<double>(gradient.size(y, x));
+    const double across = static_cast<double>(gradient.across(y, x)) / size,
+                 down = static_cast<double>(gradient.down(y, x)) / size;
+    const auto slope = [&](int offset_px) {
+      const int i =
+          std::clamp(x + static_cast<int>(std::lround(offset_px * across)), 0, map.width_px - 1);
+      const int j =
+          std::clamp(y + static_cast<int>(std::lround(offset_px * down)), 0, map.height_px - 1);
+      return across * static_cast<double>(smooth.across(j, i)) +
+             down * static_cast<double>(smooth.down(j, i));
+    };
+    return size > std::max(slope(-kFlankPx), slope(kFlankPx));
+  };
+  double sum = 0, kept = 0, edges = 0;
   for (int y = 0; y < map.height_px; ++y) {
     for (int x = 0; x < map.width_px; ++x) {
       const bool is_border = x < kBorderPx || y < kBorderPx || x >= map.width_px - kBorderPx ||
                              y >= map.height_px - kBorderPx;
       // The Sobel filter gives four times the difference over a px and a neighbour.
       const double above = static_cast<double>(strength(y, x)) - kNoEdge * median;
-      const double edge = is_border ? 0 : std::clamp(above / (4 * kFullEdge * range), 0.0, 1.0);
-      strength(y, x) = edge < kMinEdge ? 0 : static_cast<float>(edge);
-      sum += static_cast<double>(strength(y, x));
+      double edge = is_border ? 0 : std::clamp(above / (4 * kFullEdge * range), 0.0, 1.0);
+      if (edge < kMinEdge) edge = 0;
+      sum += edge;
+      if (edge > 0 && !(is_high(x, y) && is_kept(x, y))) edge = 0;
+      kept += edge;
+      if (edge > 0 && !is_steep(x, y)) edge = 0;
+      edges += edge;
+      strength(y, x) = static_cast<float>(edge);
     }
   }
   constexpr double kMinEdges = 40;
-  if (!(sum >= kMinEdges)) return std::nullopt;
-  return WithDirections(strength, gradient, 0);
+  MapEdges found;
+  if (!(sum >= kMinEdges)) return found;
+  found.is_unclear = kept < (1 - kMaxOfNoEdges) * sum || edges < kMinEdges;
+  if (!found.is_unclear) found.parts = WithDirections(strength, gradient, 0);
+  return found;
 }
 
 // The sums of all places of a map, over their standard deviation at places from `near` to `far`.
@@ -121,7 +200,8 @@ class Places {
 
  private:
   double Sum(int x, int y) const {
-    return static_cast<double>(sums_((y + sums_.rows) % sums_.rows, (x + sums_.cols) % sums_.cols));
+    const auto wrapped = [](int at, int size) { return (at % size + size) % size; };
+    return static_cast<double>(sums_(wrapped(y, sums_.rows), wrapped(x, sums_.cols)));
   }
   cv::Mat_<float> sums_;
   double mean_ = 0, sigma_ = 1;
@@ -199,15 +279,24 @@ EdgeCoincidence::EdgeCoincidence(const model::LinearImage& grey,
 
 std::optional<EdgeCoincidence::Found> EdgeCoincidence::Of(const DisparityMap& map,
                                                           int reach_px) const {
-  const std::optional<EdgeParts> edges = DepthEdges(map);
-  if (!edges) return std::nullopt;
+  const MapEdges edges = DepthEdges(map);
+  if (!edges.parts) {
+    if (!edges.is_unclear) return std::nullopt;
+    Found unclear;
+    unclear.is_unclear = true;
+    return unclear;
+  }
   const double smaller = std::min(width_px_, height_px_);
   const int far = static_cast<int>(kFarthest * smaller),
             near = static_cast<int>(kNearest * smaller);
+  const int reach = std::min(reach_px, far);
+  // The sums around a place that is compared do not reach those of the other end.
+  const int padding = far + 2 * kAroundPx;
   const auto pad = [&](const cv::Mat_<float>& values) {
     cv::Mat_<float> padded;
-    cv::copyMakeBorder(values, padded, 0, cv::getOptimalDFTSize(height_px_ + far) - height_px_, 0,
-                       cv::getOptimalDFTSize(width_px_ + far) - width_px_, cv::BORDER_CONSTANT, 0);
+    cv::copyMakeBorder(values, padded, 0, cv::getOptimalDFTSize(height_px_ + padding) - height_px_,
+                       0, cv::getOptimalDFTSize(width_px_ + padding) - width_px_,
+                       cv::BORDER_CONSTANT, 0);
     return padded;
   };
   // Sums over the edges of the map for all of its places.
@@ -215,7 +304,7 @@ std::optional<EdgeCoincidence::Found> EdgeCoincidence::Of(const DisparityMap& ma
   for (std::size_t part = 0; part < edges_.size(); ++part) {
     cv::Mat of_photo, of_map, product;
     cv::dft(pad(ImageOf(edges_[part], width_px_, height_px_)), of_photo);
-    cv::dft(pad((*edges)[part]), of_map);
+    cv::dft(pad((*edges.parts)[part]), of_map);
     cv::mulSpectrums(of_photo, of_map, product, 0, true);
     spectrum = spectrum.empty() ? product : cv::Mat(spectrum + product);
   }
@@ -236,8 +325,8 @@ std::optional<EdgeCoincidence::Found> EdgeCoincidence::Of(const DisparityMap& ma
   Found found;
   found.sigmas = found.best_sigmas = -std::numeric_limits<double>::infinity();
   found.coarse_sigmas = coarse.At(0, 0);
-  for (int y = -reach_px; y <= reach_px; ++y) {
-    for (int x = -reach_px; x <= reach_px; ++x) {
+  for (int y = -reach; y <= reach; ++y) {
+    for (int x = -reach; x <= reach; ++x) {
       const double sigmas = sharp.At(x, y);
       if (std::max(std::abs(x), std::abs(y)) <= 1) found.sigmas = std::max(found.sigmas, sigmas);
       if (sigmas > found.best_sigmas) {
@@ -248,8 +337,8 @@ std::optional<EdgeCoincidence::Found> EdgeCoincidence::Of(const DisparityMap& ma
     }
   }
   found.opposite_sigmas = -std::numeric_limits<double>::infinity();
-  for (int y = -reach_px; y <= reach_px; ++y) {
-    for (int x = -reach_px; x <= reach_px; ++x) {
+  for (int y = -reach; y <= reach; ++y) {
+    for (int x = -reach; x <= reach; ++x) {
       if (x * found.best_x + y * found.best_y >= 0) continue;
       found.opposite_sigmas = std::max(found.opposite_sigmas, sharp.At(x, y));
     }
@@ -268,6 +357,21 @@ constexpr double kMaxOfTile = 4;  // the most that one tile says
 constexpr std::size_t kEnoughTiles = 64, kFewTiles = 48;
 constexpr int kPartsAlong = 4;
 
+// Removes the tiles that show a lower bound.
+void RemoveClipped(const ClippedValues& clipped, int width_px, std::vector<PhotoTile>* tiles) {
+  if (clipped.empty()) return;
+  const auto is_clipped = [&](const PhotoTile& tile) {
+    for (int y = tile.y; y < tile.y + kTilePx; ++y) {
+      const auto row =
+          clipped.begin() + static_cast<std::ptrdiff_t>(Index(y) * Index(width_px) + Index(tile.x));
+      if (std::any_of(row, row + kTilePx, [](std::uint8_t value) { return value != 0; }))
+        return true;
+    }
+    return false;
+  };
+  tiles->erase(std::remove_if(tiles->begin(), tiles->end(), is_clipped), tiles->end());
+}
+
 double SpreadOf(const DisparityMap& map, const Eigen::ArrayXXd& weights) {
   DisparityMap unit{1, 1, {1.0F}, map.step};
   return static_cast<double>(BlurSigmaPx(unit, weights).front());
@@ -284,6 +388,7 @@ TileLikelihood::TileLikelihood(const ReducedPhoto& photo, const EstimateInput& i
   for (const int stride : {kTilePx, kTilePx / 2}) {
     tiles_ =
         TilesOf(photo.grey, photo.disparity, input.transfer, noise_sigma, spread_, stride, threads);
+    RemoveClipped(photo.clipped, width_px_, &tiles_);
     weight_ = stride == kTilePx ? 1 : 0.5;
     if (tiles_.size() >= kFewTiles) break;
   }
@@ -417,6 +522,7 @@ ResidualBlocks ExplainedBy(const ReducedPhoto& photo, const DisparityMap& map,
                            const EstimateInput& input, double photo_aperture, int threads) {
   EstimateInput tried;
   tried.image = photo.grey;
+  tried.clipped = photo.clipped;
   tried.disparity = map;
   tried.weights = input.weights;
   tried.transfer = input.transfer;

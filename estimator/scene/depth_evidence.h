@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "estimator/scene/lower_bounds.h"
 #include "estimator/scene/photo_tiles.h"
 #include "thicklens/estimator/depth_contradiction.h"
 #include "thicklens/estimator/estimate_input.h"
@@ -17,12 +18,13 @@ namespace thicklens::estimator {
 struct ReducedPhoto {
   model::LinearImage grey;
   DisparityMap disparity;
-  double scale = 1;  // px of the photograph per px of it
+  double scale = 1;            // px of the photograph per px of it
+  ClippedValues clipped = {};  // pixels to which a lower bound contributed
 };
 
 // Returns the map in the order that a cause of kRows to kQuarterLeft, kShift or kSign asks for.
-// `step` is that of the map's disparities; a quarter turn needs a square map. Pixels that a shift
-// leaves open repeat the border.
+// `px`: of the photograph per px of the map, in which a shift is stated. A quarter turn needs a
+// square map. Pixels that a shift leaves open repeat the border.
 DisparityMap Reordered(const DisparityMap& map, const DepthCauseTrial& change, double px);
 
 // How often edges of a depth map lie on edges of the photograph.
@@ -35,6 +37,8 @@ class EdgeCoincidence {
     double best_sigmas = 0;      // at the best place within `reach` px
     int best_x = 0, best_y = 0;  // by which the map has to move to be there, px
     double opposite_sigmas = 0;  // at the best place on the opposite side of the map's
+    // The edges are steps between the levels of slanted surfaces, or noise: they say nothing.
+    bool is_unclear = false;
   };
   // Absent for maps without edges.
   std::optional<Found> Of(const DisparityMap& map, int reach_px) const;
@@ -47,7 +51,8 @@ class EdgeCoincidence {
 // How likely the spectra of the tiles of a photograph are for another map.
 class TileLikelihood {
  public:
-  // Fewer tiles say nothing.
+  // Fewer tiles say nothing. Tiles with lower bounds are left out: where values are cut off, their
+  // spectrum is not that of a blur.
   static constexpr std::size_t kMinTiles = 6;
   // `share`: of the disparities by which the photograph is blurred.
   TileLikelihood(const ReducedPhoto& photo, const EstimateInput& input, double share,

@@ -28,7 +28,7 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr int kBlocksAlong = 12;
 constexpr int kMinBlocks = 24;
 // Blocks that are clipped in part, or so dark that black level and noise make their logarithm, say
-// nothing.
+// nothing; nor do those that the camera predicts to be black.
 constexpr double kMaxClippedShare = 0.01, kMaxDarkShare = 0.1;
 constexpr double kDarkest = 2e-3;
 // Exponents of the scene's power spectrum that are tried, how usual they are, and the variances of
@@ -97,6 +97,7 @@ Blocks BlocksOf(const EstimateInput& input, const std::vector<float>& falloff) {
       }
       const double pixels = static_cast<double>(y1 - y0) * (x1 - x0);
       if (lost > kMaxClippedShare * pixels || dark > kMaxDarkShare * pixels) continue;
+      if (!(sum > 0) || !(sum_of_falloff > 0)) continue;
       blocks.x.push_back(i);
       blocks.y.push_back(j);
       light.push_back(std::log(sum / pixels));

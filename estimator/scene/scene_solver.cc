@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <utility>
 
 #include "estimator/scene/scene_band_run.h"
@@ -53,16 +54,28 @@ void FillOrigin(const SceneOptions& options, const SceneSummary& summary, bool f
   if (falloff) origin->effects.emplace_back("falloff");
 }
 
+// Returns the share of the photograph's values that are lower bounds.
+double ClippedShare(const EstimateInput& input) {
+  const auto clipped = std::count_if(input.clipped.begin(), input.clipped.end(),
+                                     [](std::uint8_t value) { return value != 0; });
+  return static_cast<double>(clipped) / static_cast<double>(input.image.values.size());
+}
+
 // The returned light field has its views only without a sink.
 template <typename Real>
 model::LightField EstimateIn(const EstimateInput& input, const SceneOptions& options,
                              const SolverRun& how, SceneSummary* summary, SceneMaps* maps) {
   const auto start = Clock::now();
-  kernels::Backend* const backend = how.backend;
+  kernels::Backend* const backend = how.backend;  // of the views
   const SceneViewSink* const sink = how.sink;
   summary->threads = ResolveThreads(how.threads);
   summary->prior = options.prior;
-  summary->device = backend != nullptr ? backend->name() : "cpu";
+  summary->clipped_share = ClippedShare(input);
+  SolverRun iterating = how;
+  // Only the processor knows lower bounds [D181]. One value of them takes all bands there, so that
+  // the device of the summary is that of all iterations.
+  if (summary->clipped_share > 0) iterating.backend = nullptr;
+  summary->device = iterating.backend != nullptr ? iterating.backend->name() : "cpu";
   const bool falloff = options.falloff && input.camera.has_value();
   model::LightField light_field = DescriptionOf(input);
   const int reach_px =
@@ -80,7 +93,8 @@ model::LightField EstimateIn(const EstimateInput& input, const SceneOptions& opt
 
   const std::optional<double> noise = EncodedNoiseSigma(input.image, input.transfer, input.clipped);
   summary->noise_sigma = noise.value_or(kDefaultNoise);
-  SceneBandRun<Real> run(input, options, how, memory, reach_px, iterations, &progress, summary);
+  SceneBandRun<Real> run(input, options, iterating, memory, reach_px, iterations, &progress,
+                         summary);
   std::optional<model::LinearImage> without_falloff;
   if (falloff) {
     without_falloff = WithoutFalloff(input.image, *input.grid, input.camera_of_falloff(),
@@ -96,10 +110,6 @@ model::LightField EstimateIn(const EstimateInput& input, const SceneOptions& opt
     summary->brightest = static_cast<double>(
         *std::max_element(solved.radiance.values.begin(), solved.radiance.values.end()));
   }
-  summary->clipped_share =
-      static_cast<double>(std::count(input.clipped.begin(), input.clipped.end(), 1)) /
-      static_cast<double>(input.image.values.size());
-  if (summary->clipped_share > 0) summary->device = "cpu";  // that of the iterations
 
   const auto views_start = Clock::now();
   if (sink == nullptr) {

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "thicklens/base/cancel.h"
+#include "thicklens/base/index.h"
 #include "thicklens/base/memory_available.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/base/parallel.h"
@@ -259,10 +260,40 @@ void EstimateInto(io::LightFieldWriter* writer, EstimateCall call, bool has_page
       static_cast<double>(light_field.ViewStart(light_field.channels, 0, 0));
 }
 
+// Returns whether what is estimated of the photograph may show clipped values. They are those of
+// the whole photograph: a part shows less of what is a limit.
+bool MayShowClipping(const EstimateCall& call) {
+  const Image& photo = call.photo;
+  const PhotoClipping clipping = FindClipping(photo);
+  if (!(clipping.share > 0)) return false;
+  const std::optional<PixelRect>& crop = call.settings.crop;
+  const bool is_moved = call.settings.undistort && call.camera && call.camera->distortion;
+  // A photograph that does not contain the crop was cut before, or is refused later.
+  if (!crop || is_moved || crop->x < 0 || crop->y < 0 || crop->width > photo.width_px() - crop->x ||
+      crop->height > photo.height_px() - crop->y)
+    return true;
+  const auto value_at = [&photo](std::size_t i) {
+    return photo.is_linear() ? static_cast<double>(photo.light().values[i])
+                             : photo.encoded().values[i] / photo.encoded().full_scale();
+  };
+  const auto channels = Index(photo.channels());
+  for (int y = crop->y; y < crop->y + crop->height; ++y) {
+    ThrowIfCancelled();
+    for (int x = crop->x; x < crop->x + crop->width; ++x) {
+      const std::size_t pixel = Index(y) * Index(photo.width_px()) + Index(x);
+      for (std::size_t c = 0; c < clipping.levels.size(); ++c) {
+        const double level = clipping.levels[c];
+        if (level > 0 && value_at(pixel * channels + c) >= level) return true;
+      }
+    }
+  }
+  return false;
+}
+
 // Highlights that are estimated are brighter than full scale, where png ends.
-io::ViewFormat FormatFor(const EstimateOptions& options, const Image& photo) {
+io::ViewFormat FormatFor(const EstimateOptions& options, const EstimateCall& call) {
   const bool is_auto_tiff = options.format == "auto" && options.solver == "scene" &&
-                            options.clipped == "bounds" && FindClipping(photo).share > 0;
+                            options.clipped == "bounds" && MayShowClipping(call);
   return is_auto_tiff || options.format == "tiff" ? io::ViewFormat::kTiff : io::ViewFormat::kPng;
 }
 
@@ -286,8 +317,8 @@ CommandResult RunEstimate(const EstimateOptions& options) {
       call.settings.solver = ChooserOf(options, start, &choice);
     }
     outcome.read_seconds = SecondsSince(start);
-    io::LightFieldWriter writer(TransferOf(call), FormatFor(options, call.photo),
-                                &outputs.light_field, call.photo.ColourProfile(TransferOf(call)));
+    io::LightFieldWriter writer(TransferOf(call), FormatFor(options, call), &outputs.light_field,
+                                call.photo.ColourProfile(TransferOf(call)));
     EstimateInto(&writer, std::move(call), outputs.report.has_value(), run.control(), &outcome);
   });
   outcome.total_seconds = SecondsSince(start);

@@ -9,6 +9,7 @@
 #include <utility>
 #include <variant>
 
+#include "thicklens/base/cancel.h"
 #include "thicklens/base/index.h"
 #include "thicklens/estimator/scene_solver.h"
 
@@ -29,6 +30,10 @@ constexpr std::size_t kMinOfArea = 5;
 // highlights may be below that of the photograph by this factor.
 constexpr double kMinExpected = 15;
 constexpr double kNoiseOfHighlights = 0.4;
+// Linear light has no levels. Its texture looks like noise far below those of 8 bits.
+constexpr double kLevelsOfLight = 255;
+// Values between two safe points of a loop that does not run over rows.
+constexpr std::size_t kValuesPerSafePoint = std::size_t{1} << 18U;
 
 double NormalBelow(double x) { return std::erfc(-x / std::sqrt(2.0)) / 2; }
 
@@ -53,10 +58,12 @@ class Channel {
         channel_(channel) {
     largest_ = At(0, 0);
     for (int y = 0; y < height_px_; ++y) {
+      ThrowIfCancelled();
       for (int x = 0; x < width_px_; ++x) largest_ = std::max(largest_, At(x, y));
     }
     // The values near the largest: only these are counted one by one.
     for (int y = 0; y < height_px_; ++y) {
+      ThrowIfCancelled();
       for (int x = 0; x < width_px_; ++x) {
         const Value value = At(x, y);
         if (counts_.size() > kLevelsBelow && value < counts_.begin()->first) continue;
@@ -98,13 +105,14 @@ class Channel {
       open.push_back(pixel);
     };
     for (int y = 0; y < height_px_; ++y) {
+      ThrowIfCancelled();
       for (int x = 0; x < width_px_; ++x) {
         visit(x, y);
         std::size_t size = 0;
         while (!open.empty()) {
           const auto at = static_cast<int>(open.back());
           open.pop_back();
-          ++size;
+          if (++size % kValuesPerSafePoint == 0) ThrowIfCancelled();
           const int i = at % width_px_, j = at / width_px_;
           visit(i - 1, j);
           visit(i + 1, j);
@@ -138,6 +146,7 @@ double NoiseBelow(const Image& photo, const std::vector<Value>& values,
   const auto channels = Index(photo.channels());
   std::vector<std::uint8_t> clipped(values.size(), 0);
   for (std::size_t i = 0; i < values.size(); ++i) {
+    if (i % kValuesPerSafePoint == 0) ThrowIfCancelled();
     if (i % channels < largest.size() && values[i] == largest[i % channels]) clipped[i] = 1;
   }
   const TransferCurve transfer = photo.transfer().value_or(TransferCurve::Srgb());
@@ -184,19 +193,28 @@ PhotoClipping ClippingOfEncoded(const Image& photo) {
   return found;
 }
 
-// Real numbers have no full scale, and noise makes all of them different.
+// Real numbers have no full scale, and noise makes all of them different. A rendered image without
+// noise may have one even area that is its brightest.
 PhotoClipping ClippingOfLight(const Image& photo) {
   const model::LinearImage& image = photo.light();
   PhotoClipping found;
   found.levels.assign(Index(ColoursOf(photo)), 0);
   found.at_full_scale = false;
   const auto channels = ChannelsOf(photo, image.values);
+  std::vector<float> largest;
+  for (const auto& channel : channels) largest.push_back(channel.largest());
+  std::optional<double> noise;  // measured only where it decides
   for (std::size_t c = 0; c < channels.size(); ++c) {
     const Channel<float>& channel = channels[c];
     if (!(channel.largest() > 0) || !channel.is_piled_up()) continue;
+    bool is_limit = channel.Areas() >= kMinAreas;
     const bool is_continuous = channel.largest_count_below() <= 2;
-    if (is_continuous || channel.Areas() >= kMinAreas)
-      found.levels[c] = static_cast<double>(channel.largest());
+    if (!is_limit && is_continuous) {
+      if (!noise) noise = NoiseBelow(photo, image.values, largest);
+      const double sigma = kNoiseOfHighlights * *noise * kLevelsOfLight;
+      is_limit = static_cast<double>(channel.count()) * ShareAbove(sigma) >= kMinExpected;
+    }
+    if (is_limit) found.levels[c] = static_cast<double>(channel.largest());
   }
   return found;
 }
@@ -211,6 +229,7 @@ std::vector<float> MaskOf(const Image& photo, const PhotoClipping& clipping) {
   const auto channels = Index(photo.channels());
   std::vector<float> mask(Index(photo.width_px()) * Index(photo.height_px()) * channels, 0.0F);
   for (std::size_t i = 0; i < mask.size(); ++i) {
+    if (i % kValuesPerSafePoint == 0) ThrowIfCancelled();
     const std::size_t c = i % channels;
     if (c >= clipping.levels.size() || clipping.levels[c] == 0) continue;
     if (EncodedAt(photo, i) >= clipping.levels[c]) mask[i] = 1;
@@ -225,9 +244,13 @@ void GrowMask(const Image& photo, const PhotoClipping& clipping, double scatter,
   const auto channels = Index(photo.channels());
   std::vector<std::size_t> open;
   for (std::size_t i = 0; i < mask->size(); ++i) {
+    if (i % kValuesPerSafePoint == 0) ThrowIfCancelled();
     if ((*mask)[i] != 0) open.push_back(i);
   }
+  std::size_t steps = 0;
   while (!open.empty()) {
+    // Each looks at nine values.
+    if (++steps % (kValuesPerSafePoint / 16) == 0) ThrowIfCancelled();
     const std::size_t from = open.back();
     open.pop_back();
     const std::size_t channel = from % channels;
@@ -277,12 +300,9 @@ PhotoClipping FindClipping(const Image& photo) {
   return found;
 }
 
-std::optional<Image> ClippedPartsOf(const Image& photo, const EstimateOptions& options,
-                                    EstimateDiagnostics* diagnostics) {
+std::optional<Image> ClippedPartsOf(const Image& photo, EstimateDiagnostics* diagnostics) {
   diagnostics->clipping = FindClipping(photo);
-  if (!(diagnostics->clipping.share > 0) || options.clipped == ClippedHighlights::kData) {
-    return std::nullopt;
-  }
+  if (!(diagnostics->clipping.share > 0)) return std::nullopt;
   std::vector<float> mask = MaskOf(photo, diagnostics->clipping);
   constexpr double kLargestScatter = 4;  // in standard deviations of the compression
   const double scatter = kLargestScatter * diagnostics->compression_sigma.value_or(0);
@@ -298,23 +318,44 @@ std::vector<std::uint8_t> MarksOf(const Image& clipped_parts) {
   constexpr float kTrace = 1e-3F;  // interpolation overshoots by less than this far away
   std::vector<std::uint8_t> marks;
   marks.reserve(clipped_parts.light().values.size());
-  for (const float value : clipped_parts.light().values)
+  for (const float value : clipped_parts.light().values) {
+    if (marks.size() % kValuesPerSafePoint == 0) ThrowIfCancelled();
     marks.push_back(std::abs(value) > kTrace ? 1 : 0);
+  }
   return marks;
+}
+
+void LimitToMarks(const std::vector<std::uint8_t>& marks, PhotoClipping* clipping) {
+  std::vector<std::size_t> counts(clipping->levels.size(), 0);
+  for (std::size_t i = 0; i < marks.size(); ++i) {
+    if (i % kValuesPerSafePoint == 0) ThrowIfCancelled();
+    if (marks[i] != 0) ++counts[i % counts.size()];
+  }
+  std::size_t all = 0;
+  for (std::size_t c = 0; c < counts.size(); ++c) {
+    all += counts[c];
+    if (counts[c] == 0) clipping->levels[c] = 0;
+  }
+  clipping->share = static_cast<double>(all) / static_cast<double>(marks.size());
 }
 
 void ReportClipping(const std::string& photo, const EstimateOptions& options,
                     const PhotoClipping& clipping, RunScope* run) {
   if (!(clipping.share > 0)) return;
   constexpr double kPercent = 100;
-  const bool is_scene = std::holds_alternative<SceneSolver>(options.solver) ||
-                        std::holds_alternative<SolverChooser>(options.solver);
+  const bool is_open = std::holds_alternative<SolverChooser>(options.solver);
   const std::string found = fmt::format("{}: {:.2g} % of its values are clipped ({})", photo,
                                         kPercent * clipping.share, LevelsInWords(clipping));
   if (options.clipped == ClippedHighlights::kData) {
     run->Warn(
         fmt::format("{}: they are taken as the light itself ({})", found, run->Option("clipped")));
-  } else if (is_scene) {
+  } else if (is_open) {
+    run->Warn(
+        fmt::format("{}: if the solver scene is chosen, the light there is at least that, and its "
+                    "residual counts only below it; {} data, and every other solver, takes such "
+                    "values as the light itself",
+                    found, run->Option("clipped")));
+  } else if (std::holds_alternative<SceneSolver>(options.solver)) {
     run->Warn(
         fmt::format("{}: the light there is at least that, and its residual counts only below it; "
                     "{} data takes "

@@ -38,6 +38,25 @@ std::string ValuesText(const DepthOrigin& depth, double scale, double offset_px,
                      scale * depth.meaning.disparity_offset_px + offset_px);
 }
 
+// A negative scale exchanges near and far.
+std::string ScaleOffsetText(const DepthOrigin& depth, const DepthCauseTrial& cause,
+                            const RunScope& run) {
+  const bool is_reversed = cause.scale < 0;
+  if (depth.meaning.kind == DepthKind::kDisparity) {
+    return is_reversed ? "near and far are exchanged, and the offset is wrong"
+                       : "scale and offset are wrong";
+  }
+  const std::string focus =
+      fmt::format("the camera is focused elsewhere (are its focus distance and {} right?)",
+                  run.Option("lens_position"));
+  return is_reversed ? fmt::format("near and far are exchanged (is {} right?), and {}",
+                                   run.Option("depth.meaning.kind"), focus)
+                     : fmt::format(
+                           "the predicted blur needs a factor of about {:.2g} (are {} and "
+                           "the camera's aperture right?), and {}",
+                           cause.scale, run.Option("depth.meaning.unit"), focus);
+}
+
 std::string CauseText(const DepthOrigin& depth, const DepthCauseTrial& cause, const RunScope& run) {
   const bool is_disparity = depth.meaning.kind == DepthKind::kDisparity;
   const auto values = [&] {
@@ -57,9 +76,11 @@ std::string CauseText(const DepthOrigin& depth, const DepthCauseTrial& cause, co
           run.Option("photo.orientation"));
     case DepthCause::kShift:
       return fmt::format(
-          "it lies beside the photograph and has to move by about {} px to the {} and {} px {}",
+          "it lies beside the photograph and has to move by about {} px to the {} and {} px {} ({} "
+          "states which part of the photograph it covers, {} the camera that it was captured by)",
           std::abs(cause.shift_x_px), cause.shift_x_px < 0 ? "left" : "right",
-          std::abs(cause.shift_y_px), cause.shift_y_px < 0 ? "up" : "down");
+          std::abs(cause.shift_y_px), cause.shift_y_px < 0 ? "up" : "down",
+          run.Option("depth_fit.part"), run.Option("depth_fit.camera"));
     case DepthCause::kSign:
       return "near and far are exchanged" +
              (is_disparity ? values()
@@ -78,15 +99,18 @@ std::string CauseText(const DepthOrigin& depth, const DepthCauseTrial& cause, co
                                         cause.offset_px, values())
                           : fmt::format(
                                 "the camera is focused elsewhere, by {:.2g} px of disparity per "
-                                "view step",
-                                cause.offset_px);
+                                "view step (are its focus distance and {} right?)",
+                                cause.offset_px, run.Option("lens_position"));
     case DepthCause::kScaleOffset:
-      return fmt::format("scale and offset are wrong{}", values());
+      return ScaleOffsetText(depth, cause, run) + values();
     case DepthCause::kSharp:
       return fmt::format("the photograph is sharp at all depths ({} sharp)",
                          run.Option("solver.photo"));
     case DepthCause::kOtherImage:
-      return "it belongs to another image, or to another part of this one";
+      return fmt::format(
+          "it belongs to another image, or to another part of this one (are {} and the photograph "
+          "the files of one capture?)",
+          depth.name);
     case DepthCause::kNone:
       break;
   }

@@ -18,9 +18,9 @@ constexpr double kMaxOfWholePx = 3;
 // Share of the image by which the outermost views may see half of the points apart: light fields
 // have less than a twentieth, a wide portrait lens blurs a far background by an eighth.
 constexpr double kMaxOfDisparity = 1.0 / 8, kMaxOfDepth = 1.0 / 2;
-// Displacement over the whole aperture that is no visible parallax, and one that is, px.
 // Diameter over focal length of the widest lenses.
 constexpr double kWidestLens = 1.4;
+// Displacement over the whole aperture that is no visible parallax, and one that is, px.
 constexpr double kInvisiblePx = 0.3, kVisiblePx = 1;
 // Points beyond are too few to count.
 constexpr double kFew = 0.005;
@@ -103,14 +103,15 @@ void ReportPlausibility(const DepthMap& map, const estimator::DisparityMap& disp
   const DepthMeaning& meaning = map.meaning;
   const bool has_no_scale = map.is_integer && meaning.kind == DepthKind::kDisparity &&
                             meaning.disparity_scale == 1 && meaning.disparity_offset_px == 0;
-  if (has_no_scale && size.median > kMaxOfWholePx) {
+  const int size_px = std::min(disparity.width_px, disparity.height_px);
+  // Whole numbers may be px, such as those of a stereo pair.
+  if (has_no_scale && size.median > kMaxOfWholePx &&
+      size.median * views > kMaxOfDisparity * size_px) {
     throw Error(fmt::format(
         "{}: the whole numbers of the map are taken as px per view step: the median of {:.4g} px "
         "moves a point by {:.4g} px between the outermost views, and the image has {} px; {}",
-        NameFor(map), size.median, size.median * views,
-        std::min(disparity.width_px, disparity.height_px), ScaleAdvice(map, range, *run)));
+        NameFor(map), size.median, size.median * views, size_px, ScaleAdvice(map, range, *run)));
   }
-  const int size_px = std::min(disparity.width_px, disparity.height_px);
   const double most =
       (meaning.kind == DepthKind::kDisparity ? kMaxOfDisparity : kMaxOfDepth) * size_px;
   if (size.median * views > most && size.median > kMaxOfWholePx) {

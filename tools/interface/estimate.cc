@@ -166,8 +166,6 @@ void CheckFlips(const PreparedProblem& prepared, const EstimateOptions& options,
   estimate->summary.seconds.depth_flips = SecondsSince(start);
 }
 
-using DepthFile = DepthOrigin;
-
 std::string WordsOf(model::DepthFlip flip) {
   switch (flip) {
     case model::DepthFlip::kRows:
@@ -179,7 +177,7 @@ std::string WordsOf(model::DepthFlip flip) {
   }
 }
 
-std::string ReversedText(const DepthFile& depth, const LightFieldEstimate& estimate,
+std::string ReversedText(const DepthOrigin& depth, const LightFieldEstimate& estimate,
                          const RunScope& run) {
   const estimator::DepthFlipCheck& flips = *estimate.diagnostics.depth_flips;
   const EstimateSummary& summary = estimate.summary;
@@ -195,11 +193,78 @@ std::string ReversedText(const DepthFile& depth, const LightFieldEstimate& estim
           : fmt::format("{} {}", run.Option("depth.flip"), model::DepthFlipName(flip)));
 }
 
+// Returns which causes do not explain the photograph, and which were not tested, as a part of a
+// sentence.
+std::string TestedText(const EstimateDiagnostics& found) {
+  using estimator::DepthCause;
+  const auto is_tried = [&found](DepthCause cause) {
+    if (!found.contradiction) return false;
+    const auto& trials = found.contradiction->trials;
+    return std::any_of(trials.begin(), trials.end(), [cause](const estimator::DepthCauseTrial& of) {
+      return of.cause == cause && (of.edges || of.spectra || of.residual);
+    });
+  };
+  std::vector<std::string> tested, untested;
+  const auto add = [&](bool is_tested, const char* cause) {
+    (is_tested ? tested : untested).emplace_back(cause);
+  };
+  const bool has_place = is_tried(DepthCause::kNone);  // by edges
+  add(is_tried(DepthCause::kRows) || found.depth_flips, "order");
+  add(has_place, "place");
+  add(has_place, "another image");
+  add(is_tried(DepthCause::kSign), "sign");
+  add(is_tried(DepthCause::kScale), "scale");
+  add(is_tried(DepthCause::kOffset), "offset");
+  std::string text;
+  if (!tested.empty()) {
+    text = fmt::format("none of the causes that were tested ({}) explains it",
+                       fmt::join(tested, ", "));
+  }
+  if (untested.empty()) return text;
+  const std::string why =
+      found.contradiction ? found.contradiction->values_untested : "the check itself failed";
+  return fmt::format("{}{}{} could not be tested{}", text, text.empty() ? "" : ", and ",
+                     fmt::join(untested, ", "), why.empty() ? "" : fmt::format(" ({})", why));
+}
+
+std::string NoiseText(const EstimateDiagnostics& found) {
+  return found.compression_sigma ? "noise and JPEG compression" : "noise";
+}
+
+// Returns the causes that the measure of a compression does not know of; empty without compression.
+std::string JpegCauseText(const EstimateDiagnostics& found) {
+  return found.compression_sigma
+             ? "; the photograph is a JPEG file: stronger compression before, halved colours and "
+               "sharpening have this effect too"
+             : "";
+}
+
+std::string UnexplainedText(const DepthOrigin& depth, const EstimateDiagnostics& found,
+                            const RunScope& run) {
+  const bool is_large =
+      found.unexplained_share && *found.unexplained_share > estimator::kMaxUnexplained;
+  return fmt::format(
+      "{}: {} of the photograph is not explained beyond its {} of {:.1f} grey levels: its residual "
+      "of {:.1f} grey levels is {:.1f} times that; {}; check that the map belongs to this "
+      "photograph, and {}{}",
+      depth.name, is_large ? fmt::format("{:.0f} %", 100 * *found.unexplained_share) : "a part",
+      NoiseText(found), kEightBitLevels * *found.DoubtSigma(),
+      kEightBitLevels * *found.residual_rms, *found.residual_rms / *found.DoubtSigma(),
+      TestedText(found),
+      depth.meaning.kind == DepthKind::kDisparity
+          ? fmt::format("{} and {}", run.Option("depth.meaning.disparity_scale"),
+                        run.Option("depth.meaning.disparity_offset_px"))
+          : fmt::format("its unit ({}) and the camera's aperture and focus",
+                        run.Option("depth.meaning.unit")),
+      JpegCauseText(found));
+}
+
 // A photograph that contradicts its depth, or that nothing explains, makes the result partial. The
-// residual alone shows reversed orders only if the map has no edges.
-void CheckAgreement(const PreparedProblem& prepared, const EstimateOptions& options,
-                    const DepthFile& depth, RunScope* run, LightFieldEstimate* estimate) {
-  if (!std::holds_alternative<SceneSolver>(options.solver)) return;
+// residual alone shows reversed orders only if the map has no edges. Returns whether there is such
+// a reason.
+bool CheckAgreement(const PreparedProblem& prepared, const EstimateOptions& options,
+                    const DepthOrigin& depth, RunScope* run, LightFieldEstimate* estimate) {
+  if (!std::holds_alternative<SceneSolver>(options.solver)) return false;
   EstimateDiagnostics& found = estimate->diagnostics;
   FindContradiction(prepared, IsInDoubt(found, kDoubtful), run, estimate);
   std::string reason =
@@ -208,17 +273,12 @@ void CheckAgreement(const PreparedProblem& prepared, const EstimateOptions& opti
   if (reason.empty() && !has_edges) CheckFlips(prepared, options, run, estimate);
   const bool is_reversed = found.depth_flips && found.depth_flips->better;
   if (is_reversed) reason = ReversedText(depth, *estimate, *run);
-  if (reason.empty() && IsInDoubt(found, kUnexplainedResidual)) {
-    reason = fmt::format(
-        "{}: the photograph is not explained: its residual of {:.1f} grey levels is {:.1f} times "
-        "the noise, and none of the causes that were tested (order, place, sign, scale, offset, "
-        "another image) explains it",
-        depth.name, kEightBitLevels * *found.residual_rms,
-        *found.residual_rms / *found.DoubtSigma());
-  }
-  if (reason.empty()) return;
+  if (reason.empty() && IsInDoubt(found, kUnexplainedResidual))
+    reason = UnexplainedText(depth, found, *run);
+  if (reason.empty()) return false;
   std::string& partial = estimate->summary.partial_reason;
   partial += (partial.empty() ? "" : "; ") + reason;
+  return true;
 }
 
 // Returns what a user should know of the photograph's aperture; empty: nothing beyond the summary.
@@ -245,9 +305,10 @@ std::string PhotoWarning(const EstimateDiagnostics& found, const RunScope& run) 
   }
 }
 
-// Returns the warnings about the result, one line each, with their numbers.
-std::vector<std::string> WarningsOf(const DepthFile& depth, bool has_camera, const RunScope& run,
-                                    const LightFieldEstimate& estimate) {
+// Returns the warnings about the result, one line each, with their numbers. `is_disagreement`: the
+// reason of a partial result already states the residual.
+std::vector<std::string> WarningsOf(const DepthOrigin& depth, bool has_camera, bool is_disagreement,
+                                    const RunScope& run, const LightFieldEstimate& estimate) {
   const EstimateDiagnostics& found = estimate.diagnostics;
   const EstimateSummary& summary = estimate.summary;
   std::vector<std::string> warnings;
@@ -279,13 +340,9 @@ std::vector<std::string> WarningsOf(const DepthFile& depth, bool has_camera, con
   if (!summary.partial_reason.empty()) warnings.push_back(summary.partial_reason);
   const double noise_levels = kEightBitLevels * found.DoubtSigma().value_or(0);
   const double noise_of_mean_levels = kEightBitLevels * found.DoubtSigmaOfMean().value_or(0);
-  const bool is_jpeg = found.compression_sigma.has_value();
-  const std::string noise = is_jpeg ? "noise and JPEG compression" : "noise";
+  const std::string noise = NoiseText(found);
   // Its measure does not know of every cause. The first warning names them.
-  std::string jpeg_cause =
-      is_jpeg ? "; the photograph is a JPEG file: stronger compression before, halved colours and "
-                "sharpening have this effect too"
-              : "";
+  std::string jpeg_cause = is_disagreement ? "" : JpegCauseText(found);
   if (!found.patches.empty()) {
     const UnexplainedPatch& worst = found.patches.front();
     warnings.push_back(fmt::format(
@@ -299,7 +356,7 @@ std::vector<std::string> WarningsOf(const DepthFile& depth, bool has_camera, con
   const bool is_reversed = (found.depth_flips && found.depth_flips->better) ||
                            (found.contradiction && found.contradiction->is_contradicted);
   if (found.unexplained_share && *found.unexplained_share > estimator::kMaxUnexplained &&
-      !is_reversed) {
+      !is_disagreement) {
     warnings.push_back(fmt::format(
         "{:.0f} % of the photograph is not explained beyond its {} of {:.1f} grey levels: most "
         "likely it is sharper than depth and aperture predict; {}{}",
@@ -310,7 +367,7 @@ std::vector<std::string> WarningsOf(const DepthFile& depth, bool has_camera, con
             : "are the depth's unit, and the camera's aperture and focus, right?",
         std::exchange(jpeg_cause, "")));
   }
-  if (IsInDoubt(found, kDoubtful) && !found.unexplained_share && !is_reversed) {
+  if (IsInDoubt(found, kDoubtful) && !found.unexplained_share && !is_disagreement) {
     warnings.push_back(fmt::format(
         "the photograph has a residual of {:.1f} grey levels ({}: {:.1f}), and nearly "
         "everywhere it receives light from points that the centre view does not show: check the "
@@ -318,7 +375,7 @@ std::vector<std::string> WarningsOf(const DepthFile& depth, bool has_camera, con
         kEightBitLevels * *found.residual_rms, noise, noise_levels, summary.width_px,
         summary.height_px, std::exchange(jpeg_cause, "")));
   }
-  const bool is_reported = is_reversed || !found.patches.empty() || !found.unexplained_share ||
+  const bool is_reported = is_disagreement || !found.patches.empty() || !found.unexplained_share ||
                            *found.unexplained_share > estimator::kMaxUnexplained;
   if (IsInDoubt(found, kUnexplainedAnyway) && !is_reported) {
     warnings.push_back(fmt::format(
@@ -419,8 +476,8 @@ LightFieldEstimate Estimate(ViewSink* given_sink, Image photo, DepthMap depth,
   RequireValidEstimate(depth, camera, given, control);
   RunScope run(control);
   LightFieldEstimate estimate;
-  const DepthFile depth_file{depth.source.empty() ? "depth" : depth.source, depth.meaning,
-                             depth.flip};
+  const DepthOrigin depth_file{depth.source.empty() ? "depth" : depth.source, depth.meaning,
+                               depth.flip};
   PreparedProblem prepared =
       Prepare(std::move(photo), std::move(depth), camera, given, &estimate.diagnostics, &run);
   ThrowIfCancelled();
@@ -463,7 +520,7 @@ LightFieldEstimate Estimate(ViewSink* given_sink, Image photo, DepthMap depth,
   origin.date = NowIso8601();
   estimate.summary.effects = origin.effects;
   CheckResult(prepared, solved, &estimate);
-  CheckAgreement(prepared, options, depth_file, &run, &estimate);
+  const bool is_disagreement = CheckAgreement(prepared, options, depth_file, &run, &estimate);
   if (options.strict && !estimate.summary.partial_reason.empty())
     throw Error(estimate.summary.partial_reason);
   ThrowIfCancelled();
@@ -483,7 +540,7 @@ LightFieldEstimate Estimate(ViewSink* given_sink, Image photo, DepthMap depth,
   estimate.was_hole = std::move(prepared.was_hole);
   estimate.maps = std::move(solved.maps);
   estimate.summary.warnings =
-      WarningsOf(depth_file, prepared.input->camera.has_value(), run, estimate);
+      WarningsOf(depth_file, prepared.input->camera.has_value(), is_disagreement, run, estimate);
   for (const std::string& warning : estimate.summary.warnings) run.Warn(warning);
   estimate.diagnostics.notices = run.notices();
   return estimate;

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+#include <string>
 #include <utility>
 
 #include "thicklens/estimator/falloff_evidence.h"
@@ -29,14 +31,19 @@ void DecideFalloff(const std::string& photo, const EstimateOptions& options,
   if (!(factor >= kMinFactor)) return;
   const std::string without = run->Option("effects.without") + " falloff";
   const std::string with = run->Option("effects.given") + " all";
+  // Where the lens shades a corner completely, there is no factor.
+  const bool is_black = !std::isfinite(factor);
+  const std::string darker =
+      is_black ? "black corners" : fmt::format("corners {:.2g}x darker", factor);
+  const std::string brighter = is_black ? "all corners that are not predicted to be black"
+                                        : fmt::format("the corners up to {:.2g}x", factor);
   const std::string keeps = fmt::format(
-      "the fall-off, by which the camera predicts corners {:.2g}x darker, is not divided out; if "
-      "the photograph has it, {} divides it out",
-      factor, with);
-  const std::string divides = fmt::format(
-      "the fall-off is divided out, which brightens the corners up to {:.2g}x; {} keeps them as "
-      "they are",
-      factor, without);
+      "the fall-off, by which the camera predicts {}, is not divided out; if the photograph has "
+      "it, {} divides it out",
+      darker, with);
+  const std::string divides =
+      fmt::format("the fall-off is divided out, which brightens {}; {} keeps them as they are",
+                  brighter, without);
   const bool is_raw = input.transfer == TransferCurve::Linear();
   switch (evidence.verdict) {
     case Verdict::kShown:

@@ -1,4 +1,6 @@
 // A depth map of another size, part or camera in the pixels of its photograph.
+#include "tools/interface/fit_depth.h"
+
 #include <fmt/format.h>
 
 #include <Eigen/LU>
@@ -76,37 +78,6 @@ bool HasAspectOf(const DepthMap& depth, const Image& photo) {
   const double cross = std::abs(width * photo.height_px() - height * photo.width_px());
   return cross < std::max({width, height, static_cast<double>(photo.width_px()),
                            static_cast<double>(photo.height_px())});
-}
-
-// ---- Confidence.
-
-// Makes holes of the values below the confidence.
-void DropDoubtful(const DepthFit& fit, DepthMap* depth, RunScope* run) {
-  if (depth->confidence.empty()) {
-    if (fit.min_confidence > 0) {
-      throw OptionError("depth_fit.min_confidence",
-                        fmt::format("depth_fit.min_confidence: {} has no confidence that could be "
-                                    "compared with {:g}",
-                                    MapName(*depth), fit.min_confidence));
-    }
-    return;
-  }
-  std::size_t dropped = 0;
-  for (std::size_t i = 0; i < depth->values.size(); ++i) {
-    const auto confidence = static_cast<double>(depth->confidence[i]);
-    if (confidence > 0 && confidence >= fit.min_confidence) continue;
-    if (std::isfinite(depth->values[i])) ++dropped;
-    depth->values[i] = kNoDepth;
-    depth->confidence[i] = 0;
-  }
-  if (dropped == depth->values.size()) {
-    throw Error(fmt::format("{}: no value has a confidence above 0 and of at least {:g} ({})",
-                            MapName(*depth), fit.min_confidence,
-                            run->Option("depth_fit.min_confidence")));
-  }
-  run->Inform(fmt::format(
-      "{}: {:.1f} % of its values have too little confidence and are no depths", MapName(*depth),
-      kPercent * static_cast<double>(dropped) / static_cast<double>(depth->values.size())));
 }
 
 // ---- The camera that measured the map.
@@ -287,23 +258,71 @@ estimator::MapPlacement PartByEdges(const DepthMap& depth, const estimator::Dept
 
 }  // namespace
 
+void DropDoubtful(const DepthFit& fit, DepthMap* depth, RunScope* run) {
+  if (depth->confidence.empty()) {
+    if (fit.min_confidence > 0) {
+      throw OptionError("depth_fit.min_confidence",
+                        fmt::format("depth_fit.min_confidence: {} has no confidence that could be "
+                                    "compared with {:g}",
+                                    MapName(*depth), fit.min_confidence));
+    }
+    return;
+  }
+  std::size_t dropped = 0, remaining = 0;
+  for (std::size_t i = 0; i < depth->values.size(); ++i) {
+    const auto confidence = static_cast<double>(depth->confidence[i]);
+    const bool is_value = std::isfinite(depth->values[i]);
+    if (confidence > 0 && confidence >= fit.min_confidence) {
+      remaining += is_value ? 1 : 0;
+      continue;
+    }
+    dropped += is_value ? 1 : 0;
+    depth->values[i] = kNoDepth;
+    depth->confidence[i] = 0;
+  }
+  if (dropped > 0 && remaining == 0) {
+    throw Error(fmt::format("{}: no value has a confidence above 0 and of at least {:g} ({})",
+                            MapName(*depth), fit.min_confidence,
+                            run->Option("depth_fit.min_confidence")));
+  }
+  run->Inform(fmt::format(
+      "{}: {:.1f} % of its values have too little confidence and are no depths", MapName(*depth),
+      kPercent * static_cast<double>(dropped) / static_cast<double>(depth->values.size())));
+}
+
 DepthMap FitDepth(DepthMap depth, const Image& photo, const DepthFit& fit, std::string* described,
                   const RunControl& control) {
   checks::RequireValid(control);
   checks::RequireValid(depth);
   checks::RequireValid(fit);
   RunScope run(control);
-  if (described != nullptr) described->clear();
   DropDoubtful(fit, &depth, &run);
+  return FitDepthWithin(std::move(depth), photo, fit, described, &run);
+}
+
+DepthMap FitDepthWithin(DepthMap depth, const Image& photo, const DepthFit& fit,
+                        std::string* described, RunScope* run) {
+  checks::RequireValid(depth);
+  checks::RequireValid(fit);
+  if (described != nullptr) described->clear();
+  const auto samples_have_no_effect = [&](const std::string& why) {
+    if (fit.samples == DepthSamples::kAuto) return;
+    run->Warn(fmt::format("{}: {} has no effect: {}", MapName(depth),
+                          run->Option("depth_fit.samples"), why));
+  };
   const bool is_equal = depth.width_px == photo.width_px() && depth.height_px == photo.height_px();
-  if (is_equal && !fit.part && fit.camera == nullptr) return depth;
-  // The holes of the map as it is stored; those that result are reported later.
-  model::RawDepthMap raw = MarkedMap(depth, nullptr);
+  if (is_equal && !fit.part && fit.camera == nullptr) {
+    samples_have_no_effect("the map has the size of the photograph");
+    return depth;
+  }
+  // Holes by the marks of the file are reported here: those of the result are NaN.
+  model::RawDepthMap raw = MarkedMap(depth, run);
   const model::LinearImage guide = GuideOf(photo);
   estimator::DepthSampling map;
   estimator::MapPlacement place;
   std::string how;
   if (fit.camera != nullptr) {
+    samples_have_no_effect("the camera of the map says where its samples are");
     std::tie(map, place) = SeenByPhoto(depth, raw.values, *fit.camera, photo);
     how = fmt::format("registered from the camera of {}, {:.4g} mm beside the photograph's",
                       fit.camera->source.empty() ? "depth_fit.camera" : fit.camera->source,
@@ -313,29 +332,33 @@ DepthMap FitDepth(DepthMap depth, const Image& photo, const DepthFit& fit, std::
     depth.meaning.unit = LengthUnit::kMillimetre;
     depth.is_integer = false;
     depth.near_value.reset();
+    depth.holes = {};
   } else {
     map = {depth.width_px, depth.height_px, std::move(raw.values), depth.confidence};
     InvertLengths(depth.meaning.kind, &map.values);
     const model::PixelRect part =
         fit.part.value_or(model::PixelRect{0, 0, photo.width_px(), photo.height_px()});
     if (!fit.part && !HasAspectOf(depth, photo)) {
-      place = PartByEdges(depth, map, guide, photo, &how, &run);
+      place = PartByEdges(depth, map, guide, photo, &how, run);
+      how += ", ";
     } else {
       place = estimator::PlaceOn(Eigen::Vector2d(part.x, part.y),
                                  Eigen::Vector2d(part.width, part.height), depth.width_px,
                                  depth.height_px);
-      if (place.step_px.minCoeff() > 1) {
-        place = DecideSamples(map, guide, place, fit, &how, &run);
-      } else {
-        how = "each pixel has the surface that fills most of it";
-      }
     }
+    std::string of_samples = "each pixel has the surface that fills most of it";
+    if (place.step_px.minCoeff() > 1) {
+      place = DecideSamples(map, guide, place, fit, &of_samples, run);
+    } else {
+      samples_have_no_effect("the map is at least as fine as the photograph");
+    }
+    how += of_samples;
     if (fit.part) {
       how = fmt::format("on the part {},{},{},{} of the photograph, {}", part.x, part.y, part.width,
                         part.height, how);
     }
   }
-  estimator::ResampledDepth found = estimator::ResampleDepth(map, guide, place, run.threads());
+  estimator::ResampledDepth found = estimator::ResampleDepth(map, guide, place, run->threads());
   InvertLengths(depth.meaning.kind, &found.values);
   std::size_t without = 0;
   for (const float value : found.values) without += std::isnan(value) ? 1 : 0;
@@ -346,18 +369,21 @@ DepthMap FitDepth(DepthMap depth, const Image& photo, const DepthFit& fit, std::
       depth.width_px, depth.height_px, photo.width_px(), photo.height_px(), how,
       kPercent * found.between_share, kPercent * found.moved_share,
       kPercent * static_cast<double>(without) / pixels);
-  run.Inform(fmt::format("{}: {}", MapName(depth), text));
+  run->Inform(fmt::format("{}: {}", MapName(depth), text));
   if (described != nullptr) *described = text;
   if (without == found.values.size()) {
-    throw Error(
-        fmt::format("{}: no pixel of the photograph has a depth: the map shows another "
-                    "part, or all its values are holes ({} and {})",
-                    MapName(depth), run.Option("depth_fit.part"), run.Option("depth_fit.camera")));
+    throw Error(fmt::format(
+        "{}: no pixel of the photograph has a depth: the map shows another "
+        "part, or all its values are holes ({} and {})",
+        MapName(depth), run->Option("depth_fit.part"), run->Option("depth_fit.camera")));
   }
   depth.width_px = photo.width_px();
   depth.height_px = photo.height_px();
   depth.values = std::move(found.values);
   depth.confidence = std::move(found.confidence);
+  // Marks are NaN by now, and a value that lies on one between two samples is none.
+  depth.holes.hole_values.clear();
+  depth.largest_of_type.reset();
   return depth;
 }
 

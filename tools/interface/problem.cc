@@ -6,8 +6,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <utility>
+#include <vector>
 
 #include "thicklens/depth_fit.h"
 #include "thicklens/distortion.h"
@@ -27,6 +30,7 @@
 #include "tools/interface/effects_choice.h"
 #include "tools/interface/exif_comparison.h"
 #include "tools/interface/falloff_choice.h"
+#include "tools/interface/fit_depth.h"
 #include "tools/interface/prepare_aperture.h"
 #include "tools/interface/stated_transfer.h"
 #include "tools/interface/validation.h"
@@ -81,8 +85,10 @@ void CutToCrop(const std::optional<PixelRect>& crop, Image* photo, DepthMap* dep
   const auto was_cut = [&](int width_px, int height_px, const std::string& name) {
     const bool cut = width_px == crop->width && height_px == crop->height && differ;
     if (cut) {
-      run->Warn(fmt::format("{}: has the size of {} already and is not cropped", name,
-                            run->Option("crop")));
+      run->Warn(fmt::format(
+          "{}: has the size of {} already and is not cropped (a smaller depth map of the whole "
+          "photograph is stated by {} 0,0 and the photograph's size)",
+          name, run->Option("crop"), run->Option("depth_fit.part")));
     }
     return cut;
   };
@@ -97,13 +103,22 @@ void CutToCrop(const std::optional<PixelRect>& crop, Image* photo, DepthMap* dep
   }
 }
 
-// Whether one of photograph and depth map is the crop of the other already.
-bool IsCutAlready(const std::optional<PixelRect>& crop, const Image& photo, const DepthMap& depth) {
-  if (!crop) return false;
+// Whether one of photograph and depth map is the crop of the other already, unless it is stated
+// what the map shows. A map of the crop's size may also be a smaller one of the whole photograph;
+// the warning of CutToCrop says as what it is taken.
+bool IsCutAlready(const EstimateOptions& options, const Image& photo, const DepthMap& depth) {
+  const std::optional<PixelRect>& crop = options.crop;
+  if (!crop || options.depth_fit.part || options.depth_fit.camera != nullptr) return false;
   const auto is_crop = [&](int width_px, int height_px) {
     return width_px == crop->width && height_px == crop->height;
   };
-  return is_crop(photo.width_px(), photo.height_px()) || is_crop(depth.width_px, depth.height_px);
+  const auto contains_crop = [&](int width_px, int height_px) {
+    return crop->x + crop->width <= width_px && crop->y + crop->height <= height_px;
+  };
+  const bool photo_is_crop = is_crop(photo.width_px(), photo.height_px());
+  const bool depth_is_crop = is_crop(depth.width_px, depth.height_px);
+  return (photo_is_crop && contains_crop(depth.width_px, depth.height_px)) ||
+         (depth_is_crop && !photo_is_crop);
 }
 
 // ---- 2. The distortion of the lens.
@@ -146,6 +161,17 @@ std::optional<LensDistortion> DistortionOf(const std::string& photo, int width_p
   });
 }
 
+// A pixel without a source, whose number `missing` gets, continues the image: an edge to black
+// would be light that no blur explains.
+Image UndistortedAndContinued(const Image& image, const LensDistortion& distortion,
+                              std::size_t* missing) {
+  Image undistorted = UndistortImage(image, distortion, missing);
+  if (*missing == 0) return undistorted;
+  model::LinearImage light = undistorted.light();
+  model::ContinueBeyondSource(distortion, &light);
+  return undistorted.WithLight(std::move(light.values));
+}
+
 // Takes the distortion out of photograph and depth map. The photograph becomes linear light, as it
 // would be later. A pixel that it does not show continues the image and gets no depth, so that it
 // is filled like a hole.
@@ -163,13 +189,7 @@ void Undistort(const LensDistortion& distortion, const TransferCurve& transfer, 
   std::size_t missing = 0;
   const Image linear = Image::FromLight(photo->width_px(), photo->height_px(), photo->order(),
                                         photo->ToLight(transfer).values, transfer, photo->source());
-  *photo = UndistortImage(linear, distortion, &missing);
-  if (missing > 0) {  // an edge to black would be light that no blur explains
-    model::LinearImage light = photo->light();
-    model::ContinueBeyondSource(distortion, &light);
-    *photo = Image::FromLight(light.width_px, light.height_px, photo->order(),
-                              std::move(light.values), transfer, photo->source());
-  }
+  *photo = UndistortedAndContinued(linear, distortion, &missing);
   std::vector<float> confidence = std::move(depth->confidence);
   depth->confidence.clear();
   if (!confidence.empty()) {
@@ -516,12 +536,12 @@ PreparedProblem Prepare(Image photo, DepthMap map, const std::optional<Camera>& 
   if (photo.channels() == 4) run->Warn(file.name + ": its alpha channel is ignored");
   Image part = photo.channels() == 4 ? photo.WithoutAlpha() : std::move(photo);
   FindStorageErrors(part, facts.get(), diagnostics);
-  std::optional<Image> clipped = ClippedPartsOf(part, options, diagnostics);
+  std::optional<Image> clipped = ClippedPartsOf(part, diagnostics);
   const std::optional<TransferCurve> given = part.transfer();
-  if (!IsCutAlready(options.crop, part, map)) {
+  DropDoubtful(options.depth_fit, &map, run);
+  if (!IsCutAlready(options, part, map)) {
     try {
-      map = FitDepth(std::move(map), part, options.depth_fit, &diagnostics->depth_fit,
-                     run->control());
+      map = FitDepthWithin(std::move(map), part, options.depth_fit, &diagnostics->depth_fit, run);
     } catch (const OptionError&) {
       throw;
     } catch (const Interrupted&) {
@@ -534,7 +554,8 @@ PreparedProblem Prepare(Image photo, DepthMap map, const std::optional<Camera>& 
   if (const auto distortion =
           DistortionOf(file.name, part.width_px(), part.height_px(), camera, options, run)) {
     Undistort(*distortion, given.value_or(camera->sensor.transfer), &part, &map, diagnostics, run);
-    if (clipped) clipped = UndistortImage(*clipped, *distortion);
+    std::size_t missing = 0;
+    if (clipped) clipped = UndistortedAndContinued(*clipped, *distortion, &missing);
   }
   const int full_width_px = std::max(part.width_px(), map.width_px);
   const int full_height_px = std::max(part.height_px(), map.height_px);
@@ -562,7 +583,14 @@ PreparedProblem Prepare(Image photo, DepthMap map, const std::optional<Camera>& 
   if (facts != nullptr && StatedTransferOf(*facts) == input.transfer)
     prepared.colour_profile = facts->icc_profile;
   input.image = part.ToLight(input.transfer);
-  if (clipped) input.clipped = MarksOf(*clipped);
+  if (clipped) {
+    std::vector<std::uint8_t> marks = MarksOf(*clipped);
+    clipped.reset();  // its memory is needed
+    LimitToMarks(marks, &diagnostics->clipping);
+    const bool has_bounds =
+        diagnostics->clipping.share > 0 && options.clipped == ClippedHighlights::kBounds;
+    if (has_bounds) input.clipped = std::move(marks);
+  }
   ReportClipping(file.name, options, diagnostics->clipping, run);
   part = Image();  // its memory is needed
   const Camera* const known = input.camera ? &*input.camera : nullptr;

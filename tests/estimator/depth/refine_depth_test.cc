@@ -92,6 +92,41 @@ TEST(RefineDepth, AnExactMapStaysBitForBit) {
   }
 }
 
+TEST(RefineDepth, LayersStayBitForBit) {
+  // Five discs of their own colours in front of a wall, 0.5 px per view step apart.
+  TwoDiscs scene;
+  scene.photo.values.clear();
+  constexpr std::array<std::array<int, 3>, 5> kDiscs = {
+      {{40, 38, 27}, {112, 42, 31}, {36, 112, 24}, {88, 96, 19}, {130, 124, 22}}};
+  constexpr std::array<std::array<float, 3>, 6> kColours = {{{0.35F, 0.36F, 0.5F},
+                                                             {0.62F, 0.4F, 0.3F},
+                                                             {0.3F, 0.55F, 0.4F},
+                                                             {0.6F, 0.6F, 0.3F},
+                                                             {0.25F, 0.25F, 0.25F},
+                                                             {0.7F, 0.45F, 0.6F}}};
+  const model::TransferCurve transfer = model::TransferCurve::Srgb();
+  std::mt19937_64 engine(6);
+  std::normal_distribution<double> noise(0, 1.5 / 255);
+  for (int y = 0; y < kSize; ++y) {
+    for (int x = 0; x < kSize; ++x) {
+      std::size_t layer = 0;
+      for (std::size_t i = 0; i < kDiscs.size(); ++i) {
+        if (std::hypot(x - kDiscs[i][0], y - kDiscs[i][1]) < kDiscs[i][2]) layer = i + 1;
+      }
+      scene.disparity.at<float>(y, x) = -1 + 0.5F * static_cast<float>(layer);
+      for (const float part : kColours[layer]) {
+        scene.photo.values.push_back(
+            static_cast<float>(transfer.Decode(static_cast<double>(part) + noise(engine))));
+      }
+    }
+  }
+  DisparityMap map = MapOf(scene.disparity);
+  const DepthRefinement found = Refine(scene, &map);
+  EXPECT_FALSE(found.applied) << found.message;
+  EXPECT_EQ(found.quantum_px, 0);
+  EXPECT_EQ(map.disparity, MapOf(scene.disparity).disparity);
+}
+
 TEST(RefineDepth, WideEdgesBecomeStepsWhereTheColoursChange) {
   const TwoDiscs scene;
   cv::Mat blurred;
@@ -283,12 +318,33 @@ TEST(MapFaults, ExactMapsHaveNoBlocksAndNoQuantum) {
   const TwoDiscs scene;
   EXPECT_EQ(FindBlocks(scene.disparity).size_px(), 1);
   // The truth is a multiple of the slopes per px, which is far below any rounding that matters.
-  EXPECT_LT(QuantumOf(scene.disparity), 0.0025);
+  EXPECT_LT(QuantumOf(scene.disparity, 0.25), 0.0025);
   // Few flat surfaces are neither.
   cv::Mat flat(100, 100, CV_32F, cv::Scalar(0));
   flat(cv::Rect(20, 30, 40, 20)) = 1;
   EXPECT_EQ(FindBlocks(flat).size_px(), 1);
-  EXPECT_EQ(QuantumOf(flat), 0);
+  EXPECT_EQ(QuantumOf(flat, 0.25), 0);
+}
+
+TEST(MapFaults, AQuantumIsSmallAndDividesTheDifferences) {
+  const auto map_of = [](const std::vector<float>& layers) {
+    cv::Mat map(10, static_cast<int>(layers.size()), CV_32F);
+    for (int x = 0; x < map.cols; ++x) map.col(x) = static_cast<double>(layers[std::size_t(x)]);
+    return map;
+  };
+  // Some levels may be absent.
+  EXPECT_NEAR(QuantumOf(map_of({0, 0.1F, 0.2F, 0.5F, 0.6F, 0.7F, 1.4F, 1.5F}), 0.25), 0.1, 1e-6);
+  EXPECT_EQ(QuantumOf(map_of({0, 0.5F, 1, 1.5F, 2, 2.5F}), 0.25), 0);
+  EXPECT_EQ(QuantumOf(map_of({0, 0.07F, 0.17F, 0.23F, 0.38F, 0.49F, 0.54F, 0.78F}), 0.25), 0);
+}
+
+TEST(MapFaults, SmoothingTheQuantaDoesNotDependOnTheThreads) {
+  const TwoDiscs scene;
+  cv::Mat quantised = scene.disparity.clone();
+  for (float& value : cv::Mat_<float>(quantised)) value = 0.1F * std::round(value / 0.1F);
+  const cv::Mat one = WithoutQuanta(quantised, 0.1, 1), four = WithoutQuanta(quantised, 0.1, 4);
+  EXPECT_EQ(cv::norm(one, four, cv::NORM_INF), 0);
+  EXPECT_GT(cv::norm(one, quantised, cv::NORM_INF), 0.03);
 }
 
 }  // namespace

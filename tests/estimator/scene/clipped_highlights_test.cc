@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <memory>
 #include <random>
 #include <string>
 #include <vector>
@@ -14,6 +16,10 @@
 #include "thicklens/estimator/photo_aperture.h"
 #include "thicklens/estimator/render.h"
 #include "thicklens/estimator/scene_solver.h"
+#include "thicklens/kernels/device.h"
+#include "thicklens/kernels/kernels.h"
+#include "thicklens/kernels/radiance_steps.h"
+#include "thicklens/kernels/view_warp.h"
 #include "thicklens/model/light_field.h"
 #include "thicklens/model/light_field_grid.h"
 
@@ -278,6 +284,54 @@ TEST(ClippedHighlights, AreNoReasonForAnotherBlur) {
   as_data.clipped.clear();
   const BlurCheck misled = CheckBlur(as_data, options);
   EXPECT_LT(check.unexplained_blocks, misled.unexplained_blocks);
+}
+
+// A device that counts the systems it was asked to solve.
+class CountingDevice : public kernels::Backend {
+ public:
+  int systems = 0;
+  bool is_opencl() const override { return false; }
+  bool has_double() const override { return true; }
+  std::string name() const override { return "counting"; }
+  std::string description() const override { return "simulated"; }
+  std::unique_ptr<kernels::Kernels<float>> NewFloat() override { return nullptr; }
+  std::unique_ptr<kernels::Kernels<double>> NewDouble() override { return nullptr; }
+  std::unique_ptr<kernels::RadianceSteps<float>> NewSteps(
+      const kernels::DataTerm<float>& data) override {
+    ++systems;
+    return kernels::NewCpuRadianceSteps(data);
+  }
+  std::unique_ptr<kernels::RadianceSteps<double>> NewSteps(
+      const kernels::DataTerm<double>& data) override {
+    ++systems;
+    return kernels::NewCpuRadianceSteps(data);
+  }
+  std::unique_ptr<kernels::ViewWarp> NewWarp(const kernels::SurfaceImage&) override {
+    return nullptr;
+  }
+};
+
+// One device is stated for all bands.
+TEST(ClippedHighlights, InOneBandTakeAllBandsToTheProcessor) {
+  EstimateInput input = MakeScene(model::ApertureShape::kDisc, 1, 1, 7).input;
+  for (const bool has_bounds : {true, false}) {
+    const auto first = input.clipped.begin() + (has_bounds ? kW * kH * 3 / 4 : 0);
+    std::fill(first, input.clipped.end(), std::uint8_t{0});  // the lower bands have none
+    for (const Prior prior : {Prior::kTotalVariation, Prior::kPatches}) {
+      CountingDevice device;
+      SceneOptions options;
+      options.prior = prior;
+      options.least_bands = 3;
+      SolverRun run;
+      run.threads = 1;
+      run.backend = &device;
+      SceneSummary summary;
+      EstimateScene(input, options, run, &summary);
+      EXPECT_EQ(summary.bands, 3);
+      EXPECT_EQ(summary.device, has_bounds ? "cpu" : "counting") << PriorName(prior);
+      EXPECT_EQ(device.systems > 0, !has_bounds) << PriorName(prior);
+    }
+  }
 }
 
 TEST(ClippedHighlights, OfHalfTheSizeAreThoseOfAnyOfFourValues) {

@@ -7,9 +7,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <numeric>
+#include <random>
 #include <string>
 #include <vector>
 
+#include "estimator/scene/depth_evidence.h"
 #include "estimator/scene/jpeg_blocks.h"
 #include "support/layered_scene.h"
 #include "thicklens/base/error.h"
@@ -17,8 +21,10 @@
 namespace thicklens::estimator {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
 using thicklens::testing::LayeredScene;
@@ -164,6 +170,102 @@ TEST(DepthContradiction, WrongValuesAreNamedWithBetterOnes) {
   }
 }
 
+// The photograph of a textured surface whose disparity rises from left to right, and its map. The
+// photograph is made without the estimator: points are moved view by view and averaged.
+EstimateInput SlantedSurface(int width_px, int height_px, double first_px, double last_px) {
+  constexpr int kSide = 256, kDiscs = 5000, kViews = LayeredScene::kViews;
+  std::mt19937 random(21);
+  std::uniform_real_distribution<double> unit(0, 1);
+  std::vector<float> texture(static_cast<std::size_t>(kSide) * kSide, 0.5F);
+  const auto place = [](int x, int y) {
+    return static_cast<std::size_t>(y & (kSide - 1)) * kSide +
+           static_cast<std::size_t>(x & (kSide - 1));
+  };
+  for (int disc = 0; disc < kDiscs; ++disc) {
+    const double radius = 2 / std::sqrt(2e-3 + unit(random));
+    const double x = kSide * unit(random), y = kSide * unit(random);
+    const auto value = static_cast<float>(0.2 + 0.6 * unit(random));
+    const int reach = static_cast<int>(radius) + 1;
+    for (int j = -reach; j <= reach; ++j) {
+      for (int i = -reach; i <= reach; ++i) {
+        const int column = static_cast<int>(x) + i, row = static_cast<int>(y) + j;
+        if (std::hypot(column - x, row - y) <= radius) texture[place(column, row)] = value;
+      }
+    }
+  }
+  EstimateInput input;
+  input.weights = Eigen::ArrayXXd::Constant(kViews, kViews, 1.0 / (kViews * kViews));
+  input.transfer = model::TransferCurve::Linear();
+  input.image = {width_px, height_px, 1, {}};
+  input.disparity = {width_px, height_px, {}, {1, 1}};
+  std::normal_distribution<double> noise(0, 1.0 / 255);
+  for (int y = 0; y < height_px; ++y) {
+    for (int x = 0; x < width_px; ++x) {
+      const double disparity = first_px + (last_px - first_px) * x / (width_px - 1);
+      double sum = 0;
+      for (int view = 0; view < kViews * kViews; ++view) {
+        const double s = x + disparity * (view % kViews - kViews / 2);
+        const double t = y + disparity * (view / kViews - kViews / 2);
+        const int i = static_cast<int>(std::floor(s)), j = static_cast<int>(std::floor(t));
+        const double a = s - i, b = t - j;
+        const auto at = [&](int k, int l) { return static_cast<double>(texture[place(k, l)]); };
+        sum += (1 - b) * ((1 - a) * at(i, j) + a * at(i + 1, j)) +
+               b * ((1 - a) * at(i, j + 1) + a * at(i + 1, j + 1));
+      }
+      const double stored = std::clamp(sum / (kViews * kViews) + noise(random), 0.0, 1.0);
+      input.image.values.push_back(static_cast<float>(std::round(255 * stored) / 255));
+      input.disparity.disparity.push_back(static_cast<float>(disparity));
+    }
+  }
+  return input;
+}
+
+// More than 2^20 px are compared at half the size, but an offset is stated in px of the photograph.
+TEST(DepthContradiction, AnOffsetIsInPixelsOfTheWholePhotograph) {
+  constexpr float kOffsetPx = 1.5F;
+  EstimateInput input = SlantedSurface(1300, 900, -1.6, 1.6);
+  for (float& value : input.disparity.disparity) value += kOffsetPx;
+  const DepthContradiction found = Check(input);
+  ASSERT_TRUE(found.is_contradicted) << TrialsOf(found);
+  const DepthCauseTrial& cause = found.causes.front();
+  for (const double truth : {-1.2, 0.4}) {
+    const double proposed =
+        cause.scale * (truth + static_cast<double>(kOffsetPx)) + cause.offset_px;
+    EXPECT_NEAR(std::abs(proposed), std::abs(truth), 0.4) << TrialsOf(found);
+  }
+}
+
+// The contours of a slanted surface in a map of few levels are no edges of things, and neither are
+// single pixels.
+TEST(DepthContradiction, LevelsAndSinglePixelsSayNothing) {
+  const EstimateInput truth = SlantedSurface(kSizePx, kSizePx, -1.6, 1.6);
+  EstimateInput levels = truth;
+  for (float& value : levels.disparity.disparity) {
+    value = std::round((value + 1.6F) * 15 / 3.2F) * 3.2F / 15 - 1.6F;
+  }
+  EstimateInput noisy = truth;
+  std::mt19937 random(22);
+  std::uniform_real_distribution<float> unit(0, 1);
+  for (float& value : noisy.disparity.disparity) {
+    if (unit(random) < 0.02F) value = 3.2F * unit(random) - 1.6F;
+  }
+  for (const EstimateInput& input : {levels, noisy}) {
+    const DepthContradiction found = Check(input);
+    EXPECT_FALSE(found.is_contradicted) << TrialsOf(found);
+    EXPECT_FALSE(found.trials.front().edges) << TrialsOf(found);
+    EXPECT_THAT(found.message, HasSubstr("cannot be compared")) << TrialsOf(found);
+  }
+}
+
+TEST(DepthContradiction, AMapWithoutEdgesHasNoSign) {
+  const LayeredScene scene(14, 96, 96);
+  const DepthContradiction found =
+      Check(WithMap(scene, [](const auto& /*at*/, int /*x*/, int /*y*/) { return 0.4F; }));
+  EXPECT_FALSE(found.trials.front().edges);
+  for (const DepthCauseTrial& trial : found.trials)
+    EXPECT_NE(trial.cause, DepthCause::kSign) << TrialsOf(found);
+}
+
 // Stores an image as JPEG does, with steps of 24 grey levels for the high frequencies of its
 // blocks.
 void Compress(model::LinearImage* image) {
@@ -211,20 +313,122 @@ TEST(DepthContradiction, CompressionThatNoFileStatesIsSeen) {
   const DepthContradiction found = Check(input);
   EXPECT_FALSE(found.is_contradicted) << TrialsOf(found);
   for (const DepthCauseTrial& trial : found.trials) EXPECT_FALSE(trial.spectra);
+  EXPECT_THAT(found.values_untested, HasSubstr("compression"));
+  EXPECT_THAT(found.message,
+              AllOf(HasSubstr("were not tested"), Not(HasSubstr("no other values"))));
   for (float& value : input.disparity.disparity) value *= 2;
   EXPECT_THAT(CausesOf(Check(input)), Not(Contains("scale")));
   model::FlipDepth(model::DepthFlip::kRows, kSizePx, &input.disparity.disparity);
   EXPECT_THAT(CausesOf(Check(input)), ElementsAre("rows"));
 }
 
-TEST(DepthContradiction, WhatAgreesIsNotTestedFurther) {
-  const LayeredScene scene(12, kSizePx, 144);
+// Adds lamps to the background of a scene, whose rays no object stops, and cuts the photograph off
+// at full scale. Returns their number, at most 5.
+int AddClippedLamps(EstimateInput* input) {
+  constexpr int kGridPx = 12, kReachPx = 8, kViews = LayeredScene::kViews, kMost = 5;
+  constexpr double kLight = 30, kHalfWidthPx = 1.5;
+  const int width = input->image.width_px, height = input->image.height_px;
+  const auto index = [width](int x, int y) {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+           static_cast<std::size_t>(x);
+  };
+  std::vector<double> light(input->image.values.begin(), input->image.values.end());
+  int lamps = 0;
+  for (int lamp_y = kGridPx; lamp_y + kGridPx <= height; lamp_y += 2 * kGridPx) {
+    for (int lamp_x = kGridPx; lamp_x + kGridPx <= width; lamp_x += 2 * kGridPx) {
+      bool is_background = true;
+      for (int y = lamp_y - kReachPx; y <= lamp_y + kReachPx; ++y) {
+        for (int x = lamp_x - kReachPx; x <= lamp_x + kReachPx; ++x) {
+          const auto disparity = static_cast<double>(input->disparity.disparity[index(x, y)]);
+          is_background = is_background && std::abs(disparity - LayeredScene::kFarPx) < 1e-3;
+        }
+      }
+      if (!is_background || lamps == kMost) continue;
+      ++lamps;
+      const auto cover = [](double at) { return std::clamp(kHalfWidthPx + 0.5 - at, 0.0, 1.0); };
+      for (int y = lamp_y - kReachPx; y <= lamp_y + kReachPx; ++y) {
+        for (int x = lamp_x - kReachPx; x <= lamp_x + kReachPx; ++x) {
+          for (int view = 0; view < kViews * kViews; ++view) {
+            const double a = view % kViews - kViews / 2, b = view / kViews - kViews / 2;
+            light[index(x, y)] += kLight / (kViews * kViews) *
+                                  cover(std::abs(x + LayeredScene::kFarPx * a - lamp_x)) *
+                                  cover(std::abs(y + LayeredScene::kFarPx * b - lamp_y));
+          }
+        }
+      }
+    }
+  }
+  input->clipped.clear();
+  for (std::size_t i = 0; i < light.size(); ++i) {
+    input->clipped.push_back(light[i] >= 1 ? 1 : 0);
+    input->image.values[i] = static_cast<float>(std::min(light[i], 1.0));
+  }
+  return lamps;
+}
+
+// Where values are only lower bounds, light is missing that no map explains.
+TEST(DepthContradiction, ClippedLampsAccuseNoRightMap) {
+  EstimateInput input = LayeredScene(1, kSizePx, kSizePx).input();
+  ASSERT_EQ(AddClippedLamps(&input), 5);
+  const DepthContradiction found = Check(input);
+  EXPECT_FALSE(found.is_contradicted) << TrialsOf(found);
+}
+
+TEST(DepthContradiction, ResidualsCountOnlyBelowClippedValues) {
+  EstimateInput input = LayeredScene(14, 128, 128).input();
+  ASSERT_EQ(AddClippedLamps(&input), 4);
+  const auto squares = [&](const ClippedValues& clipped) {
+    const ReducedPhoto photo{input.image, input.disparity, 1, clipped};
+    const std::vector<double> of_blocks = ExplainedBy(photo, input.disparity, input, 1, 1).squares;
+    return std::accumulate(of_blocks.begin(), of_blocks.end(), 0.0);
+  };
+  EXPECT_LT(squares(input.clipped), squares({}));
+}
+
+TEST(DepthContradiction, TilesWithClippedPixelsShowNoBlur) {
+  const EstimateInput input = LayeredScene(15, kSizePx, kSizePx).input();
+  const auto tiles = [&](const ClippedValues& clipped) {
+    return TileLikelihood({input.image, input.disparity, 1, clipped}, input, 1, 1.0 / 255, 1)
+        .tiles();
+  };
+  const std::size_t all = tiles({});
+  ASSERT_GE(all, TileLikelihood::kMinTiles);
+  ClippedValues clipped(input.image.values.size(), 0);
+  EXPECT_EQ(tiles(clipped), all);
+  for (std::size_t i = 0; i < clipped.size(); ++i) {
+    if (i % kSizePx < kSizePx / 2) clipped[i] = 1;
+  }
+  EXPECT_LT(tiles(clipped), all);
+  std::fill(clipped.begin(), clipped.end(), std::uint8_t{1});
+  EXPECT_EQ(tiles(clipped), 0U);
+}
+
+// Blur does not show the sign: it is tested also where the values are not.
+TEST(DepthContradiction, OnlyTheSignOfValuesThatAgreeIsTested) {
   DepthContradictionOptions options;
   options.check_values = false;
+  const LayeredScene scene(12, kSizePx, 144);
   const DepthContradiction found = CheckContradiction(scene.input(), options);
-  EXPECT_FALSE(found.is_contradicted);
-  EXPECT_EQ(found.trials.size(), 1U) << TrialsOf(found);
-  EXPECT_THAT(found.message, ::testing::HasSubstr("lie on edges"));
+  EXPECT_FALSE(found.is_contradicted) << TrialsOf(found);
+  for (const DepthCauseTrial& trial : found.trials) EXPECT_FALSE(trial.spectra);
+  EXPECT_THAT(found.message, AllOf(HasSubstr("lie on edges"), HasSubstr("were not tested")));
+  const LayeredScene other(9, 128, 128);
+  EXPECT_THAT(CausesOf(CheckContradiction(
+                  WithMap(other, [](const auto& at, int x, int y) { return -at(x, y); }), options)),
+              ElementsAre("sign"));
+}
+
+// Edges of a strip are compared within its width only.
+TEST(DepthContradiction, AStripShowsNothing) {
+  const LayeredScene scene(15, 64, 3000);
+  const DepthContradiction found = Check(scene.input());
+  EXPECT_FALSE(found.is_contradicted) << TrialsOf(found);
+  EXPECT_THAT(found.message, HasSubstr("less than 48 px at 1/2"));
+  const LayeredScene narrow(16, 20, 1500);
+  const auto place = EdgeCoincidence(narrow.input().image, narrow.input().transfer)
+                         .Of(narrow.input().disparity, 24);
+  ASSERT_TRUE(place);
+  EXPECT_LE(std::max(std::abs(place->best_x), std::abs(place->best_y)), 6);
 }
 
 TEST(DepthContradiction, ASmallPhotographShowsNothing) {
@@ -232,7 +436,8 @@ TEST(DepthContradiction, ASmallPhotographShowsNothing) {
   const DepthContradiction found = Check(scene.input());
   EXPECT_FALSE(found.is_contradicted);
   EXPECT_THAT(found.causes, IsEmpty());
-  EXPECT_THAT(found.message, ::testing::HasSubstr("less than 48 px"));
+  EXPECT_THAT(found.message, HasSubstr("less than 48 px"));
+  EXPECT_THAT(found.values_untested, HasSubstr("less than 48 px"));
   DepthContradictionOptions options;
   options.photo_aperture = -1;
   EXPECT_THROW(CheckContradiction(scene.input(), options), Error);

@@ -23,6 +23,7 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 constexpr int kLampsAcrossPx = 64, kLampsDownPx = 48;
 
@@ -83,6 +84,19 @@ TEST_F(EstimateHighlightsTest, SaysWhatIsClippedAndKeepsItsLight) {
   fs::remove_all(Output());
   Summary(With(Usual(), {"--solver", "grid"}), &result);
   EXPECT_THAT(result.err, HasSubstr("this solver takes them as the light itself"));
+}
+
+TEST_F(EstimateHighlightsTest, APartWithoutClippedValuesIsAnOrdinaryPhotograph) {
+  ProgramResult result;
+  const Words part = With(Usual(), {"--crop", "20,0,24,48"});  // the lamp that is not clipped
+  EXPECT_EQ(Summary(part, &result)["photo_clipping"]["share"], 0);
+  EXPECT_THAT(result.err, Not(HasSubstr("clipped")));
+  EXPECT_TRUE(fs::exists(fs::path(Output()) / "views/view_00_00.png"));
+  fs::remove_all(Output());
+  const Words lamp = With(Usual(), {"--crop", "0,0,24,48"});
+  EXPECT_NEAR(Summary(lamp, &result)["photo_clipping"]["share"], 25.0 / (24 * 48), 1e-9);
+  EXPECT_THAT(result.err, HasSubstr("lamps.png: 2.2 % of its values are clipped"));
+  EXPECT_TRUE(fs::exists(fs::path(Output()) / "views/view_00_00.tiff"));
 }
 
 TEST_F(EstimateHighlightsTest, AnUnknownMeaningIsWrongUsage) {

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "thicklens/estimate.h"
@@ -119,6 +120,24 @@ TEST(FindClipping, FindsTheLimitOfLinearLight) {
   EXPECT_EQ(FindClipping(light()).share, 0);
 }
 
+// A rendered image without noise may show one even area that is its brightest.
+TEST(FindClipping, DoesNotClaimTheEvenAreaOfALinearImageWithoutNoise) {
+  const auto found = [](const std::vector<double>& lamps, double noise, double limit) {
+    std::vector<float> values;
+    for (const double value : LampSceneOf(lamps, noise, 11))
+      values.push_back(static_cast<float>(std::min(value, limit)));
+    return FindClipping(
+        Image::FromLight(kLampsWidth, kLampsHeight, ChannelOrder::kGrey, std::move(values)));
+  };
+  // The lamp is clipped or not: its values are the same.
+  EXPECT_EQ(found({0.9}, 0, 10).share, 0);
+  EXPECT_EQ(found({3}, 0, 0.9).share, 0);
+  EXPECT_EQ(found({1.7}, 0, 10).share, 0);
+  // Noise would make them differ, and three areas have no reason to agree.
+  EXPECT_THAT(found({3}, 0.012, 0.9).levels, ElementsAre(DoubleNear(0.9, 1e-6)));
+  EXPECT_THAT(found({3, 4, 5}, 0, 1.7).levels, ElementsAre(DoubleNear(1.7, 1e-6)));
+}
+
 // The values of a clipped disc of a JPEG file, which scatter about full scale.
 TEST(ClippedHighlights, OfCompressedPhotographsAreWholeAreas) {
   std::vector<double> scene = LampSceneOf({3}, 0, 8);
@@ -128,8 +147,7 @@ TEST(ClippedHighlights, OfCompressedPhotographsAreWholeAreas) {
   const Image photo = StoredLamps(scene, {1});
   EstimateDiagnostics diagnostics;
   const auto marked = [&] {
-    const std::vector<std::uint8_t> marks =
-        MarksOf(ClippedPartsOf(photo, EstimateOptions(), &diagnostics).value());
+    const std::vector<std::uint8_t> marks = MarksOf(ClippedPartsOf(photo, &diagnostics).value());
     return std::count(marks.begin(), marks.end(), 1);
   };
   const auto alone = static_cast<double>(marked());
@@ -143,7 +161,7 @@ TEST(ClippedHighlights, AreMarkedAndReported) {
   const Image photo = StoredLamps(LampSceneOf({2}, 0.004, 7), {0.5, 1, 1});
   EstimateOptions options;
   EstimateDiagnostics diagnostics;
-  const std::optional<Image> parts = ClippedPartsOf(photo, options, &diagnostics);
+  const std::optional<Image> parts = ClippedPartsOf(photo, &diagnostics);
   ASSERT_TRUE(parts.has_value());
   const std::vector<std::uint8_t> marks = MarksOf(*parts);
   ASSERT_EQ(marks.size(), photo.encoded().values.size());
@@ -163,14 +181,26 @@ TEST(ClippedHighlights, AreMarkedAndReported) {
   EXPECT_THAT(report(), HasSubstr("lamps.png: 0.39 % of its values are clipped"));
   EXPECT_THAT(report(), HasSubstr("green at full scale, blue at full scale"));
   EXPECT_THAT(report(), HasSubstr("at least that"));
+  options.solver = SolverChooser([](const Problem&, double) { return SolverChoice(); });
+  EXPECT_THAT(report(), HasSubstr("if the solver scene is chosen, the light there is at least"));
   options.solver = BlockSolver{};
   EXPECT_THAT(report(), HasSubstr("this solver takes them as the light itself"));
   options.clipped = ClippedHighlights::kData;
   EXPECT_THAT(report(), HasSubstr("they are taken as the light itself"));
-  EXPECT_FALSE(ClippedPartsOf(photo, options, &diagnostics).has_value());
-  EXPECT_GT(diagnostics.clipping.share, 0);
   diagnostics.clipping = {};
   EXPECT_EQ(report(), "");
+}
+
+TEST(ClippedHighlights, OfAPartAreThoseThatItShows) {
+  PhotoClipping clipping;
+  clipping.levels = {0.5, 1, 0};
+  clipping.share = 0.1;
+  LimitToMarks({0, 1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0}, &clipping);  // 4 px
+  EXPECT_THAT(clipping.levels, ElementsAre(0, 1, 0));
+  EXPECT_DOUBLE_EQ(clipping.share, 2.0 / 12);
+  LimitToMarks(std::vector<std::uint8_t>(12, 0), &clipping);
+  EXPECT_THAT(clipping.levels, ElementsAre(0, 0, 0));
+  EXPECT_EQ(clipping.share, 0);
 }
 
 }  // namespace

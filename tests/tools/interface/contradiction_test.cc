@@ -1,5 +1,7 @@
 // The answers of the public interface to a depth that contradicts its photograph, and to depths
 // that mean nothing.
+#include "tools/interface/contradiction.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -14,6 +16,7 @@
 #include "support/layered_scene.h"
 #include "thicklens/base/error.h"
 #include "thicklens/estimate.h"
+#include "tools/interface/run_scope.h"
 
 namespace thicklens {
 namespace {
@@ -102,6 +105,48 @@ TEST(ContradictedDepth, AReversedMapThatWasReversedWhenItWasReadIsToldSo) {
   EXPECT_THAT(EstimateLightField(files.photo, files.map, {}, FiveViews(), OneThread())
                   .summary.partial_reason,
               HasSubstr("without <depth.flip> the program"));
+}
+
+TEST(ContradictedDepth, EachCauseHasItsRemedy) {
+  const RunControl control = OneThread();
+  const RunScope run(control);
+  const auto text = [&run](estimator::DepthCause cause, double scale, DepthKind kind) {
+    estimator::DepthContradiction found;
+    found.is_contradicted = true;
+    estimator::DepthCauseTrial trial;
+    trial.cause = cause;
+    trial.scale = scale;
+    found.causes = {trial};
+    DepthOrigin depth;
+    depth.name = "map.png";
+    depth.meaning.kind = kind;
+    return ContradictionText(depth, found, run);
+  };
+  using estimator::DepthCause;
+  EXPECT_THAT(text(DepthCause::kShift, 1, DepthKind::kZ),
+              AllOf(HasSubstr("<depth_fit.part>"), HasSubstr("<depth_fit.camera>")));
+  EXPECT_THAT(text(DepthCause::kOffset, 1, DepthKind::kZ),
+              AllOf(HasSubstr("focus distance"), HasSubstr("<lens_position>")));
+  EXPECT_THAT(text(DepthCause::kScaleOffset, -1, DepthKind::kZ),
+              AllOf(HasSubstr("near and far are exchanged"), HasSubstr("<lens_position>")));
+  EXPECT_THAT(text(DepthCause::kScaleOffset, -1, DepthKind::kDisparity),
+              AllOf(HasSubstr("near and far are exchanged"),
+                    HasSubstr("<depth.meaning.disparity_scale> -1")));
+  EXPECT_THAT(text(DepthCause::kScaleOffset, 1, DepthKind::kDisparity),
+              Not(HasSubstr("exchanged")));
+  EXPECT_THAT(text(DepthCause::kOtherImage, 1, DepthKind::kZ),
+              HasSubstr("map.png and the photograph"));
+}
+
+TEST(DepthPlausibility, WholeNumbersOfPixelsAreAccepted) {
+  Files files = FilesOf(LayeredScene(3, kSidePx, kSidePx));
+  files.map.is_integer = true;
+  for (std::size_t i = 0; i < files.map.values.size(); ++i)
+    files.map.values[i] = static_cast<float>(4 + i % 2);
+  EstimateOptions options = FiveViews();
+  options.views = ViewCounts{3, 3};
+  // 2 steps of 5 px are less than an eighth of 128 px.
+  EXPECT_NO_THROW(PrepareProblem(files.photo, files.map, {}, options, nullptr, OneThread()));
 }
 
 TEST(DepthPlausibility, GreyLevelsAreNoPixelsAndAScaleIsProposed) {

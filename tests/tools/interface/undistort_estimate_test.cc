@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <string>
 #include <utility>
 #include <vector>
@@ -136,6 +138,41 @@ TEST_F(UndistortedEstimate, ACropIsCutFromTheUndistortedImages) {
   const Problem problem = Prepared(&found);
   EXPECT_EQ(problem.width_px(), 60);
   EXPECT_LT(LargestError(problem.photograph(), 20, 10), 0.01);
+}
+
+// Where the photograph continues a clipped corner, it is no more than a lower bound either.
+TEST_F(UndistortedEstimate, ClippedValuesAreContinuedLikeThePhotograph) {
+  constexpr int kClippedPx = 12;
+  std::vector<std::uint16_t> values;
+  for (int y = 0; y < kPhotoHeight; ++y) {
+    for (int x = 0; x < kPhotoWidth; ++x) {
+      const bool is_clipped = x < kClippedPx && y < kClippedPx;
+      const float light = photo_.light().at(x, y, 0);
+      values.push_back(static_cast<std::uint16_t>(is_clipped ? 255 : std::lround(255 * light)));
+    }
+  }
+  photo_ = Image::FromEncoded(kPhotoWidth, kPhotoHeight, ChannelOrder::kGrey, 8, std::move(values),
+                              TransferCurve::Linear(), "photo");
+  EstimateDiagnostics found;
+  const Problem problem = Prepared(&found);
+  ASSERT_FALSE(problem.input().clipped.empty());
+  EXPECT_GT(found.without_source_share, 0.05);
+  for (const auto& [x, y] : {std::pair{0, 0}, {2, 1}, {1, 3}}) {
+    EXPECT_GT(problem.photograph().at(x, y, 0), 0.98F) << x << " " << y;
+    EXPECT_EQ(problem.input().clipped[static_cast<std::size_t>(y * kPhotoWidth + x)], 1)
+        << x << " " << y;
+  }
+  EXPECT_EQ(problem.input().clipped[45 * kPhotoWidth + 60], 0);
+  EXPECT_THAT(notices_, Contains(HasSubstr("of its values are clipped")));
+  // A part without that corner has no clipped values, of which nothing is said then.
+  notices_.clear();
+  for (const ClippedHighlights meaning : {ClippedHighlights::kBounds, ClippedHighlights::kData}) {
+    options_.clipped = meaning;
+    options_.crop = PixelRect{50, 40, 60, 40};
+    EXPECT_THAT(Prepared(&found).input().clipped, IsEmpty());
+    EXPECT_EQ(found.clipping.share, 0);
+    EXPECT_THAT(notices_, Not(Contains(HasSubstr("clipped"))));
+  }
 }
 
 TEST_F(UndistortedEstimate, APartOfTheSensorHasItsPartOfTheDistortion) {

@@ -43,8 +43,8 @@ struct DepthCauseTrial {
   // it is, and its standard deviation. Absent where fewer than 6 tiles show one depth.
   std::optional<double> spectra, spectra_sigma;
   // Standard deviations by which the map, so changed, explains the reduced photograph better than
-  // the map as it is. Found only for changes that leave the amount of blur. A narrower blur
-  // explains any photograph better.
+  // the map as it is; 0 where their squares differ by less than 1 %. Found only for changes that
+  // leave the amount of blur. A narrower blur explains any photograph better.
   std::optional<double> residual;
 };
 
@@ -58,6 +58,9 @@ struct DepthContradiction {
   // The causes are changes of the values, and the photograph does not decide by 4 standard
   // deviations which of the two signs the changed disparities have.
   bool is_sign_open = false;
+  // Why scale and offset of the values were not tested; empty if they were, and where the order or
+  // the place of the map is the fault.
+  std::string values_untested = {};
   std::vector<DepthCauseTrial> trials;  // all that were tested, the map as it is first
   double seconds = 0;                   // time of the check
 };
@@ -68,8 +71,8 @@ struct DepthContradictionOptions {
   // Error of the photograph's compression, in its encoded values, which its noise does not show.
   double compression_sigma = 0;
   double photo_aperture = 1;  // of SceneOptions
-  // Whether the values are tested also where the place of the edges agrees: where something else
-  // casts doubt on them.
+  // Whether scale and offset of the values are tested also where the place of the edges agrees:
+  // where something else casts doubt on them.
   bool check_values = true;
   int threads = 0;  // 0: one per core
 
