@@ -57,6 +57,21 @@ cv::Mat GuideOf(const model::LinearImage& photo, const model::TransferCurve& tra
   return guide;
 }
 
+// Whether the map with its rows, its columns or both reversed agrees with the photograph about as
+// well as the moved one.
+bool AgreesReversed(const cv::Mat& guide, const cv::Mat& map, const cv::Mat& moved,
+                    const EdgeLabelOptions& options) {
+  constexpr double kAboutAsWell = 0.85;
+  const double needed = kAboutAsWell * AlignEdges(guide, moved, options).agreement;
+  constexpr int kRows = 0, kColumns = 1, kBoth = -1;  // of cv::flip
+  for (const int axes : {kRows, kColumns, kBoth}) {
+    cv::Mat reversed;
+    cv::flip(map, reversed, axes);
+    if (AlignEdges(guide, reversed, options).agreement >= needed) return true;
+  }
+  return false;
+}
+
 // Moves the map to where the photograph has its edges.
 void Align(const cv::Mat& guide, const EdgeLabelOptions& labels, bool eager, bool is_coarse,
            cv::Mat* map, DepthRefinement* found) {
@@ -81,7 +96,11 @@ void Align(const cv::Mat& guide, const EdgeLabelOptions& labels, bool eager, boo
     moved = Aligned(before, total);
   }
   // So far no map is displaced: the colours repeat.
-  if (std::hypot(total.right_px, total.down_px) > kMaxShiftPx) total = {};
+  const double shift_px = std::hypot(total.right_px, total.down_px);
+  if (shift_px > kMaxShiftPx) total = {};
+  // A reversed map may look like a displaced one. Then it stays as it is, and the search for
+  // contradictions names both.
+  if (shift_px > 0 && AgreesReversed(guide, before, moved, options)) total = {};
   found->right_px = total.right_px;
   found->down_px = total.down_px;
   found->dilation_px = total.dilation_px;

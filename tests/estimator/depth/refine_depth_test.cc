@@ -184,6 +184,36 @@ TEST(RefineDepth, ADisplacedMapIsMovedBack) {
   }
 }
 
+// A disc: its map with reversed rows is the right one moved by 5 px. Which of both
+// is wrong cannot be said, so that the map stays for the search of contradictions.
+TEST(RefineDepth, AMapThatMayBeReversedIsNotMoved) {
+  TwoDiscs scene;
+  std::mt19937_64 engine(11);
+  std::normal_distribution<float> normal(0, 1);
+  cv::Mat truth(kSize, kSize, CV_32F);
+  for (int y = 0; y < kSize; ++y) {
+    for (int x = 0; x < kSize; ++x) {
+      const bool is_disc = std::hypot(x - 60, y - 82) < 36;
+      truth.at<float>(y, x) = is_disc ? 1 : -1;
+      for (int c = 0; c < 3; ++c) {
+        const auto i = 3 * static_cast<std::size_t>(y * kSize + x) + static_cast<std::size_t>(c);
+        scene.photo.values[i] = (is_disc == (c == 0) ? 0.4F : 0.15F) + 0.003F * normal(engine);
+      }
+    }
+  }
+  cv::Mat reversed, moved(kSize, kSize, CV_32F, cv::Scalar(-1));
+  cv::flip(truth, reversed, 0);
+  DisparityMap map = MapOf(reversed);
+  const DisparityMap before = map;
+  const DepthRefinement found = Refine(scene, &map);
+  EXPECT_EQ(found.down_px, 0) << found.message;
+  EXPECT_EQ(map.disparity, before.disparity);
+  // The same disc, moved to a side: no order of rows and columns has it there.
+  truth(cv::Rect(0, 0, kSize - 5, kSize)).copyTo(moved(cv::Rect(5, 0, kSize - 5, kSize)));
+  map = MapOf(moved);
+  EXPECT_EQ(Refine(scene, &map).right_px, 5);
+}
+
 TEST(RefineDepth, NearSurfacesThatAreTooWideOrTooNarrowAreChanged) {
   const TwoDiscs scene;
   const cv::Mat window = cv::Mat::ones(7, 7, CV_8U);
