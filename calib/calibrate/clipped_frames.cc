@@ -26,12 +26,13 @@ bool Contains(const std::vector<std::size_t>& list, std::size_t value) {
 }  // namespace
 
 ClippedFrames ChooseClippedFrames(const std::vector<FrameMeasurement>& frames,
-                                  const std::vector<std::size_t>& used, double focus_mm) {
+                                  const std::vector<std::size_t>& used, double focus_mm,
+                                  double replaced_share) {
   ClippedFrames clipped;
   std::size_t nearer = 0, farther = 0;
   for (const std::size_t i : used) {
     ++(frames[i].depth_mm < focus_mm ? nearer : farther);
-    if (ShareOf(frames[i]) > 0) clipped.kept.push_back(i);
+    if (ShareOf(frames[i]) > replaced_share) clipped.kept.push_back(i);
   }
   std::stable_sort(clipped.kept.begin(), clipped.kept.end(), [&](std::size_t a, std::size_t b) {
     return ShareOf(frames[a]) > ShareOf(frames[b]);

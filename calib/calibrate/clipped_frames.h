@@ -24,8 +24,11 @@ using SharpestOf = std::function<std::size_t(const std::vector<std::size_t>& fra
 
 // Leaves clipped frames out of the fit of the blur, the most clipped ones first, as long as at
 // least a half of `used` and nine frames are left, with frames nearer and farther than `focus_mm`.
+// `replaced_share` is the share of the pixels that the frame correction replaces: hot pixels are
+// clipped in every frame, and their light is not used.
 ClippedFrames ChooseClippedFrames(const std::vector<FrameMeasurement>& frames,
-                                  const std::vector<std::size_t>& used, double focus_mm);
+                                  const std::vector<std::size_t>& used, double focus_mm,
+                                  double replaced_share = 0);
 
 // Leaves these frames out, says so, and returns the other ones of `used`. A reference that is left
 // out is replaced by the sharpest other registered frame, to which `scales` are converted;

@@ -45,6 +45,7 @@
 #include "thicklens/base/error.h"
 #include "thicklens/base/parallel.h"
 #include "thicklens/calib/error_budget.h"
+#include "thicklens/calib/frame_correction.h"
 #include "thicklens/model/pupil_law.h"
 
 namespace thicklens::calib {
@@ -333,6 +334,15 @@ class Calibrator {
       return false;
     FindSharpest();
     return true;
+  }
+
+  // The share of the pixels that the frame correction replaces.
+  double ReplacedShare() const {
+    if (sweep_.correction == nullptr) return 0;
+    const cv::Mat& defects = sweep_.correction->defects();
+    return defects.empty() ? 0
+                           : static_cast<double>(sweep_.correction->defect_count()) /
+                                 static_cast<double>(defects.total());
   }
 
   std::size_t SharpestUsed() const { return SharpestAmong(used()); }
@@ -796,9 +806,10 @@ class Calibrator {
     const double start_mm = result_.diagnostics.sharpness.done
                                 ? result_.diagnostics.sharpness.focus_depth_mm
                                 : result_.frames[reference_].depth_mm;
-    ClippedFrames clipped = IsSparse(sweep_.target)
-                                ? ClippedFrames()
-                                : ChooseClippedFrames(result_.frames, used(), start_mm);
+    ClippedFrames clipped =
+        IsSparse(sweep_.target)
+            ? ClippedFrames()
+            : ChooseClippedFrames(result_.frames, used(), start_mm, ReplacedShare());
     BlurTask task(sweep_, store_);
     task.frames = LeaveOutClipped(
         &clipped, used(),
