@@ -330,10 +330,21 @@ class Search {
                                NoiseOf(photo_, input_, options_.compression_sigma), threads_);
     // Offsets are stated in px of the photograph, whose step the reduced one has not.
     const double step = photo_.disparity.step.cwiseAbs().maxCoeff() * photo_.scale;
-    if (tiles.tiles() < TileLikelihood::kMinTiles) {
+    // The textures of a few tiles may differ by chance as their blur would. Tiles of one blur say
+    // nothing of it: what they have in common may be their texture.
+    constexpr std::size_t kMinTiles = 16;
+    constexpr double kMinRangePx = 0.5;
+    if (tiles.tiles() < kMinTiles) {
       found_->values_untested =
           fmt::format("of the {} parts that are needed, {} show one depth and more than noise",
-                      TileLikelihood::kMinTiles, tiles.tiles());
+                      kMinTiles, tiles.tiles());
+      return;
+    }
+    if (!(tiles.BlurRangePx() >= kMinRangePx)) {
+      found_->values_untested = fmt::format(
+          "the predicted blur is about the same everywhere (its standard deviation changes by "
+          "{:.2g} px, {:g} are needed), as the texture may be",
+          tiles.BlurRangePx(), kMinRangePx);
       return;
     }
     const auto trial = [&](DepthCause cause, double scale, double offset) {

@@ -507,6 +507,15 @@ std::optional<TileLikelihood::Gain> TileLikelihood::Against(const Other& other) 
   return gain;
 }
 
+double TileLikelihood::BlurRangePx() const {
+  if (tiles_.empty()) return 0;
+  std::vector<double> sigmas;
+  for (const PhotoTile& tile : tiles_) sigmas.push_back(spread_ * RmsOf(tile.disparity));
+  std::sort(sigmas.begin(), sigmas.end());
+  const std::size_t end = sigmas.size() / 10;
+  return sigmas[sigmas.size() - 1 - end] - sigmas[end];
+}
+
 TileLikelihood::Gain TileLikelihood::OfValues(double scale, double offset) const {
   const auto gain = Against([&](const PhotoTile& tile) {
     TileDisparity disparity = tile.disparity;

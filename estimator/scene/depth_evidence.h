@@ -59,6 +59,9 @@ class TileLikelihood {
                  double noise_sigma, int threads);
   std::size_t tiles() const { return tiles_.size(); }
   double spread_px() const { return spread_; }
+  // The standard deviations of the blur that the map predicts, px: the difference between those of
+  // the tenth and of the ninetieth percentile of the tiles.
+  double BlurRangePx() const;
   struct Gain {
     double mean = 0, sigma = 0;  // logarithm of the likelihood ratio, and its standard deviation
     int tiles = 0;               // number of tiles that were compared

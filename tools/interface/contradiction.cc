@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <utility>
 
 #include "thicklens/base/stopwatch.h"
 
@@ -122,6 +123,20 @@ std::string CauseText(const DepthOrigin& depth, const DepthCauseTrial& cause, co
 void FindContradiction(const PreparedProblem& prepared, bool is_in_doubt, RunScope* run,
                        LightFieldEstimate* estimate) {
   EstimateDiagnostics& found = estimate->diagnostics;
+  constexpr double kMaxGuessed = 0.5;
+  if (found.holes_share > kMaxGuessed) {
+    // Areas that were filled in are no statement of the map.
+    estimator::DepthContradiction skipped;
+    skipped.values_untested = fmt::format(
+        "{:.0f} % of the depth is guessed, because the map has no "
+        "values there",
+        100 * found.holes_share);
+    skipped.message =
+        "the depth cannot be compared with the photograph: " + skipped.values_untested;
+    skipped.trials.emplace_back();
+    found.contradiction = std::move(skipped);
+    return;
+  }
   const auto start = Clock::now();
   estimator::DepthContradictionOptions check;
   check.falloff = prepared.effects.on.Has(Effect::kFalloff);

@@ -220,6 +220,16 @@ EstimateInput SlantedSurface(int width_px, int height_px, double first_px, doubl
   return input;
 }
 
+// What all parts have in common may be their texture, so that one depth everywhere shows no blur.
+TEST(DepthContradiction, OneDepthEverywhereShowsNoValues) {
+  EstimateInput input = SlantedSurface(2 * kSizePx, kSizePx, 0.9, 0.9);
+  for (float& disparity : input.disparity.disparity) disparity -= 0.9F;
+  const DepthContradiction found = Check(input);
+  EXPECT_FALSE(found.is_contradicted) << TrialsOf(found);
+  EXPECT_THAT(found.values_untested, HasSubstr("about the same everywhere"));
+}
+
+
 // More than 2^20 px are compared at half the size, but an offset is stated in px of the photograph.
 TEST(DepthContradiction, AnOffsetIsInPixelsOfTheWholePhotograph) {
   constexpr float kOffsetPx = 1.5F;
