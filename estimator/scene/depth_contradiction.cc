@@ -333,7 +333,7 @@ class Search {
     // The textures of a few tiles may differ by chance as their blur would. Tiles of one blur say
     // nothing of it: what they have in common may be their texture.
     constexpr std::size_t kMinTiles = 16;
-    constexpr double kMinRangePx = 0.5;
+    constexpr double kMinRangePx = 0.3;
     if (tiles.tiles() < kMinTiles) {
       found_->values_untested =
           fmt::format("of the {} parts that are needed, {} show one depth and more than noise",

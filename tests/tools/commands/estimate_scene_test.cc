@@ -334,7 +334,8 @@ TEST_F(EstimateSceneTest, WarnsOfStepsThatAreTooLarge) {
   EXPECT_THAT(
       summary["warnings"][0].get<std::string>(),
       AllOf(HasSubstr("1.0 % of the pixels"), HasSubstr("3 px"), HasSubstr("up to 3.2 px")));
-  EXPECT_THAT(summary["warnings"][1].get<std::string>(), HasSubstr("times its noise"));
+  EXPECT_THAT(summary["warnings"][1].get<std::string>(),
+              HasSubstr("not explained beyond its noise"));
   EXPECT_THAT(result.err, HasSubstr("up to 3.2 px"));
   EXPECT_NEAR(summary["disparity"]["coarse_share"].get<double>(), 1.0 / kColumns, 1e-9);
 }
