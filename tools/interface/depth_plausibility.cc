@@ -15,9 +15,11 @@ namespace {
 
 // Displacement between neighbouring views above which whole numbers without a scale are no px.
 constexpr double kMaxOfWholePx = 3;
-// Share of the image by which the outermost views may see half of the points apart: light fields
-// have less than a twentieth, a wide portrait lens blurs a far background by an eighth.
-constexpr double kMaxOfDisparity = 1.0 / 8, kMaxOfDepth = 1.0 / 2;
+// Shares of the image by which the outermost views may see half of the points apart. Light fields
+// have less than a twentieth, and a wide portrait lens blurs a far background by an eighth: whole
+// numbers beyond that are grey levels. Stated disparities may blur most of a small image away, but
+// the views must have something in common.
+constexpr double kMaxOfWholeNumbers = 1.0 / 8, kMaxOfDisparity = 1, kMaxOfDepth = 1.0 / 2;
 // Diameter over focal length of the widest lenses.
 constexpr double kWidestLens = 1.4;
 // Displacement over the whole aperture that is no visible parallax, and one that is, px.
@@ -58,14 +60,17 @@ std::string ScaleAdvice(const DepthMap& map, const Range& px, const RunScope& ru
   }
   // A map of the same order whose middle is in focus and whose ends are 1 px per view step off.
   const DepthMeaning& meaning = map.meaning;
-  const double reach = std::max({px.most - px.median, px.median - px.least, 1e-6});
+  const double reach = std::max(px.most - px.median, px.median - px.least);
+  const std::string options = fmt::format(
+      "px per view step = scale * value + offset is what {} and {} state",
+      run.Option("depth.meaning.disparity_scale"), run.Option("depth.meaning.disparity_offset_px"));
+  if (!(reach > 1e-3 * std::abs(px.median))) return options;  // one depth has no scale
   const double scale = meaning.disparity_scale / reach;
   const double offset = (meaning.disparity_offset_px - px.median) / reach;
   return fmt::format(
-      "px per view step = scale * value + offset is what {} and {} state; for a first try, with "
-      "the median in focus and at most 1 px per view step: {} {:.3g} {} {:.3g}",
-      run.Option("depth.meaning.disparity_scale"), run.Option("depth.meaning.disparity_offset_px"),
-      run.Option("depth.meaning.disparity_scale"), scale,
+      "{}; for a first try, with the median in focus and at most 1 px per view step: {} {:.3g} {} "
+      "{:.3g}",
+      options, run.Option("depth.meaning.disparity_scale"), scale,
       run.Option("depth.meaning.disparity_offset_px"), offset);
 }
 
@@ -106,7 +111,7 @@ void ReportPlausibility(const DepthMap& map, const estimator::DisparityMap& disp
   const int size_px = std::min(disparity.width_px, disparity.height_px);
   // Whole numbers may be px, such as those of a stereo pair.
   if (has_no_scale && size.median > kMaxOfWholePx &&
-      size.median * views > kMaxOfDisparity * size_px) {
+      size.median * views > kMaxOfWholeNumbers * size_px) {
     throw Error(fmt::format(
         "{}: the whole numbers of the map are taken as px per view step: the median of {:.4g} px "
         "moves a point by {:.4g} px between the outermost views, and the image has {} px; {}",

@@ -249,7 +249,7 @@ std::vector<StressCase> Blurs() {
   std::vector<StressCase> cases;
   cases.push_back(Blurred("blur-of-5-px", 5, 64));
   cases.push_back(Blurred("blur-of-20-px", 20, 96));
-  cases.push_back(Blurred("blur-of-60-px", 60, 128));
+  cases.push_back(Blurred("blur-of-60-px", 60, 160));
   cases.push_back(
       Estimator("blur-beyond-the-image", "views move by more than the size of the image",
                 "refused: the largest disparity, and its limit",

@@ -166,7 +166,7 @@ TEST(DepthPlausibility, GreyLevelsAreNoPixelsAndAScaleIsProposed) {
 
 TEST(DepthPlausibility, ViewsThatLieAPartOfAnImageApartAreRefused) {
   Files files = FilesOf(LayeredScene(3, kSidePx, kSidePx));
-  for (float& value : files.map.values) value = 6 + value;
+  for (float& value : files.map.values) value = 40 + value;
   EXPECT_THAT(ErrorOf([&] {
                 PrepareProblem(files.photo, files.map, {}, FiveViews(), nullptr, OneThread());
               }),
