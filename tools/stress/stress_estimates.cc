@@ -229,7 +229,7 @@ StressCase Blurred(const std::string& name, double sigma_px, int size_px) {
           std::to_string(size_px) + " px: hardly any frequency remains",
       "views differ from the true ones by at most 0.25 of full scale, rms, and stay within ten "
       "times the range of what remains of the image; or a report that the iterations did not "
-      "converge",
+      "converge, or that the photograph is not explained",
       [=](const fs::path& folder, const Capabilities& capabilities) {
         const ViewOf view = SlantedSurface(Waves, disparity_px, 0);
         WriteMeanOfViews(folder, shape, view);

@@ -208,7 +208,7 @@ TEST(RefineDepth, AMapThatMayBeReversedIsNotMoved) {
   const DepthRefinement found = Refine(scene, &map);
   EXPECT_EQ(found.down_px, 0) << found.message;
   EXPECT_EQ(map.disparity, before.disparity);
-  // The same disc, moved to a side: no order of rows and columns has it there.
+  // No order of rows and columns has the disc where it is moved to a side.
   truth(cv::Rect(0, 0, kSize - 5, kSize)).copyTo(moved(cv::Rect(5, 0, kSize - 5, kSize)));
   map = MapOf(moved);
   EXPECT_EQ(Refine(scene, &map).right_px, 5);

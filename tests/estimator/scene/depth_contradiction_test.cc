@@ -220,7 +220,7 @@ EstimateInput SlantedSurface(int width_px, int height_px, double first_px, doubl
   return input;
 }
 
-// What all parts have in common may be their texture, so that one depth everywhere shows no blur.
+// The texture may be what all parts have in common, so that one depth everywhere shows no blur.
 TEST(DepthContradiction, OneDepthEverywhereShowsNoValues) {
   EstimateInput input = SlantedSurface(2 * kSizePx, kSizePx, 0.9, 0.9);
   for (float& disparity : input.disparity.disparity) disparity -= 0.9F;
