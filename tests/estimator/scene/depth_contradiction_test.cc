@@ -229,7 +229,6 @@ TEST(DepthContradiction, OneDepthEverywhereShowsNoValues) {
   EXPECT_THAT(found.values_untested, HasSubstr("about the same everywhere"));
 }
 
-
 // More than 2^20 px are compared at half the size, but an offset is stated in px of the photograph.
 TEST(DepthContradiction, AnOffsetIsInPixelsOfTheWholePhotograph) {
   constexpr float kOffsetPx = 1.5F;

@@ -65,6 +65,7 @@ struct EdgeAgreement {
   std::vector<double> sums;         // of the logarithms, by tile, row by row
   std::vector<std::size_t> counts;  // of pixels
 };
+// Measures the agreement of a placed map with the photograph. Throws like ResampleDepth.
 THICKLENS_EXPORT EdgeAgreement AgreementOf(const DepthSampling& map,
                                            const model::LinearImage& photo,
                                            const MapPlacement& placement, int threads);
