@@ -119,7 +119,9 @@ std::string MessageOf(const DepthRefinement& found, bool ramps, bool quanta, boo
   if (ramps) parts.push_back(fmt::format("edges {:.2g} px wide made steps", found.edge_width_px));
   if (found.right_px != 0 || found.down_px != 0) {
     parts.push_back(
-        fmt::format("moved by {:+g} px across and {:+g} px down", -found.right_px, -found.down_px));
+        // 0 minus 0 has no sign.
+        fmt::format("moved by {:+g} px across and {:+g} px down", 0 - found.right_px,
+                    0 - found.down_px));
   }
   if (found.dilation_px != 0) {
     parts.push_back(fmt::format("near surfaces made {} by {:g} px on each side",

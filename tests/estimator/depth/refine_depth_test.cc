@@ -180,12 +180,13 @@ TEST(RefineDepth, ADisplacedMapIsMovedBack) {
     const DepthRefinement found = Refine(scene, &map);
     EXPECT_EQ(found.right_px, right) << found.message;
     EXPECT_EQ(found.down_px, down) << found.message;
+    EXPECT_THAT(found.message, ::testing::Not(::testing::HasSubstr("-0 px")));
     EXPECT_LT(scene.WrongShare(map), before / 5);
   }
 }
 
-// A disc: its map with reversed rows is the right one moved by 5 px. Which of both
-// is wrong cannot be said, so that the map stays for the search of contradictions.
+// A disc: its map with reversed rows is the right one moved by 5 px. Which of both is wrong cannot
+// be said, so that the map stays for the search of contradictions.
 TEST(RefineDepth, AMapThatMayBeReversedIsNotMoved) {
   TwoDiscs scene;
   std::mt19937_64 engine(11);
