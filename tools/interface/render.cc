@@ -61,6 +61,16 @@ model::EffectSelection SelectEffects(const EffectSelection& selection,
                            model::PlacesBetween(*light_field.camera, near_mm,
                                                 std::numeric_limits<double>::infinity(), false),
                            of_model);
+  // Views from which an estimate did not divide the fall-off out have the brightness of their
+  // photograph. Simulated views are radiance.
+  const model::LightFieldOrigin& origin = light_field.origin;
+  const std::vector<std::string>& modelled = origin.effects;
+  const bool keeps_falloff =
+      origin.method != "simulated" && origin.method != "imported" && !modelled.empty() &&
+      std::find(modelled.begin(), modelled.end(), model::EffectName(Effect::kFalloff)) ==
+          modelled.end();
+  if (keeps_falloff && selection.base == EffectSelection::Base::kAuto)
+    decision.on.Remove(Effect::kFalloff);
   // Without defocus each pixel has one ray.
   if (!decision.on.Has(Effect::kDefocus)) decision.on.Remove(Effect::kVignetting);
   decision.findings.erase(std::remove_if(decision.findings.begin(), decision.findings.end(),
