@@ -49,39 +49,48 @@ void Describe(const SensorDefects& defects, FixedPattern* pattern) {
 
 }  // namespace
 
-bool FindFixedPattern(const FramePlaces& places, std::size_t reference,
-                      const std::vector<double>& sharpness, int threads, FrameStore* store,
-                      FixedPattern* pattern, RemovedDefects* defects) {
-  const FrameShading shading = MeasureShading(places, threads);
-  pattern->measured = shading.done;
-  pattern->message = shading.message;
-  pattern->corner_stops = shading.corner_stops;
-  const bool shades = RemoveShading(places, shading, store, pattern);
+RemovedPattern FindFixedPattern(const FramePlaces& places, std::size_t reference,
+                                const std::vector<double>& sharpness, bool with_shading,
+                                int threads, FrameStore* store, FixedPattern* pattern,
+                                RemovedDefects* defects) {
+  RemovedPattern removed;
+  if (with_shading) {
+    const FrameShading shading = MeasureShading(places, threads);
+    pattern->measured = shading.done;
+    pattern->message = shading.message;
+    pattern->corner_stops = shading.corner_stops;
+    removed.shading = RemoveShading(places, shading, store, pattern);
+  }
   SensorDefects& found = defects->all;
   found = FindSensorDefects(places, reference, sharpness, threads);
   pattern->measured |= found.done;
-  if (!found.Any()) return shades;
+  if (!found.Any()) return removed;
   Describe(found, pattern);
   AddToCorrection({found.log_gain, found.filled}, store);
-  return true;
+  removed.defects = true;
+  return removed;
 }
 
-bool FindRemainingPattern(const FramePlaces& places, std::size_t reference,
-                          const std::vector<double>& sharpness, int threads, FrameStore* store,
-                          FixedPattern* pattern, RemovedDefects* defects) {
-  const FrameShading shading = MeasureShading(places, threads);
-  const bool had_shading = pattern->shading_removed;
-  const bool shades = RemoveShading(places, shading, store, pattern);
-  if (shades && had_shading) {
-    pattern->corner_stops->value += shading.corner_stops->value;
-    pattern->corner_stops->sigma = shading.corner_stops->sigma;
-  } else if (shades) {
-    pattern->corner_stops = shading.corner_stops;
+RemovedPattern FindRemainingPattern(const FramePlaces& places, std::size_t reference,
+                                    const std::vector<double>& sharpness, bool with_shading,
+                                    int threads, FrameStore* store, FixedPattern* pattern,
+                                    RemovedDefects* defects) {
+  RemovedPattern removed;
+  if (with_shading) {
+    const FrameShading shading = MeasureShading(places, threads);
+    const bool had_shading = pattern->shading_removed;
+    removed.shading = RemoveShading(places, shading, store, pattern);
+    if (removed.shading && had_shading) {
+      pattern->corner_stops->value += shading.corner_stops->value;
+      pattern->corner_stops->sigma = shading.corner_stops->sigma;
+    } else if (removed.shading) {
+      pattern->corner_stops = shading.corner_stops;
+    }
   }
-  if (!defects->all.Any()) return shades;
+  if (!defects->all.Any()) return removed;
   const SensorDefects more = FindSensorDefects(places, reference, sharpness, threads);
   defects->remainder = kMinRemainder;
-  if (!more.done || !more.Any()) return shades;
+  if (!more.done || !more.Any()) return removed;
   const double before = PowerOf(defects->all);
   const cv::Mat filled_before = defects->all.filled;
   defects->all = WithMore(defects->all, more);
@@ -94,7 +103,8 @@ bool FindRemainingPattern(const FramePlaces& places, std::size_t reference,
   }
   Describe(defects->all, pattern);
   AddToCorrection({more.log_gain, more.filled}, store);
-  return true;
+  removed.defects = true;
+  return removed;
 }
 
 void AddErrorOfShading(const FixedPattern& pattern, const ScaleModel& before, ScaleModel* law) {

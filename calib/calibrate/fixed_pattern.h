@@ -18,19 +18,28 @@ struct RemovedDefects {
   double remainder = 1;
 };
 
-// Finds the shading and the fine structure that are fixed to the frame, and lets `store` remove
-// them from the light of all frames. Says in `pattern` what was found. `sharpness` has an index for
-// each frame of the sweep. `defects` gets the fine structure. Returns whether anything is removed.
-bool FindFixedPattern(const FramePlaces& places, std::size_t reference,
-                      const std::vector<double>& sharpness, int threads, FrameStore* store,
-                      FixedPattern* pattern, RemovedDefects* defects);
+// What a round of the search removes from the light of all frames.
+struct RemovedPattern {
+  bool shading = false;
+  bool defects = false;
+  bool Any() const { return shading || defects; }
+};
+
+// Finds the shading, if `with_shading`, and the fine structure that are fixed to the frame, and
+// lets `store` remove them from the light of all frames. Says in `pattern` what was found.
+// `sharpness` has an index for each frame of the sweep. `defects` gets the fine structure.
+RemovedPattern FindFixedPattern(const FramePlaces& places, std::size_t reference,
+                                const std::vector<double>& sharpness, bool with_shading,
+                                int threads, FrameStore* store, FixedPattern* pattern,
+                                RemovedDefects* defects);
 
 // Finds what is left of a strong shading, or of fine structure, once its removal has made the
 // registrations better: fine structure pulls the scale of blurred frames toward 1 and their blur
-// toward 0. Returns whether more is removed.
-bool FindRemainingPattern(const FramePlaces& places, std::size_t reference,
-                          const std::vector<double>& sharpness, int threads, FrameStore* store,
-                          FixedPattern* pattern, RemovedDefects* defects);
+// toward 0. Returns what more is removed.
+RemovedPattern FindRemainingPattern(const FramePlaces& places, std::size_t reference,
+                                    const std::vector<double>& sharpness, bool with_shading,
+                                    int threads, FrameStore* store, FixedPattern* pattern,
+                                    RemovedDefects* defects);
 
 // Adds the part of the bench offset's error that the error of a removed shading causes: the shift
 // of the offset is proportional to the shading. `before` is the law of the scales with the shading.

@@ -60,6 +60,8 @@ constexpr double kFewRegistered = 0.8;  // share of the used frames; below it th
 // Rounds of finding structure fixed to the frame: the later ones, with better scales, find the
 // remainder.
 constexpr int kPatternRounds = 3;
+// Registered frames that the removal of a true shading may cost.
+constexpr std::size_t kFramesByChance = 1;
 // Rounds of measuring bands: the second one has better registrations.
 constexpr int kBandPasses = 2;
 constexpr char kNoOffset[] = "nothing determines the bench offset";
@@ -539,15 +541,30 @@ class Calibrator {
     }
     const ScaleModel before = result_.diagnostics.scale;
     RemovedDefects defects;
+    bool is_first = true, with_shading = true;
     for (int round = 0; round < kPatternRounds; ++round) {
       const FramePlaces places = PlacesOf(*samples);
-      const bool found = (round == 0 ? FindFixedPattern : FindRemainingPattern)(
-          places, reference_, energies_, options_.threads, &store_, &pattern, &defects);
-      if (!found) break;
-      ForEachUsed([&](std::size_t frame) { MeasureStatistics(frame); });
-      if (!MeasureSharpness()) return false;
-      *samples = Track(known_offset_mm);
-      result_.diagnostics.scale = LawOf(*samples);
+      std::optional<FixedPatternRemoval> removed_before;
+      if (store_.correction() != nullptr) removed_before = *store_.correction();
+      const FixedPattern pattern_before = pattern;
+      const RemovedDefects defects_before = defects;
+      const std::size_t registered = samples->size();
+      const RemovedPattern removed = (is_first ? FindFixedPattern : FindRemainingPattern)(
+          places, reference_, energies_, with_shading, options_.threads, &store_, &pattern,
+          &defects);
+      if (!removed.Any()) break;
+      if (!MeasureCorrected(known_offset_mm, samples)) return false;
+      if (removed.shading && samples->size() + kFramesByChance < registered) {
+        // A shading that is there hides the target; without it, more frames are recognised.
+        store_.SetCorrection(removed_before);
+        pattern = pattern_before;
+        pattern.message = "fewer frames can be registered once the fitted shading is divided out";
+        defects = defects_before;
+        with_shading = false;
+        if (!MeasureCorrected(known_offset_mm, samples)) return false;
+        continue;
+      }
+      is_first = false;
     }
     ScaleModel& law = result_.diagnostics.scale;
     const double without_mm = law.offset_mm.sigma;
@@ -555,6 +572,17 @@ class Calibrator {
     AddErrorOfDefects(defects, before, &law);
     shading_sigma_mm_ = std::sqrt(
         std::max(0.0, law.offset_mm.sigma * law.offset_mm.sigma - without_mm * without_mm));
+    return true;
+  }
+
+  // Measures all that depends on the light of the frames, after its correction has changed. Returns
+  // false after a refusal.
+  bool MeasureCorrected(const std::optional<double>& known_offset_mm,
+                        std::vector<ScaleSample>* samples) {
+    ForEachUsed([&](std::size_t frame) { MeasureStatistics(frame); });
+    if (!MeasureSharpness()) return false;
+    *samples = Track(known_offset_mm);
+    result_.diagnostics.scale = LawOf(*samples);
     return true;
   }
 

@@ -10,8 +10,8 @@ FrameStore::FrameStore(const FocusSweep& sweep, std::size_t byte_limit)
 
 cv::Mat FrameStore::Stored(std::size_t index) { return kept_(index); }
 
-void FrameStore::SetCorrection(const FixedPatternRemoval& correction) {
-  correction_ = std::make_unique<const FixedPatternRemoval>(correction);
+void FrameStore::SetCorrection(const std::optional<FixedPatternRemoval>& correction) {
+  correction_ = correction ? std::make_unique<const FixedPatternRemoval>(*correction) : nullptr;
 }
 
 void FrameStore::SetLineGains(const std::vector<std::vector<double>>& log_gain, bool are_columns) {

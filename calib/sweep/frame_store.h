@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <memory>
 #include <opencv2/core/mat.hpp>
+#include <optional>
 #include <vector>
 
 #include "calib/sweep/fixed_pattern_removal.h"
@@ -24,9 +25,9 @@ class FrameStore {
   // reader throws.
   cv::Mat Stored(std::size_t index);
 
-  // Removes `correction` from all light that is returned from now on. Must not be called while
-  // another thread reads.
-  void SetCorrection(const FixedPatternRemoval& correction);
+  // Removes `correction`, or nothing, from all light that is returned from now on. Must not be
+  // called while another thread reads.
+  void SetCorrection(const std::optional<FixedPatternRemoval>& correction);
   // The correction that is set; null: none.
   const FixedPatternRemoval* correction() const { return correction_.get(); }
 

@@ -1,6 +1,7 @@
 // Hard cases of scenes and images, each with every way to a light field.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -60,9 +61,14 @@ StressCase Bounded(std::string name, std::string why, const StressImage& shape,
   hard.name = "scene/" + std::move(name);
   hard.why = std::move(why);
   hard.required = fmt::format(
-      "no view leaves the range of the image's values by more than {:g} of it (scene), {:g} (the "
+      "no view leaves the range of the scene's light by more than {:g} of it (scene), {:g} (the "
       "paper's functional, by blocks or not)",
       limit, limit_of_source);
+  // A clipped image shows less than the light of the scene, which is estimated beyond full scale.
+  double brightest = 0;
+  for (int y = 0; y < shape.height_px; ++y) {
+    for (int x = 0; x < shape.width_px; ++x) brightest = std::max(brightest, image(x, y));
+  }
   hard.prepare = [=](const fs::path& folder, const Capabilities& capabilities) {
     WriteImage(folder, shape, image);
     WriteDepth(folder, shape, disparity);
@@ -70,7 +76,8 @@ StressCase Bounded(std::string name, std::string why, const StressImage& shape,
     for (const Way& way : EveryWay(capabilities)) {
       runs.push_back(
           EstimateOf(shape, way.arguments,
-                     ViewsWithinImage(shape, way.solver == "scene" ? limit : limit_of_source)));
+                     ViewsWithinImage(shape, way.solver == "scene" ? limit : limit_of_source,
+                                      way.solver == "scene" ? brightest : 0)));
     }
     return runs;
   };

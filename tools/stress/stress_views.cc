@@ -158,14 +158,14 @@ Requirement ViewsAre(const StressImage& shape, const ViewOf& view, int border_px
       limit);
 }
 
-Requirement ViewsWithinImage(const StressImage& shape, double limit) {
+Requirement ViewsWithinImage(const StressImage& shape, double limit, double brightest) {
   return Solved(
       [=](const fs::path& folder, const nlohmann::json&) {
         const model::EncodedImage image = io::WithoutAlpha(
             io::ToEncodedImage(io::ReadImageFile((folder / "picture.png").string())));
         const auto [least, most] = std::minmax_element(image.values.begin(), image.values.end());
         const double full = image.bits == 8 ? 255 : 65535;
-        const double low = *least / full, high = *most / full;
+        const double low = *least / full, high = std::max(*most / full, brightest);
         double beyond = 0, sum = 0;
         const model::LightField views = ReadViews(folder, shape);
         ForEachValue(views, 0, [&](int, double, double, int, int, double value) {

@@ -56,9 +56,10 @@ StressRun EstimateOf(const StressImage& shape, const std::vector<std::string>& m
 // Measures the rms difference of all views from the truth, without `border_px`. Throws Error if a
 // value is not a number or the sizes are not as requested.
 Requirement ViewsAre(const StressImage& shape, const ViewOf& view, int border_px, double limit);
-// Measures how far views leave the range of the photograph's values, relative to that range. Throws
-// Error if their light differs from that of the photograph by more than a tenth.
-Requirement ViewsWithinImage(const StressImage& shape, double limit);
+// Measures how far views leave the range of the photograph's values, relative to that range, which
+// reaches at least up to `brightest` (of full scale). Throws Error if their light differs from that
+// of the photograph by more than a tenth.
+Requirement ViewsWithinImage(const StressImage& shape, double limit, double brightest = 0);
 // Requires the same range. If the iterations converged, the views must also be `truth` (if given)
 // within an rms. If they did not, the summary must be partial and report it. A refusal because the
 // iterations diverged or a block is singular is also accepted.
