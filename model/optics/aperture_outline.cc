@@ -92,13 +92,13 @@ std::complex<double> PolygonTransfer(const std::vector<Eigen::Vector2d>& corners
   const Eigen::Vector2d q = 2 * kPi * f;
   const double spread = q.dot(moments.second * q);
   if (spread < kSmallPhase * kSmallPhase)
-    return std::polar(1 - spread / 2, -q.dot(moments.centroid));
+    return (1 - spread / 2) * std::polar(1.0, -q.dot(moments.centroid));
   std::complex<double> sum = 0;
   for (std::size_t i = 0; i < corners.size(); ++i) {
     const Eigen::Vector2d &a = corners[i], &b = corners[(i + 1) % corners.size()];
     const double half = q.dot(b - a) / 2;
     const double sinc = std::abs(half) < 1e-8 ? 1 : std::sin(half) / half;
-    sum += std::complex<double>(0, Cross(q, b - a)) * std::polar(sinc, -q.dot(a + b) / 2);
+    sum += std::complex<double>(0, Cross(q, b - a)) * (sinc * std::polar(1.0, -q.dot(a + b) / 2));
   }
   return sum / (q.squaredNorm() * moments.area);
 }

@@ -73,7 +73,7 @@ Scene MakeScene(model::ApertureShape shape, double noise_levels, double level, u
   input.disparity = {kW, kH, {}, {1, 1}};
   scene.unclipped = input.image;
   std::mt19937 engine(seed);
-  std::normal_distribution<double> noise(0, noise_levels);
+  std::normal_distribution<double> noise(0, 1);
   double clipped = 0;
   for (int y = 0; y < kH; ++y) {
     for (int x = 0; x < kW; ++x) {
@@ -92,7 +92,8 @@ Scene MakeScene(model::ApertureShape shape, double noise_levels, double level, u
           }
         }
         scene.unclipped.values.push_back(static_cast<float>(light));
-        const double stored = std::round(255 * input.transfer.Encode(light) + noise(engine));
+        const double stored =
+            std::round(255 * input.transfer.Encode(light) + noise_levels * noise(engine));
         const bool is_clipped = stored >= std::round(255 * level);
         const double kept = std::clamp(stored, 0.0, std::round(255 * level)) / 255;
         input.image.values.push_back(static_cast<float>(input.transfer.Decode(kept)));

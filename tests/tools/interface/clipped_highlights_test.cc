@@ -26,7 +26,7 @@ constexpr int kLampsWidth = 160, kLampsHeight = 120;
 std::vector<double> LampSceneOf(const std::vector<double>& lamps, double noise, unsigned seed) {
   std::vector<double> values;
   std::mt19937 engine(seed);
-  std::normal_distribution<double> normal(0, noise);
+  std::normal_distribution<double> normal(0, 1);
   for (int y = 0; y < kLampsHeight; ++y) {
     for (int x = 0; x < kLampsWidth; ++x) {
       double value = 0.3 + 0.2 * std::sin(0.11 * x + 0.05 * y);
@@ -35,7 +35,7 @@ std::vector<double> LampSceneOf(const std::vector<double>& lamps, double noise, 
         // Discs whose edge is a px wide.
         value += (lamps[i] - value) * std::clamp(6.5 - r, 0.0, 1.0);
       }
-      values.push_back(value + normal(engine));
+      values.push_back(value + noise * normal(engine));
     }
   }
   return values;
