@@ -18,7 +18,7 @@ struct RemovedDefects {
   double remainder = 1;
 };
 
-// What a round of the search removes from the light of all frames.
+// The parts of the fixed pattern that a round of the search removes from the light of all frames.
 struct RemovedPattern {
   bool shading = false;
   bool defects = false;
