@@ -9,6 +9,7 @@
 
 #include "estimator/render/shown_views.h"
 #include "thicklens/base/error.h"
+#include "thicklens/model/light_field_description.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -62,7 +63,8 @@ Eigen::ArrayXXd NearestViews(const model::LightField& light_field) {
 }  // namespace
 
 Eigen::ArrayXXd WeightsForRadius(const model::LightField& light_field, double radius) {
-  CheckLightField(light_field);
+  std::string why;
+  if (!model::IsValidDescription(light_field, &why)) throw Error("light field: " + why);
   if (!(radius >= 0) || !std::isfinite(radius)) {
     throw Error(fmt::format("aperture radius is {} {}: it must be finite and >= 0", radius,
                             light_field.camera ? "mm" : "view steps"));

@@ -540,10 +540,8 @@ ResidualBlocks ExplainedBy(const ReducedPhoto& photo, const DisparityMap& map,
   options.photo_aperture = photo_aperture;
   options.tolerance = 1e-3;
   SceneViewSink sink;  // only the residual is wanted
-  sink.take = [](int, int, const model::LinearImage&, const std::vector<Confidence>&) {
-    ThrowIfCancelled();
-  };
   sink.wants_confidence = false;
+  sink.wants_views = false;
   SolverRun run;
   run.threads = threads;
   run.sink = &sink;

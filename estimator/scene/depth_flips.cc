@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "estimator/scene/blur_image.h"
-#include "thicklens/base/cancel.h"
 #include "thicklens/base/parallel.h"
 #include "thicklens/estimator/scene_solver.h"
 
@@ -66,10 +65,8 @@ DepthFlipCheck CheckDepthFlips(const EstimateInput& input, const DepthFlipOption
   check.noise_sigma =
       std::hypot(noise_sigma, std::ldexp(options.compression_sigma, -image.halvings));
   SceneViewSink sink;  // only the residual is wanted
-  sink.take = [](int, int, const model::LinearImage&, const std::vector<Confidence>&) {
-    ThrowIfCancelled();
-  };
   sink.wants_confidence = false;
+  sink.wants_views = false;
   SolverRun run;
   run.threads = threads;
   run.memory_limit_mib = options.memory_limit_mib;

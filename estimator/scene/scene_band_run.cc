@@ -261,6 +261,7 @@ template <typename Real>
 bool SceneBandRun<Real>::MayKeepBundle(int bands) const {
   // The rays of a photograph through another aperture are not those of the views.
   if (bands > 1 || options_.photo_aperture != 1) return false;
+  if (run_.sink != nullptr && !run_.sink->wants_views) return false;
   if (!input_.grid) return true;
   return LandingStepPx(*input_.camera, *input_.grid).isZero(0);
 }

@@ -89,7 +89,9 @@ model::LightField EstimateIn(const EstimateInput& input, const SceneOptions& opt
   ReturnFreedMemory(how.memory_limit_mib);
   const SceneMemory memory(input, options, summary->threads, keeps, reach_px);
   const int iterations = std::min(options.max_iterations, UsualIterations(options.prior));
-  IterationProgress progress(how.progress, iterations + static_cast<int>(input.weights.size()));
+  const bool makes_views = sink == nullptr || sink->wants_views;
+  const int views = makes_views ? static_cast<int>(input.weights.size()) : 0;
+  IterationProgress progress(how.progress, iterations + views);
 
   const std::optional<double> noise = EncodedNoiseSigma(input.image, input.transfer, input.clipped);
   summary->noise_sigma = noise.value_or(kDefaultNoise);
@@ -128,13 +130,16 @@ model::LightField EstimateIn(const EstimateInput& input, const SceneOptions& opt
                       }
                     },
                     0, maps != nullptr});
-  } else {
+  } else if (makes_views) {
     ShowInAllViews(input, solved, summary->threads, backend, &progress, *sink);
   }
   summary->views_seconds = SecondsSince(views_start);
   summary->message = MessageOf(options, *summary, noise.has_value());
   FillOrigin(options, *summary, falloff, &light_field.origin);
-  if (maps != nullptr) maps->radiance = std::move(solved.radiance);
+  if (maps != nullptr) {
+    maps->radiance = std::move(solved.radiance);
+    maps->of_points = std::move(solved.of_points);
+  }
   return light_field;
 }
 

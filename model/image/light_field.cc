@@ -8,6 +8,7 @@
 
 #include "thicklens/base/error.h"
 #include "thicklens/base/validity.h"
+#include "thicklens/model/light_field_description.h"
 
 namespace thicklens::model {
 namespace {
@@ -65,7 +66,8 @@ std::string GridComplaint(const LightField& light_field) {
   return "";
 }
 
-std::string Complaint(const LightField& light_field) {
+// Returns the error of all members but the values, or an empty text if they are valid.
+std::string DescriptionComplaint(const LightField& light_field) {
   const struct {
     const char* name;
     int value;
@@ -78,13 +80,6 @@ std::string Complaint(const LightField& light_field) {
   }
   if (light_field.channels < 1) {
     return fmt::format("channels is {}: it must be >= 1", light_field.channels);
-  }
-  const std::size_t expected = light_field.ViewStart(light_field.channels, 0, 0);
-  if (light_field.values.size() != expected) {
-    return fmt::format(
-        "values: {} values for {}x{} views of {}x{} samples in {} channels: {} are needed",
-        light_field.values.size(), light_field.u_count, light_field.v_count, light_field.s_count,
-        light_field.t_count, light_field.channels, expected);
   }
   const auto views = static_cast<std::size_t>(light_field.u_count * light_field.v_count);
   if (!light_field.present.empty()) {
@@ -104,6 +99,19 @@ std::string Complaint(const LightField& light_field) {
   }
   const std::string weights = WeightComplaint(light_field);
   return weights.empty() ? GridComplaint(light_field) : weights;
+}
+
+std::string Complaint(const LightField& light_field) {
+  std::string of_description = DescriptionComplaint(light_field);
+  if (!of_description.empty()) return of_description;
+  const std::size_t expected = light_field.ViewStart(light_field.channels, 0, 0);
+  if (light_field.values.size() != expected) {
+    return fmt::format(
+        "values: {} values for {}x{} views of {}x{} samples in {} channels: {} are needed",
+        light_field.values.size(), light_field.u_count, light_field.v_count, light_field.s_count,
+        light_field.t_count, light_field.channels, expected);
+  }
+  return "";
 }
 
 void RequireView(const LightField& light_field, int k, int l) {
@@ -163,6 +171,11 @@ bool LightField::IsValid(std::string* why) const {
   std::string complaint = Complaint(*this);
   if (complaint.empty()) return true;
   return Fail(why, std::move(complaint));
+}
+
+bool IsValidDescription(const LightField& light_field, std::string* why) {
+  std::string complaint = DescriptionComplaint(light_field);
+  return complaint.empty() || Fail(why, std::move(complaint));
 }
 
 LightField MakeLightField(int s_count, int t_count, int u_count, int v_count, int channels) {

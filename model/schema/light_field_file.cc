@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <filesystem>
+#include <vector>
 
 #include "model/schema/yaml_fields.h"
 #include "model/schema/yaml_writer.h"
@@ -16,7 +17,8 @@
 namespace thicklens::model {
 namespace {
 
-constexpr char kSchema[] = "thicklens/light-field/1";
+constexpr char kSchemaOfViews[] = "thicklens/light-field/1";
+constexpr char kSchemaOfScene[] = "thicklens/light-field/2";
 constexpr char kConfidenceFormat[] = "png";
 constexpr char kDisparityIs[] = "px per view step, near positive";
 constexpr int kMaxImageSizePx = 100000;
@@ -152,6 +154,45 @@ LightFieldOrigin ReadOrigin(const YamlNode& node) {
   return origin;
 }
 
+// How the values are stored of a light field of views.
+void ReadViewFormats(const YamlNode& root, LightFieldDescription* description) {
+  description->view_format = root.At("view_format").OneOf({"png", "tiff"});
+  if (const auto format = root.Find("confidence_format")) {
+    format->OneOf({kConfidenceFormat});
+    description->has_confidence = true;
+  }
+  if (const auto missing = root.Find("missing_views"))
+    ReadMissingViews(*missing, &description->light_field);
+}
+
+// How the values are stored of a light field that is kept as its scene.
+void ReadScene(const YamlNode& node, LightFieldDescription* description) {
+  node.RequireKeys({"radiance", "radiance_bits", "radiance_offset", "radiance_scale", "disparity",
+                    "disparity_step", "confidence", "colour_profile"});
+  ScenePlanes& planes = description->scene.emplace();
+  node.At("radiance").OneOf({kSceneRadianceFile});
+  planes.radiance_bits = node.At("radiance_bits").OneOf({"16", "32"}) == "16" ? 16 : 32;
+  const bool is_whole = planes.radiance_bits == 16;
+  for (const char* key : {"radiance_offset", "radiance_scale"}) {
+    if (const auto number = node.Find(key); number && !is_whole)
+      throw number->ErrorHere("this key requires 'radiance_bits: 16'");
+  }
+  if (is_whole) {
+    planes.radiance_offset = node.At("radiance_offset").Number();
+    planes.radiance_scale = node.At("radiance_scale").PositiveNumber();
+  }
+  node.At("disparity").OneOf({kSceneDisparityFile});
+  planes.disparity_step = ReadPair(node.At("disparity_step"));
+  if (const auto confidence = node.Find("confidence")) {
+    confidence->OneOf({kSceneConfidenceFile});
+    description->has_confidence = true;
+  }
+  if (const auto profile = node.Find("colour_profile")) {
+    profile->OneOf({kSceneProfileFile});
+    planes.has_colour_profile = true;
+  }
+}
+
 class DescriptionWriter {
  public:
   explicit DescriptionWriter(const LightFieldDescription& description)
@@ -162,8 +203,12 @@ class DescriptionWriter {
               {std::to_string(light_field_.u_count), std::to_string(light_field_.v_count)});
     out_.List("size", {std::to_string(light_field_.s_count), std::to_string(light_field_.t_count)});
     out_.Text("channels", std::to_string(light_field_.channels));
-    out_.Text("view_format", description_.view_format);
-    if (description_.has_confidence) out_.Text("confidence_format", kConfidenceFormat);
+    if (description_.scene) {
+      WriteScene(*description_.scene);
+    } else {
+      out_.Text("view_format", description_.view_format);
+      if (description_.has_confidence) out_.Text("confidence_format", kConfidenceFormat);
+    }
     out_.Text("transfer", light_field_.transfer.Name());
     out_.Text("disparity", kDisparityIs);
     Point("landing_step_px", light_field_.landing_step_px);
@@ -189,6 +234,21 @@ class DescriptionWriter {
   }
   void Point(const char* key, const Eigen::Vector2d& point) {
     out_.List(key, {YamlNumber(Checked(key, point.x())), YamlNumber(Checked(key, point.y()))});
+  }
+
+  void WriteScene(const ScenePlanes& planes) {
+    out_.BeginMap("scene");
+    out_.Text("radiance", kSceneRadianceFile);
+    out_.Text("radiance_bits", std::to_string(planes.radiance_bits));
+    if (planes.radiance_bits == 16) {
+      Number("radiance_offset", planes.radiance_offset);
+      Number("radiance_scale", planes.radiance_scale);
+    }
+    out_.Text("disparity", kSceneDisparityFile);
+    Point("disparity_step", planes.disparity_step);
+    if (description_.has_confidence) out_.Text("confidence", kSceneConfidenceFile);
+    if (planes.has_colour_profile) out_.Text("colour_profile", kSceneProfileFile);
+    out_.EndMap();
   }
 
   void WriteWeights() {
@@ -255,7 +315,7 @@ class DescriptionWriter {
 
   const LightFieldDescription& description_;
   const LightField& light_field_;
-  YamlWriter out_{kSchema};
+  YamlWriter out_{description_.scene ? kSchemaOfScene : kSchemaOfViews};
 };
 
 }  // namespace
@@ -265,17 +325,25 @@ std::string ViewFileStem(int k, int l) { return fmt::format("view_{:02}_{:02}", 
 LightFieldDescription ParseLightFieldDescription(const std::string& text,
                                                  const std::string& source_name) {
   const YamlNode root = YamlNode::Parse(text, source_name);
-  root.RequireSchema(kSchema);
-  root.RequireKeys({"schema", "views", "size", "channels", "view_format", "confidence_format",
-                    "transfer", "disparity", "landing_step_px", "weights", "missing_views",
-                    "camera", "planes", "steps", "st_origin_index", "origin"});
+  const bool is_scene = root.HasSchema(kSchemaOfScene);
+  if (!is_scene) root.RequireSchema(kSchemaOfViews);
+  std::vector<std::string> keys = {"schema",          "views",   "size",    "channels",
+                                   "transfer",        "disparity", "landing_step_px", "weights",
+                                   "camera",          "planes",  "steps",   "st_origin_index",
+                                   "origin"};
+  if (is_scene) {
+    keys.emplace_back("scene");
+  } else {
+    keys.insert(keys.end(), {"view_format", "confidence_format", "missing_views"});
+  }
+  root.RequireKeys(keys);
   LightFieldDescription description;
   LightField& light_field = description.light_field;
   ReadSizes(root, &light_field);
-  description.view_format = root.At("view_format").OneOf({"png", "tiff"});
-  if (const auto format = root.Find("confidence_format")) {
-    format->OneOf({kConfidenceFormat});
-    description.has_confidence = true;
+  if (is_scene) {
+    ReadScene(root.At("scene"), &description);
+  } else {
+    ReadViewFormats(root, &description);
   }
   light_field.transfer = ReadTransfer(root.At("transfer"));
   const YamlNode disparity = root.At("disparity");
@@ -285,7 +353,6 @@ LightFieldDescription ParseLightFieldDescription(const std::string& text,
   }
   if (const auto step = root.Find("landing_step_px")) light_field.landing_step_px = ReadPair(*step);
   ReadWeights(root.At("weights"), &light_field);
-  if (const auto missing = root.Find("missing_views")) ReadMissingViews(*missing, &light_field);
   ReadCameraAndGrid(root, &description);
   if (const auto origin = root.Find("origin")) light_field.origin = ReadOrigin(*origin);
   return description;

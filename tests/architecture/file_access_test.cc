@@ -36,7 +36,7 @@ const std::set<std::string>& Known() {
       "model/base/output_target.cc",            //
       "tools/io/journal_file.cc",               // grows during a run
       "tools/report/report_folder.cc",          // the head of an output: reading reports an input
-      "tools/io/float_tiff.cc",                 // writes a file in an output folder
+      "tools/io/plain_tiff.cc",                 // writes a file in an output folder
       "tools/io/array_file.cc",                 // the first bytes of an input; /proc
       "tools/io/frame_files.cc",                // digests of videos, which may exceed the memory
       "tools/io/video/video_file.cc",           // the first bytes of an input

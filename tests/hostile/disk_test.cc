@@ -21,6 +21,7 @@ class HostileDisk : public HostileTest {
     return {Explain("disk/new"),
             Render("disk/new.png"),
             Estimate("disk/new"),
+            Estimate("disk/new --store views"),
             Estimate("disk/new --format tiff"),
             "\"$T\" estimate picture.png depth.pfm --depth-kind z --depth-unit mm --camera "
             "camera.yaml --views 2x2 --quiet -o disk/new --json disk/new.json",

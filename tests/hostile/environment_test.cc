@@ -17,8 +17,9 @@ class HostileEnvironment : public HostileTest {
  protected:
   // Returns the results of estimate and calibrate, without what differs from run to run.
   std::string Results(const std::string& name) {
-    return testing::ContentOf(Work(name + "/views/view_00_00.png")) +
-           testing::ContentOf(Work(name + "/views/view_01_01.png"));
+    return testing::ContentOf(Work(name + "/radiance.tiff")) +
+           testing::ContentOf(Work(name + "/disparity.tiff")) +
+           testing::ContentOf(Work(name + "/confidence.png"));
   }
   // Each setting gives the outputs of a usual run.
   void ExpectNoDifference(const std::vector<std::string>& settings) {

@@ -163,9 +163,9 @@ THICKLENS_SITUATION(
     "The process may use one processor of the machine only, and 64 threads are requested",
     "The result is the same as usual") {
   ASSERT_EQ(Shell("command -v taskset").exit_code, 0);
-  ExpectDone(Shell(Estimate("usual")), {"new usual"});
+  ExpectDone(Shell(Estimate("usual --store views")), {"new usual"});
   ExpectDone(Shell("cpu=$(taskset -cp $$ | sed 's/.*: //; s/[-,].*//'); taskset -c $cpu sh -c " +
-                   Quoted(Estimate("new --threads 64"))),
+                   Quoted(Estimate("new --threads 64 --store views"))),
              {"new new"});
   for (const char* view : {"views/view_00_00.png", "views/view_01_01.png"}) {
     EXPECT_EQ(testing::ContentOf(Work(std::string("new/") + view)),

@@ -230,10 +230,20 @@ std::string Page(const EstimateOptions& options, const EstimateOutcome& outcome,
   return MakeLightFieldPage(page).html;
 }
 
-// Estimates, and writes the views below the staging path of their folder: as they are made, unless
-// a page shows them too.
-void EstimateInto(io::LightFieldWriter* writer, EstimateCall call, bool has_page,
-                  const RunControl& run, EstimateOutcome* outcome) {
+// Writes an estimate that is kept as its scene. A page shows its views.
+void WriteScene(bool has_page, const RunControl& run, OutputFolder* folder,
+                EstimateOutcome* outcome) {
+  LightFieldEstimate& estimate = outcome->estimate;
+  const auto start = Clock::now();
+  WriteSceneForm(folder, *estimate.scene, run);
+  outcome->files_seconds = SecondsSince(start);
+  if (has_page) estimate.light_field = ViewsOf(*estimate.scene, run);
+}
+
+// Estimates, and writes the light field below the staging path of its folder: views as they are
+// made, unless a page shows them too.
+void EstimateInto(io::LightFieldWriter* writer, OutputFolder* folder, EstimateCall call,
+                  bool has_page, const RunControl& run, EstimateOutcome* outcome) {
   LightFieldEstimate& estimate = outcome->estimate;
   if (has_page) {
     estimate = EstimateLightField(std::move(call.photo), std::move(call.depth), call.camera,
@@ -245,6 +255,11 @@ void EstimateInto(io::LightFieldWriter* writer, EstimateCall call, bool has_page
     outcome->files_seconds = estimate.summary.seconds.sink;
   }
   ThrowIfCancelled();
+  if (auto& seconds = estimate.light_field.origin.seconds) *seconds += outcome->read_seconds;
+  if (estimate.scene) {
+    estimate.scene->frame.origin.seconds = estimate.light_field.origin.seconds;
+    return WriteScene(has_page, run, folder, outcome);
+  }
   const auto start = Clock::now();
   const LightField& light_field = estimate.light_field;
   if (has_page) {
@@ -252,7 +267,6 @@ void EstimateInto(io::LightFieldWriter* writer, EstimateCall call, bool has_page
     io::WriteConfidence(estimate.confidence, light_field.u_count, light_field.s_count,
                         light_field.t_count, writer);
   }
-  if (auto& seconds = estimate.light_field.origin.seconds) *seconds += outcome->read_seconds;
   const std::size_t clipped = writer->Finish(light_field);
   outcome->files_seconds += SecondsSince(start);
   outcome->clipped_fraction =
@@ -319,7 +333,8 @@ CommandResult RunEstimate(const EstimateOptions& options) {
     outcome.read_seconds = SecondsSince(start);
     io::LightFieldWriter writer(TransferOf(call), FormatFor(options, call), &outputs.light_field,
                                 call.photo.ColourProfile(TransferOf(call)));
-    EstimateInto(&writer, std::move(call), outputs.report.has_value(), run.control(), &outcome);
+    EstimateInto(&writer, &outputs.light_field, std::move(call), outputs.report.has_value(),
+                 run.control(), &outcome);
   });
   outcome.total_seconds = SecondsSince(start);
 

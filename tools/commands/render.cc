@@ -4,8 +4,10 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -14,12 +16,14 @@
 #include <utility>
 #include <vector>
 
+#include "thicklens/animation.h"
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/base/stopwatch.h"
 #include "thicklens/image.h"
 #include "thicklens/light_field.h"
+#include "thicklens/scene_form.h"
 #include "tools/commands/commands.h"
 #include "tools/options/command_frame.h"
 #include "tools/options/effect_options.h"
@@ -29,6 +33,8 @@
 
 namespace thicklens::tools {
 namespace {
+
+namespace fs = std::filesystem;
 
 constexpr int kMosaicGapPx = 2;
 constexpr int kEpipolarRepeatPx = 8;  // one line per view would be too thin to see
@@ -47,6 +53,7 @@ struct RenderOptions {
   bool is_epi = false;
   std::string epi;
   std::string convert;
+  std::string animate;
   // Settings of the rendering.
   std::string aperture_shape;
   std::optional<double> aperture_radius;
@@ -54,6 +61,8 @@ struct RenderOptions {
   std::optional<double> noise_levels;
   std::optional<int> bits;
   std::optional<std::int64_t> seed;
+  std::optional<int> frames;
+  std::optional<double> seconds;
   std::string device = "auto";
 };
 
@@ -64,7 +73,7 @@ bool IsFocused(const RenderOptions& options) {
 // --- The command line.
 
 constexpr char kWhatToRender[] =
-    "--as-captured, --view, --focus, --focus-disparity, --mosaic, --epi, --convert";
+    "--as-captured, --view, --focus, --focus-disparity, --mosaic, --epi, --convert, --animate";
 
 std::vector<std::string> AskedFor(const RenderOptions& options) {
   std::vector<std::string> asked;
@@ -75,6 +84,7 @@ std::vector<std::string> AskedFor(const RenderOptions& options) {
   if (options.mosaic) asked.emplace_back("--mosaic");
   if (options.is_epi) asked.emplace_back("--epi");
   if (!options.convert.empty()) asked.emplace_back("--convert");
+  if (!options.animate.empty()) asked.emplace_back("--animate");
   return asked;
 }
 
@@ -93,8 +103,9 @@ void CheckUsage(RenderOptions* options) {
         fmt::format("exactly one of {} is expected, found {}", kWhatToRender,
                     asked.empty() ? "none" : fmt::format("{}", fmt::join(asked, ", "))));
   }
-  const bool averages = options->as_captured || IsFocused(*options);
-  const char* const kAverages = "--as-captured, --focus or --focus-disparity";
+  const bool averages =
+      options->as_captured || IsFocused(*options) || options->animate == "focus";
+  const char* const kAverages = "--as-captured, --focus, --focus-disparity or --animate focus";
   RefuseUnless(averages, !options->aperture_shape.empty(), "--aperture-shape", kAverages);
   RefuseUnless(averages, options->aperture_radius.has_value(), "--aperture", kAverages);
   if (!options->aperture_shape.empty() && options->aperture_radius)
@@ -105,8 +116,10 @@ void CheckUsage(RenderOptions* options) {
                "--as-captured");
   RefuseUnless(options->as_captured, options->effects.tolerance.has_value(), "--effect-tolerance",
                "--as-captured");
-  const bool is_image = options->convert.empty();
-  const char* const kImages = "an image as output, not --convert";
+  RefuseUnless(!options->animate.empty(), options->frames.has_value(), "--frames", "--animate");
+  RefuseUnless(!options->animate.empty(), options->seconds.has_value(), "--seconds", "--animate");
+  const bool is_image = options->convert.empty() && options->animate.empty();
+  const char* const kImages = "an image as output, not --convert or --animate";
   RefuseUnless(is_image, options->noise_levels.has_value(), "--noise", kImages);
   RefuseUnless(is_image, options->bits.has_value(), "--bits", kImages);
   RefuseUnless(is_image, options->seed.has_value(), "--seed", kImages);
@@ -114,7 +127,8 @@ void CheckUsage(RenderOptions* options) {
 
 struct ViewPlace {
   bool centre = false;
-  int k = 0, l = 0;
+  double u = 0, v = 0;
+  bool is_whole() const { return u == std::floor(u) && v == std::floor(v); }
 };
 
 constexpr int kMaxViewIndex = 9999;
@@ -122,9 +136,12 @@ constexpr int kMaxViewIndex = 9999;
 ViewPlace ParseView(const std::string& text) {
   if (text == "centre") return {true, 0, 0};
   const std::string form = "u,v (view indices from 0) or centre";
-  const std::vector<int> place = SplitWhole("--view", text, ',', form, 0, kMaxViewIndex);
-  if (place.size() != 2)
-    throw UsageError(fmt::format("--view: {} is expected, found '{}'", form, text));
+  const std::vector<double> place = SplitNumbers("--view", text, ',', form);
+  const auto fits = [](double index) { return index >= 0 && index <= kMaxViewIndex; };
+  if (place.size() != 2 || !fits(place[0]) || !fits(place[1])) {
+    throw UsageError(fmt::format("--view: {} is expected, each from 0 to {}, found '{}'", form,
+                                 kMaxViewIndex, text));
+  }
   return {false, place[0], place[1]};
 }
 
@@ -231,15 +248,43 @@ Rendering RenderPhotograph(const RenderOptions& options, const LightField& light
   return rendering;
 }
 
-Rendering RenderFocused(const RenderOptions& options, const LightField& light_field,
+// The light field of a folder: its views, or the scene that they show, without values.
+struct Source {
+  LightField light_field;
+  std::optional<SceneForm> scene;
+};
+
+// Whether what is asked for is rendered from the scene itself. Other images need all views.
+bool IsOfTheScene(const RenderOptions& options) {
+  return options.convert.empty() && (IsFocused(options) || !options.view.empty());
+}
+
+// Reads what the rendering needs. Inner views, other orders and parts are those of views.
+Source ReadSource(const RenderOptions& options, const RunControl& run) {
+  const LightFieldReadOptions reading = LightFieldReadOptionsOf(options.reading);
+  const bool is_whole = !reading.inner_views && !reading.crop && !reading.view_order.swap &&
+                        !reading.view_order.mirror_u && !reading.view_order.mirror_v;
+  Source source;
+  if (is_whole && IsOfTheScene(options) && IsSceneForm(options.light_field)) {
+    source.scene = ReadSceneForm(options.light_field, run);
+    source.light_field = source.scene->frame;
+  } else {
+    source.light_field = ReadLightField(options.light_field, reading, run);
+  }
+  return source;
+}
+
+Rendering RenderFocused(const RenderOptions& options, const Source& source,
                         const RunControl& run) {
+  const LightField& light_field = source.light_field;
   FocusOptions asked;
   asked.depth_mm = options.focus_mm;
   asked.disparity_px = options.focus_disparity_px;
   asked.aperture = ApertureOf(options);
   RenderSummary found;
   Rendering rendering;
-  rendering.image = Refocus(light_field, asked, run, &found);
+  rendering.image = source.scene ? Refocus(*source.scene, asked, run, &found)
+                                 : Refocus(light_field, asked, run, &found);
   const Eigen::Vector2d& disparity_px = found.disparity_px;
   rendering.details = {{"rendered", "focus"},
                        {"disparity_px", {disparity_px.x(), disparity_px.y()}}};
@@ -253,31 +298,46 @@ Rendering RenderFocused(const RenderOptions& options, const LightField& light_fi
   return rendering;
 }
 
-Rendering RenderView(const RenderOptions& options, const LightField& light_field) {
+Rendering RenderView(const RenderOptions& options, const Source& source) {
+  const LightField& light_field = source.light_field;
   ViewPlace place = ParseView(options.view);
   if (place.centre) {
-    if (light_field.u_count % 2 == 0 || light_field.v_count % 2 == 0) {
+    place.u = (light_field.u_count - 1) / 2.0;
+    place.v = (light_field.v_count - 1) / 2.0;
+    if (!source.scene && !place.is_whole()) {
       throw Error(
           fmt::format("--view centre: {} has {}x{} views, with none in the middle; give --view "
                       "u,v",
                       options.light_field, light_field.u_count, light_field.v_count));
     }
-    place.k = light_field.u_count / 2;
-    place.l = light_field.v_count / 2;
   }
-  const auto [centre, k, l] = place;
-  if (k >= light_field.u_count || l >= light_field.v_count) {
+  const double u = place.u, v = place.v;
+  if (u > light_field.u_count - 1 || v > light_field.v_count - 1) {
     throw Error(
-        fmt::format("--view {},{}: {} has {}x{} views: u must be from 0 to {}, v from 0 to "
+        fmt::format("--view {:g},{:g}: {} has {}x{} views: u must be from 0 to {}, v from 0 to "
                     "{}",
-                    k, l, options.light_field, light_field.u_count, light_field.v_count,
+                    u, v, options.light_field, light_field.u_count, light_field.v_count,
                     light_field.u_count - 1, light_field.v_count - 1));
   }
+  Rendering rendering;
+  rendering.what = fmt::format("view ({:g}, {:g})", u, v);
+  rendering.details = {{"rendered", "view"}, {"u", u}, {"v", v}};
+  if (source.scene) {
+    rendering.image = thicklens::RenderView(*source.scene, u, v);
+    return rendering;
+  }
+  if (!place.is_whole()) {
+    throw Error(fmt::format(
+        "--view {:g},{:g}: {} holds views, and none between them; give whole numbers, or estimate "
+        "it with --store scene",
+        u, v, options.light_field));
+  }
+  const auto k = static_cast<int>(u), l = static_cast<int>(v);
   if (!light_field.IsPresent(k, l))
     throw Error(fmt::format("--view {},{}: {} has no such view", k, l, options.light_field));
-  return {ViewOf(light_field, k, l),
-          fmt::format("view ({}, {})", k, l),
-          {{"rendered", "view"}, {"u", k}, {"v", l}}};
+  rendering.image = ViewOf(light_field, k, l);
+  rendering.details = {{"rendered", "view"}, {"u", k}, {"v", l}};
+  return rendering;
 }
 
 int Chosen(const std::string& name, const std::optional<int>& asked, int count,
@@ -305,12 +365,12 @@ Rendering RenderEpi(const RenderOptions& options, const LightField& light_field)
           {{"rendered", "epi"}, {"column", s}, {"u", k}}};
 }
 
-Rendering RenderAny(const RenderOptions& options, const LightField& light_field,
-                    const RunControl& run) {
+Rendering RenderAny(const RenderOptions& options, const Source& source, const RunControl& run) {
+  const LightField& light_field = source.light_field;
   if (options.as_captured) return RenderPhotograph(options, light_field, run);
-  if (IsFocused(options)) return RenderFocused(options, light_field, run);
+  if (IsFocused(options)) return RenderFocused(options, source, run);
   if (options.is_epi) return RenderEpi(options, light_field);
-  if (!options.mosaic) return RenderView(options, light_field);
+  if (!options.mosaic) return RenderView(options, source);
   return {
       RenderMosaic(light_field, kMosaicGapPx), "all views side by side", {{"rendered", "mosaic"}}};
 }
@@ -387,11 +447,11 @@ CommandResult RenderImage(const RenderOptions& options) {
   RequireHeld(options, file);
   OutputFile output(options.output);
   const CommandRun run(options.common, RenderOptionNames());
-  const LightField light_field =
-      ReadLightField(options.light_field, LightFieldReadOptionsOf(options.reading), run.control());
+  const Source source = ReadSource(options, run.control());
+  const LightField& light_field = source.light_field;
   ThrowIfCancelled();
   Rendering rendering =
-      WithOptionNames(run.names(), [&] { return RenderAny(options, light_field, run.control()); });
+      WithOptionNames(run.names(), [&] { return RenderAny(options, source, run.control()); });
   ThrowIfCancelled();
 
   file.description = Description(options, rendering);
@@ -450,11 +510,61 @@ CommandResult Convert(const RenderOptions& options) {
   return result;
 }
 
+// --- Animations.
+
+OptionNames AnimationOptionNames() {
+  OptionNames names = RenderOptionNames();
+  return names.Add({{"frames", "--frames"}, {"seconds", "--seconds"}});
+}
+
+CommandResult Animate(const RenderOptions& options) {
+  const auto start = Clock::now();
+  constexpr char kEnding[] = ".webp";
+  if (fs::path(options.output).extension() != kEnding) {
+    throw UsageError(fmt::format("-o {}: an animation is a WebP file; its name must end in {}",
+                                 options.output, kEnding));
+  }
+  AnimationOptions asked;
+  asked.kind = options.animate == "focus" ? AnimationKind::kFocus : AnimationKind::kParallax;
+  asked.frames = options.frames.value_or(asked.frames);
+  asked.seconds = options.seconds.value_or(asked.seconds);
+  asked.aperture = ApertureOf(options);
+  OutputFile output(options.output);
+  const CommandRun run(options.common, AnimationOptionNames());
+  if (!IsSceneForm(options.light_field)) {
+    throw Error(fmt::format(
+        "{}: an animation shows views between the views, which only a light field has that is "
+        "stored as its scene (estimate --store scene)",
+        options.light_field));
+  }
+  const SceneForm scene = ReadSceneForm(options.light_field, run.control());
+  const std::string bytes = WithOptionNames(
+      run.names(), [&] { return RenderAnimation(scene, asked, run.control()); });
+  ThrowIfCancelled();
+  output.Commit(bytes);
+
+  CommandResult result;
+  result.is_written = true;
+  result.summary = {{"rendered", "animation"},
+                    {"kind", options.animate},
+                    {"frames", asked.frames},
+                    {"animation_seconds", asked.seconds}};
+  AddToSummary(options, scene.frame, 0, SecondsSince(start), &result.summary);
+  PrintResult(options.common,
+              fmt::format("{} in {} frames of {} x {} px, {:g} s: {}\n",
+                          options.animate == "focus" ? "focus from far to near and back"
+                                                     : "viewpoint once around the aperture",
+                          asked.frames, scene.frame.s_count, scene.frame.t_count, asked.seconds,
+                          options.output));
+  return result;
+}
+
 // --- Its options.
 
 void AddWhatToRender(CLI::App* command, RenderOptions* options) {
   command->add_flag("--as-captured", options->as_captured, "Photograph through the whole aperture");
-  command->add_option("--view", options->view, "One view: its indices from 0, or centre")
+  command->add_option("--view", options->view, "One view: its indices from 0, or centre; numbers between them for a light field "
+                  "that is stored as its scene")
       ->type_name("U,V");
   command
       ->add_option("--focus", options->focus_mm,
@@ -478,6 +588,13 @@ void AddWhatToRender(CLI::App* command, RenderOptions* options) {
                    "(float) or hci (8-bit PNG in the layout of the HCI benchmark)")
       ->check(CLI::IsMember({"thicklens", "hci", "thicklens-tiff"}))
       ->type_name("LAYOUT");
+  command
+      ->add_option("--animate", options->animate,
+                   "Animation that repeats, as a WebP file: parallax (the viewpoint goes around the "
+                   "aperture) or focus (it goes from far to near and back); of a light field that "
+                   "is stored as its scene")
+      ->check(CLI::IsMember({"parallax", "focus"}))
+      ->type_name("WHAT");
 }
 
 void AddHowToRender(CLI::App* command, RenderOptions* options) {
@@ -501,6 +618,12 @@ void AddHowToRender(CLI::App* command, RenderOptions* options) {
   command->add_option("--bits", options->bits, "Bits per value of the image: 8 (default) or 16")
       ->check(CLI::IsMember({8, 16}))
       ->type_name("N");
+  command->add_option("--frames", options->frames, "Frames of the animation; default 36")
+      ->check(CLI::Range(2, 1000))
+      ->type_name("N");
+  command->add_option("--seconds", options->seconds, "Length of the animation; default 3")
+      ->check(CLI::Range(0.1, 3600.0))
+      ->type_name("S");
   AddDeviceOption(command, &options->device);
 }
 
@@ -519,7 +642,7 @@ void AddRenderCommand(CLI::App* program, CommandAction* action) {
       ->add_option("-o,--output", options->output,
                    "Image file to write, of the kind that its ending names (.png .jpg .tif .exr "
                    ".webp .bmp .ppm .pfm); "
-                   "with --convert a folder")
+                   "with --convert a folder, with --animate a .webp file")
       ->required()
       ->type_name("OUT");
   AddWhatToRender(command, options.get());
@@ -535,6 +658,7 @@ void AddRenderCommand(CLI::App* program, CommandAction* action) {
       LightFieldReadOptionsOf(options->reading);  // reports wrong usage before any work begins
       RequireDistinctFiles({options->common.json_path, options->output}, {options->light_field});
       RunCommand(options->common, [&] {
+        if (!options->animate.empty()) return Animate(*options);
         return options->convert.empty() ? RenderImage(*options) : Convert(*options);
       });
     };

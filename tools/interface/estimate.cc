@@ -395,8 +395,19 @@ std::vector<std::string> WarningsOf(const DepthOrigin& depth, bool has_camera, b
   return warnings;
 }
 
+// Keeps what a solver found that made no views. Returns the shares of the rays of its views.
+estimator::ConfidenceShares KeepScene(const PreparedProblem& prepared, int threads, Solved* solved,
+                                      LightFieldEstimate* estimate) {
+  SceneForm& scene = estimate->scene.emplace();
+  scene.frame = model::DescriptionOf(estimate->light_field);
+  scene.radiance = std::exchange(solved->maps->radiance, {});
+  scene.disparity = prepared.input->disparity;
+  scene.confidence = std::exchange(solved->maps->of_points, {});
+  return estimator::RaySharesOf(scene, threads);
+}
+
 // Hands on the views and the confidence that the solver did not.
-void GiveRays(const PreparedProblem& prepared, int threads, CountingSink* sink, Solved* solved,
+void GiveRemaining(const PreparedProblem& prepared, int threads, CountingSink* sink, Solved* solved,
               LightFieldEstimate* estimate) {
   LightField& light_field = estimate->light_field;
   const auto give_view = [&](int k, int l) {
@@ -437,6 +448,21 @@ void GiveRays(const PreparedProblem& prepared, int threads, CountingSink* sink, 
   });
   light_field.values = {};
   estimate->confidence = {};
+}
+
+// Hands on what the solver did not, and returns the shares of the rays.
+estimator::ConfidenceShares GiveRays(const PreparedProblem& prepared, int threads,
+                                     CountingSink* sink, Solved* solved,
+                                     LightFieldEstimate* estimate) {
+  const auto start = Clock::now();
+  GiveRemaining(prepared, threads, sink, solved, estimate);
+  if (sink != nullptr) {
+    if (!solved->views_in_sink) estimate->summary.seconds.sink = SecondsSince(start);
+    return estimator::SharesOf(sink->counts());
+  }
+  CountingSink own(nullptr);
+  own.Count(estimate->confidence.begin(), estimate->confidence.end());
+  return estimator::SharesOf(own.counts());
 }
 
 void FillSummary(const SolverSummary& solver, const AnySolver& chosen, const RunScope& run,
@@ -524,13 +550,10 @@ LightFieldEstimate Estimate(ViewSink* given_sink, Image photo, DepthMap depth,
   if (options.strict && !estimate.summary.partial_reason.empty())
     throw Error(estimate.summary.partial_reason);
   ThrowIfCancelled();
-  const auto rays_start = Clock::now();
-  GiveRays(prepared, control.threads, sink ? &*sink : nullptr, &solved, &estimate);
-  if (sink && !solved.views_in_sink) seconds.sink = SecondsSince(rays_start);
-  CountingSink own(nullptr);
-  if (!sink) own.Count(estimate.confidence.begin(), estimate.confidence.end());
   const estimator::ConfidenceShares shares =
-      estimator::SharesOf(sink ? sink->counts() : own.counts());
+      solved.is_scene
+          ? KeepScene(prepared, control.threads, &solved, &estimate)
+          : GiveRays(prepared, control.threads, sink ? &*sink : nullptr, &solved, &estimate);
   estimate.diagnostics.rays_visible = shares.visible;
   estimate.diagnostics.rays_partly_visible = shares.partly_visible;
   estimate.diagnostics.rays_blurred = shares.blurred;

@@ -81,7 +81,16 @@ void RequireValid(const LightField& light_field) {
 }
 
 void RequireFormat(LightFieldFormat format) {
-  checks::RequireOneOf("format", LightFieldFormat::kHci, format);
+  checks::RequireOneOf("format", LightFieldFormat::kScene, format);
+}
+
+// Views do not state the scene that they show.
+void RequireFormatOfViews(LightFieldFormat format) {
+  RequireFormat(format);
+  if (format != LightFieldFormat::kScene) return;
+  throw OptionError("format",
+                    "format: a light field of views cannot be written as its scene; an estimate "
+                    "with LightFieldForm::kScene has one");
 }
 
 // The confidence has one byte for each ray, or is absent.
@@ -148,7 +157,7 @@ OutputFolder ClaimLightFieldFolder(const std::string& folder, LightFieldFormat f
 std::size_t WriteLightField(OutputFolder* folder, const LightField& light_field,
                             LightFieldFormat format, const RunControl& run) {
   checks::RequireValid(run);
-  RequireFormat(format);
+  RequireFormatOfViews(format);
   if (folder == nullptr) throw Error("folder: a claimed folder is expected, found null");
   RequireValid(light_field);
   const RunScope scope(run);
@@ -161,7 +170,7 @@ std::size_t WriteLightField(OutputFolder* folder, const LightField& light_field,
 std::size_t WriteLightField(const std::string& folder, const LightField& light_field,
                             LightFieldFormat format, const RunControl& run) {
   checks::RequireValid(run);
-  RequireFormat(format);
+  RequireFormatOfViews(format);
   RequireValid(light_field);
   const RunScope scope(run);
   OutputFolder output = ClaimLightFieldFolder(folder, format);
@@ -175,6 +184,15 @@ std::size_t WriteLightField(const std::string& folder, const LightFieldEstimate&
                             LightFieldFormat format, const RunControl& run) {
   checks::RequireValid(run);
   RequireFormat(format);
+  if (format == LightFieldFormat::kScene) {
+    if (!estimate.scene) {
+      throw Error(
+          "scene: the estimate has views and no scene; LightFieldForm::kScene in its options keeps "
+          "it");
+    }
+    WriteSceneForm(folder, *estimate.scene, run);
+    return 0;
+  }
   const LightField& light_field = estimate.light_field;
   RequireValid(light_field);
   RequireFittingConfidence(estimate);

@@ -382,6 +382,7 @@ bool EstimateOptions::IsValid(std::string* why) const {
                 "states which shape the aperture has, and effects leave the shape out");
   }
   if (!OneOf(why, "hidden_rays", HiddenRays::kTelea, hidden_rays)) return false;
+  if (!OneOf(why, "form", LightFieldForm::kScene, form)) return false;
   if (!OneOf(why, "clipped", ClippedHighlights::kData, clipped)) return false;
   if (memory_limit_mib &&
       !AboveUpTo(why, "memory_limit_mib", 0, kMaxMemoryMib, *memory_limit_mib)) {

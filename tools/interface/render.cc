@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -156,6 +157,29 @@ void RequireDisparityInside(const LightField& light_field, const FocusOptions& o
       focus, disparity_px.x(), disparity_px.y(), size_px, LightFieldName(light_field)));
 }
 
+// Returns the disparity in focus, px per view step along u and v.
+Eigen::Vector2d DisparityInFocus(const LightField& light_field, const FocusOptions& options,
+                                 const RunScope& run) {
+  Eigen::Vector2d disparity_px;
+  if (options.depth_mm) {
+    if (!light_field.camera) {
+      throw Error(
+          fmt::format("{} {} mm: {} has no camera, so that depths in mm are unknown; give {}",
+                      run.Option("depth_mm"), *options.depth_mm, LightFieldName(light_field),
+                      run.Option("disparity_px")));
+    }
+    disparity_px = estimator::DisparityAtDepthPx(light_field, *options.depth_mm);
+  } else {
+    // The disparity along v is the disparity along u times the ratio of the view steps.
+    disparity_px = {*options.disparity_px, *options.disparity_px};
+    if (light_field.grid && light_field.grid->u_step_mm != 0) {
+      disparity_px.y() *= light_field.grid->v_step_mm / light_field.grid->u_step_mm;
+    }
+  }
+  RequireDisparityInside(light_field, options, disparity_px, run);
+  return disparity_px;
+}
+
 }  // namespace
 
 Image RenderPhotograph(const LightField& light_field, const PhotographOptions& options,
@@ -204,27 +228,33 @@ Image Refocus(const LightField& light_field, const FocusOptions& options, const 
   checks::RequireValidInput(LightFieldName(light_field), light_field);
   const RunScope run(control);
   RenderSummary found;
-  Eigen::Vector2d& disparity_px = found.disparity_px;
-  if (options.depth_mm) {
-    if (!light_field.camera) {
-      throw Error(
-          fmt::format("{} {} mm: {} has no camera, so that depths in mm are unknown; give {}",
-                      run.Option("depth_mm"), *options.depth_mm, LightFieldName(light_field),
-                      run.Option("disparity_px")));
-    }
-    disparity_px = estimator::DisparityAtDepthPx(light_field, *options.depth_mm);
-  } else {
-    // The disparity along v is the disparity along u times the ratio of the view steps.
-    disparity_px = {*options.disparity_px, *options.disparity_px};
-    if (light_field.grid && light_field.grid->u_step_mm != 0) {
-      disparity_px.y() *= light_field.grid->v_step_mm / light_field.grid->u_step_mm;
-    }
-  }
-  RequireDisparityInside(light_field, options, disparity_px, run);
+  found.disparity_px = DisparityInFocus(light_field, options, run);
+  Image image = ImageOf(
+      estimator::Refocus(light_field, found.disparity_px.x(), found.disparity_px.y(),
+                         WeightsOf(options.aperture, light_field, &found), control.threads),
+      light_field);
+  if (summary != nullptr) *summary = std::move(found);
+  return image;
+}
+
+Image Refocus(const SceneForm& scene, const FocusOptions& options, const RunControl& control,
+              RenderSummary* summary) {
+  checks::RequireValid(control);
+  checks::RequireValid(options);
+  checks::RequireValidInput(LightFieldName(scene.frame), scene);
+  const RunScope run(control);
+  RenderSummary found;
+  found.disparity_px = DisparityInFocus(scene.frame, options, run);
+  // Both axes state the same depth; the longer step states it better.
+  const Eigen::Vector2d& step = scene.disparity.step;
+  const bool along_u = std::abs(step.x()) >= std::abs(step.y());
+  const double px = along_u ? found.disparity_px.x() : found.disparity_px.y();
+  const double px_per_unit = along_u ? step.x() : step.y();
   Image image =
-      ImageOf(estimator::Refocus(light_field, disparity_px.x(), disparity_px.y(),
-                                 WeightsOf(options.aperture, light_field, &found), control.threads),
-              light_field);
+      ImageOf(estimator::RefocusScene(scene, px_per_unit != 0 ? px / px_per_unit : 0,
+                                      WeightsOf(options.aperture, scene.frame, &found),
+                                      control.threads),
+              scene.frame);
   if (summary != nullptr) *summary = std::move(found);
   return image;
 }

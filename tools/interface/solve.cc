@@ -226,6 +226,13 @@ void CompleteRun(const SceneSolver& solver, const PreparedProblem& prepared,
   }
   solved->maps.emplace();
   // Hidden rays that are inpainted need all views.
+  solved->is_scene =
+      options.form == LightFieldForm::kScene && options.hidden_rays == HiddenRays::kSolver;
+  if (solved->is_scene) {
+    library->views.emplace().wants_views = false;
+    library->how.sink = &*library->views;
+    return;
+  }
   solved->views_in_sink = sink != nullptr && options.hidden_rays == HiddenRays::kSolver;
   if (!solved->views_in_sink) return;
   library->views = SinkOf(sink, static_cast<double>(input.image.values.size()));
@@ -278,7 +285,10 @@ Solved SolveByLibrary(const Given& solver, const PreparedProblem& prepared,
   solved.light_field =
       estimator::Solve(*prepared.input, OptionsOf(solver, prepared, *diagnostics), library.how,
                        &summary, solved.maps ? &*solved.maps : nullptr);
-  if (solved.maps) solved.maps->radiance = {};  // the middle of the light field contains it
+  if (solved.maps && !solved.is_scene) {  // the middle of the light field contains it
+    solved.maps->radiance = {};
+    solved.maps->of_points = {};
+  }
   TakeSummary(summary, &solved);
   std::visit([&](const auto& found) { TakeDiagnostics(found, diagnostics); }, summary.diagnostics);
   return solved;

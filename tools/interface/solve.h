@@ -17,6 +17,7 @@ struct Solved {
   LightField light_field;  // without values if the sink got the views
   SolverSummary summary;
   bool views_in_sink = false;
+  bool is_scene = false;  // no views were made: radiance and confidence of the points are in `maps`
   std::optional<estimator::SceneMaps> maps;
   std::optional<estimator::BlurCheck> blur;
   std::vector<BlockRecord> blocks;

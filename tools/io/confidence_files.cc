@@ -12,7 +12,9 @@
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/estimator/scene_form.h"
 #include "thicklens/io/image_io.h"
+#include "thicklens/io/scene_form_files.h"
 #include "thicklens/model/light_field_file.h"
 #include "tools/io/array_file.h"
 #include "tools/io/confidence_file_name.h"
@@ -69,6 +71,7 @@ std::vector<estimator::Confidence> ReadConfidence(const std::string& folder, int
   const model::LightFieldDescription description =
       model::ReadLightFieldDescription(description_path.string());
   if (!description.has_confidence) return {};
+  if (description.scene) return estimator::RayConfidenceOf(ReadSceneForm(folder), threads);
   const model::LightField& frame = description.light_field;
   std::vector<std::string> paths;  // empty: the view is missing, and its confidence too
   for (int l = 0; l < frame.v_count; ++l) {

@@ -1,6 +1,7 @@
 #ifndef THICKLENS_TOOLS_IO_IMAGE_LIBRARY_H_
 #define THICKLENS_TOOLS_IO_IMAGE_LIBRARY_H_
 
+#include <functional>
 #include <memory>
 #include <opencv2/core/mat.hpp>
 #include <string>
@@ -41,6 +42,14 @@ struct LibraryDepth {
   std::vector<std::string> other_types;  // of the other auxiliary images, without alpha
 };
 
+// The frames of an animation that repeats, each asked for when it is encoded.
+struct AnimationFrames {
+  int count = 0, width_px = 0, height_px = 0;
+  double seconds = 0;  // length of all frames
+  // 8 bits, grey or RGB; throws nothing, and returns an empty image where it fails.
+  std::function<cv::Mat(int frame)> frame;
+};
+
 // OpenImageIO with LibRaw, libheif and FFmpeg. They are in a library of their own, which is loaded
 // when an image first needs it: with the 260 libraries that it depends on it takes more time and
 // memory than everything else that the program does at its start. No exception leaves a function,
@@ -61,6 +70,9 @@ struct ImageLibrary {
   // Opens a video by its path: it may be larger than the memory.
   bool (*open_video)(const std::string& path, const VideoOpening& opening,
                      std::unique_ptr<VideoDecoder>* video, std::string* why);
+  // As WebP.
+  bool (*encode_animation)(const AnimationFrames& frames, int quality, std::string* bytes,
+                           std::string* why);
 };
 
 // Throws Error if that library is missing from the program's installation, or left out of the

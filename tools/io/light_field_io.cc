@@ -17,10 +17,10 @@
 #include "thicklens/base/parallel.h"
 #include "thicklens/base/stopwatch.h"
 #include "thicklens/io/image_io.h"
-#include "thicklens/model/camera_file.h"
 #include "thicklens/model/light_field_file.h"
 #include "tools/io/confidence_file_name.h"
-#include "tools/io/float_tiff.h"
+#include "tools/io/light_field_camera.h"
+#include "tools/io/plain_tiff.h"
 #include "tools/io/view_files.h"
 
 namespace thicklens::io {
@@ -32,7 +32,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr char kCameraFile[] = "camera.yaml";
 constexpr char kViewsFolder[] = "views";
 constexpr char kHciSignature[] = "# Written by thicklens.\n";
 
@@ -98,7 +97,9 @@ std::string HciParameters(const model::LightField& light_field) {
 }  // namespace
 
 std::vector<std::string> LightFieldEntries() {
-  std::vector<std::string> entries = {kLightFieldMarker, kCameraFile};
+  std::vector<std::string> entries = {kLightFieldMarker,           kLightFieldCameraFile,
+                                      model::kSceneRadianceFile,   model::kSceneDisparityFile,
+                                      model::kSceneConfidenceFile, model::kSceneProfileFile};
   for (const char* v : {"[0-9][0-9]", "[0-9][0-9][0-9]"}) {
     for (const char* u : {"[0-9][0-9]", "[0-9][0-9][0-9]"}) {
       for (const char* format : {"png", "tiff"})
@@ -155,12 +156,7 @@ std::size_t LightFieldWriter::Finish(const model::LightField& light_field) {
   model::LightFieldDescription description;
   description.view_format = NameOf(format_);
   description.has_confidence = has_confidence_;
-  if (light_field.camera) {
-    description.camera_file = kCameraFile;
-    // The weights of the views state the aperture.
-    folder_->Write(kCameraFile,
-                   model::CameraToYaml(model::WithoutMeasuredPsf(*light_field.camera)));
-  }
+  description.camera_file = WriteCameraOfLightField(light_field, folder_);
   description.light_field = model::DescriptionOf(light_field);
   folder_->Write(kLightFieldMarker, model::LightFieldDescriptionToYaml(description));
   return clipped_;

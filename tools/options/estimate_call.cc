@@ -134,6 +134,7 @@ OptionNames EstimateOptionNames() {
           {"depth.holes.zero_is_value", "--zero-is value"},
           {"depth.holes.largest_is_value", "--largest-is value"},
           {"hidden_rays", "--fill"},
+          {"form", "--store"},
           {"device", "--device"},
           {"memory_limit_mib", "--memory-limit"},
           {"solver", "--solver"},
@@ -188,6 +189,7 @@ thicklens::EstimateOptions SettingsOf(const EstimateOptions& options) {
   settings.strict = options.strict;
   settings.effects = EffectSelectionOf(options.effects);
   settings.solver = AsAnySolver(SolverOf(options));
+  if (options.stores_scene()) settings.form = LightFieldForm::kScene;
   if (options.fill == "telea") settings.hidden_rays = HiddenRays::kTelea;
   settings.device = options.device;
   settings.memory_limit_mib = options.memory_limit_mib;

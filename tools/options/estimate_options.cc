@@ -199,9 +199,18 @@ void AddOutputOptions(CLI::App* command, EstimateOptions* options) {
       ->type_name("LF");
   AddViewsOption(command, &options->views, "Number of views across and down; default 7x7");
   command
+      ->add_option("--store", options->store,
+                   "How the light field is stored: scene (light and disparity of the points that "
+                   "the centre view shows, in three files, from which every view follows), views "
+                   "(an image file for each), or auto (scene, unless --format, --fill telea, another "
+                   "solver or a target of time or quality asks for views)")
+      ->check(CLI::IsMember({"auto", "scene", "views"}))
+      ->capture_default_str()
+      ->type_name("FORM");
+  command
       ->add_option(
           "--format", options->format,
-          "Format of the views: png (16 bit, encoded values), tiff (float, linear light, which "
+          "Format of views that are stored: png (16 bit, encoded values), tiff (float, linear light, which "
           "keeps what is brighter than full scale) or auto (tiff if highlights of the photograph "
           "are clipped and estimated, otherwise png)")
       ->check(CLI::IsMember({"auto", "png", "tiff"}))
@@ -379,6 +388,11 @@ void RequireBesideLightField(const char* option, const std::string& path,
 
 }  // namespace
 
+bool EstimateOptions::stores_scene() const {
+  if (store != "auto") return store == "scene";
+  return solver == "scene" && fill == "solver" && format == "auto" && !quality_target.has_value();
+}
+
 std::string EstimateOptions::report_path() const {
   return report_folder.empty() ? "" : (fs::path(report_folder) / kReportName).string();
 }
@@ -467,6 +481,17 @@ void CheckEstimateUsage(const EstimateOptions& options) {
         "--aperture-shape and --aperture-of state the shape of the aperture; without the effect "
         "aperture-shape it is Gaussian");
   CheckSolverUsage(options);
+  const bool is_scene = options.store == "scene";
+  needs(is_scene, options.solver == "scene",
+        fmt::format("--store scene requires --solver scene; the solver {} finds views, and no "
+                    "scene that they show",
+                    options.solver));
+  needs(is_scene, options.fill == "solver",
+        "--store scene excludes --fill telea, which fills each view for itself");
+  needs(is_scene, options.format == "auto",
+        "--format is that of the views' files and excludes --store scene");
+  needs(is_scene, !options.quality_target.has_value(),
+        "--store scene excludes --quality, --within and --psnr-loss, which know the time of views");
   needs(!options.profile_path.empty(), options.quality_target.has_value(),
         "--profile is only used by --quality, --within or --psnr-loss, and none of them is given");
   RequireBesideLightField("--report", options.report_folder, options);

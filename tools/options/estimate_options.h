@@ -41,6 +41,7 @@ struct EstimateOptions {
   std::string fill = "solver";  // or "telea"
   EffectOptions effects;
   std::string device = "auto";
+  std::string store = "auto";   // views or scene; auto: scene unless another option asks for views
   std::string format = "auto";  // png, or tiff for a photograph with clipped highlights
   // Options of some solvers, as the help says.
   std::optional<std::string> prior, strength;
@@ -61,6 +62,8 @@ struct EstimateOptions {
   std::string profile_path;
 
   bool by_blocks() const { return solver == "blocks"; }
+  // Whether the light field is stored as its scene, and not as views.
+  bool stores_scene() const;
   std::string report_path() const;  // path of the page in its folder; empty: none
 };
 

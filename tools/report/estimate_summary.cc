@@ -369,6 +369,7 @@ json EstimateJson(const EstimateOptions& options, const EstimateOutcome& outcome
               {"output", options.output_folder},
               {"solver", summary.solver},
               {"views", {summary.u_count, summary.v_count}},
+              {"stored", estimate.scene ? "scene" : "views"},
               {"size", {summary.width_px, summary.height_px}},
               {"channels", summary.channels},
               {"transfer", found.transfer.Name()},
@@ -471,8 +472,9 @@ std::string EstimateText(const EstimateOptions& options, const EstimateOutcome& 
                             : "");
   }
   text += DepthText(found);
-  text += fmt::format("light field  {} x {} views of {} x {} px, {} channel(s)\n", summary.u_count,
-                      summary.v_count, summary.width_px, summary.height_px, summary.channels);
+  text += fmt::format("light field  {} x {} views of {} x {} px, {} channel(s){}\n",
+                      summary.u_count, summary.v_count, summary.width_px, summary.height_px,
+                      summary.channels, estimate.scene ? ", stored as their scene" : "");
   text += fmt::format("aperture     {}\n", PrintableUtf8(ApertureInWords(options, found)));
   if (options.common.verbose) text += ApertureBlurText(found);
   text += SolverText(estimate);

@@ -60,7 +60,9 @@ class EstimateHighlightsTest : public ::testing::Test, protected EstimateCommand
             "--depth-kind",
             "disparity",
             "--threads",
-            "1"};
+            "1",
+            "--store",
+            "views"};
   }
 };
 

@@ -128,7 +128,8 @@ TEST_F(EstimateSceneTest, OccludedRaysMayBeInpainted) {
 
 TEST_F(EstimateSceneTest, WritesTheConfidenceOfEachRay) {
   const json summary = Summary(
-      {Image(), Depth(Strip), "--depth-kind", "disparity", "--views", "3x3", "--threads", "2"});
+      {Image(), Depth(Strip), "--depth-kind", "disparity", "--views", "3x3", "--threads", "2",
+       "--store", "views"});
   std::size_t filled = 0, whole = 0;
   for (int l = 0; l < 3; ++l) {
     for (int k = 0; k < 3; ++k) {
@@ -157,7 +158,8 @@ TEST_F(EstimateSceneTest, WritesTheConfidenceOfEachRay) {
 }
 
 TEST_F(EstimateSceneTest, WritesTheSameConfidenceWithAPageAndByOtherSolvers) {
-  const Arguments usual = {Image(), Depth(Strip), "--depth-kind", "disparity", "--views", "3x3"};
+  const Arguments usual = {Image(),   Depth(Strip), "--depth-kind", "disparity",
+                           "--views", "3x3",        "--store",      "views"};
   Summary(usual);
   const model::EncodedImage streamed = ConfidenceFile(Output(), 0, 2);
   for (const Arguments& more : {Arguments{"--report", Report()},

@@ -25,6 +25,7 @@ LibraryDepth HeifDepth(const std::string& bytes, const LibraryReading& reading);
 std::vector<LibraryPage> WebpPages(const std::string& bytes);
 DecodedImage DecodeWebp(const std::string& bytes, const LibraryReading& reading);
 std::string EncodeWebp(const cv::Mat& pixels, const ImageWriting& writing);
+std::string EncodeWebpFrames(const AnimationFrames& frames, int quality);
 
 std::vector<LibraryPage> OiioPages(const std::string& bytes, ImageFileKind kind);
 DecodedImage DecodeByOiio(const std::string& bytes, const LibraryReading& reading);

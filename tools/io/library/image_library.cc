@@ -71,6 +71,11 @@ bool OpenVideoFile(const std::string& path, const VideoOpening& opening,
   return Guarded(why, [&] { *video = OpenVideo(path, opening); });
 }
 
+bool EncodeAnimation(const AnimationFrames& frames, int quality, std::string* bytes,
+                     std::string* why) {
+  return Guarded(why, [&] { *bytes = EncodeWebpFrames(frames, quality); });
+}
+
 }  // namespace
 }  // namespace thicklens::io
 
@@ -80,6 +85,7 @@ extern "C" __attribute__((visibility("default"))) const thicklens::io::ImageLibr
 ThicklensImageLibrary() {
   static const thicklens::io::ImageLibrary library{thicklens::io::Pages, thicklens::io::Decode,
                                                    thicklens::io::Depth, thicklens::io::Encode,
-                                                   thicklens::io::OpenVideoFile};
+                                                   thicklens::io::OpenVideoFile,
+                                                   thicklens::io::EncodeAnimation};
   return &library;
 }

@@ -1,8 +1,10 @@
-// Our own layout: lightfield.yaml, and views/view_VV_UU.png or .tiff (docs/file-formats.md).
+// Our own layout: lightfield.yaml, and views/view_VV_UU.png or .tiff, or the planes of a scene
+// (docs/file-formats.md).
 #include <fmt/format.h>
 
 #include <cstddef>
 #include <filesystem>
+#include <memory>
 #include <opencv2/core/mat.hpp>
 #include <system_error>
 
@@ -11,11 +13,12 @@
 #include "thicklens/base/input_file.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/io/image_file.h"
-#include "thicklens/model/camera_file.h"
+#include "thicklens/io/scene_form_files.h"
 #include "thicklens/model/light_field_file.h"
 #include "tools/io/confidence_file_name.h"
 #include "tools/io/image_file_kind.h"
 #include "tools/io/image_metadata.h"
+#include "tools/io/light_field_camera.h"
 #include "tools/io/lightfields/layout.h"
 #include "tools/io/lightfields/view_grid.h"
 #include "tools/io/lightfields/view_pixels.h"
@@ -78,6 +81,26 @@ std::string ProfileOfViews(const std::string& folder, const model::LightField& f
   return "";
 }
 
+// The views of a light field that is stored as its scene are rendered when they are asked for.
+ViewSource SourceOfScene(const std::string& folder) {
+  struct Rendered {
+    explicit Rendered(const std::string& path) : scene(ReadSceneForm(path)), renderer(scene) {}
+    const estimator::SceneForm scene;
+    const estimator::SceneRenderer renderer;
+  };
+  const auto rendered = std::make_shared<const Rendered>(folder);
+  ViewSource source;
+  source.is_own = source.is_plain = true;
+  source.kind = "a light field of thicklens, stored as its scene";
+  source.frame = rendered->scene.frame;
+  source.frame.source.clear();
+  source.read = [rendered](int k, int l) {
+    const model::LightField& frame = rendered->scene.frame;
+    return rendered->renderer.View(frame.u_offset(k), frame.v_offset(l));
+  };
+  return source;
+}
+
 }  // namespace
 
 std::optional<ViewSource> OpenOwnFolder(const LayoutInput& input) {
@@ -87,22 +110,13 @@ std::optional<ViewSource> OpenOwnFolder(const LayoutInput& input) {
   if (!input.is_forced && !fs::exists(description_path, ignored)) return std::nullopt;
   const model::LightFieldDescription description =
       model::ReadLightFieldDescription(description_path);
+  if (description.scene) return SourceOfScene(folder);
   ViewSource source;
   source.is_own = source.is_plain = true;
   source.kind = "a light field of thicklens";
   source.frame = description.light_field;
   model::LightField& frame = source.frame;
-  if (!description.camera_file.empty()) {
-    const std::string camera = (fs::path(folder) / description.camera_file).string();
-    frame.camera = model::ReadCamera(camera);
-    const model::Sensor& sensor = frame.camera->sensor;
-    if (sensor.width_px != frame.s_count || sensor.height_px != frame.t_count) {
-      throw Error(fmt::format(
-          "{}: its sensor has {}x{} px, the views of {} have {}x{}: the sizes must be equal",
-          camera, sensor.width_px, sensor.height_px, description_path, frame.s_count,
-          frame.t_count));
-    }
-  }
+  frame.camera = CameraOfLightField(folder, description);
   std::vector<std::string> missing;
   for (int l = 0; l < frame.v_count; ++l) {
     for (int k = 0; k < frame.u_count; ++k) {

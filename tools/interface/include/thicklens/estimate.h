@@ -26,6 +26,7 @@
 #include "thicklens/image.h"
 #include "thicklens/light_field.h"
 #include "thicklens/run.h"
+#include "thicklens/scene_form.h"
 #include "thicklens/solver.h"
 
 namespace thicklens {
@@ -75,6 +76,14 @@ enum class HiddenRays {
   kTelea,   // by the inpainting of section 6 of the supplement [D99], for comparison
 };
 
+// How an estimated light field is kept.
+enum class LightFieldForm {
+  kViews,  // U x V views
+  // The radiance and the disparity of the scene (scene_form.h), from which every view follows; by a
+  // solver that finds them (SceneSolver with HiddenRays::kSolver). Others have views.
+  kScene,
+};
+
 // Whether the faults of a depth map are repaired by the photograph [D191] to [D193].
 enum class DepthRefining {
   kAuto,  // those that map and photograph show for certain
@@ -108,6 +117,7 @@ struct EstimateOptions {
   EffectSelection effects;                            // effects that the estimate models
   AnySolver solver = SceneSolver{};                   // how the light field is computed
   HiddenRays hidden_rays = HiddenRays::kSolver;       // how hidden rays are filled
+  LightFieldForm form = LightFieldForm::kViews;       // how the light field is kept
   // Meaning of the clipped values of the photograph.
   ClippedHighlights clipped = ClippedHighlights::kBounds;
   // "auto", "cpu", "opencl", "opencl:PLATFORM" or "opencl:PLATFORM:DEVICE". auto: the processor for
@@ -293,7 +303,12 @@ struct BlockRecord {
 
 // The estimated light field, and everything known of it.
 struct LightFieldEstimate {
-  LightField light_field;           // U x V views of S x T px, linear light
+  // U x V views of S x T px, linear light; without values if the views went to a sink, and if
+  // `scene` is present.
+  LightField light_field;
+  // With LightFieldForm::kScene: what the views follow from. RenderView shows one of them, and
+  // ViewsOf all.
+  std::optional<SceneForm> scene;
   EstimateSummary summary;          // the result in numbers
   EstimateDiagnostics diagnostics;  // how far to trust it
   std::vector<BlockRecord> blocks;  // of BlockSolver, row by row
@@ -345,7 +360,7 @@ THICKLENS_EXPORT LightFieldEstimate EstimateLightField(Image photo, DepthMap dep
 
 // The same, with the views given to `sink`: the returned light field and confidence have no values.
 // SceneSolver never holds more than a few views. Same bits, except that a memory limit may need
-// fewer bands.
+// fewer bands. An estimate with `scene` gives no views to the sink.
 THICKLENS_EXPORT LightFieldEstimate EstimateLightFieldTo(ViewSink* sink, Image photo,
                                                          DepthMap depth,
                                                          const std::optional<Camera>& camera,
@@ -360,7 +375,8 @@ THICKLENS_EXPORT Problem PrepareProblem(Image photo, DepthMap depth,
                                         const RunControl& run = {});
 
 // Writes the light field with its confidence as `thicklens estimate` does, completely or not at
-// all. The HCI layout has no place for a confidence, a camera or weights. Returns the number of
+// all. The HCI layout has no place for a confidence, a camera or weights. LightFieldFormat::kScene
+// needs an estimate with `scene`, and the other formats one with views. Returns the number of
 // clipped values. Throws OptionError, and Error, also for a confidence that is neither empty nor
 // has one byte for each ray.
 THICKLENS_EXPORT std::size_t WriteLightField(const std::string& folder,

@@ -77,12 +77,13 @@ enum class LightFieldFormat {
   kPng,   // views of 16 bits, encoded by the light field's transfer curve and clipped
   kTiff,  // views in float, linear light, not clipped
   kHci,   // the HCI layout: views of 8 bits in sRGB, and parameters.cfg; no camera, no weights
+  kScene,  // the scene that the views show (scene_form.h); of an estimate that has one
 };
 
 // Writes a light field into a folder, completely or not at all. The confidence of an estimate is
 // written only by WriteLightField(folder, estimate) of estimate.h. A folder that this program did
 // not write is not replaced. Returns the number of clipped values. Throws OptionError for a format
-// that is no enumerator, and Error, also for a light field that is not valid.
+// that is no enumerator or kScene, and Error, also for a light field that is not valid.
 THICKLENS_EXPORT std::size_t WriteLightField(const std::string& folder,
                                              const LightField& light_field,
                                              LightFieldFormat format = LightFieldFormat::kPng,

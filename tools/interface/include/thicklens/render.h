@@ -12,6 +12,7 @@
 #include "thicklens/image.h"
 #include "thicklens/light_field.h"
 #include "thicklens/run.h"
+#include "thicklens/scene_form.h"
 
 namespace thicklens {
 
@@ -77,6 +78,10 @@ struct FocusOptions {
 // Shifts the views so that points at that depth coincide, and averages them [D98]. Throws Error for
 // a depth without a camera, and for a disparity, px per view step, above the size of the views.
 THICKLENS_EXPORT Image Refocus(const LightField& light_field, const FocusOptions& options,
+                               const RunControl& run = {}, RenderSummary* summary = nullptr);
+// The same of a light field that is stored as its scene: each view is rendered where it is needed,
+// so that its samples are interpolated once, and beyond the borders of the views as well.
+THICKLENS_EXPORT Image Refocus(const SceneForm& scene, const FocusOptions& options,
                                const RunControl& run = {}, RenderSummary* summary = nullptr);
 
 // All views side by side, (0, 0) at the top left, with `gap_px` >= 0 black pixels between them. The

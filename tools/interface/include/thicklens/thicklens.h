@@ -10,6 +10,7 @@
 // outcome of an operation is in its summary. A cancelled call throws thicklens::Interrupted.
 //
 // The headers that need OpenCV are included apart: thicklens/opencv.h, frames.h and watch.h.
+#include "thicklens/animation.h"    // IWYU pragma: export
 #include "thicklens/calibrate.h"    // IWYU pragma: export
 #include "thicklens/camera.h"       // IWYU pragma: export
 #include "thicklens/compare.h"      // IWYU pragma: export
@@ -24,6 +25,7 @@
 #include "thicklens/plan.h"         // IWYU pragma: export
 #include "thicklens/render.h"       // IWYU pragma: export
 #include "thicklens/run.h"          // IWYU pragma: export
+#include "thicklens/scene_form.h"   // IWYU pragma: export
 #include "thicklens/simulate.h"     // IWYU pragma: export
 #include "thicklens/solver.h"       // IWYU pragma: export
 #include "thicklens/sweep.h"        // IWYU pragma: export

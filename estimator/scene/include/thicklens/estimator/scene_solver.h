@@ -96,9 +96,10 @@ struct SceneSummary : SolverResult, SceneDiagnostics {
   int iterations = 0;  // conjugate-gradient iterations at full size, for all strengths together
 };
 
-// Maps of the estimate's quality. All have the size of the image except the last.
+// The estimate and maps of its quality. All have the size of the image except the last.
 struct SceneMaps {
   model::LinearImage radiance;  // radiance of the scene's points, as the centre view shows them
+  std::vector<Confidence> of_points;  // confidence of the same points; empty if it is not wanted
   std::vector<float> residual;  // H r - I in encoded values, the channels' mean
   std::vector<float> occluded_fraction;  // share of the aperture that sees a pixel past an edge
   std::vector<float> blur_sigma_px;      // blur of the photograph, by the depth
@@ -155,7 +156,9 @@ struct SceneViewSink {
                      const std::vector<Confidence>& confidence)>
       take;
   double bytes = 0;              // memory that the sink needs per view while it processes it
-  bool wants_confidence = true;  // the sink uses `confidence`
+  bool wants_confidence = true;  // the sink uses `confidence`, or that of the points in the maps
+  // False: no view is made, and `take` is not called. The scene is in the maps.
+  bool wants_views = true;
 };
 
 // Returns the standard deviation of the noise of encoded values in [0, 1], quantisation included

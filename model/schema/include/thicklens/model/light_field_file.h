@@ -1,6 +1,8 @@
 #ifndef THICKLENS_MODEL_LIGHT_FIELD_FILE_H_
 #define THICKLENS_MODEL_LIGHT_FIELD_FILE_H_
 
+#include <Eigen/Core>
+#include <optional>
 #include <string>
 
 #include "thicklens/base/export.h"
@@ -8,14 +10,34 @@
 
 namespace thicklens::model {
 
-// Content of lightfield.yaml, schema thicklens/light-field/1 (docs/file-formats.md): a light field
-// without its values. The camera has a file of its own in the same folder.
-struct LightFieldDescription {
-  LightField light_field;       // without values and without `camera`
-  std::string view_format;      // "png" (16 bit, encoded values) or "tiff" (float, linear light)
-  bool has_confidence = false;  // true: each ray has a confidence in confidence/view_VV_UU.png
-  std::string camera_file;      // path relative to the description; empty: no camera
+// How the planes of a light field are stored that is kept as its scene.
+struct ScenePlanes {
+  int radiance_bits = 32;  // 32: floats; 16: whole numbers N, linear light offset + scale N
+  // Linear light, 1 at full scale; for floats 0 and 1. The scale is > 0.
+  double radiance_offset = 0, radiance_scale = 1;
+  Eigen::Vector2d disparity_step{1, 1};  // px per view step along u and v, per unit of disparity
+  bool has_colour_profile = false;       // the ICC profile of views is in a file
 };
+
+// Content of lightfield.yaml (docs/file-formats.md): a light field without its values. The schema
+// is thicklens/light-field/1 if it is stored as views, and thicklens/light-field/2 as its scene.
+// The camera has a file of its own in the same folder.
+struct LightFieldDescription {
+  LightField light_field;  // without values and without `camera`
+  // "png" (16 bit, encoded values) or "tiff" (float, linear light); empty: stored as its scene.
+  std::string view_format;
+  // True: each ray has a confidence in confidence/view_VV_UU.png, or each point of the scene in
+  // confidence.png.
+  bool has_confidence = false;
+  std::string camera_file;           // path relative to the description; empty: no camera
+  std::optional<ScenePlanes> scene;  // present if and only if it is stored as its scene
+};
+
+// Names of the files of a light field that is stored as its scene, in its folder.
+constexpr char kSceneRadianceFile[] = "radiance.tiff";      // light of the points, S x T px
+constexpr char kSceneDisparityFile[] = "disparity.tiff";    // their disparity, floats
+constexpr char kSceneConfidenceFile[] = "confidence.png";   // their confidence, 8 bits
+constexpr char kSceneProfileFile[] = "colour-profile.icc";  // of views
 
 // File name "view_VV_UU" of the view (k, l) without its extension. Each number has two digits, more
 // where needed.

@@ -1,4 +1,4 @@
-#include "tools/io/float_tiff.h"
+#include "tools/io/plain_tiff.h"
 
 #include <gtest/gtest.h>
 

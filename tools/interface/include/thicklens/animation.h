@@ -1,0 +1,43 @@
+#ifndef THICKLENS_ANIMATION_H_
+#define THICKLENS_ANIMATION_H_
+
+#include <string>
+
+#include "thicklens/base/export.h"
+#include "thicklens/render.h"
+#include "thicklens/run.h"
+#include "thicklens/scene_form.h"
+
+namespace thicklens {
+
+// What changes from frame to frame.
+enum class AnimationKind {
+  // The viewpoint goes once around the aperture, on the ellipse through the outermost views of the
+  // middle row and column.
+  kParallax,
+  kFocus,  // the focus goes from the farthest point to the nearest one and back
+};
+
+// The options of RenderAnimation.
+struct AnimationOptions {
+  AnimationKind kind = AnimationKind::kParallax;  // what changes
+  int frames = 36;                                // 2 to 1000
+  double seconds = 3;                             // length of one loop, s, 0.1 to 3600
+  int quality = 90;                               // of the compression, 0 to 100
+  RenderAperture aperture;                        // of kFocus
+
+  // Returns whether all members are valid. Otherwise `why`, if not null, gets the field, the value
+  // and the constraint.
+  THICKLENS_EXPORT bool IsValid(std::string* why) const;
+};
+
+// Renders an animation that repeats for ever, and returns it as the bytes of a WebP file. Its last
+// frame leads to its first. Throws OptionError, Error for a scene that is not valid or has more
+// than 16383 px per side and in builds without an encoder of WebP, and Interrupted.
+THICKLENS_EXPORT std::string RenderAnimation(const SceneForm& scene,
+                                             const AnimationOptions& options = {},
+                                             const RunControl& run = {});
+
+}  // namespace thicklens
+
+#endif  // THICKLENS_ANIMATION_H_
