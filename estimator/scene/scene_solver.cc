@@ -90,8 +90,8 @@ model::LightField EstimateIn(const EstimateInput& input, const SceneOptions& opt
   const SceneMemory memory(input, options, summary->threads, keeps, reach_px);
   const int iterations = std::min(options.max_iterations, UsualIterations(options.prior));
   const bool makes_views = sink == nullptr || sink->wants_views;
-  const int views = makes_views ? static_cast<int>(input.weights.size()) : 0;
-  IterationProgress progress(how.progress, iterations + views);
+  const int view_steps = makes_views ? static_cast<int>(input.weights.size()) : 0;
+  IterationProgress progress(how.progress, iterations + view_steps);
 
   const std::optional<double> noise = EncodedNoiseSigma(input.image, input.transfer, input.clipped);
   summary->noise_sigma = noise.value_or(kDefaultNoise);

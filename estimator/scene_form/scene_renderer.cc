@@ -50,17 +50,21 @@ std::vector<PlacedView> ViewsWithWeight(const model::LightField& frame,
   return views;
 }
 
-// Places and weights along one axis of the aperture that stand for its `count` views.
+// Places and weights along one axis of the aperture that stand for its `count` views. These are the
+// middles of equal parts of the aperture, whose sum is near the integral. What a view lacks grows
+// from the middle to both sides, with a kink in the middle, so each half has a rule of its own.
 std::vector<std::pair<double, double>> NodesOf(int count) {
-  constexpr int kNodes = 3;
+  constexpr int kNodes = 4;
   std::vector<std::pair<double, double>> nodes;
   if (count <= kNodes) {
     for (int k = 0; k < count; ++k) nodes.emplace_back(k - (count - 1) / 2.0, 1.0 / count);
     return nodes;
   }
-  // The views are the middles of equal parts of the aperture, whose sum is near the integral.
-  const double outer = std::sqrt(3.0 / 5.0) * count / 2;
-  return {{-outer, 5.0 / 18}, {0.0, 8.0 / 18}, {outer, 5.0 / 18}};
+  const double inner = (1 - 1 / std::sqrt(3.0)) * count / 4;
+  const double outer = (1 + 1 / std::sqrt(3.0)) * count / 4;
+  for (const double place : {-outer, -inner, inner, outer})
+    nodes.emplace_back(place, 1.0 / kNodes);
+  return nodes;
 }
 
 }  // namespace

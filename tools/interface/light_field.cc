@@ -193,6 +193,12 @@ std::size_t WriteLightField(const std::string& folder, const LightFieldEstimate&
     WriteSceneForm(folder, *estimate.scene, run);
     return 0;
   }
+  if (estimate.scene) {  // its views were not made
+    LightFieldEstimate rendered;
+    rendered.light_field = ViewsOf(*estimate.scene, run);
+    rendered.confidence = estimator::RayConfidenceOf(*estimate.scene, run.threads);
+    return WriteLightField(folder, rendered, format, run);
+  }
   const LightField& light_field = estimate.light_field;
   RequireValid(light_field);
   RequireFittingConfidence(estimate);

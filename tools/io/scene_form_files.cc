@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <opencv2/core/mat.hpp>
 #include <system_error>
 #include <utility>
@@ -145,6 +146,22 @@ estimator::SceneForm ReadSceneForm(const std::string& folder) {
   std::string why;
   if (!scene.IsValid(&why)) throw Error(fmt::format("{}: {}", folder, why));
   return scene;
+}
+
+SceneViews OpenSceneViews(const std::string& folder) {
+  struct Rendered {
+    explicit Rendered(const std::string& path) : scene(ReadSceneForm(path)), renderer(scene) {}
+    const estimator::SceneForm scene;
+    const estimator::SceneRenderer renderer;
+  };
+  const auto rendered = std::make_shared<const Rendered>(folder);
+  SceneViews views;
+  views.frame = rendered->scene.frame;
+  views.view = [rendered](int k, int l) {
+    const model::LightField& frame = rendered->scene.frame;
+    return rendered->renderer.View(frame.u_offset(k), frame.v_offset(l));
+  };
+  return views;
 }
 
 void WriteSceneForm(const estimator::SceneForm& scene, OutputFolder* folder) {

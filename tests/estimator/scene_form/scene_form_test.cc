@@ -175,18 +175,18 @@ TEST(SceneForm, TheNumberOfThreadsDoesNotMatter) {
   }
 }
 
-TEST(SceneForm, NineViewsTellTheSharesOfAllRays) {
-  for (const int count : {2, 3, 7, 12}) {
+TEST(SceneForm, AFewViewsTellTheSharesOfAllRays) {
+  for (const int count : {2, 4, 7, 12}) {
     const SceneForm scene = SquareBeforeWall(count, count);
     std::array<std::size_t, 256> counts{};
     for (const Confidence confidence : RayConfidenceOf(scene, 2)) ++counts[confidence];
     const ConfidenceShares all = SharesOf(counts), found = RaySharesOf(scene, 2);
-    const double bound = count <= 3 ? 1e-12 : 0.01;
+    const double bound = count <= 4 ? 1e-12 : 0.01;  // a sample is seen or not: small images are coarse
     EXPECT_NEAR(found.visible, all.visible, bound) << count;
     EXPECT_NEAR(found.partly_visible, all.partly_visible, bound) << count;
     EXPECT_NEAR(found.blurred, all.blurred, bound) << count;
     EXPECT_NEAR(found.filled_in, all.filled_in, bound) << count;
-    EXPECT_GT(all.filled_in, count > 3 ? 0.05 : 0.005);
+    EXPECT_GT(all.filled_in, count > 4 ? 0.05 : 0.005);
     EXPECT_GT(all.blurred, 0.1);
   }
 }

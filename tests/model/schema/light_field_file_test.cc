@@ -97,6 +97,31 @@ TEST(LightFieldFile, ReadsWhatIsThere) {
   EXPECT_EQ(grid.t_count, 480);
 }
 
+TEST(LightFieldFile, AScene) {
+  std::string text = Replaced(kRelative, "light-field/1", "light-field/2");
+  text = Replaced(text, "view_format: png\n",
+                  "scene: {radiance: radiance.tiff, radiance_bits: 16, radiance_offset: -0.25, "
+                  "radiance_scale: 1e-5, disparity: disparity.tiff, disparity_step: [0.5, 2]}\n");
+  const LightFieldDescription scene = ParseLightFieldDescription(text, "l.yaml");
+  EXPECT_THAT(scene.view_format, IsEmpty());
+  EXPECT_FALSE(scene.has_confidence);
+  ASSERT_TRUE(scene.scene);
+  EXPECT_EQ(scene.scene->radiance_bits, 16);
+  EXPECT_EQ(scene.scene->radiance_offset, -0.25);
+  EXPECT_EQ(scene.scene->radiance_scale, 1e-5);
+  EXPECT_EQ(scene.scene->disparity_step, Eigen::Vector2d(0.5, 2));
+  EXPECT_FALSE(scene.scene->has_colour_profile);
+  const std::string written = LightFieldDescriptionToYaml(scene);
+  const LightFieldDescription again = ParseLightFieldDescription(written, "again.yaml");
+  EXPECT_EQ(again.scene->radiance_scale, 1e-5);
+  EXPECT_EQ(LightFieldDescriptionToYaml(again), written);
+  EXPECT_THAT(ErrorOfText(Replaced(text, "radiance_scale: 1e-5", "radiance_scale: 0")),
+              HasSubstr("scene.radiance_scale"));
+  EXPECT_THAT(ErrorOfText(Replaced(text, "radiance_offset: -0.25, ", "")),
+              HasSubstr("'radiance_offset' is missing"));
+  EXPECT_THAT(ErrorOfText(text + "missing_views: [[0, 0]]\n"), HasSubstr("missing_views"));
+}
+
 TEST(LightFieldFile, KnowsMissingViews) {
   const auto present = ParseLightFieldDescription(
                            std::string(kRelative) + "missing_views: [[2, 0], [0, 1]]\n", "l.yaml")
@@ -108,7 +133,9 @@ TEST(LightFieldFile, EveryErrorNamesItsPlace) {
   EXPECT_THAT(ErrorWithMore("confidence_format: tiff\n"), HasSubstr("png"));
   EXPECT_THAT(ErrorWith("view_format", "view_fromat"),
               AllOf(StartsWith("l.yaml:5:1"), HasSubstr("did you mean 'view_format'")));
-  EXPECT_THAT(ErrorWith("light-field/1", "light-field/2"), StartsWith("l.yaml:1:9"));
+  EXPECT_THAT(ErrorWith("light-field/1", "light-field/3"), StartsWith("l.yaml:1:9"));
+  EXPECT_THAT(ErrorWith("light-field/1", "light-field/2"),
+              AllOf(StartsWith("l.yaml:5:1"), HasSubstr("view_format")));
   EXPECT_THAT(ErrorWith("[3, 2]", "[3]"), AllOf(StartsWith("l.yaml:2:"), HasSubstr("views")));
   EXPECT_THAT(ErrorWith("[3, 2]", "[3, 0]"), HasSubstr("views[1]"));
   EXPECT_THAT(ErrorWith("[3, 2]", "[4, 2]"),

@@ -16,6 +16,7 @@
 #include "support/test_cameras.h"
 #include "thicklens/io/confidence_files.h"
 #include "thicklens/io/depth_io.h"
+#include "thicklens/io/image_file.h"
 #include "thicklens/io/image_io.h"
 #include "thicklens/io/light_field_io.h"
 #include "thicklens/model/camera_file.h"
@@ -67,7 +68,8 @@ class SceneFormCommandTest : public ::testing::Test, protected EstimateCommand {
     arguments.insert(arguments.end(), what.begin(), what.end());
     const ProgramResult result = RunProgram(arguments);
     EXPECT_EQ(result.exit_code, 0) << result.err;
-    const cv::Mat image = io::ReadImageFile(folder_ / "rendered.pfm");
+    const std::string path = folder_ / "rendered.pfm";
+    const cv::Mat image = io::DecodeImageFile(testing::ContentOf(path), path).pixels;
     model::LinearImage light{image.cols, image.rows, image.channels(), {}};
     for (int y = 0; y < image.rows; ++y) {
       const auto* const row = image.ptr<float>(y);
@@ -161,7 +163,7 @@ TEST_F(SceneFormCommandTest, ACamerasDepthsAreKept) {
   for (int i = 0; i < kColumns * kRows; ++i)
     map.values.push_back(static_cast<float>(i % kColumns < 40 ? 700 : 1000));
   const std::string depth = folder_.Put("depth.pfm", io::EncodePfm(map));
-  const Arguments arguments = {Photo(),    depth,  "--depth-kind", "optical-axis",
+  const Arguments arguments = {Photo(),    depth,  "--depth-kind", "z",
                                "--camera", camera, "--depth-unit", "mm"};
   Summary(With(arguments, {"--format", "tiff"}));
   const model::LightField views = io::ReadLightField(Output(), {});

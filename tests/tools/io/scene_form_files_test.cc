@@ -120,7 +120,8 @@ TEST_F(SceneFormFolder, OneLightEverywhereIsKept) {
 
 TEST_F(SceneFormFolder, ItsCameraAndProfileAreKept) {
   estimator::SceneForm scene = Scene(3);
-  const model::Camera camera = testing::SmallCamera(kWidth, kHeight, {2.75, 1.5});
+  const model::Camera camera =
+      testing::WithMethod(testing::SmallCamera(kWidth, kHeight, {2.75, 1.5}));
   scene.frame.camera = camera;
   scene.frame.grid = model::DefaultGrid(camera, 4, 3);
   scene.frame.colour_profile = std::string("not\0text", 8);
@@ -181,7 +182,7 @@ TEST_F(SceneFormFolder, RefusesWrongFilesByName) {
   EXPECT_THAT(error_with("radiance_bits: 16", "radiance_bits: 8"), HasSubstr("16, 32"));
   EXPECT_THAT(error_with("disparity_step: [0.5, 0.25]", "disparity_step: [0.5]"),
               HasSubstr("scene.disparity_step"));
-  EXPECT_THAT(error_with("scene:", "views_of:"), HasSubstr("did you mean"));
+  EXPECT_THAT(error_with("scene:", "views_of:"), HasSubstr("unknown key 'views_of'"));
   EXPECT_THAT(error_with("light-field/2", "light-field/3"), HasSubstr("thicklens/light-field/1"));
   std::ofstream(folder + "/lightfield.yaml") << good;
   std::filesystem::rename(folder + "/disparity.tiff", folder + "/elsewhere.tiff");

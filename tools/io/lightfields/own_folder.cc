@@ -4,9 +4,9 @@
 
 #include <cstddef>
 #include <filesystem>
-#include <memory>
 #include <opencv2/core/mat.hpp>
 #include <system_error>
+#include <utility>
 
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
@@ -81,23 +81,13 @@ std::string ProfileOfViews(const std::string& folder, const model::LightField& f
   return "";
 }
 
-// The views of a light field that is stored as its scene are rendered when they are asked for.
 ViewSource SourceOfScene(const std::string& folder) {
-  struct Rendered {
-    explicit Rendered(const std::string& path) : scene(ReadSceneForm(path)), renderer(scene) {}
-    const estimator::SceneForm scene;
-    const estimator::SceneRenderer renderer;
-  };
-  const auto rendered = std::make_shared<const Rendered>(folder);
+  SceneViews views = OpenSceneViews(folder);
   ViewSource source;
   source.is_own = source.is_plain = true;
   source.kind = "a light field of thicklens, stored as its scene";
-  source.frame = rendered->scene.frame;
-  source.frame.source.clear();
-  source.read = [rendered](int k, int l) {
-    const model::LightField& frame = rendered->scene.frame;
-    return rendered->renderer.View(frame.u_offset(k), frame.v_offset(l));
-  };
+  source.frame = std::move(views.frame);
+  source.read = std::move(views.view);
   return source;
 }
 

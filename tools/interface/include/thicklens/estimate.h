@@ -376,7 +376,7 @@ THICKLENS_EXPORT Problem PrepareProblem(Image photo, DepthMap depth,
 
 // Writes the light field with its confidence as `thicklens estimate` does, completely or not at
 // all. The HCI layout has no place for a confidence, a camera or weights. LightFieldFormat::kScene
-// needs an estimate with `scene`, and the other formats one with views. Returns the number of
+// needs an estimate with `scene`; the other formats then render its views. Returns the number of
 // clipped values. Throws OptionError, and Error, also for a confidence that is neither empty nor
 // has one byte for each ray.
 THICKLENS_EXPORT std::size_t WriteLightField(const std::string& folder,

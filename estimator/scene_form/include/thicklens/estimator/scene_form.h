@@ -68,9 +68,9 @@ THICKLENS_EXPORT model::LightField ViewsOf(const SceneForm& scene, int threads);
 // the scene is unknown. Throws Error if the scene is not valid.
 THICKLENS_EXPORT std::vector<Confidence> RayConfidenceOf(const SceneForm& scene, int threads);
 
-// Returns the shares of the rays of all views, from nine views at the nodes of the Gauss-Legendre
-// rule over the aperture, or from all views if there are no more. All shares are 0 if the
-// confidence of the scene is unknown. Throws Error if the scene is not valid.
+// Returns the shares of the rays of all views. Along an axis with more than four views they are
+// those of views at the four nodes of the Gauss-Legendre rule on both halves of the aperture. All
+// shares are 0 if the confidence of the scene is unknown. Throws Error if the scene is not valid.
 THICKLENS_EXPORT ConfidenceShares RaySharesOf(const SceneForm& scene, int threads);
 
 }  // namespace thicklens::estimator
