@@ -36,7 +36,7 @@ constexpr double kMaxOfTile = 6;
 constexpr double kShown = 25, kOtherAperture = 5, kAboutAsWell = 8;
 // Standard deviations of scale and offset that remain however many tiles there are: of the scale,
 // and of the width of the blur, px.
-constexpr double kSystematicScale = 0.01, kSystematicPx = 0.1;
+constexpr double kSystematicScale = 0.015, kSystematicPx = 0.1;
 // The largest standard deviation of a scale that is a measurement.
 constexpr double kMaxScaleSigma = 0.1;
 // Values that differ by less than this in the width of their blur, px, are the same.
@@ -376,7 +376,7 @@ class Search {
     }
     if (IsOfDisc()) {
       found.message =
-          "the photograph was taken through a round aperture, which is not the stated one";
+          "another aperture than the stated one explains the photograph better, as a round one";
       return;
     }
     const std::string values =
@@ -393,7 +393,8 @@ class Search {
               : "");
       return;
     }
-    if (!(found.scale_sigma <= kMaxScaleSigma * found.best.scale)) {
+    // The first values of a search for all are refined.
+    if (is_near_ && !(found.scale_sigma <= kMaxScaleSigma * found.best.scale)) {
       found.message = "the photograph shows the values of the depth too inexactly: " + values;
       return;
     }

@@ -16,7 +16,9 @@ namespace thicklens::estimator {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr std::array<int, 2> kSizesPx = {32, 64};
+constexpr std::array<int, 3> kSizesPx = {32, 64, 128};
+// Where the blur is not known, larger tiles would be looked at for any.
+constexpr int kLargestUnstatedPx = 64;
 // Below, the mean of the tile and the window dominate; above, hardly any photograph has content.
 constexpr double kMinRadius = 1.6, kMaxFrequency = 0.44;
 // Periods per view step up to which samples are the aperture.
@@ -33,12 +35,12 @@ constexpr double kClippedLight = 0.98;
 constexpr double kDarkest = 0.003;
 // Power of a tile over that of the noise, at its lower frequencies.
 constexpr double kMinTexture = 6;
-constexpr double kTextureFrequency = 0.23;
-constexpr std::size_t kMaxTilesOfSize = 96;
+constexpr double kTextureFrequency = 0.23, kLeastTextureFrequency = 0.06, kTextureLobes = 1.6;
+constexpr std::size_t kMaxTilesOfSize = 96, kMaxUnstatedTiles = 48;
 constexpr int kPartsAlong = 4;
 // Exponent of the power of photographs.
 constexpr double kExponent = 2.2;
-constexpr double kCell = 0.03;  // of the table of disparities, px per view step
+constexpr double kCellPx = 0.2;  // of the table of disparities, width of the blur
 
 constexpr std::size_t kSmooth = 7, kUnknowns = kSmooth + 1;  // the last one is that of the noise
 using Unknowns = std::array<double, kUnknowns>;
@@ -108,10 +110,13 @@ struct TileRipples::Frequencies {
 // K for the frequencies of one size of tile, by disparity.
 class TileRipples::Shapes {
  public:
+  // `cell`: distance of the disparities of the table, from `least` to `most`.
   Shapes(RippleAperture aperture, const Frequencies& frequencies, const Eigen::ArrayXXd& weights,
-         const Eigen::Vector2d& step, const Eigen::Vector2d& sigma_steps, double largest,
-         int threads)
-      : table_(Index(static_cast<int>(std::ceil(largest / kCell)) + 2)) {
+         const Eigen::Vector2d& step, const Eigen::Vector2d& sigma_steps, double cell_size,
+         double least, double most, int threads)
+      : cell_(cell_size),
+        first_(static_cast<int>(std::floor(std::max(0.0, least) / cell_size))),
+        table_(Index(static_cast<int>(std::ceil(most / cell_size)) - first_ + 2)) {
     const int half = frequencies.size_px / 2, wide = frequencies.size_px + 1;
     const auto at = [half, wide](int x, int y) { return Index((y + half) * wide + x + half); };
     std::vector<double> content(Index(wide) * Index(wide));
@@ -122,14 +127,15 @@ class TileRipples::Shapes {
     content[at(0, 0)] *= 0.25;  // the mean of a tile is subtracted
     ParallelFor(static_cast<int>(table_.size()), threads, [&](int cell) {
       ThrowIfCancelled();
-      const double disparity = cell * kCell;
+      const double disparity = (first_ + cell) * cell_;
       // Hermitian: the half plane of x >= -1 is sufficient.
       std::vector<double> product(content.size());
+      const Phases phases(weights.rows(), half, disparity * step.y() / (2 * half));
       for (int x = -2; x <= half; ++x) {
         const Transfer transfer(aperture, weights, sigma_steps, disparity * step.x() * x / (2 * half));
         for (int y = -half; y <= half; ++y) {
           product[at(x, y)] = content[at(x, y)] *
-                              transfer.At(disparity * step.y() * y / (2 * half));
+                              transfer.At(disparity * step.y() * y / (2 * half), phases.Of(y));
         }
       }
       // A Hann window spreads a power over its neighbours, a sixth to each side.
@@ -153,8 +159,8 @@ class TileRipples::Shapes {
     constexpr std::array<double, 4> kParts = {-0.375, -0.125, 0.125, 0.375};
     std::vector<double> shape(table_.front().size(), 0.0);
     for (const double part : kParts) {
-      const double cell = std::min(std::abs(disparity + part * range) / kCell,
-                                   static_cast<double>(table_.size()) - 1.001);
+      const double cell = std::clamp(std::abs(disparity + part * range) / cell_ - first_, 0.0,
+                                     static_cast<double>(table_.size()) - 1.001);
       const auto below = static_cast<std::size_t>(cell);
       const double share = cell - static_cast<double>(below);
       const std::vector<double>&a = table_[below], &b = table_[below + 1];
@@ -165,6 +171,26 @@ class TileRipples::Shapes {
   }
 
  private:
+  // The phases of the rows of views at each frequency down.
+  class Phases {
+   public:
+    Phases(Eigen::Index rows, int half, double per_view)
+        : rows_(static_cast<std::size_t>(rows)), half_(half) {
+      const double middle = static_cast<double>(rows - 1) / 2;
+      for (int y = -half; y <= half; ++y) {
+        for (std::size_t l = 0; l < rows_; ++l) {
+          all_.push_back(
+              std::polar(1.0, 2 * kPi * per_view * y * (static_cast<double>(l) - middle)));
+        }
+      }
+    }
+    const std::complex<double>* Of(int y) const { return &all_[Index(y + half_) * rows_]; }
+
+   private:
+    std::size_t rows_;
+    int half_;
+    std::vector<std::complex<double>> all_;
+  };
   // abs(T)^2 along one column of frequencies, in periods per view step.
   class Transfer {
    public:
@@ -181,14 +207,15 @@ class TileRipples::Shapes {
           rows_[static_cast<std::size_t>(l)] += weights(l, k) * phase;
       }
     }
-    double At(double down) const {
+    double At(double down, const std::complex<double>* phases) const {
       switch (aperture_) {
         case RippleAperture::kSampled: {
-          std::complex<double> sum = 0;
-          const double middle = static_cast<double>(rows_.size() - 1) / 2;
-          for (std::size_t l = 0; l < rows_.size(); ++l)
-            sum += rows_[l] * std::polar(1.0, 2 * kPi * down * (static_cast<double>(l) - middle));
-          return std::norm(sum);
+          double real = 0, imaginary = 0;
+          for (std::size_t l = 0; l < rows_.size(); ++l) {
+            real += rows_[l].real() * phases[l].real() - rows_[l].imag() * phases[l].imag();
+            imaginary += rows_[l].real() * phases[l].imag() + rows_[l].imag() * phases[l].real();
+          }
+          return real * real + imaginary * imaginary;
         }
         case RippleAperture::kSquare: {
           const double sinc = Sinc(std::sqrt(12.0) * sigma_.x() * across_) *
@@ -214,6 +241,8 @@ class TileRipples::Shapes {
     std::vector<std::complex<double>> rows_;
   };
 
+  double cell_;
+  int first_;
   std::vector<std::vector<double>> table_;
 };
 
@@ -329,7 +358,8 @@ std::optional<RippleTile> TileAt(const DisparityMap& map, double step, int x, in
   const auto at = [&values](double share) {
     return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1) + 0.5)];
   };
-  RippleTile tile{x, y, size_px, 0, (at(0.9) - at(0.1)) / 0.8};
+  // Where nothing is known of the unit, a range has none either.
+  RippleTile tile{x, y, size_px, 0, rules.by_blur ? (at(0.9) - at(0.1)) / 0.8 : 0};
   tile.disparity =
       std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
   if (at(0.97) - at(0.03) > rules.range + rules.range_share * std::abs(tile.disparity))
@@ -440,6 +470,7 @@ void TileRipples::FindTiles(const RipplePhoto& photo, const model::TransferCurve
                             const RippleTileRules& rules, const Frequencies& frequencies,
                             double noise_power, int threads) {
   const int size = frequencies.size_px, stride = size / 2;
+  if (!rules.by_blur && size > kLargestUnstatedPx) return;
   const int across = (photo.image.width_px - size) / stride + 1;
   const int down = (photo.image.height_px - size) / stride + 1;
   if (photo.image.width_px < size || photo.image.height_px < size) return;
@@ -457,14 +488,18 @@ void TileRipples::FindTiles(const RipplePhoto& photo, const model::TransferCurve
       if (!tile) continue;
       const double width = width_ * std::abs(tile->disparity);
       if (rules.by_blur && (width > size / kMinStatedWidths ||
-                            (size > kSizesPx[0] && width < kSizesPx[0] / kWellResolved)))
+                            (size > kSizesPx[0] && width < size / 2 / kWellResolved)))
         continue;
+      const double most_texture =
+          rules.by_blur ? std::clamp(kTextureLobes / std::max(1e-9, width), kLeastTextureFrequency,
+                                     kTextureFrequency)
+                        : kTextureFrequency;
       std::vector<double> powers =
           PowersOf(photo, transfer, *tile, frequencies.window, frequencies.all);
       if (powers.empty()) continue;
       double texture = 0, count = 0;
       for (std::size_t i = 0; i < powers.size(); ++i) {
-        if (frequencies.all[i].square > kTextureFrequency * size) break;
+        if (frequencies.all[i].square > most_texture * size) break;
         texture += powers[i];
         count += 1;
       }
@@ -476,7 +511,8 @@ void TileRipples::FindTiles(const RipplePhoto& photo, const model::TransferCurve
   for (auto& row : rows) {
     for (Found& tile : row) found.push_back(std::move(tile));
   }
-  const std::size_t kept = std::min(found.size(), kMaxTilesOfSize);
+  const std::size_t kept =
+      std::min(found.size(), rules.by_blur ? kMaxTilesOfSize : kMaxUnstatedTiles);
   for (std::size_t i = 0; i < kept; ++i) {
     Found& tile = found[i * found.size() / kept];
     tiles_.push_back(tile.tile);
@@ -491,8 +527,21 @@ void TileRipples::Look(RippleAperture aperture) {
     const Frequencies frequencies(kSizesPx[size]);
     const std::vector<double>& levels = levels_[size];
     if (levels.empty()) continue;
-    const Shapes shapes(aperture, frequencies, weights_, step_, sigma, levels.back() + 0.3,
-                        threads_);
+    // Only what the tiles need is computed.
+    double least = std::numeric_limits<double>::infinity(), most = 0, range = 0;
+    for (const RippleTile& tile : tiles_) {
+      if (tile.size_px != kSizesPx[size]) continue;
+      const auto [first, last] = LevelsAbout(tile, levels);
+      least = std::min(least, levels[first]);
+      most = std::max(most, levels[last]);
+      range = std::max(range, tile.range);
+    }
+    if (!(least <= most)) continue;
+    const double cell = kCellPx / width_;
+    const Shapes shapes(aperture, frequencies, weights_, step_, sigma, cell, least - range / 2,
+                        most + range / 2, threads_);
+    const Shapes of_none(aperture, frequencies, weights_, step_, sigma, cell, 0, 0, threads_);
+    const std::vector<double> none = of_none.At(0, 0);
     ParallelFor(static_cast<int>(tiles_.size()), threads_, [&](int i) {
       const RippleTile& tile = tiles_[Index(i)];
       if (tile.size_px != kSizesPx[size]) return;
@@ -500,18 +549,11 @@ void TileRipples::Look(RippleAperture aperture) {
       const std::vector<double>& power = powers_[Index(i)];
       SmoothFit with(frequencies.all, power, noise_power_);
       SmoothFit without(frequencies.all, power, noise_power_);
-      const std::vector<double> none = shapes.At(0, 0);
       TileEvidence& evidence = evidence_[Index(i)];
-      std::size_t last = levels.size() - 1;
-      const double stated = std::abs(tile.disparity), more = kMoreWidthPx / width_;
-      if (by_blur_) {
-        while (last > 1 && levels[last - 1] > kMostShare * stated + more) --last;
-        while (evidence.first + 1 < last &&
-               levels[evidence.first + 1] < kLeastShare * stated - more)
-          ++evidence.first;
-      }
+      const auto [first, last] = LevelsAbout(tile, levels);
+      evidence.first = first;
       // Where no disparity is stated, each is compared by the frequencies that it has.
-      std::size_t used = frequencies.Used(kUsedShare * stated), used_before = 0;
+      std::size_t used = frequencies.Used(kUsedShare * std::abs(tile.disparity)), used_before = 0;
       double null_cost = 0;
       // From the widest band down to the narrowest, each fit begins where the last one ended.
       for (std::size_t level = evidence.first; level <= last; ++level) {
@@ -525,8 +567,19 @@ void TileRipples::Look(RippleAperture aperture) {
   }
 }
 
+std::pair<std::size_t, std::size_t> TileRipples::LevelsAbout(
+    const RippleTile& tile, const std::vector<double>& levels) const {
+  std::size_t first = 0, last = levels.size() - 1;
+  if (!by_blur_) return {first, last};
+  const double stated = std::abs(tile.disparity), more = kMoreWidthPx / width_;
+  while (last > 1 && levels[last - 1] > kMostShare * stated + more) --last;
+  while (first + 1 < last && levels[first + 1] < kLeastShare * stated - more) ++first;
+  return {first, last};
+}
+
 double TileRipples::Of(std::size_t tile, double disparity) const {
-  const std::vector<double>& levels = levels_[tiles_[tile].size_px == kSizesPx[0] ? 0 : 1];
+  const auto size = std::find(kSizesPx.begin(), kSizesPx.end(), tiles_[tile].size_px);
+  const std::vector<double>& levels = levels_[static_cast<std::size_t>(size - kSizesPx.begin())];
   const TileEvidence& evidence = evidence_[tile];
   const std::size_t count = evidence.of_level.size();
   const double at = std::abs(disparity);
@@ -543,8 +596,9 @@ double TileRipples::Of(std::size_t tile, double disparity) const {
 
 double TileRipples::largest() const {
   double largest = 0;
-  for (const std::vector<double>& levels : levels_) {
-    if (!levels.empty()) largest = std::max(largest, levels.back());
+  for (std::size_t size = 0; size < kSizes; ++size) {
+    const bool is_used = by_blur_ || kSizesPx[size] <= kLargestUnstatedPx;
+    if (is_used && !levels_[size].empty()) largest = std::max(largest, levels_[size].back());
   }
   return largest;
 }

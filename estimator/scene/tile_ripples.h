@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstddef>
-#include <functional>
+#include <utility>
 #include <vector>
 
 #include "estimator/scene/lower_bounds.h"
@@ -81,11 +81,15 @@ class TileRipples {
   int PartOf(std::size_t tile) const;
 
  private:
+  static constexpr std::size_t kSizes = 3;
   struct Frequencies;
   struct Spectrum;
   class Shapes;
 
   std::vector<double> LevelsOf(const Frequencies& frequencies) const;
+  // The levels of a tile that are tried, from the first to the last.
+  std::pair<std::size_t, std::size_t> LevelsAbout(const RippleTile& tile,
+                                                  const std::vector<double>& levels) const;
   void FindTiles(const RipplePhoto& photo, const model::TransferCurve& transfer,
                  const RippleTileRules& rules, const Frequencies& frequencies, double noise_power,
                  int threads);
@@ -98,7 +102,7 @@ class TileRipples {
   double noise_power_ = 0;
   std::vector<RippleTile> tiles_;
   std::vector<std::vector<double>> powers_;            // of each tile, by frequency
-  std::array<std::vector<double>, 2> levels_;          // of each size of tile
+  std::array<std::vector<double>, kSizes> levels_;     // of each size of tile
   // From one of its levels on.
   struct TileEvidence {
     std::size_t first = 0;

@@ -21,8 +21,8 @@ using estimator::DepthValuesTrial;
 
 // Logarithm of the likelihood ratio, and that over its standard deviation, from which the values of
 // a map are wrong. Changes up to three standard deviations, or up to these, are none.
-constexpr double kCertainGain = 10, kCertainSigmas = 2.5;
-constexpr double kSigmas = 3, kMinScaleChange = 0.025, kMinOffsetChangePx = 0.05;
+constexpr double kCertainGain = 10, kCertainSigmas = 2;
+constexpr double kSigmas = 3, kMinScaleChange = 0.04, kMinOffsetChangePx = 0.05;
 // Scales beyond are those of another aperture as well: PhotoAperture decides.
 constexpr double kLeastScale = 0.85, kMostScale = 1.25;
 // Standard deviations of the coincidence of edges of a map that lies at its place.
