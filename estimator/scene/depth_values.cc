@@ -31,9 +31,11 @@ constexpr int kParts = 16;
 constexpr std::size_t kMinTiles = 12;
 // The most that one tile says.
 constexpr double kMaxOfTile = 6;
-// Evidence from which a photograph shows the ripples of its aperture, that by which one aperture is
-// likelier than another, and that within which other values are about as likely.
-constexpr double kShown = 25, kOtherAperture = 5, kAboutAsWell = 8;
+// Evidence from which a photograph shows the ripples of its aperture, at the stated values and
+// anywhere; that by which one aperture is likelier than another, and that within which other values
+// are about as likely, also as a share.
+constexpr double kShown = 25, kShownAnywhere = 60, kOtherAperture = 5, kAboutAsWell = 8,
+                 kAboutAsWellShare = 0.1;
 // Standard deviations of scale and offset that remain however many tiles there are: of the scale,
 // and of the width of the blur, px.
 constexpr double kSystematicScale = 0.015, kSystematicPx = 0.1;
@@ -49,8 +51,8 @@ RipplePhoto LookedAt(const EstimateInput& input) {
         PhotographDisparity(input.disparity, LandingStepPx(*input.camera, *input.grid));
   }
   while (1.0 * photo.image.width_px * photo.image.height_px > kMaxPixels) {
-    photo.clipped = HalfSize(photo.clipped, photo.image.width_px, photo.image.height_px,
-                             photo.image.channels);
+    photo.clipped =
+        HalfSize(photo.clipped, photo.image.width_px, photo.image.height_px, photo.image.channels);
     photo.image = HalfSize(photo.image);
     photo.disparity = HalfSize(photo.disparity);
     photo.scale *= 2;
@@ -66,8 +68,7 @@ struct Values {
 class Fit {
  public:
   explicit Fit(const TileRipples& ripples) : ripples_(ripples) {
-    for (std::size_t i = 0; i < ripples.tiles().size(); ++i)
-      parts_.push_back(ripples.PartOf(i));
+    for (std::size_t i = 0; i < ripples.tiles().size(); ++i) parts_.push_back(ripples.PartOf(i));
   }
 
   // The sum over the tiles, without those of one part (-1: with all).
@@ -129,8 +130,7 @@ class Fit {
       is_used[Index(parts_[i])] = true;
       mean += gain;
     }
-    const auto used =
-        static_cast<double>(std::count(is_used.begin(), is_used.end(), true));
+    const auto used = static_cast<double>(std::count(is_used.begin(), is_used.end(), true));
     if (used < 2) return std::abs(mean);
     mean /= used;
     double squares = 0;
@@ -170,13 +170,14 @@ struct Grid {
 };
 
 Grid NearGrid(const TileRipples& ripples) {
-  constexpr double kLeast = 0.7, kMost = 1.4, kScaleStep = 0.02, kOffsetPx = 4, kOffsetStepPx = 0.15;
+  constexpr double kLeast = 0.7, kMost = 1.4, kScaleStep = 0.02, kOffsetPx = 4,
+                   kOffsetStepPx = 0.15;
   Grid grid;
   grid.scale_step = kScaleStep;
   grid.offset_step = kOffsetStepPx / ripples.width_px();
   grid.scales = Steps(kLeast, kMost, kScaleStep);
-  grid.offsets = Steps(-kOffsetPx / ripples.width_px(), kOffsetPx / ripples.width_px(),
-                       grid.offset_step);
+  grid.offsets =
+      Steps(-kOffsetPx / ripples.width_px(), kOffsetPx / ripples.width_px(), grid.offset_step);
   return grid;
 }
 
@@ -249,15 +250,17 @@ double DifferencePx(const TileRipples& ripples, const Values& a, const Values& b
 class Search {
  public:
   // The disparities of the input are those of `base`, to which the found values refer.
+  // `is_anywhere`: nothing states them.
   Search(const EstimateInput& input, const DepthValuesOptions& options, const Values& base,
-         int threads, DepthValuesFit* found)
+         bool is_anywhere, int threads, DepthValuesFit* found)
       : is_near_(options.search == DepthValuesSearch::kNear),
+        is_anywhere_(is_anywhere),
         base_(base),
         photo_(LookedAt(input)),
         ripples_(photo_, input.transfer, input.weights, Rules(),
-                 std::hypot(std::max(kMinNoise, EncodedNoiseSigma(photo_.image, input.transfer,
-                                                                  photo_.clipped)
-                                                    .value_or(1.0 / 255)),
+                 std::hypot(std::max(kMinNoise,
+                                     EncodedNoiseSigma(photo_.image, input.transfer, photo_.clipped)
+                                         .value_or(1.0 / 255)),
                             options.compression_sigma / photo_.scale),
                  threads),
         found_(found) {}
@@ -316,12 +319,12 @@ class Search {
     std::vector<Values> maxima;
     for (const Values& start : AllMaxima(ripples_, fit, range))
       maxima.push_back(fit.Refined(start, scale_step_, offset_step_));
-    std::stable_sort(maxima.begin(), maxima.end(), [&](const Values& a, const Values& b) {
-      return fit.Of(a) > fit.Of(b);
-    });
+    std::stable_sort(maxima.begin(), maxima.end(),
+                     [&](const Values& a, const Values& b) { return fit.Of(a) > fit.Of(b); });
     const Values best = maxima.front();
+    const double least = fit.Of(best) - std::max(kAboutAsWell, kAboutAsWellShare * fit.Of(best));
     for (const Values& other : maxima) {
-      if (!(other.scale > 0) || fit.Of(other) < fit.Of(best) - kAboutAsWell) continue;
+      if (!(other.scale > 0) || fit.Of(other) < least) continue;
       bool is_new = DifferencePx(ripples_, best, other) > kSameWidthPx;
       for (const Values& known : others_)
         is_new = is_new && DifferencePx(ripples_, known, other) > kSameWidthPx;
@@ -334,8 +337,7 @@ class Search {
 
   // The values refer to the base, whose offset is in px of the photograph.
   Values OfBase(const Values& values) const {
-    return {values.scale * base_.scale,
-            values.scale * base_.offset + values.offset * photo_.scale};
+    return {values.scale * base_.scale, values.scale * base_.offset + values.offset * photo_.scale};
   }
   DepthValuesTrial TrialOf(const Values& values, double evidence) const {
     const Values of_base = OfBase(values);
@@ -367,30 +369,30 @@ class Search {
 
   void Decide() {
     DepthValuesFit& found = *found_;
-    if (found.best.evidence < kShown) {
+    const double shown = is_anywhere_ ? kShownAnywhere : kShown;
+    if (found.best.evidence < shown) {
+      found.others.clear();
       found.message = fmt::format(
           "the photograph does not show the blur of its aperture: it is sharp, too smooth or too "
           "noisy, or was taken through another aperture (evidence {:.0f}, {:.0f} are needed)",
-          found.best.evidence, kShown);
+          found.best.evidence, shown);
       return;
     }
     if (IsOfDisc()) {
+      found.others.clear();
       found.message =
           "another aperture than the stated one explains the photograph better, as a round one";
       return;
     }
-    const std::string values =
-        fmt::format("scale {:.3g} +- {:.2g}, offset {:.3g} +- {:.2g} px per view step",
-                    found.best.scale, found.scale_sigma, found.best.offset_px,
-                    found.offset_sigma_px);
+    const std::string values = fmt::format(
+        "scale {:.3g} +- {:.2g}, offset {:.3g} +- {:.2g} px per view step", found.best.scale,
+        found.scale_sigma, found.best.offset_px, found.offset_sigma_px);
     if (!found.others.empty()) {
       found.message = fmt::format(
           "blur alone is the same on both sides of the plane of focus: {} explains it, and so does "
           "scale {:.3g}, offset {:.3g} px per view step{}",
           values, found.others.front().scale, found.others.front().offset_px,
-          found.others.size() > 1
-              ? fmt::format(", and {} more", found.others.size() - 1)
-              : "");
+          found.others.size() > 1 ? fmt::format(", and {} more", found.others.size() - 1) : "");
       return;
     }
     // The first values of a search for all are refined.
@@ -411,16 +413,16 @@ class Search {
     if (is_near_) {
       // The width of the aperture is that of the photograph.
       const Grid grid = NearGrid(other);
-      evidence = fit.Of(fit.Refined(fit.BestOf(grid.scales, grid.offsets), grid.scale_step,
-                                    grid.offset_step));
+      evidence = fit.Of(
+          fit.Refined(fit.BestOf(grid.scales, grid.offsets), grid.scale_step, grid.offset_step));
     } else {
       for (const Values& start : AllMaxima(other, fit, RangeOf(other.tiles())))
-        evidence = std::max(evidence, fit.Of(start));
+        evidence = std::max(evidence, fit.Of(fit.Refined(start, scale_step_, offset_step_)));
     }
     return evidence > found_->best.evidence + kOtherAperture;
   }
 
-  const bool is_near_;
+  const bool is_near_, is_anywhere_;
   const Values base_;
   const RipplePhoto photo_;
   TileRipples ripples_;
@@ -469,9 +471,8 @@ void DecideByEdges(const EstimateInput& input, int threads, DepthValuesFit* foun
   constexpr double kDecided = 4;
   const ReducedPhoto photo = SmallGrey(input);
   const double step = photo.disparity.step.cwiseAbs().maxCoeff() * photo.scale;
-  const double noise =
-      std::max(kMinNoise, EncodedNoiseSigma(photo.grey, input.transfer, photo.clipped)
-                              .value_or(1.0 / 255));
+  const double noise = std::max(
+      kMinNoise, EncodedNoiseSigma(photo.grey, input.transfer, photo.clipped).value_or(1.0 / 255));
   const double noise_square = noise * noise * kResidualBlockPx * kResidualBlockPx;
   std::vector<DepthValuesTrial> trials = {found->best};
   trials.insert(trials.end(), found->others.begin(), found->others.end());
@@ -485,9 +486,8 @@ void DecideByEdges(const EstimateInput& input, int threads, DepthValuesFit* foun
   for (std::size_t i = 0; i < trials.size(); ++i) {
     bool is_decided = true;
     for (std::size_t j = 0; j < trials.size(); ++j) {
-      is_decided =
-          is_decided &&
-          (i == j || SigmasBetter(explained[j], explained[i], noise_square) >= kDecided);
+      is_decided = is_decided &&
+                   (i == j || SigmasBetter(explained[j], explained[i], noise_square) >= kDecided);
     }
     if (!is_decided) continue;
     found->best = trials[i];
@@ -509,18 +509,20 @@ DepthValuesFit FitDepthValues(const EstimateInput& input, const DepthValuesOptio
   const auto start = Clock::now();
   const int threads = ResolveThreads(options.threads);
   DepthValuesFit found;
-  Search(input, options, {}, threads, &found).Run();
+  const bool is_anywhere = options.search == DepthValuesSearch::kAll;
+  Search(input, options, {}, is_anywhere, threads, &found).Run();
   if (!found.others.empty()) {
     DecideByEdges(input, threads, &found);
     found.is_found = found.others.empty();
   }
-  if (found.is_found && options.search == DepthValuesSearch::kAll) {
+  if (found.is_found && is_anywhere) {
     // Now the map states the blur, by which tiles are chosen.
     DepthValuesOptions near = options;
     near.search = DepthValuesSearch::kNear;
     const DepthValuesTrial first = found.best;
     found = {};
-    Search(WithValues(input, first), near, {first.scale, first.offset_px}, threads, &found).Run();
+    Search(WithValues(input, first), near, {first.scale, first.offset_px}, true, threads, &found)
+        .Run();
   }
   found.seconds = SecondsSince(start);
   return found;

@@ -45,7 +45,7 @@ constexpr double kCellPx = 0.2;  // of the table of disparities, width of the bl
 constexpr std::size_t kSmooth = 7, kUnknowns = kSmooth + 1;  // the last one is that of the noise
 using Unknowns = std::array<double, kUnknowns>;
 constexpr double kNoiseSpread = 0.2;
-constexpr Unknowns kSpread = {100, 2, 2, 1, 1, 2, 2, kNoiseSpread};
+constexpr Unknowns kSpread = {100, 6, 6, 3, 3, 6, 6, kNoiseSpread};
 // Neighbouring frequencies of a windowed tile are correlated. Of each two only one is used, and
 // these still count less.
 constexpr double kPerDegree = 1.2;
@@ -86,13 +86,12 @@ struct TileRipples::Frequencies {
         all.push_back({x,
                        y,
                        1.0 * std::max(x, std::abs(y)),
-                       {1, level, square, std::cos(angle), std::sin(angle),
-                        level * std::cos(angle), level * std::sin(angle)}});
+                       {1, level, square, std::cos(angle), std::sin(angle), level * std::cos(angle),
+                        level * std::sin(angle)}});
       }
     }
-    std::stable_sort(all.begin(), all.end(), [](const Frequency& a, const Frequency& b) {
-      return a.square < b.square;
-    });
+    std::stable_sort(all.begin(), all.end(),
+                     [](const Frequency& a, const Frequency& b) { return a.square < b.square; });
   }
   // The number of those that an aperture of this disparity represents.
   std::size_t Used(double disparity) const {
@@ -132,10 +131,11 @@ class TileRipples::Shapes {
       std::vector<double> product(content.size());
       const Phases phases(weights.rows(), half, disparity * step.y() / (2 * half));
       for (int x = -2; x <= half; ++x) {
-        const Transfer transfer(aperture, weights, sigma_steps, disparity * step.x() * x / (2 * half));
+        const Transfer transfer(aperture, weights, sigma_steps,
+                                disparity * step.x() * x / (2 * half));
         for (int y = -half; y <= half; ++y) {
-          product[at(x, y)] = content[at(x, y)] *
-                              transfer.At(disparity * step.y() * y / (2 * half), phases.Of(y));
+          product[at(x, y)] =
+              content[at(x, y)] * transfer.At(disparity * step.y() * y / (2 * half), phases.Of(y));
         }
       }
       // A Hann window spreads a power over its neighbours, a sixth to each side.
@@ -143,7 +143,8 @@ class TileRipples::Shapes {
       std::vector<double> across(content.size());
       for (int y = -half; y <= half; ++y) {
         for (int x = -1; x < half; ++x)
-          across[at(x, y)] = spread(product[at(x - 1, y)], product[at(x, y)], product[at(x + 1, y)]);
+          across[at(x, y)] =
+              spread(product[at(x - 1, y)], product[at(x, y)], product[at(x + 1, y)]);
       }
       std::vector<double>& shape = table_[Index(cell)];
       shape.reserve(frequencies.all.size());
@@ -232,9 +233,7 @@ class TileRipples::Shapes {
     }
 
    private:
-    static double Sinc(double x) {
-      return std::abs(x) < 1e-9 ? 1 : std::sin(kPi * x) / (kPi * x);
-    }
+    static double Sinc(double x) { return std::abs(x) < 1e-9 ? 1 : std::sin(kPi * x) / (kPi * x); }
     RippleAperture aperture_;
     Eigen::Vector2d sigma_;
     double across_;
@@ -350,8 +349,8 @@ std::optional<RippleTile> TileAt(const DisparityMap& map, double step, int x, in
   for (int j = border; j < size_px - border; j += stride) {
     for (int i = border; i < size_px - border; i += stride) {
       values.push_back(
-          step * static_cast<double>(
-                     map.disparity[Index(y + j) * Index(map.width_px) + Index(x + i)]));
+          step *
+          static_cast<double>(map.disparity[Index(y + j) * Index(map.width_px) + Index(x + i)]));
     }
   }
   std::sort(values.begin(), values.end());
@@ -490,10 +489,10 @@ void TileRipples::FindTiles(const RipplePhoto& photo, const model::TransferCurve
       if (rules.by_blur && (width > size / kMinStatedWidths ||
                             (size > kSizesPx[0] && width < size / 2 / kWellResolved)))
         continue;
-      const double most_texture =
-          rules.by_blur ? std::clamp(kTextureLobes / std::max(1e-9, width), kLeastTextureFrequency,
-                                     kTextureFrequency)
-                        : kTextureFrequency;
+      const double most_texture = rules.by_blur
+                                      ? std::clamp(kTextureLobes / std::max(1e-9, width),
+                                                   kLeastTextureFrequency, kTextureFrequency)
+                                      : kTextureFrequency;
       std::vector<double> powers =
           PowersOf(photo, transfer, *tile, frequencies.window, frequencies.all);
       if (powers.empty()) continue;
@@ -587,8 +586,8 @@ double TileRipples::Of(std::size_t tile, double disparity) const {
   if (at <= levels[evidence.first]) return evidence.of_level.front();
   if (at >= levels[evidence.first + count - 1])
     return by_blur_ ? evidence.of_level.back() : std::min(0.0, evidence.of_level.back());
-  const auto above = static_cast<std::size_t>(
-      std::upper_bound(levels.begin(), levels.end(), at) - levels.begin());
+  const auto above =
+      static_cast<std::size_t>(std::upper_bound(levels.begin(), levels.end(), at) - levels.begin());
   const double share = (at - levels[above - 1]) / (levels[above] - levels[above - 1]);
   const std::size_t below = above - 1 - evidence.first;
   return (1 - share) * evidence.of_level[below] + share * evidence.of_level[below + 1];

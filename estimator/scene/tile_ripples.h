@@ -101,8 +101,8 @@ class TileRipples {
   int width_of_image_px_ = 0, height_of_image_px_ = 0, threads_ = 1;
   double noise_power_ = 0;
   std::vector<RippleTile> tiles_;
-  std::vector<std::vector<double>> powers_;            // of each tile, by frequency
-  std::array<std::vector<double>, kSizes> levels_;     // of each size of tile
+  std::vector<std::vector<double>> powers_;         // of each tile, by frequency
+  std::array<std::vector<double>, kSizes> levels_;  // of each size of tile
   // From one of its levels on.
   struct TileEvidence {
     std::size_t first = 0;

@@ -317,8 +317,7 @@ void Run(const Arguments& arguments) {
         }
         other = ReadMap(other_folder);
       }
-      Row row =
-          Measure(scene, degradation, degradation.make(scene.disparity, other), arguments);
+      Row row = Measure(scene, degradation, degradation.make(scene.disparity, other), arguments);
       row.light_field = std::filesystem::path(folder).filename().string();
       std::cout << fmt::format("| {} | {} | {:.2f} | {:.3f} | {:.1f} | {} |\n", row.light_field,
                                row.map, row.psnr_db, row.error_px, row.seconds, row.remark)

@@ -63,8 +63,7 @@ bool IsAtPlace(const PreparedProblem& prepared, const EstimateDiagnostics& diagn
   check.compression_sigma = diagnostics.compression_sigma.value_or(0);
   check.check_values = false;
   check.threads = threads;
-  const estimator::DepthContradiction found =
-      estimator::CheckContradiction(*prepared.input, check);
+  const estimator::DepthContradiction found = estimator::CheckContradiction(*prepared.input, check);
   return !found.is_contradicted && !found.trials.empty() &&
          found.trials.front().edges.value_or(0) >= kAtPlace;
 }
@@ -79,13 +78,12 @@ void FindRelativeValues(const EstimateOptions& options, const PreparedProblem& p
     return Error(fmt::format(
         "{}: its scale and its offset are not known: {}; state them ({} disparity, {} and {}: px "
         "per view step = scale * value + offset)",
-        name, why, run->Option("depth.meaning.kind"),
-        run->Option("depth.meaning.disparity_scale"),
+        name, why, run->Option("depth.meaning.kind"), run->Option("depth.meaning.disparity_scale"),
         run->Option("depth.meaning.disparity_offset_px")));
   };
   if (IsTakenAsSharp(options)) {
-    throw remedy(fmt::format("a sharp photograph ({}) does not show them",
-                             run->Option("solver.photo")));
+    throw remedy(
+        fmt::format("a sharp photograph ({}) does not show them", run->Option("solver.photo")));
   }
   DepthMap as_disparity = *map;
   as_disparity.meaning.is_relative = false;
@@ -155,20 +153,19 @@ void CorrectValues(const EstimateOptions& options, DepthMeaning* meaning, Prepar
   if (!are_others || options.refine_depth == DepthRefining::kOff) return;
   const double step = input.disparity.step.cwiseAbs().maxCoeff();
   for (float& value : input.disparity.disparity) {
-    value = static_cast<float>(fit.best.scale * static_cast<double>(value) +
-                               fit.best.offset_px / step);
+    value =
+        static_cast<float>(fit.best.scale * static_cast<double>(value) + fit.best.offset_px / step);
   }
   meaning->disparity_scale *= fit.best.scale;
-  meaning->disparity_offset_px =
-      fit.best.scale * meaning->disparity_offset_px + fit.best.offset_px;
+  meaning->disparity_offset_px = fit.best.scale * meaning->disparity_offset_px + fit.best.offset_px;
   estimator::DepthRefinement& refinement = *diagnostics->depth_refinement;
   refinement.scale = fit.best.scale;
   refinement.offset_px = fit.best.offset_px;
   refinement.scale_sigma = fit.scale_sigma;
   refinement.offset_sigma_px = fit.offset_sigma_px;
-  const std::string text = fmt::format(
-      "scale {:.3f} +- {:.3f}, offset {:.2f} +- {:.2f} px per view step", fit.best.scale,
-      fit.scale_sigma, fit.best.offset_px, fit.offset_sigma_px);
+  const std::string text =
+      fmt::format("scale {:.3f} +- {:.3f}, offset {:.2f} +- {:.2f} px per view step",
+                  fit.best.scale, fit.scale_sigma, fit.best.offset_px, fit.offset_sigma_px);
   refinement.message = refinement.applied ? refinement.message + "; " + text : text;
   refinement.applied = true;
   refinement.seconds += fit.seconds;

@@ -115,7 +115,8 @@ bool DepthMeaning::IsValid(std::string* why) const {
     return Fail(why, "is_relative", "is for kDisparity only");
   if (is_relative && !(std::abs(disparity_scale) == 1)) {
     return Unexpected(why, "disparity_scale",
-                      "1 or -1, because the scale of a relative map is not known,", disparity_scale);
+                      "1 or -1, because the scale of a relative map is not known,",
+                      disparity_scale);
   }
   if (is_relative && !(disparity_offset_px == 0)) {
     return Unexpected(why, "disparity_offset_px",

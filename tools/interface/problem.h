@@ -46,9 +46,9 @@ struct PreparedDepth {
   model::DepthHoles found_holes;                // of the map, by reason
   std::optional<model::DepthStatistics> depth;  // mm from Ap, with a camera
 };
-// The map is not relative. `camera` and `grid` are both null or both set. `run`, which may be null, gets reports of holes
-// and marks, also where the map is refused. Throws Error that names the map's source and, with
-// `run`, what in the map may be the cause of impossible depths.
+// The map is not relative. `camera` and `grid` are both null or both set. `run`, which may be null,
+// gets reports of holes and marks, also where the map is refused. Throws Error that names the map's
+// source and, with `run`, what in the map may be the cause of impossible depths.
 PreparedDepth PrepareDepth(const DepthMap& map, const model::LinearImage& image,
                            const Camera* camera, const model::LightFieldGrid* grid,
                            RunScope* run = nullptr);

@@ -92,9 +92,8 @@ std::string KindInWords(model::DepthKind kind) {
 void RefuseOtherMeaning(const DepthOptions& options, const DepthMap& inside) {
   const std::string file_says = fmt::format("the depth map inside {} states its own meaning, {}",
                                             inside.source, KindInWords(inside.meaning.kind));
-  if (!options.kind.empty() &&
-      (options.kind == "relative" ||
-       model::DepthKindFromName(options.kind) != inside.meaning.kind)) {
+  if (!options.kind.empty() && (options.kind == "relative" ||
+                                model::DepthKindFromName(options.kind) != inside.meaning.kind)) {
     throw UsageError(fmt::format(
         "--depth-kind {}: {}; leave the option out, or give the map that it describes as DEPTH",
         options.kind, file_says));

@@ -313,9 +313,10 @@ model::DepthConvention ConventionOf(const DepthOptions& options) {
   }
   model::DepthConvention convention;
   if (!options.near_is.empty() && options.kind != kRelative) {
-    throw UsageError(fmt::format("--near-is requires --depth-kind relative, found {}; a negative "
-                                 "scale makes small values near",
-                                 options.kind));
+    throw UsageError(
+        fmt::format("--near-is requires --depth-kind relative, found {}; a negative "
+                    "scale makes small values near",
+                    options.kind));
   }
   if (options.kind == kRelative) {
     DepthOptions disparity = options;

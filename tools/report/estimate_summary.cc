@@ -339,9 +339,8 @@ json ValuesJson(const EstimateDiagnostics& found) {
   if (!found.depth_values) return nullptr;
   const estimator::DepthValuesFit& fit = *found.depth_values;
   const auto trial = [](const estimator::DepthValuesTrial& values) {
-    return json{{"scale", values.scale},
-                {"offset_px", values.offset_px},
-                {"evidence", values.evidence}};
+    return json{
+        {"scale", values.scale}, {"offset_px", values.offset_px}, {"evidence", values.evidence}};
   };
   json others = json::array();
   for (const estimator::DepthValuesTrial& other : fit.others) others.push_back(trial(other));

@@ -21,7 +21,8 @@ RipplePhoto PhotoOfOneDepth(int disparity_px) {
   for (double& at : scene) at = value(random);
   RipplePhoto photo;
   photo.image = {kSizePx, kSizePx, 1, {}};
-  photo.disparity = {kSizePx, kSizePx,
+  photo.disparity = {kSizePx,
+                     kSizePx,
                      std::vector<float>(kSizePx * kSizePx, static_cast<float>(disparity_px)),
                      {1, 1}};
   for (int y = 0; y < kSizePx; ++y) {
@@ -75,7 +76,8 @@ TEST(TileRipples, ShowTheBlurOfATile) {
 TEST(TileRipples, AreNotThoseOfAnotherAperture) {
   const Eigen::ArrayXXd weights =
       Eigen::ArrayXXd::Constant(kViews, kViews, 1.0 / (kViews * kViews));
-  TileRipples ripples(PhotoOfOneDepth(2), model::TransferCurve::Linear(), weights, {}, 0.5 / 255, 1);
+  TileRipples ripples(PhotoOfOneDepth(2), model::TransferCurve::Linear(), weights, {}, 0.5 / 255,
+                      1);
   const auto evidence = [&](RippleAperture aperture) {
     ripples.Look(aperture);
     double sum = 0;

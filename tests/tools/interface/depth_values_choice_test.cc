@@ -74,8 +74,7 @@ TEST(DepthValuesChoice, AWrongScaleIsCorrected) {
   const LayeredScene scene(1, kSidePx, kSidePx);
   const DepthMap map = MapOf(scene, 1 / 1.12, 0);
   EstimateDiagnostics found;
-  const Problem problem =
-      PrepareProblem(PhotoOf(scene), map, {}, FiveViews(), &found, OneThread());
+  const Problem problem = PrepareProblem(PhotoOf(scene), map, {}, FiveViews(), &found, OneThread());
   ASSERT_TRUE(found.depth_refinement);
   EXPECT_TRUE(found.are_depth_values_wrong) << found.depth_values->message;
   EXPECT_TRUE(found.depth_refinement->applied);
@@ -87,8 +86,8 @@ TEST(DepthValuesChoice, AWrongScaleIsCorrected) {
 TEST(DepthValuesChoice, AWrongScaleIsReportedIfNothingIsRefined) {
   const LayeredScene scene(1, kSidePx, kSidePx);
   const DepthMap map = MapOf(scene, 1 / 1.12, 0);
-  const LightFieldEstimate estimate = EstimateLightField(
-      PhotoOf(scene), map, {}, FiveViews(DepthRefining::kOff), OneThread());
+  const LightFieldEstimate estimate =
+      EstimateLightField(PhotoOf(scene), map, {}, FiveViews(DepthRefining::kOff), OneThread());
   EXPECT_EQ(estimate.problem->disparity(), map.values);
   EXPECT_THAT(estimate.summary.partial_reason,
               AllOf(HasSubstr("map: the blur of the photograph agrees with other disparities"),
@@ -152,13 +151,11 @@ TEST(DepthValuesChoice, ARelativeMapOfASharpPhotographIsRefusedWithWhatToState) 
   DepthMap map = MapOf(sharp, 1 / 60.0, -1.8);
   map.meaning.is_relative = true;
   const auto refused = [&](const EstimateOptions& options) {
-    return ErrorOf(
-        [&] { PrepareProblem(PhotoOf(sharp), map, {}, options, nullptr, OneThread()); });
+    return ErrorOf([&] { PrepareProblem(PhotoOf(sharp), map, {}, options, nullptr, OneThread()); });
   };
-  EXPECT_THAT(refused(FiveViews()),
-              AllOf(HasSubstr("map: its scale and its offset are not known"),
-                    HasSubstr("<depth.meaning.disparity_scale> and "
-                              "<depth.meaning.disparity_offset_px>")));
+  EXPECT_THAT(refused(FiveViews()), AllOf(HasSubstr("map: its scale and its offset are not known"),
+                                          HasSubstr("<depth.meaning.disparity_scale> and "
+                                                    "<depth.meaning.disparity_offset_px>")));
   EstimateOptions stated = FiveViews();
   SceneSolver solver;
   solver.photo = PhotoKind::kSharp;

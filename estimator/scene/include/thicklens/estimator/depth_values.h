@@ -23,8 +23,8 @@ struct DepthValuesFit {
   std::string message = "not run";  // how it ended, one line
   // The photograph determines scale and offset, and its blur is that of the stated aperture.
   bool is_found = false;
-  DepthValuesTrial given;  // the map as it is
-  DepthValuesTrial best;   // the values that agree best
+  DepthValuesTrial given;                       // the map as it is
+  DepthValuesTrial best;                        // the values that agree best
   double scale_sigma = 0, offset_sigma_px = 0;  // standard deviations of the best
   // Logarithm of the likelihood ratio of the best against the map as it is, and its standard
   // deviation.
@@ -59,7 +59,8 @@ struct DepthValuesOptions {
 // depth has minima there, which depend on its blur and not on its texture. The evidence of tiles of
 // 32 x 32 and 64 x 64 px, at every frequency and limited for each tile, is summed for all values,
 // and the largest sum is that of the best ones. Their standard deviations are those of a delete-one
-// jackknife over 4 x 4 parts of the photograph, with a systematic part. Derived here [D195], [D196].
+// jackknife over 4 x 4 parts of the photograph, with a systematic part. Derived here [D195],
+// [D196].
 //
 // A scale cannot be distinguished from another width of the aperture, and a pair of scale and
 // offset not from the negative of both. Where a disc explains the photograph better than the stated
