@@ -35,7 +35,7 @@ constexpr double kMaxOfTile = 6;
 // anywhere; that by which one aperture is likelier than another, and that within which other values
 // are about as likely, also as a share.
 constexpr double kShown = 25, kShownAnywhere = 60, kOtherAperture = 5, kAboutAsWell = 8,
-                 kAboutAsWellShare = 0.1;
+                 kAboutAsWellShare = 0.1, kOtherApertureShare = 0.15;
 // Standard deviations of scale and offset that remain however many tiles there are: of the scale,
 // and of the width of the blur, px.
 constexpr double kSystematicScale = 0.015, kSystematicPx = 0.1;
@@ -419,7 +419,11 @@ class Search {
       for (const Values& start : AllMaxima(other, fit, RangeOf(other.tiles())))
         evidence = std::max(evidence, fit.Of(fit.Refined(start, scale_step_, offset_step_)));
     }
-    return evidence > found_->best.evidence + kOtherAperture;
+    // The first values of a search for all are compared once more when they are refined.
+    const double more =
+        is_near_ ? kOtherAperture
+                 : std::max(kOtherAperture, kOtherApertureShare * found_->best.evidence);
+    return evidence > found_->best.evidence + more;
   }
 
   const bool is_near_, is_anywhere_;
