@@ -103,6 +103,24 @@ double NoiseOf(const ReducedPhoto& photo, const EstimateInput& input, double com
       compression_sigma / photo.scale);
 }
 
+// Standard deviations by which `other` explains the photograph better than `given`: the mean of
+// the logarithm of the ratio of their squares in blocks, in which no single block decides.
+double SigmasBetter(const ResidualBlocks& given, const ResidualBlocks& other, double noise_square) {
+  // Rounding alone makes the same small difference in many blocks.
+  constexpr double kMinRatio = 0.01;
+  double sum = 0, squares = 0, count = 0;
+  for (std::size_t i = 0; i < given.squares.size(); ++i) {
+    const double ratio =
+        std::log((given.squares[i] + noise_square) / (other.squares[i] + noise_square));
+    sum += ratio;
+    squares += ratio * ratio;
+    count += 1;
+  }
+  if (!(std::abs(sum) > kMinRatio * count)) return 0;
+  const double scatter = (squares - sum * sum / count) * count / std::max(1.0, count - 1);
+  return sum / std::sqrt(std::max(1e-12, scatter));
+}
+
 class Search {
  public:
   Search(const EstimateInput& input, const DepthContradictionOptions& options, int threads,

@@ -565,20 +565,4 @@ ResidualBlocks ExplainedBy(const ReducedPhoto& photo, const DisparityMap& map,
   return blocks;
 }
 
-double SigmasBetter(const ResidualBlocks& given, const ResidualBlocks& other, double noise_square) {
-  // Rounding alone makes the same small difference in many blocks.
-  constexpr double kMinRatio = 0.01;
-  double sum = 0, squares = 0, count = 0;
-  for (std::size_t i = 0; i < given.squares.size(); ++i) {
-    const double ratio =
-        std::log((given.squares[i] + noise_square) / (other.squares[i] + noise_square));
-    sum += ratio;
-    squares += ratio * ratio;
-    count += 1;
-  }
-  if (!(std::abs(sum) > kMinRatio * count)) return 0;
-  const double scatter = (squares - sum * sum / count) * count / std::max(1.0, count - 1);
-  return sum / std::sqrt(std::max(1e-12, scatter));
-}
-
 }  // namespace thicklens::estimator

@@ -90,9 +90,6 @@ struct ResidualBlocks {
 };
 ResidualBlocks ExplainedBy(const ReducedPhoto& photo, const DisparityMap& map,
                            const EstimateInput& input, double photo_aperture, int threads);
-// Standard deviations by which `other` explains the photograph better than `given`: the mean of
-// the logarithm of the ratio of their squares in blocks, in which no single block decides.
-double SigmasBetter(const ResidualBlocks& given, const ResidualBlocks& other, double noise_square);
 
 }  // namespace thicklens::estimator
 

@@ -11,7 +11,6 @@
 
 #include "estimator/projection/scene_projection.h"
 #include "estimator/scene/coarse_start.h"
-#include "estimator/scene/depth_evidence.h"
 #include "estimator/scene/lower_bounds.h"
 #include "estimator/scene/tile_ripples.h"
 #include "estimator/views/input_checks.h"
@@ -35,7 +34,7 @@ constexpr double kMaxOfTile = 6;
 // anywhere; that by which one aperture is likelier than another, and that within which other values
 // are about as likely, also as a share.
 constexpr double kShown = 25, kShownAnywhere = 60, kOtherAperture = 5, kAboutAsWell = 8,
-                 kAboutAsWellShare = 0.1, kOtherApertureShare = 0.15;
+                 kAboutAsWellShare = 0.25, kOtherApertureShare = 0.15;
 // Standard deviations of scale and offset that remain however many tiles there are: of the scale,
 // and of the width of the blur, px.
 constexpr double kSystematicScale = 0.015, kSystematicPx = 0.1;
@@ -445,61 +444,6 @@ EstimateInput WithValues(const EstimateInput& input, const DepthValuesTrial& val
   return changed;
 }
 
-// A small grey photograph, on which whole estimates are compared.
-ReducedPhoto SmallGrey(const EstimateInput& input) {
-  constexpr double kPixels = 130 * 130;
-  ReducedPhoto photo;
-  const model::LinearImage& image = input.image;
-  photo.grey = {image.width_px, image.height_px, 1, {}};
-  const auto channels = Index(image.channels);
-  for (std::size_t i = 0; i < image.values.size(); i += channels) {
-    photo.grey.values.push_back(channels < 3
-                                    ? image.values[i]
-                                    : 0.2126F * image.values[i] + 0.7152F * image.values[i + 1] +
-                                          0.0722F * image.values[i + 2]);
-  }
-  photo.clipped = InAnyChannel(input.clipped, image.channels);
-  photo.disparity = input.disparity;
-  while (1.0 * photo.grey.width_px * photo.grey.height_px > kPixels) {
-    photo.clipped = HalfSize(photo.clipped, photo.grey.width_px, photo.grey.height_px, 1);
-    photo.grey = HalfSize(photo.grey);
-    photo.disparity = HalfSize(photo.disparity);
-    photo.scale *= 2;
-  }
-  return photo;
-}
-
-// Leaves the values with which the edges of the photograph agree, if they decide it: what is in
-// front hides what is behind, which blur does not show.
-void DecideByEdges(const EstimateInput& input, int threads, DepthValuesFit* found) {
-  constexpr double kDecided = 4;
-  const ReducedPhoto photo = SmallGrey(input);
-  const double step = photo.disparity.step.cwiseAbs().maxCoeff() * photo.scale;
-  const double noise = std::max(
-      kMinNoise, EncodedNoiseSigma(photo.grey, input.transfer, photo.clipped).value_or(1.0 / 255));
-  const double noise_square = noise * noise * kResidualBlockPx * kResidualBlockPx;
-  std::vector<DepthValuesTrial> trials = {found->best};
-  trials.insert(trials.end(), found->others.begin(), found->others.end());
-  std::vector<ResidualBlocks> explained;
-  for (const DepthValuesTrial& trial : trials) {
-    DisparityMap map = photo.disparity;
-    for (float& value : map.disparity)
-      value = static_cast<float>(trial.scale * static_cast<double>(value) + trial.offset_px / step);
-    explained.push_back(ExplainedBy(photo, map, input, 1, threads));
-  }
-  for (std::size_t i = 0; i < trials.size(); ++i) {
-    bool is_decided = true;
-    for (std::size_t j = 0; j < trials.size(); ++j) {
-      is_decided = is_decided &&
-                   (i == j || SigmasBetter(explained[j], explained[i], noise_square) >= kDecided);
-    }
-    if (!is_decided) continue;
-    found->best = trials[i];
-    found->others.clear();
-    return;
-  }
-}
-
 }  // namespace
 
 bool DepthValuesOptions::IsValid(std::string* why) const {
@@ -515,10 +459,6 @@ DepthValuesFit FitDepthValues(const EstimateInput& input, const DepthValuesOptio
   DepthValuesFit found;
   const bool is_anywhere = options.search == DepthValuesSearch::kAll;
   Search(input, options, {}, is_anywhere, threads, &found).Run();
-  if (!found.others.empty()) {
-    DecideByEdges(input, threads, &found);
-    found.is_found = found.others.empty();
-  }
   if (found.is_found && is_anywhere) {
     // Now the map states the blur, by which tiles are chosen.
     DepthValuesOptions near = options;

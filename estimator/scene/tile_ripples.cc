@@ -19,8 +19,9 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr std::array<int, 3> kSizesPx = {32, 64, 128};
 // Where the blur is not known, larger tiles would be looked at for any.
 constexpr int kLargestUnstatedPx = 64;
-// Below, the mean of the tile and the window dominate; above, hardly any photograph has content.
-constexpr double kMinRadius = 1.6, kMaxFrequency = 0.44;
+// Below, the mean of the tile and the window dominate; above, demosaicing and other interpolation
+// change what an aperture lets through.
+constexpr double kMinRadius = 1.6, kMaxFrequency = 0.27;
 // Periods per view step up to which samples are the aperture.
 constexpr double kMaxOfSampling = 0.55;
 // Edge of a tile over the width of the blur: fewer do not resolve the ripples. Larger tiles are

@@ -19,13 +19,8 @@ class LayeredScene {
   static constexpr int kViews = 5;
   static constexpr double kFarPx = -1.2;  // disparity of the background, px per view step
 
-  // `near_px`: the disparity of all discs; 0: each has its own.
   LayeredScene(unsigned seed, int width_px, int height_px, double noise_levels = 1,
-               double aperture = 1, double near_px = 0)
-      : LayeredScene(seed, width_px, height_px, noise_levels, aperture, near_px, UniformViews()) {}
-  // The photograph of the views with these weights; those of the input are equal nevertheless.
-  LayeredScene(unsigned seed, int width_px, int height_px, double noise_levels, double aperture,
-               double near_px, const Eigen::ArrayXXd& photo_weights)
+               double aperture = 1)
       : width_px_(width_px), height_px_(height_px) {
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> unit(0, 1);
@@ -37,12 +32,12 @@ class LayeredScene {
       layer.height = (0.15 + 0.2 * unit(random)) * height_px;
       layer.x = unit(random) * (width_px - layer.width);
       layer.y = unit(random) * (height_px - layer.height);
-      layer.disparity = near_px != 0 ? near_px : kFarPx + 0.5 + 2.3 * (i + 1) / kThings;
+      layer.disparity = kFarPx + 0.5 + 2.3 * (i + 1) / kThings;
       layer.texture = static_cast<int>(unit(random) * kSide);
       layers_.push_back(layer);
     }
     std::normal_distribution<double> noise(0, noise_levels / 255);
-    input_.weights = UniformViews();
+    input_.weights = Eigen::ArrayXXd::Constant(kViews, kViews, 1.0 / (kViews * kViews));
     input_.transfer = model::TransferCurve::Linear();
     input_.image = {width_px, height_px, 1, {}};
     input_.disparity = {width_px, height_px, {}, {1, 1}};
@@ -50,12 +45,10 @@ class LayeredScene {
       for (int x = 0; x < width_px; ++x) {
         double sum = 0;
         for (int view = 0; view < kViews * kViews; ++view) {
-          const double weight = photo_weights(view / kViews, view % kViews);
-          if (weight == 0) continue;
-          sum += weight * At(x, y, aperture * (view % kViews - kViews / 2),
-                             aperture * (view / kViews - kViews / 2));
+          sum += At(x, y, aperture * (view % kViews - kViews / 2),
+                    aperture * (view / kViews - kViews / 2));
         }
-        const double stored = std::clamp(sum + noise(random), 0.0, 1.0);
+        const double stored = std::clamp(sum / (kViews * kViews) + noise(random), 0.0, 1.0);
         input_.image.values.push_back(static_cast<float>(std::round(255 * stored) / 255));
         const Layer* const seen = SeenAt(x, y, 0, 0);
         input_.disparity.disparity.push_back(
@@ -64,9 +57,6 @@ class LayeredScene {
     }
   }
 
-  static Eigen::ArrayXXd UniformViews() {
-    return Eigen::ArrayXXd::Constant(kViews, kViews, 1.0 / (kViews * kViews));
-  }
   // The photograph, and the map of its depth.
   const estimator::EstimateInput& input() const { return input_; }
 

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "support/error_message.h"
-#include "support/layered_scene.h"
+#include "support/stepped_scene.h"
 #include "thicklens/base/error.h"
 #include "thicklens/estimate.h"
 
@@ -22,11 +22,16 @@ namespace {
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using thicklens::testing::ErrorOf;
-using thicklens::testing::LayeredScene;
+using thicklens::testing::SteppedScene;
 
-constexpr int kSidePx = 256;
+constexpr int kSidePx = 320;
 
-Image PhotoOf(const LayeredScene& scene) {
+SteppedScene SceneOf(unsigned seed,
+                     const Eigen::ArrayXXd& weights = SteppedScene::UniformViews()) {
+  return SteppedScene(seed, kSidePx, {-2, 1, 2, -1, 0}, 1, weights);
+}
+
+Image PhotoOf(const SteppedScene& scene) {
   std::vector<std::uint16_t> levels;
   for (const float value : scene.input().image.values)
     levels.push_back(static_cast<std::uint16_t>(std::lround(255 * value)));
@@ -35,7 +40,7 @@ Image PhotoOf(const LayeredScene& scene) {
 }
 
 // The map whose disparities are scale * value + offset.
-DepthMap MapOf(const LayeredScene& scene, double scale, double offset_px) {
+DepthMap MapOf(const SteppedScene& scene, double scale, double offset_px) {
   DepthMap map;
   map.width_px = map.height_px = kSidePx;
   map.meaning.kind = DepthKind::kDisparity;
@@ -47,7 +52,7 @@ DepthMap MapOf(const LayeredScene& scene, double scale, double offset_px) {
 
 EstimateOptions FiveViews(DepthRefining refining = DepthRefining::kAuto) {
   EstimateOptions options;
-  options.views = ViewCounts{LayeredScene::kViews, LayeredScene::kViews};
+  options.views = ViewCounts{SteppedScene::kViews, SteppedScene::kViews};
   options.aperture.shape = model::ApertureShape::kUniform;
   options.refine_depth = refining;
   return options;
@@ -60,7 +65,7 @@ RunControl OneThread() {
   return control;
 }
 
-double RmsError(const std::vector<float>& found, const LayeredScene& scene) {
+double RmsError(const std::vector<float>& found, const SteppedScene& scene) {
   double squares = 0;
   for (std::size_t i = 0; i < found.size(); ++i) {
     squares += std::pow(
@@ -71,7 +76,7 @@ double RmsError(const std::vector<float>& found, const LayeredScene& scene) {
 }
 
 TEST(DepthValuesChoice, AWrongScaleIsCorrected) {
-  const LayeredScene scene(1, kSidePx, kSidePx);
+  const SteppedScene scene = SceneOf(1);
   const DepthMap map = MapOf(scene, 1 / 1.12, 0);
   EstimateDiagnostics found;
   const Problem problem = PrepareProblem(PhotoOf(scene), map, {}, FiveViews(), &found, OneThread());
@@ -84,7 +89,7 @@ TEST(DepthValuesChoice, AWrongScaleIsCorrected) {
 }
 
 TEST(DepthValuesChoice, AWrongScaleIsReportedIfNothingIsRefined) {
-  const LayeredScene scene(1, kSidePx, kSidePx);
+  const SteppedScene scene = SceneOf(1);
   const DepthMap map = MapOf(scene, 1 / 1.12, 0);
   const LightFieldEstimate estimate =
       EstimateLightField(PhotoOf(scene), map, {}, FiveViews(DepthRefining::kOff), OneThread());
@@ -98,7 +103,7 @@ TEST(DepthValuesChoice, AWrongScaleIsReportedIfNothingIsRefined) {
 TEST(DepthValuesChoice, ARightMapStays) {
   for (unsigned seed = 1; seed <= 3; ++seed) {
     SCOPED_TRACE(seed);
-    const LayeredScene scene(seed, kSidePx, kSidePx);
+    const SteppedScene scene = SceneOf(seed);
     const DepthMap map = MapOf(scene, 1, 0);
     EstimateDiagnostics found;
     const Problem problem =
@@ -110,7 +115,7 @@ TEST(DepthValuesChoice, ARightMapStays) {
 
 // Their values are not what is wrong, or a smaller aperture explains them as well.
 TEST(DepthValuesChoice, AReversedMapAndASmallApertureAreLeftToTheirOwnChecks) {
-  const LayeredScene scene(3, kSidePx, kSidePx);
+  const SteppedScene scene = SceneOf(3);
   DepthMap reversed = MapOf(scene, 1, 0);
   model::FlipDepth(model::DepthFlip::kRows, kSidePx, &reversed.values);
   EstimateDiagnostics found;
@@ -118,7 +123,13 @@ TEST(DepthValuesChoice, AReversedMapAndASmallApertureAreLeftToTheirOwnChecks) {
       PrepareProblem(PhotoOf(scene), reversed, {}, FiveViews(), &found, OneThread());
   EXPECT_FALSE(found.are_depth_values_wrong);
   EXPECT_EQ(found.depth_refinement->scale, 1);
-  const LayeredScene small(3, kSidePx, kSidePx, 1, 0.7);
+  Eigen::ArrayXXd inner = SteppedScene::UniformViews();
+  inner.row(0).setZero();
+  inner.row(4).setZero();
+  inner.col(0).setZero();
+  inner.col(4).setZero();
+  inner /= inner.sum();
+  const SteppedScene small = SceneOf(3, inner);
   const DepthMap map = MapOf(small, 1, 0);
   EXPECT_EQ(PrepareProblem(PhotoOf(small), map, {}, FiveViews(), &found, OneThread()).disparity(),
             map.values)
@@ -127,7 +138,7 @@ TEST(DepthValuesChoice, AReversedMapAndASmallApertureAreLeftToTheirOwnChecks) {
 }
 
 TEST(DepthValuesChoice, TheValuesOfARelativeMapAreFound) {
-  const LayeredScene scene(2, kSidePx, kSidePx);
+  const SteppedScene scene = SceneOf(2);
   for (const double sign : {1.0, -1.0}) {
     DepthMap map = MapOf(scene, sign / 60, -1.8);
     for (float& value : map.values) value = std::round(value);
@@ -147,7 +158,7 @@ TEST(DepthValuesChoice, TheValuesOfARelativeMapAreFound) {
 }
 
 TEST(DepthValuesChoice, ARelativeMapOfASharpPhotographIsRefusedWithWhatToState) {
-  const LayeredScene sharp(2, kSidePx, kSidePx, 1, 0);
+  const SteppedScene sharp = SceneOf(2, SteppedScene::Pinhole());
   DepthMap map = MapOf(sharp, 1 / 60.0, -1.8);
   map.meaning.is_relative = true;
   const auto refused = [&](const EstimateOptions& options) {
