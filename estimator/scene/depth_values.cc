@@ -169,12 +169,12 @@ struct Grid {
 };
 
 Grid NearGrid(const TileRipples& ripples) {
-  constexpr double kLeast = 0.7, kMost = 1.4, kScaleStep = 0.02, kOffsetPx = 4,
+  constexpr double kMinScale = 0.7, kMaxScale = 1.4, kScaleStep = 0.02, kOffsetPx = 4,
                    kOffsetStepPx = 0.15;
   Grid grid;
   grid.scale_step = kScaleStep;
   grid.offset_step = kOffsetStepPx / ripples.width_px();
-  grid.scales = Steps(kLeast, kMost, kScaleStep);
+  grid.scales = Steps(kMinScale, kMaxScale, kScaleStep);
   grid.offsets =
       Steps(-kOffsetPx / ripples.width_px(), kOffsetPx / ripples.width_px(), grid.offset_step);
   return grid;
@@ -203,9 +203,9 @@ Values ValuesOf(const TileRange& range, double slope, double middle) {
 
 // The local maxima over all positive scales, the largest first.
 std::vector<Values> AllMaxima(const TileRipples& ripples, const Fit& fit, const TileRange& range) {
-  constexpr double kStepPx = 0.4, kLeastSlopePx = 0.5;
+  constexpr double kStepPx = 0.4, kMinSlopePx = 0.5;
   const double step = kStepPx / ripples.width_px(), most = ripples.largest();
-  const std::vector<double> slopes = Steps(kLeastSlopePx / ripples.width_px(), most, step),
+  const std::vector<double> slopes = Steps(kMinSlopePx / ripples.width_px(), most, step),
                             middles = Steps(-most, most, step);
   std::vector<std::vector<double>> sums(slopes.size(), std::vector<double>(middles.size()));
   for (std::size_t i = 0; i < slopes.size(); ++i) {
@@ -229,10 +229,10 @@ std::vector<Values> AllMaxima(const TileRipples& ripples, const Fit& fit, const 
   }
   std::stable_sort(maxima.begin(), maxima.end(),
                    [](const Maximum& a, const Maximum& b) { return a.sum > b.sum; });
-  constexpr std::size_t kMostMaxima = 12;
+  constexpr std::size_t kMaxMaxima = 12;
   std::vector<Values> best;
   for (const Maximum& maximum : maxima) {
-    if (best.size() < kMostMaxima) best.push_back(maximum.values);
+    if (best.size() < kMaxMaxima) best.push_back(maximum.values);
   }
   return best;
 }
@@ -419,9 +419,9 @@ class Search {
         evidence = std::max(evidence, fit.Of(fit.Refined(start, scale_step_, offset_step_)));
     }
     // The first values of a search for all are compared once more when they are refined.
-    const double more =
-        is_near_ ? kOtherAperture
-                 : std::max(kOtherAperture, kOtherApertureShare * found_->best.evidence);
+    const double more = is_near_
+                            ? kOtherAperture
+                            : std::max(kOtherAperture, kOtherApertureShare * found_->best.evidence);
     return evidence > found_->best.evidence + more;
   }
 

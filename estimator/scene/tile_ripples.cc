@@ -19,9 +19,8 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr std::array<int, 3> kSizesPx = {32, 64, 128};
 // Where the blur is not known, larger tiles would be looked at for any.
 constexpr int kLargestUnstatedPx = 64;
-// Below, the mean of the tile and the window dominate; above, demosaicing and other interpolation
-// change what an aperture lets through.
-constexpr double kMinRadius = 1.6, kMaxFrequency = 0.27;
+// Below, the mean of the tile and the window dominate; above, hardly any photograph has content.
+constexpr double kMinRadius = 1.6, kMaxFrequency = 0.44;
 // Periods per view step up to which samples are the aperture.
 constexpr double kMaxOfSampling = 0.55;
 // Edge of a tile over the width of the blur: fewer do not resolve the ripples. Larger tiles are
@@ -29,14 +28,14 @@ constexpr double kMaxOfSampling = 0.55;
 // well below the largest one that is tried.
 constexpr double kMinWidths = 3, kWellResolved = 5, kMinStatedWidths = 4.2;
 // The disparities about the stated one that are tried.
-constexpr double kLeastShare = 0.6, kMostShare = 1.45, kMoreWidthPx = 4;
-// Of the stated disparity, the one whose frequencies are used.
+constexpr double kMinShare = 0.6, kMaxShare = 1.45, kMoreWidthPx = 4;
+// Share of the stated disparity that decides which frequencies are used.
 constexpr double kUsedShare = 1.2;
 constexpr double kClippedLight = 0.98;
 constexpr double kDarkest = 0.003;
 // Power of a tile over that of the noise, at its lower frequencies.
 constexpr double kMinTexture = 6;
-constexpr double kTextureFrequency = 0.23, kLeastTextureFrequency = 0.06, kTextureLobes = 1.6;
+constexpr double kTextureFrequency = 0.23, kMinTextureFrequency = 0.06, kTextureLobes = 1.6;
 constexpr std::size_t kMaxTilesOfSize = 96, kMaxUnstatedTiles = 48;
 constexpr int kPartsAlong = 4;
 // Exponent of the power of photographs.
@@ -455,11 +454,11 @@ TileRipples::TileRipples(const RipplePhoto& photo, const model::TransferCurve& t
 
 // Levels are as close as the tile distinguishes blurs.
 std::vector<double> TileRipples::LevelsOf(const Frequencies& frequencies) const {
-  constexpr double kLeastPx = 0.15, kOfSquare = 0.2;
+  constexpr double kMinStepPx = 0.15, kOfSquare = 0.2;
   std::vector<double> levels;
   const double most = frequencies.size_px / kMinWidths;
   for (double width = 0; width <= most;
-       width += std::max(kLeastPx, kOfSquare * width * width / frequencies.size_px)) {
+       width += std::max(kMinStepPx, kOfSquare * width * width / frequencies.size_px)) {
     if (frequencies.Used(width / width_) < kMinFrequencies) break;
     levels.push_back(width / width_);
   }
@@ -492,7 +491,7 @@ void TileRipples::FindTiles(const RipplePhoto& photo, const model::TransferCurve
         continue;
       const double most_texture = rules.by_blur
                                       ? std::clamp(kTextureLobes / std::max(1e-9, width),
-                                                   kLeastTextureFrequency, kTextureFrequency)
+                                                   kMinTextureFrequency, kTextureFrequency)
                                       : kTextureFrequency;
       std::vector<double> powers =
           PowersOf(photo, transfer, *tile, frequencies.window, frequencies.all);
@@ -555,7 +554,7 @@ void TileRipples::Look(RippleAperture aperture) {
       // Where no disparity is stated, each is compared by the frequencies that it has.
       std::size_t used = frequencies.Used(kUsedShare * std::abs(tile.disparity)), used_before = 0;
       double null_cost = 0;
-      // From the widest band down to the narrowest, each fit begins where the last one ended.
+      // Each fit begins where the last one ended, the one of the widest band first.
       for (std::size_t level = evidence.first; level <= last; ++level) {
         if (!by_blur_) used = frequencies.Used(levels[level]);
         if (used != used_before) null_cost = without.Cost(none, used);
@@ -572,8 +571,8 @@ std::pair<std::size_t, std::size_t> TileRipples::LevelsAbout(
   std::size_t first = 0, last = levels.size() - 1;
   if (!by_blur_) return {first, last};
   const double stated = std::abs(tile.disparity), more = kMoreWidthPx / width_;
-  while (last > 1 && levels[last - 1] > kMostShare * stated + more) --last;
-  while (first + 1 < last && levels[first + 1] < kLeastShare * stated - more) ++first;
+  while (last > 1 && levels[last - 1] > kMaxShare * stated + more) --last;
+  while (first + 1 < last && levels[first + 1] < kMinShare * stated - more) ++first;
   return {first, last};
 }
 

@@ -103,7 +103,7 @@ class TileRipples {
   std::vector<RippleTile> tiles_;
   std::vector<std::vector<double>> powers_;         // of each tile, by frequency
   std::array<std::vector<double>, kSizes> levels_;  // of each size of tile
-  // From one of its levels on.
+  // Evidence of a tile for its levels from `first` on.
   struct TileEvidence {
     std::size_t first = 0;
     std::vector<double> of_level;

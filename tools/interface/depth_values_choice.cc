@@ -24,7 +24,7 @@ using estimator::DepthValuesTrial;
 constexpr double kCertainGain = 10, kCertainSigmas = 2;
 constexpr double kSigmas = 3, kMinScaleChange = 0.04, kMinOffsetChangePx = 0.05;
 // Scales beyond are those of another aperture as well: PhotoAperture decides.
-constexpr double kLeastScale = 0.85, kMostScale = 1.25;
+constexpr double kMinScale = 0.85, kMaxScale = 1.25;
 // Standard deviations of the coincidence of edges of a map that lies at its place.
 constexpr double kAtPlace = 3;
 
@@ -145,8 +145,8 @@ void CorrectValues(const EstimateOptions& options, DepthMeaning* meaning, Prepar
   search.threads = run->threads();
   DepthValuesFit fit = estimator::FitDepthValues(input, search);
   run->Detail("values of the depth: " + fit.message);
-  const bool are_others = AreOthers(fit) && fit.best.scale >= kLeastScale &&
-                          fit.best.scale <= kMostScale &&
+  const bool are_others = AreOthers(fit) && fit.best.scale >= kMinScale &&
+                          fit.best.scale <= kMaxScale &&
                           IsAtPlace(*prepared, *diagnostics, run->threads());
   diagnostics->depth_values = fit;
   diagnostics->are_depth_values_wrong = are_others;

@@ -104,7 +104,7 @@ TEST(DepthValues, OfARelativeMapAreFoundWithoutAnyStart) {
   }
 }
 
-// Of two depths, blur shows only how far from the plane of focus they are, and not on which side.
+// Blur shows only how far two depths are from the plane of focus, and not on which side.
 TEST(DepthValues, OfTwoDepthsAreTwo) {
   const SteppedScene scene(5, kSizePx, {-2, 1}, 1);
   const DepthValuesFit fit = Find(scene.input(), DepthValuesSearch::kAll);

@@ -26,8 +26,7 @@ using thicklens::testing::SteppedScene;
 
 constexpr int kSidePx = 320;
 
-SteppedScene SceneOf(unsigned seed,
-                     const Eigen::ArrayXXd& weights = SteppedScene::UniformViews()) {
+SteppedScene SceneOf(unsigned seed, const Eigen::ArrayXXd& weights = SteppedScene::UniformViews()) {
   return SteppedScene(seed, kSidePx, {-2, 1, 2, -1, 0}, 1, weights);
 }
 
