@@ -55,6 +55,7 @@ struct Row {
 struct Degradation {
   std::string name;
   std::function<cv::Mat(const cv::Mat& exact, const cv::Mat& other)> make;
+  bool is_relative = false;  // neither its scale nor its offset is known
 };
 
 // Returns the map from every n-th sample of every n-th row, enlarged plainly, as image programs do
@@ -102,6 +103,17 @@ cv::Mat WithNoise(const cv::Mat& exact, double sigma_px) {
   return map;
 }
 
+// The grey levels of a network's map: near is bright, and nothing else is known.
+cv::Mat AsGreyLevels(const cv::Mat& exact) {
+  double least = 0, most = 0;
+  cv::minMaxLoc(exact, &least, &most);
+  cv::Mat levels;
+  constexpr double kLevels = 255;
+  exact.convertTo(levels, CV_8U, kLevels / (most - least), -least * kLevels / (most - least));
+  levels.convertTo(levels, CV_32F);
+  return levels;
+}
+
 const std::vector<Degradation>& AllDegradations() {
   using cv::Mat;
   static const std::vector<Degradation> all = {
@@ -129,6 +141,7 @@ const std::vector<Degradation>& AllDegradations() {
       {"scale-1.1", [](const Mat& map, const Mat&) { return Mat(map * 1.1); }},
       {"scale-0.9", [](const Mat& map, const Mat&) { return Mat(map * 0.9); }},
       {"offset-0.2", [](const Mat& map, const Mat&) { return Mat(map + 0.2); }},
+      {"relative-8bit", [](const Mat& map, const Mat&) { return AsGreyLevels(map); }, true},
       {"noise-0.2", [](const Mat& map, const Mat&) { return WithNoise(map, 0.2); }},
       {"flipped",
        [](const Mat& map, const Mat&) {
@@ -208,13 +221,14 @@ double ErrorPx(const estimator::DisparityMap& used, const cv::Mat& exact) {
   return cv::norm(map, exact, cv::NORM_L2) / std::sqrt(static_cast<double>(exact.total()));
 }
 
-Row Measure(const TrueScene& scene, const std::string& name, const cv::Mat& map,
+Row Measure(const TrueScene& scene, const Degradation& degradation, const cv::Mat& map,
             const Arguments& arguments) {
   DepthMap depth;
   depth.width_px = map.cols;
   depth.height_px = map.rows;
   depth.values.assign(map.begin<float>(), map.end<float>());
   depth.meaning.kind = DepthKind::kDisparity;
+  depth.meaning.is_relative = degradation.is_relative;
   EstimateOptions options;
   options.views = ViewCounts{scene.views.u_count, scene.views.v_count};
   options.aperture.shape =
@@ -227,7 +241,7 @@ Row Measure(const TrueScene& scene, const std::string& name, const cv::Mat& map,
   RunControl run;
   run.threads = arguments.threads;
   Row row;
-  row.map = name;
+  row.map = degradation.name;
   const auto start = std::chrono::steady_clock::now();
   try {
     const LightFieldEstimate estimate =
@@ -243,6 +257,8 @@ Row Measure(const TrueScene& scene, const std::string& name, const cv::Mat& map,
                      : "partial: " + estimate.summary.partial_reason;
     if (const auto& refined = estimate.diagnostics.depth_refinement)
       row.remark += fmt::format("; {} ({:.2f} s)", refined->message, refined->seconds);
+    if (const auto& values = estimate.diagnostics.depth_values)
+      row.remark += fmt::format("; {} ({:.2f} s)", values->message, values->seconds);
   } catch (const Interrupted&) {
     throw;
   } catch (const Error& error) {
@@ -301,8 +317,7 @@ void Run(const Arguments& arguments) {
         }
         other = ReadMap(other_folder);
       }
-      Row row =
-          Measure(scene, degradation.name, degradation.make(scene.disparity, other), arguments);
+      Row row = Measure(scene, degradation, degradation.make(scene.disparity, other), arguments);
       row.light_field = std::filesystem::path(folder).filename().string();
       std::cout << fmt::format("| {} | {} | {:.2f} | {:.3f} | {:.1f} | {} |\n", row.light_field,
                                row.map, row.psnr_db, row.error_px, row.seconds, row.remark)

@@ -20,6 +20,7 @@
 #include "thicklens/version.h"
 #include "tools/interface/blur_proposal.h"
 #include "tools/interface/contradiction.h"
+#include "tools/interface/depth_values_choice.h"
 #include "tools/interface/problem.h"
 #include "tools/interface/solve.h"
 #include "tools/interface/validation.h"
@@ -269,6 +270,7 @@ bool CheckAgreement(const PreparedProblem& prepared, const EstimateOptions& opti
   FindContradiction(prepared, IsInDoubt(found, kDoubtful), run, estimate);
   std::string reason =
       found.contradiction ? ContradictionText(depth, *found.contradiction, *run) : "";
+  if (reason.empty()) reason = ValuesReason(depth.name, depth.meaning, found, *run);
   const bool has_edges = found.contradiction && found.contradiction->trials.front().edges;
   if (reason.empty() && !has_edges) CheckFlips(prepared, options, run, estimate);
   const bool is_reversed = found.depth_flips && found.depth_flips->better;
@@ -502,10 +504,10 @@ LightFieldEstimate Estimate(ViewSink* given_sink, Image photo, DepthMap depth,
   RequireValidEstimate(depth, camera, given, control);
   RunScope run(control);
   LightFieldEstimate estimate;
-  const DepthOrigin depth_file{depth.source.empty() ? "depth" : depth.source, depth.meaning,
-                               depth.flip};
+  DepthOrigin depth_file{depth.source.empty() ? "depth" : depth.source, depth.meaning, depth.flip};
   PreparedProblem prepared =
       Prepare(std::move(photo), std::move(depth), camera, given, &estimate.diagnostics, &run);
+  depth_file.meaning = prepared.depth_meaning;
   ThrowIfCancelled();
   EstimateOptions options = given;
   if (const auto* chooser = std::get_if<SolverChooser>(&given.solver)) {

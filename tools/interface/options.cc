@@ -111,6 +111,17 @@ bool DepthMeaning::IsValid(std::string* why) const {
   } else if (!(inverse_offset_dpt == 0)) {
     return Fail(why, "inverse_offset_dpt", "is for kInverse only");
   }
+  if (is_relative && kind != DepthKind::kDisparity)
+    return Fail(why, "is_relative", "is for kDisparity only");
+  if (is_relative && !(std::abs(disparity_scale) == 1)) {
+    return Unexpected(why, "disparity_scale",
+                      "1 or -1, because the scale of a relative map is not known,",
+                      disparity_scale);
+  }
+  if (is_relative && !(disparity_offset_px == 0)) {
+    return Unexpected(why, "disparity_offset_px",
+                      "0, because the offset of a relative map is not known,", disparity_offset_px);
+  }
   if (kind == DepthKind::kDisparity) {
     if (unit != LengthUnit::kNone) {
       return Fail(why, "unit",

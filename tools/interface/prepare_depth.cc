@@ -74,6 +74,12 @@ PreparedDepth PrepareDepth(const DepthMap& map, const model::LinearImage& image,
                             NameOf(map), map.width_px, map.height_px, image.width_px,
                             image.height_px));
   }
+  if (map.meaning.is_relative) {
+    throw Error(fmt::format(
+        "{}: the scale and the offset of a relative map are not known: an estimate finds them, and "
+        "nothing else can use it",
+        NameOf(map)));
+  }
   model::DepthHoles found;
   const model::RawDepthMap raw = MarkedMap(map, run, &found);
   if (camera != nullptr) {

@@ -27,6 +27,7 @@
 #include "tools/interface/depth_causes.h"
 #include "tools/interface/depth_plausibility.h"
 #include "tools/interface/depth_reports.h"
+#include "tools/interface/depth_values_choice.h"
 #include "tools/interface/effects_choice.h"
 #include "tools/interface/exif_comparison.h"
 #include "tools/interface/falloff_choice.h"
@@ -604,6 +605,7 @@ PreparedProblem Prepare(Image photo, DepthMap map, const std::optional<Camera>& 
     WarnOfOtherSteps(options, aperture, *input.grid, *input.camera, run);
   }
   ReportReading(map, run);  // also where the map is refused
+  FindRelativeValues(options, prepared, &map, diagnostics, run);
   PreparedDepth prepared_depth =
       PrepareDepth(map, input.image, known, input.grid ? &*input.grid : nullptr, run);
   const std::string beyond = ValuesBeyondNear(map, *run);
@@ -623,6 +625,8 @@ PreparedProblem Prepare(Image photo, DepthMap map, const std::optional<Camera>& 
                      prepared_depth.depth, run);
   SmoothNoisyDepth(options, map.confidence, &input.disparity, diagnostics, run->threads());
   RefineDepthOf(options, prepared.was_hole, run->threads(), &input, diagnostics);
+  prepared.depth_meaning = map.meaning;
+  CorrectValues(options, &prepared.depth_meaning, &prepared, diagnostics, run);
   diagnostics->disparity_range_px = DisparityRangePx(input.disparity);
   prepared.effects = SelectEffects(options, input.camera, prepared_depth.depth);
   if (input.camera && !prepared.effects.on.Has(Effect::kThickness)) {

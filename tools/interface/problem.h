@@ -15,6 +15,7 @@ namespace thicklens {
 struct PreparedProblem {
   std::shared_ptr<estimator::EstimateInput> input;
   model::EffectSelection effects;
+  DepthMeaning depth_meaning;    // of the map, with the scale and the offset that were found
   std::vector<bool> was_hole;    // per pixel of the depth map
   std::string colour_profile;    // of the photograph, if its curve is that of the input
   double compression_sigma = 0;  // EstimateDiagnostics::compression_sigma; 0: none
@@ -45,9 +46,9 @@ struct PreparedDepth {
   model::DepthHoles found_holes;                // of the map, by reason
   std::optional<model::DepthStatistics> depth;  // mm from Ap, with a camera
 };
-// `camera` and `grid` are both null or both set. `run`, which may be null, gets reports of holes
-// and marks, also where the map is refused. Throws Error that names the map's source and, with
-// `run`, what in the map may be the cause of impossible depths.
+// The map is not relative. `camera` and `grid` are both null or both set. `run`, which may be null,
+// gets reports of holes and marks, also where the map is refused. Throws Error that names the map's
+// source and, with `run`, what in the map may be the cause of impossible depths.
 PreparedDepth PrepareDepth(const DepthMap& map, const model::LinearImage& image,
                            const Camera* camera, const model::LightFieldGrid* grid,
                            RunScope* run = nullptr);

@@ -60,6 +60,7 @@ std::vector<std::string> GivenDepthOptions(const DepthOptions& options) {
     if (is_given) given.emplace_back(name);
   };
   add(!options.unit.empty(), "--depth-unit");
+  add(!options.near_is.empty(), "--near-is");
   add(options.disparity_scale != 1, "--disparity-scale");
   add(options.disparity_offset_px != 0, "--disparity-offset");
   add(options.inverse_scale_dpt != 1, "--inverse-scale");
@@ -91,7 +92,8 @@ std::string KindInWords(model::DepthKind kind) {
 void RefuseOtherMeaning(const DepthOptions& options, const DepthMap& inside) {
   const std::string file_says = fmt::format("the depth map inside {} states its own meaning, {}",
                                             inside.source, KindInWords(inside.meaning.kind));
-  if (!options.kind.empty() && model::DepthKindFromName(options.kind) != inside.meaning.kind) {
+  if (!options.kind.empty() && (options.kind == "relative" ||
+                                model::DepthKindFromName(options.kind) != inside.meaning.kind)) {
     throw UsageError(fmt::format(
         "--depth-kind {}: {}; leave the option out, or give the map that it describes as DEPTH",
         options.kind, file_says));

@@ -63,7 +63,7 @@ void AddInputOptions(CLI::App* command, EstimateOptions* options) {
           "Its depth map, of any size with the same aspect ratio (others: --depth-crop, "
           "--depth-camera); default: the one inside the photograph's file, as phones store it")
       ->type_name("DEPTH");
-  AddDepthOptions(command, "Required with DEPTH", &options->depth);
+  AddDepthOptions(command, "Required with DEPTH", &options->depth, true);
   AddDepthFitOptions(command, &options->depth_fit);
   command
       ->add_option("--camera", options->camera_path,
@@ -465,9 +465,11 @@ void CheckEstimateUsage(const EstimateOptions& options) {
   needs(options.orientation == "displayed", has_depth,
         "--orientation displayed: the depth map inside a photograph is stored like its pixels, and "
         "both are used as they are stored; leave the option out, or give DEPTH");
-  needs(has_depth && !options.depth.kind.empty() && options.depth.kind != "disparity", camera,
+  needs(has_depth && !options.depth.kind.empty() && options.depth.kind != "disparity" &&
+            options.depth.kind != "relative",
+        camera,
         fmt::format("--depth-kind {} needs --camera; without a camera only a disparity map can be "
-                    "used",
+                    "used, or a relative one",
                     options.depth.kind));
   needs(!options.sensor_origin.empty(), camera, "--sensor-origin needs a --camera");
   needs(options.lens_position.has_value(), camera, "--lens-position needs a --camera");

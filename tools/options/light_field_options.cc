@@ -157,16 +157,33 @@ LightFieldReadOptions LightFieldReadOptionsOf(const ReadingOptions& options,
   return reading;
 }
 
-void AddDepthOptions(CLI::App* command, const std::string& required, DepthOptions* options) {
+namespace {
+constexpr const char* kRelative = "relative";
+}  // namespace
+
+void AddDepthOptions(CLI::App* command, const std::string& required, DepthOptions* options,
+                     bool takes_relative) {
+  std::vector<std::string> kinds = {"z", "range", "disparity", "inverse"};
+  if (takes_relative) kinds.emplace_back("relative");
   command
       ->add_option(
           "--depth-kind", options->kind,
           required +
               ". Meaning of the depth map: z (along the axis), range (along the pixel's ray), "
-              "disparity (px per view step, near positive, 0 in the plane of focus) or inverse "
-              "(1/z)")
-      ->check(CLI::IsMember({"z", "range", "disparity", "inverse"}))
+              "disparity (px per view step, near positive, 0 in the plane of focus)" +
+              (takes_relative
+                   ? ", inverse (1/z) or relative (1/z up to a scale and an offset, which are "
+                     "found from the photograph's blur)"
+                   : " or inverse (1/z)"))
+      ->check(CLI::IsMember(kinds))
       ->type_name("KIND");
+  if (takes_relative) {
+    command
+        ->add_option("--near-is", options->near_is,
+                     "Which values of a relative map are near: large (default) or small")
+        ->check(CLI::IsMember({"large", "small"}))
+        ->type_name("WHAT");
+  }
   command
       ->add_option("--depth-unit", options->unit,
                    "Unit of z and range, and of --depth-near and --depth-far: mm, cm, m, or "
@@ -295,6 +312,25 @@ model::DepthConvention ConventionOf(const DepthOptions& options) {
         "not state it itself");
   }
   model::DepthConvention convention;
+  if (!options.near_is.empty() && options.kind != kRelative) {
+    throw UsageError(
+        fmt::format("--near-is requires --depth-kind relative, found {}; a negative "
+                    "scale makes small values near",
+                    options.kind));
+  }
+  if (options.kind == kRelative) {
+    DepthOptions disparity = options;
+    disparity.kind = "disparity";
+    disparity.near_is.clear();
+    if (options.disparity_scale != 1 || options.disparity_offset_px != 0) {
+      throw UsageError(
+          "--disparity-scale and --disparity-offset state what --depth-kind relative finds; with "
+          "them the kind is disparity");
+    }
+    convention = ConventionOf(disparity);
+    convention.disparity_scale = options.near_is == "small" ? -1 : 1;
+    return convention;
+  }
   convention.kind = model::DepthKindFromName(options.kind);
   CheckOptionsOfKind(options, convention.kind);
   if (convention.kind == model::DepthKind::kInverse) {
@@ -342,8 +378,9 @@ DepthMeaning DepthMeaningOf(const DepthOptions& options) {
                           LengthUnit::kTum5000}) {
     if (options.unit == LengthUnitName(unit)) meaning.unit = unit;
   }
-  meaning.disparity_scale = options.disparity_scale;
-  meaning.disparity_offset_px = options.disparity_offset_px;
+  meaning.disparity_scale = convention.disparity_scale;
+  meaning.disparity_offset_px = convention.disparity_offset_px;
+  meaning.is_relative = options.kind == kRelative;
   return meaning;
 }
 
@@ -359,7 +396,9 @@ DepthReadOptions DepthReadOptionsOf(const DepthOptions& options) {
   if (options.pfm_scale == "ignore") reading.pfm_scale = PfmScale::kIgnored;
   reading.flip = DepthFlipOf(options);
   reading.holes.hole_values = options.hole_values;
-  reading.holes.zero_is_value = options.zero_is == "value";
+  // Networks leave no holes, and their 0 is the farthest value.
+  reading.holes.zero_is_value =
+      options.zero_is == "value" || (options.kind == kRelative && options.zero_is.empty());
   reading.holes.largest_is_value = options.largest_is == "value";
   if (convention.kind == model::DepthKind::kInverse && options.near) {
     const double unit_mm = model::DepthUnitMm(options.unit);

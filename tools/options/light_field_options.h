@@ -52,8 +52,9 @@ LightFieldReadOptions LightFieldReadOptionsOf(const ReadingOptions& options,
 // range need a unit, disparity has none, and inverse has that of --depth-near and --depth-far. The
 // others state which values of the file are depths.
 struct DepthOptions {
-  std::string kind;
+  std::string kind;  // "relative": a disparity whose scale and offset are found
   std::string unit;
+  std::string near_is;  // "large" or "small"; empty: large
   double disparity_scale = 1;
   double disparity_offset_px = 0;
   double inverse_scale_dpt = 1;
@@ -76,8 +77,10 @@ void AddDepthFitOptions(CLI::App* command, DepthFitOptions* options);
 DepthFit DepthFitOf(const DepthFitOptions& options);
 // Reads the confidence into the map, if it was given. Throws UsageError and Error.
 void ReadConfidenceInto(const DepthFitOptions& options, DepthMap* depth);
-// `required` begins the description of --depth-kind: when the kind must be given.
-void AddDepthOptions(CLI::App* command, const std::string& required, DepthOptions* options);
+// `required` begins the description of --depth-kind: when the kind must be given. `takes_relative`:
+// the command finds the values of a relative map.
+void AddDepthOptions(CLI::App* command, const std::string& required, DepthOptions* options,
+                     bool takes_relative = false);
 // Throws UsageError if the kind is not given, z or range have no unit, disparity has one, or an
 // option is for another kind. Near and far are not part of the result: they need the file.
 model::DepthConvention ConventionOf(const DepthOptions& options);

@@ -327,8 +327,36 @@ json RefinementJson(const EstimateDiagnostics& found) {
           {"outlier_share", refinement.outlier_share},
           {"displaced_px", {refinement.right_px, refinement.down_px}},
           {"dilation_px", refinement.dilation_px},
+          {"scale", refinement.scale},
+          {"scale_sigma", refinement.scale_sigma},
+          {"offset_px", refinement.offset_px},
+          {"offset_sigma_px", refinement.offset_sigma_px},
           {"changed_share", refinement.changed_share},
           {"seconds", refinement.seconds}};
+}
+
+json ValuesJson(const EstimateDiagnostics& found) {
+  if (!found.depth_values) return nullptr;
+  const estimator::DepthValuesFit& fit = *found.depth_values;
+  const auto trial = [](const estimator::DepthValuesTrial& values) {
+    return json{
+        {"scale", values.scale}, {"offset_px", values.offset_px}, {"evidence", values.evidence}};
+  };
+  json others = json::array();
+  for (const estimator::DepthValuesTrial& other : fit.others) others.push_back(trial(other));
+  json best = trial(fit.best);
+  best["scale_sigma"] = fit.scale_sigma;
+  best["offset_sigma_px"] = fit.offset_sigma_px;
+  return {{"message", fit.message},
+          {"found", fit.is_found},
+          {"wrong", found.are_depth_values_wrong},
+          {"given", trial(fit.given)},
+          {"best", best},
+          {"others", others},
+          {"gain", fit.gain},
+          {"gain_sigma", fit.gain_sigma},
+          {"tiles", fit.tiles},
+          {"seconds", fit.seconds}};
 }
 
 json TextOrNull(const std::string& text) {
@@ -420,6 +448,7 @@ json EstimateJson(const EstimateOptions& options, const EstimateOutcome& outcome
                 {"noise_px", OrNull(found.depth_noise_px)},
                 {"noise_left_px", OrNull(found.depth_noise_left_px)}}},
               {"depth_refinement", RefinementJson(found)},
+              {"depth_values", ValuesJson(found)},
               {"warnings", summary.warnings},
               {"aperture_blur", ApertureBlurJson(found)},
               {"inpainting", InpaintingJson(found)},

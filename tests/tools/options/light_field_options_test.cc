@@ -154,6 +154,26 @@ TEST(DepthOptions, NearAndFarAreHandedOnInMm) {
   EXPECT_EQ(DepthMeaningOf(options).unit, LengthUnit::kNone);
 }
 
+TEST(DepthOptions, ARelativeMapStatesNoScale) {
+  DepthOptions options = KindAndUnit("relative", "");
+  DepthMeaning meaning = DepthMeaningOf(options);
+  EXPECT_EQ(meaning.kind, DepthKind::kDisparity);
+  EXPECT_TRUE(meaning.is_relative);
+  EXPECT_EQ(meaning.disparity_scale, 1);
+  EXPECT_TRUE(meaning.IsValid(nullptr));
+  // Networks leave no holes.
+  EXPECT_TRUE(DepthReadOptionsOf(options).holes.zero_is_value);
+  options.near_is = "small";
+  options.zero_is = "hole";
+  EXPECT_EQ(DepthMeaningOf(options).disparity_scale, -1);
+  EXPECT_FALSE(DepthReadOptionsOf(options).holes.zero_is_value);
+  options.disparity_scale = 0.1;
+  EXPECT_THAT(UsageErrorOf([&] { DepthMeaningOf(options); }), HasSubstr("the kind is disparity"));
+  options = KindAndUnit("disparity", "");
+  options.near_is = "small";
+  EXPECT_THAT(UsageErrorOf([&] { DepthMeaningOf(options); }), HasSubstr("--near-is"));
+}
+
 TEST(DepthOptions, AreHandedToTheInterface) {
   for (const char* unit : {"mm", "cm", "m", "tum5000"}) {
     const DepthMeaning meaning = DepthMeaningOf(KindAndUnit("range", unit));

@@ -38,6 +38,11 @@ struct DepthMeaning {
   // is finite and not 0, the offset finite.
   double disparity_scale = 1;
   double disparity_offset_px = 0;  // px per view step
+  // Only for kDisparity: the scale and the offset are not known, as with the relative map of a
+  // network. The sign of the scale states which values are near: 1 large ones, -1 small ones; the
+  // offset is 0. An estimate finds both from the blur of the photograph (FitDepthValues); nothing
+  // else takes such a map.
+  bool is_relative = false;
   // Only for kInverse: 1/z in dioptres (1/m) = inverse_scale_dpt * value + inverse_offset_dpt. The
   // scale is finite and not 0, the offset finite. The defaults are those of a map of dioptres.
   double inverse_scale_dpt = 1;

@@ -18,6 +18,7 @@
 #include "thicklens/estimator/blur_check.h"
 #include "thicklens/estimator/depth_contradiction.h"
 #include "thicklens/estimator/depth_flips.h"
+#include "thicklens/estimator/depth_values.h"
 #include "thicklens/estimator/falloff_evidence.h"
 #include "thicklens/estimator/inpaint.h"
 #include "thicklens/estimator/photo_aperture.h"
@@ -84,7 +85,7 @@ enum class LightFieldForm {
   kScene,
 };
 
-// Whether the faults of a depth map are repaired by the photograph [D191] to [D193].
+// Whether the faults of a depth map are repaired by the photograph [D191] to [D193], [D196].
 enum class DepthRefining {
   kAuto,  // those that map and photograph show for certain
   kOn,    // also those that are only probable
@@ -244,6 +245,12 @@ struct EstimateDiagnostics {
   std::optional<double> depth_noise_px, depth_noise_left_px;  // px per view step [D93], [D94]
   // Repairs of the depth map; absent with DepthRefining::kOff.
   std::optional<estimator::DepthRefinement> depth_refinement;
+  // Of SceneSolver, and of relative maps: scale and offset with which the blur of the photograph
+  // agrees. Absent: not looked for, because a camera states them or the photograph is sharp.
+  std::optional<estimator::DepthValuesFit> depth_values;
+  // They differ for certain from those of the map. They are applied unless the depth is not to be
+  // refined.
+  bool are_depth_values_wrong = false;
   double largest_step_px = 0;  // displacement between neighbouring views
   double coarse_share = 0;     // share of the pixels whose step is above 3 px
   std::optional<double> strength, noise_sigma, residual_rms;  // noise, residual in encoded values
