@@ -5,9 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <utility>
 
 #include "calib/uncertainty/systematic_advice.h"
-#include "thicklens/model/camera.h"
+#include "thicklens/model/grey_focus.h"
 
 namespace thicklens::calib {
 namespace {
@@ -65,32 +66,45 @@ std::string ColoursInWords(const Calibration& calibration) {
   }
   return fmt::format(
       "the colours come into focus differently: {}. The results are those of grey (0.2126 R + "
-      "0.7152 G + 0.0722 B), and their intervals contain the root mean square of the differences "
-      "to the colours. The lens has "
-      "axial colour, or parts of the target with different colours are at different depths",
+      "0.7152 G + 0.0722 B), whose 1/zf is the mean of the colours'; the focal length is taken to "
+      "be that of grey, and the interval of d1 allows that of each colour. The lens has axial "
+      "colour, or parts of the target with different colours are at different depths",
       colours);
 }
 
-void WidenByColours(const model::ThickLens& lens, Calibration* calibration) {
+void WidenByColours(const model::ThickLens& lens, bool focus_moves, Calibration* calibration) {
   const std::vector<ChannelFocus>& channels = calibration->diagnostics.channels;
   const auto& zf = calibration->summary.focus_depth_mm;
   const auto& ratio = calibration->summary.blur_ratio;
   if (!zf || !ratio || !ColoursDiffer(channels)) return;
-  double squares_mm2 = 0, ratio_move = 0, ratio_variance = 0;
+  double squares_mm2 = 0, inverse_per_mm = 0, ratio_move = 0, ratio_variance = 0;
   for (std::size_t c = 0; c < kColours; ++c) {
+    const double weight = model::kGreyWeights[c];
     const model::Estimate& focus = channels[c].focus_depth_mm;
-    squares_mm2 +=
-        kGreyWeights[c] * (std::pow(focus.value - zf->value, 2) - std::pow(focus.sigma, 2));
-    ratio_move += kGreyWeights[c] * (channels[c].blur_ratio.value - ratio->value);
-    ratio_variance += std::pow(kGreyWeights[c] * channels[c].blur_ratio.sigma, 2);
+    squares_mm2 += weight * (std::pow(focus.value - zf->value, 2) - std::pow(focus.sigma, 2));
+    inverse_per_mm += weight / focus.value;
+    ratio_move += weight * (channels[c].blur_ratio.value - ratio->value);
+    ratio_variance += std::pow(weight * channels[c].blur_ratio.sigma, 2);
   }
   const double spread_mm = std::sqrt(std::max(0.0, squares_mm2));
+  const double grey_move_mm = 1 / inverse_per_mm - zf->value;
   const double reach = 2 * std::sqrt(ratio_variance);
-  WidenFocusAndRatio("axial colour", {-spread_mm, spread_mm},
-                     {std::min(0.0, ratio_move - reach), std::max(0.0, ratio_move + reach)},
-                     "calibrate frames of one colour: photograph the sweep in the light of that "
-                     "colour, or give one channel as grey frames",
-                     lens, calibration);
+  const auto distance_mm = [&](double move_mm) {
+    const double nearest_mm = std::min(zf->value, 1.01 * lens.front_focal_length_mm);
+    return model::ImageDistanceMm(lens, std::max(zf->value + move_mm, nearest_mm)) -
+           model::ImageDistanceMm(lens, zf->value);
+  };
+  SystematicPart part;
+  part.name = "axial colour";
+  part.remedy =
+      "calibrate frames of one colour: photograph the sweep in the light of that colour, or give "
+      "one channel as grey frames";
+  part.focus_depth_mm =
+      focus_moves ? Eigen::Vector2d(-spread_mm, spread_mm)
+                  : Eigen::Vector2d(std::min(0.0, grey_move_mm), std::max(0.0, grey_move_mm));
+  part.image_distance_mm = {distance_mm(spread_mm), distance_mm(-spread_mm)};
+  part.blur_ratio = {std::min(0.0, ratio_move - reach), std::max(0.0, ratio_move + reach)};
+  AddPart(std::move(part), calibration);
 }
 
 }  // namespace thicklens::calib

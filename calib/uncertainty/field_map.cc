@@ -11,6 +11,7 @@
 
 #include "calib/fit/misfit_causes.h"
 #include "calib/uncertainty/astigmatism.h"
+#include "calib/uncertainty/axis_focus.h"
 #include "calib/uncertainty/colour_focus.h"
 #include "calib/uncertainty/evenly_spread.h"
 #include "calib/uncertainty/field_astigmatism.h"
@@ -386,13 +387,14 @@ class Field {
 
   // One zf for a field that has several is wrong by the spread beyond their own errors; where the
   // target has several depths, by the largest difference. The fit gives the mean over a curved
-  // field, and zf means that on the axis: the interval contains both.
+  // field, and zf means that on the axis.
   void WidenBySpread(const std::vector<std::size_t>& fitted,
                      const std::optional<CurvedField>& curved) {
     const FieldMap& map = result_.diagnostics.field;
+    const model::ThickLens& lens = sweep_.camera.lens;
     const double zf = fit_.values[kFocusDepth];
     const bool is_flat = map.clusters.size() < 2;
-    const bool has_axis = is_flat && curved;
+    const bool has_axis = is_flat && curved && curved->axis_mm > lens.front_focal_length_mm;
     const double middle_mm = has_axis ? curved->axis_mm : zf;
     double farthest_mm = 0, squares = 0, errors = 0;
     for (std::size_t i = 0; i < fitted.size(); ++i) {
@@ -409,16 +411,21 @@ class Field {
     const std::string remedy = is_flat ? "restrict roi_px to the middle of the field, and set the "
                                          "target parallel to the sensor"
                                        : "restrict roi_px to a part of the target at one depth";
-    if (!has_axis) {
-      WidenFocus(is_flat ? "zf over the field" : "depths of the target", spread_mm, remedy,
-                 sweep_.camera.lens, &result_);
+    const std::string name = is_flat ? "zf over the field" : "depths of the target";
+    if (has_axis && evidence_.known_focus) {
+      // The plane of focus is stated, and it is not said whether that is the one on the axis.
+      const double move_mm = curved->axis_mm - zf;
+      const double reach_mm = spread_mm + 2 * curved->axis_sigma_mm;
+      WidenFocusAndRatio(name,
+                         {std::min(0.0, move_mm - reach_mm), std::max(0.0, move_mm + reach_mm)},
+                         {0, 0}, remedy, lens, &result_);
       return;
     }
-    const double move_mm = curved->axis_mm - zf;
-    const double reach_mm = spread_mm + 2 * curved->axis_sigma_mm;
-    WidenFocusAndRatio("zf over the field",
-                       {std::min(0.0, move_mm - reach_mm), std::max(0.0, move_mm + reach_mm)},
-                       {0, 0}, remedy, sweep_.camera.lens, &result_);
+    if (has_axis) {
+      to_axis_mm_ = {curved->axis_mm - zf, curved->axis_sigma_mm};
+      MoveFocus(to_axis_mm_, model::DirectionSign(sweep_.direction), lens, &result_);
+    }
+    if (spread_mm > 0) WidenFocus(name, spread_mm, remedy, lens, &result_);
   }
 
   void MeasureChannels() {
@@ -444,13 +451,16 @@ class Field {
         if (const auto found = FocusOf(regions[0], &focus.message)) {
           focus.done = true;
           focus.focus_depth_mm = found->focus_depth_mm;
-          focus.blur_ratio = RatioOfColour(found->blur_ratio, found->focus_depth_mm.value,
-                                           fit_.values[kFocusDepth], sweep_.camera.lens);
+          // One field is curved alike in all colours, to which the move adds a common error.
+          focus.focus_depth_mm.value += to_axis_mm_.value;
+          focus.blur_ratio =
+              RatioOfColour(found->blur_ratio, found->focus_depth_mm.value,
+                            fit_.values[kFocusDepth] + to_axis_mm_.value, sweep_.camera.lens);
         }
       }
       result_.diagnostics.channels.push_back(focus);
     }
-    WidenByColours(sweep_.camera.lens, &result_);
+    WidenByColours(sweep_.camera.lens, sweep_.moves && model::MovesFocus(*sweep_.moves), &result_);
     const std::string words = ColoursInWords(result_);
     if (!words.empty()) result_.summary.warnings.push_back(words);
   }
@@ -461,6 +471,7 @@ class Field {
   FrameStore& store_;
   Calibration& result_;
   SpectralEstimatorSetup setup_;
+  model::Estimate to_axis_mm_{0, 0};  // from the zf of the fit to that on the axis
 };
 
 }  // namespace
