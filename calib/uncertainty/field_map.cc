@@ -41,6 +41,9 @@ constexpr std::size_t kMaxFrames = 128;
 constexpr std::size_t kMaxCoarseFrames = 24;
 constexpr int kCoarseSide = 3, kCoarseModesPerRing = 24;
 constexpr double kCurved = 3;  // standard deviations of a curvature
+// A surface describes the tiles if it leaves less than this part of their variance. A plane leaves
+// a quarter of that of a step.
+constexpr double kUnexplained = 0.1;
 // Median over the tiles of chi^2 per degree of freedom of their spectra with one variance for all
 // directions. Below it, the astigmatism of the field changes nothing. Simulated sweeps of isotropic
 // lenses have 0.7 to 1.5.
@@ -318,15 +321,21 @@ class Field {
     const std::vector<std::string> warnings = FieldWarnings(result_);
     result_.summary.warnings.insert(result_.summary.warnings.end(), warnings.begin(),
                                     warnings.end());
-    std::optional<CurvedField> curved;
-    if (with_curvature && std::abs(surface[3]) > kCurved * std::sqrt(covariance(3, 3))) {
+    Surface found;
+    found.axis_mm = surface[0];
+    found.axis_sigma_mm = std::sqrt(covariance(0, 0));
+    if (with_curvature) {
       // A tile shows the mean of its window, on which R^2 is larger than at the centre [D157].
       const double moment_mm2 = mm_per_px * mm_per_px * WindowMomentsPx2(part).sum();
-      curved = CurvedField{surface[0] - surface[3] * moment_mm2, std::sqrt(covariance(0, 0)), {}};
-      for (Eigen::Index i = 0; i < n; ++i)
-        curved->without_mm.push_back(value[i] - surface[3] * design(i, 3));
+      Eigen::VectorXd axis = Eigen::VectorXd::Zero(terms);
+      axis[0] = 1;
+      axis[3] = -moment_mm2;
+      found.axis_mm = axis.dot(surface);
+      found.axis_sigma_mm = std::sqrt(axis.dot(covariance * axis));
+      found.is_curved = std::abs(surface[3]) > kCurved * std::sqrt(covariance(3, 3));
     }
-    WidenBySpread(fitted, curved);
+    found.rest_mm = rest;
+    WidenBySpread(fitted, found);
   }
 
   // Returns the size of a reference pixel on the target: p z f2/(f1 D).
@@ -378,54 +387,55 @@ class Field {
     }
   }
 
-  // A field that is curved beyond doubt: zf on the axis with its error, and that of each tile
-  // without the curvature.
-  struct CurvedField {
+  // The surface of the field: zf on the axis with its error, which contains the scatter of the
+  // tiles about the surface, whether it is curved beyond doubt, and the tiles minus the surface.
+  struct Surface {
     double axis_mm = 0, axis_sigma_mm = 0;
-    std::vector<double> without_mm;
+    bool is_curved = false;
+    Eigen::VectorXd rest_mm;
   };
 
-  // One zf for a field that has several is wrong by the spread beyond their own errors; where the
-  // target has several depths, by the largest difference. The fit gives the mean over a curved
-  // field, and zf means that on the axis.
-  void WidenBySpread(const std::vector<std::size_t>& fitted,
-                     const std::optional<CurvedField>& curved) {
+  // The fit gives the mean over the field, and zf means that on the axis: of a curved field the
+  // results are moved there, and of a tilted one the interval contains the axis with its error.
+  // Where no smooth surface describes the tiles, one zf is wrong by their spread beyond their own
+  // errors; where the target has several depths, by the largest difference.
+  void WidenBySpread(const std::vector<std::size_t>& fitted, const Surface& surface) {
     const FieldMap& map = result_.diagnostics.field;
     const model::ThickLens& lens = sweep_.camera.lens;
     const double zf = fit_.values[kFocusDepth];
-    const bool is_flat = map.clusters.size() < 2;
-    const bool has_axis = is_flat && curved && curved->axis_mm > lens.front_focal_length_mm;
-    const double middle_mm = has_axis ? curved->axis_mm : zf;
     double farthest_mm = 0, squares = 0, errors = 0;
-    for (std::size_t i = 0; i < fitted.size(); ++i) {
-      const model::Estimate& focus = map.tiles[fitted[i]].focus_depth_mm;
-      const double off_mm = (has_axis ? curved->without_mm[i] : focus.value) - middle_mm;
+    for (const std::size_t t : fitted) {
+      const model::Estimate& focus = map.tiles[t].focus_depth_mm;
       farthest_mm = std::max(farthest_mm, std::abs(focus.value - zf));
-      squares += off_mm * off_mm / static_cast<double>(fitted.size());
-      errors += focus.sigma * focus.sigma / static_cast<double>(fitted.size());
+      squares += std::pow(focus.value - zf, 2) / static_cast<double>(fitted.size());
+      errors += std::pow(focus.sigma, 2) / static_cast<double>(fitted.size());
     }
-    const bool is_spread = squares > kSpreadOverErrors * errors;
-    if (is_flat && !is_spread && !has_axis) return;
-    double spread_mm = is_flat ? std::sqrt(std::max(0.0, squares - errors)) : farthest_mm;
-    if (is_flat && !is_spread) spread_mm = 0;
-    const std::string remedy = is_flat ? "restrict roi_px to the middle of the field, and set the "
-                                         "target parallel to the sensor"
-                                       : "restrict roi_px to a part of the target at one depth";
-    const std::string name = is_flat ? "zf over the field" : "depths of the target";
-    if (has_axis && evidence_.known_focus) {
-      // The plane of focus is stated, and it is not said whether that is the one on the axis.
-      const double move_mm = curved->axis_mm - zf;
-      const double reach_mm = spread_mm + 2 * curved->axis_sigma_mm;
-      WidenFocusAndRatio(name,
-                         {std::min(0.0, move_mm - reach_mm), std::max(0.0, move_mm + reach_mm)},
-                         {0, 0}, remedy, lens, &result_);
+    if (map.clusters.size() > 1) {
+      WidenFocus("depths of the target", farthest_mm,
+                 "restrict roi_px to a part of the target at one depth", lens, &result_);
       return;
     }
-    if (has_axis) {
-      to_axis_mm_ = {curved->axis_mm - zf, curved->axis_sigma_mm};
+    const double rest = surface.rest_mm.squaredNorm() / static_cast<double>(fitted.size());
+    const bool is_smooth = rest - errors < kUnexplained * (squares - errors);
+    const bool has_axis = surface.is_curved && surface.axis_mm > lens.front_focal_length_mm;
+    const double left = has_axis ? rest : squares;  // what the results do not follow
+    const bool is_spread = left > kSpreadOverErrors * errors;
+    const double move_mm = surface.axis_mm - zf;
+    Eigen::Vector2d moves_mm(0, 0);
+    if (has_axis && !evidence_.known_focus) {
+      to_axis_mm_ = {move_mm, surface.axis_sigma_mm};
       MoveFocus(to_axis_mm_, model::DirectionSign(sweep_.direction), lens, &result_);
+    } else if (has_axis || (is_spread && is_smooth)) {
+      // If the plane of focus is stated, it is not said whether that is the one on the axis.
+      const double reach_mm = 2 * surface.axis_sigma_mm;
+      moves_mm = {std::min(0.0, move_mm - reach_mm), std::max(0.0, move_mm + reach_mm)};
     }
-    if (spread_mm > 0) WidenFocus(name, spread_mm, remedy, lens, &result_);
+    if (is_spread && !is_smooth) moves_mm += std::sqrt(left - errors) * Eigen::Vector2d(-1, 1);
+    if (moves_mm.isZero(0)) return;
+    WidenFocusAndRatio("zf over the field", moves_mm, {0, 0},
+                       "restrict roi_px to the middle of the field, and set the target parallel to "
+                       "the sensor",
+                       lens, &result_);
   }
 
   void MeasureChannels() {
