@@ -102,7 +102,7 @@ std::string SweepTruthToYaml(const SweepTruth& truth) {
   YamlWriter out(kTruthSchema);
   out.Number("image_distance_mm", truth.image_distance_mm);
   out.Number("focus_depth_mm", truth.focus_depth_mm);
-  // What follows from the aberrations is written and not read.
+  // This value follows from the aberrations: it is written and not read.
   if (truth.aberrations.axial_colour_mm) {
     out.Number("grey_focus_depth_mm", GreyFocusDepthMm(truth.aberrations, truth.focus_depth_mm));
   }
