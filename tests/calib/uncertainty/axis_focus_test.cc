@@ -35,6 +35,7 @@ Calibration Found() {
   Eigen::Matrix3d correlations = Eigen::Matrix3d::Identity();
   correlations(0, 1) = correlations(1, 0) = -kCorrelation;  // d1 falls where zf grows
   correlations(0, 2) = correlations(2, 0) = -0.5;
+  correlations(1, 2) = correlations(2, 1) = 0.5 * kCorrelation;
   found.diagnostics.covariance = sigmas.asDiagonal() * correlations * sigmas.asDiagonal();
   SystematicPart part;
   part.focus_depth_mm = {-1, 2};
