@@ -163,18 +163,37 @@ class Field {
     return setup;
   }
 
-  // Returns zf and kappa of one region, with the corrected readings and the fitted floor.
-  std::optional<RegionFocus> FocusOf(const EstimatorRegion& region, std::string* message) const {
+  // The readings as they were written, with their errors, which are fitted again.
+  BlurFitSetup WrittenReadings() const {
+    BlurFitSetup setup = HeldReadings();
+    for (std::size_t i = 0; i < setup.frames.size(); ++i)
+      setup.frames[i].reading_mm = result_.frames[setup_.frames[i].frame].reading_mm;
+    setup.reading_sigma_mm = evidence_.setup.reading_sigma_mm;
+    setup.reading_sigma_is_known = evidence_.setup.reading_sigma_is_known;
+    return setup;
+  }
+
+  // Returns the fitted blur of one region.
+  std::optional<FittedRegion> FittedBlurOf(const EstimatorRegion& region,
+                                           std::string* message) const {
     if (region.frames.size() < 5 || region.modes.size() < 8) {
       *message = "it has too little texture, or too few frames show it";
       return std::nullopt;
     }
-    const FittedRegion fitted = BlurOf(region);
-    if (!fitted.blur.done) {
-      *message = fitted.blur.message;
-      return std::nullopt;
-    }
-    BlurFitSetup setup = HeldReadings();
+    FittedRegion fitted = BlurOf(region);
+    if (fitted.blur.done) return fitted;
+    *message = fitted.blur.message;
+    return std::nullopt;
+  }
+
+  // Returns zf and kappa of one region, with the corrected readings and the fitted floor.
+  std::optional<RegionFocus> FocusOf(const EstimatorRegion& region, std::string* message) const {
+    const auto fitted = FittedBlurOf(region, message);
+    return fitted ? FocusOf(*fitted, HeldReadings(), message) : std::nullopt;
+  }
+
+  static std::optional<RegionFocus> FocusOf(const FittedRegion& fitted, BlurFitSetup setup,
+                                            std::string* message) {
     setup.estimators = {AsSamples(fitted.blur, fitted.region)};
     const BlurFitResult fit = FitBlur(setup);
     *message = fit.message;
@@ -448,6 +467,7 @@ class Field {
       return;
     const char* const names[] = {"red", "green", "blue"};
     setup_.tick = [] { ThrowIfCancelled(); };  // the progress does not count the colours
+    std::vector<std::optional<FittedRegion>> blurs;
     for (int channel = 0; channel < 3; ++channel) {
       ChannelFocus focus;
       focus.name = names[channel];
@@ -455,24 +475,42 @@ class Field {
         return store_.Channel(frame, channel);
       };
       auto region = PlanRegion(setup_, kWholeField, Eigen::Vector2d::Zero());
+      blurs.emplace_back();
       if (region) {
         std::vector<EstimatorRegion> regions = {std::move(*region)};
         MeasureRegions(setup_, &regions);
-        if (const auto found = FocusOf(regions[0], &focus.message)) {
-          focus.done = true;
-          focus.focus_depth_mm = found->focus_depth_mm;
-          // One field is curved alike in all colours, to which the move adds a common error.
-          focus.focus_depth_mm.value += to_axis_mm_.value;
-          focus.blur_ratio =
-              RatioOfColour(found->blur_ratio, found->focus_depth_mm.value,
-                            fit_.values[kFocusDepth] + to_axis_mm_.value, sweep_.camera.lens);
-        }
+        blurs.back() = FittedBlurOf(regions[0], &focus.message);
+        if (blurs.back()) FillChannel(*blurs.back(), HeldReadings(), &focus);
       }
       result_.diagnostics.channels.push_back(focus);
     }
-    WidenByColours(sweep_.camera.lens, sweep_.moves && model::MovesFocus(*sweep_.moves), &result_);
+    if (ColoursDiffer(result_.diagnostics.channels)) FitChannelsAlone(blurs);
+    FollowColours(sweep_.camera.lens, sweep_.moves && model::MovesFocus(*sweep_.moves), &result_);
     const std::string words = ColoursInWords(result_);
     if (!words.empty()) result_.summary.warnings.push_back(words);
+  }
+
+  void FillChannel(const FittedRegion& blur, const BlurFitSetup& setup, ChannelFocus* focus) const {
+    const auto found = FocusOf(blur, setup, &focus->message);
+    focus->done = found.has_value();
+    if (!found) return;
+    focus->focus_depth_mm = found->focus_depth_mm;
+    // One field is curved alike in all colours, to which the move adds a common error.
+    focus->focus_depth_mm.value += to_axis_mm_.value;
+    focus->blur_ratio =
+        RatioOfColour(found->blur_ratio, found->focus_depth_mm.value,
+                      fit_.values[kFocusDepth] + to_axis_mm_.value, sweep_.camera.lens);
+  }
+
+  // The law of one plane of focus does not hold for the grey of colours that differ, and what the
+  // fit took for errors of the readings is partly that. Each colour follows the law with its own.
+  void FitChannelsAlone(const std::vector<std::optional<FittedRegion>>& blurs) {
+    std::vector<ChannelFocus> alone = result_.diagnostics.channels;
+    const BlurFitSetup written = WrittenReadings();
+    for (std::size_t c = 0; c < alone.size(); ++c)
+      if (blurs[c]) FillChannel(*blurs[c], written, &alone[c]);
+    // The errors that colours share hide small differences.
+    if (ColoursDiffer(alone)) result_.diagnostics.channels = std::move(alone);
   }
 
   const FocusSweep& sweep_;

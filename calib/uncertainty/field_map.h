@@ -22,8 +22,8 @@ void MapField(const FocusSweep& sweep, const BlurEvidence& evidence, const BlurF
               FrameStore* store, Calibration* calibration);
 
 // A cheap part of MapField for calibrations without the map: compares nine large zones on at most
-// 24 frames. Moves the results, widens the systematic interval and warns as MapField does, so that a
-// curved field or a tilted target is not silent, and leaves `field` empty.
+// 24 frames. Moves the results, widens the systematic interval and warns as MapField does, so that
+// a curved field or a tilted target is not silent, and leaves `field` empty.
 void CompareZones(const FocusSweep& sweep, const BlurEvidence& evidence, const BlurFitResult& fit,
                   FrameStore* store, Calibration* calibration);
 
