@@ -436,9 +436,9 @@ class Field {
     }
     const double rest = surface.rest_mm.squaredNorm() / static_cast<double>(fitted.size());
     const bool is_smooth = rest - errors < kUnexplained * (squares - errors);
-    const bool has_axis = surface.is_curved && surface.axis_mm > lens.front_focal_length_mm;
-    const double left = has_axis ? rest : squares;  // what the results do not follow
-    const bool is_spread = left > kSpreadOverErrors * errors;
+    const bool has_axis =
+        surface.is_curved && is_smooth && surface.axis_mm > lens.front_focal_length_mm;
+    const bool is_spread = squares > kSpreadOverErrors * errors;
     const double move_mm = surface.axis_mm - zf;
     Eigen::Vector2d moves_mm(0, 0);
     if (has_axis && !evidence_.known_focus) {
@@ -448,8 +448,9 @@ class Field {
       // If the plane of focus is stated, it is not said whether that is the one on the axis.
       const double reach_mm = 2 * surface.axis_sigma_mm;
       moves_mm = {std::min(0.0, move_mm - reach_mm), std::max(0.0, move_mm + reach_mm)};
+    } else if (is_spread) {
+      moves_mm = std::sqrt(squares - errors) * Eigen::Vector2d(-1, 1);
     }
-    if (is_spread && !is_smooth) moves_mm += std::sqrt(left - errors) * Eigen::Vector2d(-1, 1);
     if (moves_mm.isZero(0)) return;
     WidenFocusAndRatio("zf over the field", moves_mm, {0, 0},
                        "restrict roi_px to the middle of the field, and set the target parallel to "
