@@ -5,9 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <utility>
 
 #include "calib/uncertainty/systematic_advice.h"
-#include "thicklens/model/camera.h"
+#include "thicklens/model/grey_focus.h"
 
 namespace thicklens::calib {
 namespace {
@@ -35,6 +36,29 @@ double Chi2(const std::vector<ChannelFocus>& channels, model::Estimate ChannelFo
     chi2 += std::pow((of.value - mean) / std::max(of.sigma, 1e-12), 2);
   }
   return chi2;
+}
+
+// Replaces kappa. Its error and its interval stay the same part of it, and the error of the new
+// value is added as one that is independent of the others.
+void MoveRatio(const model::Estimate& to, Calibration* calibration) {
+  Result& ratio = *calibration->summary.blur_ratio;
+  CalibrationDiagnostics& found = calibration->diagnostics;
+  const double factor = to.value / ratio.value;
+  ratio.value = to.value;
+  ratio.sigma = std::hypot(factor * ratio.sigma, to.sigma);
+  if (ratio.systematic) *ratio.systematic *= factor;
+  for (SystematicPart& part : found.systematic_parts) part.blur_ratio *= factor;
+  if (found.blur_slope_px_per_mm) {
+    found.blur_slope_px_per_mm->value *= factor;
+    found.blur_slope_px_per_mm->sigma *= factor;
+  }
+  const auto row =
+      std::find(found.covariance_order.begin(), found.covariance_order.end(), "blur_ratio") -
+      found.covariance_order.begin();
+  if (row >= found.covariance.rows()) return;
+  found.covariance.row(row) *= factor;
+  found.covariance.col(row) *= factor;
+  found.covariance(row, row) += to.sigma * to.sigma;
 }
 
 }  // namespace
@@ -65,32 +89,45 @@ std::string ColoursInWords(const Calibration& calibration) {
   }
   return fmt::format(
       "the colours come into focus differently: {}. The results are those of grey (0.2126 R + "
-      "0.7152 G + 0.0722 B), and their intervals contain the root mean square of the differences "
-      "to the colours. The lens has "
-      "axial colour, or parts of the target with different colours are at different depths",
+      "0.7152 G + 0.0722 B), whose 1/zf and kappa are the means of the colours'; the focal length "
+      "is taken to be that of grey, and the interval of d1 allows that of each colour. The lens "
+      "has axial "
+      "colour, or parts of the target with different colours are at different depths",
       colours);
 }
 
-void WidenByColours(const model::ThickLens& lens, Calibration* calibration) {
+void FollowColours(const model::ThickLens& lens, bool focus_moves, Calibration* calibration) {
   const std::vector<ChannelFocus>& channels = calibration->diagnostics.channels;
   const auto& zf = calibration->summary.focus_depth_mm;
   const auto& ratio = calibration->summary.blur_ratio;
   if (!zf || !ratio || !ColoursDiffer(channels)) return;
-  double squares_mm2 = 0, ratio_move = 0, ratio_variance = 0;
+  double squares_mm2 = 0, inverse_per_mm = 0, ratio_value = 0, ratio_variance = 0;
   for (std::size_t c = 0; c < kColours; ++c) {
+    const double weight = model::kGreyWeights[c];
     const model::Estimate& focus = channels[c].focus_depth_mm;
-    squares_mm2 +=
-        kGreyWeights[c] * (std::pow(focus.value - zf->value, 2) - std::pow(focus.sigma, 2));
-    ratio_move += kGreyWeights[c] * (channels[c].blur_ratio.value - ratio->value);
-    ratio_variance += std::pow(kGreyWeights[c] * channels[c].blur_ratio.sigma, 2);
+    squares_mm2 += weight * (std::pow(focus.value - zf->value, 2) - std::pow(focus.sigma, 2));
+    inverse_per_mm += weight / focus.value;
+    ratio_value += weight * channels[c].blur_ratio.value;
+    ratio_variance += std::pow(weight * channels[c].blur_ratio.sigma, 2);
   }
+  MoveRatio({ratio_value, std::sqrt(ratio_variance)}, calibration);
   const double spread_mm = std::sqrt(std::max(0.0, squares_mm2));
-  const double reach = 2 * std::sqrt(ratio_variance);
-  WidenFocusAndRatio("axial colour", {-spread_mm, spread_mm},
-                     {std::min(0.0, ratio_move - reach), std::max(0.0, ratio_move + reach)},
-                     "calibrate frames of one colour: photograph the sweep in the light of that "
-                     "colour, or give one channel as grey frames",
-                     lens, calibration);
+  const double grey_move_mm = 1 / inverse_per_mm - zf->value;
+  const auto distance_mm = [&](double move_mm) {
+    const double nearest_mm = std::min(zf->value, 1.01 * lens.front_focal_length_mm);
+    return model::ImageDistanceMm(lens, std::max(zf->value + move_mm, nearest_mm)) -
+           model::ImageDistanceMm(lens, zf->value);
+  };
+  SystematicPart part;
+  part.name = "axial colour";
+  part.remedy =
+      "calibrate frames of one colour: photograph the sweep in the light of that colour, or give "
+      "one channel as grey frames";
+  part.focus_depth_mm =
+      focus_moves ? Eigen::Vector2d(-spread_mm, spread_mm)
+                  : Eigen::Vector2d(std::min(0.0, grey_move_mm), std::max(0.0, grey_move_mm));
+  part.image_distance_mm = {distance_mm(spread_mm), distance_mm(-spread_mm)};
+  AddPart(std::move(part), calibration);
 }
 
 }  // namespace thicklens::calib

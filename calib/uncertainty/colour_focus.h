@@ -9,9 +9,6 @@
 
 namespace thicklens::calib {
 
-// Part of red, green and blue in the grey that is calibrated.
-inline constexpr double kGreyWeights[] = {0.2126, 0.7152, 0.0722};
-
 // [D178] kappa of a colour for the sensor where it is. The fit of a colour takes D, and with it
 // K = f1 D/f2, from the zf of that colour and the focal length of the camera. The sensor has one D
 // for all colours, and it is the focal length that differs: kappa K is what the frames show, so
@@ -27,9 +24,15 @@ bool ColoursDiffer(const std::vector<ChannelFocus>& channels);
 // The in-focus object distances of colours that differ, in words; empty if they do not.
 std::string ColoursInWords(const Calibration& calibration);
 
-// Adds what colours that differ leave open: zf is that of grey, with a part for the spread of the
-// colours, weighted as in grey; kappa has one for the difference of the mean of the colours.
-void WidenByColours(const model::ThickLens& lens, Calibration* calibration);
+// Takes kappa from colours that differ, and adds what they leave open. The blur of grey is a
+// mixture of the blurs of its colours, which no single shape describes, so that a fit of grey gives
+// a kappa that is too small: kappa is moved to the mean of the colours, weighted as in grey, with
+// the errors of both. zf is that of a grey target in grey frames [D221]: its part is what lacks to
+// the mean of the colours, as it does where the target is coloured. The focal length may be that of
+// any of the colours, so that d1 has a part for their root mean square about zf, weighted as in
+// grey. `focus_moves`: the lens or the sensor moves, not the target. The sensor is then measured,
+// and zf follows from the focal length and has the part of the colours.
+void FollowColours(const model::ThickLens& lens, bool focus_moves, Calibration* calibration);
 
 }  // namespace thicklens::calib
 

@@ -11,6 +11,7 @@
 
 #include "calib/fit/misfit_causes.h"
 #include "calib/uncertainty/astigmatism.h"
+#include "calib/uncertainty/axis_focus.h"
 #include "calib/uncertainty/colour_focus.h"
 #include "calib/uncertainty/evenly_spread.h"
 #include "calib/uncertainty/field_astigmatism.h"
@@ -40,6 +41,9 @@ constexpr std::size_t kMaxFrames = 128;
 constexpr std::size_t kMaxCoarseFrames = 24;
 constexpr int kCoarseSide = 3, kCoarseModesPerRing = 24;
 constexpr double kCurved = 3;  // standard deviations of a curvature
+// A surface describes the tiles if it leaves less than this part of their variance. A plane leaves
+// a quarter of that of a step.
+constexpr double kUnexplained = 0.1;
 // Median over the tiles of chi^2 per degree of freedom of their spectra with one variance for all
 // directions. Below it, the astigmatism of the field changes nothing. Simulated sweeps of isotropic
 // lenses have 0.7 to 1.5.
@@ -159,18 +163,37 @@ class Field {
     return setup;
   }
 
-  // Returns zf and kappa of one region, with the corrected readings and the fitted floor.
-  std::optional<RegionFocus> FocusOf(const EstimatorRegion& region, std::string* message) const {
+  // The readings as they were written, with their errors, which are fitted again.
+  BlurFitSetup WrittenReadings() const {
+    BlurFitSetup setup = HeldReadings();
+    for (std::size_t i = 0; i < setup.frames.size(); ++i)
+      setup.frames[i].reading_mm = result_.frames[setup_.frames[i].frame].reading_mm;
+    setup.reading_sigma_mm = evidence_.setup.reading_sigma_mm;
+    setup.reading_sigma_is_known = evidence_.setup.reading_sigma_is_known;
+    return setup;
+  }
+
+  // Returns the fitted blur of one region.
+  std::optional<FittedRegion> FittedBlurOf(const EstimatorRegion& region,
+                                           std::string* message) const {
     if (region.frames.size() < 5 || region.modes.size() < 8) {
       *message = "it has too little texture, or too few frames show it";
       return std::nullopt;
     }
-    const FittedRegion fitted = BlurOf(region);
-    if (!fitted.blur.done) {
-      *message = fitted.blur.message;
-      return std::nullopt;
-    }
-    BlurFitSetup setup = HeldReadings();
+    FittedRegion fitted = BlurOf(region);
+    if (fitted.blur.done) return fitted;
+    *message = fitted.blur.message;
+    return std::nullopt;
+  }
+
+  // Returns zf and kappa of one region, with the corrected readings and the fitted floor.
+  std::optional<RegionFocus> FocusOf(const EstimatorRegion& region, std::string* message) const {
+    const auto fitted = FittedBlurOf(region, message);
+    return fitted ? FocusOf(*fitted, HeldReadings(), message) : std::nullopt;
+  }
+
+  static std::optional<RegionFocus> FocusOf(const FittedRegion& fitted, BlurFitSetup setup,
+                                            std::string* message) {
     setup.estimators = {AsSamples(fitted.blur, fitted.region)};
     const BlurFitResult fit = FitBlur(setup);
     *message = fit.message;
@@ -317,15 +340,21 @@ class Field {
     const std::vector<std::string> warnings = FieldWarnings(result_);
     result_.summary.warnings.insert(result_.summary.warnings.end(), warnings.begin(),
                                     warnings.end());
-    std::optional<CurvedField> curved;
-    if (with_curvature && std::abs(surface[3]) > kCurved * std::sqrt(covariance(3, 3))) {
+    Surface found;
+    found.axis_mm = surface[0];
+    found.axis_sigma_mm = std::sqrt(covariance(0, 0));
+    if (with_curvature) {
       // A tile shows the mean of its window, on which R^2 is larger than at the centre [D157].
       const double moment_mm2 = mm_per_px * mm_per_px * WindowMomentsPx2(part).sum();
-      curved = CurvedField{surface[0] - surface[3] * moment_mm2, std::sqrt(covariance(0, 0)), {}};
-      for (Eigen::Index i = 0; i < n; ++i)
-        curved->without_mm.push_back(value[i] - surface[3] * design(i, 3));
+      Eigen::VectorXd axis = Eigen::VectorXd::Zero(terms);
+      axis[0] = 1;
+      axis[3] = -moment_mm2;
+      found.axis_mm = axis.dot(surface);
+      found.axis_sigma_mm = std::sqrt(axis.dot(covariance * axis));
+      found.is_curved = std::abs(surface[3]) > kCurved * std::sqrt(covariance(3, 3));
     }
-    WidenBySpread(fitted, curved);
+    found.rest_mm = rest;
+    WidenBySpread(fitted, found);
   }
 
   // Returns the size of a reference pixel on the target: p z f2/(f1 D).
@@ -377,48 +406,56 @@ class Field {
     }
   }
 
-  // A field that is curved beyond doubt: zf on the axis with its error, and that of each tile
-  // without the curvature.
-  struct CurvedField {
+  // The surface of the field: zf on the axis with its error, which contains the scatter of the
+  // tiles about the surface, whether it is curved beyond doubt, and the tiles minus the surface.
+  struct Surface {
     double axis_mm = 0, axis_sigma_mm = 0;
-    std::vector<double> without_mm;
+    bool is_curved = false;
+    Eigen::VectorXd rest_mm;
   };
 
-  // One zf for a field that has several is wrong by the spread beyond their own errors; where the
-  // target has several depths, by the largest difference. The fit gives the mean over a curved
-  // field, and zf means that on the axis: the interval contains both.
-  void WidenBySpread(const std::vector<std::size_t>& fitted,
-                     const std::optional<CurvedField>& curved) {
+  // The fit gives the mean over the field, and zf means that on the axis: of a curved field the
+  // results are moved there, and of a tilted one the interval contains the axis with its error.
+  // Where no smooth surface describes the tiles, one zf is wrong by their spread beyond their own
+  // errors; where the target has several depths, by the largest difference.
+  void WidenBySpread(const std::vector<std::size_t>& fitted, const Surface& surface) {
     const FieldMap& map = result_.diagnostics.field;
+    const model::ThickLens& lens = sweep_.camera.lens;
     const double zf = fit_.values[kFocusDepth];
-    const bool is_flat = map.clusters.size() < 2;
-    const bool has_axis = is_flat && curved;
-    const double middle_mm = has_axis ? curved->axis_mm : zf;
     double farthest_mm = 0, squares = 0, errors = 0;
-    for (std::size_t i = 0; i < fitted.size(); ++i) {
-      const model::Estimate& focus = map.tiles[fitted[i]].focus_depth_mm;
-      const double off_mm = (has_axis ? curved->without_mm[i] : focus.value) - middle_mm;
+    for (const std::size_t t : fitted) {
+      const model::Estimate& focus = map.tiles[t].focus_depth_mm;
       farthest_mm = std::max(farthest_mm, std::abs(focus.value - zf));
-      squares += off_mm * off_mm / static_cast<double>(fitted.size());
-      errors += focus.sigma * focus.sigma / static_cast<double>(fitted.size());
+      squares += std::pow(focus.value - zf, 2) / static_cast<double>(fitted.size());
+      errors += std::pow(focus.sigma, 2) / static_cast<double>(fitted.size());
     }
-    const bool is_spread = squares > kSpreadOverErrors * errors;
-    if (is_flat && !is_spread && !has_axis) return;
-    double spread_mm = is_flat ? std::sqrt(std::max(0.0, squares - errors)) : farthest_mm;
-    if (is_flat && !is_spread) spread_mm = 0;
-    const std::string remedy = is_flat ? "restrict roi_px to the middle of the field, and set the "
-                                         "target parallel to the sensor"
-                                       : "restrict roi_px to a part of the target at one depth";
-    if (!has_axis) {
-      WidenFocus(is_flat ? "zf over the field" : "depths of the target", spread_mm, remedy,
-                 sweep_.camera.lens, &result_);
+    if (map.clusters.size() > 1) {
+      WidenFocus("depths of the target", farthest_mm,
+                 "restrict roi_px to a part of the target at one depth", lens, &result_);
       return;
     }
-    const double move_mm = curved->axis_mm - zf;
-    const double reach_mm = spread_mm + 2 * curved->axis_sigma_mm;
-    WidenFocusAndRatio("zf over the field",
-                       {std::min(0.0, move_mm - reach_mm), std::max(0.0, move_mm + reach_mm)},
-                       {0, 0}, remedy, sweep_.camera.lens, &result_);
+    const double rest = surface.rest_mm.squaredNorm() / static_cast<double>(fitted.size());
+    const bool is_smooth = rest - errors < kUnexplained * (squares - errors);
+    const bool has_axis =
+        surface.is_curved && is_smooth && surface.axis_mm > lens.front_focal_length_mm;
+    const bool is_spread = squares > kSpreadOverErrors * errors;
+    const double move_mm = surface.axis_mm - zf;
+    Eigen::Vector2d moves_mm(0, 0);
+    if (has_axis && !evidence_.known_focus) {
+      to_axis_mm_ = {move_mm, surface.axis_sigma_mm};
+      MoveFocus(to_axis_mm_, model::DirectionSign(sweep_.direction), lens, &result_);
+    } else if (has_axis || (is_spread && is_smooth)) {
+      // If the plane of focus is stated, it is not said whether that is the one on the axis.
+      const double reach_mm = 2 * surface.axis_sigma_mm;
+      moves_mm = {std::min(0.0, move_mm - reach_mm), std::max(0.0, move_mm + reach_mm)};
+    } else if (is_spread) {
+      moves_mm = std::sqrt(squares - errors) * Eigen::Vector2d(-1, 1);
+    }
+    if (moves_mm.isZero(0)) return;
+    WidenFocusAndRatio("zf over the field", moves_mm, {0, 0},
+                       "restrict roi_px to the middle of the field, and set the target parallel to "
+                       "the sensor",
+                       lens, &result_);
   }
 
   void MeasureChannels() {
@@ -431,6 +468,7 @@ class Field {
       return;
     const char* const names[] = {"red", "green", "blue"};
     setup_.tick = [] { ThrowIfCancelled(); };  // the progress does not count the colours
+    std::vector<std::optional<FittedRegion>> blurs;
     for (int channel = 0; channel < 3; ++channel) {
       ChannelFocus focus;
       focus.name = names[channel];
@@ -438,21 +476,42 @@ class Field {
         return store_.Channel(frame, channel);
       };
       auto region = PlanRegion(setup_, kWholeField, Eigen::Vector2d::Zero());
+      blurs.emplace_back();
       if (region) {
         std::vector<EstimatorRegion> regions = {std::move(*region)};
         MeasureRegions(setup_, &regions);
-        if (const auto found = FocusOf(regions[0], &focus.message)) {
-          focus.done = true;
-          focus.focus_depth_mm = found->focus_depth_mm;
-          focus.blur_ratio = RatioOfColour(found->blur_ratio, found->focus_depth_mm.value,
-                                           fit_.values[kFocusDepth], sweep_.camera.lens);
-        }
+        blurs.back() = FittedBlurOf(regions[0], &focus.message);
+        if (blurs.back()) FillChannel(*blurs.back(), HeldReadings(), &focus);
       }
       result_.diagnostics.channels.push_back(focus);
     }
-    WidenByColours(sweep_.camera.lens, &result_);
+    if (ColoursDiffer(result_.diagnostics.channels)) FitChannelsAlone(blurs);
+    FollowColours(sweep_.camera.lens, sweep_.moves && model::MovesFocus(*sweep_.moves), &result_);
     const std::string words = ColoursInWords(result_);
     if (!words.empty()) result_.summary.warnings.push_back(words);
+  }
+
+  void FillChannel(const FittedRegion& blur, const BlurFitSetup& setup, ChannelFocus* focus) const {
+    const auto found = FocusOf(blur, setup, &focus->message);
+    focus->done = found.has_value();
+    if (!found) return;
+    focus->focus_depth_mm = found->focus_depth_mm;
+    // One field is curved alike in all colours, to which the move adds a common error.
+    focus->focus_depth_mm.value += to_axis_mm_.value;
+    focus->blur_ratio =
+        RatioOfColour(found->blur_ratio, found->focus_depth_mm.value,
+                      fit_.values[kFocusDepth] + to_axis_mm_.value, sweep_.camera.lens);
+  }
+
+  // The law of one plane of focus does not hold for the grey of colours that differ, and what the
+  // fit took for errors of the readings is partly that. Each colour follows the law with its own.
+  void FitChannelsAlone(const std::vector<std::optional<FittedRegion>>& blurs) {
+    std::vector<ChannelFocus> alone = result_.diagnostics.channels;
+    const BlurFitSetup written = WrittenReadings();
+    for (std::size_t c = 0; c < alone.size(); ++c)
+      if (blurs[c]) FillChannel(*blurs[c], written, &alone[c]);
+    // The errors that colours share hide small differences.
+    if (ColoursDiffer(alone)) result_.diagnostics.channels = std::move(alone);
   }
 
   const FocusSweep& sweep_;
@@ -461,6 +520,7 @@ class Field {
   FrameStore& store_;
   Calibration& result_;
   SpectralEstimatorSetup setup_;
+  model::Estimate to_axis_mm_{0, 0};  // from the zf of the fit to that on the axis
 };
 
 }  // namespace

@@ -16,13 +16,14 @@ namespace thicklens::calib {
 // so that errors that the parts share do not hide their differences. The blur along x and along y
 // is measured first (MeasureAstigmatism), with readings of its own. Fills `field` and `channels` of
 // the calibration, warns of properties that one plane of focus does not describe, and widens the
-// systematic interval by them.
+// systematic interval by them. The results of a curved field are moved to the axis (MoveFocus),
+// unless its plane of focus is stated.
 void MapField(const FocusSweep& sweep, const BlurEvidence& evidence, const BlurFitResult& fit,
               FrameStore* store, Calibration* calibration);
 
 // A cheap part of MapField for calibrations without the map: compares nine large zones on at most
-// 24 frames. Widens the systematic interval and warns as MapField does, so that a curved field or a
-// tilted target is not silent, and leaves `field` empty.
+// 24 frames. Moves the results, widens the systematic interval and warns as MapField does, so that
+// a curved field or a tilted target is not silent, and leaves `field` empty.
 void CompareZones(const FocusSweep& sweep, const BlurEvidence& evidence, const BlurFitResult& fit,
                   FrameStore* store, Calibration* calibration);
 

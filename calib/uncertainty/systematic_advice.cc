@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "thicklens/calib/error_budget.h"
 
@@ -34,8 +35,7 @@ void WidenFocus(const std::string& name, double move_mm, const std::string& reme
 void WidenFocusAndRatio(const std::string& name, const Eigen::Vector2d& focus_moves_mm,
                         const Eigen::Vector2d& ratio_moves, const std::string& remedy,
                         const model::ThickLens& lens, Calibration* calibration) {
-  CalibrationSummary& summary = calibration->summary;
-  const double zf = summary.focus_depth_mm->value;
+  const double zf = calibration->summary.focus_depth_mm->value;
   const double d1_mm = model::ImageDistanceMm(lens, zf);
   SystematicPart part;
   part.name = name;
@@ -48,13 +48,18 @@ void WidenFocusAndRatio(const std::string& name, const Eigen::Vector2d& focus_mo
   part.image_distance_mm = {model::ImageDistanceMm(lens, farthest_mm) - d1_mm,
                             model::ImageDistanceMm(lens, nearest_mm) - d1_mm};
   part.blur_ratio = ratio_moves;
+  AddPart(std::move(part), calibration);
+}
+
+void AddPart(SystematicPart part, Calibration* calibration) {
+  CalibrationSummary& summary = calibration->summary;
   const auto add = [](std::optional<Result>* result, const Eigen::Vector2d& moves) {
     if (*result && (*result)->systematic) *(*result)->systematic += moves;
   };
   add(&summary.focus_depth_mm, part.focus_depth_mm);
   add(&summary.image_distance_mm, part.image_distance_mm);
   add(&summary.blur_ratio, part.blur_ratio);
-  calibration->diagnostics.systematic_parts.push_back(part);
+  calibration->diagnostics.systematic_parts.push_back(std::move(part));
   SortAndAdvise(calibration);
 }
 
@@ -94,14 +99,7 @@ void WidenByTrials(const std::string& name, const std::string& remedy,
     widen(trial.values[kBenchOffset], &zero_mm);
   }
   if (zero) zero->systematic = zero_mm;
-  const auto add = [](std::optional<Result>* result, const Eigen::Vector2d& moves) {
-    if (*result && (*result)->systematic) *(*result)->systematic += moves;
-  };
-  add(&calibration->summary.focus_depth_mm, part.focus_depth_mm);
-  add(&calibration->summary.image_distance_mm, part.image_distance_mm);
-  add(&calibration->summary.blur_ratio, part.blur_ratio);
-  calibration->diagnostics.systematic_parts.push_back(part);
-  SortAndAdvise(calibration);
+  AddPart(std::move(part), calibration);
 }
 
 void WidenRatio(const std::string& name, const Eigen::Vector2d& moves, const std::string& remedy,
@@ -110,10 +108,7 @@ void WidenRatio(const std::string& name, const Eigen::Vector2d& moves, const std
   part.name = name;
   part.remedy = remedy;
   part.blur_ratio = moves;
-  std::optional<Result>& ratio = calibration->summary.blur_ratio;
-  if (ratio && ratio->systematic) *ratio->systematic += moves;
-  calibration->diagnostics.systematic_parts.push_back(part);
-  SortAndAdvise(calibration);
+  AddPart(std::move(part), calibration);
 }
 
 }  // namespace thicklens::calib

@@ -24,6 +24,9 @@ inline constexpr char kFromOffset[] = "offset_mm";
 // or systematic (ErrorTerms), and what makes it smaller.
 void SortAndAdvise(Calibration* calibration);
 
+// Adds a part to the table and linearly to the intervals of zf, d1 and kappa.
+void AddPart(SystematicPart part, Calibration* calibration);
+
 // Adds a part that moves zf by up to `move_mm` in either direction to the table and to the
 // intervals of zf and d1. It is added linearly because such errors do not average out.
 void WidenFocus(const std::string& name, double move_mm, const std::string& remedy,

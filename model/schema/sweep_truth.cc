@@ -5,6 +5,7 @@
 #include "model/schema/yaml_fields.h"
 #include "model/schema/yaml_writer.h"
 #include "thicklens/base/yaml_reader.h"
+#include "thicklens/model/grey_focus.h"
 #include "thicklens/model/pupil_law.h"
 #include "thicklens/model/sweep_file.h"
 
@@ -40,6 +41,7 @@ SweepTruth ReadSweepTruth(const std::string& path) {
   root.RequireKeys({"schema",
                     "image_distance_mm",
                     "focus_depth_mm",
+                    "grey_focus_depth_mm",
                     "blur_ratio",
                     "blur_floor_px",
                     "bench_offset_mm",
@@ -100,6 +102,10 @@ std::string SweepTruthToYaml(const SweepTruth& truth) {
   YamlWriter out(kTruthSchema);
   out.Number("image_distance_mm", truth.image_distance_mm);
   out.Number("focus_depth_mm", truth.focus_depth_mm);
+  // This value follows from the aberrations: it is written and not read.
+  if (truth.aberrations.axial_colour_mm) {
+    out.Number("grey_focus_depth_mm", GreyFocusDepthMm(truth.aberrations, truth.focus_depth_mm));
+  }
   out.Number("blur_ratio", truth.blur_ratio);
   out.Number("blur_floor_px", truth.blur_floor_px);
   out.Number("bench_offset_mm", truth.bench_offset_mm);

@@ -107,14 +107,20 @@ void AddOptions(CLI::App* app, Arguments* arguments) {
   app->add_flag("--processing", arguments->processing,
                 "instead: sweeps whose frames were read with a wrong transfer curve, or denoised, "
                 "compressed or sharpened: the change of kappa, and what is reported");
-  app->add_flag("--benches", arguments->benches,
-                "instead: sweeps of each kind of configs/accuracy/benches.yaml, with the goals");
+  CLI::Option* const benches = app->add_flag(
+      "--benches", arguments->benches,
+      "instead: sweeps of each kind of configs/accuracy/benches.yaml, with the goals");
+  for (const char* const other : {"--faults", "--pupil-laws", "--processing"})
+    benches->excludes(app->get_option(other));
   app->add_flag("--check", arguments->check,
-                "with --benches: exit with 1 if a kind misses its goals");
-  app->add_option("--kind", arguments->kinds.names, "with --benches: these kinds alone (all)");
+                "with --benches: exit with 1 if a kind misses its goals")
+      ->needs(benches);
+  app->add_option("--kind", arguments->kinds.names, "with --benches: these kinds alone (all)")
+      ->needs(benches);
   app->add_option("--mixtures", arguments->kinds.mixtures,
                   "with --benches: sweeps with random mixtures of the disturbances (0)")
-      ->check(CLI::NonNegativeNumber);
+      ->check(CLI::NonNegativeNumber)
+      ->needs(benches);
   app->add_option("--json", arguments->json_path, "write the tables to a file");
 }
 

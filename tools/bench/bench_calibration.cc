@@ -23,6 +23,7 @@
 #include "thicklens/base/parallel.h"
 #include "thicklens/calib/calibrate.h"
 #include "thicklens/io/simulated_sweep.h"
+#include "thicklens/model/grey_focus.h"
 #include "thicklens/model/thick_lens.h"
 #include "tools/bench/bench_calibration_page.h"
 #include "tools/bench/bench_calibration_rows.h"
@@ -80,13 +81,18 @@ std::optional<CalibrationError> ErrorOf(const std::optional<calib::Result>& resu
 constexpr double kMmToUm = 1000;
 double ToPercentOf(double truth) { return 100 / truth; }
 
+// Frames in colour are calibrated as grey.
+double GreyFocusMm(const model::SweepTruth& truth) {
+  return model::GreyFocusDepthMm(truth.aberrations, truth.focus_depth_mm);
+}
+
 CalibrationTrial OfFit(const calib::Calibration& c, const BenchSweep& bench) {
   CalibrationTrial trial;
   trial.outcome = c.summary.outcome;
   trial.reason = c.summary.reason;
   if (c.summary.outcome == calib::Outcome::kRefused) return trial;
   const model::SweepTruth& truth = bench.truth;
-  trial.focus_depth_mm = ErrorOf(c.summary.focus_depth_mm, truth.focus_depth_mm, 1);
+  trial.focus_depth_mm = ErrorOf(c.summary.focus_depth_mm, GreyFocusMm(truth), 1);
   trial.image_distance_um = ErrorOf(c.summary.image_distance_mm, truth.image_distance_mm, kMmToUm);
   trial.blur_ratio_percent =
       ErrorOf(c.summary.blur_ratio, truth.blur_ratio, ToPercentOf(truth.blur_ratio));
@@ -112,7 +118,7 @@ CalibrationTrial OfPeak(const calib::Calibration& c, const BenchSweep& bench) {
   CalibrationTrial trial = OfPart(done, peak.message, c);
   if (!done) return trial;
   trial.focus_depth_mm =
-      CalibrationError{peak.focus_depth_mm - bench.truth.focus_depth_mm, peak.sigma_mm};
+      CalibrationError{peak.focus_depth_mm - GreyFocusMm(bench.truth), peak.sigma_mm};
   const double image_distance_mm = model::ImageDistanceMm(lens, peak.focus_depth_mm);
   trial.image_distance_um =
       CalibrationError{kMmToUm * (image_distance_mm - bench.truth.image_distance_mm), std::nullopt};
@@ -125,7 +131,7 @@ CalibrationTrial OfSource(const calib::Calibration& c, const BenchSweep& bench) 
   if (!source.done) return trial;
   const model::SweepTruth& truth = bench.truth;
   const auto error = [](double difference) { return CalibrationError{difference, std::nullopt}; };
-  trial.focus_depth_mm = error(source.focus_depth_mm - truth.focus_depth_mm);
+  trial.focus_depth_mm = error(source.focus_depth_mm - GreyFocusMm(truth));
   trial.image_distance_um = error(kMmToUm * (source.image_distance_mm - truth.image_distance_mm));
   trial.blur_ratio_percent =
       error(ToPercentOf(truth.blur_ratio) * (source.blur_ratio - truth.blur_ratio));

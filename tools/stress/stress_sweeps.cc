@@ -16,6 +16,7 @@
 #include "thicklens/io/image_io.h"
 #include "thicklens/io/simulated_sweep.h"
 #include "thicklens/model/camera_file.h"
+#include "thicklens/model/grey_focus.h"
 #include "thicklens/model/light_field.h"
 #include "tools/bench/bench_sweep.h"
 
@@ -135,7 +136,8 @@ Requirement FindsTruth(const model::SweepTruth& truth, double most_um) {
         RequireAdviceAgrees(summary);
         const double off =
             std::max({OffInSigmas(summary, "image_distance_mm", truth.image_distance_mm),
-                      OffInSigmas(summary, "focus_depth_mm", truth.focus_depth_mm),
+                      OffInSigmas(summary, "focus_depth_mm",
+                                  model::GreyFocusDepthMm(truth.aberrations, truth.focus_depth_mm)),
                       OffInSigmas(summary, "blur_ratio", truth.blur_ratio)});
         const double off_um = 1000 * std::abs(summary["image_distance_mm"]["value"].get<double>() -
                                               truth.image_distance_mm);

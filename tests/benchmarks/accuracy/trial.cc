@@ -7,6 +7,7 @@
 #include <regex>
 
 #include "tests/calib/simulated_sweep.h"
+#include "thicklens/model/grey_focus.h"
 
 namespace thicklens::accuracy {
 namespace {
@@ -65,7 +66,9 @@ void FillTrial(const calib::Calibration& c, const model::SweepTruth& truth, Tria
     trial->reason = Countable(c.summary.reason);
     return;
   }
-  trial->focus_depth_mm = Compare(*c.summary.focus_depth_mm, truth.focus_depth_mm);
+  // Frames in colour are calibrated as grey.
+  trial->focus_depth_mm = Compare(*c.summary.focus_depth_mm,
+                                  model::GreyFocusDepthMm(truth.aberrations, truth.focus_depth_mm));
   trial->image_distance_mm = Compare(*c.summary.image_distance_mm, truth.image_distance_mm);
   trial->blur_ratio = Compare(*c.summary.blur_ratio, truth.blur_ratio);
 }

@@ -76,6 +76,15 @@ TEST(FieldMap, AFlatTargetHasOneDepthAndNoTilt) {
     EXPECT_NEAR(tile.focus_depth_mm.value, s.truth.focus_depth_mm, 1);
   }
   EXPECT_TRUE(c.diagnostics.channels.empty());  // grey frames
+  // The results of a flat field are those of the fit, whatever map shows that it is flat.
+  CalibrationOptions coarse;
+  coarse.map_field = false;
+  const Calibration again = Calibrate(s.sweep, coarse);
+  EXPECT_EQ(c.summary.focus_depth_mm->value, again.summary.focus_depth_mm->value);
+  EXPECT_EQ(c.summary.focus_depth_mm->sigma, again.summary.focus_depth_mm->sigma);
+  EXPECT_EQ(c.summary.image_distance_mm->value, again.summary.image_distance_mm->value);
+  EXPECT_EQ(c.summary.blur_ratio->value, again.summary.blur_ratio->value);
+  EXPECT_EQ(c.diagnostics.covariance, again.diagnostics.covariance);
 }
 
 TEST(FieldMap, IsLeftOutOnRequest) {

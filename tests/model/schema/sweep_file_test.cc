@@ -349,6 +349,25 @@ TEST(SweepTruth, ComesBackWithTheSameBits) {
   EXPECT_THAT(ErrorOf([&] { ReadSweepTruth(file); }), HasSubstr("unknown key 'more'"));
 }
 
+// zf of grey follows from that of the colours, for those who compare results with the file.
+TEST(SweepTruth, SaysWhereGreyIsInFocus) {
+  SweepTruth truth;
+  truth.image_distance_mm = 60;
+  truth.focus_depth_mm = 300;
+  truth.frames = {{"a", 1, 2, 3}};
+  EXPECT_THAT(SweepTruthToYaml(truth), Not(HasSubstr("grey_focus_depth_mm")));
+  truth.aberrations.axial_colour_mm.emplace(2, 0, -1);
+  const std::string text = SweepTruthToYaml(truth);
+  const TemporaryFolder folder;
+  const std::string file = folder.Put("t.yaml", text);
+  const YamlNode written = YamlNode::LoadFile(file);
+  EXPECT_EQ(written.At("focus_depth_mm").Number(), 300);
+  EXPECT_NEAR(written.At("grey_focus_depth_mm").Number(),
+              1 / (0.2126 / 302 + 0.7152 / 300 + 0.0722 / 299), 1e-9);
+  const SweepTruth back = ReadSweepTruth(file);
+  EXPECT_EQ(back.aberrations.axial_colour_mm, truth.aberrations.axial_colour_mm);
+}
+
 // The examples of docs/file-formats.md, as a user would copy them.
 TEST(FileFormatsPage, ExamplesAreRead) {
   const std::string page = ContentOf(std::string(THICKLENS_SOURCE_DIR) + "/docs/file-formats.md");
