@@ -6,7 +6,7 @@
 
 namespace thicklens::calib {
 
-// [D220] Moves the results of a sweep with a moving target by `move_mm` from the zf of the fit, the
+// [D197] Moves the results of a sweep with a moving target by `move_mm` from the zf of the fit, the
 // mean over a curved field, to the zf on the axis. d1, the magnification at focus and the reading
 // at focus follow zf; `reading_sign` is that of dz/d reading. kappa K is what the frames show, so
 // that kappa changes as 1/K with K = f1 zf/(zf - f1). The error of the move is independent of the

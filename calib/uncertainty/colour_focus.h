@@ -27,7 +27,7 @@ std::string ColoursInWords(const Calibration& calibration);
 // Takes kappa from colours that differ, and adds what they leave open. The blur of grey is a
 // mixture of the blurs of its colours, which no single shape describes, so that a fit of grey gives
 // a kappa that is too small: kappa is moved to the mean of the colours, weighted as in grey, with
-// the errors of both. zf is that of a grey target in grey frames [D221]: its part is what lacks to
+// the errors of both. zf is that of a grey target in grey frames [D198]: its part is what lacks to
 // the mean of the colours, as it does where the target is coloured. The focal length may be that of
 // any of the colours, so that d1 has a part for their root mean square about zf, weighted as in
 // grey. `focus_moves`: the lens or the sensor moves, not the target. The sensor is then measured,

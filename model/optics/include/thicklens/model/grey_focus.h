@@ -9,7 +9,7 @@ namespace thicklens::model {
 // Part of red, green and blue in grey light (ToGrey).
 inline constexpr double kGreyWeights[] = {0.2126, 0.7152, 0.0722};
 
-// [D221] zf of the grey frames of a grey target, mm: the variance of the blur of grey light is the
+// [D198] zf of the grey frames of a grey target, mm: the variance of the blur of grey light is the
 // mean of those of its colours, which is smallest at the mean of their 1/zf, with kGreyWeights.
 // `focus_depth_mm` is the zf from which the aberrations displace the colours. Without axial colour
 // it is zf of grey.
