@@ -34,7 +34,7 @@ constexpr double kMaxOfTile = 6;
 // anywhere; that by which one aperture is likelier than another, and that within which other values
 // are about as likely, also as a share.
 constexpr double kShown = 25, kShownAnywhere = 60, kOtherAperture = 5, kAboutAsWell = 8,
-                 kAboutAsWellShare = 0.25, kOtherApertureShare = 0.15;
+                 kAboutAsWellShare = 0.1, kOtherApertureShare = 0.15;
 // Standard deviations of scale and offset that remain however many tiles there are: of the scale,
 // and of the width of the blur, px.
 constexpr double kSystematicScale = 0.015, kSystematicPx = 0.1;
