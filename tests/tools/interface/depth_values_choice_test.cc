@@ -24,24 +24,24 @@ using ::testing::HasSubstr;
 using thicklens::testing::ErrorOf;
 using thicklens::testing::SteppedScene;
 
-constexpr int kSidePx = 320;
+constexpr int kChoiceSidePx = 320;
 
 SteppedScene SceneOf(unsigned seed, const Eigen::ArrayXXd& weights = SteppedScene::UniformViews()) {
-  return SteppedScene(seed, kSidePx, {-2, 1, 2, -1, 0}, 1, weights);
+  return SteppedScene(seed, kChoiceSidePx, {-2, 1, 2, -1, 0}, 1, weights);
 }
 
 Image PhotoOf(const SteppedScene& scene) {
   std::vector<std::uint16_t> levels;
   for (const float value : scene.input().image.values)
     levels.push_back(static_cast<std::uint16_t>(std::lround(255 * value)));
-  return Image::FromEncoded(kSidePx, kSidePx, ChannelOrder::kGrey, 8, std::move(levels),
+  return Image::FromEncoded(kChoiceSidePx, kChoiceSidePx, ChannelOrder::kGrey, 8, std::move(levels),
                             TransferCurve::Linear());
 }
 
 // The map whose disparities are scale * value + offset.
 DepthMap MapOf(const SteppedScene& scene, double scale, double offset_px) {
   DepthMap map;
-  map.width_px = map.height_px = kSidePx;
+  map.width_px = map.height_px = kChoiceSidePx;
   map.meaning.kind = DepthKind::kDisparity;
   map.source = "map";
   for (const float value : scene.input().disparity.disparity)
@@ -49,7 +49,7 @@ DepthMap MapOf(const SteppedScene& scene, double scale, double offset_px) {
   return map;
 }
 
-EstimateOptions FiveViews(DepthRefining refining = DepthRefining::kAuto) {
+EstimateOptions RefinedBy(DepthRefining refining = DepthRefining::kAuto) {
   EstimateOptions options;
   options.views = ViewCounts{SteppedScene::kViews, SteppedScene::kViews};
   options.aperture.shape = model::ApertureShape::kUniform;
@@ -57,7 +57,7 @@ EstimateOptions FiveViews(DepthRefining refining = DepthRefining::kAuto) {
   return options;
 }
 
-RunControl OneThread() {
+RunControl OnOneThread() {
   RunControl control;
   control.threads = 1;
   control.option_name = [](const std::string& field) { return "<" + field + ">"; };
@@ -78,7 +78,7 @@ TEST(DepthValuesChoice, AWrongScaleIsCorrected) {
   const SteppedScene scene = SceneOf(1);
   const DepthMap map = MapOf(scene, 1 / 1.12, 0);
   EstimateDiagnostics found;
-  const Problem problem = PrepareProblem(PhotoOf(scene), map, {}, FiveViews(), &found, OneThread());
+  const Problem problem = PrepareProblem(PhotoOf(scene), map, {}, RefinedBy(), &found, OnOneThread());
   ASSERT_TRUE(found.depth_refinement);
   EXPECT_TRUE(found.are_depth_values_wrong) << found.depth_values->message;
   EXPECT_TRUE(found.depth_refinement->applied);
@@ -91,7 +91,7 @@ TEST(DepthValuesChoice, AWrongScaleIsReportedIfNothingIsRefined) {
   const SteppedScene scene = SceneOf(1);
   const DepthMap map = MapOf(scene, 1 / 1.12, 0);
   const LightFieldEstimate estimate =
-      EstimateLightField(PhotoOf(scene), map, {}, FiveViews(DepthRefining::kOff), OneThread());
+      EstimateLightField(PhotoOf(scene), map, {}, RefinedBy(DepthRefining::kOff), OnOneThread());
   EXPECT_EQ(estimate.problem->disparity(), map.values);
   EXPECT_THAT(estimate.summary.partial_reason,
               AllOf(HasSubstr("map: the blur of the photograph agrees with other disparities"),
@@ -106,7 +106,7 @@ TEST(DepthValuesChoice, ARightMapStays) {
     const DepthMap map = MapOf(scene, 1, 0);
     EstimateDiagnostics found;
     const Problem problem =
-        PrepareProblem(PhotoOf(scene), map, {}, FiveViews(), &found, OneThread());
+        PrepareProblem(PhotoOf(scene), map, {}, RefinedBy(), &found, OnOneThread());
     EXPECT_EQ(problem.disparity(), map.values) << found.depth_refinement->message;
     EXPECT_FALSE(found.are_depth_values_wrong);
   }
@@ -116,10 +116,10 @@ TEST(DepthValuesChoice, ARightMapStays) {
 TEST(DepthValuesChoice, AReversedMapAndASmallApertureAreLeftToTheirOwnChecks) {
   const SteppedScene scene = SceneOf(3);
   DepthMap reversed = MapOf(scene, 1, 0);
-  model::FlipDepth(model::DepthFlip::kRows, kSidePx, &reversed.values);
+  model::FlipDepth(model::DepthFlip::kRows, kChoiceSidePx, &reversed.values);
   EstimateDiagnostics found;
   const Problem kept =
-      PrepareProblem(PhotoOf(scene), reversed, {}, FiveViews(), &found, OneThread());
+      PrepareProblem(PhotoOf(scene), reversed, {}, RefinedBy(), &found, OnOneThread());
   EXPECT_FALSE(found.are_depth_values_wrong);
   EXPECT_EQ(found.depth_refinement->scale, 1);
   Eigen::ArrayXXd inner = SteppedScene::UniformViews();
@@ -130,7 +130,7 @@ TEST(DepthValuesChoice, AReversedMapAndASmallApertureAreLeftToTheirOwnChecks) {
   inner /= inner.sum();
   const SteppedScene small = SceneOf(3, inner);
   const DepthMap map = MapOf(small, 1, 0);
-  EXPECT_EQ(PrepareProblem(PhotoOf(small), map, {}, FiveViews(), &found, OneThread()).disparity(),
+  EXPECT_EQ(PrepareProblem(PhotoOf(small), map, {}, RefinedBy(), &found, OnOneThread()).disparity(),
             map.values)
       << found.depth_refinement->message;
   EXPECT_FALSE(found.are_depth_values_wrong);
@@ -145,7 +145,7 @@ TEST(DepthValuesChoice, TheValuesOfARelativeMapAreFound) {
     map.meaning.disparity_scale = sign;
     EstimateDiagnostics found;
     const Problem problem =
-        PrepareProblem(PhotoOf(scene), map, {}, FiveViews(), &found, OneThread());
+        PrepareProblem(PhotoOf(scene), map, {}, RefinedBy(), &found, OnOneThread());
     ASSERT_TRUE(found.depth_values);
     EXPECT_NEAR(found.depth_values->best.scale, 1 / 60.0, 3 * found.depth_values->scale_sigma);
     EXPECT_LT(RmsError(problem.disparity(), scene), 0.06);
@@ -161,18 +161,18 @@ TEST(DepthValuesChoice, ARelativeMapOfASharpPhotographIsRefusedWithWhatToState) 
   DepthMap map = MapOf(sharp, 1 / 60.0, -1.8);
   map.meaning.is_relative = true;
   const auto refused = [&](const EstimateOptions& options) {
-    return ErrorOf([&] { PrepareProblem(PhotoOf(sharp), map, {}, options, nullptr, OneThread()); });
+    return ErrorOf([&] { PrepareProblem(PhotoOf(sharp), map, {}, options, nullptr, OnOneThread()); });
   };
-  EXPECT_THAT(refused(FiveViews()), AllOf(HasSubstr("map: its scale and its offset are not known"),
+  EXPECT_THAT(refused(RefinedBy()), AllOf(HasSubstr("map: its scale and its offset are not known"),
                                           HasSubstr("<depth.meaning.disparity_scale> and "
                                                     "<depth.meaning.disparity_offset_px>")));
-  EstimateOptions stated = FiveViews();
+  EstimateOptions stated = RefinedBy();
   SceneSolver solver;
   solver.photo = PhotoKind::kSharp;
   stated.solver = solver;
   EXPECT_THAT(refused(stated), HasSubstr("a sharp photograph (<solver.photo>)"));
   map.values.assign(map.values.size(), 7);
-  EXPECT_THAT(refused(FiveViews()), HasSubstr("all of its values are equal"));
+  EXPECT_THAT(refused(RefinedBy()), HasSubstr("all of its values are equal"));
 }
 
 TEST(DepthValuesChoice, ARelativeMapStatesNothingButWhichValuesAreNear) {
