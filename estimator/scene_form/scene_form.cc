@@ -27,8 +27,8 @@ std::string PlaneComplaint(const char* name, int width_px, int height_px, int ch
   if (values.size() != count) {
     return fmt::format("{}: {} values: {} are needed", name, values.size(), count);
   }
-  const auto wrong = std::find_if(values.begin(), values.end(),
-                                  [](float value) { return !std::isfinite(value); });
+  const auto wrong =
+      std::find_if(values.begin(), values.end(), [](float value) { return !std::isfinite(value); });
   if (wrong == values.end()) return "";
   const auto pixel = static_cast<std::size_t>(wrong - values.begin()) / Index(channels);
   return fmt::format("{}: the value at ({}, {}) is {}: it must be finite", name,
@@ -50,8 +50,8 @@ std::string Complaint(const SceneForm& scene) {
                        radiance.values, frame, frame.channels);
   if (!why.empty()) return why;
   const DisparityMap& disparity = scene.disparity;
-  why = PlaneComplaint("disparity", disparity.width_px, disparity.height_px, 1,
-                       disparity.disparity, frame, 1);
+  why = PlaneComplaint("disparity", disparity.width_px, disparity.height_px, 1, disparity.disparity,
+                       frame, 1);
   if (!why.empty()) return why;
   if (!disparity.step.allFinite()) {
     return fmt::format("disparity.step is ({}, {}): both must be finite", disparity.step.x(),

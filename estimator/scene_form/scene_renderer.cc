@@ -62,8 +62,7 @@ std::vector<std::pair<double, double>> NodesOf(int count) {
   }
   const double inner = (1 - 1 / std::sqrt(3.0)) * count / 4;
   const double outer = (1 + 1 / std::sqrt(3.0)) * count / 4;
-  for (const double place : {-outer, -inner, inner, outer})
-    nodes.emplace_back(place, 1.0 / kNodes);
+  for (const double place : {-outer, -inner, inner, outer}) nodes.emplace_back(place, 1.0 / kNodes);
   return nodes;
 }
 
@@ -108,8 +107,8 @@ model::LinearImage RefocusScene(const SceneForm& scene, double disparity,
   const DisparityRenderer geometry(map);
   const ImageWarper image(scene.radiance, map);
   const std::vector<PlacedView> views = ViewsWithWeight(scene.frame, weights);
-  model::LinearImage sum{scene.radiance.width_px, scene.radiance.height_px,
-                         scene.radiance.channels, {}};
+  model::LinearImage sum{
+      scene.radiance.width_px, scene.radiance.height_px, scene.radiance.channels, {}};
   sum.values.assign(scene.radiance.values.size(), 0.0F);
   // As many views at a time as there are threads; each is added in its turn, so that the sum is the
   // same for any number of them.

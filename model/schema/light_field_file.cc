@@ -327,10 +327,9 @@ LightFieldDescription ParseLightFieldDescription(const std::string& text,
   const YamlNode root = YamlNode::Parse(text, source_name);
   const bool is_scene = root.HasSchema(kSchemaOfScene);
   if (!is_scene) root.RequireSchema(kSchemaOfViews);
-  std::vector<std::string> keys = {"schema",          "views",   "size",    "channels",
-                                   "transfer",        "disparity", "landing_step_px", "weights",
-                                   "camera",          "planes",  "steps",   "st_origin_index",
-                                   "origin"};
+  std::vector<std::string> keys = {
+      "schema",  "views",  "size",   "channels", "transfer",        "disparity", "landing_step_px",
+      "weights", "camera", "planes", "steps",    "st_origin_index", "origin"};
   if (is_scene) {
     keys.emplace_back("scene");
   } else {

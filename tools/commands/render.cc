@@ -103,8 +103,7 @@ void CheckUsage(RenderOptions* options) {
         fmt::format("exactly one of {} is expected, found {}", kWhatToRender,
                     asked.empty() ? "none" : fmt::format("{}", fmt::join(asked, ", "))));
   }
-  const bool averages =
-      options->as_captured || IsFocused(*options) || options->animate == "focus";
+  const bool averages = options->as_captured || IsFocused(*options) || options->animate == "focus";
   const char* const kAverages = "--as-captured, --focus, --focus-disparity or --animate focus";
   RefuseUnless(averages, !options->aperture_shape.empty(), "--aperture-shape", kAverages);
   RefuseUnless(averages, options->aperture_radius.has_value(), "--aperture", kAverages);
@@ -274,8 +273,7 @@ Source ReadSource(const RenderOptions& options, const RunControl& run) {
   return source;
 }
 
-Rendering RenderFocused(const RenderOptions& options, const Source& source,
-                        const RunControl& run) {
+Rendering RenderFocused(const RenderOptions& options, const Source& source, const RunControl& run) {
   const LightField& light_field = source.light_field;
   FocusOptions asked;
   asked.depth_mm = options.focus_mm;
@@ -538,8 +536,8 @@ CommandResult Animate(const RenderOptions& options) {
         options.light_field));
   }
   const SceneForm scene = ReadSceneForm(options.light_field, run.control());
-  const std::string bytes = WithOptionNames(
-      run.names(), [&] { return RenderAnimation(scene, asked, run.control()); });
+  const std::string bytes =
+      WithOptionNames(run.names(), [&] { return RenderAnimation(scene, asked, run.control()); });
   ThrowIfCancelled();
   output.Commit(bytes);
 
@@ -563,8 +561,11 @@ CommandResult Animate(const RenderOptions& options) {
 
 void AddWhatToRender(CLI::App* command, RenderOptions* options) {
   command->add_flag("--as-captured", options->as_captured, "Photograph through the whole aperture");
-  command->add_option("--view", options->view, "One view: its indices from 0, or centre; numbers between them for a light field "
-                  "that is stored as its scene")
+  command
+      ->add_option(
+          "--view", options->view,
+          "One view: its indices from 0, or centre; numbers between them for a light field "
+          "that is stored as its scene")
       ->type_name("U,V");
   command
       ->add_option("--focus", options->focus_mm,
@@ -589,10 +590,11 @@ void AddWhatToRender(CLI::App* command, RenderOptions* options) {
       ->check(CLI::IsMember({"thicklens", "hci", "thicklens-tiff"}))
       ->type_name("LAYOUT");
   command
-      ->add_option("--animate", options->animate,
-                   "Animation that repeats, as a WebP file: parallax (the viewpoint goes around the "
-                   "aperture) or focus (it goes from far to near and back); of a light field that "
-                   "is stored as its scene")
+      ->add_option(
+          "--animate", options->animate,
+          "Animation that repeats, as a WebP file: parallax (the viewpoint goes around the "
+          "aperture) or focus (it goes from far to near and back); of a light field that "
+          "is stored as its scene")
       ->check(CLI::IsMember({"parallax", "focus"}))
       ->type_name("WHAT");
 }

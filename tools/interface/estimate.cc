@@ -410,7 +410,7 @@ estimator::ConfidenceShares KeepScene(const PreparedProblem& prepared, int threa
 
 // Hands on the views and the confidence that the solver did not.
 void GiveRemaining(const PreparedProblem& prepared, int threads, CountingSink* sink, Solved* solved,
-              LightFieldEstimate* estimate) {
+                   LightFieldEstimate* estimate) {
   LightField& light_field = estimate->light_field;
   const auto give_view = [&](int k, int l) {
     if (light_field.IsPresent(k, l)) sink->TakeView(k, l, model::ViewImage(light_field, k, l));

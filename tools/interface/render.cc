@@ -229,10 +229,10 @@ Image Refocus(const LightField& light_field, const FocusOptions& options, const 
   const RunScope run(control);
   RenderSummary found;
   found.disparity_px = DisparityInFocus(light_field, options, run);
-  Image image = ImageOf(
-      estimator::Refocus(light_field, found.disparity_px.x(), found.disparity_px.y(),
-                         WeightsOf(options.aperture, light_field, &found), control.threads),
-      light_field);
+  Image image =
+      ImageOf(estimator::Refocus(light_field, found.disparity_px.x(), found.disparity_px.y(),
+                                 WeightsOf(options.aperture, light_field, &found), control.threads),
+              light_field);
   if (summary != nullptr) *summary = std::move(found);
   return image;
 }
@@ -250,11 +250,10 @@ Image Refocus(const SceneForm& scene, const FocusOptions& options, const RunCont
   const bool along_u = std::abs(step.x()) >= std::abs(step.y());
   const double px = along_u ? found.disparity_px.x() : found.disparity_px.y();
   const double px_per_unit = along_u ? step.x() : step.y();
-  Image image =
-      ImageOf(estimator::RefocusScene(scene, px_per_unit != 0 ? px / px_per_unit : 0,
-                                      WeightsOf(options.aperture, scene.frame, &found),
-                                      control.threads),
-              scene.frame);
+  Image image = ImageOf(
+      estimator::RefocusScene(scene, px_per_unit != 0 ? px / px_per_unit : 0,
+                              WeightsOf(options.aperture, scene.frame, &found), control.threads),
+      scene.frame);
   if (summary != nullptr) *summary = std::move(found);
   return image;
 }

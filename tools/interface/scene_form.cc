@@ -55,10 +55,9 @@ Image RenderView(const SceneForm& scene, double u, double v) {
   }
   model::LinearImage view = estimator::SceneRenderer(scene).View(u - (frame.u_count - 1) / 2.0,
                                                                  v - (frame.v_count - 1) / 2.0);
-  Image image = Image::FromLight(view.width_px, view.height_px,
-                                 view.channels == 1 ? ChannelOrder::kGrey : ChannelOrder::kRgb,
-                                 std::move(view.values), frame.transfer,
-                                 fmt::format("view ({:g}, {:g})", u, v));
+  Image image = Image::FromLight(
+      view.width_px, view.height_px, view.channels == 1 ? ChannelOrder::kGrey : ChannelOrder::kRgb,
+      std::move(view.values), frame.transfer, fmt::format("view ({:g}, {:g})", u, v));
   image.SetColourProfile(frame.colour_profile);
   return image;
 }

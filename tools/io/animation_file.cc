@@ -26,8 +26,8 @@ std::string EncodeWebpAnimation(const AnimationFile& animation) {
         throw Error(fmt::format(
             "frame {} has {}x{} px in {} channel(s) of {} bits: {}x{} px in 1 or 3 of 8 bits are "
             "needed",
-            number, image.width_px, image.height_px, image.channels, image.bits,
-            animation.width_px, animation.height_px));
+            number, image.width_px, image.height_px, image.channels, image.bits, animation.width_px,
+            animation.height_px));
       }
       cv::Mat pixels(image.height_px, image.width_px, CV_8UC(image.channels));
       auto value = image.values.begin();
@@ -43,8 +43,7 @@ std::string EncodeWebpAnimation(const AnimationFile& animation) {
     }
   };
   std::string bytes, why;
-  const bool done =
-      LoadedImageLibrary().encode_animation(frames, animation.quality, &bytes, &why);
+  const bool done = LoadedImageLibrary().encode_animation(frames, animation.quality, &bytes, &why);
   if (failure) std::rethrow_exception(failure);
   if (!done) throw Error("animation: " + why);
   return bytes;

@@ -66,10 +66,10 @@ void ForEachValue(const cv::Mat& image, const Take& take) {
 model::LinearImage ReadRadiance(const std::string& path, const model::LightField& frame,
                                 const model::ScenePlanes& planes) {
   const bool is_whole = planes.radiance_bits == 16;
-  const cv::Mat image = ReadPlane(
-      path, frame, CV_MAKETYPE(is_whole ? CV_16U : CV_32F, frame.channels),
-      is_whole ? "whole numbers of 16 bits in the channels of the light field"
-               : "floats in the channels of the light field");
+  const cv::Mat image =
+      ReadPlane(path, frame, CV_MAKETYPE(is_whole ? CV_16U : CV_32F, frame.channels),
+                is_whole ? "whole numbers of 16 bits in the channels of the light field"
+                         : "floats in the channels of the light field");
   model::LinearImage light{image.cols, image.rows, image.channels(), {}};
   light.values.reserve(image.total() * static_cast<std::size_t>(image.channels()));
   if (is_whole) {
@@ -126,12 +126,11 @@ estimator::SceneForm ReadSceneForm(const std::string& folder) {
   const std::string radiance_path = PathIn(folder, model::kSceneRadianceFile);
   const std::string disparity_path = PathIn(folder, model::kSceneDisparityFile);
   scene.radiance = ReadRadiance(radiance_path, scene.frame, planes);
-  const cv::Mat disparity = ReadPlane(disparity_path, scene.frame, CV_32FC1,
-                                      "floats in one channel");
+  const cv::Mat disparity =
+      ReadPlane(disparity_path, scene.frame, CV_32FC1, "floats in one channel");
   scene.disparity = {disparity.cols, disparity.rows, {}, planes.disparity_step};
   scene.disparity.disparity.reserve(disparity.total());
-  ForEachValue<float>(disparity,
-                      [&](float value) { scene.disparity.disparity.push_back(value); });
+  ForEachValue<float>(disparity, [&](float value) { scene.disparity.disparity.push_back(value); });
   if (description.has_confidence) {
     const cv::Mat confidence = ReadPlane(PathIn(folder, model::kSceneConfidenceFile), scene.frame,
                                          CV_8UC1, "bytes in one channel");
@@ -140,8 +139,7 @@ estimator::SceneForm ReadSceneForm(const std::string& folder) {
                                [&](std::uint8_t value) { scene.confidence.push_back(value); });
   }
   if (planes.has_colour_profile) {
-    scene.frame.colour_profile =
-        ReadWholeFile(PathIn(folder, model::kSceneProfileFile));
+    scene.frame.colour_profile = ReadWholeFile(PathIn(folder, model::kSceneProfileFile));
   }
   std::string why;
   if (!scene.IsValid(&why)) throw Error(fmt::format("{}: {}", folder, why));
@@ -169,8 +167,8 @@ void WriteSceneForm(const estimator::SceneForm& scene, OutputFolder* folder) {
   if (!scene.IsValid(&why)) throw Error("scene: " + why);
   const model::LightField& frame = scene.frame;
   if (frame.channels != 1 && frame.channels != 3) {
-    throw Error(fmt::format("scene: channels is {}: image files have 1 (grey) or 3 (RGB)",
-                            frame.channels));
+    throw Error(
+        fmt::format("scene: channels is {}: image files have 1 (grey) or 3 (RGB)", frame.channels));
   }
   model::LightFieldDescription description;
   description.light_field = model::DescriptionOf(frame);
@@ -179,11 +177,11 @@ void WriteSceneForm(const estimator::SceneForm& scene, OutputFolder* folder) {
   planes.disparity_step = scene.disparity.step;
   planes.has_colour_profile = !frame.colour_profile.empty();
   const std::vector<std::uint16_t> whole = WholeNumbersOf(scene.radiance.values, &planes);
-  folder->WriteWith(model::kSceneRadianceFile, [&](const std::string& path,
-                                                   const std::string& shown) {
-    if (whole.empty()) return WriteFloatTiff(scene.radiance, path, shown);
-    WriteWholeTiff(whole, frame.s_count, frame.t_count, frame.channels, path, shown);
-  });
+  folder->WriteWith(
+      model::kSceneRadianceFile, [&](const std::string& path, const std::string& shown) {
+        if (whole.empty()) return WriteFloatTiff(scene.radiance, path, shown);
+        WriteWholeTiff(whole, frame.s_count, frame.t_count, frame.channels, path, shown);
+      });
   folder->WriteWith(
       model::kSceneDisparityFile, [&](const std::string& path, const std::string& shown) {
         WriteFloatTiff({frame.s_count, frame.t_count, 1, scene.disparity.disparity}, path, shown);
@@ -191,8 +189,7 @@ void WriteSceneForm(const estimator::SceneForm& scene, OutputFolder* folder) {
   if (description.has_confidence) {
     folder->Write(model::kSceneConfidenceFile, EncodeBytesPng(scene.confidence, frame.s_count));
   }
-  if (planes.has_colour_profile)
-    folder->Write(model::kSceneProfileFile, frame.colour_profile);
+  if (planes.has_colour_profile) folder->Write(model::kSceneProfileFile, frame.colour_profile);
   description.camera_file = WriteCameraOfLightField(frame, folder);
   folder->Write(kLightFieldMarker, model::LightFieldDescriptionToYaml(description));
 }

@@ -199,18 +199,20 @@ void AddOutputOptions(CLI::App* command, EstimateOptions* options) {
       ->type_name("LF");
   AddViewsOption(command, &options->views, "Number of views across and down; default 7x7");
   command
-      ->add_option("--store", options->store,
-                   "How the light field is stored: scene (light and disparity of the points that "
-                   "the centre view shows, in three files, from which every view follows), views "
-                   "(an image file for each), or auto (scene, unless --format, --fill telea, another "
-                   "solver or a target of time or quality asks for views)")
+      ->add_option(
+          "--store", options->store,
+          "How the light field is stored: scene (light and disparity of the points that "
+          "the centre view shows, in three files, from which every view follows), views "
+          "(an image file for each), or auto (scene, unless --format, --fill telea, another "
+          "solver or a target of time or quality asks for views)")
       ->check(CLI::IsMember({"auto", "scene", "views"}))
       ->capture_default_str()
       ->type_name("FORM");
   command
       ->add_option(
           "--format", options->format,
-          "Format of views that are stored: png (16 bit, encoded values), tiff (float, linear light, which "
+          "Format of views that are stored: png (16 bit, encoded values), tiff (float, linear "
+          "light, which "
           "keeps what is brighter than full scale) or auto (tiff if highlights of the photograph "
           "are clipped and estimated, otherwise png)")
       ->check(CLI::IsMember({"auto", "png", "tiff"}))

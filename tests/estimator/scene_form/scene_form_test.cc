@@ -34,8 +34,7 @@ SceneForm SquareBeforeWall(int u_count, int v_count) {
   scene.frame.u_count = u_count;
   scene.frame.v_count = v_count;
   scene.frame.channels = 3;
-  scene.frame.weights =
-      model::ApertureWeights(model::ApertureShape::kUniform, u_count, v_count);
+  scene.frame.weights = model::ApertureWeights(model::ApertureShape::kUniform, u_count, v_count);
   scene.radiance = {kWidth, kHeight, 3, {}};
   scene.disparity = {kWidth, kHeight, {}, {1, 1}};
   std::mt19937 engine(11);
@@ -43,8 +42,8 @@ SceneForm SquareBeforeWall(int u_count, int v_count) {
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 0; x < kWidth; ++x) {
       const bool is_near = x > 20 && x < 40 && y > 15 && y < 33;
-      scene.disparity.disparity.push_back(
-          is_near ? 1.5F : static_cast<float>(-1 + 0.01 * x + 0.004 * y));
+      scene.disparity.disparity.push_back(is_near ? 1.5F
+                                                  : static_cast<float>(-1 + 0.01 * x + 0.004 * y));
       scene.confidence.push_back(ConfidenceOfPoint(is_near ? 1 : 0.8, is_near ? 4 : 1));
       for (int c = 0; c < 3; ++c) scene.radiance.values.push_back(light(engine));
     }
@@ -137,8 +136,7 @@ TEST(SceneForm, ARefocusedImageIsTheMeanOfDisplacedViews) {
     for (int y = kBorderPx; y < kHeight - kBorderPx; ++y) {
       for (int x = kBorderPx; x < kWidth - kBorderPx; ++x) {
         const std::size_t i = 3 * static_cast<std::size_t>(y * kWidth + x);
-        ASSERT_NEAR(image.values[i], by_views.values[i], 3e-6)
-            << focus_px << ": " << x << ' ' << y;
+        ASSERT_NEAR(image.values[i], by_views.values[i], 3e-6) << focus_px << ": " << x << ' ' << y;
       }
     }
   }
@@ -181,7 +179,8 @@ TEST(SceneForm, AFewViewsTellTheSharesOfAllRays) {
     std::array<std::size_t, 256> counts{};
     for (const Confidence confidence : RayConfidenceOf(scene, 2)) ++counts[confidence];
     const ConfidenceShares all = SharesOf(counts), found = RaySharesOf(scene, 2);
-    const double bound = count <= 4 ? 1e-12 : 0.01;  // a sample is seen or not: small images are coarse
+    const double bound =
+        count <= 4 ? 1e-12 : 0.01;  // a sample is seen or not: small images are coarse
     EXPECT_NEAR(found.visible, all.visible, bound) << count;
     EXPECT_NEAR(found.partly_visible, all.partly_visible, bound) << count;
     EXPECT_NEAR(found.blurred, all.blurred, bound) << count;

@@ -127,9 +127,8 @@ TEST_F(EstimateSceneTest, OccludedRaysMayBeInpainted) {
 }
 
 TEST_F(EstimateSceneTest, WritesTheConfidenceOfEachRay) {
-  const json summary = Summary(
-      {Image(), Depth(Strip), "--depth-kind", "disparity", "--views", "3x3", "--threads", "2",
-       "--store", "views"});
+  const json summary = Summary({Image(), Depth(Strip), "--depth-kind", "disparity", "--views",
+                                "3x3", "--threads", "2", "--store", "views"});
   std::size_t filled = 0, whole = 0;
   for (int l = 0; l < 3; ++l) {
     for (int k = 0; k < 3; ++k) {

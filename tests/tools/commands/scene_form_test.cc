@@ -43,8 +43,8 @@ class SceneFormCommandTest : public ::testing::Test, protected EstimateCommand {
     for (int i = 0; i < kColumns * kRows * 3; ++i) {
       const double x = i / 3 % kColumns, y = i / 3 / kColumns;
       const double value = 120 + 40 * std::sin(0.35 * x + i % 3) + 30 * std::sin(0.3 * y);
-      image.values.push_back(static_cast<std::uint16_t>(
-          std::lround(std::clamp(value + noise(engine), 0.0, 255.0))));
+      image.values.push_back(
+          static_cast<std::uint16_t>(std::lround(std::clamp(value + noise(engine), 0.0, 255.0))));
     }
     return folder_.Put("picture.png", io::EncodePng(image));
   }
@@ -148,17 +148,16 @@ TEST_F(SceneFormCommandTest, RendersViewsBetweenTheViews) {
 }
 
 TEST_F(SceneFormCommandTest, AReportShowsItsViews) {
-  const json summary =
-      Summary(With(Usual(), {"--store", "scene", "--report", folder_ / "page"}));
+  const json summary = Summary(With(Usual(), {"--store", "scene", "--report", folder_ / "page"}));
   EXPECT_EQ(summary["stored"], "scene");
   EXPECT_TRUE(fs::exists(folder_ / "page/index.html"));
   EXPECT_TRUE(fs::exists(fs::path(Output()) / "radiance.tiff"));
 }
 
 TEST_F(SceneFormCommandTest, ACamerasDepthsAreKept) {
-  const std::string camera = folder_.Put(
-      "camera.yaml", model::CameraToYaml(thicklens::testing::PhotographCamera(
-                         kColumns, kRows, model::TransferCurve::Srgb())));
+  const std::string camera =
+      folder_.Put("camera.yaml", model::CameraToYaml(thicklens::testing::PhotographCamera(
+                                     kColumns, kRows, model::TransferCurve::Srgb())));
   model::RawDepthMap map{kColumns, kRows, {}, false};
   for (int i = 0; i < kColumns * kRows; ++i)
     map.values.push_back(static_cast<float>(i % kColumns < 40 ? 700 : 1000));

@@ -78,7 +78,8 @@ TEST(DepthValuesChoice, AWrongScaleIsCorrected) {
   const SteppedScene scene = SceneOf(1);
   const DepthMap map = MapOf(scene, 1 / 1.12, 0);
   EstimateDiagnostics found;
-  const Problem problem = PrepareProblem(PhotoOf(scene), map, {}, RefinedBy(), &found, OnOneThread());
+  const Problem problem =
+      PrepareProblem(PhotoOf(scene), map, {}, RefinedBy(), &found, OnOneThread());
   ASSERT_TRUE(found.depth_refinement);
   EXPECT_TRUE(found.are_depth_values_wrong) << found.depth_values->message;
   EXPECT_TRUE(found.depth_refinement->applied);
@@ -161,7 +162,8 @@ TEST(DepthValuesChoice, ARelativeMapOfASharpPhotographIsRefusedWithWhatToState) 
   DepthMap map = MapOf(sharp, 1 / 60.0, -1.8);
   map.meaning.is_relative = true;
   const auto refused = [&](const EstimateOptions& options) {
-    return ErrorOf([&] { PrepareProblem(PhotoOf(sharp), map, {}, options, nullptr, OnOneThread()); });
+    return ErrorOf(
+        [&] { PrepareProblem(PhotoOf(sharp), map, {}, options, nullptr, OnOneThread()); });
   };
   EXPECT_THAT(refused(RefinedBy()), AllOf(HasSubstr("map: its scale and its offset are not known"),
                                           HasSubstr("<depth.meaning.disparity_scale> and "

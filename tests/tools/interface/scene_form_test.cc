@@ -109,9 +109,8 @@ TEST(SceneFormInterface, IsWrittenInEveryFormat) {
   EXPECT_EQ(back.disparity.disparity, scene.scene->disparity.disparity);
   WriteSceneForm(folder / "again", back);
   EXPECT_EQ(ReadSceneForm(folder / "again").radiance.values, back.radiance.values);
-  EXPECT_THAT(
-      ErrorOf([&] { WriteLightField(folder / "no", views, LightFieldFormat::kScene); }),
-      HasSubstr("LightFieldForm::kScene"));
+  EXPECT_THAT(ErrorOf([&] { WriteLightField(folder / "no", views, LightFieldFormat::kScene); }),
+              HasSubstr("LightFieldForm::kScene"));
   EXPECT_EQ(FieldOfOptionError([&] {
               WriteLightField(folder / "no", views.light_field, LightFieldFormat::kScene);
             }),
@@ -158,8 +157,7 @@ TEST(SceneFormInterface, OptionsOfAnimationsAreChecked) {
   EXPECT_EQ(field_of([](AnimationOptions* o) { o->frames = 1; }), "frames");
   EXPECT_EQ(field_of([](AnimationOptions* o) { o->seconds = std::nan(""); }), "seconds");
   EXPECT_EQ(field_of([](AnimationOptions* o) { o->quality = 101; }), "quality");
-  EXPECT_EQ(field_of([](AnimationOptions* o) { o->kind = static_cast<AnimationKind>(7); }),
-            "kind");
+  EXPECT_EQ(field_of([](AnimationOptions* o) { o->kind = static_cast<AnimationKind>(7); }), "kind");
   EXPECT_EQ(field_of([](AnimationOptions* o) { o->aperture.radius = 1; }), "aperture");
 }
 

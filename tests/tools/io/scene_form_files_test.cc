@@ -147,8 +147,7 @@ TEST_F(SceneFormFolder, AReaderOfLightFieldsGetsItsViews) {
   inner.v_count = 1;
   inner.crop = model::PixelRect{3, 2, 20, 10};
   const model::LightField part = ReadLightField(folder, inner);
-  EXPECT_EQ(part.values,
-            model::CropViews(model::InnerViews(views, 2, 1), {3, 2, 20, 10}).values);
+  EXPECT_EQ(part.values, model::CropViews(model::InnerViews(views, 2, 1), {3, 2, 20, 10}).values);
 }
 
 TEST_F(SceneFormFolder, ReplacesViewsOfAnOlderRun) {

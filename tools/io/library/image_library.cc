@@ -83,9 +83,8 @@ THICKLENS_STATE_PLUGIN_IDENTITY()
 
 extern "C" __attribute__((visibility("default"))) const thicklens::io::ImageLibrary*
 ThicklensImageLibrary() {
-  static const thicklens::io::ImageLibrary library{thicklens::io::Pages, thicklens::io::Decode,
-                                                   thicklens::io::Depth, thicklens::io::Encode,
-                                                   thicklens::io::OpenVideoFile,
-                                                   thicklens::io::EncodeAnimation};
+  static const thicklens::io::ImageLibrary library{
+      thicklens::io::Pages,  thicklens::io::Decode,        thicklens::io::Depth,
+      thicklens::io::Encode, thicklens::io::OpenVideoFile, thicklens::io::EncodeAnimation};
   return &library;
 }

@@ -74,9 +74,9 @@ THICKLENS_EXPORT std::vector<std::uint8_t> ReadConfidence(const std::string& fol
 
 // How the views are stored.
 enum class LightFieldFormat {
-  kPng,   // views of 16 bits, encoded by the light field's transfer curve and clipped
-  kTiff,  // views in float, linear light, not clipped
-  kHci,   // the HCI layout: views of 8 bits in sRGB, and parameters.cfg; no camera, no weights
+  kPng,    // views of 16 bits, encoded by the light field's transfer curve and clipped
+  kTiff,   // views in float, linear light, not clipped
+  kHci,    // the HCI layout: views of 8 bits in sRGB, and parameters.cfg; no camera, no weights
   kScene,  // the scene that the views show (scene_form.h); of an estimate that has one
 };
 

@@ -24,9 +24,9 @@ struct DepthRefinement {
   // Distances by which the map lay to the right of and below the photograph, and by which its near
   // surfaces were too wide on each side.
   double right_px = 0, down_px = 0, dilation_px = 0;
-  // Scale and offset (px per view step) by which the disparities were changed to agree with the blur
-  // of the photograph, with standard deviations. RefineDepth leaves them alone; an estimate corrects
-  // them afterwards (FitDepthValues).
+  // Scale and offset (px per view step) by which the disparities were changed to agree with the
+  // blur of the photograph, with standard deviations. RefineDepth leaves them alone; an estimate
+  // corrects them afterwards (FitDepthValues).
   double scale = 1, offset_px = 0, scale_sigma = 0, offset_sigma_px = 0;
   // Share of the pixels that changed by more than half of the smallest jump.
   double changed_share = 0;

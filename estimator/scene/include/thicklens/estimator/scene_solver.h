@@ -99,8 +99,8 @@ struct SceneSummary : SolverResult, SceneDiagnostics {
 // The estimate and maps of its quality. All have the size of the image except the last.
 struct SceneMaps {
   model::LinearImage radiance;  // radiance of the scene's points, as the centre view shows them
-  std::vector<Confidence> of_points;  // confidence of the same points; empty if it is not wanted
-  std::vector<float> residual;  // H r - I in encoded values, the channels' mean
+  std::vector<Confidence> of_points;     // confidence of the same points; empty if it is not wanted
+  std::vector<float> residual;           // H r - I in encoded values, the channels' mean
   std::vector<float> occluded_fraction;  // share of the aperture that sees a pixel past an edge
   std::vector<float> blur_sigma_px;      // blur of the photograph, by the depth
   // Confidence of all rays, view by view, row by row; empty if a sink gets the views.
