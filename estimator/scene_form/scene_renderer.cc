@@ -110,8 +110,8 @@ model::LinearImage RefocusScene(const SceneForm& scene, double disparity,
   model::LinearImage sum{
       scene.radiance.width_px, scene.radiance.height_px, scene.radiance.channels, {}};
   sum.values.assign(scene.radiance.values.size(), 0.0F);
-  // As many views at a time as there are threads; each is added in its turn, so that the sum is the
-  // same for any number of them.
+  // Views are rendered as many at a time as there are threads. Each is added in its turn, so that
+  // the sum is the same for any number of them.
   const int at_once = ResolveThreads(threads);
   std::vector<model::LinearImage> rendered(Index(at_once));
   const int count = static_cast<int>(views.size());

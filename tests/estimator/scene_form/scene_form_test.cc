@@ -121,8 +121,8 @@ TEST(SceneForm, AViewBetweenViewsShowsADisplacedRamp) {
   }
 }
 
-// With a whole disparity in focus, each view is displaced by whole pixels, and the mean of the
-// displaced views needs no interpolation.
+// Views are displaced by whole pixels where the disparity in focus is whole, and their mean needs
+// no interpolation.
 TEST(SceneForm, ARefocusedImageIsTheMeanOfDisplacedViews) {
   const SceneForm scene = SquareBeforeWall(5, 3);
   Eigen::ArrayXXd weights = scene.frame.weights;

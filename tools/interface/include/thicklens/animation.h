@@ -10,7 +10,7 @@
 
 namespace thicklens {
 
-// What changes from frame to frame.
+// The kind of animation: what changes from frame to frame.
 enum class AnimationKind {
   // The viewpoint goes once around the aperture, on the ellipse through the outermost views of the
   // middle row and column.

@@ -79,8 +79,8 @@ struct FocusOptions {
 // a depth without a camera, and for a disparity, px per view step, above the size of the views.
 THICKLENS_EXPORT Image Refocus(const LightField& light_field, const FocusOptions& options,
                                const RunControl& run = {}, RenderSummary* summary = nullptr);
-// The same of a light field that is stored as its scene: each view is rendered where it is needed,
-// so that its samples are interpolated once, and beyond the borders of the views as well.
+// Refocuses a light field that is stored as its scene. Each view is rendered where it is needed, so
+// that its samples are interpolated once, and beyond the borders of the views as well.
 THICKLENS_EXPORT Image Refocus(const SceneForm& scene, const FocusOptions& options,
                                const RunControl& run = {}, RenderSummary* summary = nullptr);
 
