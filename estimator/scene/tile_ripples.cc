@@ -582,7 +582,7 @@ double TileRipples::Of(std::size_t tile, double disparity) const {
   const TileEvidence& evidence = evidence_[tile];
   const std::size_t count = evidence.of_level.size();
   const double at = std::abs(disparity);
-  if (count < 2) return 0;
+  if (count < 2 || !std::isfinite(at)) return 0;
   if (at <= levels[evidence.first]) return evidence.of_level.front();
   if (at >= levels[evidence.first + count - 1])
     return by_blur_ ? evidence.of_level.back() : std::min(0.0, evidence.of_level.back());

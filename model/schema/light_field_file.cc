@@ -167,20 +167,11 @@ void ReadViewFormats(const YamlNode& root, LightFieldDescription* description) {
 
 // How the values are stored of a light field that is kept as its scene.
 void ReadScene(const YamlNode& node, LightFieldDescription* description) {
-  node.RequireKeys({"radiance", "radiance_bits", "radiance_offset", "radiance_scale", "disparity",
-                    "disparity_step", "confidence", "colour_profile"});
+  node.RequireKeys(
+      {"radiance", "radiance_bits", "disparity", "disparity_step", "confidence", "colour_profile"});
   ScenePlanes& planes = description->scene.emplace();
   node.At("radiance").OneOf({kSceneRadianceFile});
   planes.radiance_bits = node.At("radiance_bits").OneOf({"16", "32"}) == "16" ? 16 : 32;
-  const bool is_whole = planes.radiance_bits == 16;
-  for (const char* key : {"radiance_offset", "radiance_scale"}) {
-    if (const auto number = node.Find(key); number && !is_whole)
-      throw number->ErrorHere("this key requires 'radiance_bits: 16'");
-  }
-  if (is_whole) {
-    planes.radiance_offset = node.At("radiance_offset").Number();
-    planes.radiance_scale = node.At("radiance_scale").PositiveNumber();
-  }
   node.At("disparity").OneOf({kSceneDisparityFile});
   planes.disparity_step = ReadPair(node.At("disparity_step"));
   if (const auto confidence = node.Find("confidence")) {
@@ -240,10 +231,6 @@ class DescriptionWriter {
     out_.BeginMap("scene");
     out_.Text("radiance", kSceneRadianceFile);
     out_.Text("radiance_bits", std::to_string(planes.radiance_bits));
-    if (planes.radiance_bits == 16) {
-      Number("radiance_offset", planes.radiance_offset);
-      Number("radiance_scale", planes.radiance_scale);
-    }
     out_.Text("disparity", kSceneDisparityFile);
     Point("disparity_step", planes.disparity_step);
     if (description_.has_confidence) out_.Text("confidence", kSceneConfidenceFile);

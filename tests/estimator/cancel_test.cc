@@ -4,10 +4,12 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <csignal>
 #include <cstddef>
 #include <ctime>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <random>
 
@@ -85,9 +87,14 @@ TEST(CancelledProjection, EndsInAFractionOfItsTime) {
   const auto work = [&] {
     MakeSceneProjection<float>(input.disparity, input.weights, ProjectionOptions());
   };
-  const double start_s = CpuNow();
-  work();
-  const double whole_s = CpuNow() - start_s;
+  // The least of several runs: on a busy machine some take longer, and the work must not end before
+  // it is cancelled.
+  double whole_s = std::numeric_limits<double>::infinity();
+  for (int run = 0; run < 4; ++run) {
+    const double start_s = CpuNow();
+    work();
+    whole_s = std::min(whole_s, CpuNow() - start_s);
+  }
   for (const double share : {0.2, 0.4, 0.6}) {
     EXPECT_LT(CpuSecondsAfterCancel(share * whole_s, work), whole_s / 10) << share << " of it";
   }

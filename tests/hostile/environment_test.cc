@@ -17,9 +17,9 @@ class HostileEnvironment : public HostileTest {
  protected:
   // Returns the results of estimate and calibrate, without what differs from run to run.
   std::string Results(const std::string& name) {
-    return testing::ContentOf(Work(name + "/radiance.tiff")) +
-           testing::ContentOf(Work(name + "/disparity.tiff")) +
-           testing::ContentOf(Work(name + "/confidence.png"));
+    return testing::ContentOf(Work(name + "/scene/radiance.tiff")) +
+           testing::ContentOf(Work(name + "/scene/disparity.tiff")) +
+           testing::ContentOf(Work(name + "/scene/confidence.png"));
   }
   // Each setting gives the outputs of a usual run.
   void ExpectNoDifference(const std::vector<std::string>& settings) {

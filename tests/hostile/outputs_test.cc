@@ -227,7 +227,8 @@ THICKLENS_SITUATION(HostileOutputs, PermissionsThatTheUserWants,
       };
       EXPECT_EQ(mode("new.json"), 0666U & bits);
       EXPECT_EQ(mode("new"), 0777U & bits);
-      EXPECT_EQ(mode("new/views"), 0777U & bits);
+      EXPECT_EQ(mode("new/scene"), 0777U & bits);
+      EXPECT_EQ(mode("new/scene/radiance.tiff"), 0666U & bits);
       EXPECT_EQ(mode("new/lightfield.yaml"), 0666U & bits);
     }
     fs::remove_all(Work("new"));

@@ -92,6 +92,13 @@ void RefuseUnless(bool fits, bool given, const char* option, const char* goes_wi
   if (given && !fits) throw UsageError(fmt::format("{}: requires {}", option, goes_with));
 }
 
+// Whether the folder is read as thicklens stores it, without another order of the views.
+bool IsReadAsStored(const LightFieldReadOptions& reading) {
+  return (reading.layout.empty() || reading.layout == "thicklens") && reading.view_name.empty() &&
+         reading.hci_grid == 0 && !reading.view_order.swap && !reading.view_order.mirror_u &&
+         !reading.view_order.mirror_v;
+}
+
 void CheckUsage(RenderOptions* options) {
   std::vector<std::string> asked = AskedFor(*options);
   if (asked.empty() && options->aperture_radius) {  // another aperture, otherwise as captured
@@ -117,6 +124,13 @@ void CheckUsage(RenderOptions* options) {
                "--as-captured");
   RefuseUnless(!options->animate.empty(), options->frames.has_value(), "--frames", "--animate");
   RefuseUnless(!options->animate.empty(), options->seconds.has_value(), "--seconds", "--animate");
+  const LightFieldReadOptions reading = LightFieldReadOptionsOf(options->reading);
+  if (!options->animate.empty() && (!IsReadAsStored(reading) || reading.inner_views ||
+                                    reading.crop || reading.allow_missing_views)) {
+    throw UsageError(
+        "--animate shows the whole light field as it is stored, and excludes --views, --crop, "
+        "--sparse, --layout, --name, --grid and --view-order");
+  }
   const bool is_image = options->convert.empty() && options->animate.empty();
   const char* const kImages = "an image as output, not --convert or --animate";
   RefuseUnless(is_image, options->noise_levels.has_value(), "--noise", kImages);
@@ -258,18 +272,20 @@ bool IsOfTheScene(const RenderOptions& options) {
   return options.convert.empty() && (IsFocused(options) || !options.view.empty());
 }
 
-// Reads what the rendering needs. Inner views, other orders and parts are those of views.
+// Reads what the rendering needs.
 Source ReadSource(const RenderOptions& options, const RunControl& run) {
   const LightFieldReadOptions reading = LightFieldReadOptionsOf(options.reading);
-  const bool is_whole = !reading.inner_views && !reading.crop && !reading.view_order.swap &&
-                        !reading.view_order.mirror_u && !reading.view_order.mirror_v;
   Source source;
-  if (is_whole && IsOfTheScene(options) && IsSceneForm(options.light_field)) {
-    source.scene = ReadSceneForm(options.light_field, run);
-    source.light_field = source.scene->frame;
-  } else {
+  if (!IsReadAsStored(reading) || !IsOfTheScene(options) || !IsSceneForm(options.light_field)) {
     source.light_field = ReadLightField(options.light_field, reading, run);
+    return source;
   }
+  source.scene = ReadSceneForm(options.light_field, run);
+  LightField& frame = source.scene->frame;
+  // Inner views are at the same places on the aperture, and a part of each is cut out at the end.
+  if (reading.inner_views)
+    frame = model::InnerViews(frame, reading.inner_views->u, reading.inner_views->v);
+  source.light_field = reading.crop ? model::CropViews(frame, *reading.crop) : frame;
   return source;
 }
 
@@ -320,21 +336,30 @@ Rendering RenderView(const RenderOptions& options, const Source& source) {
   Rendering rendering;
   rendering.what = fmt::format("view ({:g}, {:g})", u, v);
   rendering.details = {{"rendered", "view"}, {"u", u}, {"v", v}};
+  if (place.is_whole()) {
+    rendering.details["u"] = static_cast<int>(u);
+    rendering.details["v"] = static_cast<int>(v);
+  }
   if (source.scene) {
     rendering.image = thicklens::RenderView(*source.scene, u, v);
     return rendering;
   }
   if (!place.is_whole()) {
+    const std::string what = fmt::format("--view {:g},{:g}: ", u, v);
+    if (IsSceneForm(options.light_field)) {
+      throw Error(what +
+                  "views between the views exclude --layout, --name, --grid and "
+                  "--view-order");
+    }
     throw Error(fmt::format(
-        "--view {:g},{:g}: {} holds views, and none between them; give whole numbers, or estimate "
-        "it with --store scene",
-        u, v, options.light_field));
+        "{}{} holds views, and none between them; give whole numbers, or estimate it with --store "
+        "scene",
+        what, options.light_field));
   }
   const auto k = static_cast<int>(u), l = static_cast<int>(v);
   if (!light_field.IsPresent(k, l))
     throw Error(fmt::format("--view {},{}: {} has no such view", k, l, options.light_field));
   rendering.image = ViewOf(light_field, k, l);
-  rendering.details = {{"rendered", "view"}, {"u", k}, {"v", l}};
   return rendering;
 }
 
@@ -450,6 +475,8 @@ CommandResult RenderImage(const RenderOptions& options) {
   ThrowIfCancelled();
   Rendering rendering =
       WithOptionNames(run.names(), [&] { return RenderAny(options, source, run.control()); });
+  if (source.scene && LightFieldReadOptionsOf(options.reading).crop)
+    rendering.image = rendering.image.Cropped(*LightFieldReadOptionsOf(options.reading).crop);
   ThrowIfCancelled();
 
   file.description = Description(options, rendering);

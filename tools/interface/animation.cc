@@ -19,6 +19,8 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 constexpr int kMinFrames = 2, kMaxFrames = 1000;
 constexpr double kMinSeconds = 0.1, kMaxSeconds = 3600;
+// Viewers slow down frames that are shorter.
+constexpr double kMinFrameSeconds = 0.02;
 constexpr int kMaxQuality = 100;
 constexpr int kBits = 8;
 
@@ -48,6 +50,11 @@ bool AnimationOptions::IsValid(std::string* why) const {
   if (!(seconds >= kMinSeconds && seconds <= kMaxSeconds)) {
     return checks::Unexpected(why, "seconds", "a number from 0.1 to 3600", seconds);
   }
+  if (!(seconds / frames >= kMinFrameSeconds)) {
+    return checks::Fail(why, "frames",
+                        fmt::format("{} frames in {:g} s: viewers show a frame for at least {:g} s",
+                                    frames, seconds, kMinFrameSeconds));
+  }
   if (!WholeBetween(why, "quality", 0, kMaxQuality, quality)) return false;
   if (!checks::Member(why, "aperture", aperture)) return false;
   const bool is_stated = aperture.shape || aperture.radius;
@@ -72,6 +79,7 @@ std::string RenderAnimation(const SceneForm& scene, const AnimationOptions& opti
   file.height_px = frame.t_count;
   file.seconds = options.seconds;
   file.quality = options.quality;
+  file.icc_profile = frame.colour_profile;
   file.frame = [&, far_px = far_px, near_px = near_px](int number) {
     ThrowIfCancelled();
     progress(number, options.frames);

@@ -104,11 +104,25 @@ void FindRelativeValues(const EstimateOptions& options, const PreparedProblem& p
   const auto [least, most] =
       std::minmax_element(input.disparity.disparity.begin(), input.disparity.disparity.end());
   if (!(*least < *most)) throw remedy("all of its values are equal");
+  // The unit of the values is free: as they are, they might exceed the image as disparities.
+  const float largest = std::max(std::abs(*least), std::abs(*most));
+  for (float& value : input.disparity.disparity) value /= largest;
   estimator::DepthValuesOptions search;
   search.search = estimator::DepthValuesSearch::kAll;
   search.compression_sigma = diagnostics->compression_sigma.value_or(0);
   search.threads = run->threads();
-  const DepthValuesFit fit = estimator::FitDepthValues(input, search);
+  DepthValuesFit fit = estimator::FitDepthValues(input, search);
+  // Options state px per view step along u, unless there is one column of views.
+  const Eigen::Vector2d& unit_step = input.disparity.step;
+  const double of_stated = unit_step.x() != 0 ? unit_step.x() : unit_step.y();
+  const auto convert = [&](DepthValuesTrial* trial) {
+    trial->scale *= of_stated / static_cast<double>(largest);
+    trial->offset_px *= of_stated;
+  };
+  convert(&fit.best);
+  for (DepthValuesTrial& other : fit.others) convert(&other);
+  fit.scale_sigma *= of_stated / static_cast<double>(largest);
+  fit.offset_sigma_px *= of_stated;
   diagnostics->depth_values = fit;
   if (!fit.is_found) {
     std::string why = fit.message;
@@ -136,8 +150,9 @@ void CorrectValues(const EstimateOptions& options, DepthMeaning* meaning, Prepar
                    EstimateDiagnostics* diagnostics, RunScope* run) {
   estimator::EstimateInput& input = *prepared->input;
   // A camera states the disparities of depths in metres, and values that were found need no search.
-  const auto* scene = std::get_if<SceneSolver>(&options.solver);
-  if (scene == nullptr || scene->photo == PhotoKind::kSharp || input.camera ||
+  const bool is_scene = std::holds_alternative<SceneSolver>(options.solver) ||
+                        std::holds_alternative<SolverChooser>(options.solver);
+  if (!is_scene || IsTakenAsSharp(options) || input.camera ||
       meaning->kind != DepthKind::kDisparity || diagnostics->depth_values)
     return;
   estimator::DepthValuesOptions search;
@@ -169,6 +184,13 @@ void CorrectValues(const EstimateOptions& options, DepthMeaning* meaning, Prepar
   refinement.message = refinement.applied ? refinement.message + "; " + text : text;
   refinement.applied = true;
   refinement.seconds += fit.seconds;
+  run->Warn(fmt::format(
+      "the blur of the photograph agrees with other disparities than those of the depth map, which "
+      "are used ({} {:.4g} {} {:.4g} state them); an aperture that is {} than the stated one has "
+      "the same effect; {} off keeps the map",
+      run->Option("depth.meaning.disparity_scale"), meaning->disparity_scale,
+      run->Option("depth.meaning.disparity_offset_px"), meaning->disparity_offset_px,
+      fit.best.scale < 1 ? "narrower" : "wider", run->Option("refine_depth")));
 }
 
 std::string ValuesReason(const std::string& name, const DepthMeaning& meaning,

@@ -193,7 +193,9 @@ std::size_t WriteLightField(const std::string& folder, const LightFieldEstimate&
     WriteSceneForm(folder, *estimate.scene, run);
     return 0;
   }
-  if (estimate.scene) {  // its views were not made
+  if (estimate.scene) {                     // its views were not made
+    ClaimLightFieldFolder(folder, format);  // refuses a wrong folder before the work
+    const RunScope scope(run);
     LightFieldEstimate rendered;
     rendered.light_field = ViewsOf(*estimate.scene, run);
     rendered.confidence = estimator::RayConfidenceOf(*estimate.scene, run.threads);

@@ -11,6 +11,11 @@
 namespace thicklens::io {
 
 std::string EncodeWebpAnimation(const AnimationFile& animation) {
+  constexpr int kMaxSidePx = 16383;
+  if (animation.width_px > kMaxSidePx || animation.height_px > kMaxSidePx) {
+    throw Error(fmt::format("animation: {}x{} px: a WebP file has at most {} px per side",
+                            animation.width_px, animation.height_px, kMaxSidePx));
+  }
   // No exception crosses the library.
   std::exception_ptr failure;
   AnimationFrames frames;
@@ -18,6 +23,7 @@ std::string EncodeWebpAnimation(const AnimationFile& animation) {
   frames.width_px = animation.width_px;
   frames.height_px = animation.height_px;
   frames.seconds = animation.seconds;
+  frames.icc_profile = animation.icc_profile;
   frames.frame = [&](int number) -> cv::Mat {
     try {
       const model::EncodedImage image = animation.frame(number);

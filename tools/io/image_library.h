@@ -45,7 +45,8 @@ struct LibraryDepth {
 // The frames of an animation that repeats, each asked for when it is encoded.
 struct AnimationFrames {
   int count = 0, width_px = 0, height_px = 0;
-  double seconds = 0;  // length of all frames
+  double seconds = 0;       // length of all frames
+  std::string icc_profile;  // of all frames; empty: none
   // 8 bits, grey or RGB; throws nothing, and returns an empty image where it fails.
   std::function<cv::Mat(int frame)> frame;
 };

@@ -16,10 +16,13 @@
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
+#include "thicklens/estimator/disparity_map.h"
 #include "thicklens/io/image_file.h"
 #include "thicklens/io/image_io.h"
 #include "thicklens/io/light_field_io.h"
 #include "thicklens/model/light_field_file.h"
+#include "thicklens/model/quantised_levels.h"
+#include "thicklens/model/scene.h"
 #include "tools/io/light_field_camera.h"
 #include "tools/io/plain_tiff.h"
 
@@ -27,10 +30,6 @@ namespace thicklens::io {
 namespace {
 
 namespace fs = std::filesystem;
-
-// The light is rounded by at most this, 1 at full scale; otherwise it is stored as floats.
-constexpr double kMaxRounding = 1e-5;
-constexpr double kMaxWhole = 65535;
 
 std::string PathIn(const std::string& folder, const char* name) {
   return (fs::path(folder) / name).string();
@@ -70,38 +69,41 @@ model::LinearImage ReadRadiance(const std::string& path, const model::LightField
       ReadPlane(path, frame, CV_MAKETYPE(is_whole ? CV_16U : CV_32F, frame.channels),
                 is_whole ? "whole numbers of 16 bits in the channels of the light field"
                          : "floats in the channels of the light field");
+  if (is_whole) return model::ToLinear(ToEncodedImage(image), frame.transfer);
   model::LinearImage light{image.cols, image.rows, image.channels(), {}};
   light.values.reserve(image.total() * static_cast<std::size_t>(image.channels()));
-  if (is_whole) {
-    ForEachValue<std::uint16_t>(image, [&](std::uint16_t value) {
-      light.values.push_back(
-          static_cast<float>(planes.radiance_offset + planes.radiance_scale * value));
-    });
-  } else {
-    ForEachValue<float>(image, [&](float value) { light.values.push_back(value); });
-  }
+  ForEachValue<float>(image, [&](float value) { light.values.push_back(value); });
   return light;
 }
 
-// Returns whole numbers for the light and sets their meaning in `planes`; empty if these would
-// differ too much from it.
-std::vector<std::uint16_t> WholeNumbersOf(const std::vector<float>& light,
-                                          model::ScenePlanes* planes) {
+// Returns whether whole numbers can hold the light: neither clipped highlights nor what a prior
+// left below black.
+bool IsWithinScale(const std::vector<float>& light) {
   const auto [least, most] = std::minmax_element(light.begin(), light.end());
-  const double offset = static_cast<double>(*least);
-  const double range = static_cast<double>(*most) - offset;
-  if (!(range / kMaxWhole / 2 <= kMaxRounding)) return {};
-  planes->radiance_bits = 16;
-  planes->radiance_offset = offset;
-  planes->radiance_scale = range > 0 ? range / kMaxWhole : kMaxRounding;
-  std::vector<std::uint16_t> whole;
-  whole.reserve(light.size());
-  const double per_unit = 1 / planes->radiance_scale;
-  for (const float value : light) {
-    const double number = (static_cast<double>(value) - offset) * per_unit + 0.5;
-    whole.push_back(static_cast<std::uint16_t>(std::min(number, kMaxWhole)));
+  return *least >= 0 && *most <= 1;
+}
+
+// Throws Error unless the disparities are those of the stated views.
+void RequireFitting(const std::string& path, const estimator::SceneForm& scene) {
+  const model::LightField& frame = scene.frame;
+  const Eigen::Vector2d& step = scene.disparity.step;
+  Eigen::Vector2d stated(1, 1);
+  if (frame.grid) stated = estimator::DisparityOnGrid(*frame.grid, {1e9F}, 1, 1).step;
+  constexpr double kRounding = 1e-9;
+  if (!((step - stated).norm() <= kRounding * stated.norm())) {
+    throw Error(fmt::format(
+        "{}: scene.disparity_step is [{:g}, {:g}]: {} make it [{:g}, {:g}]", path, step.x(),
+        step.y(), frame.grid ? "the camera and the steps between views" : "views without a camera",
+        stated.x(), stated.y()));
   }
-  return whole;
+  const int size_px = std::max(frame.s_count, frame.t_count);
+  const double px_per_unit = step.cwiseAbs().maxCoeff();
+  for (const float value : scene.disparity.disparity) {
+    if (std::abs(static_cast<double>(value)) * px_per_unit <= size_px) continue;
+    throw Error(fmt::format(
+        "{}: a disparity is {:.4g} px per view step: it must be within the {} px of a view",
+        PathIn(frame.source, model::kSceneDisparityFile), value * px_per_unit, size_px));
+  }
 }
 
 }  // namespace
@@ -143,6 +145,7 @@ estimator::SceneForm ReadSceneForm(const std::string& folder) {
   }
   std::string why;
   if (!scene.IsValid(&why)) throw Error(fmt::format("{}: {}", folder, why));
+  RequireFitting(path, scene);
   return scene;
 }
 
@@ -176,11 +179,14 @@ void WriteSceneForm(const estimator::SceneForm& scene, OutputFolder* folder) {
   model::ScenePlanes& planes = description.scene.emplace();
   planes.disparity_step = scene.disparity.step;
   planes.has_colour_profile = !frame.colour_profile.empty();
-  const std::vector<std::uint16_t> whole = WholeNumbersOf(scene.radiance.values, &planes);
+  const bool is_whole = IsWithinScale(scene.radiance.values);
+  planes.radiance_bits = is_whole ? 16 : 32;
   folder->WriteWith(
       model::kSceneRadianceFile, [&](const std::string& path, const std::string& shown) {
-        if (whole.empty()) return WriteFloatTiff(scene.radiance, path, shown);
-        WriteWholeTiff(whole, frame.s_count, frame.t_count, frame.channels, path, shown);
+        if (!is_whole) return WriteFloatTiff(scene.radiance, path, shown);
+        const model::EncodedImage encoded =
+            model::ToEncoded(scene.radiance, model::QuantisedLevels(frame.transfer, 16));
+        WriteWholeTiff(encoded.values, frame.s_count, frame.t_count, frame.channels, path, shown);
       });
   folder->WriteWith(
       model::kSceneDisparityFile, [&](const std::string& path, const std::string& shown) {

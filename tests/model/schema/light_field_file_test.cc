@@ -100,25 +100,23 @@ TEST(LightFieldFile, ReadsWhatIsThere) {
 TEST(LightFieldFile, AScene) {
   std::string text = Replaced(kRelative, "light-field/1", "light-field/2");
   text = Replaced(text, "view_format: png\n",
-                  "scene: {radiance: radiance.tiff, radiance_bits: 16, radiance_offset: -0.25, "
-                  "radiance_scale: 1e-5, disparity: disparity.tiff, disparity_step: [0.5, 2]}\n");
+                  "scene: {radiance: scene/radiance.tiff, radiance_bits: 16, disparity: "
+                  "scene/disparity.tiff, disparity_step: [0.5, 2]}\n");
   const LightFieldDescription scene = ParseLightFieldDescription(text, "l.yaml");
   EXPECT_THAT(scene.view_format, IsEmpty());
   EXPECT_FALSE(scene.has_confidence);
   ASSERT_TRUE(scene.scene);
   EXPECT_EQ(scene.scene->radiance_bits, 16);
-  EXPECT_EQ(scene.scene->radiance_offset, -0.25);
-  EXPECT_EQ(scene.scene->radiance_scale, 1e-5);
   EXPECT_EQ(scene.scene->disparity_step, Eigen::Vector2d(0.5, 2));
   EXPECT_FALSE(scene.scene->has_colour_profile);
   const std::string written = LightFieldDescriptionToYaml(scene);
   const LightFieldDescription again = ParseLightFieldDescription(written, "again.yaml");
-  EXPECT_EQ(again.scene->radiance_scale, 1e-5);
+  EXPECT_EQ(again.scene->disparity_step, scene.scene->disparity_step);
   EXPECT_EQ(LightFieldDescriptionToYaml(again), written);
-  EXPECT_THAT(ErrorOfText(Replaced(text, "radiance_scale: 1e-5", "radiance_scale: 0")),
-              HasSubstr("scene.radiance_scale"));
-  EXPECT_THAT(ErrorOfText(Replaced(text, "radiance_offset: -0.25, ", "")),
-              HasSubstr("'radiance_offset' is missing"));
+  EXPECT_THAT(ErrorOfText(Replaced(text, "radiance_bits: 16, ", "")),
+              HasSubstr("'radiance_bits' is missing"));
+  EXPECT_THAT(ErrorOfText(Replaced(text, "scene/radiance.tiff", "/etc/passwd")),
+              HasSubstr("scene.radiance"));
   EXPECT_THAT(ErrorOfText(text + "missing_views: [[0, 0]]\n"), HasSubstr("missing_views"));
 }
 

@@ -319,7 +319,8 @@ TEST_F(OpenClFaults, ADeviceThatIsLostHalfwayIsReportedAndRemovesNoFile) {
   const Contents before = ContentsOf(job.output);
   const std::vector<Arguments> commands = {
       Estimate({"--views", "3x3", "--solver", "blocks", "--device", "opencl", "-o", job.output}),
-      Estimate({"--views", "3x3", "--solver", "scene", "--device", "opencl", "-o", job.output}),
+      Estimate({"--views", "3x3", "--solver", "scene", "--store", "views", "--device", "opencl",
+                "-o", job.output}),
       {"render", job.output, "--focus", "300", "--device", "opencl", "-o", folder_ / "new.png"}};
   int lost = 0;
   for (const Arguments& command : commands) {

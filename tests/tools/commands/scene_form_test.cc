@@ -100,7 +100,7 @@ TEST_F(SceneFormCommandTest, ShowsTheViewsOfTheEstimate) {
   EXPECT_FALSE(fs::exists(fs::path(Output()) / "views"));
   EXPECT_FALSE(fs::exists(fs::path(Output()) / "confidence"));
   const model::LightField of_scene = io::ReadLightField(Output(), {});
-  EXPECT_LE(LargestDifference(of_scene.values, views.values), 2e-5);
+  EXPECT_LE(LargestDifference(of_scene.values, views.values), 4e-5);
   EXPECT_EQ(io::ReadConfidence(Output(), 1), confidence);
   EXPECT_EQ(of_scene.origin.strength, views.origin.strength);
 }
@@ -147,11 +147,35 @@ TEST_F(SceneFormCommandTest, RendersViewsBetweenTheViews) {
   }
 }
 
+TEST_F(SceneFormCommandTest, InnerViewsAndPartsAreThoseOfTheViews) {
+  Summary(With(Usual(), {"--store", "scene"}));
+  const std::string scene = Output();
+  const std::string views = folder_ / "views-of-it";
+  ASSERT_EQ(RunProgram({"render", scene, "--convert", "thicklens-tiff", "-o", views}).exit_code, 0);
+  const Arguments part = {"--views", "3x1", "--crop", "10,4,40,30"};
+  for (Arguments what : {Arguments{"--view", "2,0"}, {"--view", "centre"}}) {
+    what.insert(what.end(), part.begin(), part.end());
+    const model::LinearImage of_scene = Rendered(scene, what);
+    EXPECT_EQ(of_scene.width_px, 40);
+    EXPECT_LE(LargestDifference(of_scene.values, Rendered(views, what).values), 1e-6);
+  }
+  // Between views, a part of an inner view is a part of the view.
+  const model::LinearImage whole = Rendered(scene, {"--view", "2.5,1"});
+  const model::LinearImage inner =
+      Rendered(scene, {"--view", "1.5,0", "--views", "3x1", "--crop", "10,4,40,30"});
+  for (int y = 0; y < 30; ++y) {
+    for (int x = 0; x < 40; ++x) ASSERT_EQ(inner.at(x, y, 1), whole.at(x + 10, y + 4, 1));
+  }
+  const ProgramResult refused = RunProgram(
+      {"render", scene, "--view", "1.5,1", "--view-order", "swap", "-o", folder_ / "view.png"});
+  EXPECT_THAT(refused.err, HasSubstr("exclude --layout"));
+}
+
 TEST_F(SceneFormCommandTest, AReportShowsItsViews) {
   const json summary = Summary(With(Usual(), {"--store", "scene", "--report", folder_ / "page"}));
   EXPECT_EQ(summary["stored"], "scene");
   EXPECT_TRUE(fs::exists(folder_ / "page/index.html"));
-  EXPECT_TRUE(fs::exists(fs::path(Output()) / "radiance.tiff"));
+  EXPECT_TRUE(fs::exists(fs::path(Output()) / "scene/radiance.tiff"));
 }
 
 TEST_F(SceneFormCommandTest, ACamerasDepthsAreKept) {
@@ -168,13 +192,32 @@ TEST_F(SceneFormCommandTest, ACamerasDepthsAreKept) {
   const model::LightField views = io::ReadLightField(Output(), {});
   Summary(With(arguments, {"--store", "scene"}));
   const model::LightField of_scene = io::ReadLightField(Output(), {});
-  EXPECT_LE(LargestDifference(of_scene.values, views.values), 2e-5);
+  EXPECT_LE(LargestDifference(of_scene.values, views.values), 4e-5);
   ASSERT_TRUE(of_scene.grid && of_scene.camera);
   EXPECT_EQ(of_scene.landing_step_px, views.landing_step_px);
   const ProgramResult result =
       RunProgram({"render", Output(), "--focus", "700", "-o", folder_ / "focus.png"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, HasSubstr("focus at 700 mm"));
+  // Stored views are interpolated once more, which changes the details a little; at another depth
+  // everything is displaced.
+  const std::string stored = folder_ / "views-of-it";
+  ASSERT_EQ(RunProgram({"render", Output(), "--convert", "thicklens-tiff", "-o", stored}).exit_code,
+            0);
+  const auto rms = [&](const char* of_scene, const char* of_views) {
+    const model::LinearImage a = Rendered(Output(), {"--focus", of_scene});
+    const model::LinearImage b = Rendered(stored, {"--focus", of_views});
+    double squares = 0;
+    int count = 0;
+    for (int y = 8; y < kRows - 8; ++y) {
+      for (int x = 8; x < kColumns - 8; ++x, ++count)
+        squares += std::pow(static_cast<double>(a.at(x, y, 1) - b.at(x, y, 1)), 2);
+    }
+    return std::sqrt(squares / count);
+  };
+  for (const char* depth_mm : {"700", "1000"}) {
+    EXPECT_LT(rms(depth_mm, depth_mm), 0.2 * rms("700", "1000")) << depth_mm;
+  }
 }
 
 // The chunks of a WebP file of that name.
@@ -206,6 +249,9 @@ TEST_F(SceneFormCommandTest, BecomesAnAnimation) {
   }
   EXPECT_THAT(RunProgram({"render", Output(), "--animate", "focus", "-o", folder_ / "a.mp4"}).err,
               HasSubstr(".webp"));
+  EXPECT_THAT(
+      RunProgram({"render", Output(), "--animate", "focus", "--crop", "0,0,8,8", "-o", file}).err,
+      HasSubstr("excludes --views, --crop"));
   EXPECT_THAT(RunProgram({"render", Output(), "--view", "1,1", "--frames", "6", "-o", file}).err,
               HasSubstr("--frames: requires --animate"));
   Summary(With(Usual(), {"--format", "png"}));

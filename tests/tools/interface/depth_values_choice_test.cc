@@ -139,8 +139,10 @@ TEST(DepthValuesChoice, AReversedMapAndASmallApertureAreLeftToTheirOwnChecks) {
 
 TEST(DepthValuesChoice, TheValuesOfARelativeMapAreFound) {
   const SteppedScene scene = SceneOf(2);
-  for (const double sign : {1.0, -1.0}) {
-    DepthMap map = MapOf(scene, sign / 60, -1.8);
+  // The numbers may be larger than the image, as those of a map of 16 bits.
+  for (const double per_px : {60.0, -60.0, 6000.0}) {
+    const double sign = per_px < 0 ? -1 : 1;
+    DepthMap map = MapOf(scene, 1 / per_px, -1.8);
     for (float& value : map.values) value = std::round(value);
     map.meaning.is_relative = true;
     map.meaning.disparity_scale = sign;
@@ -148,7 +150,8 @@ TEST(DepthValuesChoice, TheValuesOfARelativeMapAreFound) {
     const Problem problem =
         PrepareProblem(PhotoOf(scene), map, {}, RefinedBy(), &found, OnOneThread());
     ASSERT_TRUE(found.depth_values);
-    EXPECT_NEAR(found.depth_values->best.scale, 1 / 60.0, 3 * found.depth_values->scale_sigma);
+    EXPECT_NEAR(found.depth_values->best.scale, 1 / std::abs(per_px),
+                3 * found.depth_values->scale_sigma);
     EXPECT_LT(RmsError(problem.disparity(), scene), 0.06);
     std::string said;
     for (const Notice& notice : found.notices) said += notice.text + "\n";

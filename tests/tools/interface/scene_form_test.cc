@@ -156,6 +156,7 @@ TEST(SceneFormInterface, OptionsOfAnimationsAreChecked) {
   };
   EXPECT_EQ(field_of([](AnimationOptions* o) { o->frames = 1; }), "frames");
   EXPECT_EQ(field_of([](AnimationOptions* o) { o->seconds = std::nan(""); }), "seconds");
+  EXPECT_EQ(field_of([](AnimationOptions* o) { o->seconds = 0.5; }), "frames");
   EXPECT_EQ(field_of([](AnimationOptions* o) { o->quality = 101; }), "quality");
   EXPECT_EQ(field_of([](AnimationOptions* o) { o->kind = static_cast<AnimationKind>(7); }), "kind");
   EXPECT_EQ(field_of([](AnimationOptions* o) { o->aperture.radius = 1; }), "aperture");

@@ -3,6 +3,7 @@
 #include <webp/mux.h>
 
 #include <cmath>
+#include <cstdint>
 #include <memory>
 #include <opencv2/core.hpp>
 
@@ -15,6 +16,19 @@ struct FreePicture {
   void operator()(WebPPicture* picture) const { WebPPictureFree(picture); }
 };
 
+std::string WithProfile(const WebPData& file, const std::string& icc_profile) {
+  const std::unique_ptr<WebPMux, void (*)(WebPMux*)> mux(WebPMuxCreate(&file, 1), WebPMuxDelete);
+  const WebPData profile{reinterpret_cast<const std::uint8_t*>(icc_profile.data()),  // NOLINT
+                         icc_profile.size()};
+  WebPData whole;
+  WebPDataInit(&whole);
+  const std::unique_ptr<WebPData, void (*)(WebPData*)> freed(&whole, WebPDataClear);
+  if (!mux || WebPMuxSetChunk(mux.get(), "ICCP", &profile, 1) != WEBP_MUX_OK ||
+      WebPMuxAssemble(mux.get(), &whole) != WEBP_MUX_OK)
+    throw Refusal("its colour profile cannot be stored");
+  return {reinterpret_cast<const char*>(whole.bytes), whole.size};  // NOLINT: bytes
+}
+
 }  // namespace
 
 std::string EncodeWebpFrames(const AnimationFrames& frames, int quality) {
@@ -26,7 +40,7 @@ std::string EncodeWebpFrames(const AnimationFrames& frames, int quality) {
   options.anim_params.loop_count = 0;  // for ever
   const std::unique_ptr<WebPAnimEncoder, void (*)(WebPAnimEncoder*)> encoder(
       WebPAnimEncoderNew(frames.width_px, frames.height_px, &options), WebPAnimEncoderDelete);
-  if (!encoder) throw Refusal("a WebP file has at most 16383 px per side");
+  if (!encoder) throw Refusal("libwebpmux makes no encoder of this size");
   // Times are whole milliseconds; rounding each keeps the length of the whole.
   const auto time_ms = [&frames](int frame) {
     return static_cast<int>(std::lround(1000 * frames.seconds * frame / frames.count));
@@ -41,8 +55,9 @@ std::string EncodeWebpFrames(const AnimationFrames& frames, int quality) {
     picture.use_argb = 1;
     picture.width = pixels.cols;
     picture.height = pixels.rows;
-    if (WebPPictureImportRGB(&picture, pixels.data, static_cast<int>(pixels.step)) == 0 ||
-        WebPAnimEncoderAdd(encoder.get(), &picture, time_ms(frame), &config) == 0)
+    if (WebPPictureImportRGB(&picture, pixels.data, static_cast<int>(pixels.step)) == 0)
+      throw Refusal("there is too little memory for a frame");
+    if (WebPAnimEncoderAdd(encoder.get(), &picture, time_ms(frame), &config) == 0)
       throw Refusal(WebPAnimEncoderGetError(encoder.get()));
   }
   WebPData data;
@@ -51,7 +66,9 @@ std::string EncodeWebpFrames(const AnimationFrames& frames, int quality) {
   if (WebPAnimEncoderAdd(encoder.get(), nullptr, time_ms(frames.count), nullptr) == 0 ||
       WebPAnimEncoderAssemble(encoder.get(), &data) == 0)
     throw Refusal(WebPAnimEncoderGetError(encoder.get()));
-  return {reinterpret_cast<const char*>(data.bytes), data.size};  // NOLINT: bytes
+  if (frames.icc_profile.empty())
+    return {reinterpret_cast<const char*>(data.bytes), data.size};  // NOLINT: bytes
+  return WithProfile(data, frames.icc_profile);
 }
 
 }  // namespace thicklens::io

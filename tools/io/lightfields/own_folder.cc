@@ -11,6 +11,7 @@
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/input_file.h"
+#include "thicklens/base/memory_available.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/io/image_file.h"
 #include "thicklens/io/scene_form_files.h"
@@ -81,8 +82,25 @@ std::string ProfileOfViews(const std::string& folder, const model::LightField& f
   return "";
 }
 
-ViewSource SourceOfScene(const std::string& folder) {
+// Rendered views take memory that no file states. Throws Error if there is too little.
+void RequireMemoryForViews(const std::string& folder, const LightFieldReading& reading,
+                           const model::LightField& frame) {
+  const double views = reading.u_count > 0 ? static_cast<double>(reading.u_count) * reading.v_count
+                                           : static_cast<double>(frame.u_count) * frame.v_count;
+  const double pixels = static_cast<double>(frame.s_count) * frame.t_count;
+  constexpr double kMib = 1 << 20;
+  const double needed_mib = views * pixels * frame.channels * sizeof(float) / kMib;
+  const std::optional<double> left_mib = MemoryLeftMib();
+  if (!left_mib || needed_mib <= *left_mib) return;
+  throw Error(fmt::format(
+      "{}: its views take {:.0f} MiB, and {:.0f} MiB of memory are left; the option views reads "
+      "fewer of them, and single views can be rendered",
+      folder, needed_mib, *left_mib));
+}
+
+ViewSource SourceOfScene(const std::string& folder, const LightFieldReading& reading) {
   SceneViews views = OpenSceneViews(folder);
+  RequireMemoryForViews(folder, reading, views.frame);
   ViewSource source;
   source.is_own = source.is_plain = true;
   source.kind = "a light field of thicklens, stored as its scene";
@@ -100,7 +118,7 @@ std::optional<ViewSource> OpenOwnFolder(const LayoutInput& input) {
   if (!input.is_forced && !fs::exists(description_path, ignored)) return std::nullopt;
   const model::LightFieldDescription description =
       model::ReadLightFieldDescription(description_path);
-  if (description.scene) return SourceOfScene(folder);
+  if (description.scene) return SourceOfScene(folder, *input.reading);
   ViewSource source;
   source.is_own = source.is_plain = true;
   source.kind = "a light field of thicklens";

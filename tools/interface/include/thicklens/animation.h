@@ -15,16 +15,18 @@ enum class AnimationKind {
   // The viewpoint goes once around the aperture, on the ellipse through the outermost views of the
   // middle row and column.
   kParallax,
-  kFocus,  // the focus goes from the farthest point to the nearest one and back
+  // The focus goes from the far end of the scene to the near one and back; 0.5 % of the points at
+  // either end are left out, because a few wrong depths would stretch the way.
+  kFocus,
 };
 
 // The options of RenderAnimation.
 struct AnimationOptions {
   AnimationKind kind = AnimationKind::kParallax;  // what changes
   int frames = 36;                                // 2 to 1000
-  double seconds = 3;                             // length of one loop, s, 0.1 to 3600
-  int quality = 90;                               // of the compression, 0 to 100
-  RenderAperture aperture;                        // of kFocus
+  double seconds = 3;       // length of one loop, s, 0.1 to 3600, and at least 0.02 per frame
+  int quality = 90;         // of the compression, 0 to 100
+  RenderAperture aperture;  // of kFocus
 
   // Returns whether all members are valid. Otherwise `why`, if not null, gets the field, the value
   // and the constraint.

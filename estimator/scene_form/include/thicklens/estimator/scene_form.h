@@ -15,9 +15,9 @@
 namespace thicklens::estimator {
 
 // A light field as the scene that it shows: three planes instead of U x V views. It holds what
-// EstimateScene found, and every view of that estimate follows from it bit for bit. Points that the
-// centre view does not show are no part of it: a view that would show them repeats the background
-// beside them, as EstimateScene does.
+// EstimateScene found, and every view that it would make on the processor follows bit for bit.
+// Points that the centre view does not show are no part of it: a view that would show them repeats
+// the background beside them, as EstimateScene does.
 struct SceneForm {
   // Sizes, weights, transfer curve, grid, camera and origin of the light field; without values, and
   // with all views present.

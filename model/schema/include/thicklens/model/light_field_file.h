@@ -12,9 +12,7 @@ namespace thicklens::model {
 
 // How the planes of a light field are stored that is kept as its scene.
 struct ScenePlanes {
-  int radiance_bits = 32;  // 32: floats; 16: whole numbers N, linear light offset + scale N
-  // Linear light, 1 at full scale; for floats 0 and 1. The scale is > 0.
-  double radiance_offset = 0, radiance_scale = 1;
+  int radiance_bits = 32;  // 32: floats, linear light; 16: values that the transfer curve encoded
   Eigen::Vector2d disparity_step{1, 1};  // px per view step along u and v, per unit of disparity
   bool has_colour_profile = false;       // the ICC profile of views is in a file
 };
@@ -34,10 +32,10 @@ struct LightFieldDescription {
 };
 
 // Names of the files of a light field that is stored as its scene, in its folder.
-constexpr char kSceneRadianceFile[] = "radiance.tiff";      // light of the points, S x T px
-constexpr char kSceneDisparityFile[] = "disparity.tiff";    // their disparity, floats
-constexpr char kSceneConfidenceFile[] = "confidence.png";   // their confidence, 8 bits
-constexpr char kSceneProfileFile[] = "colour-profile.icc";  // of views
+constexpr char kSceneRadianceFile[] = "scene/radiance.tiff";      // light of the points, S x T px
+constexpr char kSceneDisparityFile[] = "scene/disparity.tiff";    // their disparity, floats
+constexpr char kSceneConfidenceFile[] = "scene/confidence.png";   // their confidence, 8 bits
+constexpr char kSceneProfileFile[] = "scene/colour-profile.icc";  // of views
 
 // File name "view_VV_UU" of the view (k, l) without its extension. Each number has two digits, more
 // where needed.

@@ -30,9 +30,9 @@ struct SceneViews {
 THICKLENS_EXPORT SceneViews OpenSceneViews(const std::string& folder);
 
 // Writes a light field as its scene below the staging path of a folder for light fields; the caller
-// commits it. The light is stored as whole numbers of 16 bits where these are within 1e-5 of it (of
-// full scale), and as floats otherwise, for example with highlights above full scale; disparities
-// are floats. Throws Error for a scene that is not valid and for a file that cannot be written.
+// commits it. The light is stored as views in PNG files are, encoded by the transfer curve in 16
+// bits, where it lies between black and full scale, and as floats otherwise; disparities are
+// floats. Throws Error for a scene that is not valid and for a file that cannot be written.
 THICKLENS_EXPORT void WriteSceneForm(const estimator::SceneForm& scene, OutputFolder* folder);
 
 }  // namespace thicklens::io
